@@ -1,0 +1,188 @@
+"""Attitude-altitude feedback linearization of the tiltrotor (ch. 3, Sec. 3; ch. 4, Sec. 3).
+
+Outputs are roll, pitch, yaw and altitude; inputs the four rotor accelerations, reached by the
+third derivative. Position is steered through roll and pitch by a decoupler. The law is one
+function of time and state, built from the steps below in the order in which a reader of ch. 4
+meets them.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from controllers.decoupling_matrix import (
+    body_force,
+    sines_and_cosines,
+    solve_by_pairs,
+    torque_entries,
+    torque_free_force,
+    vertical_force_entries,
+)
+from controllers.decouplers import (
+    CONVENTIONAL,
+    EXACT,
+    NONE,
+    conventional_decoupler,
+    exact_decoupler,
+    modified_decoupler,
+)
+from controllers.gaits import GaitParameters
+from controllers.references import ReferenceParameters, position_reference
+from controllers.rotation import world_up_in_body
+from controllers.scalar import scalar
+from controllers.vehicle import Vehicle, drag_ratio
+
+PUBLISHED_DECOUPLING: Final = 0
+EXACT_DECOUPLING: Final = 1
+
+DECOUPLINGS: Final = {"published": PUBLISHED_DECOUPLING, "exact": EXACT_DECOUPLING}
+"""Forms of the decoupling matrix by the name a scenario gives them."""
+
+
+class Gains(NamedTuple):
+    """Gains of the third-order laws and of the position loop (ch. 4, Eqs. 26-28).
+
+    ``1`` multiplies the error of the second derivative, ``2`` of the first, ``3`` of the output;
+    in the position loop ``1`` multiplies the velocity error and ``2`` the position error.
+    """
+
+    roll_1: float  # [K_P1] 1/s
+    roll_2: float  # [K_P2] 1/s^2
+    roll_3: float  # [K_P3] 1/s^3
+    pitch_1: float
+    pitch_2: float
+    pitch_3: float
+    yaw_1: float
+    yaw_2: float
+    yaw_3: float
+    altitude_1: float  # [K_PZ1] 1/s
+    altitude_2: float  # [K_PZ2] 1/s^2
+    altitude_3: float  # [K_PZ3] 1/s^3
+    position_1: float  # [K_X1 = K_Y1] 1/s
+    position_2: float  # [K_X2 = K_Y2] 1/s^2
+
+
+class Parameters(NamedTuple):
+    """All that the law needs to know besides time and state."""
+
+    vehicle: Vehicle
+    gains: Gains
+    gait: GaitParameters
+    reference: ReferenceParameters
+    decoupler: float
+    decoupling: float
+
+
+STATE_FIELDS: Final = (
+    *("x", "y", "z", "vx", "vy", "vz"),  # 0-5: m and m/s, world axes
+    *("roll", "pitch", "yaw", "p", "q", "r"),  # 6-11: rad; body rates, rad/s
+    *("alpha_1", "alpha_2", "alpha_3", "alpha_4"),  # 12-15: rad
+    *("rotor_speed_1", "rotor_speed_2", "rotor_speed_3", "rotor_speed_4"),  # 16-19: rad/s, signed
+)
+"""The vehicle's state as the law takes it: one float per name, in this order."""
+
+
+@scalar
+def attitude_reference(time, state, trig, parameters):
+    """Attitude and altitude to track, with the altitude's derivatives (ch. 4, Eqs. 28-30).
+
+    ``trig`` holds the sines and cosines of the tilt angles, see `sines_and_cosines`. Returns
+    ``(roll, pitch, yaw, z, vz, az)`` in rad and SI units.
+    """
+    reference = parameters.reference
+    x_ref, y_ref, z_ref, vx_ref, vy_ref, vz_ref, ax_ref, ay_ref, az_ref = position_reference(
+        time, reference
+    )
+    yaw_ref = reference.yaw
+    if parameters.decoupler == NONE:
+        return reference.roll, reference.pitch, yaw_ref, z_ref, vz_ref, az_ref
+
+    # Eq. (28): the horizontal acceleration that would take the vehicle to its reference.
+    gains = parameters.gains
+    ax = ax_ref + gains.position_1 * (vx_ref - state[3]) + gains.position_2 * (x_ref - state[0])
+    ay = ay_ref + gains.position_1 * (vy_ref - state[4]) + gains.position_2 * (y_ref - state[1])
+
+    vehicle = parameters.vehicle
+    gravity = vehicle.gravity
+    if parameters.decoupler == CONVENTIONAL:
+        roll_ref, pitch_ref = conventional_decoupler(ax, ay, yaw_ref, gravity)
+        return roll_ref, pitch_ref, yaw_ref, z_ref, vz_ref, az_ref
+
+    nx, ny, nz = torque_free_force(trig, drag_ratio(vehicle))
+    if parameters.decoupler == EXACT:
+        roll_ref, pitch_ref = exact_decoupler(ax, ay, az_ref, yaw_ref, gravity, nx, ny, nz)
+    else:
+        roll_ref, pitch_ref = modified_decoupler(ax, ay, yaw_ref, gravity, nx, ny, nz)
+    return roll_ref, pitch_ref, yaw_ref, z_ref, vz_ref, az_ref
+
+
+@scalar
+def rotor_accelerations(time, state, parameters):
+    """The rotor accelerations (rad/s^2) of the feedback linearization at a time and state.
+
+    Third-order laws (ch. 4, Eqs. 26-27) on the outputs give the wanted third derivatives; the
+    decoupling matrix and ``Ma`` (Eq. 18) turn them into inputs (Eq. 19). Body rates stand for
+    the rates of roll, pitch and yaw (ch. 3, Eq. 8), second derivatives come from the model. NaN
+    where the decoupling matrix is singular.
+    """
+    z, vz = state[2], state[5]
+    roll, pitch, yaw, p, q, r = state[6], state[7], state[8], state[9], state[10], state[11]
+    speed_1, speed_2, speed_3, speed_4 = state[16], state[17], state[18], state[19]
+    vehicle = parameters.vehicle
+    gains = parameters.gains
+
+    trig = sines_and_cosines(state[12], state[13], state[14], state[15])
+    roll_ref, pitch_ref, yaw_ref, z_ref, vz_ref, az_ref = attitude_reference(
+        time, state, trig, parameters
+    )
+
+    # Second derivatives of the outputs, Eq. (10), from w_i = varpi_i |varpi_i|.
+    factor_1, factor_2 = 2.0 * abs(speed_1), 2.0 * abs(speed_2)
+    factor_3, factor_4 = 2.0 * abs(speed_3), 2.0 * abs(speed_4)
+    w1, w2 = 0.5 * factor_1 * speed_1, 0.5 * factor_2 * speed_2
+    w3, w4 = 0.5 * factor_3 * speed_3, 0.5 * factor_4 * speed_4
+    x2, x4, y1, y3, z1, z2, z3, z4 = torque_entries(trig, drag_ratio(vehicle))
+    per_torque = vehicle.arm_length * vehicle.thrust_coefficient
+    per_roll = per_torque / vehicle.inertia_xx
+    per_pitch = per_torque / vehicle.inertia_yy
+    per_yaw = per_torque / vehicle.inertia_zz
+    roll_acceleration = per_roll * (x2 * w2 + x4 * w4)
+    pitch_acceleration = per_pitch * (y1 * w1 + y3 * w3)
+    yaw_acceleration = per_yaw * (z1 * w1 + z2 * w2 + z3 * w3 + z4 * w4)
+    ux, uy, uz = world_up_in_body(roll, pitch)
+    h1, h2, h3, h4 = vertical_force_entries(trig, ux, uy, uz)
+    per_lift = vehicle.thrust_coefficient / vehicle.mass
+    altitude_acceleration = per_lift * (h1 * w1 + h2 * w2 + h3 * w3 + h4 * w4) - vehicle.gravity
+
+    # Ma, Eq. (18): the thrust direction turns with the body, r3^T (omega x F w) / m.
+    fx, fy, fz = body_force(trig, w1, w2, w3, w4)
+    turning = per_lift * (ux * (q * fz - r * fy) + uy * (r * fx - p * fz) + uz * (p * fy - q * fx))
+
+    # Third-order laws, Eqs. (26)-(27); the references of roll, pitch and yaw are held constant.
+    roll_jerk = (
+        gains.roll_3 * (roll_ref - roll) - gains.roll_2 * p - gains.roll_1 * roll_acceleration
+    )
+    pitch_jerk = (
+        gains.pitch_3 * (pitch_ref - pitch) - gains.pitch_2 * q - gains.pitch_1 * pitch_acceleration
+    )
+    yaw_jerk = gains.yaw_3 * (yaw_ref - yaw) - gains.yaw_2 * r - gains.yaw_1 * yaw_acceleration
+    altitude_jerk = (
+        gains.altitude_3 * (z_ref - z)
+        + gains.altitude_2 * (vz_ref - vz)
+        + gains.altitude_1 * (az_ref - altitude_acceleration)
+    )
+
+    # Eq. (19). The published matrix has the factor 2 |varpi_i| in its last row alone; the exact one
+    # has it in every row, so that it can be taken out of the matrix and divided out of the answer.
+    if parameters.decoupling == PUBLISHED_DECOUPLING:
+        h1, h2, h3, h4 = h1 * factor_1, h2 * factor_2, h3 * factor_3, h4 * factor_4
+        factor_1 = factor_2 = factor_3 = factor_4 = 1.0
+    v1, v2, v3, v4 = solve_by_pairs(
+        (x2, x4, y1, y3, z1, z2, z3, z4),
+        (h1, h2, h3, h4),
+        roll_jerk / per_roll,
+        pitch_jerk / per_pitch,
+        yaw_jerk / per_yaw,
+        (altitude_jerk - turning) / per_lift,
+    )
+    return v1 / factor_1, v2 / factor_2, v3 / factor_3, v4 / factor_4

@@ -1,0 +1,55 @@
+"""Parameter records: one declaration read by name in Python and in native code.
+
+A record is a ``NamedTuple`` whose fields are floats or further records. Flattened, it fills the
+head of MuJoCo's ``userdata``, so the parameters of a flight are part of its state; seen through
+`record_dtype`, the same numbers are a struct whose fields native code reads by the same names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any, TypeVar, get_type_hints
+
+import numpy as np
+
+Record = TypeVar("Record", bound=tuple[Any, ...])
+
+
+def flatten(record: Iterable[Any]) -> Iterator[float]:
+    """Yield the floats of a record in the order of declaration, nested records in place."""
+    for value in record:
+        if isinstance(value, tuple):
+            yield from flatten(value)
+        else:
+            yield float(value)
+
+
+def unflatten(record_type: type[Record], values: Iterable[float]) -> Record:
+    """Rebuild a record of the given type from its floats; the inverse of `flatten`."""
+    return _take(record_type, iter(values))
+
+
+def _take(record_type: type[Record], values: Iterator[float]) -> Record:
+    fields = get_type_hints(record_type).values()
+    return record_type(
+        *(_take(kind, values) if _is_record(kind) else next(values) for kind in fields)
+    )
+
+
+def record_dtype(record_type: type[tuple[Any, ...]]) -> np.dtype[np.void]:
+    """The structured dtype (all float64, no padding) with the record's field names."""
+    return np.dtype(
+        [
+            (name, record_dtype(kind) if _is_record(kind) else np.float64)
+            for name, kind in get_type_hints(record_type).items()
+        ]
+    )
+
+
+def record_size(record_type: type[tuple[Any, ...]]) -> int:
+    """The number of floats in a flattened record."""
+    return record_dtype(record_type).itemsize // np.dtype(np.float64).itemsize
+
+
+def _is_record(kind: type) -> bool:
+    return isinstance(kind, type) and issubclass(kind, tuple)

@@ -1,0 +1,41 @@
+"""Rotations between body and world in roll, pitch, yaw (ch. 3, Eq. 2: R = Rz(yaw) Ry(pitch) Rx(roll))."""
+
+from __future__ import annotations
+
+from math import asin, atan2, cos, sin
+
+from controllers.scalar import scalar
+
+
+@scalar
+def euler_from_quaternion(w, x, y, z):
+    """Roll, pitch and yaw (rad) of a unit quaternion, scalar first."""
+    sin_pitch = 2.0 * (w * y - z * x)
+    # Rounding may carry the sine past one at pitch = +-90 degrees.
+    sin_pitch = min(1.0, max(-1.0, sin_pitch))
+    return (
+        atan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+        asin(sin_pitch),
+        atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)),
+    )
+
+
+@scalar
+def quaternion_from_euler(roll, pitch, yaw):
+    """The unit quaternion (scalar first) of roll, pitch and yaw (rad)."""
+    cr, sr = cos(0.5 * roll), sin(0.5 * roll)
+    cp, sp = cos(0.5 * pitch), sin(0.5 * pitch)
+    cy, sy = cos(0.5 * yaw), sin(0.5 * yaw)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+@scalar
+def world_up_in_body(roll, pitch):
+    """World up seen from the body, ``r3``: the third row of the body-to-world rotation."""
+    cos_pitch = cos(pitch)
+    return -sin(pitch), sin(roll) * cos_pitch, cos(roll) * cos_pitch

@@ -1,0 +1,27 @@
+"""Mark the functions that must run on plain floats and, unchanged, in native code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+_registry: list[Callable[..., Any]] = []
+
+
+def scalar(function: Function) -> Function:
+    """Register ``function`` as scalar code and return it untouched.
+
+    Scalar code works on floats, tuples of floats and parameter records; it uses only arithmetic,
+    comparisons, the ``math`` module and other scalar functions. Called from Python it is ordinary
+    Python; the native engine compiles the very same source, callees before callers, in the order
+    of registration. A marker, not a compiler: importing ``controllers`` never imports numba.
+    """
+    _registry.append(function)
+    return function
+
+
+def scalar_functions() -> tuple[Callable[..., Any], ...]:
+    """All functions registered so far, callees before their callers."""
+    return tuple(_registry)
