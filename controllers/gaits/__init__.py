@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from controllers.gaits.trot import continuous_trot, instant_trot
+from controllers.gaits.trot import TiltsAndRates, continuous_trot, instant_trot
 from controllers.scalar import scalar
 
 FIXED: Final = 0
@@ -32,7 +32,7 @@ class GaitParameters(NamedTuple):
 
 
 @scalar
-def tilt_reference(time, gait):
+def tilt_reference(time: float, gait: GaitParameters) -> TiltsAndRates:
     """The planned tilt angles (rad) and their rates (rad/s) at a time (s).
 
     Returns ``(alpha_1, ..., alpha_4, rate_1, ..., rate_4)``.
