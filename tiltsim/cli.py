@@ -10,7 +10,7 @@ from typing import Final
 
 from tiltsim.errors import InputError
 
-COMMANDS: Final = ("run", "list", "schema")
+COMMANDS: Final = ("run", "check", "list", "bench", "schema")
 INPUT_ERROR: Final = 2
 INTERRUPTED: Final = 130
 

@@ -299,6 +299,9 @@ class Expectation(Table):
     min: float | None = None
     max: float | None = None
     equals: bool | None = Field(None, description="for metrics that are true or false")
+    plant: Literal["mujoco", "thesis"] | None = Field(
+        None, description="judge on this plant alone; default: on either"
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Self:
