@@ -73,3 +73,26 @@ def position_reference(time: float, reference: ReferenceParameters) -> tuple[flo
         0.0,
         0.0,
     )
+
+
+@scalar
+def reference_derivatives(time: float, reference: ReferenceParameters) -> tuple[float, ...]:
+    """A reference and its first four derivatives at a time (s), world axes.
+
+    Returns position, velocity, acceleration, jerk and snap, three floats each, in m and s. Nothing
+    is left out: laws of the fourth order (ch. 2, Eq. A2) need them all.
+    """
+    if reference.type == CIRCLE:
+        radius = reference.radius
+        omega = reference.angular_frequency
+        across, along = radius * sin(omega * time), radius * cos(omega * time)
+        square = omega * omega
+        return (
+            *(reference.x + along, reference.y + across, reference.z),
+            *(-omega * across, omega * along, 0.0),
+            *(-square * along, -square * across, 0.0),
+            *(square * omega * across, -square * omega * along, 0.0),
+            *(square * square * along, square * square * across, 0.0),
+        )
+    x, y, z, vx, vy, vz, _, _, _ = position_reference(time, reference)
+    return (x, y, z, vx, vy, vz, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

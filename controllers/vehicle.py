@@ -49,6 +49,19 @@ PRESETS: Final = {
         drag_coefficient=2.423e-7,
         gravity=9.8,
     ),
+    # ch. 2, Table A1: the same airframe with its inertia unrounded, flown as a plain quadrotor. The
+    # table gives 8.048e-4 for both rotor coefficients; the law's inputs are forces and torques and
+    # use neither, so the rotors here are ch. 3's.
+    "ar_drone_2_unrounded": Vehicle(
+        mass=0.429,
+        inertia_xx=2.237568e-3,
+        inertia_yy=2.985236e-3,
+        inertia_zz=4.80374e-3,
+        arm_length=0.1785,
+        thrust_coefficient=8.048e-6,
+        drag_coefficient=2.423e-7,
+        gravity=9.8,
+    ),
     # Luukkonen, "Modelling and control of quadcopter" (2011), Table 1; ch. 12 takes its L, K_f, K_m
     "luukkonen": Vehicle(
         mass=0.468,
