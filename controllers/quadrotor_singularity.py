@@ -1,14 +1,16 @@
 """Where the quadrotor's yaw-position decoupling matrix is singular: claimed and exact (ch. 2).
 
 Ch. 2 derives a "determinant surface" ``S(theta, phi)`` that vanishes on a closed curve through
-level attitude. It rests on a slip: Eq. (31) differentiates ``c_psi s_theta c_phi`` by yaw into
-``s_psi s_theta s_phi`` instead of ``s_psi s_theta c_phi``, and Eq. (36) likewise. The determinant
-of the matrix as it follows from Eqs. (9)-(28) is
+level attitude. It rests on one entry: the first of the third row of Eq. (43) is printed as 0, but
+the printed factors make it ``cos(theta)^2 (sin(phi) - cos(phi))``, and with it the product has the
+determinant -1 at every attitude. The determinant of ``Delta`` itself is
 
     ``det Delta = -d^3 zeta^2 cos(phi) / (I_x I_y I_z m^3 cos(theta))``,
 
-which is never zero for ``zeta != 0`` and roll and pitch inside of 90 degrees. Both are kept here,
-the published form for what was published, the exact one for what is so.
+which is never zero for ``zeta != 0`` and roll and pitch inside of 90 degrees. Eqs. (31) and (36)
+have a slip too (``s_theta s_phi`` for ``s_theta c_phi``), which adds multiples of the matrix' last
+row to its first two and so does not touch the determinant. Both forms are kept here, the published
+one for what was published, the exact one for what is so.
 
 Attitudes are roll ``phi`` and pitch ``theta`` in rad. Each expression is even in pitch, so that it
 is the same in ch. 2's axes (z down) and in ours.
@@ -61,10 +63,7 @@ def published_singular_curve(points: int = 181) -> tuple[NDArray[np.float64], ND
 def exact_determinant(
     roll: ArrayLike, pitch: ArrayLike, thrust: ArrayLike, vehicle: Vehicle
 ) -> NDArray[np.float64]:
-    """The determinant of ``Delta``, Eq. (42) without its slips.
-
-    The unit is that of the product of the outputs' derivatives over that of the inputs,
-    ``1 / (kg^4 m^2 s^2)`` times N.
+    """The determinant of ``Delta``, Eq. (42) without its slips, in SI units.
 
     Parameters
     ----------

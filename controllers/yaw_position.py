@@ -138,7 +138,8 @@ def decoupling_matrix(z_down: State, vehicle: Vehicle) -> tuple[float, ...]:
     """``Delta`` of ch. 2, Eqs. (20) and (42), rows first; NaN at a pitch of 90 degrees.
 
     Yaw torque does not turn the thrust, so the upper three entries of the last column are zero;
-    the printed ones are not, for a slip in Eq. (31), see `controllers.quadrotor_singularity`.
+    the printed ones are not, for slips in Eqs. (31) and (36): ``s_theta s_phi`` should read
+    ``s_theta c_phi``.
     """
     roll, pitch, yaw, thrust = z_down[6], z_down[7], z_down[8], z_down[12]
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_from_euler(roll, pitch, yaw)
