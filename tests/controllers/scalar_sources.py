@@ -1,0 +1,47 @@
+"""The scalar functions' own source, run otherwise: compiled, or on symbols."""
+
+from __future__ import annotations
+
+import math
+from types import FunctionType, SimpleNamespace
+
+import numba
+import numpy as np
+import sympy
+
+from controllers.records import flatten, record_dtype
+from controllers.scalar import scalar_functions
+
+
+def rebuilt(make, replaced=()):
+    """Every scalar function remade by ``make``, calling the remade ones in place of its own."""
+    known = dict(replaced)
+    for function in scalar_functions():
+        scope = dict(function.__globals__)
+        for name in function.__code__.co_names:
+            value = scope.get(name)
+            if isinstance(value, FunctionType | type(math.sin)) and value in known:
+                scope[name] = known[value]
+        known[function] = make(FunctionType(function.__code__, scope, function.__name__))
+    return known
+
+
+def compiled():
+    """Every scalar function under numba; each compiles when first called."""
+    return rebuilt(numba.njit(error_model="numpy"))
+
+
+def symbolic():
+    """Every scalar function with sympy's functions for those of ``math``."""
+    names = ("sin", "cos", "tan", "sqrt")
+    return rebuilt(lambda f: f, {getattr(math, name): getattr(sympy, name) for name in names})
+
+
+def as_native(record):
+    """A parameter record as native code sees it."""
+    return np.array(list(flatten(record))).view(record_dtype(type(record)))[0]
+
+
+def fields(**values):
+    """A stand-in for a record, with symbols for numbers."""
+    return SimpleNamespace(**values)
