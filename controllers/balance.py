@@ -158,16 +158,13 @@ def balanced_gait(
     twist = 2.0 * atan(ratio)
     max_sum = twist - asin(min_lever * sin(twist))
     tilts = _best_on_grid(x, y, ratio, max_sum, max_tilt)
-    if tilts is not None:
-        tilts = _least_tilt(tilts, x, y, ratio, max_sum, max_tilt)
-        tilts = _onto_balance(tilts, x, y, ratio)
-    if tilts is None or np.abs(_imbalance(tilts, x, y, ratio)).max() > _TOLERANCE:
+    if tilts is None:
         raise ValueError(
             f"acceleration {_shown(acceleration)}: out of reach, needs a side force of"
             f" {hypot(x, y):.3g} times the lift; no gait makes it with tilt angles up to"
             f" {max_tilt:.3g} rad and yaw levers of {min_lever:g} or more"
         )
-    a1, a2, a3, a4 = tilts.tolist()
+    a1, a2, a3, a4 = _least_tilt(tilts, x, y, ratio, max_sum, max_tilt).tolist()
     return a1, a2, a3, a4
 
 
@@ -222,8 +219,15 @@ def _least_tilt(
         ],
         options={"ftol": 1e-15, "maxiter": 200},
     )
-    # The start is itself balanced and within the limits.
-    return np.asarray(found.x, dtype=float) if found.success else start
+    # With so fine a tolerance the optimiser often reports failure for want of further progress, so
+    # its answer is judged by itself; the start is balanced and within the limits.
+    tilts = _onto_balance(np.asarray(found.x, dtype=float), x, y, ratio)
+    kept = (
+        np.abs(balance(tilts)).max() < _TOLERANCE
+        and (sums @ tilts + max_sum).min() > -_TOLERANCE
+        and np.abs(tilts).max() < max_tilt + _TOLERANCE
+    )
+    return tilts if kept and tilts @ tilts <= start @ start else start
 
 
 def _onto_balance(tilts: Vector, x: float, y: float, ratio: float) -> Vector:

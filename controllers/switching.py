@@ -17,9 +17,8 @@ from typing import Final, NamedTuple
 import controllers.quadrotor_attitude_altitude as attitude_altitude
 import controllers.yaw_position as yaw_position
 from controllers.quadrotor_attitude_altitude import attitude_altitude_inputs
-from controllers.references import ReferenceParameters, position_reference
+from controllers.references import position_reference
 from controllers.scalar import scalar
-from controllers.vehicle import Vehicle
 from controllers.yaw_position import Inputs, State, euler_rates, yaw_position_inputs
 
 RUNNING: Final = 0
@@ -51,10 +50,8 @@ PUBLISHED_ZONE: Final = Zone(-1.5707963267948966, 0.2, -0.5, 0.5)
 class Parameters(NamedTuple):
     """All that the law needs to know besides time and state."""
 
-    vehicle: Vehicle
-    yaw_position: yaw_position.Gains
+    yaw_position: yaw_position.Parameters  # vehicle and reference are those of both laws
     attitude_altitude: attitude_altitude.Gains
-    reference: ReferenceParameters
     zone: Zone
     extension: float
     extension_rate: float = 100.0  # 1/s, how fast bumpless states reach the flown thrust
@@ -70,8 +67,10 @@ def in_attitude_zone(roll: float, pitch: float, zone: Zone) -> bool:
 def flown_thrust_rate(time: float, state: State, thrust: float, parameters: Parameters) -> float:
     """Rate (N/s) of the thrust that the attitude-altitude law makes, ``thrust`` in N."""
     vz, roll, pitch = state[5], state[6], state[7]
-    vehicle, gains = parameters.vehicle, parameters.attitude_altitude
-    _, _, _, _, _, vz_ref, _, _, az_ref = position_reference(time, parameters.reference)
+    vehicle, gains = parameters.yaw_position.vehicle, parameters.attitude_altitude
+    _, _, _, _, _, vz_ref, _, _, az_ref = position_reference(
+        time, parameters.yaw_position.reference
+    )
     upright = cos(roll) * cos(pitch)
     if upright == 0.0:
         return nan
@@ -86,13 +85,11 @@ def flown_thrust_rate(time: float, state: State, thrust: float, parameters: Para
 @scalar
 def switching_inputs(time: float, state: State, parameters: Parameters) -> Inputs:
     """Thrust, torques and the rates of the extension's states (`INPUT_FIELDS`), world z up."""
-    vehicle, reference = parameters.vehicle, parameters.reference
-    law = yaw_position.Parameters(vehicle, parameters.yaw_position, reference)
+    law = parameters.yaw_position
     if not in_attitude_zone(state[6], state[7], parameters.zone):
         return yaw_position_inputs(time, state, law)
-    gains = parameters.attitude_altitude
     thrust, roll_torque, pitch_torque, yaw_torque = attitude_altitude_inputs(
-        time, state, vehicle, gains, reference
+        time, state, law.vehicle, parameters.attitude_altitude, law.reference
     )
     zeta, xi = state[12], state[13]
     zeta_rate, xi_rate = 0.0, 0.0

@@ -7,7 +7,7 @@ from math import isnan, pi
 import numpy as np
 import pytest
 from flights import fly, quadrotor_rates, rk4_step
-from scalar_sources import as_native, compiled
+from scalar_sources import as_native
 
 import controllers.quadrotor_attitude_altitude as attitude_altitude
 import controllers.yaw_position as yaw_position
@@ -41,10 +41,8 @@ def parameters(extension, roll=0.01, pitch=0.0, gains="ch02"):
         pitch=-pitch,
     )
     return Parameters(
-        QUADROTOR,
-        yaw_position.GAIN_SETS[gains],
+        yaw_position.Parameters(QUADROTOR, yaw_position.GAIN_SETS[gains], reference),
         GAINS,
-        reference,
         PUBLISHED_ZONE,
         EXTENSIONS[extension],
     )
@@ -117,12 +115,14 @@ def test_the_published_zone(roll, pitch, inside):
 def test_each_law_flies_in_its_zone(extension):
     random = np.random.default_rng(2)
     law = parameters(extension)
-    position = yaw_position.Parameters(QUADROTOR, law.yaw_position, law.reference)
+    position = law.yaw_position
     for _ in range(2 * CASES):
         state = random_state(random)
         inputs = switching_inputs(1.0, state, law)
         if in_attitude_zone(state[6], state[7], PUBLISHED_ZONE):
-            attitude = attitude_altitude_inputs(1.0, state, QUADROTOR, GAINS, law.reference)
+            attitude = attitude_altitude_inputs(
+                1.0, state, QUADROTOR, GAINS, law.yaw_position.reference
+            )
             assert inputs[:4] == attitude
         else:
             assert inputs == yaw_position.yaw_position_inputs(1.0, state, position)
@@ -135,7 +135,9 @@ def test_the_flown_thrust_rate_is_the_thrusts_derivative():
         state = random_state(random)
 
         def thrust(time, state):
-            return attitude_altitude_inputs(time, state, QUADROTOR, GAINS, law.reference)[0]
+            return attitude_altitude_inputs(
+                time, state, QUADROTOR, GAINS, law.yaw_position.reference
+            )[0]
 
         def rates(time, state):
             return quadrotor_rates(state, switching_inputs(time, state, law), QUADROTOR)
@@ -158,7 +160,9 @@ def flight(law, duration, step=0.004):
         duration,
         step,
     )
-    inside = np.array([in_attitude_zone(roll, pitch, PUBLISHED_ZONE) for roll, pitch in states[:, 6:8]])
+    inside = np.array(
+        [in_attitude_zone(roll, pitch, PUBLISHED_ZONE) for roll, pitch in states[:, 6:8]]
+    )
     return times, states, inside
 
 
@@ -206,7 +210,9 @@ def test_bumpless_states_carry_the_flown_thrust_over_the_switch():
 
 def test_no_law_at_ninety_degrees():
     state = (*[0.0] * 6, float("nan"), 0.0, 0.0, *[0.0] * 5)
-    assert isnan(attitude_altitude_inputs(0.0, state, QUADROTOR, GAINS, ReferenceParameters(0.0))[0])
+    assert isnan(
+        attitude_altitude_inputs(0.0, state, QUADROTOR, GAINS, ReferenceParameters(0.0))[0]
+    )
 
 
 @pytest.mark.parametrize("extension", EXTENSIONS)
@@ -215,9 +221,6 @@ def test_compiled_code_gives_the_same_bits(extension, native):
     law = parameters(extension)
     for _ in range(CASES):
         state = random_state(random)
-        assert native(1.7, state, as_native(law)) == switching_inputs(1.7, state, law)
-
-
-@pytest.fixture(scope="module")
-def native():
-    return compiled()[switching_inputs]
+        assert native[switching_inputs](1.7, state, as_native(law)) == switching_inputs(
+            1.7, state, law
+        )
