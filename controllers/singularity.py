@@ -5,10 +5,11 @@ shape ``(..., 4)``; roll and pitch broadcast against the leading shape; angles a
 
 Ch. 3 and 6 write the condition for an invertible matrix as ``R cos(roll) cos(pitch) + R_phi
 sin(roll) cos(pitch) + R_theta sin(pitch) != 0``, which is ``n . r3 != 0`` with the torque-free
-force ``n = (-R_theta, R_phi, R)`` and world up seen from the body ``r3``. The coefficients in ch. 3, Eqs. (17) and (19), and ch. 12, Eqs. (4)-(8), are those of `residuals` at the respective drag
-ratio, with these slips of the pen: the term ``-2.880 s1 s2 c3 s4 sin(roll) cos(pitch)`` of ch. 3,
-Eq. (17), stands for ``s1 s2 c3 c4``, and the last term of ch. 5, Eq. (15), for ``s1 s2 c3 s4``.
-Ch. 12 scales everything by the one constant 1.025.
+force ``n = (-R_theta, R_phi, R)`` and world up seen from the body ``r3``. The coefficients printed
+in ch. 3, Eqs. (17) and (19), and ch. 12, Eqs. (4)-(8), are those of `residuals` at the respective
+drag ratio, with these slips of the pen: the term ``-2.880 s1 s2 c3 s4 sin(roll) cos(pitch)`` of
+ch. 3, Eq. (17), stands for ``s1 s2 c3 c4``, and the last term of ch. 5, Eq. (15), for ``s1 s2 c3
+s4``. Ch. 12 scales everything by the one constant 1.025.
 """
 
 from __future__ import annotations
