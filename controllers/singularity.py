@@ -165,4 +165,4 @@ def margin_over_gait(angles: ArrayLike, vehicle: Vehicle) -> Array:
     sign = np.sign(residuals(angles, vehicle).R)
     started = np.flatnonzero(sign)
     side = sign[started[0]] if started.size else 1.0
-    return singularity_margin(angles, vehicle) * sign * side
+    return singularity_margin(angles, vehicle) * sign * side + 0.0  # no negative zeros
