@@ -10,14 +10,6 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from controllers.decoupling_matrix import (
-    body_force,
-    sines_and_cosines,
-    solve_by_pairs,
-    torque_entries,
-    torque_free_force,
-    vertical_force_entries,
-)
 from controllers.decouplers import (
     CONVENTIONAL,
     EXACT,
@@ -26,10 +18,19 @@ from controllers.decouplers import (
     exact_decoupler,
     modified_decoupler,
 )
+from controllers.decoupling_matrix import (
+    Octet,
+    body_force,
+    sines_and_cosines,
+    solve_by_pairs,
+    torque_entries,
+    torque_free_force,
+    vertical_force_entries,
+)
 from controllers.gaits import GaitParameters
 from controllers.references import ReferenceParameters, position_reference
 from controllers.rotation import world_up_in_body
-from controllers.scalar import scalar
+from controllers.scalar import Quad, scalar
 from controllers.vehicle import Vehicle, drag_ratio
 
 PUBLISHED_DECOUPLING: Final = 0
@@ -73,6 +74,8 @@ class Parameters(NamedTuple):
     decoupling: float
 
 
+State = tuple[float, ...]
+
 STATE_FIELDS: Final = (
     *("x", "y", "z", "vx", "vy", "vz"),  # 0-5: m and m/s, world axes
     *("roll", "pitch", "yaw", "p", "q", "r"),  # 6-11: rad; body rates, rad/s
@@ -83,7 +86,9 @@ STATE_FIELDS: Final = (
 
 
 @scalar
-def attitude_reference(time, state, trig, parameters):
+def attitude_reference(
+    time: float, state: State, trig: Octet, parameters: Parameters
+) -> tuple[float, float, float, float, float, float]:
     """Attitude and altitude to track, with the altitude's derivatives (ch. 4, Eqs. 28-30).
 
     ``trig`` holds the sines and cosines of the tilt angles, see `sines_and_cosines`. Returns
@@ -108,16 +113,16 @@ def attitude_reference(time, state, trig, parameters):
         roll_ref, pitch_ref = conventional_decoupler(ax, ay, yaw_ref, gravity)
         return roll_ref, pitch_ref, yaw_ref, z_ref, vz_ref, az_ref
 
-    nx, ny, nz = torque_free_force(trig, drag_ratio(vehicle))
+    n = torque_free_force(trig, drag_ratio(vehicle))
     if parameters.decoupler == EXACT:
-        roll_ref, pitch_ref = exact_decoupler(ax, ay, az_ref, yaw_ref, gravity, nx, ny, nz)
+        roll_ref, pitch_ref = exact_decoupler(ax, ay, az_ref, yaw_ref, gravity, n)
     else:
-        roll_ref, pitch_ref = modified_decoupler(ax, ay, yaw_ref, gravity, nx, ny, nz)
+        roll_ref, pitch_ref = modified_decoupler(ax, ay, yaw_ref, gravity, n)
     return roll_ref, pitch_ref, yaw_ref, z_ref, vz_ref, az_ref
 
 
 @scalar
-def rotor_accelerations(time, state, parameters):
+def rotor_accelerations(time: float, state: State, parameters: Parameters) -> Quad:
     """The rotor accelerations (rad/s^2) of the feedback linearization at a time and state.
 
     Third-order laws (ch. 4, Eqs. 26-27) on the outputs give the wanted third derivatives; the

@@ -11,7 +11,7 @@ from __future__ import annotations
 from math import acos, atan2, cos, sin, sqrt
 from typing import Final
 
-from controllers.scalar import scalar
+from controllers.scalar import Triple, scalar
 
 NONE: Final = 0
 CONVENTIONAL: Final = 1
@@ -28,26 +28,31 @@ DECOUPLERS: Final = {
 
 
 @scalar
-def conventional_decoupler(ax, ay, yaw, gravity):
+def conventional_decoupler(ax: float, ay: float, yaw: float, gravity: float) -> tuple[float, float]:
     """Roll and pitch (rad) of a plain quadrotor near hover (ch. 4, Eqs. 7-8)."""
     sin_yaw, cos_yaw = sin(yaw), cos(yaw)
     return (ax * sin_yaw - ay * cos_yaw) / gravity, (ax * cos_yaw + ay * sin_yaw) / gravity
 
 
 @scalar
-def modified_decoupler(ax, ay, yaw, gravity, nx, ny, nz):
+def modified_decoupler(
+    ax: float, ay: float, yaw: float, gravity: float, n: Triple
+) -> tuple[float, float]:
     """Conventional roll and pitch plus the side force at level hover (ch. 4, Eqs. 9-11).
 
     Eq. 11 asks for the rotor inputs without torque whose vertical force is the weight, level.
     Their force is parallel to ``n``, so ``F_X = m g n_x / n_z`` and ``F_Y = m g n_y / n_z``: the
     printed 4 x 4 inverse in closed form.
     """
+    nx, ny, nz = n
     roll, pitch = conventional_decoupler(ax, ay, yaw, gravity)
     return roll + ny / nz, pitch - nx / nz
 
 
 @scalar
-def exact_decoupler(ax, ay, az, yaw, gravity, nx, ny, nz):
+def exact_decoupler(
+    ax: float, ay: float, az: float, yaw: float, gravity: float, n: Triple
+) -> tuple[float, float]:
     """The roll and pitch (rad) that point the torque-free force along the wanted one.
 
     Solves ``Ry(pitch) Rx(roll) n = d |n|`` with ``d`` the unit vector along ``Rz(-yaw) (ax, ay,
@@ -59,8 +64,8 @@ def exact_decoupler(ax, ay, az, yaw, gravity, nx, ny, nz):
     dy = ay * cos_yaw - ax * sin_yaw
     dz = gravity + az
     # The rotors push along n or against it; the vehicle flies with whichever side points up.
-    side = 1.0 if nz >= 0.0 else -1.0
-    nx, ny, nz = side * nx, side * ny, side * nz
+    side = 1.0 if n[2] >= 0.0 else -1.0
+    nx, ny, nz = side * n[0], side * n[1], side * n[2]
     scale = sqrt((nx * nx + ny * ny + nz * nz) / (dx * dx + dy * dy + dz * dz))
     lateral = dy * scale / sqrt(ny * ny + nz * nz)
     roll = acos(min(1.0, max(-1.0, lateral))) - atan2(nz, ny)

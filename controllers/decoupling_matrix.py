@@ -19,11 +19,13 @@ from __future__ import annotations
 
 from math import cos, nan, sin
 
-from controllers.scalar import scalar
+from controllers.scalar import Quad, Triple, scalar
+
+Octet = tuple[float, float, float, float, float, float, float, float]
 
 
 @scalar
-def sines_and_cosines(alpha_1, alpha_2, alpha_3, alpha_4):
+def sines_and_cosines(alpha_1: float, alpha_2: float, alpha_3: float, alpha_4: float) -> Octet:
     """``(sin alpha_1, cos alpha_1, ..., sin alpha_4, cos alpha_4)`` of tilt angles in rad."""
     return (
         sin(alpha_1),
@@ -38,7 +40,7 @@ def sines_and_cosines(alpha_1, alpha_2, alpha_3, alpha_4):
 
 
 @scalar
-def torque_entries(trig, drag_ratio):
+def torque_entries(trig: Octet, drag_ratio: float) -> Octet:
     """The eight non-zero entries of ``tau(alpha) / (L K_f)`` (ch. 3, Eq. 5).
 
     Returns ``(x2, x4, y1, y3, z1, z2, z3, z4)``: roll, pitch and yaw torque by rotor.
@@ -57,7 +59,7 @@ def torque_entries(trig, drag_ratio):
 
 
 @scalar
-def body_force(trig, w1, w2, w3, w4):
+def body_force(trig: Octet, w1: float, w2: float, w3: float, w4: float) -> Triple:
     """The product ``F(alpha) w / K_f`` in body axes (ch. 3, Eq. 3)."""
     s1, c1, s2, c2, s3, c3, s4, c4 = trig
     return (
@@ -68,7 +70,7 @@ def body_force(trig, w1, w2, w3, w4):
 
 
 @scalar
-def vertical_force_entries(trig, ux, uy, uz):
+def vertical_force_entries(trig: Octet, ux: float, uy: float, uz: float) -> Quad:
     """The row ``u^T F(alpha) / K_f``: force along the body-frame direction ``u``, by rotor.
 
     With ``u = r3`` this is the last row of the decoupling matrix (ch. 3, Eq. 18).
@@ -83,7 +85,7 @@ def vertical_force_entries(trig, ux, uy, uz):
 
 
 @scalar
-def torque_free_inputs(trig, drag_ratio):
+def torque_free_inputs(trig: Octet, drag_ratio: float) -> Quad:
     """The inputs ``w`` that span ``ker tau(alpha)`` (where tau has rank 3; else they may vanish).
 
     Rotors 2 and 4 share a factor that cancels their roll torque, rotors 1 and 3 one that cancels
@@ -96,7 +98,7 @@ def torque_free_inputs(trig, drag_ratio):
 
 
 @scalar
-def torque_free_force(trig, drag_ratio):
+def torque_free_force(trig: Octet, drag_ratio: float) -> Triple:
     """The force direction at zero torque, ``n = (-R_theta, R_phi, R)``, body axes.
 
     Its length carries ch. 3's normalisation: ``R = 4`` for an untilted vehicle. Where ``n = 0`` the
@@ -111,7 +113,9 @@ def torque_free_force(trig, drag_ratio):
 
 
 @scalar
-def solve_by_pairs(torque, force, roll, pitch, yaw, lift):
+def solve_by_pairs(
+    torque: Octet, force: Quad, roll: float, pitch: float, yaw: float, lift: float
+) -> Quad:
     """Solve the 4 x 4 system of the decoupling matrix for the rotor inputs.
 
     ``torque`` are the `torque_entries`, ``force`` the four entries of the last row. Each opposite

@@ -26,10 +26,11 @@ def flatten(record: Iterable[Any]) -> Iterator[float]:
 
 def unflatten(record_type: type[Record], values: Iterable[float]) -> Record:
     """Rebuild a record of the given type from its floats; the inverse of `flatten`."""
-    return _take(record_type, iter(values))
+    record: Record = _take(record_type, iter(values))
+    return record
 
 
-def _take(record_type: type[Record], values: Iterator[float]) -> Record:
+def _take(record_type: Any, values: Iterator[float]) -> Any:
     fields = get_type_hints(record_type).values()
     return record_type(
         *(_take(kind, values) if _is_record(kind) else next(values) for kind in fields)

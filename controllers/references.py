@@ -40,7 +40,7 @@ class ReferenceParameters(NamedTuple):
 
 
 @scalar
-def position_reference(time, reference):
+def position_reference(time: float, reference: ReferenceParameters) -> tuple[float, ...]:
     """Position (m), velocity (m/s) and acceleration (m/s^2) to track at a time (s), world axes.
 
     Returns ``(x, y, z, vx, vy, vz, ax, ay, az)``. Ch. 4 sets the acceleration to zero for the

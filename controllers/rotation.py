@@ -1,14 +1,14 @@
-"""Rotations between body and world in roll, pitch, yaw (ch. 3, Eq. 2: R = Rz(yaw) Ry(pitch) Rx(roll))."""
+"""Rotations between body and world, ``Rz(yaw) Ry(pitch) Rx(roll)`` (ch. 3, Eq. 2)."""
 
 from __future__ import annotations
 
 from math import asin, atan2, cos, sin
 
-from controllers.scalar import scalar
+from controllers.scalar import Quad, Triple, scalar
 
 
 @scalar
-def euler_from_quaternion(w, x, y, z):
+def euler_from_quaternion(w: float, x: float, y: float, z: float) -> Triple:
     """Roll, pitch and yaw (rad) of a unit quaternion, scalar first."""
     sin_pitch = 2.0 * (w * y - z * x)
     # Rounding may carry the sine past one at pitch = +-90 degrees.
@@ -21,7 +21,7 @@ def euler_from_quaternion(w, x, y, z):
 
 
 @scalar
-def quaternion_from_euler(roll, pitch, yaw):
+def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> Quad:
     """The unit quaternion (scalar first) of roll, pitch and yaw (rad)."""
     cr, sr = cos(0.5 * roll), sin(0.5 * roll)
     cp, sp = cos(0.5 * pitch), sin(0.5 * pitch)
@@ -35,7 +35,26 @@ def quaternion_from_euler(roll, pitch, yaw):
 
 
 @scalar
-def world_up_in_body(roll, pitch):
+def world_up_in_body(roll: float, pitch: float) -> Triple:
     """World up seen from the body, ``r3``: the third row of the body-to-world rotation."""
     cos_pitch = cos(pitch)
     return -sin(pitch), sin(roll) * cos_pitch, cos(roll) * cos_pitch
+
+
+@scalar
+def rotation_from_euler(roll: float, pitch: float, yaw: float) -> tuple[float, ...]:
+    """The nine entries, rows first, of the body-to-world rotation (ch. 3, Eq. 2)."""
+    sr, cr = sin(roll), cos(roll)
+    sp, cp = sin(pitch), cos(pitch)
+    sy, cy = sin(yaw), cos(yaw)
+    return (
+        cp * cy,
+        sr * sp * cy - cr * sy,
+        cr * sp * cy + sr * sy,
+        cp * sy,
+        sr * sp * sy + cr * cy,
+        cr * sp * sy - sr * cy,
+        -sp,
+        sr * cp,
+        cr * cp,
+    )

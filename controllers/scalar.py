@@ -7,6 +7,9 @@ from typing import Any, TypeVar
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
+Triple = tuple[float, float, float]
+Quad = tuple[float, float, float, float]
+
 _registry: list[Callable[..., Any]] = []
 
 

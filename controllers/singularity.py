@@ -14,7 +14,7 @@ s4``. Ch. 12 scales everything by the one constant 1.025.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -47,8 +47,11 @@ class Residuals(NamedTuple):
     R_theta: Array  # of sin(pitch)
 
 
-def tilt_trigonometry(angles: ArrayLike) -> tuple[Array, ...]:
-    """``(sin alpha_1, cos alpha_1, ..., cos alpha_4)`` of tilt angles of shape (..., 4)."""
+def tilt_trigonometry(angles: ArrayLike) -> Any:
+    """``(sin alpha_1, cos alpha_1, ..., cos alpha_4)`` of tilt angles of shape (..., 4).
+
+    Eight arrays of shape (...), typed loosely: they stand where scalar code declares floats.
+    """
     angles = np.asarray(angles, dtype=float)
     sines, cosines = np.sin(angles), np.cos(angles)
     return tuple(part[..., rotor] for rotor in range(4) for part in (sines, cosines))
@@ -66,7 +69,7 @@ def torque_matrix(angles: ArrayLike, vehicle: Vehicle) -> Array:
     trig = tilt_trigonometry(angles)
     x2, x4, y1, y3, z1, z2, z3, z4 = torque_entries(trig, drag_ratio(vehicle))
     zero = np.zeros_like(x2)
-    rows = [[zero, x2, zero, x4], [y1, zero, y3, zero], [z1, z2, z3, z4]]
+    rows: Any = [[zero, x2, zero, x4], [y1, zero, y3, zero], [z1, z2, z3, z4]]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
@@ -102,7 +105,7 @@ def rank(angles: ArrayLike, vehicle: Vehicle) -> NDArray[np.int_]:
 
 def residuals(angles: ArrayLike, vehicle: Vehicle) -> Residuals:
     """``R``, ``R_phi`` and ``R_theta`` of tilt angles, each of shape (...)."""
-    nx, ny, nz = torque_free_force(tilt_trigonometry(angles), drag_ratio(vehicle))
+    nx, ny, nz = map(np.asarray, torque_free_force(tilt_trigonometry(angles), drag_ratio(vehicle)))
     return Residuals(R=nz, R_phi=ny, R_theta=-nx)
 
 

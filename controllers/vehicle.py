@@ -29,7 +29,7 @@ class Vehicle(NamedTuple):
 
 
 @scalar
-def drag_ratio(vehicle):
+def drag_ratio(vehicle: Vehicle) -> float:
     """Drag torque over thrust torque of a rotor, ``r = K_m / (L K_f)``, dimensionless."""
     return vehicle.drag_coefficient / (vehicle.arm_length * vehicle.thrust_coefficient)
 

@@ -1,0 +1,54 @@
+"""tiltsim: a MuJoCo testbed for thrust-vectoring vehicles.
+
+    >>> import tiltsim
+    >>> scenario = tiltsim.load_scenario("ch04_tracking/setpoint#rho_065_modified")
+    >>> flight = tiltsim.simulate(scenario)
+    >>> flight.metrics()["final_position_error_x"]
+
+Importing the package is cheap; MuJoCo is loaded when the first scenario is simulated.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tiltsim.errors import InputError, TiltsimError
+    from tiltsim.flight import End, Flight
+    from tiltsim.loading import load_scenario, parse_scenario
+    from tiltsim.scenario import Scenario
+    from tiltsim.simulation import simulate
+
+_HOMES = {
+    "End": "flight",
+    "Flight": "flight",
+    "InputError": "errors",
+    "Scenario": "scenario",
+    "TiltsimError": "errors",
+    "load_scenario": "loading",
+    "parse_scenario": "loading",
+    "simulate": "simulation",
+}
+
+__all__ = [
+    "End",
+    "Flight",
+    "InputError",
+    "Scenario",
+    "TiltsimError",
+    "load_scenario",
+    "parse_scenario",
+    "simulate",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name on first use."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'tiltsim' has no attribute {name!r}")
+    return getattr(import_module(f"tiltsim.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOMES])

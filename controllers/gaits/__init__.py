@@ -6,10 +6,11 @@ what a scenario or a chapter states, and knows period, amplitude, rate and conti
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from controllers.gaits.keyframes import keyframe_gait
-from controllers.gaits.trot import continuous_trot, instant_trot
+from controllers.gaits.keyframes import NO_KEYFRAMES, keyframe_gait
+from controllers.gaits.trot import TiltsAndRates, continuous_trot, instant_trot
 from controllers.gaits.two_color import two_color_circle
 from controllers.scalar import scalar
 
@@ -54,7 +55,7 @@ class GaitParameters(NamedTuple):
 
 
 @scalar
-def planned_angles(time, gait, table):
+def planned_angles(time: float, gait: GaitParameters, table: Sequence[float]) -> TiltsAndRates:
     """The gait before scale and bias: ``(alpha_1, ..., alpha_4, rate_1, ..., rate_4)``."""
     if gait.type == KEYFRAMES:
         return keyframe_gait(time, gait.period, gait.keyframes, table)
@@ -76,7 +77,9 @@ def planned_angles(time, gait, table):
 
 
 @scalar
-def tilt_reference(time, gait, table):
+def tilt_reference(
+    time: float, gait: GaitParameters, table: Sequence[float] = NO_KEYFRAMES
+) -> TiltsAndRates:
     """The planned tilt angles (rad) and their rates (rad/s) at a time (s).
 
     ``table`` holds the keyframes of gaits that have them (`controllers.gaits.keyframes`): a flat

@@ -8,17 +8,22 @@ the same angles in both; two rows of equal phase make a jump.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import floor
 from typing import Final
 
+from controllers.gaits.trot import TiltsAndRates
 from controllers.scalar import scalar
 
 ROW: Final = 5
 """Floats in a row of the table."""
 
+NO_KEYFRAMES: Final = (0.0, 0.0)
+"""The table of gaits without keyframes; not empty, so that native code can give it a type."""
+
 
 @scalar
-def keyframe_row(phase, rows, table):
+def keyframe_row(phase: float, rows: int, table: Sequence[float]) -> int:
     """Index of the last of the ``rows - 1`` segments that starts at or before ``phase``."""
     low, high = 0, rows - 1
     while high - low > 1:
@@ -31,7 +36,7 @@ def keyframe_row(phase, rows, table):
 
 
 @scalar
-def keyframe_gait(time, period, rows, table):
+def keyframe_gait(time: float, period: float, rows: float, table: Sequence[float]) -> TiltsAndRates:
     """Tilt angles (rad) and rates (rad/s) of a keyframe table at a time (s).
 
     ``rows`` is the number of rows in use; the table may be longer.

@@ -23,7 +23,7 @@ from controllers.gaits import (
     tilt_reference,
 )
 from controllers.gaits.cat import FOOTFALLS, cat_keyframes
-from controllers.gaits.keyframes import ROW
+from controllers.gaits.keyframes import NO_KEYFRAMES, ROW
 from controllers.gaits.two_color import COLORS
 from controllers.vehicle import drag_ratio
 
@@ -43,7 +43,7 @@ class Gait:
 
     name: str
     parameters: GaitParameters
-    table: tuple[float, ...] = ()
+    table: tuple[float, ...] = NO_KEYFRAMES
     source: str = ""
 
     @property

@@ -6,15 +6,17 @@ from math import floor
 
 from controllers.scalar import scalar
 
+TiltsAndRates = tuple[float, float, float, float, float, float, float, float]
+
 
 @scalar
-def _trot(rho, rate):
+def _trot(rho: float, rate: float) -> TiltsAndRates:
     """Tilt angles and rates of the trot angle ``rho`` (ch. 4, Eqs. 21-24)."""
     return -rho, -rho, rho, rho, -rate, -rate, rate, rate
 
 
 @scalar
-def instant_trot(time, amplitude, period):
+def instant_trot(time: float, amplitude: float, period: float) -> TiltsAndRates:
     """``rho`` switches between plus and minus the amplitude at half periods (ch. 4, Eq. 33)."""
     phase = time - floor(time / period) * period
     if phase <= 0.5 * period:
@@ -23,7 +25,7 @@ def instant_trot(time, amplitude, period):
 
 
 @scalar
-def continuous_trot(time, amplitude, period):
+def continuous_trot(time: float, amplitude: float, period: float) -> TiltsAndRates:
     """``rho`` runs from plus to minus the amplitude and back at a constant rate (ch. 4, Eq. 34)."""
     phase = time - floor(time / period) * period
     rate = 4.0 * amplitude / period

@@ -11,6 +11,7 @@ from __future__ import annotations
 from math import atan, cos, pi, sin
 from typing import Final
 
+from controllers.gaits.trot import TiltsAndRates
 from controllers.scalar import scalar
 
 RED: Final = 0
@@ -21,7 +22,9 @@ COLORS: Final = {"red": RED, "blue": BLUE}
 
 
 @scalar
-def colored_angles(alpha_1, alpha_2, color, drag_ratio):
+def colored_angles(
+    alpha_1: float, alpha_2: float, color: float, drag_ratio: float
+) -> tuple[float, float]:
     """``(alpha_3, alpha_4)`` of a colour (ch. 8, Eqs. 11-12, with the exact offset), rad."""
     if color == RED:
         return alpha_1, alpha_2
@@ -30,7 +33,15 @@ def colored_angles(alpha_1, alpha_2, color, drag_ratio):
 
 
 @scalar
-def two_color_circle(time, period, centre_1, centre_2, radius, color, drag_ratio):
+def two_color_circle(
+    time: float,
+    period: float,
+    centre_1: float,
+    centre_2: float,
+    radius: float,
+    color: float,
+    drag_ratio: float,
+) -> TiltsAndRates:
     """Tilt angles (rad) and rates (rad/s) on a circle in the alpha_1-alpha_2 plane (ch. 8, Sec. 4).
 
     Starts at ``(centre_1 + radius, centre_2)`` and turns counter-clockwise once a period.

@@ -146,7 +146,7 @@ def test_defaults_leave_the_existing_gaits_untouched() -> None:
     """Bit for bit: factors of one must not round."""
     for time in np.linspace(0, 7, 101).tolist():
         raw = scalar_trot(time, 0.65, 3.0)
-        assert tilt_reference(time, GAITS["trot_continuous"].parameters, ()) == raw
+        assert tilt_reference(time, GAITS["trot_continuous"].parameters) == raw
 
 
 @pytest.mark.parametrize(
@@ -195,18 +195,31 @@ def native():
     def evaluate(time, records, table):
         return reference(time, records[0], table)
 
-    return evaluate
+    @numba.njit
+    def without_table(time, records):
+        return reference(time, records[0])
+
+    return {"with": evaluate, "without": without_table}
+
+
+def native_record(gait: Gait) -> np.ndarray:
+    values = np.array(tuple(flatten(gait.parameters)), dtype=float)
+    return values.view(record_dtype(GaitParameters))
 
 
 @settings(deadline=None, max_examples=200)
 @given(name=st.sampled_from(sorted(GAITS)), time=st.floats(-100, 100))
 def test_native_code_gives_the_same_bits(native, name, time) -> None:
     gait = GAITS[name]
-    records = np.array(tuple(flatten(gait.parameters)), dtype=float).view(
-        record_dtype(GaitParameters)
-    )
     table = np.array([*gait.table, *[np.nan] * 7])  # longer than the rows in use
-    assert native(time, records, table) == tilt_reference(time, gait.parameters, gait.table)
+    evaluated = native["with"](time, native_record(gait), table)
+    assert evaluated == tilt_reference(time, gait.parameters, gait.table)
+
+
+def test_native_code_needs_no_table_for_gaits_without_keyframes(native) -> None:
+    for name in ("fixed", "trot_instant", "trot_continuous", "red_circle"):
+        gait = GAITS[name]
+        assert native["without"](0.7, native_record(gait)) == tilt_reference(0.7, gait.parameters)
 
 
 def test_every_type_name_has_a_gait() -> None:

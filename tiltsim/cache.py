@@ -1,0 +1,39 @@
+"""Where compiled control steps are kept between runs."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+
+import controllers
+
+
+@cache
+def native_code_folder() -> Path:
+    """The folder for code compiled from exactly these sources with exactly these versions."""
+    versions = [version(name) for name in ("numba", "llvmlite", "numpy", "mujoco")]
+    digest = hashlib.sha256(repr([*versions, platform.platform()]).encode())
+    for package in (Path(controllers.__file__).parent, Path(__file__).parent):
+        for source in sorted(package.rglob("*.py")):
+            digest.update(source.read_bytes())
+    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(base) / "tiltsim" / digest.hexdigest()[:16]
+
+
+def native_code_is_cached() -> bool:
+    """Whether the native engine would load rather than compile."""
+    return any(native_code_folder().rglob("*.nbc"))
+
+
+def native_code_can_be_kept() -> bool:
+    """Whether compiled code can be written for the next run."""
+    folder = native_code_folder()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK)

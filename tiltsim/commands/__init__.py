@@ -1,0 +1,1 @@
+"""The subcommands. Each module has ``add_parser``; heavy imports wait until it runs."""

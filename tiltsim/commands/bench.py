@@ -1,0 +1,1 @@
+"""``tiltsim check``: every scenario under some paths, for continuous integration."""

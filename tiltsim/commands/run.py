@@ -1,0 +1,124 @@
+"""``tiltsim run``: one flight."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tiltsim.commands.progress import progress_bar
+
+if TYPE_CHECKING:
+    from tiltsim.expectations import Verdict
+    from tiltsim.flight import Flight
+
+DONE, EXPECTATION_FAILED, FLIGHT_LOST, INTERRUPTED = 0, 1, 3, 130
+
+
+def add_parser(subparsers: Any) -> None:
+    """Declare the command."""
+    parser = subparsers.add_parser(
+        "run",
+        help="fly one scenario",
+        description="Fly one scenario, write its files and judge its expectations.",
+    )
+    parser.add_argument(
+        "scenario",
+        metavar="SCENARIO",
+        help="a TOML file or a name from the library, with #VARIANT for a member of a family",
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="write metrics.json, flight.parquet, scenario.toml"
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        dest="overrides",
+        help="override a key of the scenario, such as controller.decoupler=exact; repeatable",
+    )
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Fly, save, judge."""
+    from tiltsim.expectations import judge
+    from tiltsim.files import prepare_folder
+    from tiltsim.loading import load_scenario, parse_override
+
+    overrides = dict(parse_override(text) for text in arguments.overrides)
+    scenario = load_scenario(arguments.scenario, overrides)
+    if arguments.out is not None:
+        prepare_folder(arguments.out)
+
+    from tiltsim.simulation import simulate
+
+    duration = scenario.simulation.duration
+    with progress_bar(duration, "s", shown=not arguments.quiet) as advance_to:
+        flight = simulate(scenario, lambda sample: advance_to(float(sample[0])))
+    if arguments.out is not None:
+        flight.save(arguments.out)
+    verdicts = judge(scenario, flight.metrics())
+    if not arguments.quiet:
+        print(summary(flight, verdicts))
+        if arguments.out is not None:
+            print(f"written to {arguments.out}")
+    if flight.end.kind == "interrupted":
+        return INTERRUPTED
+    if flight.end.kind != "completed":
+        print(f"tiltsim: {lost(flight)}", file=sys.stderr)
+        return FLIGHT_LOST
+    return DONE if all(verdict.holds for verdict in verdicts) else EXPECTATION_FAILED
+
+
+def lost(flight: Flight) -> str:
+    """One line on a flight that ended early: kind, time, cause."""
+    return f"flight {flight.end.kind} at t = {flight.end.time:.3f} s: {flight.end.cause}"
+
+
+def summary(flight: Flight, verdicts: list[Verdict]) -> str:
+    """The flight in a few aligned lines."""
+    scenario, metrics = flight.scenario, flight.metrics()
+    lines = [scenario.title or scenario.address or "scenario"]
+    if scenario.source:
+        lines.append(f"  {scenario.source}")
+    simulation = scenario.simulation
+    solver = simulation.integrator if simulation.plant == "mujoco" else "ode3"
+    lines.append(
+        f"  {metrics['duration']:g} s on the {simulation.plant} plant, {solver} at "
+        f"{simulation.timestep:g} s, {flight.engine} engine, {metrics['realtime_factor']:.0f} times"
+        " real time"
+    )
+    rows = [(name, f"{value:.6g}") for name, value in metrics.items() if name not in _IN_HEADER]
+    width = max(len(name) for name, _ in rows)
+    lines += ["", *(f"  {name:<{width}}  {value:>12}" for name, value in rows)]
+    if verdicts:
+        lines += ["", *expectation_lines(verdicts)]
+    return "\n".join(lines)
+
+
+_IN_HEADER = ("duration", "realtime_factor", "diverged")
+
+
+def expectation_lines(verdicts: list[Verdict]) -> list[str]:
+    """A table of expectations: verdict, metric, measured, published, bounds."""
+    rows = [("", "expected", "measured", "published", "bounds")]
+    for verdict in verdicts:
+        wanted, measured = verdict.expectation, verdict.measured
+        rows.append(
+            (
+                "ok" if verdict.holds else "FAILED",
+                wanted.metric,
+                "no value" if measured is None else f"{measured:.6g}",
+                "" if wanted.published is None else f"{wanted.published:g}",
+                verdict.bounds,
+            )
+        )
+    widths = [max(len(row[column]) for row in rows) for column in range(5)]
+    return [
+        "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip()
+        for row in rows
+    ]

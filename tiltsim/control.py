@@ -1,0 +1,93 @@
+"""The control step: from MuJoCo's state to MuJoCo's controls, as scalar code.
+
+One step serves every engine. It is a pure function of time, `qpos`, `qvel`, `act` and the
+parameters in `userdata`, so that a saved state restarts exactly and an integrator may call it at
+every stage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+from controllers.attitude_altitude import Parameters, State, rotor_accelerations
+from controllers.gaits import tilt_reference
+from controllers.rotation import euler_from_quaternion
+from controllers.scalar import Quad, scalar
+
+
+class ControlParameters(NamedTuple):
+    """The head of `userdata`: what the control step of a flight needs to know."""
+
+    signature: float  # tells our models from foreign ones, see `tiltsim.engine`
+    servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
+    law: Parameters
+
+
+TILTROTOR_SIZES: Final = (11, 10, 4, 12)
+"""Lengths of qpos, qvel, act and ctrl of the tiltrotor model."""
+
+
+@scalar
+def tiltrotor_state(qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float]) -> State:
+    """The law's state (`controllers.attitude_altitude.STATE_FIELDS`) from MuJoCo's.
+
+    MuJoCo gives the body's position, its quaternion and the tilt angles in ``qpos``, the velocity
+    in world axes, the body rates in body axes and the tilt rates in ``qvel``.
+    """
+    x, y, z, qw, qx, qy, qz, alpha_1, alpha_2, alpha_3, alpha_4 = qpos
+    vx, vy, vz, p, q, r = qvel[0], qvel[1], qvel[2], qvel[3], qvel[4], qvel[5]
+    speed_1, speed_2, speed_3, speed_4 = act
+    roll, pitch, yaw = euler_from_quaternion(qw, qx, qy, qz)
+    return (
+        *(x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r),
+        *(alpha_1, alpha_2, alpha_3, alpha_4, speed_1, speed_2, speed_3, speed_4),
+    )
+
+
+@scalar
+def rotor_thrust_controls(act: Sequence[float]) -> Quad:
+    """Controls of the thrust actuators, ``s_i varpi_i |varpi_i|`` with ``s = (-1, 1, -1, 1)``."""
+    speed_1, speed_2, speed_3, speed_4 = act
+    return (
+        -speed_1 * abs(speed_1),
+        speed_2 * abs(speed_2),
+        -speed_3 * abs(speed_3),
+        speed_4 * abs(speed_4),
+    )
+
+
+@scalar
+def tiltrotor_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+) -> tuple[float, ...]:
+    """All twelve controls of the tiltrotor: tilt servos, thrusts, rotor accelerations.
+
+    The servo commands lead the planned angles by the servo's own lag, so that a stiff servo
+    follows a moving gait and not only a resting one.
+    """
+    law = parameters.law
+    alpha_1, alpha_2, alpha_3, alpha_4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(
+        time, law.gait
+    )
+    lead = parameters.servo_lead
+    thrust_1, thrust_2, thrust_3, thrust_4 = rotor_thrust_controls(act)
+    u1, u2, u3, u4 = rotor_accelerations(time, tiltrotor_state(qpos, qvel, act), law)
+    return (
+        alpha_1 + lead * rate_1,
+        alpha_2 + lead * rate_2,
+        alpha_3 + lead * rate_3,
+        alpha_4 + lead * rate_4,
+        thrust_1,
+        thrust_2,
+        thrust_3,
+        thrust_4,
+        u1,
+        u2,
+        u3,
+        u4,
+    )

@@ -1,0 +1,113 @@
+"""Engines: how the control step runs inside MuJoCo.
+
+The same scalar source runs either as Python floats (nothing to compile, best for one short flight)
+or as a native callback (`tiltsim.native`). MuJoCo's control callback is global to the process, so
+an engine is installed for the length of a ``with`` block and checks that a model is ours before
+it touches it.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from math import nan
+from typing import Any, Final, Literal, Protocol
+
+import mujoco
+
+from controllers.records import record_dtype, unflatten
+from tiltsim.control import TILTROTOR_SIZES, ControlParameters, rotor_thrust_controls
+from tiltsim.control import tiltrotor_controls as controls
+
+EngineName = Literal["python", "native"]
+
+SIGNATURE: Final = float(zlib.crc32(repr(record_dtype(ControlParameters)).encode()))
+"""First number in `userdata`: the layout of the parameters behind it, as a checksum."""
+
+AUTO_NATIVE_STEPS: Final = 100_000
+"""Flights of at least this many physics steps repay the import of the native engine."""
+
+Callback = Callable[[mujoco.MjModel, mujoco.MjData], None]
+
+
+class Engine(Protocol):
+    """Evaluates the control step of one model, at every integrator stage or when asked."""
+
+    name: EngineName
+
+    def continuous(self) -> Any:
+        """The callback that evaluates the whole step at every call."""
+
+    def held(self) -> Any:
+        """The callback that only lets the thrust follow the rotor speeds, other controls held."""
+
+    def sample(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Evaluate the whole step once, into ``data.ctrl``."""
+
+
+class PythonEngine:
+    """Runs the scalar source as Python floats."""
+
+    name: EngineName = "python"
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        check_model(model, data)
+        # Parameters never change during a flight: read once what native code reads at every call.
+        parameters = unflatten(ControlParameters, data.userdata.tolist())
+
+        def sample(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+            try:
+                data.ctrl[:] = controls(
+                    data.time, data.qpos.tolist(), data.qvel.tolist(), data.act.tolist(), parameters
+                )
+            except (ArithmeticError, ValueError):
+                # Where floats raise (sin of infinity), native code has NaN; MuJoCo reports both.
+                data.ctrl[:] = nan
+
+        def hold(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+            data.ctrl[4:8] = rotor_thrust_controls(data.act.tolist())
+
+        self._sample, self._hold = sample, hold
+
+    def continuous(self) -> Callback:
+        """See `Engine.continuous`."""
+        return self._sample
+
+    def held(self) -> Callback:
+        """See `Engine.held`."""
+        return self._hold
+
+    def sample(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """See `Engine.sample`."""
+        self._sample(model, data)
+
+
+def check_model(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Raise ValueError unless model and data are those of a tiltrotor flight of ours."""
+    sizes = (model.nq, model.nv, model.na, model.nu)
+    if sizes != TILTROTOR_SIZES or model.nuserdata == 0 or data.userdata[0] != SIGNATURE:
+        raise ValueError(
+            f"not a tiltrotor flight: (nq, nv, na, nu) = {sizes}, expected {TILTROTOR_SIZES}, "
+            "with the parameters in userdata"
+        )
+
+
+def make_engine(name: EngineName, model: mujoco.MjModel, data: mujoco.MjData) -> Engine:
+    """Build an engine for a model whose parameters already lie in ``data.userdata``."""
+    if name == "python":
+        return PythonEngine(model, data)
+    from tiltsim.native import NativeEngine
+
+    return NativeEngine(model, data)
+
+
+@contextmanager
+def control_callback(callback: Any) -> Iterator[None]:
+    """Install MuJoCo's control callback for the length of a ``with`` block."""
+    previous = mujoco.get_mjcb_control()
+    mujoco.set_mjcb_control(callback)
+    try:
+        yield
+    finally:
+        mujoco.set_mjcb_control(previous)

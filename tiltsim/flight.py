@@ -1,0 +1,171 @@
+"""A flight: what was observed, sample by sample, and all that follows from it.
+
+The samples hold the vehicle's state; references, thrusts and singularity margins are derived from
+them with the same functions that the control law uses. One `Flight` feeds metrics, files, plots
+and Rerun.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.attitude_altitude import STATE_FIELDS, attitude_reference
+from controllers.decoupling_matrix import sines_and_cosines, torque_free_force
+from controllers.gaits import tilt_reference
+from controllers.references import position_reference
+from controllers.vehicle import SPIN, drag_ratio
+from tiltsim.parameters import control_parameters
+
+if TYPE_CHECKING:
+    import pyarrow
+
+    from controllers.attitude_altitude import Parameters
+    from tiltsim.engine import EngineName
+    from tiltsim.scenario import Scenario
+
+Floats = npt.NDArray[np.float64]
+
+SAMPLE_FIELDS: Final = (
+    "time",
+    *STATE_FIELDS,
+    *(f"alpha_rate_{rotor}" for rotor in (1, 2, 3, 4)),
+)
+"""What a recorded sample holds, in order."""
+
+_FOUR: Final = (1, 2, 3, 4)
+COLUMN_UNITS: Final = {
+    "time": "s",
+    **dict.fromkeys(("x", "y", "z"), "m"),
+    **dict.fromkeys(("vx", "vy", "vz"), "m/s"),
+    **dict.fromkeys(("roll", "pitch", "yaw"), "rad"),
+    **dict.fromkeys(("p", "q", "r"), "rad/s"),
+    **{f"alpha_{i}": "rad" for i in _FOUR},
+    **{f"alpha_ref_{i}": "rad" for i in _FOUR},
+    **{f"alpha_rate_{i}": "rad/s" for i in _FOUR},
+    **{f"rotor_speed_{i}": "rad/s" for i in _FOUR},
+    **{f"thrust_{i}": "N" for i in _FOUR},
+    **dict.fromkeys(("x_ref", "y_ref", "z_ref"), "m"),
+    **dict.fromkeys(("roll_ref", "pitch_ref", "yaw_ref"), "rad"),
+    "singularity_margin": "rad",
+    "determinant": "1",
+}
+"""Columns of a flight and their units, in the order of the file."""
+
+
+@dataclass(frozen=True)
+class End:
+    """How a flight ended: ``kind``, when (s), and in words why."""
+
+    kind: Literal["completed", "diverged", "singular", "interrupted"]
+    time: float
+    cause: str = ""
+
+
+@dataclass(frozen=True)
+class Flight:
+    """The record of one flight."""
+
+    scenario: Scenario
+    samples: Floats  # (N, len(SAMPLE_FIELDS))
+    end: End
+    engine: EngineName
+    wall_time: float  # s, integration alone
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.samples)
+
+    def __getitem__(self, column: str) -> Floats:
+        """A column by name, shape (N,); see `COLUMN_UNITS`."""
+        return self.columns[column]
+
+    @cached_property
+    def columns(self) -> dict[str, Floats]:
+        """All columns by name, each of shape (N,), in the order of `COLUMN_UNITS`."""
+        known = dict(zip(SAMPLE_FIELDS, self.samples.T, strict=True))
+        law = control_parameters(self.scenario).law
+        known |= _references(self.samples, law)
+        speeds = [known[f"rotor_speed_{i}"] for i in _FOUR]
+        for i, sign, speed in zip(_FOUR, SPIN, speeds, strict=True):
+            known[f"thrust_{i}"] = law.vehicle.thrust_coefficient * sign * speed * np.abs(speed)
+        geometry = singularity(self.samples, law)
+        known |= {"singularity_margin": geometry[0], "determinant": geometry[1]}
+        return {name: known[name] for name in COLUMN_UNITS}
+
+    @cached_property
+    def _metrics(self) -> dict[str, float | bool]:
+        from tiltsim.metrics import compute_metrics
+
+        return compute_metrics(self)
+
+    def metrics(self) -> dict[str, float | bool]:
+        """The flight in numbers; names and meanings in `tiltsim.metrics.METRICS`."""
+        return dict(self._metrics)
+
+    def to_arrow(self) -> pyarrow.Table:
+        """The flight as an Arrow table: units in the fields' metadata, origin in the schema's."""
+        import pyarrow as pa
+
+        fields = [
+            pa.field(name, pa.float64(), nullable=False, metadata={"unit": unit})
+            for name, unit in COLUMN_UNITS.items()
+        ]
+        schema = pa.schema(fields, metadata=self.origin())
+        return pa.table([self.columns[name] for name in COLUMN_UNITS], schema=schema)
+
+    def origin(self) -> dict[str, str]:
+        """Where the flight comes from: scenario (JSON), versions, seed, engine, end."""
+        return {
+            "scenario": self.scenario.model_dump_json(),
+            "address": self.scenario.address,
+            "seed": str(self.scenario.simulation.seed),
+            "engine": self.engine,
+            "end": self.end.kind,
+            "cause": self.end.cause,
+            **{f"{name}_version": version(name) for name in ("tiltsim", "mujoco", "numpy")},
+        }
+
+    def save(self, folder: str | Path) -> None:
+        """Write metrics.json, flight.parquet and the resolved scenario.toml into a folder."""
+        from tiltsim.files import save_flight
+
+        save_flight(self, Path(folder))
+
+
+def _references(samples: Floats, law: Parameters) -> dict[str, Floats]:
+    """Reference columns: what the law aimed at, sample by sample."""
+    rows = []
+    for time, *state in samples.tolist():
+        trig = sines_and_cosines(*state[12:16])
+        position = position_reference(time, law.reference)[:3]
+        attitude = attitude_reference(time, state, trig, law)[:3]
+        rows.append((*position, *attitude, *tilt_reference(time, law.gait)[:4]))
+    names = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
+    tilts = tuple(f"alpha_ref_{i}" for i in _FOUR)
+    values = np.array(rows).reshape(len(rows), len(names) + len(tilts))
+    return dict(zip((*names, *tilts), values.T, strict=True))
+
+
+def singularity(samples: Floats, law: Parameters) -> tuple[Floats, Floats]:
+    """Singularity margin (rad, with its sign) and determinant ``n . r3`` of samples, shape (N,).
+
+    The margin is the smallest rotation that makes the decoupling matrix singular, negative where
+    the torque-free force points below the horizon, 0 where tau has lost rank.
+    """
+    tilts = samples[:, 13:17].T
+    trig: Any = tuple(part for tilt in tilts for part in (np.sin(tilt), np.cos(tilt)))
+    n = np.array(torque_free_force(trig, drag_ratio(law.vehicle)))
+    roll, pitch = samples[:, 7], samples[:, 8]
+    up = np.array([-np.sin(pitch), np.sin(roll) * np.cos(pitch), np.cos(roll) * np.cos(pitch)])
+    determinant = np.sum(n * up, axis=0)
+    length = np.linalg.norm(n, axis=0)
+    with np.errstate(invalid="ignore"):
+        sine = np.where(length > 0.0, determinant / np.where(length > 0.0, length, 1.0), 0.0)
+    return np.arcsin(np.clip(sine, -1.0, 1.0)), determinant

@@ -1,0 +1,73 @@
+"""The shipped files: the scenario library and the MJCF models."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from tiltsim.errors import InputError
+
+
+def shipped_folder(name: str) -> Path:
+    """The folder ``mjcf`` or ``scenarios``: inside an installed package, else in the checkout."""
+    package = Path(__file__).resolve().parent
+    installed = package / name
+    return installed if installed.is_dir() else package.parent / name
+
+
+def find_scenario_file(path: str | Path) -> Path:
+    """The scenario file that a user means: a path as given, or a name from the library.
+
+    Raises `InputError` where neither is a file.
+    """
+    given = Path(path)
+    if given.is_file():
+        return given
+    if not given.is_absolute():
+        library = shipped_folder("scenarios")
+        for candidate in (library / given, library / f"{given}.toml"):
+            if candidate.is_file():
+                return candidate
+    if given.is_dir():
+        raise InputError(f"{path}: a folder, not a scenario file; tiltsim check takes folders")
+    raise InputError(f"{path}: no such file, nor a scenario of the library (see tiltsim list)")
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The document in a TOML file. Raises `InputError` with the file and the reason."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not UTF-8 text (byte {error.start}: {error.reason})") from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not valid TOML: {error}") from error
+
+
+def scenario_files(path: Path) -> list[Path]:
+    """All scenario files under a folder, sorted; a file stands for itself."""
+    return sorted(path.rglob("*.toml")) if path.is_dir() else [path]
+
+
+def library_name(path: Path) -> str:
+    """How a user addresses a file: without folder and suffix when it is in the library."""
+    library = shipped_folder("scenarios")
+    resolved = path.resolve()
+    if resolved.is_relative_to(library.resolve()):
+        return resolved.relative_to(library.resolve()).with_suffix("").as_posix()
+    return str(path)
+
+
+def library_entries() -> Iterator[tuple[str, str, str]]:
+    """Address, title and source of every scenario of the library, variants included."""
+    for path in scenario_files(shipped_folder("scenarios")):
+        document = read_toml(path)
+        name = library_name(path)
+        variants = document.get("variant", [])
+        for variant in variants or [{}]:
+            address = f"{name}#{variant['name']}" if "name" in variant else name
+            title = variant.get("title", document.get("title", ""))
+            yield address, title, variant.get("source", document.get("source", ""))

@@ -1,0 +1,135 @@
+"""Reading scenarios: files, variants and overrides merged into one validated `Scenario`."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from tiltsim.errors import InputError
+from tiltsim.library import find_scenario_file, library_name, read_toml
+from tiltsim.messages import one_line, show
+from tiltsim.scenario import Scenario, Variant
+
+
+def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Scenario:
+    """Read a scenario.
+
+    Parameters
+    ----------
+    path
+        A TOML file or the name of a scenario in the library, with ``#variant`` for a member of a
+        family, for example ``ch04_tracking/setpoint#rho_065_modified``.
+    overrides
+        Values by dotted key, for example ``{"controller.decoupler": "exact"}``.
+
+    Raises
+    ------
+    InputError
+        In one line: the file, the key, the value and what is allowed.
+    """
+    name, _, variant = str(path).partition("#")
+    file = find_scenario_file(name)
+    document = read_toml(file)
+    address = library_name(file) + (f"#{variant}" if variant else "")
+    names = variant_names(file, document)
+    if variant:
+        document = _select_variant(file, document, variant)
+    elif names and not overrides:
+        raise InputError(f"{address}: choose a variant with #: {', '.join(names)}")
+    document.pop("variant", None)
+    for key, value in _types_first(overrides or {}):
+        _override(address, document, key, value)
+    return parse_scenario(document, address)
+
+
+def parse_scenario(document: Mapping[str, Any], address: str = "scenario") -> Scenario:
+    """Validate a document of plain dicts and lists; ``address`` names it in messages.
+
+    Raises `InputError` as `load_scenario` does.
+    """
+    try:
+        scenario = Scenario.model_validate(document)
+    except ValidationError as error:
+        raise InputError(f"{address}: {one_line(error, document, Scenario)}") from None
+    scenario._address = address
+    return scenario
+
+
+def variant_names(file: Path, document: Mapping[str, Any]) -> list[str]:
+    """The names of a file's variants, in order. Raises `InputError` where one is bad or double."""
+    names: list[str] = []
+    variants = document.get("variant", [])
+    if not isinstance(variants, list):
+        raise InputError(f"{file}: variant = {show(variants)}: write [[variant]] tables")
+    for table in variants:
+        try:
+            names.append(Variant.model_validate(table).name)
+        except ValidationError as error:
+            raise InputError(f"{file}: variant: {one_line(error, table, Variant)}") from None
+        if names[-1] in names[:-1]:
+            raise InputError(f"{file}: variant.name = {names[-1]!r}: used twice")
+    return names
+
+
+def _select_variant(file: Path, document: dict[str, Any], name: str) -> dict[str, Any]:
+    names = variant_names(file, document)
+    if name not in names:
+        allowed = f"choose {', '.join(names)}" if names else "the file has no variants"
+        raise InputError(f"{library_name(file)}#{name}: no such variant; {allowed}")
+    base = {key: value for key, value in document.items() if key != "variant"}
+    chosen = dict(document["variant"][names.index(name)])
+    del chosen["name"]
+    expectations = [*base.get("expect", []), *chosen.pop("expect", [])]
+    merged = _merge(base, chosen)
+    if expectations:
+        merged["expect"] = expectations
+    return merged
+
+
+def _merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Base with changes on top, table by table; a table of another type replaces the whole."""
+    merged = dict(base)
+    for key, value in changes.items():
+        old = merged.get(key)
+        if isinstance(old, dict) and isinstance(value, dict):
+            other_type = "type" in value and value["type"] != old.get("type")
+            merged[key] = value if other_type else _merge(old, value)
+        else:
+            merged[key] = value
+    return merged
+
+
+def _types_first(overrides: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """Overrides with those of ``type`` keys first: a new type empties its table."""
+    return sorted(overrides.items(), key=lambda item: not item[0].endswith(".type"))
+
+
+def _override(address: str, document: dict[str, Any], key: str, value: object) -> None:
+    *tables, last = key.split(".")
+    target: Any = document
+    for name in tables:
+        target = target.setdefault(name, {}) if isinstance(target, dict) else None
+    if not isinstance(target, dict):
+        raise InputError(f"{address}: {key} = {show(value)}: {key.rpartition('.')[0]} is no table")
+    if last == "type" and target.get("type") != value:
+        target.clear()
+    target[last] = value
+
+
+def parse_override(text: str) -> tuple[str, Any]:
+    """Split ``KEY=VALUE``; the value is read as TOML, or taken as a string where it is none.
+
+    Raises `InputError` where the text has no key or no equals sign.
+    """
+    key, equals, value = text.partition("=")
+    key, value = key.strip(), value.strip()
+    if not equals or not key:
+        raise InputError(f"--set {text}: write KEY=VALUE, for example controller.decoupler=exact")
+    try:
+        return key, tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key, value

@@ -1,0 +1,108 @@
+"""A flight in numbers: the metrics that expectations judge and sweeps collect."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from controllers.decoupling_matrix import torque_entries, vertical_force_entries
+from controllers.vehicle import SPIN, drag_ratio
+
+if TYPE_CHECKING:
+    from tiltsim.flight import Flight, Floats
+
+METRICS: Final = {
+    "final_position_error_x": "reference minus actual, mean over the last second, m",
+    "final_position_error_y": "reference minus actual, mean over the last second, m",
+    "final_position_error_z": "reference minus actual, mean over the last second, m",
+    "sup_position_error_after_20s": "largest horizontal position error from 20 s on, m",
+    "final_roll": "mean over the last second, rad",
+    "final_pitch": "mean over the last second, rad",
+    "final_yaw": "mean over the last second, rad",
+    "max_abs_roll": "largest absolute roll, rad",
+    "max_abs_pitch": "largest absolute pitch, rad",
+    "min_rotor_speed": "smallest rotor speed along its spin, negative where one reversed, rad/s",
+    "max_rotor_speed": "largest rotor speed along its spin, rad/s",
+    "max_tilt_rate": "largest absolute tilt rate, rad/s",
+    "min_singularity_margin": "smallest rotation left to a singular attitude, signed, rad",
+    "min_decoupling_condition": "smallest over largest singular value of [tau/(L Kf); r3 F/Kf]",
+    "saturated_fraction": "share of samples with a rotor at its speed limit",
+    "diverged": "true where the flight ended early, by divergence or a singular matrix",
+    "duration": "time flown, s",
+    "realtime_factor": "time flown over wall time of the integration",
+}
+"""Every metric by name, with its meaning. Metrics that have none for a flight are left out."""
+
+SETTLED: Final = 20.0  # s, from when the supremum of the position error counts
+
+
+def compute_metrics(flight: Flight) -> dict[str, float | bool]:
+    """All metrics of a flight, over its recorded samples."""
+    columns = flight.columns
+    time = columns["time"]
+    last_second = time >= time[-1] - 1.0
+    metrics: dict[str, float | bool] = {}
+
+    def final(values: Floats) -> float:
+        return float(np.mean(values[last_second]))
+
+    errors = {axis: columns[f"{axis}_ref"] - columns[axis] for axis in ("x", "y", "z")}
+    follows_position = flight.scenario.controller.decoupler != "none"
+    for axis, error in errors.items():
+        if follows_position or axis == "z":
+            metrics[f"final_position_error_{axis}"] = final(error)
+    settled = time >= SETTLED
+    if follows_position and settled.any():
+        horizontal = np.hypot(errors["x"], errors["y"])
+        metrics["sup_position_error_after_20s"] = float(horizontal[settled].max())
+    for angle in ("roll", "pitch", "yaw"):
+        metrics[f"final_{angle}"] = final(columns[angle])
+    for angle in ("roll", "pitch"):
+        metrics[f"max_abs_{angle}"] = float(np.abs(columns[angle]).max())
+
+    spins = np.array([sign * columns[f"rotor_speed_{i}"] for i, sign in enumerate(SPIN, start=1)])
+    metrics["min_rotor_speed"] = float(spins.min())
+    metrics["max_rotor_speed"] = float(spins.max())
+    rates = [np.abs(columns[f"alpha_rate_{i}"]).max() for i in (1, 2, 3, 4)]
+    metrics["max_tilt_rate"] = float(max(rates))
+    metrics["min_singularity_margin"] = float(columns["singularity_margin"].min())
+    metrics["min_decoupling_condition"] = _min_decoupling_condition(flight)
+    metrics["saturated_fraction"] = _saturated_fraction(flight, spins)
+    metrics["diverged"] = flight.end.kind in {"diverged", "singular"}
+    metrics["duration"] = float(time[-1])
+    metrics["realtime_factor"] = float(time[-1] / max(flight.wall_time, 1e-9))
+    return metrics
+
+
+def _saturated_fraction(flight: Flight, spins: Floats) -> float:
+    vehicle = flight.scenario.vehicle
+    saturated = np.zeros(len(flight), dtype=bool)
+    # The integrator stops on the limit to rounding, so a hair's breadth counts as reached.
+    if vehicle.max_rotor_speed is not None:
+        saturated |= (spins >= vehicle.max_rotor_speed * (1.0 - 1e-9)).any(axis=0)
+    if vehicle.min_rotor_speed is not None:
+        saturated |= (spins <= vehicle.min_rotor_speed * (1.0 + 1e-9)).any(axis=0)
+    return float(saturated.mean())
+
+
+def _min_decoupling_condition(flight: Flight) -> float:
+    columns: dict[str, Any] = flight.columns
+    trig: Any = tuple(
+        part(columns[f"alpha_{i}"]) for i in (1, 2, 3, 4) for part in (np.sin, np.cos)
+    )
+    roll, pitch = columns["roll"], columns["pitch"]
+    up: Any = (-np.sin(pitch), np.sin(roll) * np.cos(pitch), np.cos(roll) * np.cos(pitch))
+    ratio = drag_ratio(flight.scenario.vehicle.resolve())
+    x2, x4, y1, y3, z1, z2, z3, z4 = torque_entries(trig, ratio)
+    matrices = np.zeros((len(flight), 4, 4))
+    matrices[:, 0, 1], matrices[:, 0, 3] = x2, x4
+    matrices[:, 1, 0], matrices[:, 1, 2] = y1, y3
+    for column, entry in enumerate((z1, z2, z3, z4)):
+        matrices[:, 2, column] = entry
+    for column, entry in enumerate(vertical_force_entries(trig, *up)):
+        matrices[:, 3, column] = entry
+    if not np.isfinite(matrices).all():
+        return 0.0
+    values = np.linalg.svd(matrices, compute_uv=False)
+    return float((values[:, -1] / values[:, 0]).min())

@@ -1,0 +1,405 @@
+"""Scenarios: what to fly, table by table, checked before anything moves.
+
+`Scenario` mirrors the file; every key has its unit, bounds and default here and nowhere else.
+`tiltsim.loading` reads the files, `tiltsim.messages` words the mistakes.
+"""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Annotated, Literal, Self
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    PrivateAttr,
+    Tag,
+    model_validator,
+)
+
+from controllers.attitude_altitude import DECOUPLINGS, Gains
+from controllers.gains import GAIN_SETS, gains_from_rows
+from controllers.stability import closed_loops
+from controllers.vehicle import PRESETS, Vehicle
+from tiltsim.messages import InvalidValueError
+from tiltsim.metrics import METRICS
+
+Positive = Annotated[float, Field(gt=0.0)]
+NonNegative = Annotated[float, Field(ge=0.0)]
+Angle = Annotated[float, Field(ge=-pi, le=pi, description="rad")]
+Vector3 = Annotated[tuple[float, float, float], Field(strict=False)]
+Angles3 = Annotated[tuple[Angle, Angle, Angle], Field(strict=False)]
+Angles4 = Annotated[tuple[Angle, Angle, Angle, Angle], Field(strict=False)]
+Gains2 = Annotated[tuple[float, float], Field(strict=False)]
+Positive4 = Annotated[tuple[Positive, Positive, Positive, Positive], Field(strict=False)]
+
+
+class Table(BaseModel):
+    """A table of the scenario file: unknown keys, NaN and loose types are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+# --- [vehicle] ---------------------------------------------------------------------------------
+
+
+class TiltServoTable(Table):
+    """The servos that tilt the pods: second order, ideal but for what is given here."""
+
+    natural_frequency: Positive = Field(300.0, description="rad/s")
+    damping_ratio: Positive = 1.0
+    max_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
+        None, description="rad; the gait must stay within"
+    )
+
+
+class PodTable(Table):
+    """Mass properties of one rotor pod; nearly massless by default, as in the thesis."""
+
+    mass: Positive = Field(1e-9, description="kg")
+    inertia: Positive = Field(1e-12, description="kg m^2, about each axis of the pod")
+
+
+class VehicleTable(Table):
+    """The vehicle: a preset and what differs from it."""
+
+    model: Literal["tiltrotor"] = "tiltrotor"
+    preset: Literal["ar_drone_2", "luukkonen"] = "ar_drone_2"
+    mass: Positive | None = Field(None, description="kg, pods included")
+    inertia: Annotated[tuple[Positive, Positive, Positive], Field(strict=False)] | None = Field(
+        None, description="principal moments about the centre of mass, kg m^2, pods included"
+    )
+    arm_length: Positive | None = Field(None, description="m")
+    thrust_coefficient: Positive | None = Field(None, description="N s^2/rad^2")
+    drag_coefficient: Positive | None = Field(None, description="N m s^2/rad^2")
+    gravity: Positive | None = Field(None, description="m/s^2")
+    min_rotor_speed: Positive | None = Field(None, description="rad/s, absolute value")
+    max_rotor_speed: Positive | None = Field(None, description="rad/s, absolute value")
+    tilt_servo: TiltServoTable = TiltServoTable()
+    pod: PodTable = PodTable()
+
+    def resolve(self) -> Vehicle:
+        """The physical parameters: the preset with the given keys in place of its own."""
+        given = {
+            key: getattr(self, key)
+            for key in ("mass", "arm_length", "thrust_coefficient", "drag_coefficient", "gravity")
+        }
+        if self.inertia is not None:
+            given |= dict(
+                zip(("inertia_xx", "inertia_yy", "inertia_zz"), self.inertia, strict=True)
+            )
+        known = {key: value for key, value in given.items() if value is not None}
+        return PRESETS[self.preset]._replace(**known)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        a, b, c = sorted(self.resolve()[1:4])
+        if a + b < c:
+            raise InvalidValueError(
+                "vehicle.inertia", [a, b, c], "no body has it: two moments must exceed the third"
+            )
+        low, high = self.min_rotor_speed, self.max_rotor_speed
+        if low is not None and high is not None and low >= high:
+            raise InvalidValueError(
+                "vehicle.min_rotor_speed", low, f"must be below max_rotor_speed = {high}"
+            )
+        return self
+
+
+# --- [simulation] and [initial] ----------------------------------------------------------------
+
+
+class SimulationTable(Table):
+    """How the flight is computed."""
+
+    duration: Positive = Field(40.0, description="s")
+    timestep: Annotated[float, Field(gt=0.0, le=0.1)] = Field(0.001, description="s, physics")
+    control_timestep: NonNegative = Field(
+        0.0, description="s; 0 evaluates the law at every integrator stage, else sample and hold"
+    )
+    record_timestep: Positive | None = Field(
+        None, description="s between recorded samples; default: the multiple of timestep near 0.01"
+    )
+    engine: Literal["auto", "python", "native"] = "auto"
+    plant: Literal["mujoco", "thesis"] = "mujoco"
+    integrator: Literal["RK4", "implicitfast", "implicit", "Euler"] = "RK4"
+    seed: Annotated[int, Field(ge=0)] = 0
+
+    @property
+    def steps(self) -> int:
+        """Number of physics steps of the flight."""
+        return round(self.duration / self.timestep)
+
+    @property
+    def control_steps(self) -> int:
+        """Physics steps between control samples; 0 where control is continuous."""
+        return round(self.control_timestep / self.timestep)
+
+    @property
+    def record_steps(self) -> int:
+        """Physics steps between recorded samples."""
+        wanted = 0.01 if self.record_timestep is None else self.record_timestep
+        return max(1, round(wanted / self.timestep))
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for key in ("duration", "control_timestep", "record_timestep"):
+            value = getattr(self, key)
+            if value is None or value == 0.0:
+                continue
+            steps = value / self.timestep
+            if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
+                raise InvalidValueError(
+                    f"simulation.{key}", value, f"must be a multiple of timestep = {self.timestep}"
+                )
+        return self
+
+
+class InitialTable(Table):
+    """The state at time zero; the tilt angles are the gait's."""
+
+    position: Vector3 = Field((0.0, 0.0, 0.0), description="m, world")
+    velocity: Vector3 = Field((0.0, 0.0, 0.0), description="m/s, world")
+    attitude: Angles3 = Field((0.0, 0.0, 0.0), description="roll, pitch, yaw, rad")
+    angular_velocity: Vector3 = Field((0.0, 0.0, 0.0), description="p, q, r, rad/s, body")
+    rotor_speed: Positive | Positive4 = Field(
+        300.0, description="absolute value, rad/s; one for all rotors or four"
+    )
+
+    @property
+    def rotor_speeds(self) -> tuple[float, float, float, float]:
+        """Absolute rotor speeds, one each."""
+        speed = self.rotor_speed
+        return speed if isinstance(speed, tuple) else (speed, speed, speed, speed)
+
+
+# --- [controller] ------------------------------------------------------------------------------
+
+
+class GainTable(Table):
+    """Gains written out; see `controllers.gains.gains_from_rows`."""
+
+    attitude: Annotated[tuple[Vector3, Vector3, Vector3], Field(strict=False)] = Field(
+        description="diagonals of K_P1, K_P2, K_P3, each roll, pitch, yaw"
+    )
+    altitude: Vector3 = Field(description="K_PZ1, K_PZ2, K_PZ3")
+    position: Gains2 = Field((1.0, 1.0), description="K_X1, K_X2")
+
+
+def _gain_kind(value: object) -> str:
+    return "named" if isinstance(value, str) else "table"
+
+
+class ControllerTable(Table):
+    """The control law and its choices."""
+
+    law: Literal["attitude_altitude"] = "attitude_altitude"
+    decoupling: Literal["published", "exact"] = "published"
+    decoupler: Literal["none", "conventional", "modified", "exact"] = "modified"
+    gains: Annotated[
+        Annotated[Literal["ch03", "ch04", "exact"], Tag("named")]
+        | Annotated[GainTable, Tag("table")],
+        Discriminator(_gain_kind),
+    ] = "ch04"
+    gait_rate_feedforward: Literal[False] = False
+    allow_unstable: bool = Field(False, description="fly gains that fail the Routh condition")
+
+    def resolve_gains(self) -> Gains:
+        """The numbers behind a named set or a table."""
+        if isinstance(self.gains, GainTable):
+            return gains_from_rows(self.gains.attitude, self.gains.altitude, self.gains.position)
+        return GAIN_SETS[self.gains]
+
+
+# --- [gait] ------------------------------------------------------------------------------------
+
+
+class FixedGait(Table):
+    """Constant tilt angles."""
+
+    type: Literal["fixed"] = "fixed"
+    angles: Angles4 = Field((0.0, 0.0, 0.0, 0.0), description="alpha_1..4, rad")
+
+
+class TrotGait(Table):
+    """The cat trots of ch. 4, which differ in how they change sides."""
+
+    type: Literal["trot_instant", "trot_continuous"]
+    amplitude: Angle = Field(description="rho, rad")
+    period: Positive = Field(description="T, s")
+
+
+Gait = Annotated[FixedGait | TrotGait, Field(discriminator="type")]
+
+
+def largest_tilt(gait: FixedGait | TrotGait) -> tuple[str, object, float]:
+    """The key that sets a gait's largest angle, its value, and that angle (rad)."""
+    if isinstance(gait, FixedGait):
+        return "angles", gait.angles, max(abs(angle) for angle in gait.angles)
+    return "amplitude", gait.amplitude, abs(gait.amplitude)
+
+
+# --- [reference] -------------------------------------------------------------------------------
+
+
+class _PositionReference(Table):
+    yaw: Angle = 0.0
+    acceleration_feedforward: bool = Field(False, description="ch. 4 leaves it out")
+
+
+class SetpointReference(_PositionReference):
+    """A point to hold."""
+
+    type: Literal["setpoint"] = "setpoint"
+    position: Vector3 = Field((0.0, 0.0, 0.0), description="m")
+
+
+class LineReference(_PositionReference):
+    """Uniform motion along a line."""
+
+    type: Literal["line"]
+    position: Vector3 = Field((0.0, 0.0, 0.0), description="m, at time zero")
+    velocity: Vector3 = Field(description="m/s")
+
+
+class CircleReference(_PositionReference):
+    """Uniform motion on a horizontal circle, from +x towards +y."""
+
+    type: Literal["circle"]
+    position: Vector3 = Field((0.0, 0.0, 0.0), description="the centre, m")
+    radius: Positive = Field(description="m")
+    angular_frequency: float = Field(description="rad/s")
+
+
+class AttitudeAltitudeReference(Table):
+    """Attitude and altitude to hold; the horizontal position is free (ch. 3)."""
+
+    type: Literal["attitude_altitude"]
+    roll: Annotated[float, Field(gt=-pi / 2, lt=pi / 2)] = Field(0.0, description="rad")
+    pitch: Annotated[float, Field(gt=-pi / 2, lt=pi / 2)] = Field(0.0, description="rad")
+    yaw: Angle = Field(0.0, description="rad")
+    altitude: float = Field(0.0, description="m")
+
+
+Reference = Annotated[
+    SetpointReference | LineReference | CircleReference | AttitudeAltitudeReference,
+    Field(discriminator="type"),
+]
+
+# --- [[expect]] --------------------------------------------------------------------------------
+
+
+class Expectation(Table):
+    """A bound on a metric, judged after the flight."""
+
+    metric: str
+    published: float | None = Field(None, description="the thesis' figure, shown beside ours")
+    min: float | None = None
+    max: float | None = None
+    equals: bool | None = Field(None, description="for metrics that are true or false")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.metric not in METRICS:
+            raise InvalidValueError("expect.metric", self.metric, f"choose {', '.join(METRICS)}")
+        if self.min is None and self.max is None and self.equals is None:
+            raise InvalidValueError(f"expect.{self.metric}", "no bound", "give min, max or equals")
+        if self.min is not None and self.max is not None and self.min > self.max:
+            raise InvalidValueError("expect.min", self.min, f"must not exceed max = {self.max}")
+        return self
+
+
+# --- the whole ---------------------------------------------------------------------------------
+
+
+class Scenario(Table):
+    """One flight, fully specified."""
+
+    title: str = ""
+    source: str = ""
+    vehicle: VehicleTable = VehicleTable()
+    simulation: SimulationTable = SimulationTable()
+    initial: InitialTable = InitialTable()
+    controller: ControllerTable = ControllerTable()
+    gait: Gait = FixedGait()
+    reference: Reference = SetpointReference()
+    expect: Annotated[tuple[Expectation, ...], Field(strict=False)] = ()
+
+    _address: str = PrivateAttr("")
+
+    @property
+    def address(self) -> str:
+        """How the scenario is called on the command line; empty when it was built in Python."""
+        return self._address
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        key, value, largest = largest_tilt(self.gait)
+        limit = self.vehicle.tilt_servo.max_angle
+        if limit is not None and largest > limit:
+            raise InvalidValueError(
+                f"gait.{key}",
+                value,
+                f"beyond the servo limit vehicle.tilt_servo.max_angle = {limit}",
+            )
+        decoupler = self.controller.decoupler
+        free = isinstance(self.reference, AttitudeAltitudeReference)
+        if free and decoupler != "none":
+            raise InvalidValueError(
+                "controller.decoupler", decoupler, "reference.type = 'attitude_altitude' takes none"
+            )
+        if not free and decoupler == "none":
+            raise InvalidValueError(
+                "controller.decoupler",
+                decoupler,
+                f"reference.type = {self.reference.type!r} needs conventional, modified or exact",
+            )
+        self._check_rotor_limits()
+        self._check_stability()
+        return self
+
+    def _check_rotor_limits(self) -> None:
+        low, high = self.vehicle.min_rotor_speed, self.vehicle.max_rotor_speed
+        if self.simulation.plant == "thesis" and (low is not None or high is not None):
+            raise InvalidValueError(
+                "simulation.plant",
+                "thesis",
+                "the thesis' equations know no rotor limits; use mujoco",
+            )
+        for speed in self.initial.rotor_speeds:
+            if (low is not None and speed < low) or (high is not None and speed > high):
+                raise InvalidValueError(
+                    "initial.rotor_speed", speed, f"must lie within the rotor limits {low}..{high}"
+                )
+
+    def _check_stability(self) -> None:
+        controller = self.controller
+        if controller.allow_unstable:
+            return
+        loops = closed_loops(
+            controller.resolve_gains(), self.vehicle.resolve(), DECOUPLINGS[controller.decoupling]
+        )
+        for loop in loops:
+            if not loop.stable:
+                raise InvalidValueError(
+                    "controller.gains",
+                    controller.model_dump()["gains"],
+                    f"unstable under the {controller.decoupling} decoupling matrix by Routh: "
+                    f"{loop.condition}; change the gains or set controller.allow_unstable = true",
+                )
+
+
+class Variant(Table):
+    """One member of a family: a name, what differs from the base, and its own expectations."""
+
+    model_config = ConfigDict(extra="allow")
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$")]
+
+
+class ScenarioFile(Scenario):
+    """A scenario file as it is written: a base and, optionally, a family of variants."""
+
+    variant: tuple[Variant, ...] = ()

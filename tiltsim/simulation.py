@@ -1,0 +1,147 @@
+"""Simulate a scenario: advance the plant, record samples, notice when the flight is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter
+from typing import Final
+
+import numpy as np
+
+from controllers.references import position_reference
+from controllers.vehicle import SPIN
+from tiltsim.flight import SAMPLE_FIELDS, End, Flight, Floats, singularity
+from tiltsim.parameters import control_parameters
+from tiltsim.plants import Plant, make_plant
+from tiltsim.scenario import Scenario
+
+MAX_POSITION_ERROR: Final = 1e4  # m
+MAX_BODY_RATE: Final = 1e3  # rad/s, far above what any rotorcraft survives
+MAX_ROTOR_SPEED: Final = 1e5  # rad/s
+
+Observer = Callable[[Floats], None]
+
+
+def simulate(scenario: Scenario, observer: Observer | None = None) -> Flight:
+    """Fly a scenario from start to end.
+
+    Parameters
+    ----------
+    scenario
+        What to fly; see `tiltsim.load_scenario`.
+    observer
+        Called with every sample (floats in the order of `SAMPLE_FIELDS`) as it is recorded.
+
+    Returns
+    -------
+    Flight
+        All samples up to the end. A flight that diverges or meets a singular decoupling matrix
+        is a result, not an error: its log is complete up to there, and ``flight.end`` names the
+        cause and, to one physics step, the time. So is a flight interrupted from the keyboard.
+    """
+    simulation = scenario.simulation
+    plant = make_plant(scenario)
+    watch = Watch(scenario)
+    samples = [_sample(plant)]
+    end = watch.judge(plant, samples[0])
+    steps_left = simulation.steps
+    start = perf_counter()
+    try:
+        while steps_left > 0 and end is None:
+            steps = min(simulation.record_steps, steps_left)
+            before = plant.state
+            plant.advance(steps)
+            sample = _sample(plant)
+            end = watch.judge(plant, sample)
+            if end is not None:
+                plant.state = before
+                sample, end = _first_bad_step(plant, watch, steps, sample, end)
+            if np.isfinite(sample).all():
+                samples.append(sample)
+                if observer is not None:
+                    observer(sample)
+            steps_left -= steps
+    except KeyboardInterrupt:
+        end = End("interrupted", float(samples[-1][0]), "interrupted from the keyboard")
+    wall_time = perf_counter() - start
+    if end is None:
+        end = End("completed", plant.time)
+    return Flight(scenario, np.array(samples), end, plant.engine, wall_time)
+
+
+def _sample(plant: Plant) -> Floats:
+    return np.array([plant.time, *plant.observe()])
+
+
+def _first_bad_step(
+    plant: Plant, watch: Watch, steps: int, sample: Floats, end: End
+) -> tuple[Floats, End]:
+    """Repeat a recording interval step by step to find the very step on which it went wrong."""
+    for _ in range(steps):
+        plant.advance(1)
+        this = _sample(plant)
+        verdict = watch.judge(plant, this)
+        if verdict is not None:
+            return this, verdict
+    return sample, end
+
+
+class Watch:
+    """Decides from the samples of one flight whether it is lost, and why."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._law = control_parameters(scenario).law
+        self._scenario = scenario
+        self._initial_side = 0.0
+
+    def judge(self, plant: Plant, sample: Floats) -> End | None:
+        """The end that a sample spells, None while the flight goes on."""
+        time = float(sample[0])
+        fault = plant.fault()
+        if fault:
+            return End("diverged", time, fault)
+        if not np.isfinite(sample).all():
+            name = SAMPLE_FIELDS[int(np.argmin(np.isfinite(sample)))]
+            return End("diverged", time, f"{name} is no longer a finite number")
+        return self._judge_limits(time, sample) or self._judge_singularity(time, sample)
+
+    def _judge_limits(self, time: float, sample: Floats) -> End | None:
+        state = dict(zip(SAMPLE_FIELDS, sample.tolist(), strict=True))
+        target = position_reference(time, self._law.reference)
+        if self._scenario.controller.decoupler != "none":
+            error = float(np.hypot(target[0] - state["x"], target[1] - state["y"]))
+            if error > MAX_POSITION_ERROR:
+                return End("diverged", time, f"{error:.3g} m away from the reference")
+        error = abs(target[2] - state["z"])
+        if error > MAX_POSITION_ERROR:
+            return End("diverged", time, f"{error:.3g} m away from the reference altitude")
+        for name in ("p", "q", "r"):
+            if abs(state[name]) > MAX_BODY_RATE:
+                return End("diverged", time, f"body rate {name} = {state[name]:.3g} rad/s")
+        for rotor in (1, 2, 3, 4):
+            speed = state[f"rotor_speed_{rotor}"]
+            if abs(speed) > MAX_ROTOR_SPEED:
+                return End("diverged", time, f"rotor {rotor} at {speed:.3g} rad/s")
+        return None
+
+    def _judge_singularity(self, time: float, sample: Floats) -> End | None:
+        margin, _ = singularity(sample[np.newaxis], self._law)
+        side = float(np.sign(margin[0]))
+        if self._initial_side == 0.0:
+            self._initial_side = side
+        if side == 0.0:
+            return End(
+                "singular", time, "the torque matrix has lost rank: singular at any attitude"
+            )
+        if side != self._initial_side:
+            cause = (
+                "the decoupling matrix became singular: its determinant changed sign at "
+                f"roll = {sample[7]:.3g} rad, pitch = {sample[8]:.3g} rad"
+            )
+            return End("singular", time, cause)
+        if self._scenario.controller.decoupling == "exact":
+            for rotor, sign in enumerate(SPIN, start=1):
+                if sign * sample[16 + rotor] <= 0.0:
+                    cause = f"the decoupling matrix became singular: rotor {rotor} came to a stop"
+                    return End("singular", time, cause)
+        return None
