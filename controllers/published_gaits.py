@@ -99,7 +99,7 @@ _TRIANGLE: Final = (_P, (0.7, -0.25), (0.25, -0.7), _P)
 
 PATHS: Final[dict[str, Path]] = {
     # ch. 8, Fig. 7 (lost): which rule each example follows or breaks is in its caption.
-    "E1": polygon(((-0.8, 0.1), (-0.1, 0.8), (-0.7, 0.7)), "red"),
+    "E1": polygon(((-0.8, 0.2), (-0.4, 0.8), (-0.75, 0.75)), "red"),
     "E2": polygon(((-0.6, -0.6), (0.7, -0.4), (0.2, 0.8)), "blue"),
     "E3": polygon(((0.3, -0.8), (0.8, -0.3), (0.7, -0.7)), "red"),
     "E4": polygon(((0.3, -0.8), (0.8, -0.3), (0.1, 0.6)), "red"),

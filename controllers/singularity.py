@@ -158,8 +158,10 @@ def singularity_margin(
     return np.where(np.isnan(margin), 0.0, margin)
 
 
-def margin_over_gait(angles: ArrayLike, vehicle: Vehicle) -> Array:
-    """Level-attitude margin (rad) along a gait that must not cross a singularity.
+def margin_over_gait(
+    angles: ArrayLike, vehicle: Vehicle, roll: ArrayLike = 0.0, pitch: ArrayLike = 0.0
+) -> Array:
+    """Margin (rad) along a gait that must not cross a singularity.
 
     ``angles`` has the shape (N, 4), in order of time. As `singularity_margin`, but with the sign of
     ``R`` relative to where the gait starts: a gait whose determinant changes sign passes through a
@@ -168,4 +170,5 @@ def margin_over_gait(angles: ArrayLike, vehicle: Vehicle) -> Array:
     sign = np.sign(residuals(angles, vehicle).R)
     started = np.flatnonzero(sign)
     side = sign[started[0]] if started.size else 1.0
-    return singularity_margin(angles, vehicle) * sign * side + 0.0  # no negative zeros
+    margin = singularity_margin(angles, vehicle, roll, pitch)
+    return margin * sign * side + 0.0  # no negative zeros
