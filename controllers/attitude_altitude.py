@@ -87,12 +87,12 @@ STATE_FIELDS: Final = (
 
 @scalar
 def attitude_reference(
-    time: float, state: State, trig: Octet, parameters: Parameters
+    time: float, state: State, trig: Octet, torque: Octet, parameters: Parameters
 ) -> tuple[float, float, float, float, float, float]:
     """Attitude and altitude to track, with the altitude's derivatives (ch. 4, Eqs. 28-30).
 
-    ``trig`` holds the sines and cosines of the tilt angles, see `sines_and_cosines`. Returns
-    ``(roll, pitch, yaw, z, vz, az)`` in rad and SI units.
+    ``trig`` are the `sines_and_cosines` of the tilt angles, ``torque`` their `torque_entries`.
+    Returns ``(roll, pitch, yaw, z, vz, az)`` in rad and SI units.
     """
     reference = parameters.reference
     x_ref, y_ref, z_ref, vx_ref, vy_ref, vz_ref, ax_ref, ay_ref, az_ref = position_reference(
@@ -113,7 +113,7 @@ def attitude_reference(
         roll_ref, pitch_ref = conventional_decoupler(ax, ay, yaw_ref, gravity)
         return roll_ref, pitch_ref, yaw_ref, z_ref, vz_ref, az_ref
 
-    n = torque_free_force(trig, drag_ratio(vehicle))
+    n = torque_free_force(trig, torque, drag_ratio(vehicle))
     if parameters.decoupler == EXACT:
         roll_ref, pitch_ref = exact_decoupler(ax, ay, az_ref, yaw_ref, gravity, n)
     else:
@@ -137,8 +137,10 @@ def rotor_accelerations(time: float, state: State, parameters: Parameters) -> Qu
     gains = parameters.gains
 
     trig = sines_and_cosines(state[12], state[13], state[14], state[15])
+    torque = torque_entries(trig, drag_ratio(vehicle))
+    x2, x4, y1, y3, z1, z2, z3, z4 = torque
     roll_ref, pitch_ref, yaw_ref, z_ref, vz_ref, az_ref = attitude_reference(
-        time, state, trig, parameters
+        time, state, trig, torque, parameters
     )
 
     # Second derivatives of the outputs, Eq. (10), from w_i = varpi_i |varpi_i|.
@@ -146,7 +148,6 @@ def rotor_accelerations(time: float, state: State, parameters: Parameters) -> Qu
     factor_3, factor_4 = 2.0 * abs(speed_3), 2.0 * abs(speed_4)
     w1, w2 = 0.5 * factor_1 * speed_1, 0.5 * factor_2 * speed_2
     w3, w4 = 0.5 * factor_3 * speed_3, 0.5 * factor_4 * speed_4
-    x2, x4, y1, y3, z1, z2, z3, z4 = torque_entries(trig, drag_ratio(vehicle))
     per_torque = vehicle.arm_length * vehicle.thrust_coefficient
     per_roll = per_torque / vehicle.inertia_xx
     per_pitch = per_torque / vehicle.inertia_yy
@@ -183,7 +184,7 @@ def rotor_accelerations(time: float, state: State, parameters: Parameters) -> Qu
         h1, h2, h3, h4 = h1 * factor_1, h2 * factor_2, h3 * factor_3, h4 * factor_4
         factor_1 = factor_2 = factor_3 = factor_4 = 1.0
     v1, v2, v3, v4 = solve_by_pairs(
-        (x2, x4, y1, y3, z1, z2, z3, z4),
+        torque,
         (h1, h2, h3, h4),
         roll_jerk / per_roll,
         pitch_jerk / per_pitch,

@@ -85,20 +85,22 @@ def vertical_force_entries(trig: Octet, ux: float, uy: float, uz: float) -> Quad
 
 
 @scalar
-def torque_free_inputs(trig: Octet, drag_ratio: float) -> Quad:
+def torque_free_inputs(torque: Octet) -> Quad:
     """The inputs ``w`` that span ``ker tau(alpha)`` (where tau has rank 3; else they may vanish).
+
+    ``torque`` are the `torque_entries`.
 
     Rotors 2 and 4 share a factor that cancels their roll torque, rotors 1 and 3 one that cancels
     their pitch torque; the ratio of the two factors cancels the yaw torque.
     """
-    x2, x4, y1, y3, z1, z2, z3, z4 = torque_entries(trig, drag_ratio)
+    x2, x4, y1, y3, z1, z2, z3, z4 = torque
     yaw_of_13 = z3 * y1 - z1 * y3
     yaw_of_24 = z4 * x2 - z2 * x4
     return (-y3 * yaw_of_24, x4 * yaw_of_13, y1 * yaw_of_24, -x2 * yaw_of_13)
 
 
 @scalar
-def torque_free_force(trig: Octet, drag_ratio: float) -> Triple:
+def torque_free_force(trig: Octet, torque: Octet, drag_ratio: float) -> Triple:
     """The force direction at zero torque, ``n = (-R_theta, R_phi, R)``, body axes.
 
     Its length carries ch. 3's normalisation: ``R = 4`` for an untilted vehicle. Where ``n = 0`` the
@@ -106,7 +108,7 @@ def torque_free_force(trig: Octet, drag_ratio: float) -> Triple:
     the torque-free inputs of the two pairs push against each other, as red gaits do on the curve L
     of the Two Color Map.
     """
-    w1, w2, w3, w4 = torque_free_inputs(trig, drag_ratio)
+    w1, w2, w3, w4 = torque_free_inputs(torque)
     nx, ny, nz = body_force(trig, w1, w2, w3, w4)
     scale = 0.5 / drag_ratio
     return nx * scale, ny * scale, nz * scale

@@ -105,7 +105,8 @@ def rank(angles: ArrayLike, vehicle: Vehicle) -> NDArray[np.int_]:
 
 def residuals(angles: ArrayLike, vehicle: Vehicle) -> Residuals:
     """``R``, ``R_phi`` and ``R_theta`` of tilt angles, each of shape (...)."""
-    nx, ny, nz = map(np.asarray, torque_free_force(tilt_trigonometry(angles), drag_ratio(vehicle)))
+    trig, ratio = tilt_trigonometry(angles), drag_ratio(vehicle)
+    nx, ny, nz = map(np.asarray, torque_free_force(trig, torque_entries(trig, ratio), ratio))
     return Residuals(R=nz, R_phi=ny, R_theta=-nx)
 
 
@@ -132,9 +133,10 @@ def torque_free_direction(angles: ArrayLike, vehicle: Vehicle) -> Array:
     """
     trig = tilt_trigonometry(angles)
     ratio = drag_ratio(vehicle)
-    force = np.stack(torque_free_force(trig, ratio), axis=-1)
+    torque = torque_entries(trig, ratio)
+    force = np.stack(torque_free_force(trig, torque, ratio), axis=-1)
     length = np.linalg.norm(force, axis=-1, keepdims=True)
-    inputs = np.linalg.norm(np.stack(torque_free_inputs(trig, ratio), axis=-1), axis=-1)
+    inputs = np.linalg.norm(np.stack(torque_free_inputs(torque), axis=-1), axis=-1)
     full_rank = rank(angles, vehicle) == 3
     pushes = 2.0 * ratio * length[..., 0] > RANK_TOLERANCE * inputs
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -12,6 +12,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from math import nan
+from struct import Struct
 from typing import Any, Final, Literal, Protocol
 
 import mujoco
@@ -55,18 +56,23 @@ class PythonEngine:
         check_model(model, data)
         # Parameters never change during a flight: read once what native code reads at every call.
         parameters = unflatten(ControlParameters, data.userdata.tolist())
+        # Views of MuJoCo's own memory; looking them up anew would cost a tenth of the callback.
+        qpos, qvel, act, ctrl = data.qpos, data.qvel, data.act, data.ctrl
+        write_controls = Struct(f"{len(ctrl)}d").pack_into
 
-        def sample(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        def sample(_model: mujoco.MjModel, called: mujoco.MjData) -> None:
+            if called is not data:
+                return  # some other model of this process is being stepped
             try:
-                data.ctrl[:] = controls(
-                    data.time, data.qpos.tolist(), data.qvel.tolist(), data.act.tolist(), parameters
-                )
+                values = controls(data.time, qpos.tolist(), qvel.tolist(), act.tolist(), parameters)
+                write_controls(ctrl, 0, *values)
             except (ArithmeticError, ValueError):
                 # Where floats raise (sin of infinity), native code has NaN; MuJoCo reports both.
-                data.ctrl[:] = nan
+                ctrl[:] = nan
 
-        def hold(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-            data.ctrl[4:8] = rotor_thrust_controls(data.act.tolist())
+        def hold(_model: mujoco.MjModel, called: mujoco.MjData) -> None:
+            if called is data:
+                ctrl[4:8] = rotor_thrust_controls(act.tolist())
 
         self._sample, self._hold = sample, hold
 

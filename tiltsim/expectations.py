@@ -42,5 +42,9 @@ class Verdict:
 
 
 def judge(scenario: Scenario, metrics: Mapping[str, float | bool]) -> list[Verdict]:
-    """The verdict on every expectation of a scenario, in order."""
-    return [Verdict(wanted, metrics.get(wanted.metric)) for wanted in scenario.expect]
+    """The verdict on every expectation of a scenario that speaks of its plant, in order."""
+    return [
+        Verdict(wanted, metrics.get(wanted.metric))
+        for wanted in scenario.expect
+        if wanted.plant in {None, scenario.simulation.plant}
+    ]

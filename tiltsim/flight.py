@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.attitude_altitude import STATE_FIELDS, attitude_reference
-from controllers.decoupling_matrix import sines_and_cosines, torque_free_force
+from controllers.decoupling_matrix import sines_and_cosines, torque_entries, torque_free_force
 from controllers.gaits import tilt_reference
 from controllers.references import position_reference
 from controllers.vehicle import SPIN, drag_ratio
@@ -142,10 +142,12 @@ class Flight:
 def _references(samples: Floats, law: Parameters) -> dict[str, Floats]:
     """Reference columns: what the law aimed at, sample by sample."""
     rows = []
+    ratio = drag_ratio(law.vehicle)
     for time, *state in samples.tolist():
         trig = sines_and_cosines(*state[12:16])
         position = position_reference(time, law.reference)[:3]
-        attitude = attitude_reference(time, state, trig, law)[:3]
+        torque = torque_entries(trig, ratio)
+        attitude = attitude_reference(time, state, trig, torque, law)[:3]
         rows.append((*position, *attitude, *tilt_reference(time, law.gait)[:4]))
     names = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
     tilts = tuple(f"alpha_ref_{i}" for i in _FOUR)
@@ -161,7 +163,8 @@ def singularity(samples: Floats, law: Parameters) -> tuple[Floats, Floats]:
     """
     tilts = samples[:, 13:17].T
     trig: Any = tuple(part for tilt in tilts for part in (np.sin(tilt), np.cos(tilt)))
-    n = np.array(torque_free_force(trig, drag_ratio(law.vehicle)))
+    ratio = drag_ratio(law.vehicle)
+    n = np.array(torque_free_force(trig, torque_entries(trig, ratio), ratio))
     roll, pitch = samples[:, 7], samples[:, 8]
     up = np.array([-np.sin(pitch), np.sin(roll) * np.cos(pitch), np.cos(roll) * np.cos(pitch)])
     determinant = np.sum(n * up, axis=0)

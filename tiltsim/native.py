@@ -109,7 +109,7 @@ def _parameters_at(_typing: Any, address: Any) -> Any:
 
 @cfunc(types.void(types.intp, types.intp), **_OPTIONS)
 def _continuous(model, data):  # type: ignore[no-untyped-def]
-    if _state_size(model, INPUTS) != SIZE or _state_size(model, CONTROLS) != NU:
+    if _state_size(model, INPUTS) != SIZE:
         return
     address = _stack_buffer()
     buffer = carray(_floats_at(address), (SIZE,))
@@ -132,7 +132,7 @@ def _continuous(model, data):  # type: ignore[no-untyped-def]
 
 @cfunc(types.void(types.intp, types.intp), **_OPTIONS)
 def _held(model, data):  # type: ignore[no-untyped-def]
-    if _state_size(model, INPUTS) != SIZE or _state_size(model, CONTROLS) != NU:
+    if _state_size(model, INPUTS) != SIZE:
         return
     address = _stack_buffer()
     buffer = carray(_floats_at(address), (SIZE,))

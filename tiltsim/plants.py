@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Final, Protocol
 
 import mujoco
@@ -120,10 +122,10 @@ class MujocoPlant:
         """See `Plant.advance`."""
         model, data, every = self.model, self.data, self._control_steps
         if every == 0:
-            with control_callback(self._engine.continuous()):
+            with control_callback(self._engine.continuous()), quiet_warnings():
                 mujoco.mj_step(model, data, nstep=steps)
             return
-        with control_callback(self._engine.held()):
+        with control_callback(self._engine.held()), quiet_warnings():
             while steps > 0:
                 since_sample = self._steps_taken % every
                 if since_sample == 0:
@@ -145,6 +147,17 @@ class MujocoPlant:
             if self.data.warning[warning].number:
                 return words
         return ""
+
+
+@contextmanager
+def quiet_warnings() -> Iterator[None]:
+    """Keep MuJoCo from printing its warnings or leaving a log file; `Plant.fault` reports them."""
+    previous = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _message: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(previous)
 
 
 _INTEGRATION: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -169,6 +182,7 @@ def build_model(scenario: Scenario) -> mujoco.MjModel:
             tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump()),
             pod=Pod(**vehicle.pod.model_dump()),
             rotor_limits=RotorLimits(vehicle.min_rotor_speed, vehicle.max_rotor_speed),
+            visuals=False,
         )
     except ValueError as error:
         raise InputError(f"{scenario.address or 'scenario'}: vehicle: {error}") from error

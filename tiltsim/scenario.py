@@ -26,6 +26,9 @@ from controllers.vehicle import PRESETS, Vehicle
 from tiltsim.messages import InvalidValueError
 from tiltsim.metrics import METRICS
 
+MAX_SERVO_STEP = 2.6
+"""Largest product of timestep and servo pole; RK4 turns unstable at 2.78."""
+
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
 Angle = Annotated[float, Field(ge=-pi, le=pi, description="rad")]
@@ -58,8 +61,10 @@ class TiltServoTable(Table):
 class PodTable(Table):
     """Mass properties of one rotor pod; nearly massless by default, as in the thesis."""
 
-    mass: Positive = Field(1e-9, description="kg")
-    inertia: Positive = Field(1e-12, description="kg m^2, about each axis of the pod")
+    mass: Annotated[float, Field(ge=1e-14)] = Field(1e-9, description="kg")
+    inertia: Annotated[float, Field(ge=1e-14)] = Field(
+        1e-13, description="kg m^2, about each axis of the pod"
+    )
 
 
 class VehicleTable(Table):
@@ -299,6 +304,9 @@ class Expectation(Table):
     min: float | None = None
     max: float | None = None
     equals: bool | None = Field(None, description="for metrics that are true or false")
+    plant: Literal["mujoco", "thesis"] | None = Field(
+        None, description="judge on this plant alone; default: on either"
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -357,6 +365,7 @@ class Scenario(Table):
                 f"reference.type = {self.reference.type!r} needs conventional, modified or exact",
             )
         self._check_rotor_limits()
+        self._check_servo()
         self._check_stability()
         return self
 
@@ -373,6 +382,18 @@ class Scenario(Table):
                 raise InvalidValueError(
                     "initial.rotor_speed", speed, f"must lie within the rotor limits {low}..{high}"
                 )
+
+    def _check_servo(self) -> None:
+        servo, timestep = self.vehicle.tilt_servo, self.simulation.timestep
+        # The fastest pole of the servo must stay where explicit integration is stable.
+        fastest = servo.natural_frequency * max(1.0, 2.0 * servo.damping_ratio)
+        if self.simulation.plant == "mujoco" and fastest * timestep > MAX_SERVO_STEP:
+            raise InvalidValueError(
+                "simulation.timestep",
+                timestep,
+                f"too long for a tilt servo at {servo.natural_frequency:g} rad/s; at most "
+                f"{MAX_SERVO_STEP / fastest:.3g} s, or a slower vehicle.tilt_servo",
+            )
 
     def _check_stability(self) -> None:
         controller = self.controller

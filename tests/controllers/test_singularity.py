@@ -10,7 +10,7 @@ import sympy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controllers.decoupling_matrix import torque_free_force
+from controllers.decoupling_matrix import torque_entries, torque_free_force
 from controllers.singularity import (
     decoupling_matrix,
     determinant,
@@ -97,8 +97,8 @@ def test_margin_is_the_smallest_rotation_to_a_singular_attitude(angles, roll, pi
     margin = float(singularity_margin(angles, AR_DRONE, roll, pitch))
     if margin == 0.0:
         return
-    force = np.array(torque_free_force(_trig(angles), drag_ratio(AR_DRONE)))
-    force /= np.linalg.norm(force)
+    R, R_phi, R_theta = residuals(angles, AR_DRONE)
+    force = np.array([-R_theta, R_phi, R]) / np.linalg.norm([R, R_phi, R_theta])
     up = world_up(roll, pitch)
     across = np.linalg.svd(up[np.newaxis])[2][1:]
     heading = np.linspace(0, 2 * np.pi, 4_001)[:, np.newaxis]
@@ -114,10 +114,6 @@ def test_margin_is_the_smallest_rotation_to_a_singular_attitude(angles, roll, pi
         middle = 0.5 * (low + high)
         low, high = (low, middle) if reaches_zero(middle) else (middle, high)
     assert abs(margin) == pytest.approx(high, abs=1e-4)
-
-
-def _trig(angles):
-    return tuple(f(a) for a in angles for f in (np.sin, np.cos))
 
 
 def test_margin_changes_sign_across_the_curve() -> None:
@@ -221,7 +217,8 @@ def expand(vehicle: Vehicle) -> list[dict[str, float]]:
     """Coefficients of the sixteen products in R, R_phi, R_theta, by exact expansion."""
     sines, cosines = sympy.symbols("s1:5"), sympy.symbols("c1:5")
     trig = tuple(itertools.chain.from_iterable(zip(sines, cosines, strict=True)))
-    nx, ny, nz = torque_free_force(trig, sympy.Float(drag_ratio(vehicle), 30))
+    ratio = sympy.Float(drag_ratio(vehicle), 30)
+    nx, ny, nz = torque_free_force(trig, torque_entries(trig, ratio), ratio)
     tables = []
     for part in (nz, ny, -nx):
         # c^2 + s^2 = 1 has been used by the thesis; every product holds one factor per rotor.

@@ -1,0 +1,133 @@
+"""Scalar code stays scalar: what the registry holds must compile as it stands."""
+
+from __future__ import annotations
+
+import builtins
+import dis
+import inspect
+import math
+import pkgutil
+import subprocess
+import sys
+from importlib import import_module
+from types import CodeType, FunctionType
+
+import pytest
+
+import controllers
+import tiltsim.control
+import tiltsim.thesis_plant
+from controllers.attitude_altitude import Parameters, rotor_accelerations
+from controllers.decouplers import DECOUPLERS
+from controllers.gains import GAIN_SETS
+from controllers.gaits import GAIT_TYPES, GaitParameters
+from controllers.references import REFERENCE_TYPES, ReferenceParameters
+from controllers.scalar import scalar_functions
+from controllers.vehicle import PRESETS
+
+MODULES = [
+    import_module(module.name)
+    for module in pkgutil.walk_packages(controllers.__path__, "controllers.")
+]
+FUNCTIONS = scalar_functions()
+PLAIN_BUILTINS = {"abs", "float", "int", "len", "max", "min", "range", "zip", "round", "bool"}
+RECORD_FIELDS = {
+    field
+    for module in (*MODULES, tiltsim.control)
+    for kind in vars(module).values()
+    if inspect.isclass(kind) and issubclass(kind, tuple)
+    for field in getattr(kind, "_fields", ())
+}
+READS_GLOBAL = {"LOAD_GLOBAL", "LOAD_NAME"}
+READS_ATTRIBUTE = {"LOAD_ATTR", "LOAD_METHOD"}
+FORBIDDEN = {"IMPORT_NAME", "STORE_GLOBAL", "STORE_ATTR", "RAISE_VARARGS", "YIELD_VALUE"}
+
+by_function = pytest.mark.parametrize(
+    "function", FUNCTIONS, ids=lambda function: f"{function.__module__}.{function.__name__}"
+)
+
+
+def instructions(code: CodeType):
+    """The instructions of a function and of the comprehensions within."""
+    yield from dis.get_instructions(code)
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from instructions(constant)
+
+
+def names_read(function, operations):
+    return {i.argval for i in instructions(function.__code__) if i.opname in operations}
+
+
+def globals_read(function):
+    """The objects behind the global names that a function reads."""
+    known = vars(builtins) | function.__globals__
+    return {name: known[name] for name in names_read(function, READS_GLOBAL)}
+
+
+def is_math(value):
+    return getattr(math, getattr(value, "__name__", ""), None) is value
+
+
+def test_there_is_scalar_code():
+    assert rotor_accelerations in FUNCTIONS
+    assert tiltsim.control.tiltrotor_controls in FUNCTIONS
+
+
+def test_nothing_is_registered_twice():
+    assert len(set(FUNCTIONS)) == len(FUNCTIONS)
+
+
+@by_function
+def test_scalar_code_calls_only_arithmetic_math_and_scalar_code(function):
+    for name, value in globals_read(function).items():
+        plain = isinstance(value, int | float) or name in PLAIN_BUILTINS
+        assert plain or is_math(value) or value in FUNCTIONS, f"uses {name}"
+
+
+@by_function
+def test_scalar_code_reads_no_attributes_but_fields_of_records(function):
+    assert names_read(function, READS_ATTRIBUTE) <= RECORD_FIELDS
+
+
+@by_function
+def test_scalar_code_has_no_side_effects(function):
+    assert not {i.opname for i in instructions(function.__code__)} & FORBIDDEN
+
+
+@by_function
+def test_callees_are_registered_before_their_callers(function):
+    position = FUNCTIONS.index(function)
+    for value in globals_read(function).values():
+        if isinstance(value, FunctionType):
+            assert FUNCTIONS.index(value) < position, value.__name__
+
+
+@pytest.mark.parametrize("decoupler", DECOUPLERS)
+@pytest.mark.parametrize("decoupling", [0.0, 1.0])
+def test_the_law_turns_python_floats_into_python_floats(decoupler, decoupling):
+    parameters = Parameters(
+        vehicle=PRESETS["ar_drone_2"],
+        gains=GAIN_SETS["exact"],
+        gait=GaitParameters(GAIT_TYPES["fixed"]),
+        reference=ReferenceParameters(REFERENCE_TYPES["setpoint"]),
+        decoupler=DECOUPLERS[decoupler],
+        decoupling=decoupling,
+    )
+    state = (*[0.1] * 12, *[0.2, -0.1, 0.3, 0.1], -300.0, 310.0, -320.0, 330.0)
+    inputs = rotor_accelerations(0.0, state, parameters)
+    assert [type(value) for value in inputs] == [float] * 4
+
+
+def test_controllers_load_neither_simulator_nor_compiler_nor_testbed():
+    names = [module.__name__ for module in MODULES]
+    code = (
+        "import sys\n"
+        f"for name in {names}: __import__(name)\n"
+        "print(*{name.partition('.')[0] for name in sys.modules})"
+    )
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert "controllers" in loaded.stdout.split()
+    assert not {"mujoco", "numba", "llvmlite", "tiltsim"} & set(loaded.stdout.split())

@@ -1,0 +1,178 @@
+"""Headless checks: fly many scenarios, judge each, report for people and for CI machines."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Literal
+from xml.etree import ElementTree
+
+from tiltsim.errors import InputError
+from tiltsim.library import library_name, read_toml, scenario_files, shipped_folder
+from tiltsim.loading import load_scenario, variant_names
+from tiltsim.scenario import Scenario
+
+Status = Literal["passed", "failed", "lost", "invalid", "crashed"]
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """The outcome of one scenario."""
+
+    address: str
+    status: Status
+    message: str  # why it is not passed, in one line; empty when passed
+    verdicts: tuple[tuple[str, bool, float | bool | None, str], ...] = ()
+    wall_time: float = 0.0  # s
+
+
+def collect(paths: Iterable[str]) -> list[str]:
+    """Addresses of all scenarios under files and folders, families spread into variants.
+
+    A path that does not exist is looked up in the library. Raises `InputError` where it is not
+    there either, or where a folder holds no scenario.
+    """
+    addresses: list[str] = []
+    for path in paths:
+        name, _, variant = path.partition("#")
+        place = _find(name)
+        if variant:
+            addresses.append(path)
+            continue
+        files = scenario_files(place)
+        if not files:
+            raise InputError(f"{path}: no scenario file (*.toml) in this folder")
+        for file in files:
+            names = variant_names(file, read_toml(file))
+            base = library_name(file)
+            addresses += [f"{base}#{member}" for member in names] or [base]
+    return list(dict.fromkeys(addresses))
+
+
+def _find(name: str) -> Path:
+    library = shipped_folder("scenarios")
+    for place in (Path(name), library / name, library / f"{name}.toml"):
+        if place.exists():
+            return place
+    raise InputError(f"{name}: no such file or folder, nor one of the library (see tiltsim list)")
+
+
+def check_one(address: str, engine: str | None = None) -> CheckResult:
+    """Fly and judge one scenario; everything that goes wrong becomes part of the result."""
+    from tiltsim.expectations import judge
+    from tiltsim.simulation import simulate
+
+    start = perf_counter()
+    try:
+        scenario = load_scenario(address)
+    except InputError as error:
+        return CheckResult(address, "invalid", str(error))
+    if engine is not None and scenario.simulation.engine == "auto":
+        scenario = _with_engine(scenario, engine)
+    flight = simulate(scenario)
+    judged = judge(scenario, flight.metrics())
+    verdicts = tuple((v.expectation.metric, v.holds, v.measured, v.bounds) for v in judged)
+    wall_time = perf_counter() - start
+    # A scenario may be about a loss: then it says what it expects of `diverged`.
+    loss_expected = any(v.expectation.metric == "diverged" for v in judged)
+    if flight.end.kind != "completed" and not loss_expected:
+        message = f"flight {flight.end.kind} at t = {flight.end.time:.3f} s: {flight.end.cause}"
+        return CheckResult(address, "lost", message, verdicts, wall_time)
+    failed = [v for v in judged if not v.holds]
+    if failed:
+        message = "; ".join(
+            f"{v.expectation.metric} = {_number(v.measured)}, expected {v.bounds}" for v in failed
+        )
+        return CheckResult(address, "failed", message, verdicts, wall_time)
+    return CheckResult(address, "passed", "", verdicts, wall_time)
+
+
+def _number(value: float | bool | None) -> str:
+    return "missing" if value is None else f"{value:.6g}"
+
+
+def _with_engine(scenario: Scenario, engine: str) -> Scenario:
+    simulation = scenario.simulation.model_copy(update={"engine": engine})
+    return scenario.model_copy(update={"simulation": simulation})
+
+
+def check_all(
+    addresses: list[str], jobs: int, report: Callable[[CheckResult], None]
+) -> list[CheckResult]:
+    """Check scenarios on several processes; ``report`` sees each result as it comes.
+
+    Returns the results in the order of the addresses. A process that dies takes only the
+    scenarios down that it was working on, and they are reported as crashed.
+    """
+    engine = _shared_engine(addresses)
+    if jobs == 1 or len(addresses) == 1:
+        results = []
+        for address in addresses:
+            results.append(check_one(address, engine))
+            report(results[-1])
+        return results
+    by_address: dict[str, CheckResult] = {}
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(min(jobs, len(addresses)), mp_context=context) as pool:
+        futures = {pool.submit(check_one, address, engine): address for address in addresses}
+        for future in as_completed(futures):
+            address = futures[future]
+            by_address[address] = _result(address, future)
+            report(by_address[address])
+    return [by_address[address] for address in addresses]
+
+
+def _result(address: str, future: Future[CheckResult]) -> CheckResult:
+    error = future.exception()
+    if error is not None:
+        return CheckResult(address, "crashed", f"{type(error).__name__}: {error}")
+    return future.result()
+
+
+def _shared_engine(addresses: list[str]) -> str | None:
+    """The native engine where all flights together repay compiling it, once, before they start."""
+    from tiltsim.plants import STEPS_WORTH_COMPILING
+
+    steps = 0
+    for address in addresses:
+        try:
+            steps += load_scenario(address).simulation.steps
+        except InputError:
+            continue
+    if steps < STEPS_WORTH_COMPILING:
+        return None
+    import tiltsim.native  # noqa: F401
+
+    return "native"
+
+
+def write_junit(results: list[CheckResult], path: Path) -> None:
+    """Write results as JUnit XML, which CI services read."""
+    failures = sum(result.status in {"failed", "lost"} for result in results)
+    errors = sum(result.status in {"invalid", "crashed"} for result in results)
+    suite = ElementTree.Element(
+        "testsuite",
+        name="tiltsim check",
+        tests=str(len(results)),
+        failures=str(failures),
+        errors=str(errors),
+        time=f"{sum(result.wall_time for result in results):.3f}",
+    )
+    for result in results:
+        folder, _, name = result.address.rpartition("/")
+        case = ElementTree.SubElement(
+            suite, "testcase", classname=folder, name=name, time=f"{result.wall_time:.3f}"
+        )
+        if result.status in {"failed", "lost"}:
+            ElementTree.SubElement(case, "failure", type=result.status, message=result.message)
+        elif result.status != "passed":
+            ElementTree.SubElement(case, "error", type=result.status, message=result.message)
+    root = ElementTree.Element("testsuites")
+    root.append(suite)
+    tree = ElementTree.ElementTree(root)
+    ElementTree.indent(tree)
+    tree.write(path, encoding="utf-8", xml_declaration=True)

@@ -1,0 +1,340 @@
+"""Composing a vehicle's MuJoCo model from the files in ``mjcf/`` and a `Vehicle`'s parameters.
+
+The files hold chapter 3's vehicle. `compile_model` puts another vehicle's numbers in their place,
+scales what is drawn with the arms, and compiles.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from functools import lru_cache
+from math import inf, isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from controllers.vehicle import SPIN, Vehicle
+
+if TYPE_CHECKING:
+    import mujoco
+
+MODELS: Final = ("tiltrotor", "quadrotor")
+INTEGRATORS: Final = ("Euler", "RK4", "implicit", "implicitfast")
+ROTORS: Final = (1, 2, 3, 4)
+
+SERVO_ARMATURE: Final = 1e-6
+"""Inertia (kg m^2) of a tilt servo behind its gear, as felt at the hinge.
+
+It loads the servo but, other than the pod's own inertia, turns no body in reaction.
+"""
+
+START_SPEED: Final = 300.0
+"""Rotor speed (rad/s) of the keyframe ``start``."""
+
+
+def _require_positive(name: str, value: float, unit: str) -> None:
+    if not (isfinite(value) and value > 0.0):
+        raise ValueError(f"{name} = {value!r}: must be finite and above 0 {unit}")
+
+
+def _require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise ValueError(f"{name} = {value!r}: unknown; choose {', '.join(choices)}")
+
+
+@dataclass(frozen=True)
+class TiltServo:
+    """The position servo that tilts a pod: ``alpha'' = w^2 (command - alpha) - 2 zeta w alpha'``.
+
+    This holds exactly on a body that does not move; on a free one, which gives way to the pod's
+    reaction, the servo is slightly faster.
+
+    Attributes
+    ----------
+    natural_frequency : float
+        ``w``, rad/s.
+    damping_ratio : float
+        ``zeta``, dimensionless.
+    max_angle : float or None
+        Largest tilt angle either way, rad: the command is clipped there and the hinge has a stop.
+        None leaves the pod free to turn around.
+    """
+
+    natural_frequency: float = 300.0
+    damping_ratio: float = 1.0
+    max_angle: float | None = None
+
+    def __post_init__(self) -> None:
+        _require_positive("tilt_servo.natural_frequency", self.natural_frequency, "rad/s")
+        if not (isfinite(self.damping_ratio) and self.damping_ratio >= 0.0):
+            raise ValueError(
+                f"tilt_servo.damping_ratio = {self.damping_ratio!r}: must be finite and at least 0"
+            )
+        if self.max_angle is not None:
+            _require_positive("tilt_servo.max_angle", self.max_angle, "rad")
+
+
+@dataclass(frozen=True)
+class Pod:
+    """The part of a rotor that tilts; its centre of mass lies on the hinge.
+
+    The defaults are as good as nothing, for the thesis gives its pods no inertia: a pod that
+    turns by 1 rad then turns chapter 3's body by less than 5e-11 rad. MuJoCo refuses moving
+    bodies below 1e-15; the armature keeps the hinge's equation well conditioned.
+
+    Attributes
+    ----------
+    mass : float
+        kg.
+    inertia : float
+        About any axis through the pod's centre of mass, kg m^2; the same for all axes, so that
+        the vehicle's inertia does not depend on the tilt.
+    """
+
+    mass: float = 1e-9
+    inertia: float = 1e-13
+
+    def __post_init__(self) -> None:
+        for name, value, unit in (
+            ("pod.mass", self.mass, "kg"),
+            ("pod.inertia", self.inertia, "kg m^2"),
+        ):
+            _require_positive(name, value, unit)
+            if value < 1e-14:  # a decade above MuJoCo's own bound for moving bodies
+                raise ValueError(f"{name} = {value!r}: must be at least 1e-14 {unit}")
+
+
+@dataclass(frozen=True)
+class RotorLimits:
+    """Limits on a rotor's speed, held by MuJoCo at the end of each step.
+
+    Within a step the stages of RK4 may see speeds beyond a limit by what one step adds.
+
+    Attributes
+    ----------
+    min_speed : float or None
+        Smallest ``|varpi|``, rad/s: the rotor cannot reverse. None lets it stop and reverse.
+    max_speed : float or None
+        Largest ``|varpi|``, rad/s, in either sense where the rotor may reverse. None is unlimited.
+    """
+
+    min_speed: float | None = None
+    max_speed: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.min_speed is not None and not (isfinite(self.min_speed) and self.min_speed >= 0.0):
+            raise ValueError(
+                f"min_rotor_speed = {self.min_speed!r}: must be finite and at least 0 rad/s"
+            )
+        if self.max_speed is not None:
+            _require_positive("max_rotor_speed", self.max_speed, "rad/s")
+            if self.min_speed is not None and self.min_speed >= self.max_speed:
+                raise ValueError(
+                    f"min_rotor_speed = {self.min_speed!r}: must be below"
+                    f" max_rotor_speed = {self.max_speed!r} rad/s"
+                )
+
+    def speed_range(self, spin: float) -> tuple[float, float] | None:
+        """The range (rad/s) of the signed speed of a rotor with this spin; None if unlimited."""
+        if self.min_speed is None and self.max_speed is None:
+            return None
+        upper = inf if self.max_speed is None else self.max_speed
+        lower = -upper if self.min_speed is None else self.min_speed
+        return (lower, upper) if spin > 0.0 else (-upper, -lower)
+
+
+def mjcf_directory() -> Path:
+    """The folder of the MJCF files: inside the installed package, or next to it in a checkout."""
+    package = Path(__file__).resolve().parent
+    installed = package / "mjcf"
+    return installed if installed.is_dir() else package.parent / "mjcf"
+
+
+def compile_model(
+    model: str,
+    vehicle: Vehicle,
+    *,
+    timestep: float = 1e-3,
+    integrator: str = "RK4",
+    userdata_size: int = 0,
+    tilt_servo: TiltServo = TiltServo(),
+    pod: Pod = Pod(),
+    rotor_limits: RotorLimits = RotorLimits(),
+    visuals: bool = True,
+) -> mujoco.MjModel:
+    """Compile the MuJoCo model of a vehicle.
+
+    Mass and inertia of the compiled model are the vehicle's at any tilt: what the pods weigh is
+    taken from the body. Nothing collides.
+
+    Parameters
+    ----------
+    model : str
+        ``tiltrotor`` or ``quadrotor`` (without hinges; its pods are part of the body).
+    vehicle : Vehicle
+        Physical parameters, the pods' included.
+    timestep : float, default=1e-3
+        Physics time step, s.
+    integrator : str, default="RK4"
+        MuJoCo's name: ``Euler``, ``RK4``, ``implicit`` or ``implicitfast``.
+    userdata_size : int, default=0
+        Numbers of user data in the simulation's state.
+    tilt_servo : TiltServo, optional
+        The tilt servos. Without effect on a quadrotor.
+    pod : Pod, optional
+        The pods' own mass and inertia. Without effect on a quadrotor.
+    rotor_limits : RotorLimits, optional
+        Limits on the rotor speeds.
+    visuals : bool, default=True
+        Whether the vehicle has geoms. They do not touch the physics, but positioning them takes
+        about a sixth of a step.
+
+    Returns
+    -------
+    mujoco.MjModel
+        With the keyframes ``hover`` (in equilibrium) and ``start`` (rotors at 300 rad/s).
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range, or the pods are too heavy for the vehicle.
+    """
+    import mujoco
+
+    _require_choice("vehicle.model", model, MODELS)
+    _require_choice("simulation.integrator", integrator, INTEGRATORS)
+    _require_positive("simulation.timestep", timestep, "s")
+    if userdata_size < 0:
+        raise ValueError(f"userdata_size = {userdata_size!r}: must be at least 0")
+    for name, value in vehicle._asdict().items():
+        _require_positive(f"vehicle.{name}", value, "(SI)")
+
+    return mujoco.MjModel.from_xml_string(
+        _compose(
+            model,
+            vehicle,
+            timestep,
+            integrator,
+            userdata_size,
+            tilt_servo,
+            pod,
+            rotor_limits,
+            visuals,
+        )
+    )
+
+
+@lru_cache(maxsize=64)  # dm_control takes several times longer than MuJoCo's compiler
+def _compose(
+    model: str,
+    vehicle: Vehicle,
+    timestep: float,
+    integrator: str,
+    userdata_size: int,
+    tilt_servo: TiltServo,
+    pod: Pod,
+    rotor_limits: RotorLimits,
+    visuals: bool,
+) -> str:
+    """The vehicle's complete MJCF; the arguments are `compile_model`'s, found valid."""
+    root = _parse(mjcf_directory() / f"{model}.xml")
+    tilting = model == "tiltrotor"
+    stops = tilting and tilt_servo.max_angle is not None
+
+    root.option.timestep = timestep
+    root.option.integrator = integrator
+    root.option.gravity = (0.0, 0.0, -vehicle.gravity)
+    root.option.flag.contact = "disable"
+    root.option.flag.constraint = "enable" if stops else "disable"
+    root.size.nuserdata = userdata_size
+
+    _scale_lengths(root, vehicle.arm_length)
+    _set_inertia(root, vehicle, pod if tilting else None)
+    _set_rotors(root, vehicle, rotor_limits)
+    if tilting:
+        _set_servos(root, tilt_servo, pod)
+    _set_keyframe(root.keyframe.key["hover"], vehicle.hover_rotor_speed)
+    _set_keyframe(root.keyframe.key["start"], START_SPEED)
+    if not visuals:
+        for geom in root.find("body", "vehicle").find_all("geom"):
+            geom.remove()
+    return str(root.to_xml_string())
+
+
+def _parse(path: Path) -> Any:
+    with warnings.catch_warnings():
+        # dm_control tries its window systems on import; without a screen GLFW complains.
+        warnings.filterwarnings("ignore", module="glfw")
+        from dm_control import mjcf
+    return mjcf.from_path(str(path))
+
+
+def _scale_lengths(root: Any, arm_length: float) -> None:
+    """Scale the vehicle's positions and shapes so that its arms have this length (m)."""
+    ratio = arm_length / root.find("body", "pod_1").pos[0]
+    pending = [root.find("body", "vehicle"), root.find("default", "vehicle")]
+    while pending:
+        element = pending.pop()
+        pending.extend(element.all_children())
+        for name in ("pos", "size", "fromto"):
+            length = getattr(element, name, None)
+            if length is not None:
+                setattr(element, name, length * ratio)
+
+
+def _set_rotors(root: Any, vehicle: Vehicle, limits: RotorLimits) -> None:
+    for i, spin in zip(ROTORS, SPIN, strict=True):
+        drag = -spin * vehicle.drag_coefficient
+        thrust = root.find("actuator", f"thrust_{i}")
+        thrust.gear = (0.0, 0.0, vehicle.thrust_coefficient, 0.0, 0.0, drag)
+        speed_range = limits.speed_range(spin)
+        if speed_range is not None:
+            root.find("actuator", f"rotor_speed_{i}").actrange = speed_range
+
+
+def _set_inertia(root: Any, vehicle: Vehicle, pod: Pod | None) -> None:
+    """Give the pods their mass and inertia and the body the rest of the vehicle's."""
+    mass = vehicle.mass
+    moments = [vehicle.inertia_xx, vehicle.inertia_yy, vehicle.inertia_zz]
+    if pod is not None:
+        mass -= 4.0 * pod.mass
+        of_two_opposite_pods = 2.0 * pod.mass * vehicle.arm_length**2  # point masses
+        for axis, pairs in enumerate((1.0, 1.0, 2.0)):  # the pairs that lie off this axis
+            moments[axis] -= 4.0 * pod.inertia + pairs * of_two_opposite_pods
+        for i in ROTORS:
+            inertial = root.find("body", f"pod_{i}").inertial
+            inertial.mass = pod.mass
+            inertial.diaginertia = [pod.inertia] * 3
+    if mass <= 0.0 or min(moments) <= 0.0 or 2.0 * max(moments) > sum(moments):
+        raise ValueError(
+            f"vehicle.mass = {vehicle.mass!r}, vehicle.inertia = {list(vehicle[1:4])}, pods {pod}:"
+            f" the body without its pods would have {mass:.6g} kg and the moments of inertia"
+            f" {', '.join(f'{moment:.6g}' for moment in moments)} kg m^2; all must be above 0, and"
+            " none larger than the sum of the other two"
+        )
+    inertial = root.find("body", "vehicle").inertial
+    inertial.mass = mass
+    inertial.diaginertia = moments
+
+
+def _set_servos(root: Any, servo: TiltServo, pod: Pod) -> None:
+    defaults = root.find("default", "servo")
+    inertia = pod.inertia + SERVO_ARMATURE
+    defaults.joint.armature = SERVO_ARMATURE
+    defaults.position.kp = inertia * servo.natural_frequency**2
+    defaults.position.kv = 2.0 * inertia * servo.damping_ratio * servo.natural_frequency
+    if servo.max_angle is not None:
+        angle_range = (-servo.max_angle, servo.max_angle)
+        defaults.joint.range = angle_range
+        # As stiff as MuJoCo allows: its usual stop is softer than the servo and would do nothing.
+        defaults.joint.solreflimit = (2.0 * root.option.timestep, 1.0)
+        defaults.joint.solimplimit = (0.99, 0.99, 0.001, 0.5, 2.0)
+        defaults.position.ctrlrange = angle_range
+
+
+def _set_keyframe(key: Any, rotor_speed: float) -> None:
+    """Let all rotors of an upright, untilted vehicle turn at this speed (rad/s)."""
+    key.act = [spin * rotor_speed for spin in SPIN]
+    ctrl = key.ctrl.copy()
+    ctrl[-8:-4] = rotor_speed**2  # the thrust actuators stand before the four rotor speeds
+    key.ctrl = ctrl
