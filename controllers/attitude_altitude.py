@@ -8,6 +8,7 @@ meets them.
 
 from __future__ import annotations
 
+from math import nan
 from typing import Final, NamedTuple
 
 from controllers.decouplers import (
@@ -191,4 +192,6 @@ def rotor_accelerations(time: float, state: State, parameters: Parameters) -> Qu
         yaw_jerk / per_yaw,
         (altitude_jerk - turning) / per_lift,
     )
+    if factor_1 == 0.0 or factor_2 == 0.0 or factor_3 == 0.0 or factor_4 == 0.0:
+        return nan, nan, nan, nan
     return v1 / factor_1, v2 / factor_2, v3 / factor_3, v4 / factor_4

@@ -279,8 +279,8 @@ MISTAKES = {
     ),
     "expectation without a bound": (
         '[[expect]]\nmetric = "duration"',
-        "expect.duration",
-        "give min, max or equals",
+        'expect.metric = "duration"',
+        "give min, max or both",
     ),
     "expectation that nothing meets": (
         '[[expect]]\nmetric = "duration"\nmin = 3.0\nmax = 2.0',
@@ -401,10 +401,11 @@ def test_a_family_without_a_choice_lists_its_members(write):
     assert refusal(path) == f"{path}: choose a variant with #: plain, long, trotting, tilted"
 
 
-def test_an_override_does_not_choose_among_the_members_of_a_family(write):
+def test_a_family_alone_asks_for_a_member_but_overrides_fly_its_base(write):
     path = write(FAMILY)
-    line = refusal(path, {"simulation.seed": 9})
-    assert line == f"{path}: choose a variant with #: plain, long, trotting, tilted"
+    assert refusal(path) == f"{path}: choose a variant with #: plain, long, trotting, tilted"
+    scenario = load_scenario(path, {"simulation.seed": 9})
+    assert (scenario.title, scenario.simulation.seed) == ("base", 9)
 
 
 def test_an_unknown_variant_lists_the_known_ones(write):

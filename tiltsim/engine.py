@@ -26,9 +26,6 @@ EngineName = Literal["python", "native"]
 SIGNATURE: Final = float(zlib.crc32(repr(record_dtype(ControlParameters)).encode()))
 """First number in `userdata`: the layout of the parameters behind it, as a checksum."""
 
-AUTO_NATIVE_STEPS: Final = 100_000
-"""Flights of at least this many physics steps repay the import of the native engine."""
-
 Callback = Callable[[mujoco.MjModel, mujoco.MjData], None]
 
 

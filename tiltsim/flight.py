@@ -59,6 +59,10 @@ COLUMN_UNITS: Final = {
 """Columns of a flight and their units, in the order of the file."""
 
 
+RANK_TOLERANCE: Final = 1e-12
+"""Length of ``n`` (4 for an untilted vehicle) below which tau counts as having lost rank."""
+
+
 @dataclass(frozen=True)
 class End:
     """How a flight ended: ``kind``, when (s), and in words why."""
@@ -169,6 +173,6 @@ def singularity(samples: Floats, law: Parameters) -> tuple[Floats, Floats]:
     up = np.array([-np.sin(pitch), np.sin(roll) * np.cos(pitch), np.cos(roll) * np.cos(pitch)])
     determinant = np.sum(n * up, axis=0)
     length = np.linalg.norm(n, axis=0)
-    with np.errstate(invalid="ignore"):
-        sine = np.where(length > 0.0, determinant / np.where(length > 0.0, length, 1.0), 0.0)
+    regular = length > RANK_TOLERANCE
+    sine = np.where(regular, determinant, 0.0) / np.where(regular, length, 1.0)
     return np.arcsin(np.clip(sine, -1.0, 1.0)), determinant

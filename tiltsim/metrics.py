@@ -34,6 +34,8 @@ METRICS: Final = {
 }
 """Every metric by name, with its meaning. Metrics that have none for a flight are left out."""
 
+BOOLEAN_METRICS: Final = frozenset({"diverged"})
+
 SETTLED: Final = 20.0  # s, from when the supremum of the position error counts
 
 

@@ -24,7 +24,7 @@ from controllers.gains import GAIN_SETS, gains_from_rows
 from controllers.stability import closed_loops
 from controllers.vehicle import PRESETS, Vehicle
 from tiltsim.messages import InvalidValueError
-from tiltsim.metrics import METRICS
+from tiltsim.metrics import BOOLEAN_METRICS, METRICS
 
 MAX_SERVO_STEP = 2.6
 """Largest product of timestep and servo pole; RK4 turns unstable at 2.78."""
@@ -312,8 +312,14 @@ class Expectation(Table):
     def _check(self) -> Self:
         if self.metric not in METRICS:
             raise InvalidValueError("expect.metric", self.metric, f"choose {', '.join(METRICS)}")
-        if self.min is None and self.max is None and self.equals is None:
-            raise InvalidValueError(f"expect.{self.metric}", "no bound", "give min, max or equals")
+        boolean = self.metric in BOOLEAN_METRICS
+        bounded = self.min is not None or self.max is not None
+        if boolean and (bounded or self.equals is None):
+            raise InvalidValueError(
+                "expect.metric", self.metric, "true or false: give equals alone"
+            )
+        if not boolean and (self.equals is not None or not bounded):
+            raise InvalidValueError("expect.metric", self.metric, "a number: give min, max or both")
         if self.min is not None and self.max is not None and self.min > self.max:
             raise InvalidValueError("expect.min", self.min, f"must not exceed max = {self.max}")
         return self
@@ -380,7 +386,9 @@ class Scenario(Table):
         for speed in self.initial.rotor_speeds:
             if (low is not None and speed < low) or (high is not None and speed > high):
                 raise InvalidValueError(
-                    "initial.rotor_speed", speed, f"must lie within the rotor limits {low}..{high}"
+                    "initial.rotor_speed",
+                    speed,
+                    f"must lie within the rotor limits, {low or 0} to {high or 'any'} rad/s",
                 )
 
     def _check_servo(self) -> None:

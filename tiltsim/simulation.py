@@ -19,6 +19,8 @@ MAX_POSITION_ERROR: Final = 1e4  # m
 MAX_BODY_RATE: Final = 1e3  # rad/s, far above what any rotorcraft survives
 MAX_ROTOR_SPEED: Final = 1e5  # rad/s
 
+SINGULAR: Final = 1e-9  # rad, margin below which an attitude counts as singular
+
 Observer = Callable[[Floats], None]
 
 
@@ -126,17 +128,14 @@ class Watch:
 
     def _judge_singularity(self, time: float, sample: Floats) -> End | None:
         margin, _ = singularity(sample[np.newaxis], self._law)
-        side = float(np.sign(margin[0]))
+        side = 0.0 if abs(margin[0]) < SINGULAR else float(np.sign(margin[0]))
         if self._initial_side == 0.0:
             self._initial_side = side
-        if side == 0.0:
-            return End(
-                "singular", time, "the torque matrix has lost rank: singular at any attitude"
-            )
-        if side != self._initial_side:
+        if side == 0.0 or side != self._initial_side:
+            tilts = ", ".join(f"{angle:.3g}" for angle in sample[13:17])
             cause = (
-                "the decoupling matrix became singular: its determinant changed sign at "
-                f"roll = {sample[7]:.3g} rad, pitch = {sample[8]:.3g} rad"
+                f"the decoupling matrix became singular at roll = {sample[7]:.3g} rad, "
+                f"pitch = {sample[8]:.3g} rad, tilt angles ({tilts}) rad"
             )
             return End("singular", time, cause)
         if self._scenario.controller.decoupling == "exact":
