@@ -29,7 +29,7 @@ def test_every_point_of_the_curve_is_singular(angles) -> None:
     scale = np.linalg.norm(residuals(angles, AR_DRONE))
     values = determinant(angles, curve.roll, curve.pitch, AR_DRONE)
     assert np.abs(values).max() < 1e-12 * scale
-    assert np.abs(curve.roll).max() < np.pi / 2
+    assert np.abs(curve.roll).max() <= np.pi / 2
     assert np.abs(curve.pitch).max() <= np.pi / 2
 
 
