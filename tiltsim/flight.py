@@ -21,13 +21,14 @@ from controllers.decoupling_matrix import sines_and_cosines, torque_entries, tor
 from controllers.gaits import tilt_reference
 from controllers.references import position_reference
 from controllers.vehicle import SPIN, drag_ratio
-from tiltsim.parameters import control_parameters
+from tiltsim.parameters import control_setup
 
 if TYPE_CHECKING:
     import pyarrow
 
     from controllers.attitude_altitude import Parameters
     from tiltsim.engine import EngineName
+    from tiltsim.parameters import ControlSetup
     from tiltsim.scenario import Scenario
 
 Floats = npt.NDArray[np.float64]
@@ -94,8 +95,9 @@ class Flight:
     def columns(self) -> dict[str, Floats]:
         """All columns by name, each of shape (N,), in the order of `COLUMN_UNITS`."""
         known = dict(zip(SAMPLE_FIELDS, self.samples.T, strict=True))
-        law = control_parameters(self.scenario).law
-        known |= _references(self.samples, law)
+        setup = control_setup(self.scenario)
+        law = setup.parameters.law
+        known |= _references(self.samples, setup)
         speeds = [known[f"rotor_speed_{i}"] for i in _FOUR]
         for i, sign, speed in zip(_FOUR, SPIN, speeds, strict=True):
             known[f"thrust_{i}"] = law.vehicle.thrust_coefficient * sign * speed * np.abs(speed)
@@ -143,8 +145,9 @@ class Flight:
         save_flight(self, Path(folder))
 
 
-def _references(samples: Floats, law: Parameters) -> dict[str, Floats]:
+def _references(samples: Floats, setup: ControlSetup) -> dict[str, Floats]:
     """Reference columns: what the law aimed at, sample by sample."""
+    law, table = setup.parameters.law, setup.table
     rows = []
     ratio = drag_ratio(law.vehicle)
     for time, *state in samples.tolist():
@@ -152,7 +155,7 @@ def _references(samples: Floats, law: Parameters) -> dict[str, Floats]:
         position = position_reference(time, law.reference)[:3]
         torque = torque_entries(trig, ratio)
         attitude = attitude_reference(time, state, trig, torque, law)[:3]
-        rows.append((*position, *attitude, *tilt_reference(time, law.gait)[:4]))
+        rows.append((*position, *attitude, *tilt_reference(time, law.gait, table)[:4]))
     names = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
     tilts = tuple(f"alpha_ref_{i}" for i in _FOUR)
     values = np.array(rows).reshape(len(rows), len(names) + len(tilts))

@@ -11,7 +11,7 @@ import numpy as np
 from controllers.references import position_reference
 from controllers.vehicle import SPIN
 from tiltsim.flight import SAMPLE_FIELDS, End, Flight, Floats, singularity
-from tiltsim.parameters import control_parameters
+from tiltsim.parameters import control_setup
 from tiltsim.plants import Plant, make_plant
 from tiltsim.scenario import Scenario
 
@@ -92,7 +92,7 @@ class Watch:
     """Decides from the samples of one flight whether it is lost, and why."""
 
     def __init__(self, scenario: Scenario) -> None:
-        self._law = control_parameters(scenario).law
+        self._law = control_setup(scenario).parameters.law
         self._scenario = scenario
         self._initial_side = 0.0
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -73,11 +74,10 @@ def _choose(arguments: argparse.Namespace) -> tuple[Gait, Vehicle]:
         if arguments.vehicle is not None:
             raise InputError("--vehicle: the scenario has a vehicle of its own; leave one out")
         from tiltsim.loading import load_scenario
-        from tiltsim.parameters import control_parameters
 
         scenario = load_scenario(arguments.scenario)
-        law = control_parameters(scenario).law
-        return plans.Gait(scenario.gait.type, law.gait, source=scenario.source), law.vehicle
+        vehicle = scenario.vehicle.resolve()
+        return replace(scenario.gait.plan(vehicle), source=scenario.source), vehicle
     vehicle = parse_vehicle(arguments.vehicle)
     if arguments.angles is not None:
         return plans.fixed(parse_angles("--angles", arguments.angles)), vehicle
