@@ -74,6 +74,13 @@ def test_gaits_know_their_amplitude_rate_and_continuity(gait: Gait) -> None:
     assert {"trot_instant", "jump"} == {name for name in GAITS if not GAITS[name].is_continuous}
 
 
+def test_a_jump_belongs_to_the_time_after_it() -> None:
+    jump = GAITS["jump"]
+    before, at = jump.angles([0.8 - 1e-9, 0.8])
+    np.testing.assert_allclose(before, [1, 0, 0, 0], atol=1e-6)
+    np.testing.assert_array_equal(at, [-1, 0.5, 0, 0])
+
+
 def test_sample_times_hit_every_keyframe() -> None:
     rotary = GAITS["rotary_gallop"]
     times = rotary.sample_times(11)

@@ -29,7 +29,7 @@ def test_every_point_of_the_curve_is_singular(angles) -> None:
     scale = np.linalg.norm(residuals(angles, AR_DRONE))
     values = determinant(angles, curve.roll, curve.pitch, AR_DRONE)
     assert np.abs(values).max() < 1e-12 * scale
-    assert np.abs(curve.roll).max() < np.pi / 2
+    assert np.abs(curve.roll).max() <= np.pi / 2
     assert np.abs(curve.pitch).max() <= np.pi / 2
 
 
@@ -68,6 +68,16 @@ def test_share_of_red_blue_and_vertical() -> None:
     line = unacceptable_attitudes(angles, AR_DRONE).roll[0]
     assert acceptable_share(angles, AR_DRONE) == pytest.approx(
         (np.pi / 2 + abs(line)) / np.pi, abs=1e-9
+    )
+
+
+@pytest.mark.parametrize("steepness", [1e-3, 1e-5, 1e-7, 1e-9])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_share_of_a_nearly_vertical_curve_tends_to_that_of_the_line(steepness, side) -> None:
+    upright = (side * 0.8, 0.2, -side * 0.8, 0.2)
+    tilted = (side * 0.8, 0.2, -side * 0.8, 0.2 + steepness)
+    assert acceptable_share(tilted, AR_DRONE) == pytest.approx(
+        acceptable_share(upright, AR_DRONE), abs=3 * steepness + 1e-8
     )
 
 
