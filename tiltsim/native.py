@@ -90,6 +90,30 @@ def _floats_at(_typing: Any, address: Any) -> Any:
     return types.CPointer(types.float64)(address), _cast
 
 
+@intrinsic
+def _bytes_at(_typing: Any, address: Any) -> Any:
+    """An address as a pointer to anything."""
+    return types.voidptr(address), _cast
+
+
+@register_jitable(error_model="numpy")
+def _read_inputs(model, data, address, head, userdata, signature):  # type: ignore[no-untyped-def]
+    """Fill the buffer with the state of a flight; its size, or 0 where the model is not ours."""
+    size = _state_size(model, INPUTS)
+    if size < head or size > CAPACITY:
+        return 0
+    _get_state(model, data, address, INPUTS)
+    return size if carray(_floats_at(address), (CAPACITY,))[userdata] == signature else 0
+
+
+@register_jitable(error_model="numpy")
+def _write_controls(model, data, address, values):  # type: ignore[no-untyped-def]
+    buffer = carray(_floats_at(address), (CAPACITY,))
+    for index in range(len(values)):
+        buffer[index] = values[index]
+    _set_state(model, data, address, CONTROLS)
+
+
 class Callbacks(NamedTuple):
     """The compiled control callbacks of a loop; keep them as long as MuJoCo may call them."""
 
@@ -109,57 +133,46 @@ _registered: list[Any] = []
 
 @cache
 def compile_callbacks(loop: Loop) -> Callbacks:
-    """Compile a loop's control step as C callbacks, or load them from the cache on disk."""
+    """Compile a loop's control step as C callbacks, or load them from the cache on disk.
+
+    The cache knows the callbacks by the values they close over, so these must pickle to the same
+    bytes in every process: module-level functions, numbers and dtypes do.
+    """
     _register_scalar_functions()
-    controls, refresh, loop_signature = loop.controls, loop.refresh, loop.signature
+    controls, refresh, signature = loop.controls, loop.refresh, loop.signature
     nq, nv, na, nu = loop.sizes
     qpos, qvel, act, userdata = 1, 1 + nq, 1 + nq + nv, 1 + nq + nv + na
     head = userdata + loop.record_size
-    record = numba.from_dtype(record_dtype(loop.parameters))
-
-    @intrinsic
-    def record_at(_typing: Any, address: Any) -> Any:
-        """An address as a pointer to the parameter record."""
-        return types.CPointer(record)(address), _cast
+    layout = record_dtype(loop.parameters)
 
     @cfunc(types.void(types.intp, types.intp), **_OPTIONS)
     def continuous(model, data):  # type: ignore[no-untyped-def]
-        size = _state_size(model, INPUTS)
-        if size < head or size > CAPACITY:
-            return
         address = _stack_buffer()
-        buffer = carray(_floats_at(address), (CAPACITY,))
-        _get_state(model, data, address, INPUTS)
-        if buffer[userdata] != loop_signature:
+        size = _read_inputs(model, data, address, head, userdata, signature)
+        if size == 0:
             return
+        buffer = carray(_floats_at(address), (CAPACITY,))
         values = controls(
             buffer[0],
             to_fixed_tuple(buffer[qpos:qvel], nq),
             to_fixed_tuple(buffer[qvel:act], nv),
             to_fixed_tuple(buffer[act:userdata], na),
-            carray(record_at(address + 8 * userdata), (1,))[0],
+            carray(_bytes_at(address + 8 * userdata), (1,), layout)[0],
             buffer[head:size],
         )
-        for index in range(nu):
-            buffer[index] = values[index]
-        _set_state(model, data, address, CONTROLS)
+        _write_controls(model, data, address, values)
 
     @cfunc(types.void(types.intp, types.intp), **_OPTIONS)
     def held(model, data):  # type: ignore[no-untyped-def]
-        size = _state_size(model, INPUTS)
-        if size < head or size > CAPACITY:
-            return
         address = _stack_buffer()
-        buffer = carray(_floats_at(address), (CAPACITY,))
-        _get_state(model, data, address, INPUTS)
-        if buffer[userdata] != loop_signature:
+        size = _read_inputs(model, data, address, head, userdata, signature)
+        if size == 0:
             return
+        buffer = carray(_floats_at(address), (CAPACITY,))
         activations = to_fixed_tuple(buffer[act:userdata], na)
         _get_state(model, data, address, CONTROLS)
         values = refresh(to_fixed_tuple(buffer[0:nu], nu), activations)
-        for index in range(nu):
-            buffer[index] = values[index]
-        _set_state(model, data, address, CONTROLS)
+        _write_controls(model, data, address, values)
 
     return Callbacks(continuous, held)
 
