@@ -69,25 +69,12 @@ def tiltrotor_controls(
     follows a moving gait and not only a resting one.
     """
     law = parameters.law
-    alpha_1, alpha_2, alpha_3, alpha_4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(
-        time, law.gait, table
-    )
     lead = parameters.servo_lead
-    thrust_1, thrust_2, thrust_3, thrust_4 = rotor_thrust_controls(act)
-    u1, u2, u3, u4 = rotor_accelerations(time, tiltrotor_state(qpos, qvel, act), law)
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, law.gait, table)
     return (
-        alpha_1 + lead * rate_1,
-        alpha_2 + lead * rate_2,
-        alpha_3 + lead * rate_3,
-        alpha_4 + lead * rate_4,
-        thrust_1,
-        thrust_2,
-        thrust_3,
-        thrust_4,
-        u1,
-        u2,
-        u3,
-        u4,
+        *(a1 + lead * rate_1, a2 + lead * rate_2, a3 + lead * rate_3, a4 + lead * rate_4),
+        *rotor_thrust_controls(act),
+        *rotor_accelerations(time, tiltrotor_state(qpos, qvel, act), law),
     )
 
 

@@ -57,6 +57,8 @@ class GaitParameters(NamedTuple):
 @scalar
 def planned_angles(time: float, gait: GaitParameters, table: Sequence[float]) -> TiltsAndRates:
     """The gait before scale and bias: ``(alpha_1, ..., alpha_4, rate_1, ..., rate_4)``."""
+    if gait.type == FIXED:
+        return gait.angle_1, gait.angle_2, gait.angle_3, gait.angle_4, 0.0, 0.0, 0.0, 0.0
     if gait.type == KEYFRAMES:
         return keyframe_gait(time, gait.period, gait.keyframes, table)
     if gait.type == TWO_COLOR_CIRCLE:
@@ -71,9 +73,7 @@ def planned_angles(time: float, gait: GaitParameters, table: Sequence[float]) ->
         )
     if gait.type == TROT_CONTINUOUS:
         return continuous_trot(time, gait.amplitude, gait.period)
-    if gait.type == TROT_INSTANT:
-        return instant_trot(time, gait.amplitude, gait.period)
-    return gait.angle_1, gait.angle_2, gait.angle_3, gait.angle_4, 0.0, 0.0, 0.0, 0.0
+    return instant_trot(time, gait.amplitude, gait.period)
 
 
 @scalar
