@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.gaits import tilt_reference
+from controllers.records import slotted
 from controllers.rotation import quaternion_from_euler
 from controllers.vehicle import SPIN
 from tiltsim import thesis_plant
@@ -197,6 +198,7 @@ class ThesisPlant:
     def __init__(self, scenario: Scenario) -> None:
         simulation, initial = scenario.simulation, scenario.initial
         self._setup = control_setup(scenario)
+        self._law = slotted(self._setup.parameters.law)
         self._timestep = simulation.timestep
         self._control_steps = simulation.control_steps
         self._step_index = 0
@@ -239,7 +241,7 @@ class ThesisPlant:
             try:
                 self._state = thesis_plant.advance(
                     *(self._step_index, self._state, self._timestep, steps, self._control_steps),
-                    *(self._setup.parameters.law, self._setup.table),
+                    *(self._law, self._setup.table),
                 )
             except (ArithmeticError, ValueError):
                 self._fault = "the control law left the range of floating-point numbers"
