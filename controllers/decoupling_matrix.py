@@ -103,8 +103,10 @@ def torque_free_inputs(torque: Octet) -> Quad:
 def torque_free_force(trig: Octet, torque: Octet, drag_ratio: float) -> Triple:
     """The force direction at zero torque, ``n = (-R_theta, R_phi, R)``, body axes.
 
-    Its length carries ch. 3's normalisation: ``R = 4`` for an untilted vehicle. ``n = 0`` exactly
-    where ``tau`` has lost rank, and then the decoupling matrix is singular at every attitude.
+    Its length carries ch. 3's normalisation: ``R = 4`` for an untilted vehicle. Where ``n = 0`` the
+    decoupling matrix is singular at every attitude: wherever ``tau`` has lost rank, and also where
+    the torque-free inputs of the two pairs push against each other, as red gaits do on the curve L
+    of the Two Color Map.
     """
     w1, w2, w3, w4 = torque_free_inputs(torque)
     nx, ny, nz = body_force(trig, w1, w2, w3, w4)
@@ -133,8 +135,8 @@ def solve_by_pairs(
     determinant = yaw_13 * lift_24 - yaw_24 * lift_13
     if norm_24 == 0.0 or norm_13 == 0.0 or determinant == 0.0:
         return nan, nan, nan, nan
-    v2, v4 = roll * x2 / norm_24, roll * x4 / norm_24
-    v1, v3 = pitch * y1 / norm_13, pitch * y3 / norm_13
+    roll, pitch = roll / norm_24, pitch / norm_13
+    v1, v2, v3, v4 = pitch * y1, roll * x2, pitch * y3, roll * x4
     yaw = yaw - (z1 * v1 + z2 * v2 + z3 * v3 + z4 * v4)
     lift = lift - (h1 * v1 + h2 * v2 + h3 * v3 + h4 * v4)
     nu = (yaw * lift_24 - yaw_24 * lift) / determinant

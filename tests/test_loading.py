@@ -380,12 +380,19 @@ def test_a_variant_adds_its_expectations_to_those_of_the_base(write):
 
 def test_a_table_of_another_type_replaces_the_whole(write):
     gait = load_scenario(f"{write(FAMILY)}#trotting").gait
-    assert gait.model_dump() == {"type": "trot_instant", "amplitude": 0.3, "period": 1.5}
+    assert gait.model_dump(exclude={"scale", "bias"}) == {
+        "type": "trot_instant",
+        "amplitude": 0.3,
+        "period": 1.5,
+    }
 
 
 def test_a_table_without_a_type_changes_the_one_of_the_base(write):
     gait = load_scenario(f"{write(FAMILY)}#tilted").gait
-    assert gait.model_dump() == {"type": "fixed", "angles": (0.0, 0.0, 0.0, -0.1)}
+    assert gait.model_dump(exclude={"scale", "bias"}) == {
+        "type": "fixed",
+        "angles": (0.0, 0.0, 0.0, -0.1),
+    }
 
 
 def test_a_scenario_knows_its_address(write):
@@ -491,7 +498,11 @@ def test_an_override_changes_one_key(write):
 def test_a_type_is_set_before_the_keys_of_its_table(write, turn):
     changes = [("gait.type", "trot_continuous"), ("gait.amplitude", 0.2), ("gait.period", 3.0)]
     gait = load_scenario(f"{write(FAMILY)}#plain", dict(changes[::turn])).gait
-    assert gait.model_dump() == {"type": "trot_continuous", "amplitude": 0.2, "period": 3.0}
+    assert gait.model_dump(exclude={"scale", "bias"}) == {
+        "type": "trot_continuous",
+        "amplitude": 0.2,
+        "period": 3.0,
+    }
 
 
 def test_a_type_that_is_set_already_keeps_its_table(write):

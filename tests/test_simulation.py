@@ -13,6 +13,7 @@ from controllers.decouplers import DECOUPLERS
 from controllers.gains import GAIN_SETS
 from controllers.statics import setpoint_error
 from controllers.vehicle import PRESETS
+from tiltsim.control import TILTROTOR
 from tiltsim.flight import COLUMN_UNITS
 from tiltsim.plants import MujocoPlant, make_plant
 
@@ -351,7 +352,7 @@ def test_foreign_model_is_left_alone_by_the_callbacks():
     )
     data = mujoco.MjData(other)
     for name in ENGINES:
-        engine = make_engine(name, plant.model, plant.data)
+        engine = make_engine(name, TILTROTOR, plant.model, plant.data)
         for callback in (engine.continuous(), engine.held()):
             with control_callback(callback):
                 mujoco.mj_step(other, data)

@@ -7,10 +7,9 @@
 from __future__ import annotations
 
 from math import pi
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import (
-    BaseModel,
     ConfigDict,
     Discriminator,
     Field,
@@ -23,27 +22,25 @@ from controllers.attitude_altitude import DECOUPLINGS, Gains
 from controllers.gains import GAIN_SETS, gains_from_rows
 from controllers.stability import closed_loops
 from controllers.vehicle import PRESETS, Vehicle
+from tiltsim.gait_tables import FixedGait, Gait
 from tiltsim.messages import InvalidValueError
 from tiltsim.metrics import BOOLEAN_METRICS, METRICS
+from tiltsim.tables import (
+    Angle,
+    Angles3,
+    Gains2,
+    NonNegative,
+    Positive,
+    Positive4,
+    Table,
+    Vector3,
+)
 
-MAX_SERVO_STEP = 2.6
+MAX_TABLE: Final = 1500
+"""Numbers in a gait's table of keyframes, which every evaluation of the control law reads."""
+
+MAX_SERVO_STEP: Final = 2.6
 """Largest product of timestep and servo pole; RK4 turns unstable at 2.78."""
-
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
-Angle = Annotated[float, Field(ge=-pi, le=pi, description="rad")]
-Vector3 = Annotated[tuple[float, float, float], Field(strict=False)]
-Angles3 = Annotated[tuple[Angle, Angle, Angle], Field(strict=False)]
-Angles4 = Annotated[tuple[Angle, Angle, Angle, Angle], Field(strict=False)]
-Gains2 = Annotated[tuple[float, float], Field(strict=False)]
-Positive4 = Annotated[tuple[Positive, Positive, Positive, Positive], Field(strict=False)]
-
-
-class Table(BaseModel):
-    """A table of the scenario file: unknown keys, NaN and loose types are errors."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
 
 # --- [vehicle] ---------------------------------------------------------------------------------
 
@@ -218,34 +215,6 @@ class ControllerTable(Table):
         return GAIN_SETS[self.gains]
 
 
-# --- [gait] ------------------------------------------------------------------------------------
-
-
-class FixedGait(Table):
-    """Constant tilt angles."""
-
-    type: Literal["fixed"] = "fixed"
-    angles: Angles4 = Field((0.0, 0.0, 0.0, 0.0), description="alpha_1..4, rad")
-
-
-class TrotGait(Table):
-    """The cat trots of ch. 4, which differ in how they change sides."""
-
-    type: Literal["trot_instant", "trot_continuous"]
-    amplitude: Angle = Field(description="rho, rad")
-    period: Positive = Field(description="T, s")
-
-
-Gait = Annotated[FixedGait | TrotGait, Field(discriminator="type")]
-
-
-def largest_tilt(gait: FixedGait | TrotGait) -> tuple[str, object, float]:
-    """The key that sets a gait's largest angle, its value, and that angle (rad)."""
-    if isinstance(gait, FixedGait):
-        return "angles", gait.angles, max(abs(angle) for angle in gait.angles)
-    return "amplitude", gait.amplitude, abs(gait.amplitude)
-
-
 # --- [reference] -------------------------------------------------------------------------------
 
 
@@ -350,14 +319,7 @@ class Scenario(Table):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        key, value, largest = largest_tilt(self.gait)
-        limit = self.vehicle.tilt_servo.max_angle
-        if limit is not None and largest > limit:
-            raise InvalidValueError(
-                f"gait.{key}",
-                value,
-                f"beyond the servo limit vehicle.tilt_servo.max_angle = {limit}",
-            )
+        self._check_gait()
         decoupler = self.controller.decoupler
         free = isinstance(self.reference, AttitudeAltitudeReference)
         if free and decoupler != "none":
@@ -374,6 +336,27 @@ class Scenario(Table):
         self._check_servo()
         self._check_stability()
         return self
+
+    def _check_gait(self) -> None:
+        key, value = self.gait.size
+        try:
+            gait = self.gait.plan(self.vehicle.resolve())
+        except ValueError as error:
+            raise InvalidValueError(f"gait.{key}", value, str(error)) from None
+        limit = self.vehicle.tilt_servo.max_angle
+        if limit is not None and gait.amplitude > limit:
+            raise InvalidValueError(
+                f"gait.{key}",
+                value,
+                f"tilts by {gait.amplitude:.4g} rad, beyond the servo limit "
+                f"vehicle.tilt_servo.max_angle = {limit}",
+            )
+        if len(gait.table) > MAX_TABLE:
+            raise InvalidValueError(
+                f"gait.{key}",
+                value,
+                f"too many keyframes: {len(gait.table)} numbers, at most {MAX_TABLE}",
+            )
 
     def _check_rotor_limits(self) -> None:
         low, high = self.vehicle.min_rotor_speed, self.vehicle.max_rotor_speed

@@ -54,8 +54,12 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.out is not None:
         prepare_folder(arguments.out)
 
+    from tiltsim.analysis import gait_warnings
     from tiltsim.simulation import simulate
 
+    vehicle = scenario.vehicle.resolve()
+    for warning in gait_warnings(scenario.gait.plan(vehicle), vehicle):
+        print(f"tiltsim: warning: gait: {warning}", file=sys.stderr)
     duration = scenario.simulation.duration
     with progress_bar(duration, "s", shown=not arguments.quiet) as advance_to:
         flight = simulate(scenario, lambda sample: advance_to(float(sample[0])))
