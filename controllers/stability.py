@@ -65,6 +65,22 @@ def third_order_loop(name: str, gains: tuple[float, float, float], loop_gain: fl
     return Loop(name, polynomial, False, f"{name} K1 K2 = {k1 * k2:g} must exceed K3 = {k3:g}")
 
 
+def linear_loop(name: str, gains: Sequence[float]) -> Loop:
+    """The loop with the characteristic polynomial ``s^n + gains[0] s^(n-1) + ...``."""
+    polynomial = (1.0, *gains)
+    if is_hurwitz(polynomial):
+        return Loop(name, polynomial, True, "")
+    for index, gain in enumerate(gains, start=1):
+        if gain <= 0.0:
+            return Loop(name, polynomial, False, f"{name} k{index} = {gain:g} must be positive")
+    column = routh_first_column(polynomial)
+    return Loop(
+        *(name, polynomial, False),
+        f"{name} {list(gains)}: entry {len(column)} of the Routh array's first column is "
+        f"{column[-1]:g}, must be positive",
+    )
+
+
 def closed_loops(gains: Gains, vehicle: Vehicle, decoupling: float) -> list[Loop]:
     """The closed loops of the attitude-altitude law under the given form of decoupling matrix.
 

@@ -26,8 +26,8 @@ FILES = {
 TREES = {module: ast.parse(file.read_text(encoding="utf-8")) for module, file in FILES.items()}
 
 CORE = (
-    *("model", "simulation", "scenario", "metrics", "flight", "plants", "engine", "control"),
-    "parameters",
+    *("model", "simulation", "scenario", "metrics", "flight", "plants", "engine", "loop"),
+    *("loops", "controller_tables"),
 )
 SCREENS = ("__main__", "cli", "commands", "plot", "rerun", "report", "video", "viewer")
 """First letters of the modules that show flights; nothing that computes them may need one."""

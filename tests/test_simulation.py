@@ -13,8 +13,8 @@ from controllers.decouplers import DECOUPLERS
 from controllers.gains import GAIN_SETS
 from controllers.statics import setpoint_error
 from controllers.vehicle import PRESETS
-from tiltsim.control import TILTROTOR
 from tiltsim.flight import COLUMN_UNITS
+from tiltsim.loops.tiltrotor import TILTROTOR
 from tiltsim.plants import MujocoPlant, make_plant
 
 PLANTS = ("mujoco", "thesis")

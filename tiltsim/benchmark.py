@@ -8,9 +8,9 @@ from typing import Any, Final
 
 import mujoco
 
-from tiltsim.control import TILTROTOR
 from tiltsim.engine import EngineName, control_callback, make_engine
 from tiltsim.loading import parse_scenario
+from tiltsim.loops.tiltrotor import TILTROTOR
 from tiltsim.plants import MujocoPlant
 
 INTEGRATORS: Final = ("RK4", "implicitfast", "Euler")

@@ -14,31 +14,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from controllers.attitude_altitude import STATE_FIELDS, attitude_reference
-from controllers.decoupling_matrix import sines_and_cosines, torque_entries
-from controllers.gaits import tilt_reference
-from controllers.references import position_reference
-from controllers.singularity import determinant, margin_over_gait
-from controllers.vehicle import SPIN, drag_ratio
-from tiltsim.parameters import control_setup
+from controllers.vehicle import SPIN
+from tiltsim.loop import OBSERVED_FIELDS, Floats
+from tiltsim.loops import control_setup, loop_of
 
 if TYPE_CHECKING:
     import pyarrow
 
     from tiltsim.engine import EngineName
-    from tiltsim.parameters import ControlSetup
     from tiltsim.scenario import Scenario
 
-Floats = npt.NDArray[np.float64]
-
-SAMPLE_FIELDS: Final = (
-    "time",
-    *STATE_FIELDS,
-    *(f"alpha_rate_{rotor}" for rotor in (1, 2, 3, 4)),
-)
-"""What a recorded sample holds, in order."""
+SAMPLE_FIELDS: Final = ("time", *OBSERVED_FIELDS)
+"""What a recorded sample of any vehicle begins with; a law's own states follow."""
 
 _FOUR: Final = (1, 2, 3, 4)
 COLUMN_UNITS: Final = {
@@ -57,7 +45,7 @@ COLUMN_UNITS: Final = {
     "singularity_margin": "rad",
     "determinant": "1",
 }
-"""Columns of a flight and their units, in the order of the file."""
+"""Columns of every flight and their units, in the order of the file; those of a law follow."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +62,7 @@ class Flight:
     """The record of one flight."""
 
     scenario: Scenario
-    samples: Floats  # (N, len(SAMPLE_FIELDS))
+    samples: Floats  # (N, len(loop.sample_fields))
     end: End
     engine: EngineName
     wall_time: float  # s, integration alone
@@ -84,23 +72,25 @@ class Flight:
         return len(self.samples)
 
     def __getitem__(self, column: str) -> Floats:
-        """A column by name, shape (N,); see `COLUMN_UNITS`."""
+        """A column by name, shape (N,); see `units`."""
         return self.columns[column]
 
     @cached_property
+    def units(self) -> dict[str, str]:
+        """The columns of this flight and their units, in order."""
+        return COLUMN_UNITS | dict(loop_of(self.scenario).extra_columns)
+
+    @cached_property
     def columns(self) -> dict[str, Floats]:
-        """All columns by name, each of shape (N,), in the order of `COLUMN_UNITS`."""
-        known = dict(zip(SAMPLE_FIELDS, self.samples.T, strict=True))
-        setup = control_setup(self.scenario)
-        law = setup.parameters.law
-        known |= _references(self.samples, setup)
-        speeds = [known[f"rotor_speed_{i}"] for i in _FOUR]
-        for i, sign, speed in zip(_FOUR, SPIN, speeds, strict=True):
-            known[f"thrust_{i}"] = law.vehicle.thrust_coefficient * sign * speed * np.abs(speed)
-        tilts, attitude = self.samples[:, 13:17], (known["roll"], known["pitch"])
-        known["singularity_margin"] = margin_over_gait(tilts, law.vehicle, *attitude)
-        known["determinant"] = determinant(tilts, *attitude, law.vehicle)
-        return {name: known[name] for name in COLUMN_UNITS}
+        """All columns by name, each of shape (N,), in the order of `units`."""
+        loop = loop_of(self.scenario)
+        known = dict(zip(loop.sample_fields, self.samples.T, strict=True))
+        known |= loop.derive(known, control_setup(self.scenario))
+        thrust_coefficient = self.scenario.vehicle.resolve().thrust_coefficient
+        for i, sign in zip(_FOUR, SPIN, strict=True):
+            speed = known[f"rotor_speed_{i}"]
+            known[f"thrust_{i}"] = thrust_coefficient * sign * speed * np.abs(speed)
+        return {name: known[name] for name in self.units}
 
     @cached_property
     def _metrics(self) -> dict[str, float | bool]:
@@ -118,10 +108,10 @@ class Flight:
 
         fields = [
             pa.field(name, pa.float64(), nullable=False, metadata={"unit": unit})
-            for name, unit in COLUMN_UNITS.items()
+            for name, unit in self.units.items()
         ]
         schema = pa.schema(fields, metadata=self.origin())
-        return pa.table([self.columns[name] for name in COLUMN_UNITS], schema=schema)
+        return pa.table(list(self.columns.values()), schema=schema)
 
     def origin(self) -> dict[str, str]:
         """Where the flight comes from: scenario (JSON), versions, seed, engine, end."""
@@ -140,20 +130,3 @@ class Flight:
         from tiltsim.files import save_flight
 
         save_flight(self, Path(folder))
-
-
-def _references(samples: Floats, setup: ControlSetup) -> dict[str, Floats]:
-    """Reference columns: what the law aimed at, sample by sample."""
-    law, table = setup.parameters.law, setup.table
-    rows = []
-    ratio = drag_ratio(law.vehicle)
-    for time, *state in samples.tolist():
-        trig = sines_and_cosines(*state[12:16])
-        position = position_reference(time, law.reference)[:3]
-        torque = torque_entries(trig, ratio)
-        attitude = attitude_reference(time, state, trig, torque, law)[:3]
-        rows.append((*position, *attitude, *tilt_reference(time, law.gait, table)[:4]))
-    names = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
-    tilts = tuple(f"alpha_ref_{i}" for i in _FOUR)
-    values = np.array(rows).reshape(len(rows), len(names) + len(tilts))
-    return dict(zip((*names, *tilts), values.T, strict=True))

@@ -5,14 +5,18 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pydantic import ValidationError
 
+from tiltsim.controller_tables import DEFAULT_LAW
 from tiltsim.errors import InputError
 from tiltsim.library import find_scenario_file, library_name, read_toml
 from tiltsim.messages import one_line, show
 from tiltsim.scenario import Scenario, Variant
+
+KIND_KEYS: Final = {"type": None, "law": DEFAULT_LAW}
+"""Keys that decide which others a table may have, with their defaults."""
 
 
 def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Scenario:
@@ -41,7 +45,7 @@ def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) 
     elif names and not overrides:
         raise InputError(f"{address}: choose a variant with #: {', '.join(names)}")
     document.pop("variant", None)
-    for key, value in _types_first(overrides or {}):
+    for key, value in _kinds_first(overrides or {}):
         _override(address, document, key, value)
     return parse_scenario(document, address)
 
@@ -91,21 +95,24 @@ def _select_variant(file: Path, document: dict[str, Any], name: str) -> dict[str
 
 
 def _merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Base with changes on top, table by table; a table of another type replaces the whole."""
+    """Base with changes on top, table by table; a table of another kind replaces the whole."""
     merged = dict(base)
     for key, value in changes.items():
         old = merged.get(key)
         if isinstance(old, dict) and isinstance(value, dict):
-            other_type = "type" in value and value["type"] != old.get("type")
-            merged[key] = value if other_type else _merge(old, value)
+            other_kind = any(
+                tag in value and value[tag] != old.get(tag, default)
+                for tag, default in KIND_KEYS.items()
+            )
+            merged[key] = value if other_kind else _merge(old, value)
         else:
             merged[key] = value
     return merged
 
 
-def _types_first(overrides: Mapping[str, Any]) -> list[tuple[str, Any]]:
-    """Overrides with those of ``type`` keys first: a new type empties its table."""
-    return sorted(overrides.items(), key=lambda item: not item[0].endswith(".type"))
+def _kinds_first(overrides: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """Overrides with those of `KIND_KEYS` first: a new kind empties its table."""
+    return sorted(overrides.items(), key=lambda item: item[0].rpartition(".")[2] not in KIND_KEYS)
 
 
 def _override(address: str, document: dict[str, Any], key: str, value: object) -> None:
@@ -115,7 +122,7 @@ def _override(address: str, document: dict[str, Any], key: str, value: object) -
         target = target.setdefault(name, {}) if isinstance(target, dict) else None
     if not isinstance(target, dict):
         raise InputError(f"{address}: {key} = {show(value)}: {key.rpartition('.')[0]} is no table")
-    if last == "type" and target.get("type") != value:
+    if last in KIND_KEYS and target.get(last, KIND_KEYS[last]) != value:
         target.clear()
     target[last] = value
 

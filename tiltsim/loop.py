@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from controllers.records import record_dtype, record_size
+import numpy as np
+import numpy.typing as npt
+
+from controllers.attitude_altitude import STATE_FIELDS
+from controllers.records import flatten, record_dtype, record_size
+
+if TYPE_CHECKING:
+    from tiltsim.scenario import Scenario
+
+Floats = npt.NDArray[np.float64]
+
+OBSERVED_FIELDS: Final = (*STATE_FIELDS, *(f"alpha_rate_{rotor}" for rotor in (1, 2, 3, 4)))
+"""What every loop can tell of its vehicle: rigid body, tilts, rotor speeds, tilt rates."""
 
 
 class Sizes(NamedTuple):
@@ -20,16 +32,37 @@ class Sizes(NamedTuple):
     ctrl: int
 
 
-@dataclass(frozen=True)
+class ControlSetup(NamedTuple):
+    """What the control step of one flight reads besides the state."""
+
+    parameters: Any  # the loop's record
+    table: tuple[float, ...] = ()  # keyframes of the gait
+
+    @property
+    def userdata(self) -> Floats:
+        """Record and table as MuJoCo's `userdata` holds them."""
+        return np.array([*flatten(self.parameters), *self.table])
+
+
+class Watched(NamedTuple):
+    """A number that must keep its sign, or the flight is over, and what to say if it does not."""
+
+    value: float
+    cause: str
+
+
+@dataclass(frozen=True, eq=False)
 class Loop:
-    """What the engines need to close one loop.
+    """A law around a model, for all that is the same whichever law flies.
+
+    Scalar functions, for the engines:
 
     Attributes
     ----------
     model
         Name of the MJCF model.
     sizes
-        Lengths of its vectors.
+        Lengths of its vectors, the law's own states among the activations.
     parameters
         Record at the head of `userdata`; its first field is ``signature``. A table of floats, for
         gaits of any length, may follow it.
@@ -37,6 +70,28 @@ class Loop:
         Scalar function ``(time, qpos, qvel, act, parameters, table) -> ctrl``: the whole step.
     refresh
         Scalar function ``(ctrl, act) -> ctrl``: what moves between the samples of a held law.
+    setup
+        ``(scenario, signature) -> ControlSetup``.
+    initial_activations
+        ``(scenario, setup) -> act`` at time zero.
+    observe
+        ``(qpos, qvel, act, controls) -> values`` of `OBSERVED_FIELDS` and ``law_fields``;
+        ``controls()`` gives the controls in force.
+    derive
+        ``(samples by field, setup) -> columns``: references, determinant, margin and
+        ``extra_columns``.
+    watched
+        ``(sample by field, setup) -> Watched, ...``: where the law ends.
+    law_states
+        Number of activations that are states of the law.
+    law_fields
+        Fields of a sample beyond `OBSERVED_FIELDS`.
+    extra_columns
+        Columns of a flight that other loops do not have, with their units.
+    follows_position
+        Whether a scenario has the law follow the reference's horizontal position.
+    thesis_plant
+        Whether the law flies on the thesis' own equations, too.
     """
 
     model: str
@@ -44,6 +99,16 @@ class Loop:
     parameters: type[tuple[Any, ...]]
     controls: Callable[..., tuple[float, ...]]
     refresh: Callable[..., tuple[float, ...]]
+    setup: Callable[[Scenario, float], ControlSetup]
+    initial_activations: Callable[[Scenario, ControlSetup], Sequence[float]]
+    observe: Callable[..., tuple[float, ...]]
+    derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
+    watched: Callable[[Mapping[str, float], ControlSetup], tuple[Watched, ...]]
+    law_states: int = 0
+    law_fields: tuple[str, ...] = ()
+    extra_columns: Mapping[str, str] = field(default_factory=dict)
+    follows_position: Callable[[Scenario], bool] = lambda _scenario: True
+    thesis_plant: bool = False
 
     @cached_property
     def signature(self) -> float:
@@ -55,3 +120,8 @@ class Loop:
     def record_size(self) -> int:
         """Number of floats of the parameter record."""
         return record_size(self.parameters)
+
+    @cached_property
+    def sample_fields(self) -> tuple[str, ...]:
+        """What a recorded sample holds, in order."""
+        return ("time", *OBSERVED_FIELDS, *self.law_fields)

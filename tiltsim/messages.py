@@ -79,10 +79,11 @@ def _describe(detail: Any, document: Mapping[str, Any], schema: type[BaseModel])
     if kind in {"union_tag_invalid", "union_tag_not_found"}:
         if not isinstance(value, dict):
             return f"{key} = {show(value)}: must be a table"
-        allowed = ", ".join(_tags(schema, detail["loc"]))
-        if "type" not in value:
-            return f"{key}.type: missing; choose {allowed}"
-        return f"{key}.type = {show(value['type'])}: choose {allowed}"
+        tag, tags = _tags(schema, detail["loc"])
+        allowed = ", ".join(tags)
+        if tag not in value:
+            return f"{key}.{tag}: missing; choose {allowed}"
+        return f"{key}.{tag} = {show(value[tag])}: choose {allowed}"
     if kind == "literal_error":
         return f"{key} = {show(value)}: choose {context['expected'].replace(chr(39), '')}"
     if kind in {"too_short", "too_long"}:
@@ -113,12 +114,19 @@ def _locate(
     return ".".join(keys).encode("unicode_escape").decode() or "scenario", value
 
 
-def _tags(schema: Any, location: tuple[Any, ...]) -> list[str]:
-    """The values of ``type`` in the union of tables found under a location."""
+def _tags(schema: Any, location: tuple[Any, ...]) -> tuple[str, list[str]]:
+    """The key that tells the tables of a union under a location apart, and its values."""
     for part in location:
         schema = _member(schema, part)
     tables = [option.model_fields for option in _options(schema) if hasattr(option, "model_fields")]
-    return [tag for fields in tables for tag in get_args(fields["type"].annotation)]
+    keys = {_tag_key(fields) for fields in tables} - {""}
+    tag = keys.pop()
+    return tag, [value for fields in tables for value in get_args(fields[tag].annotation)]
+
+
+def _tag_key(fields: Mapping[str, Any]) -> str:
+    """The key of a table that tells it apart from others; empty where there is none."""
+    return next((key for key in ("type", "law") if key in fields), "")
 
 
 def _known_keys(schema: Any, location: tuple[Any, ...], key: str) -> str:
@@ -139,7 +147,8 @@ def _member(schema: Any, part: object) -> Any:
         return get_args(schema)[0]
     for option in _options(schema):
         fields = getattr(option, "model_fields", {})
-        tags = get_args(fields["type"].annotation) if "type" in fields else ("table",)
+        tag = _tag_key(fields)
+        tags = get_args(fields[tag].annotation) if tag else ("table",)
         if fields and part in tags:
             return option
     return schema

@@ -8,9 +8,11 @@ import numpy as np
 
 from controllers.singularity import force_matrix, torque_matrix, world_up
 from controllers.vehicle import SPIN
+from tiltsim.loops import loop_of
 
 if TYPE_CHECKING:
-    from tiltsim.flight import Flight, Floats
+    from tiltsim.flight import Flight
+    from tiltsim.loop import Floats
 
 METRICS: Final = {
     "final_position_error_x": "reference minus actual, mean over the last second, m",
@@ -24,6 +26,12 @@ METRICS: Final = {
     "max_abs_pitch": "largest absolute pitch, rad",
     "min_rotor_speed": "smallest rotor speed along its spin, negative where one reversed, rad/s",
     "max_rotor_speed": "largest rotor speed along its spin, rad/s",
+    "altitude_overshoot": "largest height above the reference, m",
+    "altitude_settling_time": "from when on the altitude error stays within 5 mm, s",
+    "max_published_determinant": "largest determinant surface S as published (ch. 2)",
+    "min_published_determinant": "smallest determinant surface S as published (ch. 2)",
+    "switches": "switches between two laws, from sample to sample",
+    "first_switch_time": "first sample after a switch, s",
     "max_tilt_rate": "largest absolute tilt rate, rad/s",
     "min_singularity_margin": "smallest rotation left to a singular attitude, negative beyond, rad",
     "min_decoupling_condition": "smallest over largest singular value of [tau/(L Kf); r3 F/Kf]",
@@ -36,6 +44,7 @@ METRICS: Final = {
 
 BOOLEAN_METRICS: Final = frozenset({"diverged"})
 
+SETTLED_ALTITUDE: Final = 0.005  # m
 SETTLED: Final = 20.0  # s, from when the supremum of the position error counts
 
 
@@ -50,7 +59,7 @@ def compute_metrics(flight: Flight) -> dict[str, float | bool]:
         return float(np.mean(values[last_second]))
 
     errors = {axis: columns[f"{axis}_ref"] - columns[axis] for axis in ("x", "y", "z")}
-    follows_position = flight.scenario.controller.decoupler != "none"
+    follows_position = loop_of(flight.scenario).follows_position(flight.scenario)
     for axis, error in errors.items():
         if follows_position or axis == "z":
             metrics[f"final_position_error_{axis}"] = final(error)
@@ -66,6 +75,18 @@ def compute_metrics(flight: Flight) -> dict[str, float | bool]:
     spins = np.array([sign * columns[f"rotor_speed_{i}"] for i, sign in enumerate(SPIN, start=1)])
     metrics["min_rotor_speed"] = float(spins.min())
     metrics["max_rotor_speed"] = float(spins.max())
+    metrics["altitude_overshoot"] = max(0.0, float(-errors["z"].min()))
+    outside = np.flatnonzero(np.abs(errors["z"]) > SETTLED_ALTITUDE)
+    if not outside.size or outside[-1] < len(time) - 1:
+        metrics["altitude_settling_time"] = float(time[outside[-1] + 1]) if outside.size else 0.0
+    if "published_determinant" in columns:
+        metrics["max_published_determinant"] = float(columns["published_determinant"].max())
+        metrics["min_published_determinant"] = float(columns["published_determinant"].min())
+    if "attitude_zone" in columns:
+        switches = np.flatnonzero(np.diff(columns["attitude_zone"]))
+        metrics["switches"] = float(switches.size)
+        if switches.size:
+            metrics["first_switch_time"] = float(time[switches[0] + 1])
     rates = [np.abs(columns[f"alpha_rate_{i}"]).max() for i in (1, 2, 3, 4)]
     metrics["max_tilt_rate"] = float(max(rates))
     metrics["min_singularity_margin"] = float(columns["singularity_margin"].min())

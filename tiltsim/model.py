@@ -160,6 +160,7 @@ def compile_model(
     tilt_servo: TiltServo = TiltServo(),
     pod: Pod = Pod(),
     rotor_limits: RotorLimits = RotorLimits(),
+    law_states: int = 0,
     visuals: bool = True,
 ) -> mujoco.MjModel:
     """Compile the MuJoCo model of a vehicle.
@@ -185,6 +186,9 @@ def compile_model(
         The pods' own mass and inertia. Without effect on a quadrotor.
     rotor_limits : RotorLimits, optional
         Limits on the rotor speeds.
+    law_states : int, default=0
+        Number of states of a control law of its own: integrators ``law_1``, ``law_2``, ... after
+        all other actuators, which act on nothing; ctrl is the state's rate.
     visuals : bool, default=True
         Whether the vehicle has geoms. They do not touch the physics, but positioning them takes
         about a sixth of a step.
@@ -204,8 +208,9 @@ def compile_model(
     _require_choice("vehicle.model", model, MODELS)
     _require_choice("simulation.integrator", integrator, INTEGRATORS)
     _require_positive("simulation.timestep", timestep, "s")
-    if userdata_size < 0:
-        raise ValueError(f"userdata_size = {userdata_size!r}: must be at least 0")
+    for name, size in (("userdata_size", userdata_size), ("law_states", law_states)):
+        if size < 0:
+            raise ValueError(f"{name} = {size!r}: must be at least 0")
     for name, value in vehicle._asdict().items():
         _require_positive(f"vehicle.{name}", value, "(SI)")
 
@@ -219,6 +224,7 @@ def compile_model(
             tilt_servo,
             pod,
             rotor_limits,
+            law_states,
             visuals,
         )
     )
@@ -234,6 +240,7 @@ def _compose(
     tilt_servo: TiltServo,
     pod: Pod,
     rotor_limits: RotorLimits,
+    law_states: int,
     visuals: bool,
 ) -> str:
     """The vehicle's complete MJCF; the arguments are `compile_model`'s, found valid."""
@@ -255,6 +262,7 @@ def _compose(
         _set_servos(root, tilt_servo, pod)
     _set_keyframe(root.keyframe.key["hover"], vehicle.hover_rotor_speed)
     _set_keyframe(root.keyframe.key["start"], START_SPEED)
+    _add_law_states(root, law_states)
     if not visuals:
         for geom in root.find("body", "vehicle").find_all("geom"):
             geom.remove()
@@ -338,3 +346,19 @@ def _set_keyframe(key: Any, rotor_speed: float) -> None:
     ctrl = key.ctrl.copy()
     ctrl[-8:-4] = rotor_speed**2  # the thrust actuators stand before the four rotor speeds
     key.ctrl = ctrl
+
+
+def _add_law_states(root: Any, count: int) -> None:
+    """Append integrators that act on nothing; in the keyframes they rest at zero."""
+    for index in range(1, count + 1):
+        root.actuator.add(
+            "general",
+            name=f"law_{index}",
+            site="imu",
+            dyntype="integrator",
+            gainprm=[0.0],
+            gear=(0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
+        )
+    for key in root.keyframe.key:
+        key.act = [*key.act, *[0.0] * count]
+        key.ctrl = [*key.ctrl, *[0.0] * count]

@@ -24,12 +24,12 @@ from numba.extending import intrinsic, register_jitable
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from controllers.records import record_dtype
-from controllers.scalar import scalar_functions
+from controllers.scalar import Triple, scalar_functions
 from tiltsim import thesis_plant
 from tiltsim.cache import native_code_can_be_kept, native_code_folder
-from tiltsim.control import ControlParameters
 from tiltsim.engine import EngineName, check_model
 from tiltsim.loop import Loop
+from tiltsim.loops.tiltrotor import ControlParameters
 
 _State = mujoco.mjtState
 INPUTS: Final = int(
@@ -200,10 +200,12 @@ class NativeEngine:
 
 
 @njit(**_OPTIONS)
-def _advance(step_index, values, timestep, steps, control_steps, records, table):  # type: ignore[no-untyped-def]
+def _advance(step_index, values, timestep, steps, control_steps, records, table, gust):  # type: ignore[no-untyped-def]
     state = list(values)
     law = records[0].law
-    state = thesis_plant.advance(step_index, state, timestep, steps, control_steps, law, table)
+    state = thesis_plant.advance(
+        step_index, state, timestep, steps, control_steps, law, table, gust
+    )
     return np.array(state)
 
 
@@ -214,6 +216,7 @@ def advance_thesis_plant(
     steps: int,
     control_steps: int,
     userdata: np.ndarray[Any, Any],
+    disturbance: Triple,
 ) -> list[float]:
     """`tiltsim.thesis_plant.advance`, compiled; ``userdata`` as in a MuJoCo flight."""
     _register_scalar_functions()
@@ -222,6 +225,6 @@ def advance_thesis_plant(
     values = np.array(state)
     result = _advance(
         *(step_index, values, timestep, steps, control_steps),
-        *(userdata[:head].view(layout), userdata[head:]),
+        *(userdata[:head].view(layout), userdata[head:], disturbance),
     )
     return list(result.tolist())

@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from math import nan
 from typing import Final, Protocol
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from controllers.gaits import tilt_reference
 from controllers.records import slotted
 from controllers.rotation import quaternion_from_euler
-from controllers.vehicle import SPIN
+from controllers.scalar import Triple
 from tiltsim import thesis_plant
 from tiltsim.cache import native_code_is_cached
-from tiltsim.control import TILTROTOR, tiltrotor_state
 from tiltsim.engine import EngineName, control_callback, make_engine
 from tiltsim.errors import InputError
+from tiltsim.loop import ControlSetup, Floats, Loop
+from tiltsim.loops import control_setup, loop_of
 from tiltsim.model import Pod, RotorLimits, TiltServo, compile_model
-from tiltsim.parameters import ControlSetup, control_setup
 from tiltsim.scenario import Scenario
-
-Floats = npt.NDArray[np.float64]
 
 STEPS_WORTH_LOADING: Final = 15_000
 """Flights of at least this many steps repay loading the native engine, once it is compiled."""
@@ -52,7 +50,7 @@ class Plant(Protocol):
         """Take physics steps."""
 
     def observe(self) -> tuple[float, ...]:
-        """The vehicle's state in the order of `STATE_FIELDS`, then the four tilt rates (rad/s)."""
+        """What a sample holds after the time; see `tiltsim.loop.Loop.sample_fields`."""
 
     def fault(self) -> str:
         """What the physics engine has found wrong so far, in a few words; else empty."""
@@ -76,25 +74,26 @@ class MujocoPlant:
     """The compiled MJCF model in MuJoCo, with the control step in its control callback."""
 
     def __init__(self, scenario: Scenario) -> None:
-        setup = control_setup(scenario)
-        self.model = build_model(scenario, len(setup.userdata))
+        self._loop, self._setup = loop_of(scenario), control_setup(scenario)
+        self.model = build_model(scenario, self._loop, len(self._setup.userdata))
         # A diverged state must stay visible; by default MuJoCo would silently start over.
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.data = mujoco.MjData(self.model)
         self._control_steps = scenario.simulation.control_steps
-        self._set_initial_state(scenario, setup)
+        self._set_initial_state(scenario, self._setup)
         self.engine: EngineName = choose_engine(scenario)
-        self._engine = make_engine(self.engine, TILTROTOR, self.model, self.data)
+        self._engine = make_engine(self.engine, self._loop, self.model, self.data)
 
     def _set_initial_state(self, scenario: Scenario, setup: ControlSetup) -> None:
         initial, data = scenario.initial, self.data
         data.userdata[:] = setup.userdata
         data.qpos[:3] = initial.position
         data.qpos[3:7] = quaternion_from_euler(*initial.attitude)
-        data.qpos[7:] = tilt_reference(0.0, setup.parameters.law.gait, setup.table)[:4]
+        gait = scenario.gait.plan(scenario.vehicle.resolve())
+        data.qpos[7:] = tilt_reference(0.0, gait.parameters, gait.table)[: self.model.nq - 7]
         data.qvel[:3] = initial.velocity
         data.qvel[3:6] = initial.angular_velocity
-        data.act[:] = np.multiply(SPIN, initial.rotor_speeds)
+        data.act[:] = self._loop.initial_activations(scenario, setup)
         mujoco.mj_forward(self.model, data)
 
     @property
@@ -138,9 +137,20 @@ class MujocoPlant:
     def observe(self) -> tuple[float, ...]:
         """See `Plant.observe`."""
         data = self.data
-        velocities = data.qvel.tolist()
-        state = tiltrotor_state(data.qpos.tolist(), velocities, data.act.tolist())
-        return (*state, *velocities[6:])
+        state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
+        return self._loop.observe(*state, self._controls_in_force)
+
+    def _controls_in_force(self) -> Sequence[float]:
+        """The controls at the present state; MuJoCo keeps those of its last integrator stage."""
+        data, every = self.data, self._control_steps
+        if every > 0 and self._steps_taken % every != 0:
+            return list(data.ctrl.tolist())
+        state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
+        try:
+            setup = self._setup
+            return self._loop.controls(data.time, *state, setup.parameters, setup.table)
+        except (ArithmeticError, ValueError):
+            return [nan] * len(data.ctrl)
 
     def fault(self) -> str:
         """See `Plant.fault`: MuJoCo resets an unstable state silently but counts its warnings."""
@@ -170,14 +180,20 @@ _WARNINGS: Final = {
 }
 
 
-def build_model(scenario: Scenario, userdata_size: int) -> mujoco.MjModel:
+def disturbing_acceleration(scenario: Scenario) -> Triple:
+    """The sum of a scenario's disturbances, m/s^2, world."""
+    x, y, z = (sum(d.value[axis] for d in scenario.disturbance) for axis in range(3))
+    return float(x), float(y), float(z)
+
+
+def build_model(scenario: Scenario, loop: Loop, userdata_size: int) -> mujoco.MjModel:
     """Compile the scenario's vehicle, without what is only drawn.
 
     Raises `InputError` where MuJoCo cannot build it.
     """
     vehicle, simulation = scenario.vehicle, scenario.simulation
     try:
-        return compile_model(
+        model = compile_model(
             vehicle.model,
             vehicle.resolve(),
             timestep=simulation.timestep,
@@ -186,10 +202,13 @@ def build_model(scenario: Scenario, userdata_size: int) -> mujoco.MjModel:
             tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump()),
             pod=Pod(**vehicle.pod.model_dump()),
             rotor_limits=RotorLimits(vehicle.min_rotor_speed, vehicle.max_rotor_speed),
+            law_states=loop.law_states,
             visuals=False,
         )
     except ValueError as error:
         raise InputError(f"{scenario.address or 'scenario'}: vehicle: {error}") from error
+    model.opt.gravity += disturbing_acceleration(scenario)
+    return model
 
 
 class ThesisPlant:
@@ -197,6 +216,7 @@ class ThesisPlant:
 
     def __init__(self, scenario: Scenario) -> None:
         simulation, initial = scenario.simulation, scenario.initial
+        self._disturbance = disturbing_acceleration(scenario)
         self._setup = control_setup(scenario)
         self._law = slotted(self._setup.parameters.law)
         self._timestep = simulation.timestep
@@ -206,7 +226,7 @@ class ThesisPlant:
             (
                 *(*initial.position, *initial.velocity),
                 *(*initial.attitude, *initial.angular_velocity, 0.0, 0.0, 0.0, 0.0),
-                *(sign * speed for sign, speed in zip(SPIN, initial.rotor_speeds, strict=True)),
+                *loop_of(scenario).initial_activations(scenario, self._setup),
             )
         )
         self._fault = ""
@@ -235,13 +255,13 @@ class ThesisPlant:
 
             self._state = advance_thesis_plant(
                 *(self._step_index, self._state, self._timestep, steps, self._control_steps),
-                self._setup.userdata,
+                *(self._setup.userdata, self._disturbance),
             )
         else:
             try:
                 self._state = thesis_plant.advance(
                     *(self._step_index, self._state, self._timestep, steps, self._control_steps),
-                    *(self._law, self._setup.table),
+                    *(self._law, self._setup.table, self._disturbance),
                 )
             except (ArithmeticError, ValueError):
                 self._fault = "the control law left the range of floating-point numbers"

@@ -7,28 +7,19 @@
 from __future__ import annotations
 
 from math import pi
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Final, Literal, Self, get_args
 
-from pydantic import (
-    ConfigDict,
-    Discriminator,
-    Field,
-    PrivateAttr,
-    Tag,
-    model_validator,
-)
+from pydantic import ConfigDict, Field, PrivateAttr, model_validator
 
-from controllers.attitude_altitude import DECOUPLINGS, Gains
-from controllers.gains import GAIN_SETS, gains_from_rows
-from controllers.stability import closed_loops
+from controllers.references import REFERENCE_TYPES, ReferenceParameters
 from controllers.vehicle import PRESETS, Vehicle
+from tiltsim.controller_tables import AttitudeAltitudeController, Controller, ReferenceKind
 from tiltsim.gait_tables import FixedGait, Gait
 from tiltsim.messages import InvalidValueError
 from tiltsim.metrics import BOOLEAN_METRICS, METRICS
 from tiltsim.tables import (
     Angle,
     Angles3,
-    Gains2,
     NonNegative,
     Positive,
     Positive4,
@@ -67,8 +58,8 @@ class PodTable(Table):
 class VehicleTable(Table):
     """The vehicle: a preset and what differs from it."""
 
-    model: Literal["tiltrotor"] = "tiltrotor"
-    preset: Literal["ar_drone_2", "luukkonen"] = "ar_drone_2"
+    model: Literal["tiltrotor", "quadrotor"] = "tiltrotor"
+    preset: Literal["ar_drone_2", "ar_drone_2_unrounded", "luukkonen"] = "ar_drone_2"
     mass: Positive | None = Field(None, description="kg, pods included")
     inertia: Annotated[tuple[Positive, Positive, Positive], Field(strict=False)] | None = Field(
         None, description="principal moments about the centre of mass, kg m^2, pods included"
@@ -177,50 +168,35 @@ class InitialTable(Table):
         return speed if isinstance(speed, tuple) else (speed, speed, speed, speed)
 
 
-# --- [controller] ------------------------------------------------------------------------------
-
-
-class GainTable(Table):
-    """Gains written out; see `controllers.gains.gains_from_rows`."""
-
-    attitude: Annotated[tuple[Vector3, Vector3, Vector3], Field(strict=False)] = Field(
-        description="diagonals of K_P1, K_P2, K_P3, each roll, pitch, yaw"
-    )
-    altitude: Vector3 = Field(description="K_PZ1, K_PZ2, K_PZ3")
-    position: Gains2 = Field((1.0, 1.0), description="K_X1, K_X2")
-
-
-def _gain_kind(value: object) -> str:
-    return "named" if isinstance(value, str) else "table"
-
-
-class ControllerTable(Table):
-    """The control law and its choices."""
-
-    law: Literal["attitude_altitude"] = "attitude_altitude"
-    decoupling: Literal["published", "exact"] = "published"
-    decoupler: Literal["none", "conventional", "modified", "exact"] = "modified"
-    gains: Annotated[
-        Annotated[Literal["ch03", "ch04", "exact"], Tag("named")]
-        | Annotated[GainTable, Tag("table")],
-        Discriminator(_gain_kind),
-    ] = "ch04"
-    gait_rate_feedforward: Literal[False] = False
-    allow_unstable: bool = Field(False, description="fly gains that fail the Routh condition")
-
-    def resolve_gains(self) -> Gains:
-        """The numbers behind a named set or a table."""
-        if isinstance(self.gains, GainTable):
-            return gains_from_rows(self.gains.attitude, self.gains.altitude, self.gains.position)
-        return GAIN_SETS[self.gains]
-
-
 # --- [reference] -------------------------------------------------------------------------------
 
 
+Tilt = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
+
+
 class _PositionReference(Table):
+    roll: Tilt = Field(0.0, description="rad, for laws of the whole pose and for switching")
+    pitch: Tilt = Field(0.0, description="rad, likewise")
     yaw: Angle = 0.0
-    acceleration_feedforward: bool = Field(False, description="ch. 4 leaves it out")
+    acceleration_feedforward: bool = Field(
+        False, description="ch. 4 leaves it out; laws of higher order always have it"
+    )
+
+    @property
+    def kind(self) -> ReferenceKind:
+        """What the reference asks of a law."""
+        return "position" if self.roll == self.pitch == 0.0 else "pose"
+
+    def _parameters(self, kind: str, position: Vector3, **own: float) -> ReferenceParameters:
+        return ReferenceParameters(
+            REFERENCE_TYPES[kind],
+            *position,
+            roll=self.roll,
+            pitch=self.pitch,
+            yaw=self.yaw,
+            acceleration_feedforward=float(self.acceleration_feedforward),
+            **own,
+        )
 
 
 class SetpointReference(_PositionReference):
@@ -228,6 +204,11 @@ class SetpointReference(_PositionReference):
 
     type: Literal["setpoint"] = "setpoint"
     position: Vector3 = Field((0.0, 0.0, 0.0), description="m")
+
+    @property
+    def parameters(self) -> ReferenceParameters:
+        """The record that the law reads."""
+        return self._parameters(self.type, self.position)
 
 
 class LineReference(_PositionReference):
@@ -237,30 +218,75 @@ class LineReference(_PositionReference):
     position: Vector3 = Field((0.0, 0.0, 0.0), description="m, at time zero")
     velocity: Vector3 = Field(description="m/s")
 
+    @property
+    def parameters(self) -> ReferenceParameters:
+        """The record that the law reads."""
+        vx, vy, vz = self.velocity
+        own = {"velocity_x": vx, "velocity_y": vy, "velocity_z": vz}
+        return self._parameters(self.type, self.position, **own)
+
 
 class CircleReference(_PositionReference):
-    """Uniform motion on a horizontal circle, from +x towards +y."""
+    """Uniform motion on a horizontal circle, from +x towards +y; from -x where radius < 0."""
 
     type: Literal["circle"]
     position: Vector3 = Field((0.0, 0.0, 0.0), description="the centre, m")
-    radius: Positive = Field(description="m")
+    radius: float = Field(description="m; negative to start on the other side")
     angular_frequency: float = Field(description="rad/s")
+
+    @property
+    def parameters(self) -> ReferenceParameters:
+        """The record that the law reads."""
+        own = {"radius": self.radius, "angular_frequency": self.angular_frequency}
+        return self._parameters(self.type, self.position, **own)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.radius == 0.0:
+            raise InvalidValueError("reference.radius", self.radius, "must not be 0")
+        return self
 
 
 class AttitudeAltitudeReference(Table):
     """Attitude and altitude to hold; the horizontal position is free (ch. 3)."""
 
     type: Literal["attitude_altitude"]
-    roll: Annotated[float, Field(gt=-pi / 2, lt=pi / 2)] = Field(0.0, description="rad")
-    pitch: Annotated[float, Field(gt=-pi / 2, lt=pi / 2)] = Field(0.0, description="rad")
+    roll: Tilt = Field(0.0, description="rad")
+    pitch: Tilt = Field(0.0, description="rad")
     yaw: Angle = Field(0.0, description="rad")
     altitude: float = Field(0.0, description="m")
+
+    @property
+    def kind(self) -> ReferenceKind:
+        """What the reference asks of a law."""
+        return "attitude_altitude"
+
+    @property
+    def parameters(self) -> ReferenceParameters:
+        """The record that the law reads."""
+        return ReferenceParameters(
+            REFERENCE_TYPES[self.type],
+            z=self.altitude,
+            roll=self.roll,
+            pitch=self.pitch,
+            yaw=self.yaw,
+        )
 
 
 Reference = Annotated[
     SetpointReference | LineReference | CircleReference | AttitudeAltitudeReference,
     Field(discriminator="type"),
 ]
+
+# --- [[disturbance]] ---------------------------------------------------------------------------
+
+
+class Disturbance(Table):
+    """What pushes the vehicle without the control law knowing."""
+
+    type: Literal["acceleration"]
+    value: Vector3 = Field(description="m/s^2, world; acts on all that has mass, as gravity does")
+
 
 # --- [[expect]] --------------------------------------------------------------------------------
 
@@ -305,9 +331,10 @@ class Scenario(Table):
     vehicle: VehicleTable = VehicleTable()
     simulation: SimulationTable = SimulationTable()
     initial: InitialTable = InitialTable()
-    controller: ControllerTable = ControllerTable()
+    controller: Controller = AttitudeAltitudeController()
     gait: Gait = FixedGait()
     reference: Reference = SetpointReference()
+    disturbance: Annotated[tuple[Disturbance, ...], Field(strict=False)] = ()
     expect: Annotated[tuple[Expectation, ...], Field(strict=False)] = ()
 
     _address: str = PrivateAttr("")
@@ -319,9 +346,79 @@ class Scenario(Table):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        self._check_law()
         self._check_gait()
-        decoupler = self.controller.decoupler
-        free = isinstance(self.reference, AttitudeAltitudeReference)
+        self._check_reference()
+        self._check_rotor_limits()
+        self._check_servo()
+        self._check_stability()
+        return self
+
+    def _check_law(self) -> None:
+        law, model = self.controller.law, self.vehicle.model
+        if self.controller.vehicle_model != model:
+            raise InvalidValueError(
+                "controller.law",
+                law,
+                f"flies the {self.controller.vehicle_model}, and vehicle.model = {model!r}; "
+                f"choose {', '.join(_laws_of(model))}",
+            )
+        if self.simulation.plant == "thesis" and law != "attitude_altitude":
+            raise InvalidValueError(
+                "simulation.plant",
+                "thesis",
+                f"has the attitude_altitude law alone, and controller.law = {law!r}; use mujoco",
+            )
+        if model != "quadrotor":
+            return
+        vehicle = self.vehicle
+        for key, value, default in (
+            ("gait.type", self.gait.type, "fixed"),
+            ("gait", self.gait.model_dump(), FixedGait().model_dump()),
+            ("vehicle.tilt_servo", vehicle.tilt_servo.model_dump(), TiltServoTable().model_dump()),
+            ("vehicle.pod", vehicle.pod.model_dump(), PodTable().model_dump()),
+            ("vehicle.min_rotor_speed", vehicle.min_rotor_speed, None),
+            ("vehicle.max_rotor_speed", vehicle.max_rotor_speed, None),
+            ("initial.rotor_speed", self.initial.rotor_speed, InitialTable().rotor_speed),
+        ):
+            if value != default:
+                raise InvalidValueError(
+                    key,
+                    value,
+                    "the quadrotor has no use for it: its rotors do not tilt, and "
+                    "make the thrust that its law asks for at once",
+                )
+
+    def _check_reference(self) -> None:
+        controller, reference = self.controller, self.reference
+        kind = reference.kind
+        # A pose of zero roll and pitch is written like a position.
+        kinds = {*controller.reference_kinds}
+        if "pose" in kinds:
+            kinds.add("position")
+        if kind not in kinds:
+            if kind == "pose":
+                key, value = (
+                    ("roll", reference.roll) if reference.roll else ("pitch", reference.pitch)
+                )
+                raise InvalidValueError(
+                    f"reference.{key}",
+                    value,
+                    f"roll and pitch are no outputs of the {controller.law} law",
+                )
+            raise InvalidValueError(
+                "reference.type", reference.type, f"the {controller.law} law cannot follow it"
+            )
+        if not isinstance(controller, AttitudeAltitudeController):
+            if getattr(reference, "acceleration_feedforward", False):
+                raise InvalidValueError(
+                    "reference.acceleration_feedforward",
+                    True,
+                    f"the {controller.law} law follows all derivatives anyway; leave it out",
+                )
+            return
+        decoupler = controller.decoupler
+        free = kind == "attitude_altitude"
         if free and decoupler != "none":
             raise InvalidValueError(
                 "controller.decoupler", decoupler, "reference.type = 'attitude_altitude' takes none"
@@ -330,12 +427,8 @@ class Scenario(Table):
             raise InvalidValueError(
                 "controller.decoupler",
                 decoupler,
-                f"reference.type = {self.reference.type!r} needs conventional, modified or exact",
+                f"reference.type = {reference.type!r} needs conventional, modified or exact",
             )
-        self._check_rotor_limits()
-        self._check_servo()
-        self._check_stability()
-        return self
 
     def _check_gait(self) -> None:
         key, value = self.gait.size
@@ -356,6 +449,12 @@ class Scenario(Table):
                 f"gait.{key}",
                 value,
                 f"too many keyframes: {len(gait.table)} numbers, at most {MAX_TABLE}",
+            )
+        if self.controller.law == "full_pose" and not gait.is_constant:
+            raise InvalidValueError(
+                "gait.type",
+                self.gait.type,
+                "the full_pose law moves the pods itself; give the angles at the start as fixed",
             )
 
     def _check_rotor_limits(self) -> None:
@@ -390,17 +489,22 @@ class Scenario(Table):
         controller = self.controller
         if controller.allow_unstable:
             return
-        loops = closed_loops(
-            controller.resolve_gains(), self.vehicle.resolve(), DECOUPLINGS[controller.decoupling]
-        )
-        for loop in loops:
+        for loop in controller.closed_loops(self.vehicle.resolve()):
             if not loop.stable:
                 raise InvalidValueError(
                     "controller.gains",
                     controller.model_dump()["gains"],
-                    f"unstable under the {controller.decoupling} decoupling matrix by Routh: "
+                    f"unstable under {controller.linearization} by Routh: "
                     f"{loop.condition}; change the gains or set controller.allow_unstable = true",
                 )
+
+
+def _laws_of(model: str) -> list[str]:
+    union = get_args(get_args(Controller)[0])
+    tables = [get_args(option)[0] for option in union]
+    return [
+        get_args(t.model_fields["law"].annotation)[0] for t in tables if t.vehicle_model == model
+    ]
 
 
 class Variant(Table):

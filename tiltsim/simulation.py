@@ -9,12 +9,10 @@ from typing import Final
 
 import numpy as np
 
-from controllers.decoupling_matrix import sines_and_cosines, torque_entries, torque_free_force
 from controllers.references import position_reference
-from controllers.rotation import world_up_in_body
-from controllers.vehicle import SPIN, drag_ratio
-from tiltsim.flight import SAMPLE_FIELDS, End, Flight, Floats
-from tiltsim.parameters import control_setup
+from tiltsim.flight import End, Flight
+from tiltsim.loop import Floats
+from tiltsim.loops import control_setup, loop_of
 from tiltsim.plants import Plant, make_plant
 from tiltsim.scenario import Scenario
 
@@ -23,7 +21,7 @@ MAX_BODY_RATE: Final = 1e3  # rad/s, far above what any rotorcraft survives
 MAX_ROTOR_SPEED: Final = 1e5  # rad/s
 
 SINGULAR: Final = 1e-9
-"""Determinant ``n . r3`` (4 for an untilted level vehicle) that counts as zero."""
+"""What counts as zero, for a determinant of order one and all else that a loop watches."""
 
 Observer = Callable[[Floats], None]
 
@@ -36,7 +34,7 @@ def simulate(scenario: Scenario, observer: Observer | None = None) -> Flight:
     scenario
         What to fly; see `tiltsim.load_scenario`.
     observer
-        Called with every sample (floats in the order of `SAMPLE_FIELDS`) as it is recorded.
+        Called with every sample (floats in the order of `Loop.sample_fields`) as it is recorded.
 
     Returns
     -------
@@ -96,9 +94,10 @@ class Watch:
     """Decides from the samples of one flight whether it is lost, and why."""
 
     def __init__(self, scenario: Scenario) -> None:
-        self._law = control_setup(scenario).parameters.law
-        self._scenario = scenario
-        self._initial_side = 0.0
+        self._loop, self._setup = loop_of(scenario), control_setup(scenario)
+        self._reference = scenario.reference.parameters
+        self._follows_position = self._loop.follows_position(scenario)
+        self._sides: dict[int, float] = {}
 
     def judge(self, plant: Plant, sample: Floats) -> End | None:
         """The end that a sample spells, None while the flight goes on."""
@@ -107,14 +106,14 @@ class Watch:
         if fault:
             return End("diverged", time, fault)
         if not np.isfinite(sample).all():
-            name = SAMPLE_FIELDS[int(np.argmin(np.isfinite(sample)))]
+            name = self._loop.sample_fields[int(np.argmin(np.isfinite(sample)))]
             return End("diverged", time, f"{name} is no longer a finite number")
-        return self._judge_limits(time, sample) or self._judge_singularity(time, sample)
+        state = dict(zip(self._loop.sample_fields, sample.tolist(), strict=True))
+        return self._judge_limits(time, state) or self._judge_singularity(time, state)
 
-    def _judge_limits(self, time: float, sample: Floats) -> End | None:
-        state = dict(zip(SAMPLE_FIELDS, sample.tolist(), strict=True))
-        target = position_reference(time, self._law.reference)
-        if self._scenario.controller.decoupler != "none":
+    def _judge_limits(self, time: float, state: dict[str, float]) -> End | None:
+        target = position_reference(time, self._reference)
+        if self._follows_position:
             error = float(np.hypot(target[0] - state["x"], target[1] - state["y"]))
             if error > MAX_POSITION_ERROR:
                 return End("diverged", time, f"{error:.3g} m away from the reference")
@@ -130,27 +129,10 @@ class Watch:
                 return End("diverged", time, f"rotor {rotor} at {speed:.3g} rad/s")
         return None
 
-    def _judge_singularity(self, time: float, sample: Floats) -> End | None:
-        roll, pitch, *tilts = sample[[7, 8, 13, 14, 15, 16]].tolist()
-        trig = sines_and_cosines(*tilts)
-        ratio = drag_ratio(self._law.vehicle)
-        n = torque_free_force(trig, torque_entries(trig, ratio), ratio)
-        up = world_up_in_body(roll, pitch)
-        determinant = n[0] * up[0] + n[1] * up[1] + n[2] * up[2]
-        # A determinant that changes its sign between two samples was zero in between.
-        side = 0.0 if abs(determinant) < SINGULAR else copysign(1.0, determinant)
-        if self._initial_side == 0.0:
-            self._initial_side = side
-        if side == 0.0 or side != self._initial_side:
-            angles = ", ".join(f"{tilt:.3g}" for tilt in tilts)
-            cause = (
-                f"the decoupling matrix became singular at roll = {roll:.3g} rad, "
-                f"pitch = {pitch:.3g} rad, tilt angles ({angles}) rad"
-            )
-            return End("singular", time, cause)
-        if self._scenario.controller.decoupling == "exact":
-            for rotor, sign in enumerate(SPIN, start=1):
-                if sign * sample[16 + rotor] <= 0.0:
-                    cause = f"the decoupling matrix became singular: rotor {rotor} came to a stop"
-                    return End("singular", time, cause)
+    def _judge_singularity(self, time: float, state: dict[str, float]) -> End | None:
+        for index, (value, cause) in enumerate(self._loop.watched(state, self._setup)):
+            # What changes its sign between two samples was zero in between.
+            side = 0.0 if abs(value) < SINGULAR else copysign(1.0, value)
+            if side == 0.0 or side != self._sides.setdefault(index, side):
+                return End("singular", time, cause)
         return None

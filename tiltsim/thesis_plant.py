@@ -17,7 +17,7 @@ from controllers.attitude_altitude import Parameters, State, rotor_accelerations
 from controllers.decoupling_matrix import body_force, sines_and_cosines, torque_entries
 from controllers.gaits import GaitParameters, tilt_reference
 from controllers.rotation import rotation_from_euler
-from controllers.scalar import Quad, scalar
+from controllers.scalar import Quad, Triple, scalar
 from controllers.vehicle import drag_ratio
 
 STATE_SIZE: Final = 26
@@ -59,9 +59,17 @@ def rotor_inputs(
 
 @scalar
 def state_rates(
-    time: float, state: Sequence[float], inputs: Quad, law: Parameters, table: Sequence[float]
+    time: float,
+    state: Sequence[float],
+    inputs: Quad,
+    law: Parameters,
+    table: Sequence[float],
+    disturbance: Triple,
 ) -> tuple[float, ...]:
-    """Time derivative of the plant's state under the given rotor accelerations."""
+    """Time derivative of the plant's state under the given rotor accelerations.
+
+    ``disturbance`` is an acceleration (m/s^2, world) that the law does not know of.
+    """
     r11, r12, r13, r21, r22, r23 = state[6], state[7], state[8], state[9], state[10], state[11]
     r31, r32, r33, p, q, r = state[12], state[13], state[14], state[15], state[16], state[17]
     s1, s2, s3, s4 = state[18], state[19], state[20], state[21]
@@ -71,12 +79,13 @@ def state_rates(
     trig = sines_and_cosines(alpha_1, alpha_2, alpha_3, alpha_4)
     w1, w2, w3, w4 = s1 * abs(s1), s2 * abs(s2), s3 * abs(s3), s4 * abs(s4)
 
-    # Eq. (1): force in body axes, turned to the world, and weight.
+    # Eq. (1): force in body axes, turned to the world, weight and disturbance.
+    gust_x, gust_y, gust_z = disturbance
     fx, fy, fz = body_force(trig, w1, w2, w3, w4)
     per_force = vehicle.thrust_coefficient / vehicle.mass
-    ax = per_force * (r11 * fx + r12 * fy + r13 * fz)
-    ay = per_force * (r21 * fx + r22 * fy + r23 * fz)
-    az = per_force * (r31 * fx + r32 * fy + r33 * fz) - vehicle.gravity
+    ax = per_force * (r11 * fx + r12 * fy + r13 * fz) + gust_x
+    ay = per_force * (r21 * fx + r22 * fy + r23 * fz) + gust_y
+    az = per_force * (r31 * fx + r32 * fy + r33 * fz) - vehicle.gravity + gust_z
 
     # Eq. (4): torque alone, no gyroscopic term.
     x2, x4, y1, y3, z1, z2, z3, z4 = torque_entries(trig, drag_ratio(vehicle))
@@ -110,6 +119,7 @@ def advance(
     control_steps: int,
     law: Parameters,
     table: Sequence[float],
+    disturbance: Triple,
 ) -> list[float]:
     """Integrate ``steps`` fixed steps with ode3, the third-order method of Bogacki and Shampine.
 
@@ -125,15 +135,15 @@ def advance(
         continuous = control_steps == 0
 
         inputs = rotor_inputs(time, state, law, table) if continuous else held
-        k1 = state_rates(time, state, inputs, law, table)
+        k1 = state_rates(time, state, inputs, law, table, disturbance)
         half = stage(state, 0.5 * timestep, k1)
         half_time = time + 0.5 * timestep
         inputs = rotor_inputs(half_time, half, law, table) if continuous else held
-        k2 = state_rates(half_time, half, inputs, law, table)
+        k2 = state_rates(half_time, half, inputs, law, table, disturbance)
         late = stage(state, 0.75 * timestep, k2)
         late_time = time + 0.75 * timestep
         inputs = rotor_inputs(late_time, late, law, table) if continuous else held
-        k3 = state_rates(late_time, late, inputs, law, table)
+        k3 = state_rates(late_time, late, inputs, law, table, disturbance)
         state = [
             value + timestep * (2.0 / 9.0 * a + 1.0 / 3.0 * b + 4.0 / 9.0 * c)
             for value, a, b, c in zip(state, k1, k2, k3)

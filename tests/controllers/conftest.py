@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from scalar_sources import compiled
+
+from tests.controllers.scalar_sources import compiled
 
 
 @pytest.fixture(scope="session")

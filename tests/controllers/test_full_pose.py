@@ -6,8 +6,6 @@ from math import isnan
 
 import numpy as np
 import pytest
-from flights import fly, rk4_step, tiltrotor_rates
-from scalar_sources import as_native
 from scipy.spatial.transform import Rotation
 
 from controllers import attitude_altitude
@@ -31,6 +29,8 @@ from controllers.references import REFERENCE_TYPES, ReferenceParameters
 from controllers.rotation import rotation_from_euler
 from controllers.stability import is_hurwitz
 from controllers.vehicle import PRESETS, SPIN, drag_ratio
+from tests.controllers.flights import fly, rk4_step, tiltrotor_rates
+from tests.controllers.scalar_sources import as_native
 
 TILTROTOR = PRESETS["ar_drone_2_unrounded"]
 GAINS = GAIN_SETS["ch03"]

@@ -15,7 +15,7 @@ from types import CodeType, FunctionType
 import pytest
 
 import controllers
-import tiltsim.control
+import tiltsim.loops
 import tiltsim.thesis_plant
 from controllers.attitude_altitude import Parameters, rotor_accelerations
 from controllers.decouplers import DECOUPLERS
@@ -29,11 +29,15 @@ MODULES = [
     import_module(module.name)
     for module in pkgutil.walk_packages(controllers.__path__, "controllers.")
 ]
+LOOP_MODULES = [
+    import_module(f"tiltsim.loops.{module.name}")
+    for module in pkgutil.iter_modules(tiltsim.loops.__path__)
+]
 FUNCTIONS = scalar_functions()
 PLAIN_BUILTINS = {"abs", "float", "int", "len", "max", "min", "range", "zip", "round", "bool"}
 RECORD_FIELDS = {
     field
-    for module in (*MODULES, tiltsim.control)
+    for module in (*MODULES, *LOOP_MODULES)
     for kind in vars(module).values()
     if inspect.isclass(kind) and issubclass(kind, tuple)
     for field in getattr(kind, "_fields", ())
@@ -71,7 +75,7 @@ def is_math(value):
 
 def test_there_is_scalar_code():
     assert rotor_accelerations in FUNCTIONS
-    assert tiltsim.control.tiltrotor_controls in FUNCTIONS
+    assert tiltsim.loops.tiltrotor.tiltrotor_controls in FUNCTIONS
 
 
 def test_nothing_is_registered_twice():

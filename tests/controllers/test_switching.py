@@ -6,8 +6,6 @@ from math import isnan, pi
 
 import numpy as np
 import pytest
-from flights import fly, quadrotor_rates, rk4_step
-from scalar_sources import as_native
 
 import controllers.quadrotor_attitude_altitude as attitude_altitude
 import controllers.yaw_position as yaw_position
@@ -22,6 +20,8 @@ from controllers.switching import (
     switching_inputs,
 )
 from controllers.vehicle import PRESETS
+from tests.controllers.flights import fly, quadrotor_rates, rk4_step
+from tests.controllers.scalar_sources import as_native
 
 QUADROTOR = PRESETS["ar_drone_2_unrounded"]
 WEIGHT = QUADROTOR.mass * QUADROTOR.gravity

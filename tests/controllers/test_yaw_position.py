@@ -7,8 +7,6 @@ from math import cos, hypot, isnan, pi, sin
 import numpy as np
 import pytest
 import sympy
-from flights import fly, quadrotor_rates, rk4_step
-from scalar_sources import as_native, fields, symbolic
 
 from controllers.quadrotor_singularity import normalized_determinant, published_determinant
 from controllers.references import REFERENCE_TYPES, ReferenceParameters, reference_derivatives
@@ -23,6 +21,8 @@ from controllers.yaw_position import (
     yaw_position_inputs,
 )
 from controllers.z_down import state_turned_over
+from tests.controllers.flights import fly, quadrotor_rates, rk4_step
+from tests.controllers.scalar_sources import as_native, fields, symbolic
 
 QUADROTOR = PRESETS["ar_drone_2_unrounded"]
 WEIGHT = QUADROTOR.mass * QUADROTOR.gravity

@@ -1,0 +1,123 @@
+"""Full-pose control around the tiltrotor: the tilt angles are inputs, too (ch. 3, Sec. 6.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from controllers.full_pose import Parameters, full_pose_inputs
+from controllers.gaits import tilt_reference
+from controllers.references import position_reference
+from controllers.scalar import scalar
+from tiltsim.controller_tables import FullPoseController
+from tiltsim.loop import ControlSetup, Floats, Loop, Sizes
+from tiltsim.loops.tiltrotor import (
+    REFERENCE_COLUMNS,
+    gait_singularity,
+    initial_rotor_speeds,
+    observe_tiltrotor,
+    rotor_stops,
+    rotor_thrust_controls,
+    servo_lead,
+    tiltrotor_state,
+)
+
+if TYPE_CHECKING:
+    from tiltsim.scenario import Scenario
+
+
+class ControlParameters(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float  # see `tiltsim.loop.Loop.signature`
+    servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
+    law: Parameters
+
+
+@scalar
+def full_pose_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All sixteen controls: tilt servos, thrusts, rotor accelerations, tilt rates.
+
+    The law gives tilt rates. Its own four states integrate them to the angles that the servos are
+    told, with the rate fed forward as for a planned gait.
+    """
+    lead = parameters.servo_lead
+    state = tiltrotor_state(qpos, qvel, act)
+    u1, u2, u3, u4, rate_1, rate_2, rate_3, rate_4 = full_pose_inputs(time, state, parameters.law)
+    return (
+        *(act[4] + lead * rate_1, act[5] + lead * rate_2),
+        *(act[6] + lead * rate_3, act[7] + lead * rate_4),
+        *rotor_thrust_controls(act),
+        *(u1, u2, u3, u4, rate_1, rate_2, rate_3, rate_4),
+    )
+
+
+@scalar
+def refreshed_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
+    """Held controls with the thrusts that belong to the present rotor speeds."""
+    return (
+        *(ctrl[0], ctrl[1], ctrl[2], ctrl[3]),
+        *rotor_thrust_controls(act),
+        *(ctrl[8], ctrl[9], ctrl[10], ctrl[11], ctrl[12], ctrl[13], ctrl[14], ctrl[15]),
+    )
+
+
+def _initial_tilts(scenario: Scenario) -> tuple[float, ...]:
+    gait = scenario.gait.plan(scenario.vehicle.resolve())
+    return tilt_reference(0.0, gait.parameters, gait.table)[:4]
+
+
+def _setup(scenario: Scenario, signature: float) -> ControlSetup:
+    controller = scenario.controller
+    assert isinstance(controller, FullPoseController)
+    vehicle = scenario.vehicle.resolve()
+    law = Parameters(
+        vehicle,
+        controller.resolve_gains(),
+        scenario.reference.parameters,
+        controller.resolve_limits(),
+        controller.resolve_tilt_weight(vehicle),
+    )
+    lead = servo_lead(scenario.vehicle.tilt_servo)
+    return ControlSetup(ControlParameters(signature, lead, law))
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    law = setup.parameters.law
+    reference = law.reference
+    time = samples["time"]
+    position = np.array([position_reference(t, reference)[:3] for t in time.tolist()])
+    attitude = (reference.roll, reference.pitch, reference.yaw)
+    columns = [*position.reshape(len(time), 3).T, *(np.full_like(time, a) for a in attitude)]
+    told = {f"alpha_ref_{i}": samples[f"tilt_command_{i}"] for i in (1, 2, 3, 4)}
+    singularity = gait_singularity(samples, law.vehicle)
+    return dict(zip(REFERENCE_COLUMNS, columns, strict=True)) | told | singularity
+
+
+FULL_POSE: Final = Loop(
+    model="tiltrotor",
+    sizes=Sizes(qpos=11, qvel=10, act=8, ctrl=16),
+    parameters=ControlParameters,
+    controls=full_pose_controls,
+    refresh=refreshed_controls,
+    setup=_setup,
+    initial_activations=lambda s, _setup: (*initial_rotor_speeds(s), *_initial_tilts(s)),
+    observe=lambda qpos, qvel, act, controls: (
+        *observe_tiltrotor(qpos, qvel, act, controls),
+        *act[4:],
+    ),
+    derive=_derive,
+    watched=lambda sample, _setup: rotor_stops(sample),
+    law_states=4,
+    law_fields=tuple(f"tilt_command_{rotor}" for rotor in (1, 2, 3, 4)),
+)
+"""Full-pose control around the tiltrotor."""

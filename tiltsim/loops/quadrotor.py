@@ -1,0 +1,136 @@
+"""What the loops around the quadrotor share.
+
+The laws of ch. 2 ask for thrust and torques, which the rotors make at once: their speeds follow
+from the controls and are no states here. The model's four rotor speed states stay at zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from math import cos, nan
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from controllers.quadrotor_mixer import speed_along_spin, thrust_controls
+from controllers.quadrotor_singularity import normalized_determinant, published_determinant
+from controllers.references import ReferenceParameters, position_reference
+from controllers.rotation import euler_from_quaternion
+from controllers.scalar import scalar
+from controllers.vehicle import SPIN, Vehicle
+from controllers.yaw_position import State
+from tiltsim.loop import ControlSetup, Floats, Sizes, Watched
+from tiltsim.loops.tiltrotor import REFERENCE_COLUMNS, TILT_REFERENCE_COLUMNS
+
+if TYPE_CHECKING:
+    from tiltsim.scenario import Scenario
+
+SIZES: Final = Sizes(qpos=7, qvel=6, act=6, ctrl=10)
+"""With the thrust and its rate, the states of the yaw-position law."""
+
+LAW_FIELDS: Final = ("extension_thrust", "extension_thrust_rate")
+"""The law's own states, ``zeta`` and ``xi``, in a sample."""
+
+EXTENSION_COLUMNS: Final = {
+    "extension_thrust": "N",
+    "extension_thrust_rate": "N/s",
+    "published_determinant": "1",
+}
+
+
+@scalar
+def rigid_body_state(
+    qpos: Sequence[float], qvel: Sequence[float], thrust: float, thrust_rate: float
+) -> State:
+    """The laws' state (`controllers.yaw_position.STATE_FIELDS`) from MuJoCo's."""
+    x, y, z, qw, qx, qy, qz = qpos
+    vx, vy, vz, p, q, r = qvel
+    roll, pitch, yaw = euler_from_quaternion(qw, qx, qy, qz)
+    return x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r, thrust, thrust_rate
+
+
+@scalar
+def extended_controls(inputs: tuple[float, ...], vehicle: Vehicle) -> tuple[float, ...]:
+    """The ten controls for a law's `INPUT_FIELDS`: thrusts, idle rotor states, law states."""
+    thrust, roll_torque, pitch_torque, yaw_torque, thrust_derivative, thrust_rate_derivative = (
+        inputs
+    )
+    return (
+        *thrust_controls(thrust, roll_torque, pitch_torque, yaw_torque, vehicle),
+        *(0.0, 0.0, 0.0, 0.0, thrust_derivative, thrust_rate_derivative),
+    )
+
+
+@scalar
+def held_extended_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
+    """Controls as they were sampled: rotors and law states go on with what they were told."""
+    return (
+        *(ctrl[0], ctrl[1], ctrl[2], ctrl[3], ctrl[4]),
+        *(ctrl[5], ctrl[6], ctrl[7], ctrl[8], ctrl[9]),
+    )
+
+
+def extended_activations(scenario: Scenario, _setup: ControlSetup) -> tuple[float, ...]:
+    """The extension starts with the thrust of hover, at rest."""
+    vehicle = scenario.vehicle.resolve()
+    return 0.0, 0.0, 0.0, 0.0, vehicle.mass * vehicle.gravity, 0.0
+
+
+def observe_quadrotor(
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    controls: Callable[[], Sequence[float]],
+) -> tuple[float, ...]:
+    """The rigid body, no tilt, rotor speeds from the thrusts in force, the law's own states."""
+    thrusts = controls()[:4]
+    speeds = [s * _speed(thrust) for s, thrust in zip(SPIN, thrusts, strict=True)]
+    body = rigid_body_state(qpos, qvel, 0.0, 0.0)[:12]
+    return (*body, *(0.0,) * 4, *speeds, *(0.0,) * 4, *act[4:])
+
+
+def _speed(thrust_control: float) -> float:
+    return speed_along_spin(thrust_control) if thrust_control == thrust_control else nan
+
+
+def references(
+    samples: Mapping[str, Floats], reference: ReferenceParameters, attitude: Sequence[object]
+) -> dict[str, Floats]:
+    """Reference columns; ``attitude`` are those of roll, pitch and yaw, arrays or constants."""
+    time = samples["time"]
+    position = np.array([position_reference(t, reference)[:3] for t in time.tolist()])
+    columns = [*position.reshape(len(time), 3).T]
+    columns += [np.broadcast_to(np.asarray(angle, dtype=float), time.shape) for angle in attitude]
+    tilts = dict.fromkeys(TILT_REFERENCE_COLUMNS, np.zeros_like(time))
+    return dict(zip(REFERENCE_COLUMNS, columns, strict=True)) | tilts
+
+
+def upright_margin(samples: Mapping[str, Floats]) -> Floats:
+    """Smallest rotation (rad) to a roll or pitch of 90 degrees, where both laws are singular.
+
+    Either has the thrust axis level, so it is what the thrust axis lacks to 90 degrees.
+    """
+    upright = np.cos(samples["roll"]) * np.cos(samples["pitch"])
+    return np.asarray(np.arcsin(np.clip(upright, -1.0, 1.0)))
+
+
+def extended_singularity(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict[str, Floats]:
+    """Exact and published determinant of the yaw-position law, and the margin to the exact one."""
+    attitude = samples["roll"], samples["pitch"]
+    exact = normalized_determinant(*attitude, samples["extension_thrust"], vehicle)
+    return {
+        "determinant": exact,
+        "singularity_margin": upright_margin(samples),
+        "published_determinant": published_determinant(*attitude),
+        **{name: samples[name] for name in LAW_FIELDS},
+    }
+
+
+def attitude_watched(sample: Mapping[str, float]) -> Watched:
+    """The cosine of the thrust axis' tilt, zero at a roll or pitch of 90 degrees."""
+    roll, pitch = sample["roll"], sample["pitch"]
+    return Watched(
+        cos(roll) * cos(pitch),
+        "the decoupling matrix became singular: the thrust axis came level, "
+        f"at roll = {roll:.3g} rad, pitch = {pitch:.3g} rad",
+    )

@@ -1,0 +1,96 @@
+"""The attitude-altitude law around the quadrotor (ch. 2, Appendix B)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from controllers.quadrotor_attitude_altitude import Gains, attitude_altitude_inputs
+from controllers.quadrotor_mixer import thrust_controls
+from controllers.references import ReferenceParameters
+from controllers.scalar import scalar
+from controllers.vehicle import Vehicle
+from tiltsim.controller_tables import QuadrotorAttitudeAltitudeController
+from tiltsim.loop import ControlSetup, Floats, Loop, Sizes
+from tiltsim.loops.quadrotor import (
+    attitude_watched,
+    observe_quadrotor,
+    references,
+    rigid_body_state,
+    upright_margin,
+)
+
+if TYPE_CHECKING:
+    from tiltsim.scenario import Scenario
+
+
+class ControlParameters(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float  # see `tiltsim.loop.Loop.signature`
+    vehicle: Vehicle
+    gains: Gains
+    reference: ReferenceParameters
+
+
+@scalar
+def attitude_altitude_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All eight controls: thrusts, idle rotor states."""
+    vehicle = parameters.vehicle
+    thrust, roll_torque, pitch_torque, yaw_torque = attitude_altitude_inputs(
+        *(time, rigid_body_state(qpos, qvel, 0.0, 0.0), vehicle),
+        *(parameters.gains, parameters.reference),
+    )
+    return (
+        *thrust_controls(thrust, roll_torque, pitch_torque, yaw_torque, vehicle),
+        *(0.0, 0.0, 0.0, 0.0),
+    )
+
+
+@scalar
+def held_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
+    """Controls as they were sampled."""
+    return ctrl[0], ctrl[1], ctrl[2], ctrl[3], ctrl[4], ctrl[5], ctrl[6], ctrl[7]
+
+
+def _setup(scenario: Scenario, signature: float) -> ControlSetup:
+    controller = scenario.controller
+    assert isinstance(controller, QuadrotorAttitudeAltitudeController)
+    vehicle, gains = scenario.vehicle.resolve(), controller.resolve_gains()
+    return ControlSetup(ControlParameters(signature, vehicle, gains, scenario.reference.parameters))
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    reference = setup.parameters.reference
+    attitude = (reference.roll, reference.pitch, reference.yaw)
+    return {
+        **references(samples, reference, attitude),
+        # cos(roll) cos(pitch) of the altitude times 1 / cos(pitch) of the Euler angles
+        "determinant": np.cos(samples["roll"]),
+        "singularity_margin": upright_margin(samples),
+    }
+
+
+QUADROTOR_ATTITUDE_ALTITUDE: Final = Loop(
+    model="quadrotor",
+    sizes=Sizes(qpos=7, qvel=6, act=4, ctrl=8),
+    parameters=ControlParameters,
+    controls=attitude_altitude_controls,
+    refresh=held_controls,
+    setup=_setup,
+    initial_activations=lambda _scenario, _setup: (0.0, 0.0, 0.0, 0.0),
+    observe=observe_quadrotor,
+    derive=_derive,
+    watched=lambda sample, _setup: (attitude_watched(sample),),
+    follows_position=lambda _scenario: False,
+)
+"""The attitude-altitude law around the quadrotor."""

@@ -1,0 +1,107 @@
+"""Switching between two laws around the quadrotor (ch. 2, Sec. 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+import controllers.yaw_position as yaw_position
+from controllers.scalar import scalar
+from controllers.switching import EXTENSIONS, Parameters, Zone, in_attitude_zone, switching_inputs
+from tiltsim.controller_tables import SwitchingController
+from tiltsim.loop import ControlSetup, Floats, Loop, Watched
+from tiltsim.loops.quadrotor import (
+    EXTENSION_COLUMNS,
+    LAW_FIELDS,
+    SIZES,
+    attitude_watched,
+    extended_activations,
+    extended_controls,
+    extended_singularity,
+    held_extended_controls,
+    observe_quadrotor,
+    references,
+    rigid_body_state,
+)
+
+if TYPE_CHECKING:
+    from tiltsim.scenario import Scenario
+
+
+class ControlParameters(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float  # see `tiltsim.loop.Loop.signature`
+    law: Parameters
+
+
+@scalar
+def switching_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All ten controls: thrusts, idle rotor states, the law's own states."""
+    law = parameters.law
+    state = rigid_body_state(qpos, qvel, act[4], act[5])
+    return extended_controls(switching_inputs(time, state, law), law.yaw_position.vehicle)
+
+
+def _setup(scenario: Scenario, signature: float) -> ControlSetup:
+    controller = scenario.controller
+    assert isinstance(controller, SwitchingController)
+    law = Parameters(
+        yaw_position.Parameters(
+            scenario.vehicle.resolve(), controller.resolve_gains(), scenario.reference.parameters
+        ),
+        controller.resolve_attitude_gains(),
+        Zone(*controller.zone.roll, *controller.zone.pitch),
+        EXTENSIONS[controller.extension],
+        controller.extension_rate,
+    )
+    return ControlSetup(ControlParameters(signature, law))
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    law = setup.parameters.law
+    reference = law.yaw_position.reference
+    attitudes = zip(samples["roll"].tolist(), samples["pitch"].tolist(), strict=True)
+    inside = np.array([in_attitude_zone(*attitude, law.zone) for attitude in attitudes], float)
+    # Outside of the zone roll and pitch are no outputs: they are what the position takes.
+    roll = np.where(inside > 0.0, reference.roll, samples["roll"])
+    pitch = np.where(inside > 0.0, reference.pitch, samples["pitch"])
+    return {
+        **references(samples, reference, (roll, pitch, reference.yaw)),
+        **extended_singularity(samples, law.yaw_position.vehicle),
+        "attitude_zone": inside,
+    }
+
+
+def _watched(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[Watched, ...]:
+    # Not the extension's thrust: while the other law flies it may be anything.
+    return (attitude_watched(sample),)
+
+
+SWITCHING: Final = Loop(
+    model="quadrotor",
+    sizes=SIZES,
+    parameters=ControlParameters,
+    controls=switching_controls,
+    refresh=held_extended_controls,
+    setup=_setup,
+    initial_activations=extended_activations,
+    observe=observe_quadrotor,
+    derive=_derive,
+    watched=_watched,
+    law_states=2,
+    law_fields=LAW_FIELDS,
+    extra_columns={**EXTENSION_COLUMNS, "attitude_zone": "1"},
+    # In the zone, where the law is meant to end up, the position is free.
+    follows_position=lambda _scenario: False,
+)
+"""Switching between yaw-position and attitude-altitude control of the quadrotor."""

@@ -1,0 +1,228 @@
+"""The attitude-altitude law around the tiltrotor.
+
+The control step goes from MuJoCo's state to MuJoCo's controls, as scalar code. One step serves
+every engine. It is a pure function of time, `qpos`, `qvel`, `act` and the parameters in
+`userdata`, so that a saved state restarts exactly and an integrator may call it at every stage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from controllers.attitude_altitude import (
+    DECOUPLINGS,
+    EXACT_DECOUPLING,
+    STATE_FIELDS,
+    Parameters,
+    State,
+    attitude_reference,
+    rotor_accelerations,
+)
+from controllers.decouplers import DECOUPLERS
+from controllers.decoupling_matrix import sines_and_cosines, torque_entries, torque_free_force
+from controllers.gaits import tilt_reference
+from controllers.references import position_reference
+from controllers.rotation import euler_from_quaternion, world_up_in_body
+from controllers.scalar import Quad, scalar
+from controllers.singularity import determinant, margin_over_gait
+from controllers.vehicle import SPIN, Vehicle, drag_ratio
+from tiltsim.controller_tables import AttitudeAltitudeController
+from tiltsim.loop import ControlSetup, Floats, Loop, Sizes, Watched
+
+if TYPE_CHECKING:
+    from tiltsim.scenario import Scenario, TiltServoTable
+
+REFERENCE_COLUMNS: Final = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
+TILT_COLUMNS: Final = ("alpha_1", "alpha_2", "alpha_3", "alpha_4")
+TILT_REFERENCE_COLUMNS: Final = tuple(f"alpha_ref_{rotor}" for rotor in (1, 2, 3, 4))
+
+
+class ControlParameters(NamedTuple):
+    """The head of `userdata`: what the control step of a flight needs to know."""
+
+    signature: float  # see `tiltsim.loop.Loop.signature`
+    servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
+    law: Parameters
+
+
+@scalar
+def tiltrotor_state(qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float]) -> State:
+    """The law's state (`controllers.attitude_altitude.STATE_FIELDS`) from MuJoCo's.
+
+    MuJoCo gives the body's position, its quaternion and the tilt angles in ``qpos``, the velocity
+    in world axes, the body rates in body axes and the tilt rates in ``qvel``.
+    """
+    x, y, z, qw, qx, qy, qz, alpha_1, alpha_2, alpha_3, alpha_4 = qpos
+    vx, vy, vz, p, q, r = qvel[0], qvel[1], qvel[2], qvel[3], qvel[4], qvel[5]
+    roll, pitch, yaw = euler_from_quaternion(qw, qx, qy, qz)
+    return (
+        *(x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r),
+        *(alpha_1, alpha_2, alpha_3, alpha_4, act[0], act[1], act[2], act[3]),
+    )
+
+
+@scalar
+def rotor_thrust_controls(act: Sequence[float]) -> Quad:
+    """Controls of the thrust actuators, ``s_i varpi_i |varpi_i|`` with ``s = (-1, 1, -1, 1)``."""
+    speed_1, speed_2, speed_3, speed_4 = act[0], act[1], act[2], act[3]
+    return (
+        -speed_1 * abs(speed_1),
+        speed_2 * abs(speed_2),
+        -speed_3 * abs(speed_3),
+        speed_4 * abs(speed_4),
+    )
+
+
+@scalar
+def tiltrotor_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All twelve controls of the tiltrotor: tilt servos, thrusts, rotor accelerations.
+
+    The servo commands lead the planned angles by the servo's own lag, so that a stiff servo
+    follows a moving gait and not only a resting one.
+    """
+    law = parameters.law
+    lead = parameters.servo_lead
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, law.gait, table)
+    return (
+        *(a1 + lead * rate_1, a2 + lead * rate_2, a3 + lead * rate_3, a4 + lead * rate_4),
+        *rotor_thrust_controls(act),
+        *rotor_accelerations(time, tiltrotor_state(qpos, qvel, act), law),
+    )
+
+
+@scalar
+def refreshed_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
+    """Held controls with the thrusts that belong to the present rotor speeds."""
+    return (
+        *(ctrl[0], ctrl[1], ctrl[2], ctrl[3]),
+        *rotor_thrust_controls(act),
+        *(ctrl[8], ctrl[9], ctrl[10], ctrl[11]),
+    )
+
+
+def servo_lead(servo: TiltServoTable) -> float:
+    """By how much (s) a tilt servo lags behind a command that moves evenly."""
+    return 2.0 * servo.damping_ratio / servo.natural_frequency
+
+
+def _setup(scenario: Scenario, signature: float) -> ControlSetup:
+    controller = scenario.controller
+    assert isinstance(controller, AttitudeAltitudeController)
+    vehicle = scenario.vehicle.resolve()
+    gait = scenario.gait.plan(vehicle)
+    parameters = ControlParameters(
+        signature,
+        servo_lead(scenario.vehicle.tilt_servo),
+        law=Parameters(
+            vehicle=vehicle,
+            gains=controller.resolve_gains(),
+            gait=gait.parameters,
+            reference=scenario.reference.parameters,
+            decoupler=DECOUPLERS[controller.decoupler],
+            decoupling=DECOUPLINGS[controller.decoupling],
+        ),
+    )
+    return ControlSetup(parameters, gait.table)
+
+
+def initial_rotor_speeds(scenario: Scenario) -> tuple[float, ...]:
+    """The signed rotor speeds (rad/s) at time zero."""
+    return tuple(s * speed for s, speed in zip(SPIN, scenario.initial.rotor_speeds, strict=True))
+
+
+def observe_tiltrotor(
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    _controls: Callable[[], Sequence[float]],
+) -> tuple[float, ...]:
+    """Rigid body, tilts, rotor speeds and tilt rates: all of them states of the simulation."""
+    return (*tiltrotor_state(qpos, qvel, act), *qvel[6:])
+
+
+def gait_singularity(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict[str, Floats]:
+    """Determinant of the attitude-altitude law at the present tilts, and the margin to zero."""
+    tilts = np.stack([samples[name] for name in TILT_COLUMNS], axis=-1)
+    attitude = samples["roll"], samples["pitch"]
+    return {
+        "singularity_margin": margin_over_gait(tilts, vehicle, *attitude),
+        "determinant": determinant(tilts, *attitude, vehicle),
+    }
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    law, table = setup.parameters.law, setup.table
+    ratio = drag_ratio(law.vehicle)
+    states = np.stack([samples[name] for name in STATE_FIELDS], axis=-1).tolist()
+    rows = []
+    for time, state in zip(samples["time"].tolist(), states, strict=True):
+        trig = sines_and_cosines(*state[12:16])
+        torque = torque_entries(trig, ratio)
+        position = position_reference(time, law.reference)[:3]
+        attitude = attitude_reference(time, state, trig, torque, law)[:3]
+        rows.append((*position, *attitude, *tilt_reference(time, law.gait, table)[:4]))
+    names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)
+    values = np.array(rows).reshape(len(rows), len(names))
+    return dict(zip(names, values.T, strict=True)) | gait_singularity(samples, law.vehicle)
+
+
+def rotor_stops(sample: Mapping[str, float]) -> tuple[Watched, ...]:
+    """Rotor speeds along their spin: a matrix with the factor ``2 |varpi|`` is singular at zero."""
+    return tuple(
+        Watched(
+            sign * sample[f"rotor_speed_{rotor}"],
+            f"the decoupling matrix became singular: rotor {rotor} came to a stop",
+        )
+        for rotor, sign in enumerate(SPIN, start=1)
+    )
+
+
+def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Watched, ...]:
+    law = setup.parameters.law
+    roll, pitch = sample["roll"], sample["pitch"]
+    tilts = [sample[name] for name in TILT_COLUMNS]
+    ratio = drag_ratio(law.vehicle)
+    trig = sines_and_cosines(*tilts)
+    n = torque_free_force(trig, torque_entries(trig, ratio), ratio)
+    up = world_up_in_body(roll, pitch)
+    angles = ", ".join(f"{tilt:.3g}" for tilt in tilts)
+    matrix = Watched(
+        n[0] * up[0] + n[1] * up[1] + n[2] * up[2],
+        f"the decoupling matrix became singular at roll = {roll:.3g} rad, "
+        f"pitch = {pitch:.3g} rad, tilt angles ({angles}) rad",
+    )
+    # As published, the factor 2 |varpi| stands in one row alone, and a rotor at rest is harmless.
+    return (matrix, *rotor_stops(sample)) if law.decoupling == EXACT_DECOUPLING else (matrix,)
+
+
+def _follows_position(scenario: Scenario) -> bool:
+    controller = scenario.controller
+    assert isinstance(controller, AttitudeAltitudeController)
+    return controller.decoupler != "none"
+
+
+TILTROTOR: Final = Loop(
+    model="tiltrotor",
+    sizes=Sizes(qpos=11, qvel=10, act=4, ctrl=12),
+    parameters=ControlParameters,
+    controls=tiltrotor_controls,
+    refresh=refreshed_controls,
+    setup=_setup,
+    initial_activations=lambda scenario, _setup: initial_rotor_speeds(scenario),
+    observe=observe_tiltrotor,
+    derive=_derive,
+    watched=_watched,
+    follows_position=_follows_position,
+    thesis_plant=True,
+)
+"""The attitude-altitude law around the tiltrotor."""

@@ -1,0 +1,90 @@
+"""The yaw-position law around the quadrotor (ch. 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from controllers.scalar import scalar
+from controllers.yaw_position import Parameters, yaw_position_inputs
+from tiltsim.controller_tables import YawPositionController
+from tiltsim.loop import ControlSetup, Floats, Loop, Watched
+from tiltsim.loops.quadrotor import (
+    EXTENSION_COLUMNS,
+    LAW_FIELDS,
+    SIZES,
+    attitude_watched,
+    extended_activations,
+    extended_controls,
+    extended_singularity,
+    held_extended_controls,
+    observe_quadrotor,
+    references,
+    rigid_body_state,
+)
+
+if TYPE_CHECKING:
+    from tiltsim.scenario import Scenario
+
+
+class ControlParameters(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float  # see `tiltsim.loop.Loop.signature`
+    law: Parameters
+
+
+@scalar
+def yaw_position_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All ten controls: thrusts, idle rotor states, the law's own states."""
+    law = parameters.law
+    state = rigid_body_state(qpos, qvel, act[4], act[5])
+    return extended_controls(yaw_position_inputs(time, state, law), law.vehicle)
+
+
+def _setup(scenario: Scenario, signature: float) -> ControlSetup:
+    controller = scenario.controller
+    assert isinstance(controller, YawPositionController)
+    law = Parameters(
+        scenario.vehicle.resolve(), controller.resolve_gains(), scenario.reference.parameters
+    )
+    return ControlSetup(ControlParameters(signature, law))
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    law = setup.parameters.law
+    # Roll and pitch are no outputs: they are what the position takes.
+    attitude = (samples["roll"], samples["pitch"], law.reference.yaw)
+    columns = references(samples, law.reference, attitude)
+    return columns | extended_singularity(samples, law.vehicle)
+
+
+def extension_watched(sample: Mapping[str, float]) -> Watched:
+    """The thrust of the extension: without thrust the decoupling matrix is singular."""
+    thrust = sample["extension_thrust"]
+    return Watched(thrust, "the decoupling matrix became singular: the thrust came to zero")
+
+
+YAW_POSITION: Final = Loop(
+    model="quadrotor",
+    sizes=SIZES,
+    parameters=ControlParameters,
+    controls=yaw_position_controls,
+    refresh=held_extended_controls,
+    setup=_setup,
+    initial_activations=extended_activations,
+    observe=observe_quadrotor,
+    derive=_derive,
+    watched=lambda sample, _setup: (attitude_watched(sample), extension_watched(sample)),
+    law_states=2,
+    law_fields=LAW_FIELDS,
+    extra_columns=EXTENSION_COLUMNS,
+)
+"""The yaw-position law around the quadrotor."""
