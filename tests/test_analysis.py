@@ -149,7 +149,10 @@ def test_vehicles_are_named_or_listed() -> None:
         (["--angles", "-30,-30,30,30"], "degrees would be -0.5236"),
         (["--angles", "0,0,0,0", "--roll", "45"], "more than half a turn"),
         (["--angles", "0,0,0,0", "--pitch", "up"], "must be a number"),
-        (["--angles", "0,0,0,0", "--vehicle", "ardrone"], "choose ar_drone_2, luukkonen"),
+        (
+            ["--angles", "0,0,0,0", "--vehicle", "ardrone"],
+            "choose ar_drone_2, ar_drone_2_unrounded, luukkonen",
+        ),
         (["--published", "ch06_gait_9"], "choose ch03_gait_1, "),
         ([], "give one of SCENARIO"),
         (["some", "--angles", "0,0,0,0"], "give one of SCENARIO"),
@@ -212,7 +215,7 @@ def test_accepted_paths(capsys) -> None:
         ("--leg red 0,0 1", "needs 2 angles"),
         ("--circle red 0,0 -1", "radius -1"),
         ("--circle red 0,0 0.2 --leg red 0,0 1,1", "either --leg or --circle"),
-        ("--vehicle none", "choose ar_drone_2, luukkonen"),
+        ("--vehicle none", "choose ar_drone_2, ar_drone_2_unrounded, luukkonen"),
     ],
 )
 def test_mistakes_on_the_map(words, message) -> None:

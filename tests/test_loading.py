@@ -204,7 +204,7 @@ MISTAKES = {
     "unknown preset": (
         '[vehicle]\npreset = "ardrone"',
         'vehicle.preset = "ardrone"',
-        "ar_drone_2 or luukkonen",
+        "ar_drone_2, ar_drone_2_unrounded or luukkonen",
     ),
     "unknown decoupler": (
         '[controller]\ndecoupler = "exakt"',

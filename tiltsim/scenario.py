@@ -477,7 +477,8 @@ class Scenario(Table):
         servo, timestep = self.vehicle.tilt_servo, self.simulation.timestep
         # The fastest pole of the servo must stay where explicit integration is stable.
         fastest = servo.natural_frequency * max(1.0, 2.0 * servo.damping_ratio)
-        if self.simulation.plant == "mujoco" and fastest * timestep > MAX_SERVO_STEP:
+        tilts = self.vehicle.model == "tiltrotor"
+        if tilts and self.simulation.plant == "mujoco" and fastest * timestep > MAX_SERVO_STEP:
             raise InvalidValueError(
                 "simulation.timestep",
                 timestep,

@@ -17,7 +17,7 @@ def scenario_schema() -> dict[str, Any]:
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     variant = Variant.model_json_schema()
     variant["properties"] |= {
-        key: value if key in {"title", "source", "expect"} else {"type": "object"}
+        key: value if key in {"title", "source", "expect", "disturbance"} else {"type": "object"}
         for key, value in schema["properties"].items()
     }
     variant["additionalProperties"] = False

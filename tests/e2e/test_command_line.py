@@ -209,8 +209,9 @@ def test_list_shows_every_scenario_with_title_and_source(capsys):
 def test_schema_knows_every_table_and_the_variants(capsys):
     assert main(["schema"]) == 0
     schema = json.loads(capsys.readouterr().out)
-    tables = {"vehicle", "simulation", "initial", "controller", "gait", "reference", "expect"}
-    assert tables | {"title", "source", "variant"} == set(schema["properties"])
+    tables = {"vehicle", "simulation", "initial", "controller", "gait", "reference"}
+    lists = {"disturbance", "expect", "variant"}
+    assert tables | lists | {"title", "source"} == set(schema["properties"])
     assert schema["additionalProperties"] is False
 
 
