@@ -114,6 +114,8 @@ class MujocoPlant:
         mujoco.mj_resetData(self.model, self.data)  # clears the warnings
         mujoco.mj_setState(self.model, self.data, value, _INTEGRATION)
         mujoco.mj_forward(self.model, self.data)
+        # The state brings its own parameters, which the Python engine reads once.
+        self._engine = make_engine(self.engine, TILTROTOR, self.model, self.data)
 
     @property
     def _steps_taken(self) -> int:
@@ -163,7 +165,7 @@ def quiet_warnings() -> Iterator[None]:
 
 _INTEGRATION: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _WARNINGS: Final = {
-    mujoco.mjtWarning.mjWARN_BADCTRL: "the control law returned NaN",
+    mujoco.mjtWarning.mjWARN_BADCTRL: "the control law returned NaN or a value beyond 1e10",
     mujoco.mjtWarning.mjWARN_BADQPOS: "positions are NaN or beyond 1e10",
     mujoco.mjtWarning.mjWARN_BADQVEL: "velocities are NaN or beyond 1e10",
     mujoco.mjtWarning.mjWARN_BADQACC: "accelerations are NaN or beyond 1e10",
@@ -219,7 +221,10 @@ class ThesisPlant:
 
     @property
     def state(self) -> Floats:
-        """See `Plant.state`: the step count and the state of `tiltsim.thesis_plant`."""
+        """See `Plant.state`: the step count and the state of `tiltsim.thesis_plant`.
+
+        The parameters are the scenario's and stay with the plant.
+        """
         return np.array([self._step_index, *self._state])
 
     @state.setter

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.progress import progress_bar
+from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, FLIGHT_LOST, INTERRUPTED
 
 if TYPE_CHECKING:
     from tiltsim.expectations import Verdict
     from tiltsim.flight import Flight
-
-DONE, EXPECTATION_FAILED, FLIGHT_LOST, INTERRUPTED = 0, 1, 3, 130
 
 
 def add_parser(subparsers: Any) -> None:
@@ -26,7 +25,8 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "scenario",
         metavar="SCENARIO",
-        help="a TOML file or a name from the library, with #VARIANT for a member of a family",
+        help="a TOML file or a name from the library, with #VARIANT for a member of a family "
+        "(a family without #VARIANT flies its base if --set is given)",
     )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="write metrics.json, flight.parquet, scenario.toml"
@@ -58,20 +58,23 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.simulation import simulate
 
     vehicle = scenario.vehicle.resolve()
-    for warning in gait_warnings(scenario.gait.plan(vehicle), vehicle):
-        print(f"tiltsim: warning: gait: {warning}", file=sys.stderr)
+    if not arguments.quiet:
+        for warning in gait_warnings(scenario.gait.plan(vehicle), vehicle):
+            print(f"tiltsim: warning: gait: {warning}", file=sys.stderr)
     duration = scenario.simulation.duration
     with progress_bar(duration, "s", shown=not arguments.quiet) as advance_to:
         flight = simulate(scenario, lambda sample: advance_to(float(sample[0])))
     if arguments.out is not None:
         flight.save(arguments.out)
+    if flight.end.kind == "interrupted":
+        kept = f"; the flight so far is in {arguments.out}" if arguments.out is not None else ""
+        print(f"tiltsim: interrupted at t = {flight.end.time:.3f} s{kept}", file=sys.stderr)
+        return INTERRUPTED
     verdicts = judge(scenario, flight.metrics())
     if not arguments.quiet:
         print(summary(flight, verdicts))
         if arguments.out is not None:
             print(f"written to {arguments.out}")
-    if flight.end.kind == "interrupted":
-        return INTERRUPTED
     if flight.end.kind != "completed":
         print(f"tiltsim: {lost(flight)}", file=sys.stderr)
         return FLIGHT_LOST
