@@ -10,7 +10,7 @@ from typing import Final
 
 from tiltsim.errors import InputError
 
-COMMANDS: Final = ("run", "check", "list", "bench", "schema")
+COMMANDS: Final = ("run", "check", "list", "view", "plot", "video", "bench", "schema")
 INPUT_ERROR: Final = 2
 INTERRUPTED: Final = 130
 

@@ -34,6 +34,18 @@ def prepare_folder(folder: Path) -> None:
         raise InputError(f"--out {folder}: not writable")
 
 
+def prepare_file(option: str, file: Path) -> None:
+    """See that a file can be written before the work for it begins.
+
+    Raises `InputError`, naming the command line's ``option``, where it cannot.
+    """
+    folder = file.absolute().parent
+    if not folder.is_dir():
+        raise InputError(f"{option} {file}: its folder does not exist")
+    if file.is_dir() or not os.access(folder, os.W_OK):
+        raise InputError(f"{option} {file}: not writable")
+
+
 def save_flight(flight: Flight, folder: Path) -> None:
     """Write a flight into a folder; each file appears whole or not at all."""
     import pyarrow.parquet as pq

@@ -169,8 +169,11 @@ _WARNINGS: Final = {
 }
 
 
-def build_model(scenario: Scenario) -> mujoco.MjModel:
-    """Compile the scenario's vehicle. Raises `InputError` where MuJoCo cannot build it."""
+def build_model(scenario: Scenario, *, visuals: bool = False) -> mujoco.MjModel:
+    """Compile the scenario's vehicle, with what is drawn of it only if asked.
+
+    Raises `InputError` where MuJoCo cannot build it.
+    """
     vehicle, simulation = scenario.vehicle, scenario.simulation
     try:
         return compile_model(
@@ -182,6 +185,7 @@ def build_model(scenario: Scenario) -> mujoco.MjModel:
             tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump()),
             pod=Pod(**vehicle.pod.model_dump()),
             rotor_limits=RotorLimits(vehicle.min_rotor_speed, vehicle.max_rotor_speed),
+            visuals=visuals,
         )
     except ValueError as error:
         raise InputError(f"{scenario.address or 'scenario'}: vehicle: {error}") from error

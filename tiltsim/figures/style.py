@@ -1,0 +1,104 @@
+"""The common style: sizes, fonts and colours that survive print and colour blindness."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from tiltsim.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# After Okabe and Ito; each pair differs in lightness too, so that grey prints stay legible.
+BLUE: Final = "#0072B2"
+RED: Final = "#D55E00"
+GREEN: Final = "#009E73"
+AMBER: Final = "#E69F00"
+PURPLE: Final = "#CC79A7"
+SKY: Final = "#56B4E9"
+INK: Final = "#222222"
+GREY: Final = "#8A8A8A"
+PALE: Final = "#E4EEF3"
+CYCLE: Final = (BLUE, RED, GREEN, PURPLE, AMBER, SKY, INK)
+SEQUENTIAL: Final = "cividis"
+
+_SETTINGS: Final = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 9,
+    "axes.titlesize": 9.5,
+    "axes.labelsize": 9,
+    "axes.edgecolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.labelcolor": INK,
+    "axes.titlelocation": "left",
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#D9D9D9",
+    "grid.linewidth": 0.5,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "legend.fontsize": 8,
+    "legend.frameon": False,
+    "lines.linewidth": 1.4,
+    "figure.dpi": 100,
+    "savefig.dpi": 200,
+    "svg.hashsalt": "tiltsim",
+    "pdf.fonttype": 42,
+}
+
+
+@contextmanager
+def paper_style() -> Iterator[None]:
+    """Draw within this context to have the common style, and leave no trace of it."""
+    from cycler import cycler
+    from matplotlib import rc_context
+
+    with rc_context({**_SETTINGS, "axes.prop_cycle": cycler(color=CYCLE)}):
+        yield
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of the given size (inches) with constrained layout."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def angle_axis(axes: Axes, axis: str, limit: float) -> None:
+    """Ticks at multiples of pi/4 up to ``limit`` (rad) on axis "x" or "y"."""
+    from math import pi
+
+    labels = {-2: "−π/2", -1: "−π/4", 0: "0", 1: "π/4", 2: "π/2"}
+    steps = [step for step in labels if abs(step) * pi / 4 <= limit + 1e-9]
+    set_ticks: Any = getattr(axes, f"set_{axis}ticks")
+    set_ticks([step * pi / 4 for step in steps], [labels[step] for step in steps])
+    set_limits: Any = getattr(axes, f"set_{axis}lim")
+    set_limits(-limit, limit)
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure; the ending of ``path`` chooses the format.
+
+    Raises
+    ------
+    InputError
+        If the format is unknown or the file cannot be written.
+    """
+    known = sorted(figure.canvas.get_supported_filetypes())
+    ending = path.suffix.lstrip(".").lower()
+    if ending not in known:
+        raise InputError(f"--plot {path}: unknown format {ending!r}; choose {', '.join(known)}")
+    try:
+        with paper_style():
+            figure.savefig(path)
+    except OSError as error:
+        raise InputError(f"--plot {path}: cannot be written: {error.strerror}") from error
