@@ -8,6 +8,7 @@ column stays where the model puts it.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import floor, log10
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import mujoco
@@ -74,6 +75,41 @@ def poses_in_parents(model: mujoco.MjModel, poses: Poses) -> Poses:
     turn = poses.quaternion[:, parents] * (1.0, -1.0, -1.0, -1.0)  # the inverse rotations
     apart = poses.position - poses.position[:, parents]
     return Poses(rotate(turn, apart), _product(turn, poses.quaternion))
+
+
+def thrust_sites(model: mujoco.MjModel) -> dict[int, str]:
+    """Sites that carry a rotor's thrust along their z axis, and the column that holds it (N)."""
+    names = {site: model.site(site).name for site in range(model.nsite)}
+    return {
+        site: name.replace("rotor_", "thrust_")
+        for site, name in names.items()
+        if name.startswith("rotor_")
+    }
+
+
+def vehicle_radius(model: mujoco.MjModel) -> float:
+    """How far a vehicle's thrusts or bodies reach from its centre (m), at least 1 cm."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    free = first_free_body(model)
+    points = [data.site_xpos[site] for site in thrust_sites(model)] or data.xpos[free:]
+    return max(0.01, float(np.max(np.linalg.norm(points - data.xpos[free], axis=1))))
+
+
+def thrust_scale(model: mujoco.MjModel) -> float:
+    """Length of a thrust arrow (m/N): 1, 2 or 5 times a power of ten, at hover about one radius."""
+    free = first_free_body(model)
+    weight = float(model.body_subtreemass[free] * np.linalg.norm(model.opt.gravity))
+    rotors = max(1, len(thrust_sites(model)))
+    wanted = vehicle_radius(model) * rotors / max(weight, 1e-9)
+    decade = 10.0 ** floor(log10(wanted))
+    return min((digit * decade for digit in (1.0, 2.0, 5.0, 10.0)), key=lambda x: abs(x - wanted))
+
+
+def first_free_body(model: mujoco.MjModel) -> int:
+    """The body that moves as the vehicle does: the first with a joint."""
+    moving = np.flatnonzero(model.body_dofnum)
+    return int(moving[0]) if len(moving) else 0
 
 
 def rotate(quaternion: Floats, vector: Floats) -> Floats:

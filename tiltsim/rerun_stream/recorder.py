@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tiltsim.events import Event, EventWatch
-from tiltsim.replay import visible_model
+from tiltsim.replay import thrust_scale, vehicle_radius, visible_model
 from tiltsim.rerun_stream import palette
 from tiltsim.rerun_stream.plane import AttitudePlane
 from tiltsim.rerun_stream.rows import send_rows
-from tiltsim.rerun_stream.scene import Scene, thrust_scale
+from tiltsim.rerun_stream.scene import Scene
 from tiltsim.rerun_stream.series import TimeSeries, comparison_series, measured_series
 
 if TYPE_CHECKING:
@@ -74,7 +74,6 @@ class FlightRecorder:
         """What the blueprint must know of this flight."""
         from tiltsim.rerun_stream.blueprint import Shown
         from tiltsim.rerun_stream.geometry import ground_height
-        from tiltsim.rerun_stream.scene import vehicle_radius
 
         return Shown(
             name=self._name,

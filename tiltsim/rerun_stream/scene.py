@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import floor, log10
 from typing import TYPE_CHECKING, Any, Final
 
 import mujoco
@@ -10,7 +9,16 @@ import numpy as np
 
 from controllers.references import position_reference
 from tiltsim.parameters import control_parameters
-from tiltsim.replay import joint_positions, poses_in_parents, world_poses
+from tiltsim.replay import (
+    first_free_body,
+    joint_positions,
+    poses_in_parents,
+    rotate,
+    thrust_scale,
+    thrust_sites,
+    vehicle_radius,
+    world_poses,
+)
 from tiltsim.rerun_stream import palette
 from tiltsim.rerun_stream.geometry import body_paths, ground_height, log_geometry, xyzw
 from tiltsim.rerun_stream.rows import Floats, Ticks, send_rows
@@ -59,7 +67,7 @@ class Scene:
     @property
     def vehicle(self) -> str:
         """The entity of the first body that is free to move."""
-        return self._paths[_first_free_body(self._model)]
+        return self._paths[first_free_body(self._model)]
 
     @property
     def camera(self) -> str:
@@ -126,7 +134,7 @@ class Scene:
             vectors = np.outer(columns[column] * self._thrust_scale, axis).astype(np.float32)
             arrow = rr.Arrows3D.columns(vectors=vectors)
             send_rows(self._recording, self._thrust_path(site), time, arrow)
-        position = world.position[:, _first_free_body(model)]
+        position = world.position[:, first_free_body(model)]
         follow = rr.Transform3D.columns(translation=position.astype(np.float32))
         send_rows(self._recording, self.camera, time, follow)
         self._append_trail(time, position)
@@ -205,42 +213,5 @@ class Scene:
         self._trail_end = ends[-1]
 
 
-def thrust_sites(model: mujoco.MjModel) -> dict[int, str]:
-    """Sites that carry a rotor's thrust along their z axis, and the column that holds it (N)."""
-    names = {site: model.site(site).name for site in range(model.nsite)}
-    return {
-        site: name.replace("rotor_", "thrust_")
-        for site, name in names.items()
-        if name.startswith("rotor_")
-    }
-
-
-def vehicle_radius(model: mujoco.MjModel) -> float:
-    """How far a vehicle's thrusts or bodies reach from its centre (m), at least 1 cm."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    free = _first_free_body(model)
-    points = [data.site_xpos[site] for site in thrust_sites(model)] or data.xpos[free:]
-    return max(0.01, float(np.max(np.linalg.norm(points - data.xpos[free], axis=1))))
-
-
-def thrust_scale(model: mujoco.MjModel) -> float:
-    """Length of a thrust arrow (m/N): 1, 2 or 5 times a power of ten, at hover about one radius."""
-    free = _first_free_body(model)
-    weight = float(model.body_subtreemass[free] * np.linalg.norm(model.opt.gravity))
-    rotors = max(1, len(thrust_sites(model)))
-    wanted = vehicle_radius(model) * rotors / max(weight, 1e-9)
-    decade = 10.0 ** floor(log10(wanted))
-    return min((digit * decade for digit in (1.0, 2.0, 5.0, 10.0)), key=lambda x: abs(x - wanted))
-
-
-def _first_free_body(model: mujoco.MjModel) -> int:
-    """The body that moves as the vehicle does: the first with a joint."""
-    moving = np.flatnonzero(model.body_dofnum)
-    return int(moving[0]) if len(moving) else 0
-
-
 def _axis_in_body(model: mujoco.MjModel, site: int) -> Floats:
-    from tiltsim.replay import rotate
-
     return rotate(model.site_quat[site], np.array([0.0, 0.0, 1.0]))
