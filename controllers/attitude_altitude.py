@@ -8,6 +8,7 @@ meets them.
 
 from __future__ import annotations
 
+from math import nan
 from typing import Final, NamedTuple
 
 from controllers.decouplers import (
@@ -130,13 +131,11 @@ def rotor_accelerations(time: float, state: State, parameters: Parameters) -> Qu
     the rates of roll, pitch and yaw (ch. 3, Eq. 8), second derivatives come from the model. NaN
     where the decoupling matrix is singular.
     """
-    z, vz = state[2], state[5]
-    roll, pitch, yaw, p, q, r = state[6], state[7], state[8], state[9], state[10], state[11]
-    speed_1, speed_2, speed_3, speed_4 = state[16], state[17], state[18], state[19]
+    _x, _y, z, _vx, _vy, vz, roll, pitch, yaw, p, q, r, a1, a2, a3, a4, s1, s2, s3, s4 = state
     vehicle = parameters.vehicle
     gains = parameters.gains
 
-    trig = sines_and_cosines(state[12], state[13], state[14], state[15])
+    trig = sines_and_cosines(a1, a2, a3, a4)
     torque = torque_entries(trig, drag_ratio(vehicle))
     x2, x4, y1, y3, z1, z2, z3, z4 = torque
     roll_ref, pitch_ref, yaw_ref, z_ref, vz_ref, az_ref = attitude_reference(
@@ -144,10 +143,7 @@ def rotor_accelerations(time: float, state: State, parameters: Parameters) -> Qu
     )
 
     # Second derivatives of the outputs, Eq. (10), from w_i = varpi_i |varpi_i|.
-    factor_1, factor_2 = 2.0 * abs(speed_1), 2.0 * abs(speed_2)
-    factor_3, factor_4 = 2.0 * abs(speed_3), 2.0 * abs(speed_4)
-    w1, w2 = 0.5 * factor_1 * speed_1, 0.5 * factor_2 * speed_2
-    w3, w4 = 0.5 * factor_3 * speed_3, 0.5 * factor_4 * speed_4
+    w1, w2, w3, w4 = s1 * abs(s1), s2 * abs(s2), s3 * abs(s3), s4 * abs(s4)
     per_torque = vehicle.arm_length * vehicle.thrust_coefficient
     per_roll = per_torque / vehicle.inertia_xx
     per_pitch = per_torque / vehicle.inertia_yy
@@ -156,12 +152,11 @@ def rotor_accelerations(time: float, state: State, parameters: Parameters) -> Qu
     pitch_acceleration = per_pitch * (y1 * w1 + y3 * w3)
     yaw_acceleration = per_yaw * (z1 * w1 + z2 * w2 + z3 * w3 + z4 * w4)
     ux, uy, uz = world_up_in_body(roll, pitch)
-    h1, h2, h3, h4 = vertical_force_entries(trig, ux, uy, uz)
+    fx, fy, fz = body_force(trig, w1, w2, w3, w4)
     per_lift = vehicle.thrust_coefficient / vehicle.mass
-    altitude_acceleration = per_lift * (h1 * w1 + h2 * w2 + h3 * w3 + h4 * w4) - vehicle.gravity
+    altitude_acceleration = per_lift * (ux * fx + uy * fy + uz * fz) - vehicle.gravity
 
     # Ma, Eq. (18): the thrust direction turns with the body, r3^T (omega x F w) / m.
-    fx, fy, fz = body_force(trig, w1, w2, w3, w4)
     turning = per_lift * (ux * (q * fz - r * fy) + uy * (r * fx - p * fz) + uz * (p * fy - q * fx))
 
     # Third-order laws, Eqs. (26)-(27); the references of roll, pitch and yaw are held constant.
@@ -180,9 +175,11 @@ def rotor_accelerations(time: float, state: State, parameters: Parameters) -> Qu
 
     # Eq. (19). The published matrix has the factor 2 |varpi_i| in its last row alone; the exact one
     # has it in every row, so that it can be taken out of the matrix and divided out of the answer.
+    h1, h2, h3, h4 = vertical_force_entries(trig, ux, uy, uz)
+    f1, f2, f3, f4 = 2.0 * abs(s1), 2.0 * abs(s2), 2.0 * abs(s3), 2.0 * abs(s4)
     if parameters.decoupling == PUBLISHED_DECOUPLING:
-        h1, h2, h3, h4 = h1 * factor_1, h2 * factor_2, h3 * factor_3, h4 * factor_4
-        factor_1 = factor_2 = factor_3 = factor_4 = 1.0
+        h1, h2, h3, h4 = h1 * f1, h2 * f2, h3 * f3, h4 * f4
+        f1 = f2 = f3 = f4 = 1.0
     v1, v2, v3, v4 = solve_by_pairs(
         torque,
         (h1, h2, h3, h4),
@@ -191,4 +188,6 @@ def rotor_accelerations(time: float, state: State, parameters: Parameters) -> Qu
         yaw_jerk / per_yaw,
         (altitude_jerk - turning) / per_lift,
     )
-    return v1 / factor_1, v2 / factor_2, v3 / factor_3, v4 / factor_4
+    if f1 == 0.0 or f2 == 0.0 or f3 == 0.0 or f4 == 0.0:
+        return nan, nan, nan, nan
+    return v1 / f1, v2 / f2, v3 / f3, v4 / f4

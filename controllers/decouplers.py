@@ -8,7 +8,7 @@ nothing (ch. 4, Eqs. 7-8), the modified one the side force at level attitude, to
 
 from __future__ import annotations
 
-from math import acos, atan2, cos, sin, sqrt
+from math import acos, atan2, cos, nan, sin, sqrt
 from typing import Final
 
 from controllers.scalar import Triple, scalar
@@ -42,9 +42,11 @@ def modified_decoupler(
 
     Eq. 11 asks for the rotor inputs without torque whose vertical force is the weight, level.
     Their force is parallel to ``n``, so ``F_X = m g n_x / n_z`` and ``F_Y = m g n_y / n_z``: the
-    printed 4 x 4 inverse in closed form.
+    printed 4 x 4 inverse in closed form. NaN where no such inputs exist.
     """
     nx, ny, nz = n
+    if nz == 0.0:
+        return nan, nan
     roll, pitch = conventional_decoupler(ax, ay, yaw, gravity)
     return roll + ny / nz, pitch - nx / nz
 
@@ -57,7 +59,8 @@ def exact_decoupler(
 
     Solves ``Ry(pitch) Rx(roll) n = d |n|`` with ``d`` the unit vector along ``Rz(-yaw) (ax, ay,
     g + az)``, on the branch that is level when ``n`` and ``d`` are vertical. Where no roll reaches
-    ``d`` (a gait with a large side force asked for more along it) the nearest one is returned.
+    ``d`` (a gait with a large side force asked for more along it) the nearest one is returned; NaN
+    where the torque-free force has neither a side nor a vertical part.
     """
     sin_yaw, cos_yaw = sin(yaw), cos(yaw)
     dx = ax * cos_yaw + ay * sin_yaw
@@ -66,8 +69,10 @@ def exact_decoupler(
     # The rotors push along n or against it; the vehicle flies with whichever side points up.
     side = 1.0 if n[2] >= 0.0 else -1.0
     nx, ny, nz = side * n[0], side * n[1], side * n[2]
+    lateral = sqrt(ny * ny + nz * nz)
+    if lateral == 0.0:
+        return nan, nan
     scale = sqrt((nx * nx + ny * ny + nz * nz) / (dx * dx + dy * dy + dz * dz))
-    lateral = dy * scale / sqrt(ny * ny + nz * nz)
-    roll = acos(min(1.0, max(-1.0, lateral))) - atan2(nz, ny)
+    roll = acos(min(1.0, max(-1.0, dy * scale / lateral))) - atan2(nz, ny)
     pitch = atan2(dx, dz) - atan2(nx, ny * sin(roll) + nz * cos(roll))
     return roll, pitch

@@ -103,8 +103,10 @@ def torque_free_inputs(torque: Octet) -> Quad:
 def torque_free_force(trig: Octet, torque: Octet, drag_ratio: float) -> Triple:
     """The force direction at zero torque, ``n = (-R_theta, R_phi, R)``, body axes.
 
-    Its length carries ch. 3's normalisation: ``R = 4`` for an untilted vehicle. ``n = 0`` exactly
-    where ``tau`` has lost rank, and then the decoupling matrix is singular at every attitude.
+    Its length carries ch. 3's normalisation: ``R = 4`` for an untilted vehicle. Where ``n = 0`` the
+    decoupling matrix is singular at every attitude: wherever ``tau`` has lost rank, and also where
+    the torque-free inputs of the two pairs push against each other, as red gaits do on the curve L
+    of the Two Color Map.
     """
     w1, w2, w3, w4 = torque_free_inputs(torque)
     nx, ny, nz = body_force(trig, w1, w2, w3, w4)

@@ -11,7 +11,8 @@ from tiltsim.scenario import Expectation, Scenario
 
 
 def expects(**bounds):
-    return Expectation(metric="final_roll", **bounds)
+    metric = "diverged" if "equals" in bounds else "final_roll"
+    return Expectation(metric=metric, **bounds)
 
 
 @pytest.mark.parametrize(

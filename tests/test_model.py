@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from controllers.vehicle import PRESETS, SPIN, Vehicle
+from tests.thesis import force_matrix, torque_matrix
 from tiltsim.model import Pod, RotorLimits, TiltServo, compile_model, mjcf_directory
 
 AR_DRONE = PRESETS["ar_drone_2"]
@@ -60,30 +61,6 @@ def placed(model, *, alpha=(0.0, 0.0, 0.0, 0.0), attitude=(1.0, 0.0, 0.0, 0.0)):
 
 def body_rotation(data):
     return data.body("vehicle").xmat.reshape(3, 3)
-
-
-def thesis_force_matrix(vehicle, alpha):
-    """Chapter 3, Eq. (3)."""
-    kf = vehicle.thrust_coefficient
-    (s1, s2, s3, s4), (c1, c2, c3, c4) = np.sin(alpha), np.cos(alpha)
-    return kf * np.array([[0, s2, 0, -s4], [s1, 0, -s3, 0], [-c1, c2, -c3, c4]])
-
-
-def thesis_torque_matrix(vehicle, alpha):
-    """Chapter 3, Eq. (5)."""
-    lkf = vehicle.arm_length * vehicle.thrust_coefficient
-    km = vehicle.drag_coefficient
-    (s1, s2, s3, s4), (c1, c2, c3, c4) = np.sin(alpha), np.cos(alpha)
-    return np.array(
-        [
-            [0, lkf * c2 - km * s2, 0, -lkf * c4 + km * s4],
-            [lkf * c1 + km * s1, 0, -lkf * c3 - km * s3, 0],
-            [lkf * s1 - km * c1, -lkf * s2 - km * c2, lkf * s3 - km * c3, -lkf * s4 - km * c4],
-        ]
-    )
-
-
-# ---------------------------------------------------------------------------------- the files
 
 
 @pytest.mark.parametrize("path", MJCF_FILES, ids=lambda path: path.stem)
@@ -198,9 +175,9 @@ def test_rotors_make_the_force_and_torque_of_chapter_3(vehicle, pod, alpha, atti
         force[:, i] = body_rotation(data).T @ data.qfrc_actuator[:3]
         torque[:, i] = data.qfrc_actuator[3:6]
     thrust = vehicle.thrust_coefficient
-    assert np.abs(force - thesis_force_matrix(vehicle, alpha)).max() < 1e-12 * thrust
+    assert np.abs(force - force_matrix(vehicle, alpha)).max() < 1e-12 * thrust
     moment = vehicle.arm_length * thrust
-    assert np.abs(torque - thesis_torque_matrix(vehicle, alpha)).max() < 1e-12 * moment
+    assert np.abs(torque - torque_matrix(vehicle, alpha)).max() < 1e-12 * moment
     # The thrust axis meets the hinge at a right angle: neither thrust nor drag moves the servo.
     assert np.abs(data.qfrc_actuator[6:]).max() < 1e-12 * moment
 
@@ -211,7 +188,7 @@ def test_quadrotor_makes_the_force_and_torque_of_an_untilted_tiltrotor():
     w = np.array([-1.0, 2.0, -3.0, 4.0])
     data.ctrl[:4] = SPIN * w
     mujoco.mj_forward(model, data)
-    matrices = (thesis_force_matrix, thesis_torque_matrix)
+    matrices = (force_matrix, torque_matrix)
     wrench = np.concatenate([matrix(LUUKKONEN, np.zeros(4)) @ w for matrix in matrices])
     np.testing.assert_allclose(data.qfrc_actuator, wrench, rtol=1e-14, atol=1e-20)
 

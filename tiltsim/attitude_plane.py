@@ -3,20 +3,20 @@
 The decoupling matrix is singular where world up, seen from the body, is perpendicular to the
 torque-free force ``n = (-R_theta, R_phi, R)``: a great circle of attitudes, which the plane shows
 as the unacceptable-attitude curve ``pitch = atan(-(R cos roll + R_phi sin roll) / R_theta)``.
-Points of the plane are (roll, pitch) in rad; ``n`` has shape (N, 3), one row an instant.
+Points of the plane are (roll, pitch) in rad; ``n``, shape (N, 3), holds unit vectors along it, one
+row an instant, zero where every attitude is singular.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from math import pi
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from controllers.decoupling_matrix import torque_entries, torque_free_force
-from controllers.vehicle import drag_ratio
+from controllers.singularity import torque_free_direction, world_up
 
 if TYPE_CHECKING:
     from controllers.vehicle import Vehicle
@@ -30,15 +30,16 @@ MARGIN_THRESHOLD: Final = 0.2
 """Singularity margin (rad) below which a flight is called close to singular."""
 
 _TINY: Final = 1e-12
-"""Below this, relative to the untilted vehicle's 4, a component of ``n`` counts as zero."""
+"""Below this a component of the unit vector ``n`` counts as zero."""
 
 
-def torque_free_forces(columns: Mapping[str, Floats], vehicle: Vehicle) -> Floats:
-    """The torque-free force ``n`` of every sample's tilt angles, shape (N, 3)."""
-    tilts = [columns[f"alpha_{rotor}"] for rotor in (1, 2, 3, 4)]
-    trig: Any = tuple(part for tilt in tilts for part in (np.sin(tilt), np.cos(tilt)))
-    ratio = drag_ratio(vehicle)
-    return np.stack(torque_free_force(trig, torque_entries(trig, ratio), ratio), axis=1)
+def torque_free_directions(columns: Mapping[str, Floats], vehicle: Vehicle) -> Floats:
+    """The unit vector along ``n`` for every sample's tilt angles, shape (N, 3).
+
+    Upwards; zero where the decoupling matrix is singular at every attitude.
+    """
+    angles = np.stack([columns[f"alpha_{rotor}"] for rotor in (1, 2, 3, 4)], axis=-1)
+    return np.nan_to_num(torque_free_direction(angles, vehicle))
 
 
 def singular_curves(n: Floats, points: int = 61) -> Floats:
@@ -64,8 +65,8 @@ def singular_curves(n: Floats, points: int = 61) -> Floats:
 def forbidden_pitch(n: Floats, side: float, roll: Floats) -> Floats:
     """The interval of pitch that is out of reach at each roll, shape (N, len(roll), 2).
 
-    Out of reach is what lies beyond the curve: where ``n . r3`` has another sign than ``side``, the
-    sign at the start of the flight. Empty intervals have both ends equal.
+    Out of reach is what lies beyond the curve: where ``n . r3`` has another sign than ``side``, that
+    of the singularity margin at the start of the flight. Empty intervals have both ends equal.
     """
     normal = n[:, :, np.newaxis] * side
     lift = normal[:, 1] * np.sin(roll) + normal[:, 2] * np.cos(roll)
@@ -84,23 +85,14 @@ def nearest_singular(n: Floats, attitude: Floats) -> Floats:
 
     The rotation that leads there is as large as the singularity margin.
     """
-    up = world_up(attitude)
-    length = np.linalg.norm(n, axis=1, keepdims=True)
-    direction = n / np.where(length > 0.0, length, 1.0)
-    flat = up - np.sum(up * direction, axis=1, keepdims=True) * direction
+    up = world_up(attitude[:, 0], attitude[:, 1])
+    flat = up - np.sum(up * n, axis=1, keepdims=True) * n
     return np.where(
         np.linalg.norm(flat, axis=1, keepdims=True) > _TINY, attitude_of(flat), attitude
     )
 
 
-def world_up(attitude: Floats) -> Floats:
-    """World up seen from the body at (roll, pitch), shape (..., 2) to (..., 3)."""
-    roll, pitch = attitude[..., 0], attitude[..., 1]
-    level = np.cos(pitch)
-    return np.stack([-np.sin(pitch), np.sin(roll) * level, np.cos(roll) * level], axis=-1)
-
-
 def attitude_of(up: Floats) -> Floats:
-    """Roll and pitch at which the body sees world up along ``up``; inverse of `world_up`."""
+    """Roll and pitch at which the body sees world up along ``up``, shape (..., 3) to (..., 2)."""
     x, y, z = up[..., 0], up[..., 1], up[..., 2]
     return np.stack([np.arctan2(y, z), np.arctan2(-x, np.hypot(y, z))], axis=-1)

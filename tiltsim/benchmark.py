@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import mujoco
 
+from tiltsim.control import TILTROTOR
 from tiltsim.engine import EngineName, control_callback, make_engine
 from tiltsim.loading import parse_scenario
 from tiltsim.plants import MujocoPlant
@@ -42,7 +43,7 @@ def bench_single(integrator: str, rounds: int = ROUNDS) -> list[dict[str, Any]]:
     plant = flying_plant(integrator)
     model, data, state = plant.model, plant.data, plant.state
     callbacks = {"bare": None} | {
-        name: make_engine(name, model, data).continuous() for name in ENGINES
+        name: make_engine(name, TILTROTOR, model, data).continuous() for name in ENGINES
     }
     seconds: dict[str, list[float]] = {name: [] for name in callbacks}
     for turn in range(rounds + 1):

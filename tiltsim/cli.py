@@ -5,14 +5,26 @@ from __future__ import annotations
 import argparse
 import sys
 from importlib import import_module
-from importlib.metadata import version
 from typing import Final
 
 from tiltsim.errors import InputError
 
-COMMANDS: Final = ("run", "check", "list", "view", "plot", "video", "bench", "schema")
+COMMANDS: Final = (
+    *("run", "check", "list", "view", "plot", "video"),
+    *("gait", "map", "bench", "schema"),
+)
 INPUT_ERROR: Final = 2
 INTERRUPTED: Final = 130
+
+
+class _Version(argparse.Action):
+    """Looks the version up only when asked: reading package metadata costs start-up time."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from importlib.metadata import version
+
+        print(f"tiltsim {version('tiltsim')}")
+        parser.exit()
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -22,7 +34,7 @@ def build_parser() -> argparse.ArgumentParser:
         description="A MuJoCo testbed for thrust-vectoring vehicles: fly scenarios, judge flights.",
         epilog="exit codes: 0 done, 1 an expectation failed, 2 invalid input, 3 flight lost",
     )
-    parser.add_argument("--version", action="version", version=f"tiltsim {version('tiltsim')}")
+    parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in COMMANDS:
         import_module(f"tiltsim.commands.{name}").add_parser(subparsers)

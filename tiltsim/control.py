@@ -14,18 +14,15 @@ from controllers.attitude_altitude import Parameters, State, rotor_accelerations
 from controllers.gaits import tilt_reference
 from controllers.rotation import euler_from_quaternion
 from controllers.scalar import Quad, scalar
+from tiltsim.loop import Loop, Sizes
 
 
 class ControlParameters(NamedTuple):
     """The head of `userdata`: what the control step of a flight needs to know."""
 
-    signature: float  # tells our models from foreign ones, see `tiltsim.engine`
+    signature: float  # see `tiltsim.loop.Loop.signature`
     servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
     law: Parameters
-
-
-TILTROTOR_SIZES: Final = (11, 10, 4, 12)
-"""Lengths of qpos, qvel, act and ctrl of the tiltrotor model."""
 
 
 @scalar
@@ -64,6 +61,7 @@ def tiltrotor_controls(
     qvel: Sequence[float],
     act: Sequence[float],
     parameters: ControlParameters,
+    table: Sequence[float],
 ) -> tuple[float, ...]:
     """All twelve controls of the tiltrotor: tilt servos, thrusts, rotor accelerations.
 
@@ -71,23 +69,30 @@ def tiltrotor_controls(
     follows a moving gait and not only a resting one.
     """
     law = parameters.law
-    alpha_1, alpha_2, alpha_3, alpha_4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(
-        time, law.gait
-    )
     lead = parameters.servo_lead
-    thrust_1, thrust_2, thrust_3, thrust_4 = rotor_thrust_controls(act)
-    u1, u2, u3, u4 = rotor_accelerations(time, tiltrotor_state(qpos, qvel, act), law)
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, law.gait, table)
     return (
-        alpha_1 + lead * rate_1,
-        alpha_2 + lead * rate_2,
-        alpha_3 + lead * rate_3,
-        alpha_4 + lead * rate_4,
-        thrust_1,
-        thrust_2,
-        thrust_3,
-        thrust_4,
-        u1,
-        u2,
-        u3,
-        u4,
+        *(a1 + lead * rate_1, a2 + lead * rate_2, a3 + lead * rate_3, a4 + lead * rate_4),
+        *rotor_thrust_controls(act),
+        *rotor_accelerations(time, tiltrotor_state(qpos, qvel, act), law),
     )
+
+
+@scalar
+def refreshed_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
+    """Held controls with the thrusts that belong to the present rotor speeds."""
+    return (
+        *(ctrl[0], ctrl[1], ctrl[2], ctrl[3]),
+        *rotor_thrust_controls(act),
+        *(ctrl[8], ctrl[9], ctrl[10], ctrl[11]),
+    )
+
+
+TILTROTOR: Final = Loop(
+    model="tiltrotor",
+    sizes=Sizes(qpos=11, qvel=10, act=4, ctrl=12),
+    parameters=ControlParameters,
+    controls=tiltrotor_controls,
+    refresh=refreshed_controls,
+)
+"""The attitude-altitude law around the tiltrotor."""

@@ -8,26 +8,18 @@ it touches it.
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from math import nan
 from struct import Struct
-from typing import Any, Final, Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import mujoco
 
-from controllers.records import record_dtype, unflatten
-from tiltsim.control import TILTROTOR_SIZES, ControlParameters, rotor_thrust_controls
-from tiltsim.control import tiltrotor_controls as controls
+from controllers.records import unflatten
+from tiltsim.loop import Loop, Sizes
 
 EngineName = Literal["python", "native"]
-
-SIGNATURE: Final = float(zlib.crc32(repr(record_dtype(ControlParameters)).encode()))
-"""First number in `userdata`: the layout of the parameters behind it, as a checksum."""
-
-AUTO_NATIVE_STEPS: Final = 100_000
-"""Flights of at least this many physics steps repay the import of the native engine."""
 
 Callback = Callable[[mujoco.MjModel, mujoco.MjData], None]
 
@@ -52,10 +44,13 @@ class PythonEngine:
 
     name: EngineName = "python"
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        check_model(model, data)
+    def __init__(self, loop: Loop, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        check_model(loop, model, data)
+        controls, refresh = loop.controls, loop.refresh
         # Parameters never change during a flight: read once what native code reads at every call.
-        parameters = unflatten(ControlParameters, data.userdata.tolist())
+        values = data.userdata.tolist()
+        parameters = unflatten(loop.parameters, values)
+        table = tuple(values[loop.record_size :])
         # Views of MuJoCo's own memory; looking them up anew would cost a tenth of the callback.
         qpos, qvel, act, ctrl = data.qpos, data.qvel, data.act, data.ctrl
         write_controls = Struct(f"{len(ctrl)}d").pack_into
@@ -64,7 +59,8 @@ class PythonEngine:
             if called is not data:
                 return  # some other model of this process is being stepped
             try:
-                values = controls(data.time, qpos.tolist(), qvel.tolist(), act.tolist(), parameters)
+                positions, velocities = qpos.tolist(), qvel.tolist()
+                values = controls(data.time, positions, velocities, act.tolist(), parameters, table)
                 write_controls(ctrl, 0, *values)
             except (ArithmeticError, ValueError):
                 # Where floats raise (sin of infinity), native code has NaN; MuJoCo reports both.
@@ -72,7 +68,7 @@ class PythonEngine:
 
         def hold(_model: mujoco.MjModel, called: mujoco.MjData) -> None:
             if called is data:
-                ctrl[4:8] = rotor_thrust_controls(act.tolist())
+                write_controls(ctrl, 0, *refresh(ctrl.tolist(), act.tolist()))
 
         self._sample, self._hold = sample, hold
 
@@ -89,23 +85,24 @@ class PythonEngine:
         self._sample(model, data)
 
 
-def check_model(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Raise ValueError unless model and data are those of a tiltrotor flight of ours."""
-    sizes = (model.nq, model.nv, model.na, model.nu)
-    if sizes != TILTROTOR_SIZES or model.nuserdata == 0 or data.userdata[0] != SIGNATURE:
+def check_model(loop: Loop, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Raise ValueError unless model and data are those of a flight of this loop."""
+    sizes = Sizes(model.nq, model.nv, model.na, model.nu)
+    signed = model.nuserdata >= loop.record_size and data.userdata[0] == loop.signature
+    if sizes != loop.sizes or not signed:
         raise ValueError(
-            f"not a tiltrotor flight: (nq, nv, na, nu) = {sizes}, expected {TILTROTOR_SIZES}, "
-            "with the parameters in userdata"
+            f"not a flight of the {loop.model}: {sizes}, expected {loop.sizes} with the "
+            "parameters in userdata"
         )
 
 
-def make_engine(name: EngineName, model: mujoco.MjModel, data: mujoco.MjData) -> Engine:
+def make_engine(name: EngineName, loop: Loop, model: mujoco.MjModel, data: mujoco.MjData) -> Engine:
     """Build an engine for a model whose parameters already lie in ``data.userdata``."""
     if name == "python":
-        return PythonEngine(model, data)
+        return PythonEngine(loop, model, data)
     from tiltsim.native import NativeEngine
 
-    return NativeEngine(model, data)
+    return NativeEngine(loop, model, data)
 
 
 @contextmanager

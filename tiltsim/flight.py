@@ -11,23 +11,24 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from controllers.attitude_altitude import STATE_FIELDS, attitude_reference
-from controllers.decoupling_matrix import sines_and_cosines, torque_entries, torque_free_force
+from controllers.decoupling_matrix import sines_and_cosines, torque_entries
 from controllers.gaits import tilt_reference
 from controllers.references import position_reference
+from controllers.singularity import determinant, margin_over_gait
 from controllers.vehicle import SPIN, drag_ratio
-from tiltsim.parameters import control_parameters
+from tiltsim.parameters import control_setup
 
 if TYPE_CHECKING:
     import pyarrow
 
-    from controllers.attitude_altitude import Parameters
     from tiltsim.engine import EngineName
+    from tiltsim.parameters import ControlSetup
     from tiltsim.scenario import Scenario
 
 Floats = npt.NDArray[np.float64]
@@ -93,13 +94,15 @@ class Flight:
     def columns(self) -> dict[str, Floats]:
         """All columns by name, each of shape (N,), in the order of `COLUMN_UNITS`."""
         known = dict(zip(SAMPLE_FIELDS, self.samples.T, strict=True))
-        law = control_parameters(self.scenario).law
-        known |= _references(self.samples, law)
+        setup = control_setup(self.scenario)
+        law = setup.parameters.law
+        known |= _references(self.samples, setup)
         speeds = [known[f"rotor_speed_{i}"] for i in _FOUR]
         for i, sign, speed in zip(_FOUR, SPIN, speeds, strict=True):
             known[f"thrust_{i}"] = law.vehicle.thrust_coefficient * sign * speed * np.abs(speed)
-        geometry = singularity(self.samples, law)
-        known |= {"singularity_margin": geometry[0], "determinant": geometry[1]}
+        tilts, attitude = self.samples[:, 13:17], (known["roll"], known["pitch"])
+        known["singularity_margin"] = margin_over_gait(tilts, law.vehicle, *attitude)
+        known["determinant"] = determinant(tilts, *attitude, law.vehicle)
         return {name: known[name] for name in COLUMN_UNITS}
 
     @cached_property
@@ -144,8 +147,9 @@ class Flight:
         save_flight(self, Path(folder))
 
 
-def _references(samples: Floats, law: Parameters) -> dict[str, Floats]:
+def _references(samples: Floats, setup: ControlSetup) -> dict[str, Floats]:
     """Reference columns: what the law aimed at, sample by sample."""
+    law, table = setup.parameters.law, setup.table
     rows = []
     ratio = drag_ratio(law.vehicle)
     for time, *state in samples.tolist():
@@ -153,27 +157,8 @@ def _references(samples: Floats, law: Parameters) -> dict[str, Floats]:
         position = position_reference(time, law.reference)[:3]
         torque = torque_entries(trig, ratio)
         attitude = attitude_reference(time, state, trig, torque, law)[:3]
-        rows.append((*position, *attitude, *tilt_reference(time, law.gait)[:4]))
+        rows.append((*position, *attitude, *tilt_reference(time, law.gait, table)[:4]))
     names = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
     tilts = tuple(f"alpha_ref_{i}" for i in _FOUR)
     values = np.array(rows).reshape(len(rows), len(names) + len(tilts))
     return dict(zip((*names, *tilts), values.T, strict=True))
-
-
-def singularity(samples: Floats, law: Parameters) -> tuple[Floats, Floats]:
-    """Singularity margin (rad, with its sign) and determinant ``n . r3`` of samples, shape (N,).
-
-    The margin is the smallest rotation that makes the decoupling matrix singular, negative where
-    the torque-free force points below the horizon, 0 where tau has lost rank.
-    """
-    tilts = samples[:, 13:17].T
-    trig: Any = tuple(part for tilt in tilts for part in (np.sin(tilt), np.cos(tilt)))
-    ratio = drag_ratio(law.vehicle)
-    n = np.array(torque_free_force(trig, torque_entries(trig, ratio), ratio))
-    roll, pitch = samples[:, 7], samples[:, 8]
-    up = np.array([-np.sin(pitch), np.sin(roll) * np.cos(pitch), np.cos(roll) * np.cos(pitch)])
-    determinant = np.sum(n * up, axis=0)
-    length = np.linalg.norm(n, axis=0)
-    with np.errstate(invalid="ignore"):
-        sine = np.where(length > 0.0, determinant / np.where(length > 0.0, length, 1.0), 0.0)
-    return np.arcsin(np.clip(sine, -1.0, 1.0)), determinant

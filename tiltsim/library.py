@@ -22,6 +22,8 @@ def find_scenario_file(path: str | Path) -> Path:
 
     Raises `InputError` where neither is a file.
     """
+    if not str(path):
+        raise InputError("no scenario named; see tiltsim list")
     given = Path(path)
     if given.is_file():
         return given
@@ -38,7 +40,7 @@ def find_scenario_file(path: str | Path) -> Path:
 def read_toml(path: Path) -> dict[str, Any]:
     """The document in a TOML file. Raises `InputError` with the file and the reason."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:

@@ -40,24 +40,49 @@ def show(value: object) -> str:
 def one_line(error: ValidationError, document: Mapping[str, Any], schema: type[BaseModel]) -> str:
     """The first mistake in one line, and how many more there are."""
     details = error.errors(include_url=False)
-    line = _describe(details[0], document, schema)
-    more = len(details) - 1
+    line = _short_list(details, document) or _describe(details[0], document, schema)
+    # Missing entries of one list, and the options of one union, are one mistake each.
+    more = len({_mistake(detail, document) for detail in details}) - 1
     return f"{line} (and {more} more)" if more else line
+
+
+def _mistake(detail: Any, document: Mapping[str, Any]) -> str:
+    """What a person would call one mistake: the key, for a list's entries the list's."""
+    keep_last = detail["type"] in {"missing", "extra_forbidden"}
+    location = detail["loc"]
+    if detail["type"] == "missing" and isinstance(location[-1], int):
+        location, keep_last = location[:-1], False
+    return _locate(location, document, keep_last=keep_last)[0]
+
+
+def _short_list(details: Any, document: Mapping[str, Any]) -> str:
+    """A line for a list with too few entries, which pydantic reports one missing entry each."""
+    first = details[0]
+    if first["type"] != "missing" or not isinstance(first["loc"][-1], int):
+        return ""
+    place = first["loc"][:-1]
+    wanted = 1 + max(detail["loc"][-1] for detail in details if detail["loc"][:-1] == place)
+    key, value = _locate(place, document)
+    return f"{key} = {show(value)}: must have {wanted} entries"
 
 
 def _describe(detail: Any, document: Mapping[str, Any], schema: type[BaseModel]) -> str:
     kind, context = detail["type"], detail.get("ctx", {})
     if isinstance(context.get("error"), InvalidValueError):
         return str(context["error"])
-    key, value = _locate(detail["loc"], document)
+    keep_last = kind in {"missing", "extra_forbidden"}
+    key, value = _locate(detail["loc"], document, keep_last=keep_last)
     if kind == "extra_forbidden":
         return f"{key} = {show(value)}: unknown key; {_known_keys(schema, detail['loc'], key)}"
     if kind == "missing":
         return f"{key}: missing, and required"
     if kind in {"union_tag_invalid", "union_tag_not_found"}:
-        tag = value.get("type") if isinstance(value, dict) else value
-        allowed = context.get("expected_tags", "a table with a type").replace("'", "")
-        return f"{key}.type = {show(tag)}: choose {allowed}"
+        if not isinstance(value, dict):
+            return f"{key} = {show(value)}: must be a table"
+        allowed = ", ".join(_tags(schema, detail["loc"]))
+        if "type" not in value:
+            return f"{key}.type: missing; choose {allowed}"
+        return f"{key}.type = {show(value['type'])}: choose {allowed}"
     if kind == "literal_error":
         return f"{key} = {show(value)}: choose {context['expected'].replace(chr(39), '')}"
     if kind in {"too_short", "too_long"}:
@@ -68,8 +93,13 @@ def _describe(detail: Any, document: Mapping[str, Any], schema: type[BaseModel])
     return f"{key} = {show(value)}: {detail['msg'].replace('Input should', 'must')}"
 
 
-def _locate(location: tuple[Any, ...], document: Mapping[str, Any]) -> tuple[str, Any]:
-    """Dotted key and value of an error's location, without the union tags that pydantic adds."""
+def _locate(
+    location: tuple[Any, ...], document: Mapping[str, Any], *, keep_last: bool = False
+) -> tuple[str, Any]:
+    """Dotted key and value of an error's location, without the union tags that pydantic adds.
+
+    Tags are told from keys by not being in the document; ``keep_last`` keeps a key that is not.
+    """
     keys: list[str] = []
     value: Any = document
     for position, part in enumerate(location):
@@ -77,10 +107,18 @@ def _locate(location: tuple[Any, ...], document: Mapping[str, Any]) -> tuple[str
         in_list = isinstance(value, list | tuple) and isinstance(part, int) and part < len(value)
         if in_table or in_list:
             value = value[part]
-        elif position < len(location) - 1:
+        elif not (keep_last and position == len(location) - 1):
             continue
         keys.append(str(part))
-    return ".".join(keys) or "scenario", value
+    return ".".join(keys).encode("unicode_escape").decode() or "scenario", value
+
+
+def _tags(schema: Any, location: tuple[Any, ...]) -> list[str]:
+    """The values of ``type`` in the union of tables found under a location."""
+    for part in location:
+        schema = _member(schema, part)
+    tables = [option.model_fields for option in _options(schema) if hasattr(option, "model_fields")]
+    return [tag for fields in tables for tag in get_args(fields["type"].annotation)]
 
 
 def _known_keys(schema: Any, location: tuple[Any, ...], key: str) -> str:
@@ -94,18 +132,19 @@ def _known_keys(schema: Any, location: tuple[Any, ...], key: str) -> str:
 
 
 def _member(schema: Any, part: object) -> Any:
-    """The table type found in a table type under a key, through unions by their tag."""
-    if hasattr(schema, "model_fields") and part in schema.model_fields:
+    """The type found in a type under one part of a location; unions are searched by their tag."""
+    if part in getattr(schema, "model_fields", {}):
         return schema.model_fields[part].annotation
     if isinstance(part, int):
         return get_args(schema)[0]
-    for option in get_args(schema):
+    for option in _options(schema):
         fields = getattr(option, "model_fields", {})
-        if "type" in fields and part in get_args(fields["type"].annotation):
+        tags = get_args(fields["type"].annotation) if "type" in fields else ("table",)
+        if fields and part in tags:
             return option
-        if part == "table" and fields:
-            return option
-        found = _member(option, part) if get_args(option) else None
-        if found is not None:
-            return found
     return schema
+
+
+def _options(schema: Any) -> list[Any]:
+    """The types that a union offers, annotations taken off."""
+    return [option for member in get_args(schema) for option in (member, *_options(member))]

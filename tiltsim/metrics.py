@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from controllers.decoupling_matrix import torque_entries, vertical_force_entries
-from controllers.vehicle import SPIN, drag_ratio
+from controllers.singularity import force_matrix, torque_matrix, world_up
+from controllers.vehicle import SPIN
 
 if TYPE_CHECKING:
     from tiltsim.flight import Flight, Floats
@@ -25,7 +25,7 @@ METRICS: Final = {
     "min_rotor_speed": "smallest rotor speed along its spin, negative where one reversed, rad/s",
     "max_rotor_speed": "largest rotor speed along its spin, rad/s",
     "max_tilt_rate": "largest absolute tilt rate, rad/s",
-    "min_singularity_margin": "smallest rotation left to a singular attitude, signed, rad",
+    "min_singularity_margin": "smallest rotation left to a singular attitude, negative beyond, rad",
     "min_decoupling_condition": "smallest over largest singular value of [tau/(L Kf); r3 F/Kf]",
     "saturated_fraction": "share of samples with a rotor at its speed limit",
     "diverged": "true where the flight ended early, by divergence or a singular matrix",
@@ -33,6 +33,8 @@ METRICS: Final = {
     "realtime_factor": "time flown over wall time of the integration",
 }
 """Every metric by name, with its meaning. Metrics that have none for a flight are left out."""
+
+BOOLEAN_METRICS: Final = frozenset({"diverged"})
 
 SETTLED: Final = 20.0  # s, from when the supremum of the position error counts
 
@@ -87,22 +89,10 @@ def _saturated_fraction(flight: Flight, spins: Floats) -> float:
 
 
 def _min_decoupling_condition(flight: Flight) -> float:
-    columns: dict[str, Any] = flight.columns
-    trig: Any = tuple(
-        part(columns[f"alpha_{i}"]) for i in (1, 2, 3, 4) for part in (np.sin, np.cos)
-    )
-    roll, pitch = columns["roll"], columns["pitch"]
-    up: Any = (-np.sin(pitch), np.sin(roll) * np.cos(pitch), np.cos(roll) * np.cos(pitch))
-    ratio = drag_ratio(flight.scenario.vehicle.resolve())
-    x2, x4, y1, y3, z1, z2, z3, z4 = torque_entries(trig, ratio)
-    matrices = np.zeros((len(flight), 4, 4))
-    matrices[:, 0, 1], matrices[:, 0, 3] = x2, x4
-    matrices[:, 1, 0], matrices[:, 1, 2] = y1, y3
-    for column, entry in enumerate((z1, z2, z3, z4)):
-        matrices[:, 2, column] = entry
-    for column, entry in enumerate(vertical_force_entries(trig, *up)):
-        matrices[:, 3, column] = entry
-    if not np.isfinite(matrices).all():
-        return 0.0
-    values = np.linalg.svd(matrices, compute_uv=False)
+    columns = flight.columns
+    tilts = np.stack([columns[f"alpha_{rotor}"] for rotor in (1, 2, 3, 4)], axis=-1)
+    up = world_up(columns["roll"], columns["pitch"])
+    lift = np.einsum("ni,nij->nj", up, force_matrix(tilts))[:, np.newaxis]
+    torque = torque_matrix(tilts, flight.scenario.vehicle.resolve())
+    values = np.linalg.svd(np.concatenate([torque, lift], axis=1), compute_uv=False)
     return float((values[:, -1] / values[:, 0]).min())

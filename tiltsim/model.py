@@ -22,9 +22,6 @@ MODELS: Final = ("tiltrotor", "quadrotor")
 INTEGRATORS: Final = ("Euler", "RK4", "implicit", "implicitfast")
 ROTORS: Final = (1, 2, 3, 4)
 
-OUTWARD: Final = ((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0))
-"""Outward directions of the arms, body axes: the tilt axes of pods 1 to 4."""
-
 SERVO_ARMATURE: Final = 1e-6
 """Inertia (kg m^2) of a tilt servo behind its gear, as felt at the hinge.
 

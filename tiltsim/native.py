@@ -9,8 +9,9 @@ was made from, and loads in a fraction of the time that compiling takes.
 from __future__ import annotations
 
 import ctypes
+from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import llvmlite.binding
 import mujoco
@@ -20,18 +21,15 @@ import numpy as np
 from llvmlite import ir
 from numba import carray, cfunc, njit, types
 from numba.extending import intrinsic, register_jitable
+from numba.np.unsafe.ndarray import to_fixed_tuple
 
-from controllers.records import record_dtype, record_size
+from controllers.records import record_dtype
 from controllers.scalar import scalar_functions
 from tiltsim import thesis_plant
 from tiltsim.cache import native_code_can_be_kept, native_code_folder
-from tiltsim.control import (
-    TILTROTOR_SIZES,
-    ControlParameters,
-    rotor_thrust_controls,
-    tiltrotor_controls,
-)
-from tiltsim.engine import SIGNATURE, EngineName, check_model
+from tiltsim.control import ControlParameters
+from tiltsim.engine import EngineName, check_model
+from tiltsim.loop import Loop
 
 _State = mujoco.mjtState
 INPUTS: Final = int(
@@ -43,21 +41,12 @@ INPUTS: Final = int(
 )
 CONTROLS: Final = int(_State.mjSTATE_CTRL)
 
-NQ, NV, NA, NU = TILTROTOR_SIZES
-QPOS: Final = 1  # offsets in the vector that mj_getState fills; time comes first
-QVEL: Final = QPOS + NQ
-ACT: Final = QVEL + NV
-USERDATA: Final = ACT + NA
-SIZE: Final = USERDATA + record_size(ControlParameters)
-PARAMETERS: Final = numba.from_dtype(record_dtype(ControlParameters))
-
+CAPACITY: Final = 2048
+"""Floats in the callback's buffer: a flight's time, state, parameters and table must fit."""
 
 # Division by zero gives infinity or NaN, as in C; MuJoCo then reports a bad control.
 _OPTIONS: Final = {"error_model": "numpy", "cache": native_code_can_be_kept()}
 numba.core.config.CACHE_DIR = str(native_code_folder())
-
-for _function in scalar_functions():
-    register_jitable(error_model="numpy")(_function)
 
 
 def _external(name: str, signature: Any) -> Any:
@@ -81,11 +70,11 @@ _set_state = _external("mj_setState", types.void(types.intp, types.intp, types.i
 
 @intrinsic
 def _stack_buffer(_typing: Any) -> Any:
-    """Address of `SIZE` floats on the callback's own stack."""
+    """Address of `CAPACITY` floats on the callback's own stack."""
 
     def generate(context: Any, builder: Any, signature: Any, _arguments: Any) -> Any:
         with builder.goto_entry_block():
-            buffer = builder.alloca(ir.DoubleType(), SIZE)
+            buffer = builder.alloca(ir.DoubleType(), CAPACITY)
         return builder.ptrtoint(buffer, context.get_value_type(signature.return_type))
 
     return types.intp(), generate
@@ -102,48 +91,90 @@ def _floats_at(_typing: Any, address: Any) -> Any:
 
 
 @intrinsic
-def _parameters_at(_typing: Any, address: Any) -> Any:
-    """An address as a pointer to the parameter record."""
-    return types.CPointer(PARAMETERS)(address), _cast
+def _bytes_at(_typing: Any, address: Any) -> Any:
+    """An address as a pointer to anything."""
+    return types.voidptr(address), _cast
 
 
-@cfunc(types.void(types.intp, types.intp), **_OPTIONS)
-def _continuous(model, data):  # type: ignore[no-untyped-def]
-    if _state_size(model, INPUTS) != SIZE:
-        return
-    address = _stack_buffer()
-    buffer = carray(_floats_at(address), (SIZE,))
+@register_jitable(error_model="numpy")
+def _read_inputs(model, data, address, head, userdata, signature):  # type: ignore[no-untyped-def]
+    """Fill the buffer with the state of a flight; its size, or 0 where the model is not ours."""
+    size = _state_size(model, INPUTS)
+    if size < head or size > CAPACITY:
+        return 0
     _get_state(model, data, address, INPUTS)
-    if buffer[USERDATA] != SIGNATURE:
-        return
-    parameters = carray(_parameters_at(address + 8 * USERDATA), (1,))[0]
-    b = buffer
-    controls = tiltrotor_controls(
-        b[0],
-        (b[1], b[2], b[3], b[4], b[5], b[6], b[7], b[8], b[9], b[10], b[11]),
-        (b[12], b[13], b[14], b[15], b[16], b[17], b[18], b[19], b[20], b[21]),
-        (b[22], b[23], b[24], b[25]),
-        parameters,
-    )
-    for index in range(NU):
-        buffer[index] = controls[index]
+    return size if carray(_floats_at(address), (CAPACITY,))[userdata] == signature else 0
+
+
+@register_jitable(error_model="numpy")
+def _write_controls(model, data, address, values):  # type: ignore[no-untyped-def]
+    buffer = carray(_floats_at(address), (CAPACITY,))
+    for index in range(len(values)):
+        buffer[index] = values[index]
     _set_state(model, data, address, CONTROLS)
 
 
-@cfunc(types.void(types.intp, types.intp), **_OPTIONS)
-def _held(model, data):  # type: ignore[no-untyped-def]
-    if _state_size(model, INPUTS) != SIZE:
-        return
-    address = _stack_buffer()
-    buffer = carray(_floats_at(address), (SIZE,))
-    _get_state(model, data, address, INPUTS)
-    if buffer[USERDATA] != SIGNATURE:
-        return
-    thrusts = rotor_thrust_controls((buffer[22], buffer[23], buffer[24], buffer[25]))
-    _get_state(model, data, address, CONTROLS)
-    for index in range(4):
-        buffer[4 + index] = thrusts[index]
-    _set_state(model, data, address, CONTROLS)
+class Callbacks(NamedTuple):
+    """The compiled control callbacks of a loop; keep them as long as MuJoCo may call them."""
+
+    continuous: Any
+    held: Any
+
+
+def _register_scalar_functions() -> None:
+    """Let compiled code call every scalar function known so far."""
+    for function in scalar_functions()[len(_registered) :]:
+        register_jitable(error_model="numpy")(function)
+        _registered.append(function)
+
+
+_registered: list[Any] = []
+
+
+@cache
+def compile_callbacks(loop: Loop) -> Callbacks:
+    """Compile a loop's control step as C callbacks, or load them from the cache on disk.
+
+    The cache knows the callbacks by the values they close over, so these must pickle to the same
+    bytes in every process: module-level functions, numbers and dtypes do.
+    """
+    _register_scalar_functions()
+    controls, refresh, signature = loop.controls, loop.refresh, loop.signature
+    nq, nv, na, nu = loop.sizes
+    qpos, qvel, act, userdata = 1, 1 + nq, 1 + nq + nv, 1 + nq + nv + na
+    head = userdata + loop.record_size
+    layout = record_dtype(loop.parameters)
+
+    @cfunc(types.void(types.intp, types.intp), **_OPTIONS)
+    def continuous(model, data):  # type: ignore[no-untyped-def]
+        address = _stack_buffer()
+        size = _read_inputs(model, data, address, head, userdata, signature)
+        if size == 0:
+            return
+        buffer = carray(_floats_at(address), (CAPACITY,))
+        values = controls(
+            buffer[0],
+            to_fixed_tuple(buffer[qpos:qvel], nq),
+            to_fixed_tuple(buffer[qvel:act], nv),
+            to_fixed_tuple(buffer[act:userdata], na),
+            carray(_bytes_at(address + 8 * userdata), (1,), layout)[0],
+            buffer[head:size],
+        )
+        _write_controls(model, data, address, values)
+
+    @cfunc(types.void(types.intp, types.intp), **_OPTIONS)
+    def held(model, data):  # type: ignore[no-untyped-def]
+        address = _stack_buffer()
+        size = _read_inputs(model, data, address, head, userdata, signature)
+        if size == 0:
+            return
+        buffer = carray(_floats_at(address), (CAPACITY,))
+        activations = to_fixed_tuple(buffer[act:userdata], na)
+        _get_state(model, data, address, CONTROLS)
+        values = refresh(to_fixed_tuple(buffer[0:nu], nu), activations)
+        _write_controls(model, data, address, values)
+
+    return Callbacks(continuous, held)
 
 
 class NativeEngine:
@@ -151,26 +182,28 @@ class NativeEngine:
 
     name: EngineName = "native"
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        check_model(model, data)
+    def __init__(self, loop: Loop, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        check_model(loop, model, data)
+        self._callbacks = compile_callbacks(loop)
 
     def continuous(self) -> Any:
         """See `tiltsim.engine.Engine.continuous`."""
-        return _continuous.ctypes
+        return self._callbacks.continuous.ctypes
 
     def held(self) -> Any:
         """See `tiltsim.engine.Engine.held`."""
-        return _held.ctypes
+        return self._callbacks.held.ctypes
 
     def sample(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """See `tiltsim.engine.Engine.sample`."""
-        _continuous.ctypes(model._address, data._address)
+        self._callbacks.continuous.ctypes(model._address, data._address)
 
 
 @njit(**_OPTIONS)
-def _advance(step_index, values, timestep, steps, control_steps, records):  # type: ignore[no-untyped-def]
+def _advance(step_index, values, timestep, steps, control_steps, records, table):  # type: ignore[no-untyped-def]
     state = list(values)
-    state = thesis_plant.advance(step_index, state, timestep, steps, control_steps, records[0].law)
+    law = records[0].law
+    state = thesis_plant.advance(step_index, state, timestep, steps, control_steps, law, table)
     return np.array(state)
 
 
@@ -180,10 +213,15 @@ def advance_thesis_plant(
     timestep: float,
     steps: int,
     control_steps: int,
-    parameters: np.ndarray[Any, Any],
+    userdata: np.ndarray[Any, Any],
 ) -> list[float]:
-    """`tiltsim.thesis_plant.advance`, compiled; ``parameters`` are the floats of the record."""
-    records = parameters.view(record_dtype(ControlParameters))
+    """`tiltsim.thesis_plant.advance`, compiled; ``userdata`` as in a MuJoCo flight."""
+    _register_scalar_functions()
+    layout = record_dtype(ControlParameters)
+    head = layout.itemsize // userdata.itemsize
     values = np.array(state)
-    result = _advance(step_index, values, timestep, steps, control_steps, records)
+    result = _advance(
+        *(step_index, values, timestep, steps, control_steps),
+        *(userdata[:head].view(layout), userdata[head:]),
+    )
     return list(result.tolist())

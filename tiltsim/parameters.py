@@ -1,53 +1,60 @@
-"""From a scenario's tables to the parameter records that the control step reads."""
+"""From a scenario's tables to what the control step reads: a parameter record and a table."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
 from controllers.attitude_altitude import DECOUPLINGS, Parameters
 from controllers.decouplers import DECOUPLERS
-from controllers.gaits import GAIT_TYPES, GaitParameters
+from controllers.records import flatten
 from controllers.references import REFERENCE_TYPES, ReferenceParameters
-from tiltsim.control import ControlParameters
-from tiltsim.engine import SIGNATURE
+from tiltsim.control import TILTROTOR, ControlParameters
 from tiltsim.scenario import (
     AttitudeAltitudeReference,
     CircleReference,
-    FixedGait,
     LineReference,
+    Reference,
     Scenario,
-    SetpointReference,
-    TrotGait,
 )
 
 
-def control_parameters(scenario: Scenario) -> ControlParameters:
-    """Everything the control step of a scenario needs, as one record of floats."""
+class ControlSetup(NamedTuple):
+    """What the control step of one flight reads besides the state."""
+
+    parameters: ControlParameters
+    table: tuple[float, ...]  # keyframes of the gait
+
+    @property
+    def userdata(self) -> npt.NDArray[np.float64]:
+        """Record and table as MuJoCo's `userdata` holds them."""
+        return np.array([*flatten(self.parameters), *self.table])
+
+
+def control_setup(scenario: Scenario) -> ControlSetup:
+    """Everything the control step of a scenario needs to know."""
     controller = scenario.controller
     servo = scenario.vehicle.tilt_servo
-    return ControlParameters(
-        signature=SIGNATURE,
+    vehicle = scenario.vehicle.resolve()
+    gait = scenario.gait.plan(vehicle)
+    parameters = ControlParameters(
+        signature=TILTROTOR.signature,
         servo_lead=2.0 * servo.damping_ratio / servo.natural_frequency,
         law=Parameters(
-            vehicle=scenario.vehicle.resolve(),
+            vehicle=vehicle,
             gains=controller.resolve_gains(),
-            gait=gait_parameters(scenario.gait),
+            gait=gait.parameters,
             reference=reference_parameters(scenario.reference),
             decoupler=DECOUPLERS[controller.decoupler],
             decoupling=DECOUPLINGS[controller.decoupling],
         ),
     )
+    return ControlSetup(parameters, gait.table)
 
 
-def gait_parameters(gait: FixedGait | TrotGait) -> GaitParameters:
-    """The record of a ``[gait]`` table."""
-    code = GAIT_TYPES[gait.type]
-    if isinstance(gait, FixedGait):
-        return GaitParameters(code, *gait.angles)
-    return GaitParameters(code, amplitude=gait.amplitude, period=gait.period)
-
-
-def reference_parameters(
-    reference: SetpointReference | LineReference | CircleReference | AttitudeAltitudeReference,
-) -> ReferenceParameters:
+def reference_parameters(reference: Reference) -> ReferenceParameters:
     """The record of a ``[reference]`` table."""
     code = REFERENCE_TYPES[reference.type]
     if isinstance(reference, AttitudeAltitudeReference):

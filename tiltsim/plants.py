@@ -11,16 +11,15 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.gaits import tilt_reference
-from controllers.records import flatten, record_size
 from controllers.rotation import quaternion_from_euler
 from controllers.vehicle import SPIN
 from tiltsim import thesis_plant
 from tiltsim.cache import native_code_is_cached
-from tiltsim.control import ControlParameters, tiltrotor_state
+from tiltsim.control import TILTROTOR, tiltrotor_state
 from tiltsim.engine import EngineName, control_callback, make_engine
 from tiltsim.errors import InputError
 from tiltsim.model import Pod, RotorLimits, TiltServo, compile_model
-from tiltsim.parameters import control_parameters
+from tiltsim.parameters import ControlSetup, control_setup
 from tiltsim.scenario import Scenario
 
 Floats = npt.NDArray[np.float64]
@@ -76,21 +75,22 @@ class MujocoPlant:
     """The compiled MJCF model in MuJoCo, with the control step in its control callback."""
 
     def __init__(self, scenario: Scenario) -> None:
-        self.model = build_model(scenario)
+        setup = control_setup(scenario)
+        self.model = build_model(scenario, userdata_size=len(setup.userdata))
         # A diverged state must stay visible; by default MuJoCo would silently start over.
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.data = mujoco.MjData(self.model)
         self._control_steps = scenario.simulation.control_steps
-        self._set_initial_state(scenario, control_parameters(scenario))
+        self._set_initial_state(scenario, setup)
         self.engine: EngineName = choose_engine(scenario)
-        self._engine = make_engine(self.engine, self.model, self.data)
+        self._engine = make_engine(self.engine, TILTROTOR, self.model, self.data)
 
-    def _set_initial_state(self, scenario: Scenario, parameters: ControlParameters) -> None:
+    def _set_initial_state(self, scenario: Scenario, setup: ControlSetup) -> None:
         initial, data = scenario.initial, self.data
-        data.userdata[:] = list(flatten(parameters))
+        data.userdata[:] = setup.userdata
         data.qpos[:3] = initial.position
         data.qpos[3:7] = quaternion_from_euler(*initial.attitude)
-        data.qpos[7:] = tilt_reference(0.0, parameters.law.gait)[:4]
+        data.qpos[7:] = tilt_reference(0.0, setup.parameters.law.gait, setup.table)[:4]
         data.qvel[:3] = initial.velocity
         data.qvel[3:6] = initial.angular_velocity
         data.act[:] = np.multiply(SPIN, initial.rotor_speeds)
@@ -169,7 +169,9 @@ _WARNINGS: Final = {
 }
 
 
-def build_model(scenario: Scenario, *, visuals: bool = False) -> mujoco.MjModel:
+def build_model(
+    scenario: Scenario, *, userdata_size: int = 0, visuals: bool = False
+) -> mujoco.MjModel:
     """Compile the scenario's vehicle, with what is drawn of it only if asked.
 
     Raises `InputError` where MuJoCo cannot build it.
@@ -181,7 +183,7 @@ def build_model(scenario: Scenario, *, visuals: bool = False) -> mujoco.MjModel:
             vehicle.resolve(),
             timestep=simulation.timestep,
             integrator=simulation.integrator,
-            userdata_size=record_size(ControlParameters),
+            userdata_size=userdata_size,
             tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump()),
             pod=Pod(**vehicle.pod.model_dump()),
             rotor_limits=RotorLimits(vehicle.min_rotor_speed, vehicle.max_rotor_speed),
@@ -196,8 +198,7 @@ class ThesisPlant:
 
     def __init__(self, scenario: Scenario) -> None:
         simulation, initial = scenario.simulation, scenario.initial
-        self._parameters = control_parameters(scenario)
-        self._values = np.array(list(flatten(self._parameters)))
+        self._setup = control_setup(scenario)
         self._timestep = simulation.timestep
         self._control_steps = simulation.control_steps
         self._step_index = 0
@@ -234,13 +235,13 @@ class ThesisPlant:
 
             self._state = advance_thesis_plant(
                 *(self._step_index, self._state, self._timestep, steps, self._control_steps),
-                self._values,
+                self._setup.userdata,
             )
         else:
             try:
                 self._state = thesis_plant.advance(
                     *(self._step_index, self._state, self._timestep, steps, self._control_steps),
-                    self._parameters.law,
+                    *(self._setup.parameters.law, self._setup.table),
                 )
             except (ArithmeticError, ValueError):
                 self._fault = "the control law left the range of floating-point numbers"
@@ -248,9 +249,9 @@ class ThesisPlant:
 
     def observe(self) -> tuple[float, ...]:
         """See `Plant.observe`."""
-        gait = self._parameters.law.gait
-        state: tuple[float, ...] = thesis_plant.vehicle_state(self.time, self._state, gait)
-        return (*state, *tilt_reference(self.time, gait)[4:])
+        gait, table = self._setup.parameters.law.gait, self._setup.table
+        state: tuple[float, ...] = thesis_plant.vehicle_state(self.time, self._state, gait, table)
+        return (*state, *tilt_reference(self.time, gait, table)[4:])
 
     def fault(self) -> str:
         """See `Plant.fault`."""

@@ -7,10 +7,9 @@
 from __future__ import annotations
 
 from math import pi
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import (
-    BaseModel,
     ConfigDict,
     Discriminator,
     Field,
@@ -23,24 +22,25 @@ from controllers.attitude_altitude import DECOUPLINGS, Gains
 from controllers.gains import GAIN_SETS, gains_from_rows
 from controllers.stability import closed_loops
 from controllers.vehicle import PRESETS, Vehicle
+from tiltsim.gait_tables import FixedGait, Gait
 from tiltsim.messages import InvalidValueError
-from tiltsim.metrics import METRICS
+from tiltsim.metrics import BOOLEAN_METRICS, METRICS
+from tiltsim.tables import (
+    Angle,
+    Angles3,
+    Gains2,
+    NonNegative,
+    Positive,
+    Positive4,
+    Table,
+    Vector3,
+)
 
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
-Angle = Annotated[float, Field(ge=-pi, le=pi, description="rad")]
-Vector3 = Annotated[tuple[float, float, float], Field(strict=False)]
-Angles3 = Annotated[tuple[Angle, Angle, Angle], Field(strict=False)]
-Angles4 = Annotated[tuple[Angle, Angle, Angle, Angle], Field(strict=False)]
-Gains2 = Annotated[tuple[float, float], Field(strict=False)]
-Positive4 = Annotated[tuple[Positive, Positive, Positive, Positive], Field(strict=False)]
+MAX_TABLE: Final = 1500
+"""Numbers in a gait's table of keyframes, which every evaluation of the control law reads."""
 
-
-class Table(BaseModel):
-    """A table of the scenario file: unknown keys, NaN and loose types are errors."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
+MAX_SERVO_STEP: Final = 2.6
+"""Largest product of timestep and servo pole; RK4 turns unstable at 2.78."""
 
 # --- [vehicle] ---------------------------------------------------------------------------------
 
@@ -58,8 +58,10 @@ class TiltServoTable(Table):
 class PodTable(Table):
     """Mass properties of one rotor pod; nearly massless by default, as in the thesis."""
 
-    mass: Positive = Field(1e-9, description="kg")
-    inertia: Positive = Field(1e-12, description="kg m^2, about each axis of the pod")
+    mass: Annotated[float, Field(ge=1e-14)] = Field(1e-9, description="kg")
+    inertia: Annotated[float, Field(ge=1e-14)] = Field(
+        1e-13, description="kg m^2, about each axis of the pod"
+    )
 
 
 class VehicleTable(Table):
@@ -213,34 +215,6 @@ class ControllerTable(Table):
         return GAIN_SETS[self.gains]
 
 
-# --- [gait] ------------------------------------------------------------------------------------
-
-
-class FixedGait(Table):
-    """Constant tilt angles."""
-
-    type: Literal["fixed"] = "fixed"
-    angles: Angles4 = Field((0.0, 0.0, 0.0, 0.0), description="alpha_1..4, rad")
-
-
-class TrotGait(Table):
-    """The cat trots of ch. 4, which differ in how they change sides."""
-
-    type: Literal["trot_instant", "trot_continuous"]
-    amplitude: Angle = Field(description="rho, rad")
-    period: Positive = Field(description="T, s")
-
-
-Gait = Annotated[FixedGait | TrotGait, Field(discriminator="type")]
-
-
-def largest_tilt(gait: FixedGait | TrotGait) -> tuple[str, object, float]:
-    """The key that sets a gait's largest angle, its value, and that angle (rad)."""
-    if isinstance(gait, FixedGait):
-        return "angles", gait.angles, max(abs(angle) for angle in gait.angles)
-    return "amplitude", gait.amplitude, abs(gait.amplitude)
-
-
 # --- [reference] -------------------------------------------------------------------------------
 
 
@@ -307,8 +281,14 @@ class Expectation(Table):
     def _check(self) -> Self:
         if self.metric not in METRICS:
             raise InvalidValueError("expect.metric", self.metric, f"choose {', '.join(METRICS)}")
-        if self.min is None and self.max is None and self.equals is None:
-            raise InvalidValueError(f"expect.{self.metric}", "no bound", "give min, max or equals")
+        boolean = self.metric in BOOLEAN_METRICS
+        bounded = self.min is not None or self.max is not None
+        if boolean and (bounded or self.equals is None):
+            raise InvalidValueError(
+                "expect.metric", self.metric, "true or false: give equals alone"
+            )
+        if not boolean and (self.equals is not None or not bounded):
+            raise InvalidValueError("expect.metric", self.metric, "a number: give min, max or both")
         if self.min is not None and self.max is not None and self.min > self.max:
             raise InvalidValueError("expect.min", self.min, f"must not exceed max = {self.max}")
         return self
@@ -339,14 +319,7 @@ class Scenario(Table):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        key, value, largest = largest_tilt(self.gait)
-        limit = self.vehicle.tilt_servo.max_angle
-        if limit is not None and largest > limit:
-            raise InvalidValueError(
-                f"gait.{key}",
-                value,
-                f"beyond the servo limit vehicle.tilt_servo.max_angle = {limit}",
-            )
+        self._check_gait()
         decoupler = self.controller.decoupler
         free = isinstance(self.reference, AttitudeAltitudeReference)
         if free and decoupler != "none":
@@ -360,8 +333,30 @@ class Scenario(Table):
                 f"reference.type = {self.reference.type!r} needs conventional, modified or exact",
             )
         self._check_rotor_limits()
+        self._check_servo()
         self._check_stability()
         return self
+
+    def _check_gait(self) -> None:
+        key, value = self.gait.size
+        try:
+            gait = self.gait.plan(self.vehicle.resolve())
+        except ValueError as error:
+            raise InvalidValueError(f"gait.{key}", value, str(error)) from None
+        limit = self.vehicle.tilt_servo.max_angle
+        if limit is not None and gait.amplitude > limit:
+            raise InvalidValueError(
+                f"gait.{key}",
+                value,
+                f"tilts by {gait.amplitude:.4g} rad, beyond the servo limit "
+                f"vehicle.tilt_servo.max_angle = {limit}",
+            )
+        if len(gait.table) > MAX_TABLE:
+            raise InvalidValueError(
+                f"gait.{key}",
+                value,
+                f"too many keyframes: {len(gait.table)} numbers, at most {MAX_TABLE}",
+            )
 
     def _check_rotor_limits(self) -> None:
         low, high = self.vehicle.min_rotor_speed, self.vehicle.max_rotor_speed
@@ -374,8 +369,22 @@ class Scenario(Table):
         for speed in self.initial.rotor_speeds:
             if (low is not None and speed < low) or (high is not None and speed > high):
                 raise InvalidValueError(
-                    "initial.rotor_speed", speed, f"must lie within the rotor limits {low}..{high}"
+                    "initial.rotor_speed",
+                    speed,
+                    f"must lie within the rotor limits, {low or 0} to {high or 'any'} rad/s",
                 )
+
+    def _check_servo(self) -> None:
+        servo, timestep = self.vehicle.tilt_servo, self.simulation.timestep
+        # The fastest pole of the servo must stay where explicit integration is stable.
+        fastest = servo.natural_frequency * max(1.0, 2.0 * servo.damping_ratio)
+        if self.simulation.plant == "mujoco" and fastest * timestep > MAX_SERVO_STEP:
+            raise InvalidValueError(
+                "simulation.timestep",
+                timestep,
+                f"too long for a tilt servo at {servo.natural_frequency:g} rad/s; at most "
+                f"{MAX_SERVO_STEP / fastest:.3g} s, or a slower vehicle.tilt_servo",
+            )
 
     def _check_stability(self) -> None:
         controller = self.controller

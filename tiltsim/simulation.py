@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import copysign
 from time import perf_counter
 from typing import Final
 
 import numpy as np
 
+from controllers.decoupling_matrix import sines_and_cosines, torque_entries, torque_free_force
 from controllers.references import position_reference
-from controllers.vehicle import SPIN
-from tiltsim.flight import SAMPLE_FIELDS, End, Flight, Floats, singularity
-from tiltsim.parameters import control_parameters
+from controllers.rotation import world_up_in_body
+from controllers.vehicle import SPIN, drag_ratio
+from tiltsim.flight import SAMPLE_FIELDS, End, Flight, Floats
+from tiltsim.parameters import control_setup
 from tiltsim.plants import Plant, make_plant
 from tiltsim.scenario import Scenario
 
 MAX_POSITION_ERROR: Final = 1e4  # m
 MAX_BODY_RATE: Final = 1e3  # rad/s, far above what any rotorcraft survives
 MAX_ROTOR_SPEED: Final = 1e5  # rad/s
+
+SINGULAR: Final = 1e-9
+"""Determinant ``n . r3`` (4 for an untilted level vehicle) that counts as zero."""
 
 Observer = Callable[[Floats], None]
 
@@ -92,7 +98,7 @@ class Watch:
     """Decides from the samples of one flight whether it is lost, and why."""
 
     def __init__(self, scenario: Scenario) -> None:
-        self._law = control_parameters(scenario).law
+        self._law = control_setup(scenario).parameters.law
         self._scenario = scenario
         self._initial_side = 0.0
 
@@ -127,18 +133,21 @@ class Watch:
         return None
 
     def _judge_singularity(self, time: float, sample: Floats) -> End | None:
-        margin, _ = singularity(sample[np.newaxis], self._law)
-        side = float(np.sign(margin[0]))
+        roll, pitch, *tilts = sample[[7, 8, 13, 14, 15, 16]].tolist()
+        trig = sines_and_cosines(*tilts)
+        ratio = drag_ratio(self._law.vehicle)
+        n = torque_free_force(trig, torque_entries(trig, ratio), ratio)
+        up = world_up_in_body(roll, pitch)
+        determinant = n[0] * up[0] + n[1] * up[1] + n[2] * up[2]
+        # A determinant that changes its sign between two samples was zero in between.
+        side = 0.0 if abs(determinant) < SINGULAR else copysign(1.0, determinant)
         if self._initial_side == 0.0:
             self._initial_side = side
-        if side == 0.0:
-            return End(
-                "singular", time, "the torque matrix has lost rank: singular at any attitude"
-            )
-        if side != self._initial_side:
+        if side == 0.0 or side != self._initial_side:
+            angles = ", ".join(f"{tilt:.3g}" for tilt in tilts)
             cause = (
-                "the decoupling matrix became singular: its determinant changed sign at "
-                f"roll = {sample[7]:.3g} rad, pitch = {sample[8]:.3g} rad"
+                f"the decoupling matrix became singular at roll = {roll:.3g} rad, "
+                f"pitch = {pitch:.3g} rad, tilt angles ({angles}) rad"
             )
             return End("singular", time, cause)
         if self._scenario.controller.decoupling == "exact":

@@ -24,9 +24,11 @@ STATE_SIZE: Final = 26
 
 
 @scalar
-def vehicle_state(time: float, state: Sequence[float], gait: GaitParameters) -> State:
+def vehicle_state(
+    time: float, state: Sequence[float], gait: GaitParameters, table: Sequence[float]
+) -> State:
     """The law's state from the plant's: Euler angles for the rotation, the gait's tilt angles."""
-    alpha_1, alpha_2, alpha_3, alpha_4, _, _, _, _ = tilt_reference(time, gait)
+    alpha_1, alpha_2, alpha_3, alpha_4, _, _, _, _ = tilt_reference(time, gait, table)
     sin_pitch = min(1.0, max(-1.0, -state[12]))  # rounding may carry the sine past one
     return (
         *(state[0], state[1], state[2], state[3], state[4], state[5]),
@@ -48,14 +50,16 @@ def plant_state(state: State) -> list[float]:
 
 
 @scalar
-def rotor_inputs(time: float, state: Sequence[float], law: Parameters) -> Quad:
+def rotor_inputs(
+    time: float, state: Sequence[float], law: Parameters, table: Sequence[float]
+) -> Quad:
     """The law's rotor accelerations (rad/s^2) at a time and plant state."""
-    return rotor_accelerations(time, vehicle_state(time, state, law.gait), law)
+    return rotor_accelerations(time, vehicle_state(time, state, law.gait, table), law)
 
 
 @scalar
 def state_rates(
-    time: float, state: Sequence[float], inputs: Quad, law: Parameters
+    time: float, state: Sequence[float], inputs: Quad, law: Parameters, table: Sequence[float]
 ) -> tuple[float, ...]:
     """Time derivative of the plant's state under the given rotor accelerations."""
     r11, r12, r13, r21, r22, r23 = state[6], state[7], state[8], state[9], state[10], state[11]
@@ -63,7 +67,7 @@ def state_rates(
     s1, s2, s3, s4 = state[18], state[19], state[20], state[21]
     u1, u2, u3, u4 = inputs
     vehicle = law.vehicle
-    alpha_1, alpha_2, alpha_3, alpha_4, _, _, _, _ = tilt_reference(time, law.gait)
+    alpha_1, alpha_2, alpha_3, alpha_4, _, _, _, _ = tilt_reference(time, law.gait, table)
     trig = sines_and_cosines(alpha_1, alpha_2, alpha_3, alpha_4)
     w1, w2, w3, w4 = s1 * abs(s1), s2 * abs(s2), s3 * abs(s3), s4 * abs(s4)
 
@@ -105,6 +109,7 @@ def advance(
     steps: int,
     control_steps: int,
     law: Parameters,
+    table: Sequence[float],
 ) -> list[float]:
     """Integrate ``steps`` fixed steps with ode3, the third-order method of Bogacki and Shampine.
 
@@ -114,21 +119,21 @@ def advance(
     for index in range(step_index, step_index + steps):
         time = index * timestep
         if control_steps > 0 and index % control_steps == 0:
-            u1, u2, u3, u4 = rotor_inputs(time, state, law)
+            u1, u2, u3, u4 = rotor_inputs(time, state, law, table)
             state[22], state[23], state[24], state[25] = u1, u2, u3, u4
         held = (state[22], state[23], state[24], state[25])
         continuous = control_steps == 0
 
-        inputs = rotor_inputs(time, state, law) if continuous else held
-        k1 = state_rates(time, state, inputs, law)
+        inputs = rotor_inputs(time, state, law, table) if continuous else held
+        k1 = state_rates(time, state, inputs, law, table)
         half = stage(state, 0.5 * timestep, k1)
         half_time = time + 0.5 * timestep
-        inputs = rotor_inputs(half_time, half, law) if continuous else held
-        k2 = state_rates(half_time, half, inputs, law)
+        inputs = rotor_inputs(half_time, half, law, table) if continuous else held
+        k2 = state_rates(half_time, half, inputs, law, table)
         late = stage(state, 0.75 * timestep, k2)
         late_time = time + 0.75 * timestep
-        inputs = rotor_inputs(late_time, late, law) if continuous else held
-        k3 = state_rates(late_time, late, inputs, law)
+        inputs = rotor_inputs(late_time, late, law, table) if continuous else held
+        k3 = state_rates(late_time, late, inputs, law, table)
         state = [
             value + timestep * (2.0 / 9.0 * a + 1.0 / 3.0 * b + 4.0 / 9.0 * c)
             for value, a, b, c in zip(state, k1, k2, k3)

@@ -1,22 +1,37 @@
-"""Gaits: the tilt angles as functions of time alone, planned before the flight (ch. 3 to 9)."""
+"""Gaits: the tilt angles as functions of time alone, planned before the flight (ch. 3 to 9).
+
+`tilt_reference` is what a flight evaluates. `controllers.gaits.plans` builds its parameters from
+what a scenario or a chapter states, and knows period, amplitude, rate and continuity.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
+from controllers.gaits.keyframes import NO_KEYFRAMES, keyframe_gait
 from controllers.gaits.trot import TiltsAndRates, continuous_trot, instant_trot
+from controllers.gaits.two_color import two_color_circle
 from controllers.scalar import scalar
 
 FIXED: Final = 0
 TROT_INSTANT: Final = 1
 TROT_CONTINUOUS: Final = 2
+KEYFRAMES: Final = 3
+TWO_COLOR_CIRCLE: Final = 4
 
 GAIT_TYPES: Final = {
     "fixed": FIXED,
     "trot_instant": TROT_INSTANT,
     "trot_continuous": TROT_CONTINUOUS,
+    "walk": KEYFRAMES,
+    "run": KEYFRAMES,
+    "transverse_gallop": KEYFRAMES,
+    "rotary_gallop": KEYFRAMES,
+    "two_color": KEYFRAMES,  # a circular path is a TWO_COLOR_CIRCLE
+    "waypoints": KEYFRAMES,
 }
-"""Gait types by the name a scenario gives them."""
+"""How a gait is evaluated, by the name a scenario gives it."""
 
 
 class GaitParameters(NamedTuple):
@@ -28,17 +43,60 @@ class GaitParameters(NamedTuple):
     angle_3: float = 0.0
     angle_4: float = 0.0
     amplitude: float = 0.0  # rad, trots
-    period: float = 1.0  # s, trots
+    period: float = 1.0  # s, all but fixed
+    scale: float = 1.0  # all four angles are multiplied by it (ch. 5, Eq. 16: 1/n)
+    bias: float = 1.0  # [eta] alpha_3 and alpha_4 are multiplied by it (ch. 6, Eqs. 12-15)
+    keyframes: float = 0.0  # number of rows of the table, keyframes
+    centre_1: float = 0.0  # rad, circle in the alpha_1-alpha_2 plane
+    centre_2: float = 0.0
+    radius: float = 0.0
+    color: float = 0.0
+    drag_ratio: float = 0.0  # [r] sets the offset of the blue lines
 
 
 @scalar
-def tilt_reference(time: float, gait: GaitParameters) -> TiltsAndRates:
-    """The planned tilt angles (rad) and their rates (rad/s) at a time (s).
-
-    Returns ``(alpha_1, ..., alpha_4, rate_1, ..., rate_4)``.
-    """
+def planned_angles(time: float, gait: GaitParameters, table: Sequence[float]) -> TiltsAndRates:
+    """The gait before scale and bias: ``(alpha_1, ..., alpha_4, rate_1, ..., rate_4)``."""
+    if gait.type == FIXED:
+        return gait.angle_1, gait.angle_2, gait.angle_3, gait.angle_4, 0.0, 0.0, 0.0, 0.0
+    if gait.type == KEYFRAMES:
+        return keyframe_gait(time, gait.period, gait.keyframes, table)
+    if gait.type == TWO_COLOR_CIRCLE:
+        return two_color_circle(
+            time,
+            gait.period,
+            gait.centre_1,
+            gait.centre_2,
+            gait.radius,
+            gait.color,
+            gait.drag_ratio,
+        )
     if gait.type == TROT_CONTINUOUS:
         return continuous_trot(time, gait.amplitude, gait.period)
-    if gait.type == TROT_INSTANT:
-        return instant_trot(time, gait.amplitude, gait.period)
-    return gait.angle_1, gait.angle_2, gait.angle_3, gait.angle_4, 0.0, 0.0, 0.0, 0.0
+    return instant_trot(time, gait.amplitude, gait.period)
+
+
+@scalar
+def tilt_reference(
+    time: float, gait: GaitParameters, table: Sequence[float] = NO_KEYFRAMES
+) -> TiltsAndRates:
+    """The planned tilt angles (rad) and their rates (rad/s) at a time (s).
+
+    ``table`` holds the keyframes of gaits that have them (`controllers.gaits.keyframes`): a flat
+    tuple of floats in Python, a one-dimensional array in native code; other gaits leave it unread.
+    Returns ``(alpha_1, ..., alpha_4, rate_1, ..., rate_4)``; at a jump the later angles and the
+    rate between jumps.
+    """
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = planned_angles(time, gait, table)
+    front = gait.scale
+    back = gait.scale * gait.bias
+    return (
+        front * a1,
+        front * a2,
+        back * a3,
+        back * a4,
+        front * rate_1,
+        front * rate_2,
+        back * rate_3,
+        back * rate_4,
+    )

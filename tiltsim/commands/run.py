@@ -67,6 +67,11 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.rerun is not None:
         prepare_file("--rerun", arguments.rerun)
 
+    from tiltsim.analysis import gait_warnings
+
+    vehicle = scenario.vehicle.resolve()
+    for warning in gait_warnings(scenario.gait.plan(vehicle), vehicle):
+        print(f"tiltsim: warning: gait: {warning}", file=sys.stderr)
     flight = fly(scenario, arguments)
     if arguments.out is not None:
         flight.save(arguments.out)

@@ -14,7 +14,7 @@ from tiltsim.attitude_plane import (
     forbidden_pitch,
     nearest_singular,
     singular_curves,
-    torque_free_forces,
+    torque_free_directions,
 )
 from tiltsim.figures import style
 
@@ -162,7 +162,7 @@ def _plan_view(axes: Any, flight: Flight) -> None:
 
 def _roll_pitch_plane(axes: Any, flight: Flight) -> None:
     """The attitudes flown, those out of reach, and the closest approach to a singular one."""
-    n = torque_free_forces(flight.columns, flight.scenario.vehicle.resolve())
+    n = torque_free_directions(flight.columns, flight.scenario.vehicle.resolve())
     margin = flight["singularity_margin"]
     closest = int(np.argmin(np.abs(margin)))
     side = float(np.sign(margin[0])) or 1.0

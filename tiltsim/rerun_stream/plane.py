@@ -17,7 +17,7 @@ from tiltsim.attitude_plane import (
     forbidden_pitch,
     nearest_singular,
     singular_curves,
-    torque_free_forces,
+    torque_free_directions,
 )
 from tiltsim.rerun_stream import palette
 from tiltsim.rerun_stream.rows import Floats, Ticks, send_rows
@@ -90,7 +90,7 @@ class AttitudePlane:
         time, margin = piece["time"], piece["singularity_margin"]
         if self._side == 0.0:
             self._side = float(np.sign(margin[0])) or 1.0
-        n = torque_free_forces(piece.columns, self._vehicle)
+        n = torque_free_directions(piece.columns, self._vehicle)
         self._append_curves(time, n)
         attitude = np.stack([piece["roll"], piece["pitch"]], axis=1)
         points = rr.Points2D.columns(positions=on_screen(attitude), labels=margin_labels(margin))
@@ -134,10 +134,8 @@ class AttitudePlane:
         """Of the picked samples those whose ``n`` points elsewhere than the one drawn last."""
         turned = []
         for sample in picked.tolist():
-            length = float(np.linalg.norm(n[sample]))
-            unit = n[sample] / length if length > 0.0 else n[sample]
-            if self._drawn is None or np.linalg.norm(unit - self._drawn) > SMALLEST_TURN:
-                self._drawn = unit
+            if self._drawn is None or np.linalg.norm(n[sample] - self._drawn) > SMALLEST_TURN:
+                self._drawn = n[sample]
                 turned.append(sample)
         return turned
 

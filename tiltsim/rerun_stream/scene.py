@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from controllers.references import position_reference
-from tiltsim.parameters import control_parameters
+from tiltsim.parameters import reference_parameters
 from tiltsim.replay import (
     first_free_body,
     joint_positions,
@@ -165,7 +165,7 @@ class Scene:
         """Log the whole path that the vehicle is to follow."""
         import rerun as rr
 
-        reference = control_parameters(self._scenario).law.reference
+        reference = reference_parameters(self._scenario.reference)
         times = np.linspace(0.0, until, REFERENCE_POINTS).tolist()
         path = np.array([position_reference(time, reference)[:3] for time in times])
         size = 0.08 * vehicle_radius(self._model)

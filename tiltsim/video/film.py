@@ -12,10 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.references import position_reference
-from tiltsim.attitude_plane import torque_free_forces
+from tiltsim.attitude_plane import torque_free_directions
 from tiltsim.errors import InputError
 from tiltsim.files import replacing
-from tiltsim.parameters import control_parameters
+from tiltsim.parameters import reference_parameters
 from tiltsim.replay import (
     first_free_body,
     joint_positions,
@@ -110,7 +110,7 @@ class _Stage:
         self._radius = vehicle_radius(model)
         self._arrow_scale = thrust_scale(model)
         self._reference = _reference_path(flight)
-        self._n = torque_free_forces(flight.columns, flight.scenario.vehicle.resolve())
+        self._n = torque_free_directions(flight.columns, flight.scenario.vehicle.resolve())
         self._attitude = np.stack([flight["roll"], flight["pitch"]], axis=1)
         side = float(np.sign(flight["singularity_margin"][0])) or 1.0
         self._inset = PlaneInset(round(INSET_SHARE * form.height), side)
@@ -220,7 +220,7 @@ def _reference_path(flight: Flight) -> Floats | None:
     """The path that the vehicle is to follow; None where its position is free."""
     if flight.scenario.controller.decoupler == "none":
         return None
-    reference = control_parameters(flight.scenario).law.reference
+    reference = reference_parameters(flight.scenario.reference)
     times = np.linspace(0.0, float(flight["time"][-1]), REFERENCE_POINTS).tolist()
     path = np.array([position_reference(time, reference)[:3] for time in times])
     return path if np.ptp(path, axis=0).max() > 0.0 else path[:1]

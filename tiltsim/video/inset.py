@@ -7,7 +7,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from tiltsim.attitude_plane import HALF_WIDTH, MARGIN_THRESHOLD, world_up
+from controllers.singularity import world_up
+from tiltsim.attitude_plane import HALF_WIDTH, MARGIN_THRESHOLD
 
 Floats = npt.NDArray[np.float64]
 Image = npt.NDArray[np.uint8]
@@ -37,8 +38,7 @@ class PlaneInset:
         self.size = size
         self._side = side
         roll = np.linspace(-HALF_WIDTH, HALF_WIDTH, size)
-        grid = np.stack(np.meshgrid(roll, -roll), axis=-1)  # pitch upwards
-        self._up = world_up(grid)
+        self._up = world_up(*np.meshgrid(roll, -roll))  # pitch upwards
         blank = np.full((size, size, 3), GROUND, dtype=np.uint8)
         for share in (0.25, 0.5, 0.75):
             line = round(share * (size - 1))
@@ -51,7 +51,7 @@ class PlaneInset:
         Parameters
         ----------
         n
-            The torque-free force, shape (3,).
+            The unit vector along the torque-free force, shape (3,).
         trail
             Attitudes (roll, pitch) so far, rad, shape (N, 2), the present one last.
         margin

@@ -1,0 +1,252 @@
+"""The command line as a user meets it: output, files and exit codes."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pyarrow.parquet as pq
+import pytest
+
+from tiltsim.cli import main
+from tiltsim.flight import COLUMN_UNITS
+from tiltsim.metrics import METRICS
+
+SETPOINT = "ch04_tracking/setpoint#rho_065_modified"
+SHORT = ("--set", "simulation.duration=0.2")
+LONGER = ("--set", "simulation.duration=2.0")
+UPSIDE_DOWN = ("--set", "initial.attitude=[3.14159, 0.0, 0.0]")
+COMMAND = (sys.executable, "-m", "tiltsim")
+
+EXPECTING = """
+title = "expecting"
+[simulation]
+duration = 0.2
+[[expect]]
+metric = "max_abs_roll"
+published = 0.0
+max = {bound}
+"""
+
+
+def tiltsim(*arguments):
+    """Run the command in a process of its own, as from a shell."""
+    return subprocess.run(
+        [*COMMAND, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.fixture
+def expecting(tmp_path):
+    def write(bound):
+        path = tmp_path / "expecting.toml"
+        path.write_text(EXPECTING.format(bound=bound), encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_run_writes_the_three_files_and_prints_a_summary(tmp_path, capsys):
+    out = tmp_path / "new" / "folder"
+    assert main(["run", SETPOINT, *SHORT, "--set", "expect=[]", "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert "Setpoint, trot angle fixed at rho = 0.65, modified decoupler" in printed
+    assert "final_position_error_x" in printed
+    assert sorted(path.name for path in out.iterdir()) == [
+        "flight.parquet",
+        "metrics.json",
+        "scenario.toml",
+    ]
+    metrics = json.loads((out / "metrics.json").read_text())
+    assert set(metrics) <= set(METRICS)
+    assert metrics["duration"] == pytest.approx(0.2)
+    table = pq.read_table(out / "flight.parquet")
+    assert table.column_names == list(COLUMN_UNITS)
+    assert table.num_rows == 21
+    assert table.schema.field("x").metadata == {b"unit": b"m"}
+
+
+def test_resolved_scenario_flies_the_same_flight_again(tmp_path):
+    first, second = tmp_path / "first", tmp_path / "second"
+    options = [*SHORT, "--set", "expect=[]", "--set", "gait.type=trot_instant"]
+    options += ["--set", "gait.amplitude=0.4", "--set", "gait.period=0.1", "--quiet"]
+    assert main(["run", SETPOINT, *options, "--out", str(first)]) == 0
+    assert main(["run", str(first / "scenario.toml"), "--quiet", "--out", str(second)]) == 0
+    assert tomllib.loads((first / "scenario.toml").read_text())["gait"]["amplitude"] == 0.4
+    tables = [pq.read_table(folder / "flight.parquet") for folder in (first, second)]
+    assert tables[0].equals(tables[1])
+
+
+@pytest.mark.parametrize(("bound", "code", "word"), [(1.0, 0, "ok"), (-1.0, 1, "FAILED")])
+def test_run_exit_code_tells_whether_expectations_hold(expecting, capsys, bound, code, word):
+    assert main(["run", str(expecting(bound))]) == code
+    assert word in capsys.readouterr().out
+
+
+def test_run_quiet_prints_nothing(capsys):
+    assert main(["run", SETPOINT, *SHORT, "--set", "expect=[]", "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_run_of_a_family_lists_its_variants_and_exits_2(capsys):
+    assert main(["run", "ch04_tracking/setpoint"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "rho_065_modified" in error
+    assert "rho_minus_065_conventional" in error
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "no/such/scenario"], ["no/such/scenario", "tiltsim list"]),
+        (["run", SETPOINT, "--set", "vehicle.mas=1"], ["vehicle.mas", "did you mean mass"]),
+        (["run", SETPOINT, "--set", "vehicle.mass=-1"], ["vehicle.mass = -1", "greater than 0"]),
+        (["run", SETPOINT, "--set", "vehicle.mass=nan"], ["vehicle.mass = NaN", "finite"]),
+        (["run", SETPOINT, "--set", "controller.gains=ch05"], ["controller.gains", "ch03"]),
+        (["run", SETPOINT, "--set", "controller.decoupling=exact"], ["Routh", "K1 K2 = 10"]),
+        (["run", SETPOINT, "--set", "nonsense"], ["nonsense", "KEY=VALUE"]),
+        (
+            ["run", SETPOINT, "--set", "vehicle.tilt_servo.max_angle=0.5"],
+            ["gait.angles", "0.65", "max_angle = 0.5"],
+        ),
+        (["check", "no/such/folder"], ["no/such/folder"]),
+    ],
+)
+def test_bad_input_is_one_clear_line_and_exit_2(capsys, arguments, words):
+    assert main(arguments) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.count("\n") == 1
+    for word in words:
+        assert word in printed.err
+
+
+def test_unwritable_output_is_noticed_before_the_flight(tmp_path, capsys):
+    (tmp_path / "file").write_text("in the way")
+    assert main(["run", SETPOINT, "--out", str(tmp_path / "file" / "out")]) == 2
+    assert "--out" in capsys.readouterr().err
+
+
+def test_lost_flight_exits_3_with_cause_and_time_and_keeps_its_log(tmp_path, capsys):
+    options = ["--set", "initial.attitude=[3.14159, 0.0, 0.0]", "--set", "expect=[]"]
+    assert main(["run", SETPOINT, *options, "--out", str(tmp_path)]) == 3
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert " at t = 0." in error
+    metrics = json.loads((tmp_path / "metrics.json").read_text())
+    assert metrics["diverged"] is True
+    table = pq.read_table(tmp_path / "flight.parquet")
+    assert table["time"][-1].as_py() == pytest.approx(metrics["duration"])
+    assert table.schema.metadata[b"cause"]
+    assert not (tmp_path / "MUJOCO_LOG.TXT").exists()
+
+
+def test_nothing_is_left_in_the_users_folder(tmp_path):
+    done = subprocess.run(
+        [*COMMAND, "run", SETPOINT, "--set", "expect=[]", *LONGER, *UPSIDE_DOWN],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 3
+    assert list(tmp_path.iterdir()) == []
+    assert done.stderr.count("\n") == 1, "only our own line, none of MuJoCo's"
+
+
+def test_check_reports_every_outcome_and_writes_junit(tmp_path, capsys):
+    good = tmp_path / "good.toml"
+    good.write_text(EXPECTING.format(bound=1.0))
+    (tmp_path / "failing.toml").write_text(EXPECTING.format(bound=-1.0))
+    (tmp_path / "typo.toml").write_text("titel = 'x'\n")
+    upside_down = "[simulation]\nduration = 2.0\n[initial]\nattitude = [3.14159, 0.0, 0.0]\n"
+    (tmp_path / "lost.toml").write_text(upside_down)
+    junit = tmp_path / "junit.xml"
+    assert main(["check", str(tmp_path), "--jobs", "1", "--junit", str(junit)]) == 2
+    printed = capsys.readouterr().out
+    assert "4 scenarios: 1 failed, 1 passed, 1 lost, 1 invalid" in printed
+    suite = ElementTree.parse(junit).getroot()[0]
+    assert {key: suite.get(key) for key in ("tests", "failures", "errors")} == {
+        "tests": "4",
+        "failures": "2",
+        "errors": "1",
+    }
+    assert main(["check", str(good), "--jobs", "1"]) == 0
+    assert main(["check", str(tmp_path / "failing.toml"), str(good), "--jobs", "1"]) == 1
+    assert main(["check", str(tmp_path / "lost.toml"), "--jobs", "1"]) == 3
+
+
+def test_check_on_several_processes_keeps_the_order_of_junit(tmp_path):
+    for name in ("a", "b", "c"):
+        (tmp_path / f"{name}.toml").write_text(EXPECTING.format(bound=1.0))
+    junit = tmp_path / "junit.xml"
+    done = tiltsim("check", tmp_path, "--jobs", "2", "--junit", junit)
+    assert done.returncode == 0, done.stderr
+    names = [case.get("name") for case in ElementTree.parse(junit).getroot()[0]]
+    assert names == ["a.toml", "b.toml", "c.toml"]
+
+
+def test_list_shows_every_scenario_with_title_and_source(capsys):
+    assert main(["list"]) == 0
+    printed = capsys.readouterr().out
+    assert any(
+        line.startswith(SETPOINT) and "modified decoupler" in line and "Fig. 4 (B1)" in line
+        for line in printed.splitlines()
+    )
+    assert main(["list", "--json"]) == 0
+    entries = json.loads(capsys.readouterr().out)
+    assert all(entry["title"] and entry["source"] for entry in entries)
+
+
+def test_schema_knows_every_table_and_the_variants(capsys):
+    assert main(["schema"]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    tables = {"vehicle", "simulation", "initial", "controller", "gait", "reference", "expect"}
+    assert tables | {"title", "source", "variant"} == set(schema["properties"])
+    assert schema["additionalProperties"] is False
+
+
+def test_version_and_module_entry():
+    done = tiltsim("--version")
+    assert done.returncode == 0
+    assert done.stdout.startswith("tiltsim ")
+
+
+def test_help_names_every_command(capsys):
+    with pytest.raises(SystemExit) as stopped:
+        main(["--help"])
+    assert stopped.value.code == 0
+    printed = capsys.readouterr().out
+    for command in ("run", "check", "list", "bench", "schema"):
+        assert command in printed
+
+
+@pytest.mark.slow
+def test_bench_prints_ratios_for_every_engine_and_integrator():
+    done = tiltsim("bench", "--json")
+    assert done.returncode == 0, done.stderr
+    rows = json.loads(done.stdout)
+    keys = {"case", "engine", "integrator", "vehicles", "threads", "steps_per_second", "ratio"}
+    assert all(keys | {"realtime_factor"} == set(row) for row in rows)
+    cases = {(row["integrator"], row["engine"]) for row in rows}
+    assert cases == {
+        (integrator, engine)
+        for integrator in ("RK4", "implicitfast", "Euler")
+        for engine in ("bare", "python", "native")
+    }
+    assert all(row["ratio"] == 1.0 for row in rows if row["engine"] == "bare")
+
+
+def test_library_scenarios_are_shipped_beside_the_package():
+    from tiltsim.library import shipped_folder
+
+    assert (shipped_folder("scenarios") / "ch04_tracking" / "setpoint.toml").is_file()
+    assert Path(shipped_folder("mjcf") / "tiltrotor.xml").is_file()

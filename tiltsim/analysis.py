@@ -1,0 +1,210 @@
+"""Reports on gaits and on the Two Color Map, as plain dicts ready for JSON.
+
+Angles are in rad, everything else in SI units; NaN becomes null.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from controllers import two_color_map
+from controllers.singularity import (
+    determinant,
+    margin_over_gait,
+    rank,
+    residuals,
+    singular_values,
+    singularity_margin,
+    torque_free_direction,
+)
+from controllers.two_color_planner import check_path
+from controllers.unacceptable_attitudes import acceptable_share, unacceptable_attitudes
+from controllers.vehicle import PRESETS, drag_ratio
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from controllers.gaits.plans import Gait
+    from controllers.two_color_planner import Path
+    from controllers.vehicle import Vehicle
+
+    Array = NDArray[np.float64]
+
+
+def gait_report(
+    gait: Gait,
+    vehicle: Vehicle,
+    *,
+    roll: float | None = None,
+    pitch: float | None = None,
+    samples: int = 201,
+) -> dict[str, Any]:
+    """Everything about the singularities of a gait (``tiltsim gait --json``).
+
+    The values at the top are those at time zero. A gait that moves adds ``time``, a table of arrays
+    over one period, and ``min_singularity_margin`` over it. With ``roll`` or ``pitch`` (rad) the
+    margins and the determinant are taken at that attitude, else margins at level.
+    """
+    at_attitude = roll is not None or pitch is not None
+    roll, pitch = roll or 0.0, pitch or 0.0
+    start = gait.angles(0.0)
+    report: dict[str, Any] = {
+        "gait": gait.name,
+        "source": gait.source,
+        "vehicle": vehicle_name(vehicle),
+        "drag_ratio": drag_ratio(vehicle),
+        **_instant(start, vehicle, roll, pitch),
+        "acceptable_share": acceptable_share(start, vehicle),
+    }
+    curve = unacceptable_attitudes(start, vehicle)
+    report["unacceptable_attitudes"] = {
+        "kind": curve.kind,
+        "roll": curve.roll.tolist(),
+        "pitch": curve.pitch.tolist(),
+    }
+    if at_attitude:
+        report |= {"roll": roll, "pitch": pitch}
+        report["determinant"] = float(determinant(start, roll, pitch, vehicle))
+    times = gait.sample_times(samples)
+    angles = gait.angles(times)
+    if not gait.is_constant:
+        table = _instant(angles, vehicle, roll, pitch)
+        table["singularity_margin"] = margin_over_gait(angles, vehicle, roll, pitch).tolist()
+        table |= {"time": times.tolist(), "rates": gait.rates(times).tolist()}
+        if at_attitude:
+            table["determinant"] = determinant(angles, roll, pitch, vehicle).tolist()
+        report |= {
+            "period": gait.period,
+            "amplitude": gait.amplitude,
+            "max_rate": gait.max_rate if isfinite(gait.max_rate) else None,
+            "continuous": gait.is_continuous,
+            "min_rank": min(table["rank"]),
+            "min_singularity_margin": min(table["singularity_margin"]),
+            "time": table,
+        }
+    report["warnings"] = gait_warnings(gait, vehicle, samples)
+    return report
+
+
+def gait_warnings(gait: Gait, vehicle: Vehicle, samples: int = 201) -> list[str]:
+    """What makes a gait unfit for flight, in one line each; empty for a sound gait."""
+    times = gait.sample_times(samples)
+    angles = gait.angles(times)
+    lost = rank(angles, vehicle) < 3
+    directionless = np.isnan(torque_free_direction(angles, vehicle)).any(axis=-1) & ~lost
+    warnings = []
+    if lost.any():
+        warnings.append(
+            f"rank of tau is {int(rank(angles, vehicle).min())}{_when(lost, times, gait)}: the "
+            "decoupling matrix is singular at every attitude"
+        )
+    if directionless.any():
+        warnings.append(
+            f"R = R_phi = R_theta = 0 (curve L){_when(directionless, times, gait)}: the decoupling "
+            "matrix is singular at every attitude"
+        )
+    R = np.where(lost | directionless, 0.0, residuals(angles, vehicle).R)
+    signs = R[R != 0.0]
+    if (signs > 0.0).any() and (signs < 0.0).any():
+        turned = (np.sign(R) == -np.sign(signs[0])) & (R != 0.0)
+        warnings.append(
+            f"R changes sign before t = {times[turned][0]:.3f} s: the decoupling matrix is "
+            "singular on the way"
+        )
+    return warnings
+
+
+def map_report(vehicle: Vehicle, path: Path | None = None) -> dict[str, Any]:
+    """The Two Color Map of a vehicle, and the verdict on a path (``tiltsim map --json``).
+
+    ``red`` and ``blue`` give ``alpha_3 = slope * alpha_1 + offset`` and likewise ``alpha_4`` from
+    ``alpha_2``. ``roots`` is the 17 x 17 search of ch. 6, done numerically.
+    """
+    offset = 2.0 * two_color_map.delta(vehicle)
+    grid = two_color_map.grid_roots(vehicle)
+    alpha_1 = np.linspace(-np.pi / 2, np.pi / 2, 182)[1:-1]
+    report: dict[str, Any] = {
+        "vehicle": vehicle_name(vehicle),
+        "drag_ratio": drag_ratio(vehicle),
+        "delta": two_color_map.delta(vehicle),
+        "P": list(two_color_map.point_p(vehicle)),
+        "red": _lines(1.0, 0.0),
+        "blue": _lines(-1.0, offset),
+        "rank": {"red": 3, "blue": 2},
+        "L": {
+            "alpha_1": alpha_1.tolist(),
+            "alpha_2": two_color_map.curve_l(alpha_1, vehicle).tolist(),
+        },
+        "roots": {
+            "grid": two_color_map.grid_axis().tolist(),
+            "count": two_color_map.root_counts(grid).tolist(),
+            "classes": dict(sorted(two_color_map.root_classes(grid).items())),
+            "list": [
+                {
+                    "alpha": [root.alpha_1, root.alpha_2, root.alpha_3, root.alpha_4],
+                    "R": root.R,
+                    "class": f"({root.plane_3},{root.plane_4})",
+                }
+                for row in grid
+                for cell in row
+                for root in cell
+            ],
+        },
+        "warnings": ["blue: tau has rank 2, the decoupling matrix is singular at every attitude"],
+    }
+    if path is not None:
+        verdict = check_path(path, vehicle)
+        report["path"] = {
+            "accepted": verdict.accepted,
+            "theorem": verdict.theorem,
+            "reasons": list(verdict.reasons),
+            "crossings": [list(crossing) for crossing in verdict.crossings],
+            "warnings": list(verdict.warnings),
+        }
+    return report
+
+
+def vehicle_name(vehicle: Vehicle) -> str | dict[str, float]:
+    """The preset's name, or the parameters of a vehicle that is none."""
+    for name, preset in PRESETS.items():
+        if preset == vehicle:
+            return name
+    return dict(vehicle._asdict())
+
+
+def _instant(angles: Array, vehicle: Vehicle, roll: float, pitch: float) -> dict[str, Any]:
+    """The singularity analysis of tilt angles of shape (4,) or (N, 4)."""
+    R, R_phi, R_theta = residuals(angles, vehicle)
+    return {
+        "angles": angles.tolist(),
+        "rank": rank(angles, vehicle).tolist(),
+        "singular_values": singular_values(angles, vehicle).tolist(),
+        "R": R.tolist(),
+        "R_phi": R_phi.tolist(),
+        "R_theta": R_theta.tolist(),
+        "torque_free_direction": _vectors(torque_free_direction(angles, vehicle)),
+        "singularity_margin": singularity_margin(angles, vehicle, roll, pitch).tolist(),
+    }
+
+
+def _vectors(directions: Array) -> Any:
+    """Vectors as lists, null for those that do not exist."""
+    if directions.ndim > 1:
+        return [_vectors(direction) for direction in directions]
+    return None if np.isnan(directions).any() else directions.tolist()
+
+
+def _when(chosen: NDArray[np.bool_], times: Array, gait: Gait) -> str:
+    if gait.is_constant or chosen.all():
+        return ""
+    return f" at t = {times[chosen][0]:.3f} s"
+
+
+def _lines(slope: float, offset: float) -> dict[str, dict[str, float]]:
+    return {
+        "alpha_3": {"slope": slope, "offset": offset},
+        "alpha_4": {"slope": slope, "offset": -offset if offset else 0.0},
+    }

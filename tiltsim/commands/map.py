@@ -1,0 +1,139 @@
+"""``tiltsim map``: the Two Color Map, and paths on it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tiltsim.commands.angles import allow_negative_lists, parse_angles, parse_vehicle
+
+if TYPE_CHECKING:
+    from controllers.two_color_planner import Circle, Polyline
+    from controllers.vehicle import Vehicle
+
+ACCEPTED, REFUSED = 0, 1
+
+
+def add_parser(subparsers: Any) -> None:
+    """Declare the command."""
+    parser = subparsers.add_parser(
+        "map",
+        help="draw the Two Color Map and check a path on it",
+        description=(
+            "The Two Color Map of a vehicle: delta, P, the exact red and blue lines, the curve L "
+            "and the grid search of ch. 6. With --leg or --circle, the verdict on a path."
+        ),
+        epilog="exit codes: 0 done, 1 the path is refused, 2 invalid input",
+    )
+    allow_negative_lists(parser)
+    parser.add_argument("--vehicle", metavar="PRESET", help="ar_drone_2 (default) or luukkonen")
+    parser.add_argument(
+        "--leg",
+        action="append",
+        nargs="+",
+        metavar="WORD",
+        help="COLOR A1,A2 A1,A2 ...: part of a closed path, vertices in rad or P; repeatable",
+    )
+    parser.add_argument(
+        "--circle",
+        nargs=3,
+        metavar=("COLOR", "A1,A2", "RADIUS"),
+        help="a circular path: centre and radius in rad",
+    )
+    parser.add_argument("--json", action="store_true", help="machine-readable")
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the map")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Report, draw, judge."""
+    from tiltsim.analysis import map_report
+    from tiltsim.errors import InputError
+
+    vehicle = parse_vehicle(arguments.vehicle)
+    path = _path(arguments, vehicle)
+    try:
+        report = map_report(vehicle, path)
+    except ValueError as error:
+        raise InputError(f"path: {error}") from None
+    if arguments.plot is not None:
+        from tiltsim.figures.style import save
+        from tiltsim.figures.two_color_map import map_figure
+
+        save(map_figure(vehicle, [("path", path)] if path else None), arguments.plot)
+    print(json.dumps(report, indent=2, allow_nan=False) if arguments.json else _summary(report))
+    return ACCEPTED if path is None or report["path"]["accepted"] else REFUSED
+
+
+def _path(arguments: argparse.Namespace, vehicle: Vehicle) -> Polyline | Circle | None:
+    from controllers.two_color_planner import Circle, Leg, Polyline
+    from tiltsim.errors import InputError
+
+    if arguments.leg and arguments.circle:
+        raise InputError("map: give either --leg or --circle")
+    if arguments.circle:
+        color, centre, radius = arguments.circle
+        (size,) = parse_angles("--circle radius", radius, 1)
+        first, second = parse_angles("--circle centre", centre, 2)
+        return Circle(_color("--circle", color), (first, second), size)
+    if not arguments.leg:
+        return None
+    return Polyline(
+        tuple(
+            Leg(_color("--leg", color), tuple(_vertex(text, vehicle) for text in vertices))
+            for color, *vertices in arguments.leg
+        )
+    )
+
+
+def _vertex(text: str, vehicle: Vehicle) -> tuple[float, float]:
+    from controllers.two_color_map import point_p
+
+    if text == "P":
+        return point_p(vehicle)
+    first, second = parse_angles("--leg", text, 2)
+    return first, second
+
+
+def _color(option: str, name: str) -> str:
+    from controllers.gaits.two_color import COLORS
+    from tiltsim.errors import InputError
+
+    if name not in COLORS:
+        raise InputError(f"{option} {name}: unknown color; choose {', '.join(COLORS)}")
+    return name
+
+
+def _summary(report: dict[str, Any]) -> str:
+    blue = report["blue"]
+    counts = report["roots"]["count"]
+    classes = ", ".join(f"{count} {name}" for name, count in report["roots"]["classes"].items())
+    rows = [
+        ("vehicle", str(report["vehicle"])),
+        ("delta = atan(K_m / (L K_f))", f"{report['delta']:.9g} rad"),
+        ("P", f"({report['P'][0]:.9g}, {report['P'][1]:.9g}) rad, on the curve L"),
+        ("red", "alpha_3 = alpha_1, alpha_4 = alpha_2"),
+        (
+            "blue",
+            f"alpha_3 = -alpha_1 + {blue['alpha_3']['offset']:.9g}, "
+            f"alpha_4 = -alpha_2 - {-blue['alpha_4']['offset']:.9g}",
+        ),
+        ("L", f"tan alpha_2 = tan alpha_1 - {2.0 * report['drag_ratio']:.9g}"),
+        (
+            "roots on the 17 x 17 grid",
+            f"{counts[8][8]} inside, {counts[0][8]} on sides, {counts[0][0]} in corners",
+        ),
+        ("their classes", classes),
+    ]
+    width = max(len(name) for name, _ in rows)
+    lines = [f"{name:<{width}}  {value}" for name, value in rows]
+    lines += [f"warning: {text}" for text in report["warnings"]]
+    if "path" in report:
+        path = report["path"]
+        if path["accepted"]:
+            lines.append(f"path: accepted by the {path['theorem']} theorem")
+        lines += [f"path: refused: {reason}" for reason in path["reasons"]]
+        lines += [f"path: warning: {text}" for text in path["warnings"]]
+    return "\n".join(lines)

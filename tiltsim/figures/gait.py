@@ -1,0 +1,148 @@
+"""Figures of one gait: roll-pitch diagram (ch. 5 to 8), tilt angles and margin over a period."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from controllers.singularity import determinant, margin_over_gait
+from controllers.unacceptable_attitudes import unacceptable_attitudes
+from tiltsim.figures import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from controllers.gaits.plans import Gait
+    from controllers.vehicle import Vehicle
+
+_CURVES = 24
+"""Instants of a period at which the unacceptable-attitude curve is drawn."""
+
+
+def gait_figure(gait: Gait, vehicle: Vehicle) -> Figure:
+    """Roll-pitch diagram of a gait, with its angles and margin over a period if it moves."""
+    with style.paper_style():
+        if gait.is_constant:
+            figure = style.new_figure(4.4, 4.2)
+            axes: Any = figure.subplots()
+            _roll_pitch(figure, axes, gait, vehicle)
+            return figure
+        figure = style.new_figure(8.6, 4.2)
+        grid = figure.add_gridspec(2, 2, width_ratios=[1.05, 1.0])
+        _roll_pitch(figure, figure.add_subplot(grid[:, 0]), gait, vehicle)
+        upper = figure.add_subplot(grid[0, 1])
+        lower = figure.add_subplot(grid[1, 1], sharex=upper)
+        _angles(upper, gait)
+        _margin(lower, [(gait, "")], vehicle)
+        upper.tick_params(labelbottom=False)
+        return figure
+
+
+def comparison_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure:
+    """Roll-pitch diagrams of gaits side by side, such as a gait and its biased twin.
+
+    ``gaits`` are pairs of title and gait (ch. 6, Figs. 21-28; ch. 8, Figs. 10-14).
+    """
+    with style.paper_style():
+        figure = style.new_figure(3.7 * len(gaits), 4.0)
+        row = figure.subplots(1, len(gaits), squeeze=False, sharey=True)[0]
+        for axes, (title, gait) in zip(row, gaits, strict=True):
+            _roll_pitch(figure, axes, gait, vehicle, color_bar=axes is row[-1])
+            axes.set_title(title)
+            if axes is not row[0]:
+                axes.set_ylabel("")
+        return figure
+
+
+def margin_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure:
+    """Singularity margin over a period for several gaits, as pairs of label and gait."""
+    with style.paper_style():
+        figure = style.new_figure(6.2, 3.2)
+        axes: Any = figure.subplots()
+        _margin(axes, [(gait, label) for label, gait in gaits], vehicle)
+        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        return figure
+
+
+def _roll_pitch(
+    figure: Figure, axes: Axes, gait: Gait, vehicle: Vehicle, *, color_bar: bool = True
+) -> None:
+    """Unacceptable-attitude curves at instants of a period; shaded where no instant forbids."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    period = gait.period or 1.0
+    times = np.zeros(1) if gait.is_constant else np.arange(_CURVES) / _CURVES * period
+    angles = gait.angles(times)
+    side = np.linspace(-pi / 2, pi / 2, 301)
+    roll, pitch = np.meshgrid(side, side)
+    level = determinant(angles[0], 0.0, 0.0, vehicle)
+    allowed = np.ones_like(roll, dtype=bool)
+    for instant in angles:
+        allowed &= determinant(instant, roll, pitch, vehicle) * level > 0.0
+    curves = [unacceptable_attitudes(instant, vehicle, 721) for instant in angles]
+    singular = sum(curve.kind == "everywhere" for curve in curves)
+
+    if not singular:
+        axes.contourf(roll, pitch, allowed, levels=[0.5, 1.5], colors=[style.PALE])
+    colors = colormaps[style.SEQUENTIAL](np.linspace(0.0, 0.92, len(curves)))
+    for curve, color in zip(curves, colors, strict=True):
+        axes.plot(curve.roll, curve.pitch, color=style.RED if len(curves) == 1 else color, lw=1.3)
+    if singular:
+        share = "at every attitude"
+        if singular < len(curves):
+            share += f",\nat {singular} of {len(curves)} instants"
+        axes.set_facecolor("#F3F3F3")
+        axes.text(
+            *(0.0, 0.75 if singular < len(curves) else 0.35),
+            f"singular {share}",
+            ha="center",
+            va="center",
+            color=style.INK,
+            bbox={"facecolor": "white", "edgecolor": style.GREY, "linewidth": 0.6},
+        )
+    axes.plot(0.0, 0.0, "+", color=style.INK, ms=8, mew=1.2)
+    if gait.period is not None and color_bar:
+        mapping = ScalarMappable(Normalize(0.0, period / 0.92), style.SEQUENTIAL)
+        bar: Any = figure.colorbar(mapping, ax=axes, shrink=0.85, pad=0.02, label="time (s)")
+        bar.ax.set_ylim(0.0, period)
+        bar.outline.set_linewidth(0.5)
+    style.angle_axis(axes, "x", pi / 2)
+    style.angle_axis(axes, "y", pi / 2)
+    axes.set_aspect("equal")
+    axes.set_xlabel("roll φ (rad)")
+    axes.set_ylabel("pitch θ (rad)")
+    axes.set_title(f"Unacceptable attitudes, {gait.name}")
+
+
+def _angles(axes: Axes, gait: Gait) -> None:
+    times = gait.sample_times(401)
+    looks = ["-", "--", "-.", ":"]
+    # Equal angles would hide each other: the later ones are thinner and dashed.
+    for index, angle in enumerate(gait.angles(times).T):
+        axes.plot(times, angle, looks[index], lw=2.4 - 0.4 * index, label=f"α{'₁₂₃₄'[index]}")
+    axes.set_ylabel("tilt angle (rad)")
+    axes.legend(ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
+
+
+def _margin(axes: Axes, gaits: list[tuple[Gait, str]], vehicle: Vehicle) -> None:
+    looks = ["-", "--", "-.", ":"]
+    longest = 0.0
+    for index, (gait, label) in enumerate(gaits):
+        period = gait.period or 1.0
+        times = np.array([0.0, 1.0]) if gait.is_constant else gait.sample_times(401)
+        margin = margin_over_gait(gait.angles(times), vehicle)
+        longest = max(longest, period)
+        axes.plot(times, margin, looks[index % 4], label=label)
+    axes.axhline(0.0, color=style.INK, lw=0.8)
+    style.angle_axis(axes, "y", pi / 2)
+    low, _ = axes.get_ylim()
+    lowest = min((float(np.min(line.get_ydata())) for line in axes.get_lines()), default=0.0)
+    axes.set_ylim(low * 1.05 if lowest < -0.05 else -0.12, pi / 2 * 1.05)
+    axes.set_xlim(0.0, longest)
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel("singularity margin (rad)")

@@ -1,0 +1,171 @@
+"""The ``[gait]`` table of a scenario: one model a type, each of which plans its gait."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from controllers.gaits import plans
+from controllers.gaits.plans import Gait as PlannedGait
+from controllers.two_color_planner import Circle, Leg, Path, Polyline, four_angle_gait, rectangle
+from controllers.vehicle import Vehicle
+from tiltsim.messages import InvalidValueError
+from tiltsim.tables import Angle, Angles2, Angles4, Positive, Table
+
+
+class GaitTable(Table, ABC):
+    """What every gait can be told: a common scale, and a bias on the two rear angles."""
+
+    scale: Positive = Field(1.0, description="multiplies all angles (ch. 5: 1/n)")
+    bias: float = Field(1.0, description="eta, multiplies alpha_3 and alpha_4 (ch. 6)")
+
+    def plan(self, vehicle: Vehicle) -> PlannedGait:
+        """The gait, ready to be flown. Raises ValueError where the numbers make none."""
+        return self.unscaled(vehicle).scaled(1.0 / self.scale).biased(self.bias)
+
+    @abstractmethod
+    def unscaled(self, vehicle: Vehicle) -> PlannedGait:
+        """The gait before scale and bias."""
+
+    @property
+    @abstractmethod
+    def size(self) -> tuple[str, object]:
+        """The key that sets how far the gait tilts, and its value."""
+
+
+class FixedGait(GaitTable):
+    """Constant tilt angles."""
+
+    type: Literal["fixed"] = "fixed"
+    angles: Angles4 = Field((0.0, 0.0, 0.0, 0.0), description="alpha_1..4, rad")
+
+    def unscaled(self, vehicle: Vehicle) -> PlannedGait:
+        """See `GaitTable.unscaled`."""
+        return plans.fixed(self.angles)
+
+    @property
+    def size(self) -> tuple[str, object]:
+        """See `GaitTable.size`."""
+        return "angles", self.angles
+
+
+class TrotGait(GaitTable):
+    """The cat trots of ch. 4, which differ in how they change sides."""
+
+    type: Literal["trot_instant", "trot_continuous"]
+    amplitude: Angle = Field(description="rho, rad")
+    period: Positive = Field(description="T, s")
+
+    def unscaled(self, vehicle: Vehicle) -> PlannedGait:
+        """See `GaitTable.unscaled`."""
+        trot = plans.instant_trot if self.type == "trot_instant" else plans.continuous_trot
+        return trot(self.amplitude, self.period)
+
+    @property
+    def size(self) -> tuple[str, object]:
+        """See `GaitTable.size`."""
+        return "amplitude", self.amplitude
+
+
+class CatGait(GaitTable):
+    """The cat gaits of ch. 5, with keyframes from published footfall timing."""
+
+    type: Literal["walk", "run", "transverse_gallop", "rotary_gallop"]
+    amplitude: Angle = Field(description="rad")
+    period: Positive = Field(description="T, s")
+
+    def unscaled(self, vehicle: Vehicle) -> PlannedGait:
+        """See `GaitTable.unscaled`."""
+        return plans.cat(self.type, self.amplitude, self.period)
+
+    @property
+    def size(self) -> tuple[str, object]:
+        """See `GaitTable.size`."""
+        return "amplitude", self.amplitude
+
+
+class WaypointGait(GaitTable):
+    """A closed gait through given angles, straight in between."""
+
+    type: Literal["waypoints"]
+    angles: Annotated[tuple[Angles4, ...], Field(min_length=2, strict=False)] = Field(
+        description="alpha_1..4 of each waypoint, rad"
+    )
+    period: Positive = Field(description="s")
+    phases: Annotated[tuple[float, ...], Field(strict=False)] | None = Field(
+        None, description="share of the period of each waypoint, from 0; default: evenly spread"
+    )
+
+    def unscaled(self, vehicle: Vehicle) -> PlannedGait:
+        """See `GaitTable.unscaled`."""
+        return plans.waypoints(self.angles, self.period, self.phases)
+
+    @property
+    def size(self) -> tuple[str, object]:
+        """See `GaitTable.size`."""
+        return "angles", self.angles
+
+
+class TwoColorLeg(Table):
+    """A part of a two-colour path: straight lines in one colour."""
+
+    color: Literal["red", "blue"]
+    vertices: Annotated[tuple[Angles2, ...], Field(min_length=2, strict=False)] = Field(
+        description="points (alpha_1, alpha_2), rad"
+    )
+
+
+class TwoColorGait(GaitTable):
+    """A path on the Two Color Map (ch. 6 to 8): a rectangle, a circle, or a path of legs.
+
+    The colour gives alpha_3 and alpha_4, on the exact lines of the vehicle at hand.
+    """
+
+    type: Literal["two_color"]
+    period: Positive = Field(description="s")
+    color: Literal["red", "blue"] = "red"
+    rectangle: Annotated[tuple[Angles2, Angles2], Field(strict=False)] | None = Field(
+        None, description="ranges of alpha_1 and of alpha_2, rad"
+    )
+    centre: Angles2 | None = Field(None, description="of a circle, rad; goes with radius")
+    radius: Positive | None = Field(None, description="rad")
+    path: Annotated[tuple[TwoColorLeg, ...], Field(strict=False)] = Field(
+        (), description="legs of one colour each, closed; a colour switch belongs at P"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        circle = self.centre is not None and self.radius is not None
+        if (self.rectangle is not None) + circle + bool(self.path) != 1:
+            raise InvalidValueError(
+                "gait.type", "two_color", "give one of rectangle, centre with radius, and path"
+            )
+        return self
+
+    @property
+    def curve(self) -> Path:
+        """The closed curve in the alpha_1-alpha_2 plane."""
+        if self.rectangle is not None:
+            return rectangle(*self.rectangle, self.color)
+        if self.centre is not None and self.radius is not None:
+            return Circle(self.color, self.centre, self.radius)
+        return Polyline(tuple(Leg(leg.color, leg.vertices) for leg in self.path))
+
+    def unscaled(self, vehicle: Vehicle) -> PlannedGait:
+        """See `GaitTable.unscaled`."""
+        return four_angle_gait(self.curve, self.period, vehicle)
+
+    @property
+    def size(self) -> tuple[str, object]:
+        """See `GaitTable.size`."""
+        if self.rectangle is not None:
+            return "rectangle", self.rectangle
+        return ("radius", self.radius) if self.radius is not None else ("path", len(self.path))
+
+
+Gait = Annotated[
+    FixedGait | TrotGait | CatGait | WaypointGait | TwoColorGait, Field(discriminator="type")
+]
+"""The ``[gait]`` table, told apart by its type."""

@@ -1,0 +1,24 @@
+"""What the tables of a scenario file are made of."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Positive = Annotated[float, Field(gt=0.0)]
+NonNegative = Annotated[float, Field(ge=0.0)]
+Angle = Annotated[float, Field(ge=-pi, le=pi, description="rad")]
+Vector3 = Annotated[tuple[float, float, float], Field(strict=False)]
+Angles2 = Annotated[tuple[Angle, Angle], Field(strict=False)]
+Angles3 = Annotated[tuple[Angle, Angle, Angle], Field(strict=False)]
+Angles4 = Annotated[tuple[Angle, Angle, Angle, Angle], Field(strict=False)]
+Gains2 = Annotated[tuple[float, float], Field(strict=False)]
+Positive4 = Annotated[tuple[Positive, Positive, Positive, Positive], Field(strict=False)]
+
+
+class Table(BaseModel):
+    """A table of the scenario file: unknown keys, NaN and loose types are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
