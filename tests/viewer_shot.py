@@ -99,7 +99,7 @@ def viewer_process(port: int, size: str = "800x600") -> Iterator[subprocess.Pope
     try:
         yield process
     finally:
-        process.terminate()
+        process.kill()  # it may be frozen and deaf to gentler words
         process.wait(10)
         process.stderr.close()
 

@@ -65,8 +65,8 @@ def singular_curves(n: Floats, points: int = 61) -> Floats:
 def forbidden_pitch(n: Floats, side: float, roll: Floats) -> Floats:
     """The interval of pitch that is out of reach at each roll, shape (N, len(roll), 2).
 
-    Out of reach is what lies beyond the curve: where ``n . r3`` has another sign than ``side``, that
-    of the singularity margin at the start of the flight. Empty intervals have both ends equal.
+    Out of reach is what lies beyond the curve: where ``n . r3`` has another sign than ``side``,
+    that of the singularity margin at the start of the flight. Empty intervals have both ends equal.
     """
     normal = n[:, :, np.newaxis] * side
     lift = normal[:, 1] * np.sin(roll) + normal[:, 2] * np.cos(roll)

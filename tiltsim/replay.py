@@ -45,7 +45,7 @@ def joint_positions(model: mujoco.MjModel, columns: Columns) -> Floats:
     qpos = np.tile(model.qpos0, (len(columns["time"]), 1))
     for joint in range(model.njnt):
         address = model.jnt_qposadr[joint]
-        kind = model.jnt_type[joint]
+        kind = mujoco.mjtJoint(model.jnt_type[joint])
         if kind == mujoco.mjtJoint.mjJNT_FREE:
             qpos[:, address : address + 3] = _stack(columns, ("x", "y", "z"))
             angles = _stack(columns, ("roll", "pitch", "yaw")).tolist()

@@ -174,9 +174,9 @@ def _plane(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
 def _mesh(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
     import rerun as rr
 
-    mesh = model.mesh(model.geom_dataid[geom])
-    first, count = int(mesh.faceadr[0]), int(mesh.facenum[0])
-    vertex, normal = int(mesh.vertadr[0]), int(mesh.normaladr[0])
+    mesh = model.geom_dataid[geom]
+    first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
+    vertex, normal = model.mesh_vertadr[mesh], model.mesh_normaladr[mesh]
     # MuJoCo numbers vertices and normals apart, Rerun together: every corner becomes a vertex.
     corners = model.mesh_vert[vertex + model.mesh_face[first : first + count].ravel()]
     normals = model.mesh_normal[normal + model.mesh_facenormal[first : first + count].ravel()]

@@ -81,6 +81,8 @@ class LiveStream:
         """Send what is left and stop, within `FAREWELL` seconds at most."""
         self._over.set()
         self._thread.join(FAREWELL)
+        if self._thread.is_alive():
+            _leave_behind()
 
     def _send_all(self) -> None:
         try:
@@ -92,7 +94,7 @@ class LiveStream:
                 self._recorder.finish(self._end)
             self._recording.disconnect()
         except Exception as error:  # the flight goes on, whatever befalls its picture
-            print(f"tiltsim: live view ended: {error}", file=sys.stderr)  # noqa: T201
+            sys.stderr.write(f"tiltsim: live view ended: {error}\n")
 
     def _send_waiting(self) -> None:
         """Send all samples that have come since the last time, as one piece of the flight."""
@@ -106,3 +108,11 @@ class LiveStream:
             now = float(samples[-1][0])
             piece = Flight(self._scenario, np.array(samples), End("completed", now), "python", 0.0)
             self._recorder.append(piece)
+
+
+def _leave_behind() -> None:
+    """Let the program end although a viewer has not taken all: Rerun would wait without end."""
+    import rerun as rr
+
+    rr.unregister_shutdown()
+    sys.stderr.write("tiltsim: the viewer does not answer; the live view is incomplete\n")
