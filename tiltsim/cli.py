@@ -10,7 +10,10 @@ from typing import Final, NoReturn
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT
 
-COMMANDS: Final = ("run", "check", "list", "gait", "map", "bench", "schema")
+COMMANDS: Final = (
+    *("run", "check", "list", "view", "plot", "video"),
+    *("gait", "map", "bench", "schema"),
+)
 
 
 class Parser(argparse.ArgumentParser):

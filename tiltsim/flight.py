@@ -65,11 +65,14 @@ COLUMN_UNITS: Final = {
 """Columns of a flight and their units, in the order of the file."""
 
 
+EndKind = Literal["completed", "diverged", "singular", "interrupted"]
+
+
 @dataclass(frozen=True)
 class End:
     """How a flight ended: ``kind``, when (s), and in words why."""
 
-    kind: Literal["completed", "diverged", "singular", "interrupted"]
+    kind: EndKind
     time: float
     cause: str = ""
 
@@ -132,13 +135,15 @@ class Flight:
         return pa.table([self.columns[name] for name in COLUMN_UNITS], schema=schema)
 
     def origin(self) -> dict[str, str]:
-        """Where the flight comes from: scenario (JSON), versions, seed, engine, end."""
+        """Where the flight comes from: scenario (JSON), versions, seed, engine, end, wall time."""
         return {
             "scenario": self.scenario.model_dump_json(),
             "address": self.scenario.address,
             "seed": str(self.scenario.simulation.seed),
             "engine": self.engine,
+            "wall_time": repr(self.wall_time),
             "end": self.end.kind,
+            "end_time": repr(self.end.time),
             "cause": self.end.cause,
             **{f"{name}_version": version(name) for name in ("tiltsim", "mujoco", "numpy")},
         }

@@ -77,7 +77,7 @@ class MujocoPlant:
 
     def __init__(self, scenario: Scenario) -> None:
         setup = control_setup(scenario)
-        self.model = build_model(scenario, len(setup.userdata))
+        self.model = build_model(scenario, userdata_size=len(setup.userdata))
         # A diverged state must stay visible; by default MuJoCo would silently start over.
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.data = mujoco.MjData(self.model)
@@ -172,8 +172,10 @@ _WARNINGS: Final = {
 }
 
 
-def build_model(scenario: Scenario, userdata_size: int) -> mujoco.MjModel:
-    """Compile the scenario's vehicle, without what is only drawn.
+def build_model(
+    scenario: Scenario, *, userdata_size: int = 0, visuals: bool = False
+) -> mujoco.MjModel:
+    """Compile the scenario's vehicle, with what is drawn of it only if asked.
 
     Raises `InputError` where MuJoCo cannot build it.
     """
@@ -188,7 +190,7 @@ def build_model(scenario: Scenario, userdata_size: int) -> mujoco.MjModel:
             tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump()),
             pod=Pod(**vehicle.pod.model_dump()),
             rotor_limits=RotorLimits(vehicle.min_rotor_speed, vehicle.max_rotor_speed),
-            visuals=False,
+            visuals=visuals,
         )
     except ValueError as error:
         raise InputError(f"{scenario.address or 'scenario'}: vehicle: {error}") from error

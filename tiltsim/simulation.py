@@ -52,6 +52,8 @@ def simulate(scenario: Scenario, observer: Observer | None = None) -> Flight:
     plant = make_plant(scenario)
     watch = Watch(scenario)
     samples = [_sample(plant)]
+    if observer is not None:
+        observer(samples[0])
     end = watch.judge(plant, samples[0])
     steps_left = simulation.steps
     start = perf_counter()
