@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from controllers.gaits import plans
-from controllers.published_gaits import PATHS, PUBLISHED_GAITS
+from controllers.published_gaits import DETERMINANT_CASES, PATHS, PUBLISHED_GAITS, TRIANGLE
 from controllers.singularity import residuals
 from controllers.two_color_planner import Circle
 from controllers.vehicle import PRESETS
@@ -21,7 +21,7 @@ from tiltsim.commands import map as map_command
 from tiltsim.errors import InputError
 from tiltsim.figures import style
 from tiltsim.figures.attainable import attainable_figure
-from tiltsim.figures.determinant import CASES, TRIANGLE, determinant_figure
+from tiltsim.figures.determinant import determinant_figure
 from tiltsim.figures.gait import comparison_figure, gait_figure, margin_figure
 from tiltsim.figures.two_color_map import map_figure
 
@@ -154,7 +154,7 @@ def test_vehicles_are_named_or_listed() -> None:
         ([], "give one of SCENARIO"),
         (["some", "--angles", "0,0,0,0"], "give one of SCENARIO"),
         (["--angles", "0,0,0,0", "--plot", "figure.xyz"], "unknown format 'xyz'"),
-        (["--angles", "0,0,0,0", "--plot", "/no/such/folder/f.png"], "No such file"),
+        (["--angles", "0,0,0,0", "--plot", "/no/such/folder/f.png"], "folder does not exist"),
     ],
 )
 def test_mistakes_are_one_clear_line(words, message) -> None:
@@ -249,7 +249,7 @@ def test_plot_option_writes_a_file(tmp_path, capsys) -> None:
         assert target.read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", DETERMINANT_CASES)
 def test_the_region_of_interest_is_free_of_singularities(case) -> None:
     """Ch. 3, Figs. 10-13: R > 0 within the triangle for all twenty pairs."""
     share = np.linspace(0.0, 1.0, 151)
@@ -261,7 +261,7 @@ def test_the_region_of_interest_is_free_of_singularities(case) -> None:
         + first[inside, np.newaxis] * (corners[1] - corners[0])
         + second[inside, np.newaxis] * (corners[2] - corners[0])
     )
-    for alpha_1, alpha_3 in CASES[case][1]:
+    for alpha_1, alpha_3 in DETERMINANT_CASES[case].pairs:
         angles = np.insert(points, [0, 1], [alpha_1, alpha_3], axis=1)
         assert residuals(angles, AR_DRONE).R.min() > 0.05
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from controllers import two_color_map
+from controllers.published_gaits import DETERMINANT_CASES, TRIANGLE
 from controllers.singularity import (
     determinant,
     margin_over_gait,
@@ -165,6 +166,31 @@ def map_report(vehicle: Vehicle, path: Path | None = None) -> dict[str, Any]:
             "warnings": list(verdict.warnings),
         }
     return report
+
+
+def determinant_report(case: str, vehicle: Vehicle, samples: int = 101) -> dict[str, Any]:
+    """How far a restriction of ch. 3 stays from singular (``tiltsim gait --figure determinant``).
+
+    For each pair ``(alpha_1, alpha_3)`` the least ``R`` over the region of interest of
+    ``(alpha_2, alpha_4)``, the triangle U V M with its edges.
+    """
+    corners = np.array(TRIANGLE)
+    share = np.linspace(0.0, 1.0, samples)
+    first, second = np.meshgrid(share, share)
+    weights = np.stack([1.0 - first, first * (1.0 - second), first * second], axis=-1)
+    points = weights.reshape(-1, 3) @ corners
+    pairs = []
+    for alpha_1, alpha_3 in DETERMINANT_CASES[case].pairs:
+        angles = np.insert(points, [0, 1], [alpha_1, alpha_3], axis=1)
+        least = float(residuals(angles, vehicle).R.min())
+        pairs.append({"alpha_1": alpha_1, "alpha_3": alpha_3, "least_R": least})
+    return {
+        "case": case,
+        "restriction": DETERMINANT_CASES[case].restriction,
+        "vehicle": vehicle_name(vehicle),
+        "triangle": [list(corner) for corner in TRIANGLE],
+        "pairs": pairs,
+    }
 
 
 def vehicle_name(vehicle: Vehicle) -> str | dict[str, float]:
