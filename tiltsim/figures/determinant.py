@@ -46,7 +46,8 @@ def determinant_figure(case: str, vehicle: Vehicle) -> Figure:
     largest = max(float(np.abs(R).max()) for _, _, R in grids)
     with style.paper_style():
         figure = style.new_figure(9.2, 5.6)
-        upper, lower = figure.subfigures(2, 1, height_ratios=[1.0, 1.45])
+        parts: Any = figure.subfigures(2, 1, height_ratios=[1.0, 1.45])
+        upper, lower = parts
         upper.suptitle(
             f"Determinant R at level attitude, {restriction}", x=0.012, ha="left", fontsize=10
         )
@@ -69,6 +70,7 @@ def determinant_figure(case: str, vehicle: Vehicle) -> Figure:
             axes.set(xlabel="α₂ (rad)", ylabel="R", title=title)
             axes.margins(x=0.0)
         handles, labels = falling.get_legend_handles_labels()
+        # Equal and opposite alpha_1 may give one curve: short dashes over long ones show both.
         lower.legend(handles, labels, loc="outside lower center", ncols=len(pairs))
         return figure
 
@@ -77,7 +79,7 @@ def _surface(surface: Any, cells: Any, largest: float) -> None:
     alpha_2, alpha_4, R = cells
     surface.plot_surface(
         *(alpha_2, alpha_4, R),
-        cmap="PuOr",
+        cmap=style.SEQUENTIAL,
         vmin=-largest,
         vmax=largest,
         rcount=60,
@@ -85,8 +87,12 @@ def _surface(surface: Any, cells: Any, largest: float) -> None:
         lw=0.0,
         antialiased=False,
     )
-    surface.contour(alpha_2, alpha_4, R, [0.0], colors=[style.INK], linewidths=[1.4], zorder=10)
-    surface.set(xticks=[-2, 0, 2], yticks=[-2, 0, 2], zticks=[-5, 0, 5], zlim=(-largest, largest))
+    # Drawn at the foot, where nothing hides it.
+    foot = -1.15 * largest
+    surface.contour(
+        alpha_2, alpha_4, R, [0.0], zdir="z", offset=foot, colors=[style.INK], linewidths=[1.0]
+    )
+    surface.set(xticks=[-2, 0, 2], yticks=[-2, 0, 2], zticks=[-5, 0, 5], zlim=(foot, largest))
     surface.set_xlabel("α₂", labelpad=-8)
     surface.set_ylabel("α₄", labelpad=-8)
     surface.tick_params(pad=-3, labelsize=7)

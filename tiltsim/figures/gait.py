@@ -54,7 +54,7 @@ def comparison_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure
     ``gaits`` are pairs of title and gait (ch. 6, Figs. 21-28; ch. 8, Figs. 10-14).
     """
     with style.paper_style():
-        figure = style.new_figure(3.3 * len(gaits) + 0.8, 3.6)
+        figure = style.new_figure(3.5 * len(gaits) + 0.8, 4.2)
         row = figure.subplots(1, len(gaits), squeeze=False, sharey=True)[0]
         for axes, (title, gait) in zip(row, gaits, strict=True):
             _roll_pitch(axes, gait, vehicle)
