@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from controllers.singularity import determinant, margin_over_gait
+from controllers.singularity import determinant, margin_over_gait, singular_values
 from controllers.unacceptable_attitudes import unacceptable_attitudes
+from tiltsim.analysis import NEARLY_SINGULAR
 from tiltsim.figures import style
 
 if TYPE_CHECKING:
@@ -97,19 +98,16 @@ def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> None:
     colors = colormaps[style.SEQUENTIAL](np.arange(len(curves)) / len(curves) * _LAST_SHADE)
     for curve, color in zip(curves, colors, strict=True):
         axes.plot(curve.roll, curve.pitch, color=style.RED if len(curves) == 1 else color, lw=1.3)
+    values = singular_values(angles, vehicle)
+    conditioning = float((values[:, 2] / values[:, 0]).min())
+    if not singular and conditioning < NEARLY_SINGULAR:
+        _note(axes, 0.75, f"nearly singular at every attitude:\nσ₃/σ₁ of τ is {conditioning:.0e}")
     if singular:
         share = "at every attitude"
         if singular < len(curves):
             share += f",\nat {singular} of {len(curves)} instants"
         axes.set_facecolor("#F3F3F3")
-        axes.text(
-            *(0.0, 0.75 if singular < len(curves) else 0.35),
-            f"singular {share}",
-            ha="center",
-            va="center",
-            color=style.INK,
-            bbox={"facecolor": "white", "edgecolor": style.GREY, "linewidth": 0.6},
-        )
+        _note(axes, 0.75 if singular < len(curves) else 0.35, f"singular {share}")
     axes.plot(0.0, 0.0, "+", color=style.INK, ms=8, mew=1.2)
     style.angle_axis(axes, "x", pi / 2)
     style.angle_axis(axes, "y", pi / 2)
@@ -117,6 +115,11 @@ def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> None:
     axes.set_xlabel("roll φ (rad)")
     axes.set_ylabel("pitch θ (rad)")
     axes.set_title(f"Unacceptable attitudes, {gait.name}")
+
+
+def _note(axes: Axes, height: float, text: str) -> None:
+    box = {"facecolor": "white", "edgecolor": style.GREY, "linewidth": 0.6}
+    axes.text(0.0, height, text, ha="center", va="center", color=style.INK, bbox=box, zorder=8)
 
 
 def _time_bar(figure: Figure, diagrams: list[Axes], gait: Gait) -> None:
