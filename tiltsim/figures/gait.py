@@ -101,7 +101,8 @@ def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> None:
     values = singular_values(angles, vehicle)
     conditioning = float((values[:, 2] / values[:, 0]).min())
     if not singular and conditioning < NEARLY_SINGULAR:
-        _note(axes, 0.75, f"nearly singular at every attitude:\nσ₃/σ₁ of τ is {conditioning:.0e}")
+        ratio = f"{conditioning:.0e}".replace("e-0", "e−")
+        _note(axes, 0.75, f"nearly singular at every attitude:\nσ₃/σ₁ of τ is {ratio}")
     if singular:
         share = "at every attitude"
         if singular < len(curves):
