@@ -7,6 +7,7 @@ import json
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,6 +30,7 @@ from tiltsim.figures.gait import comparison_figure, gait_figure, margin_figure
 from tiltsim.figures.two_color_map import map_figure
 
 AR_DRONE = PRESETS["ar_drone_2"]
+GAIT_PAGE = Path(__file__).parents[1] / "docs" / "gaits.md"
 ATTAINABLE = ["--figure", "attainable", "--plot", "f.png"]
 
 
@@ -198,6 +200,12 @@ def test_the_table_of_published_gaits(capsys) -> None:
     assert re.search(r"ch06_gait_3 +red +printed +1.57\d\d +1.57\d\d +1.2995 +\S+ +yes", output)
     assert re.search(r"ch06_gait_1 +blue +printed +-1.3738 +0.0000 +-1.5183 +0 +no", output)
     assert len({line.index("claim holds") for line in lines if "claim holds" in line}) == 1
+
+
+@pytest.mark.skipif(not GAIT_PAGE.is_file(), reason="the docs are not part of a distribution")
+def test_the_page_on_gaits_shows_the_table_of_today(capsys) -> None:
+    run("gait", "--list")
+    assert capsys.readouterr().out in GAIT_PAGE.read_text(encoding="utf-8")
 
 
 def test_no_number_is_a_negative_zero(capsys) -> None:

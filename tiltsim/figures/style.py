@@ -54,7 +54,7 @@ _SETTINGS: Final = {
     "legend.frameon": False,
     "lines.linewidth": 1.4,
     "figure.dpi": 100,
-    "savefig.dpi": 200,
+    "savefig.dpi": 160,
     "svg.hashsalt": "tiltsim",
     "pdf.fonttype": 42,
 }
