@@ -40,6 +40,11 @@ SAMPLE_FIELDS: Final = (
 )
 """What a recorded sample holds, in order."""
 
+TILTS: Final = slice(SAMPLE_FIELDS.index("alpha_1"), SAMPLE_FIELDS.index("alpha_4") + 1)
+ROTOR_SPEEDS: Final = slice(
+    SAMPLE_FIELDS.index("rotor_speed_1"), SAMPLE_FIELDS.index("rotor_speed_4") + 1
+)
+
 _FOUR: Final = (1, 2, 3, 4)
 COLUMN_UNITS: Final = {
     "time": "s",
@@ -60,11 +65,14 @@ COLUMN_UNITS: Final = {
 """Columns of a flight and their units, in the order of the file."""
 
 
+EndKind = Literal["completed", "diverged", "singular", "interrupted"]
+
+
 @dataclass(frozen=True)
 class End:
     """How a flight ended: ``kind``, when (s), and in words why."""
 
-    kind: Literal["completed", "diverged", "singular", "interrupted"]
+    kind: EndKind
     time: float
     cause: str = ""
 
@@ -78,6 +86,9 @@ class Flight:
     end: End
     engine: EngineName
     wall_time: float  # s, integration alone
+
+    def __post_init__(self) -> None:
+        self.samples.setflags(write=False)  # what is derived from them is kept
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -97,7 +108,7 @@ class Flight:
         speeds = [known[f"rotor_speed_{i}"] for i in _FOUR]
         for i, sign, speed in zip(_FOUR, SPIN, speeds, strict=True):
             known[f"thrust_{i}"] = law.vehicle.thrust_coefficient * sign * speed * np.abs(speed)
-        tilts, attitude = self.samples[:, 13:17], (known["roll"], known["pitch"])
+        tilts, attitude = self.samples[:, TILTS], (known["roll"], known["pitch"])
         known["singularity_margin"] = margin_over_gait(tilts, law.vehicle, *attitude)
         known["determinant"] = determinant(tilts, *attitude, law.vehicle)
         return {name: known[name] for name in COLUMN_UNITS}
@@ -124,13 +135,15 @@ class Flight:
         return pa.table([self.columns[name] for name in COLUMN_UNITS], schema=schema)
 
     def origin(self) -> dict[str, str]:
-        """Where the flight comes from: scenario (JSON), versions, seed, engine, end."""
+        """Where the flight comes from: scenario (JSON), versions, seed, engine, end, wall time."""
         return {
             "scenario": self.scenario.model_dump_json(),
             "address": self.scenario.address,
             "seed": str(self.scenario.simulation.seed),
             "engine": self.engine,
+            "wall_time": repr(self.wall_time),
             "end": self.end.kind,
+            "end_time": repr(self.end.time),
             "cause": self.end.cause,
             **{f"{name}_version": version(name) for name in ("tiltsim", "mujoco", "numpy")},
         }
@@ -147,8 +160,9 @@ def _references(samples: Floats, setup: ControlSetup) -> dict[str, Floats]:
     law, table = setup.parameters.law, setup.table
     rows = []
     ratio = drag_ratio(law.vehicle)
-    for time, *state in samples.tolist():
-        trig = sines_and_cosines(*state[12:16])
+    for sample in samples.tolist():
+        time, state = sample[0], sample[1:]
+        trig = sines_and_cosines(*sample[TILTS])
         position = position_reference(time, law.reference)[:3]
         torque = torque_entries(trig, ratio)
         attitude = attitude_reference(time, state, trig, torque, law)[:3]

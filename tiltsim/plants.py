@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.gaits import tilt_reference
+from controllers.records import slotted
 from controllers.rotation import quaternion_from_euler
 from controllers.vehicle import SPIN
 from tiltsim import thesis_plant
@@ -76,7 +77,7 @@ class MujocoPlant:
 
     def __init__(self, scenario: Scenario) -> None:
         setup = control_setup(scenario)
-        self.model = build_model(scenario, len(setup.userdata))
+        self.model = build_model(scenario, userdata_size=len(setup.userdata))
         # A diverged state must stay visible; by default MuJoCo would silently start over.
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.data = mujoco.MjData(self.model)
@@ -113,6 +114,8 @@ class MujocoPlant:
         mujoco.mj_resetData(self.model, self.data)  # clears the warnings
         mujoco.mj_setState(self.model, self.data, value, _INTEGRATION)
         mujoco.mj_forward(self.model, self.data)
+        # The state brings its own parameters, which the Python engine reads once.
+        self._engine = make_engine(self.engine, TILTROTOR, self.model, self.data)
 
     @property
     def _steps_taken(self) -> int:
@@ -162,15 +165,17 @@ def quiet_warnings() -> Iterator[None]:
 
 _INTEGRATION: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _WARNINGS: Final = {
-    mujoco.mjtWarning.mjWARN_BADCTRL: "the control law returned NaN",
+    mujoco.mjtWarning.mjWARN_BADCTRL: "the control law returned NaN or a value beyond 1e10",
     mujoco.mjtWarning.mjWARN_BADQPOS: "positions are NaN or beyond 1e10",
     mujoco.mjtWarning.mjWARN_BADQVEL: "velocities are NaN or beyond 1e10",
     mujoco.mjtWarning.mjWARN_BADQACC: "accelerations are NaN or beyond 1e10",
 }
 
 
-def build_model(scenario: Scenario, userdata_size: int) -> mujoco.MjModel:
-    """Compile the scenario's vehicle, without what is only drawn.
+def build_model(
+    scenario: Scenario, *, userdata_size: int = 0, visuals: bool = False
+) -> mujoco.MjModel:
+    """Compile the scenario's vehicle, with what is drawn of it only if asked.
 
     Raises `InputError` where MuJoCo cannot build it.
     """
@@ -185,7 +190,7 @@ def build_model(scenario: Scenario, userdata_size: int) -> mujoco.MjModel:
             tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump()),
             pod=Pod(**vehicle.pod.model_dump()),
             rotor_limits=RotorLimits(vehicle.min_rotor_speed, vehicle.max_rotor_speed),
-            visuals=False,
+            visuals=visuals,
         )
     except ValueError as error:
         raise InputError(f"{scenario.address or 'scenario'}: vehicle: {error}") from error
@@ -197,6 +202,7 @@ class ThesisPlant:
     def __init__(self, scenario: Scenario) -> None:
         simulation, initial = scenario.simulation, scenario.initial
         self._setup = control_setup(scenario)
+        self._law = slotted(self._setup.parameters.law)
         self._timestep = simulation.timestep
         self._control_steps = simulation.control_steps
         self._step_index = 0
@@ -217,7 +223,10 @@ class ThesisPlant:
 
     @property
     def state(self) -> Floats:
-        """See `Plant.state`: the step count and the state of `tiltsim.thesis_plant`."""
+        """See `Plant.state`: the step count and the state of `tiltsim.thesis_plant`.
+
+        The parameters are the scenario's and stay with the plant.
+        """
         return np.array([self._step_index, *self._state])
 
     @state.setter
@@ -239,7 +248,7 @@ class ThesisPlant:
             try:
                 self._state = thesis_plant.advance(
                     *(self._step_index, self._state, self._timestep, steps, self._control_steps),
-                    *(self._setup.parameters.law, self._setup.table),
+                    *(self._law, self._setup.table),
                 )
             except (ArithmeticError, ValueError):
                 self._fault = "the control law left the range of floating-point numbers"
