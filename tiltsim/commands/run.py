@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 from contextlib import ExitStack
+from importlib import import_module
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.progress import progress_bar
@@ -72,6 +74,9 @@ def run(arguments: argparse.Namespace) -> int:
     vehicle = scenario.vehicle.resolve()
     for warning in gait_warnings(scenario.gait.plan(vehicle), vehicle):
         print(f"tiltsim: warning: gait: {warning}", file=sys.stderr)
+    if arguments.rerun is not None:
+        # Rerun takes half a second to import; native physics leaves a processor for that.
+        Thread(target=import_module, args=("rerun",), daemon=True).start()
     flight = fly(scenario, arguments)
     if arguments.out is not None:
         flight.save(arguments.out)
