@@ -135,8 +135,8 @@ def solve_by_pairs(
     determinant = yaw_13 * lift_24 - yaw_24 * lift_13
     if norm_24 == 0.0 or norm_13 == 0.0 or determinant == 0.0:
         return nan, nan, nan, nan
-    v2, v4 = roll * x2 / norm_24, roll * x4 / norm_24
-    v1, v3 = pitch * y1 / norm_13, pitch * y3 / norm_13
+    roll, pitch = roll / norm_24, pitch / norm_13
+    v1, v2, v3, v4 = pitch * y1, roll * x2, pitch * y3, roll * x4
     yaw = yaw - (z1 * v1 + z2 * v2 + z3 * v3 + z4 * v4)
     lift = lift - (h1 * v1 + h2 * v2 + h3 * v3 + h4 * v4)
     nu = (yaw * lift_24 - yaw_24 * lift) / determinant

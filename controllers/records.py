@@ -30,6 +30,21 @@ def unflatten(record_type: type[Record], values: Iterable[float]) -> Record:
     return record
 
 
+def slotted(record: Any) -> Any:
+    """The same fields in an object with slots, which Python reads several times faster.
+
+    For the parameters of a law that is evaluated a hundred thousand times; everything else keeps
+    the record.
+    """
+    if not isinstance(record, tuple):
+        return record
+    fields: tuple[str, ...] = record._fields  # type: ignore[attr-defined]
+    view = type(type(record).__name__, (), {"__slots__": fields})()
+    for name, value in zip(fields, record):
+        setattr(view, name, slotted(value))
+    return view
+
+
 def _take(record_type: Any, values: Iterator[float]) -> Any:
     fields = get_type_hints(record_type).values()
     return record_type(

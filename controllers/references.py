@@ -46,6 +46,8 @@ def position_reference(time: float, reference: ReferenceParameters) -> tuple[flo
     Returns ``(x, y, z, vx, vy, vz, ax, ay, az)``. Ch. 4 sets the acceleration to zero for the
     circle too (Sec. 6.3); `ReferenceParameters.acceleration_feedforward` restores it.
     """
+    if reference.type == SETPOINT:
+        return reference.x, reference.y, reference.z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if reference.type == CIRCLE:
         radius = reference.radius
         omega = reference.angular_frequency

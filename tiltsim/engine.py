@@ -16,7 +16,7 @@ from typing import Any, Literal, Protocol
 
 import mujoco
 
-from controllers.records import unflatten
+from controllers.records import slotted, unflatten
 from tiltsim.loop import Loop, Sizes
 
 EngineName = Literal["python", "native"]
@@ -49,7 +49,7 @@ class PythonEngine:
         controls, refresh = loop.controls, loop.refresh
         # Parameters never change during a flight: read once what native code reads at every call.
         values = data.userdata.tolist()
-        parameters = unflatten(loop.parameters, values)
+        parameters = slotted(unflatten(loop.parameters, values))
         table = tuple(values[loop.record_size :])
         # Views of MuJoCo's own memory; looking them up anew would cost a tenth of the callback.
         qpos, qvel, act, ctrl = data.qpos, data.qvel, data.act, data.ctrl

@@ -141,8 +141,8 @@ def _first_line(error: Exception) -> str:
 
 
 def metrics_json(metrics: dict[str, float | bool]) -> str:
-    """Metrics as a flat JSON object, sorted as computed, numbers with all their digits."""
-    return json.dumps(metrics, indent=2) + "\n"
+    """Metrics as a flat JSON object in the order of `METRICS`, with all their digits."""
+    return json.dumps(metrics, indent=2, allow_nan=False) + "\n"
 
 
 def scenario_toml(scenario: Scenario) -> str:

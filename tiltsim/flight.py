@@ -40,6 +40,11 @@ SAMPLE_FIELDS: Final = (
 )
 """What a recorded sample holds, in order."""
 
+TILTS: Final = slice(SAMPLE_FIELDS.index("alpha_1"), SAMPLE_FIELDS.index("alpha_4") + 1)
+ROTOR_SPEEDS: Final = slice(
+    SAMPLE_FIELDS.index("rotor_speed_1"), SAMPLE_FIELDS.index("rotor_speed_4") + 1
+)
+
 _FOUR: Final = (1, 2, 3, 4)
 COLUMN_UNITS: Final = {
     "time": "s",
@@ -82,6 +87,9 @@ class Flight:
     engine: EngineName
     wall_time: float  # s, integration alone
 
+    def __post_init__(self) -> None:
+        self.samples.setflags(write=False)  # what is derived from them is kept
+
     def __len__(self) -> int:
         """Number of samples."""
         return len(self.samples)
@@ -100,7 +108,7 @@ class Flight:
         speeds = [known[f"rotor_speed_{i}"] for i in _FOUR]
         for i, sign, speed in zip(_FOUR, SPIN, speeds, strict=True):
             known[f"thrust_{i}"] = law.vehicle.thrust_coefficient * sign * speed * np.abs(speed)
-        tilts, attitude = self.samples[:, 13:17], (known["roll"], known["pitch"])
+        tilts, attitude = self.samples[:, TILTS], (known["roll"], known["pitch"])
         known["singularity_margin"] = margin_over_gait(tilts, law.vehicle, *attitude)
         known["determinant"] = determinant(tilts, *attitude, law.vehicle)
         return {name: known[name] for name in COLUMN_UNITS}
@@ -152,8 +160,9 @@ def _references(samples: Floats, setup: ControlSetup) -> dict[str, Floats]:
     law, table = setup.parameters.law, setup.table
     rows = []
     ratio = drag_ratio(law.vehicle)
-    for time, *state in samples.tolist():
-        trig = sines_and_cosines(*state[12:16])
+    for sample in samples.tolist():
+        time, state = sample[0], sample[1:]
+        trig = sines_and_cosines(*sample[TILTS])
         position = position_reference(time, law.reference)[:3]
         torque = torque_entries(trig, ratio)
         attitude = attitude_reference(time, state, trig, torque, law)[:3]

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from controllers.vehicle import SPIN, Vehicle
+from tiltsim.library import shipped_folder
 
 if TYPE_CHECKING:
     import mujoco
@@ -143,13 +144,6 @@ class RotorLimits:
         return (lower, upper) if spin > 0.0 else (-upper, -lower)
 
 
-def mjcf_directory() -> Path:
-    """The folder of the MJCF files: inside the installed package, or next to it in a checkout."""
-    package = Path(__file__).resolve().parent
-    installed = package / "mjcf"
-    return installed if installed.is_dir() else package.parent / "mjcf"
-
-
 def compile_model(
     model: str,
     vehicle: Vehicle,
@@ -231,7 +225,7 @@ def _compose(
     The arguments are `compile_model`'s, found valid. A flight is flown on the one and shown on the
     other, so both are made at once.
     """
-    root = _parse(mjcf_directory() / f"{model}.xml")
+    root = _parse(shipped_folder("mjcf") / f"{model}.xml")
     tilting = model == "tiltrotor"
     stops = tilting and tilt_servo.max_angle is not None
 

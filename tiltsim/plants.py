@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.gaits import tilt_reference
+from controllers.records import slotted
 from controllers.rotation import quaternion_from_euler
 from controllers.vehicle import SPIN
 from tiltsim import thesis_plant
@@ -113,6 +114,8 @@ class MujocoPlant:
         mujoco.mj_resetData(self.model, self.data)  # clears the warnings
         mujoco.mj_setState(self.model, self.data, value, _INTEGRATION)
         mujoco.mj_forward(self.model, self.data)
+        # The state brings its own parameters, which the Python engine reads once.
+        self._engine = make_engine(self.engine, TILTROTOR, self.model, self.data)
 
     @property
     def _steps_taken(self) -> int:
@@ -162,7 +165,7 @@ def quiet_warnings() -> Iterator[None]:
 
 _INTEGRATION: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _WARNINGS: Final = {
-    mujoco.mjtWarning.mjWARN_BADCTRL: "the control law returned NaN",
+    mujoco.mjtWarning.mjWARN_BADCTRL: "the control law returned NaN or a value beyond 1e10",
     mujoco.mjtWarning.mjWARN_BADQPOS: "positions are NaN or beyond 1e10",
     mujoco.mjtWarning.mjWARN_BADQVEL: "velocities are NaN or beyond 1e10",
     mujoco.mjtWarning.mjWARN_BADQACC: "accelerations are NaN or beyond 1e10",
@@ -199,6 +202,7 @@ class ThesisPlant:
     def __init__(self, scenario: Scenario) -> None:
         simulation, initial = scenario.simulation, scenario.initial
         self._setup = control_setup(scenario)
+        self._law = slotted(self._setup.parameters.law)
         self._timestep = simulation.timestep
         self._control_steps = simulation.control_steps
         self._step_index = 0
@@ -219,7 +223,10 @@ class ThesisPlant:
 
     @property
     def state(self) -> Floats:
-        """See `Plant.state`: the step count and the state of `tiltsim.thesis_plant`."""
+        """See `Plant.state`: the step count and the state of `tiltsim.thesis_plant`.
+
+        The parameters are the scenario's and stay with the plant.
+        """
         return np.array([self._step_index, *self._state])
 
     @state.setter
@@ -241,7 +248,7 @@ class ThesisPlant:
             try:
                 self._state = thesis_plant.advance(
                     *(self._step_index, self._state, self._timestep, steps, self._control_steps),
-                    *(self._setup.parameters.law, self._setup.table),
+                    *(self._law, self._setup.table),
                 )
             except (ArithmeticError, ValueError):
                 self._fault = "the control law left the range of floating-point numbers"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import copysign
+from math import copysign, hypot, isfinite
 from time import perf_counter
 from typing import Final
 
@@ -13,10 +13,13 @@ from controllers.decoupling_matrix import sines_and_cosines, torque_entries, tor
 from controllers.references import position_reference
 from controllers.rotation import world_up_in_body
 from controllers.vehicle import SPIN, drag_ratio
-from tiltsim.flight import SAMPLE_FIELDS, End, Flight, Floats
+from tiltsim.flight import ROTOR_SPEEDS, SAMPLE_FIELDS, TILTS, End, Flight, Floats
 from tiltsim.parameters import control_setup
 from tiltsim.plants import Plant, make_plant
 from tiltsim.scenario import Scenario
+
+X, Y, Z, ROLL, PITCH = (SAMPLE_FIELDS.index(name) for name in ("x", "y", "z", "roll", "pitch"))
+BODY_RATES: Final = slice(SAMPLE_FIELDS.index("p"), SAMPLE_FIELDS.index("r") + 1)
 
 MAX_POSITION_ERROR: Final = 1e4  # m
 MAX_BODY_RATE: Final = 1e3  # rad/s, far above what any rotorcraft survives
@@ -104,36 +107,37 @@ class Watch:
 
     def judge(self, plant: Plant, sample: Floats) -> End | None:
         """The end that a sample spells, None while the flight goes on."""
-        time = float(sample[0])
+        values = sample.tolist()
+        time = values[0]
+        finite = all(map(isfinite, values))
         fault = plant.fault()
         if fault:
-            return End("diverged", time, fault)
-        if not np.isfinite(sample).all():
-            name = SAMPLE_FIELDS[int(np.argmin(np.isfinite(sample)))]
+            singular = self._judge_singularity(time, values) if finite else None
+            return singular or End("diverged", time, fault)
+        if not finite:
+            name = SAMPLE_FIELDS[[isfinite(value) for value in values].index(False)]
             return End("diverged", time, f"{name} is no longer a finite number")
-        return self._judge_limits(time, sample) or self._judge_singularity(time, sample)
+        return self._judge_limits(time, values) or self._judge_singularity(time, values)
 
-    def _judge_limits(self, time: float, sample: Floats) -> End | None:
-        state = dict(zip(SAMPLE_FIELDS, sample.tolist(), strict=True))
+    def _judge_limits(self, time: float, sample: list[float]) -> End | None:
         target = position_reference(time, self._law.reference)
         if self._scenario.controller.decoupler != "none":
-            error = float(np.hypot(target[0] - state["x"], target[1] - state["y"]))
+            error = hypot(target[0] - sample[X], target[1] - sample[Y])
             if error > MAX_POSITION_ERROR:
                 return End("diverged", time, f"{error:.3g} m away from the reference")
-        error = abs(target[2] - state["z"])
+        error = abs(target[2] - sample[Z])
         if error > MAX_POSITION_ERROR:
             return End("diverged", time, f"{error:.3g} m away from the reference altitude")
-        for name in ("p", "q", "r"):
-            if abs(state[name]) > MAX_BODY_RATE:
-                return End("diverged", time, f"body rate {name} = {state[name]:.3g} rad/s")
-        for rotor in (1, 2, 3, 4):
-            speed = state[f"rotor_speed_{rotor}"]
+        for name, rate in zip("pqr", sample[BODY_RATES]):
+            if abs(rate) > MAX_BODY_RATE:
+                return End("diverged", time, f"body rate {name} = {rate:.3g} rad/s")
+        for rotor, speed in enumerate(sample[ROTOR_SPEEDS], start=1):
             if abs(speed) > MAX_ROTOR_SPEED:
                 return End("diverged", time, f"rotor {rotor} at {speed:.3g} rad/s")
         return None
 
-    def _judge_singularity(self, time: float, sample: Floats) -> End | None:
-        roll, pitch, *tilts = sample[[7, 8, 13, 14, 15, 16]].tolist()
+    def _judge_singularity(self, time: float, sample: list[float]) -> End | None:
+        roll, pitch, tilts = sample[ROLL], sample[PITCH], sample[TILTS]
         trig = sines_and_cosines(*tilts)
         ratio = drag_ratio(self._law.vehicle)
         n = torque_free_force(trig, torque_entries(trig, ratio), ratio)
@@ -151,8 +155,8 @@ class Watch:
             )
             return End("singular", time, cause)
         if self._scenario.controller.decoupling == "exact":
-            for rotor, sign in enumerate(SPIN, start=1):
-                if sign * sample[16 + rotor] <= 0.0:
+            for rotor, (sign, speed) in enumerate(zip(SPIN, sample[ROTOR_SPEEDS]), start=1):
+                if sign * speed <= 0.0:
                     cause = f"the decoupling matrix became singular: rotor {rotor} came to a stop"
                     return End("singular", time, cause)
         return None

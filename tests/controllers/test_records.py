@@ -9,7 +9,7 @@ import pytest
 
 from controllers.attitude_altitude import Gains, Parameters
 from controllers.gaits import GaitParameters
-from controllers.records import flatten, record_dtype, record_size, unflatten
+from controllers.records import flatten, record_dtype, record_size, slotted, unflatten
 from controllers.references import ReferenceParameters
 from controllers.vehicle import Vehicle
 
@@ -86,3 +86,12 @@ def test_unflatten_takes_only_what_it_needs():
     numbers = iter([*NUMBERS, 99.0])
     assert unflatten(Outer, numbers) == RECORD
     assert next(numbers) == 99.0
+
+
+def test_slotted_reads_like_the_record():
+    view = slotted(Outer(1.0, Middle(Inner(2.0, 3.0), 4.0), Inner(5.0, 6.0), 7.0))
+    assert (view.first, view.middle.c, view.last) == (1.0, 4.0, 7.0)
+    assert (view.middle.inner.a, view.middle.inner.b) == (2.0, 3.0)
+    assert (view.again.a, view.again.b) == (5.0, 6.0)
+    with pytest.raises(AttributeError):
+        view.misspelt = 1.0

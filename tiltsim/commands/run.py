@@ -11,14 +11,13 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.progress import progress_bar
+from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, FLIGHT_LOST, INTERRUPTED
 
 if TYPE_CHECKING:
     from tiltsim.expectations import Verdict
     from tiltsim.flight import Flight, Floats
     from tiltsim.rerun_stream import LiveStream
     from tiltsim.scenario import Scenario
-
-DONE, EXPECTATION_FAILED, FLIGHT_LOST, INTERRUPTED = 0, 1, 3, 130
 
 
 def add_parser(subparsers: Any) -> None:
@@ -31,7 +30,8 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "scenario",
         metavar="SCENARIO",
-        help="a TOML file or a name from the library, with #VARIANT for a member of a family",
+        help="a TOML file or a name from the library, with #VARIANT for a member of a family "
+        "(a family without #VARIANT flies its base if --set is given)",
     )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="write metrics.json, flight.parquet, scenario.toml"
@@ -72,11 +72,9 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.analysis import gait_warnings
 
     vehicle = scenario.vehicle.resolve()
-    for warning in gait_warnings(scenario.gait.plan(vehicle), vehicle):
-        print(f"tiltsim: warning: gait: {warning}", file=sys.stderr)
-    if arguments.rerun is not None:
-        # Rerun takes half a second to import; native physics leaves a processor for that.
-        Thread(target=import_module, args=("rerun",), daemon=True).start()
+    if not arguments.quiet:
+        for warning in gait_warnings(scenario.gait.plan(vehicle), vehicle):
+            print(f"tiltsim: warning: gait: {warning}", file=sys.stderr)
     flight = fly(scenario, arguments)
     if arguments.out is not None:
         flight.save(arguments.out)
@@ -84,6 +82,10 @@ def run(arguments: argparse.Namespace) -> int:
         from tiltsim.rerun_stream import save_recording
 
         save_recording([flight], arguments.rerun)
+    if flight.end.kind == "interrupted":
+        kept = f"; the flight so far is in {arguments.out}" if arguments.out is not None else ""
+        print(f"tiltsim: interrupted at t = {flight.end.time:.3f} s{kept}", file=sys.stderr)
+        return INTERRUPTED
     verdicts = judge(scenario, flight.metrics())
     if not arguments.quiet:
         print(summary(flight, verdicts))
@@ -91,8 +93,6 @@ def run(arguments: argparse.Namespace) -> int:
             print(f"written to {arguments.out}")
         if arguments.rerun is not None:
             print(f"recording written to {arguments.rerun}; open it with: rerun {arguments.rerun}")
-    if flight.end.kind == "interrupted":
-        return INTERRUPTED
     if flight.end.kind != "completed":
         print(f"tiltsim: {lost(flight)}", file=sys.stderr)
         return FLIGHT_LOST
@@ -112,7 +112,15 @@ def fly(scenario: Scenario, arguments: argparse.Namespace) -> Flight:
         bar = progress_bar(scenario.simulation.duration, "s", shown=not arguments.quiet)
         advance_to = stack.enter_context(bar)
 
+        # Rerun takes half a second to import; native physics leaves a processor for that, once its
+        # own imports are done.
+        at_start = [Thread(target=import_module, args=("rerun",), daemon=True).start]
+        if arguments.rerun is None:
+            at_start.clear()
+
         def observe(sample: Floats) -> None:
+            while at_start:
+                at_start.pop()()
             advance_to(float(sample[0]))
             if live is not None:
                 live(sample)
