@@ -203,19 +203,10 @@ def compile_model(
     for name, value in vehicle._asdict().items():
         _require_positive(f"vehicle.{name}", value, "(SI)")
 
-    return mujoco.MjModel.from_xml_string(
-        _compose(
-            model,
-            vehicle,
-            timestep,
-            integrator,
-            userdata_size,
-            tilt_servo,
-            pod,
-            rotor_limits,
-            visuals,
-        )
+    whole, bare = _compose(
+        model, vehicle, timestep, integrator, userdata_size, tilt_servo, pod, rotor_limits
     )
+    return mujoco.MjModel.from_xml_string(whole if visuals else bare)
 
 
 @lru_cache(maxsize=64)  # dm_control takes several times longer than MuJoCo's compiler
@@ -228,9 +219,12 @@ def _compose(
     tilt_servo: TiltServo,
     pod: Pod,
     rotor_limits: RotorLimits,
-    visuals: bool,
-) -> str:
-    """The vehicle's complete MJCF; the arguments are `compile_model`'s, found valid."""
+) -> tuple[str, str]:
+    """The vehicle's complete MJCF, and the same without what is only drawn.
+
+    The arguments are `compile_model`'s, found valid. A flight is flown on the one and shown on the
+    other, so both are made at once.
+    """
     root = _parse(shipped_folder("mjcf") / f"{model}.xml")
     tilting = model == "tiltrotor"
     stops = tilting and tilt_servo.max_angle is not None
@@ -249,10 +243,10 @@ def _compose(
         _set_servos(root, tilt_servo, pod)
     _set_keyframe(root.keyframe.key["hover"], vehicle.hover_rotor_speed)
     _set_keyframe(root.keyframe.key["start"], START_SPEED)
-    if not visuals:
-        for geom in root.find("body", "vehicle").find_all("geom"):
-            geom.remove()
-    return str(root.to_xml_string())
+    whole = str(root.to_xml_string())
+    for geom in root.find("body", "vehicle").find_all("geom"):
+        geom.remove()
+    return whole, str(root.to_xml_string())
 
 
 def _parse(path: Path) -> Any:

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.rotation import quaternion_from_euler
+from tiltsim.parameters import control_setup
 from tiltsim.plants import build_model
 
 if TYPE_CHECKING:
@@ -37,7 +38,9 @@ class Poses(NamedTuple):
 
 def visible_model(scenario: Scenario) -> mujoco.MjModel:
     """The compiled model of a scenario's vehicle with everything that is drawn."""
-    return build_model(scenario, visuals=True)
+    # The same arguments as for the flight: what they compose is then at hand.
+    userdata_size = len(control_setup(scenario).userdata)
+    return build_model(scenario, userdata_size=userdata_size, visuals=True)
 
 
 def joint_positions(model: mujoco.MjModel, columns: Columns) -> Floats:
