@@ -29,10 +29,10 @@ CORE = (
     *("model", "simulation", "scenario", "metrics", "flight", "plants", "engine", "loop"),
     *("loops", "controller_tables"),
 )
-SCREENS = ("__main__", "cli", "commands", "plot", "rerun", "report", "video", "viewer")
+SCREENS = ("__main__", "cli", "commands", "figures", "report", "rerun_stream", "video")
 """First letters of the modules that show flights; nothing that computes them may need one."""
 
-HEAVY = {"mujoco", "numba", "matplotlib", "rerun", "pyarrow", "dm_control", "pydantic"}
+HEAVY = {"av", "mujoco", "numba", "matplotlib", "rerun", "pyarrow", "dm_control", "pydantic"}
 
 in_every_module = pytest.mark.parametrize("module", TREES)
 
@@ -114,7 +114,7 @@ def test_the_core_needs_no_library_for_screens(name):
         for module in reachable(f"tiltsim.{name}")
         for imported in imports(module)
     }
-    assert not roots & {"argparse", "matplotlib", "rerun", "tqdm"}
+    assert not roots & {"argparse", "av", "matplotlib", "rerun", "tqdm"}
 
 
 @in_every_module

@@ -7,12 +7,20 @@ import os
 import tomllib
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 from tiltsim import files
 from tiltsim.errors import InputError
-from tiltsim.files import metrics_json, prepare_folder, save_flight, scenario_toml, without_none
+from tiltsim.files import (
+    load_flight,
+    metrics_json,
+    prepare_folder,
+    save_flight,
+    scenario_toml,
+    without_none,
+)
 from tiltsim.flight import COLUMN_UNITS, SAMPLE_FIELDS, End, Flight
 from tiltsim.loading import parse_scenario
 
@@ -150,3 +158,75 @@ def test_a_folder_that_is_not_writable_is_an_input_error(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "access", lambda _path, mode: mode != os.W_OK)
     with pytest.raises(InputError, match="not writable"):
         prepare_folder(tmp_path)
+
+
+# --- reading back ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", ["", "flight.parquet"])
+def test_a_flight_reads_back_whole(tmp_path, path):
+    written = flight(x=0.1 + 0.2)
+    written.save(tmp_path)
+    read = load_flight(tmp_path / path)
+    np.testing.assert_array_equal(read.samples, written.samples)
+    assert read.scenario == written.scenario
+    assert read.scenario.address == "by/hand"
+    assert (read.end, read.engine, read.wall_time) == (written.end, "python", 0.1)
+    assert read.metrics() == written.metrics()
+
+
+def refused(path):
+    with pytest.raises(InputError) as caught:
+        load_flight(path)
+    line = str(caught.value)
+    assert len(line.splitlines()) == 1
+    assert str(path) in line
+    return line
+
+
+def test_a_missing_flight_is_an_input_error(tmp_path):
+    assert "no flight.parquet in this folder" in refused(tmp_path)
+    assert "no such file" in refused(tmp_path / "nothing.parquet")
+
+
+@pytest.mark.parametrize("content", [b"", b"PAR1 and then noise", b"\0" * 1000])
+def test_a_file_that_is_no_parquet_is_an_input_error(tmp_path, content):
+    (tmp_path / "flight.parquet").write_bytes(content)
+    assert "not a readable Parquet file" in refused(tmp_path)
+
+
+def test_a_truncated_file_is_an_input_error(tmp_path):
+    flight().save(tmp_path)
+    file = tmp_path / "flight.parquet"
+    file.write_bytes(file.read_bytes()[:-100])
+    assert "not a readable Parquet file" in refused(file)
+
+
+def test_a_foreign_parquet_file_is_an_input_error(tmp_path):
+    file = tmp_path / "other.parquet"
+    pq.write_table(pa.table({"time": [0.0]}), file)
+    assert "not a flight" in refused(file)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("scenario", "{", "not a flight"),
+        ("engine", "steam", "engine 'steam' is unknown"),
+        ("end", "bored", "end 'bored' is unknown"),
+        ("end_time", "late", "not a flight"),
+        ("wall_time", None, "lack 'wall_time'"),
+    ],
+)
+def test_wrong_metadata_are_an_input_error(tmp_path, key, value, words):
+    table = flight().to_arrow()
+    metadata = {**table.schema.metadata, key.encode(): (value or "").encode()}
+    if value is None:
+        del metadata[key.encode()]
+    pq.write_table(table.replace_schema_metadata(metadata), tmp_path / "flight.parquet")
+    assert words in refused(tmp_path / "flight.parquet")
+
+
+def test_a_missing_column_is_an_input_error(tmp_path):
+    pq.write_table(flight().to_arrow().drop_columns(["vx"]), tmp_path / "flight.parquet")
+    assert "no column vx" in refused(tmp_path / "flight.parquet")

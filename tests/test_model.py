@@ -14,7 +14,8 @@ from scipy.integrate import solve_ivp
 
 from controllers.vehicle import PRESETS, SPIN, Vehicle
 from tests.thesis import force_matrix, torque_matrix
-from tiltsim.model import Pod, RotorLimits, TiltServo, compile_model, mjcf_directory
+from tiltsim.library import shipped_folder
+from tiltsim.model import Pod, RotorLimits, TiltServo, compile_model
 
 AR_DRONE = PRESETS["ar_drone_2"]
 LUUKKONEN = PRESETS["luukkonen"]
@@ -35,7 +36,7 @@ BUILDS = [
     (LUUKKONEN, Pod(mass=0.03, inertia=8e-5)),
     (BIG, Pod(mass=0.03, inertia=5e-4)),
 ]
-MJCF_FILES = sorted(mjcf_directory().glob("*.xml"))
+MJCF_FILES = sorted(shipped_folder("mjcf").glob("*.xml"))
 
 tilt_angles = st.tuples(*[st.floats(-np.pi, np.pi)] * 4).map(np.array)
 attitudes = (
@@ -96,7 +97,7 @@ def test_every_element_of_the_file_is_named_and_nothing_collides(path):
 
 @pytest.mark.parametrize("name", ["tiltrotor", "quadrotor"])
 def test_file_holds_what_compile_model_makes_of_chapter_3(name):
-    of_file = mujoco.MjModel.from_xml_path(str(mjcf_directory() / f"{name}.xml"))
+    of_file = mujoco.MjModel.from_xml_path(str(shipped_folder("mjcf") / f"{name}.xml"))
     ours = compiled(name, AR_DRONE)
     for field in (
         *("body_mass", "body_inertia", "body_ipos", "body_pos", "body_quat"),

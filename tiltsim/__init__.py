@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tiltsim.errors import InputError, TiltsimError
+    from tiltsim.files import load_flight
     from tiltsim.flight import End, Flight
     from tiltsim.loading import load_scenario, parse_scenario
     from tiltsim.scenario import Scenario
@@ -26,6 +27,7 @@ _HOMES = {
     "InputError": "errors",
     "Scenario": "scenario",
     "TiltsimError": "errors",
+    "load_flight": "files",
     "load_scenario": "loading",
     "parse_scenario": "loading",
     "simulate": "simulation",
@@ -37,6 +39,7 @@ __all__ = [
     "InputError",
     "Scenario",
     "TiltsimError",
+    "load_flight",
     "load_scenario",
     "parse_scenario",
     "simulate",

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Iterable
+import signal
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Literal
+from typing import Any, Literal
 from xml.etree import ElementTree
 
+from tiltsim.engine import EngineName
 from tiltsim.errors import InputError
+from tiltsim.expectations import Verdict, judge
 from tiltsim.library import library_name, read_toml, scenario_files, shipped_folder
 from tiltsim.loading import load_scenario, variant_names
+from tiltsim.loops import LOOPS
+from tiltsim.plants import STEPS_WORTH_COMPILING
 from tiltsim.scenario import Scenario
+from tiltsim.simulation import simulate
 
 Status = Literal["passed", "failed", "lost", "invalid", "crashed"]
 
@@ -26,7 +32,7 @@ class CheckResult:
     address: str
     status: Status
     message: str  # why it is not passed, in one line; empty when passed
-    verdicts: tuple[tuple[str, bool, float | bool | None, str], ...] = ()
+    verdicts: tuple[Verdict, ...] = ()
     wall_time: float = 0.0  # s
 
 
@@ -47,8 +53,11 @@ def collect(paths: Iterable[str]) -> list[str]:
         if not files:
             raise InputError(f"{path}: no scenario file (*.toml) in this folder")
         for file in files:
-            names = variant_names(file, read_toml(file))
             base = library_name(file)
+            try:
+                names = variant_names(file, read_toml(file))
+            except InputError:
+                names = []  # the file stays on the list and fails there, by itself
             addresses += [f"{base}#{member}" for member in names] or [base]
     return list(dict.fromkeys(addresses))
 
@@ -61,69 +70,87 @@ def _find(name: str) -> Path:
     raise InputError(f"{name}: no such file or folder, nor one of the library (see tiltsim list)")
 
 
-def check_one(address: str, engine: str | None = None) -> CheckResult:
+def check_one(
+    address: str, overrides: Mapping[str, Any], engine: EngineName | None = None
+) -> CheckResult:
     """Fly and judge one scenario; everything that goes wrong becomes part of the result."""
-    from tiltsim.expectations import judge
-    from tiltsim.simulation import simulate
-
     start = perf_counter()
     try:
-        scenario = load_scenario(address)
+        scenario = load_scenario(address, overrides)
+        if engine is not None and scenario.simulation.engine == "auto":
+            scenario = _with_engine(scenario, engine)
+        flight = simulate(scenario)
     except InputError as error:
         return CheckResult(address, "invalid", str(error))
-    if engine is not None and scenario.simulation.engine == "auto":
-        scenario = _with_engine(scenario, engine)
-    flight = simulate(scenario)
-    judged = judge(scenario, flight.metrics())
-    verdicts = tuple((v.expectation.metric, v.holds, v.measured, v.bounds) for v in judged)
+    if flight.end.kind == "interrupted":
+        raise KeyboardInterrupt
+    verdicts = tuple(judge(scenario, flight.metrics()))
     wall_time = perf_counter() - start
     # A scenario may be about a loss: then it says what it expects of `diverged`.
-    loss_expected = any(v.expectation.metric == "diverged" for v in judged)
+    loss_expected = any(v.expectation.metric == "diverged" for v in verdicts)
     if flight.end.kind != "completed" and not loss_expected:
         message = f"flight {flight.end.kind} at t = {flight.end.time:.3f} s: {flight.end.cause}"
         return CheckResult(address, "lost", message, verdicts, wall_time)
-    failed = [v for v in judged if not v.holds]
-    if failed:
-        message = "; ".join(
-            f"{v.expectation.metric} = {_number(v.measured)}, expected {v.bounds}" for v in failed
-        )
-        return CheckResult(address, "failed", message, verdicts, wall_time)
-    return CheckResult(address, "passed", "", verdicts, wall_time)
+    failed = [v for v in verdicts if not v.holds]
+    message = "; ".join(
+        f"{v.expectation.metric} = {_number(v.measured)}, expected {v.bounds}" for v in failed
+    )
+    return CheckResult(address, "failed" if failed else "passed", message, verdicts, wall_time)
 
 
 def _number(value: float | bool | None) -> str:
-    return "missing" if value is None else f"{value:.6g}"
+    if value is None:
+        return "missing"
+    return str(value).lower() if isinstance(value, bool) else f"{value:.6g}"
 
 
-def _with_engine(scenario: Scenario, engine: str) -> Scenario:
+def _with_engine(scenario: Scenario, engine: EngineName) -> Scenario:
     simulation = scenario.simulation.model_copy(update={"engine": engine})
     return scenario.model_copy(update={"simulation": simulation})
 
 
 def check_all(
-    addresses: list[str], jobs: int, report: Callable[[CheckResult], None]
+    addresses: list[str],
+    jobs: int,
+    overrides: Mapping[str, Any],
+    report: Callable[[CheckResult], None],
 ) -> list[CheckResult]:
     """Check scenarios on several processes; ``report`` sees each result as it comes.
 
     Returns the results in the order of the addresses. A process that dies takes only the
-    scenarios down that it was working on, and they are reported as crashed.
+    scenarios down that it was working on, and they are reported as crashed. An interrupt from the
+    keyboard ends all processes at once.
     """
-    engine = _shared_engine(addresses)
+    engine = _shared_engine(addresses, overrides)
     if jobs == 1 or len(addresses) == 1:
         results = []
         for address in addresses:
-            results.append(check_one(address, engine))
+            results.append(check_one(address, overrides, engine))
             report(results[-1])
         return results
     by_address: dict[str, CheckResult] = {}
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(jobs, len(addresses)), mp_context=context) as pool:
-        futures = {pool.submit(check_one, address, engine): address for address in addresses}
-        for future in as_completed(futures):
-            address = futures[future]
-            by_address[address] = _result(address, future)
-            report(by_address[address])
+    with ProcessPoolExecutor(
+        min(jobs, len(addresses)), mp_context=context, initializer=_leave_interrupts_to_the_parent
+    ) as pool:
+        futures = {
+            pool.submit(check_one, address, overrides, engine): address for address in addresses
+        }
+        try:
+            for future in as_completed(futures):
+                address = futures[future]
+                by_address[address] = _result(address, future)
+                report(by_address[address])
+        except KeyboardInterrupt:
+            for process in multiprocessing.active_children():
+                process.terminate()
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
     return [by_address[address] for address in addresses]
+
+
+def _leave_interrupts_to_the_parent() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _result(address: str, future: Future[CheckResult]) -> CheckResult:
@@ -133,20 +160,20 @@ def _result(address: str, future: Future[CheckResult]) -> CheckResult:
     return future.result()
 
 
-def _shared_engine(addresses: list[str]) -> str | None:
-    """The native engine where all flights together repay compiling it, once, before they start."""
-    from tiltsim.plants import STEPS_WORTH_COMPILING
-
-    steps = 0
+def _shared_engine(addresses: list[str], overrides: Mapping[str, Any]) -> EngineName | None:
+    """The native engine, compiled for all to load, where the flights together repay that."""
+    scenarios = []
     for address in addresses:
         try:
-            steps += load_scenario(address).simulation.steps
+            scenarios.append(load_scenario(address, overrides))
         except InputError:
-            continue
-    if steps < STEPS_WORTH_COMPILING:
+            continue  # it is reported when its turn comes
+    if sum(scenario.simulation.steps for scenario in scenarios) < STEPS_WORTH_COMPILING:
         return None
-    import tiltsim.native  # noqa: F401
+    from tiltsim.native import compile_callbacks
 
+    for law in {scenario.controller.law for scenario in scenarios}:
+        compile_callbacks(LOOPS[law])
     return "native"
 
 

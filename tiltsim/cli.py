@@ -5,13 +5,23 @@ from __future__ import annotations
 import argparse
 import sys
 from importlib import import_module
-from typing import Final
+from typing import Final, NoReturn
 
 from tiltsim.errors import InputError
+from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT
 
-COMMANDS: Final = ("run", "check", "list", "gait", "map", "bench", "schema")
-INPUT_ERROR: Final = 2
-INTERRUPTED: Final = 130
+COMMANDS: Final = (
+    *("run", "check", "list", "view", "plot", "video"),
+    *("gait", "map", "bench", "schema"),
+)
+
+
+class Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, like every other mistake."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print the line and exit."""
+        self.exit(INVALID_INPUT, f"tiltsim: {message} (see {self.prog} --help)\n")
 
 
 class _Version(argparse.Action):
@@ -26,7 +36,7 @@ class _Version(argparse.Action):
 
 def build_parser() -> argparse.ArgumentParser:
     """The parser of the whole command line."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="tiltsim",
         description="A MuJoCo testbed for thrust-vectoring vehicles: fly scenarios, judge flights.",
         epilog="exit codes: 0 done, 1 an expectation failed, 2 invalid input, 3 flight lost",
@@ -45,14 +55,17 @@ def main(arguments: list[str] | None = None) -> int:
         return int(parsed.run(parsed))
     except InputError as error:
         print(f"tiltsim: {error}", file=sys.stderr)
-        return INPUT_ERROR
+        return INVALID_INPUT
     except KeyboardInterrupt:
         print("tiltsim: interrupted", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         # The reader (head, less) has gone; the rest of the output is nobody's.
         sys.stderr.close()
-        return 0
+        return DONE
+    except OSError as error:
+        print(f"tiltsim: {error.filename or 'output'}: {error.strerror}", file=sys.stderr)
+        return INVALID_INPUT
 
 
 if __name__ == "__main__":

@@ -48,11 +48,14 @@ COLUMN_UNITS: Final = {
 """Columns of every flight and their units, in the order of the file; those of a law follow."""
 
 
+EndKind = Literal["completed", "diverged", "singular", "interrupted"]
+
+
 @dataclass(frozen=True)
 class End:
     """How a flight ended: ``kind``, when (s), and in words why."""
 
-    kind: Literal["completed", "diverged", "singular", "interrupted"]
+    kind: EndKind
     time: float
     cause: str = ""
 
@@ -66,6 +69,9 @@ class Flight:
     end: End
     engine: EngineName
     wall_time: float  # s, integration alone
+
+    def __post_init__(self) -> None:
+        self.samples.setflags(write=False)  # what is derived from them is kept
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -114,13 +120,15 @@ class Flight:
         return pa.table(list(self.columns.values()), schema=schema)
 
     def origin(self) -> dict[str, str]:
-        """Where the flight comes from: scenario (JSON), versions, seed, engine, end."""
+        """Where the flight comes from: scenario (JSON), versions, seed, engine, end, wall time."""
         return {
             "scenario": self.scenario.model_dump_json(),
             "address": self.scenario.address,
             "seed": str(self.scenario.simulation.seed),
             "engine": self.engine,
+            "wall_time": repr(self.wall_time),
             "end": self.end.kind,
+            "end_time": repr(self.end.time),
             "cause": self.end.cause,
             **{f"{name}_version": version(name) for name in ("tiltsim", "mujoco", "numpy")},
         }

@@ -12,14 +12,16 @@ from controllers.gaits.plans import Gait as PlannedGait
 from controllers.two_color_planner import Circle, Leg, Path, Polyline, four_angle_gait, rectangle
 from controllers.vehicle import Vehicle
 from tiltsim.messages import InvalidValueError
-from tiltsim.tables import Angle, Angles2, Angles4, Positive, Table
+from tiltsim.tables import Angle, Angles2, Angles4, Factor, Period, Positive, Table
 
 
 class GaitTable(Table, ABC):
     """What every gait can be told: a common scale, and a bias on the two rear angles."""
 
-    scale: Positive = Field(1.0, description="multiplies all angles (ch. 5: 1/n)")
-    bias: float = Field(1.0, description="eta, multiplies alpha_3 and alpha_4 (ch. 6)")
+    scale: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(
+        1.0, description="multiplies all angles (ch. 5: 1/n)"
+    )
+    bias: Factor = Field(1.0, description="eta, multiplies alpha_3 and alpha_4 (ch. 6)")
 
     def plan(self, vehicle: Vehicle) -> PlannedGait:
         """The gait, ready to be flown. Raises ValueError where the numbers make none."""
@@ -56,7 +58,7 @@ class TrotGait(GaitTable):
 
     type: Literal["trot_instant", "trot_continuous"]
     amplitude: Angle = Field(description="rho, rad")
-    period: Positive = Field(description="T, s")
+    period: Period = Field(description="T, s")
 
     def unscaled(self, vehicle: Vehicle) -> PlannedGait:
         """See `GaitTable.unscaled`."""
@@ -74,7 +76,7 @@ class CatGait(GaitTable):
 
     type: Literal["walk", "run", "transverse_gallop", "rotary_gallop"]
     amplitude: Angle = Field(description="rad")
-    period: Positive = Field(description="T, s")
+    period: Period = Field(description="T, s")
 
     def unscaled(self, vehicle: Vehicle) -> PlannedGait:
         """See `GaitTable.unscaled`."""
@@ -93,7 +95,7 @@ class WaypointGait(GaitTable):
     angles: Annotated[tuple[Angles4, ...], Field(min_length=2, strict=False)] = Field(
         description="alpha_1..4 of each waypoint, rad"
     )
-    period: Positive = Field(description="s")
+    period: Period = Field(description="s")
     phases: Annotated[tuple[float, ...], Field(strict=False)] | None = Field(
         None, description="share of the period of each waypoint, from 0; default: evenly spread"
     )
@@ -124,7 +126,7 @@ class TwoColorGait(GaitTable):
     """
 
     type: Literal["two_color"]
-    period: Positive = Field(description="s")
+    period: Period = Field(description="s")
     color: Literal["red", "blue"] = "red"
     rectangle: Annotated[tuple[Angles2, Angles2], Field(strict=False)] | None = Field(
         None, description="ranges of alpha_1 and of alpha_2, rad"

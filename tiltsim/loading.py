@@ -28,7 +28,8 @@ def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) 
         A TOML file or the name of a scenario in the library, with ``#variant`` for a member of a
         family, for example ``ch04_tracking/setpoint#rho_065_modified``.
     overrides
-        Values by dotted key, for example ``{"controller.decoupler": "exact"}``.
+        Values by dotted key, for example ``{"controller.decoupler": "exact"}``. A family without
+        ``#variant`` is only flown with overrides: they change its base.
 
     Raises
     ------
@@ -87,10 +88,11 @@ def _select_variant(file: Path, document: dict[str, Any], name: str) -> dict[str
     base = {key: value for key, value in document.items() if key != "variant"}
     chosen = dict(document["variant"][names.index(name)])
     del chosen["name"]
-    expectations = [*base.get("expect", []), *chosen.pop("expect", [])]
+    expectations = [base.pop("expect", []), chosen.pop("expect", [])]
     merged = _merge(base, chosen)
-    if expectations:
-        merged["expect"] = expectations
+    # Whatever is no list goes on as it is and is refused with its own name.
+    wrong = [value for value in expectations if not isinstance(value, list)]
+    merged["expect"] = wrong[0] if wrong else [*expectations[0], *expectations[1]]
     return merged
 
 

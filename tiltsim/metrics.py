@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -95,7 +96,7 @@ def compute_metrics(flight: Flight) -> dict[str, float | bool]:
     metrics["diverged"] = flight.end.kind in {"diverged", "singular"}
     metrics["duration"] = float(time[-1])
     metrics["realtime_factor"] = float(time[-1] / max(flight.wall_time, 1e-9))
-    return metrics
+    return {name: value for name, value in metrics.items() if isfinite(value)}
 
 
 def _saturated_fraction(flight: Flight, spins: Floats) -> float:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from controllers.vehicle import SPIN, Vehicle
+from tiltsim.library import shipped_folder
 
 if TYPE_CHECKING:
     import mujoco
@@ -143,13 +144,6 @@ class RotorLimits:
         return (lower, upper) if spin > 0.0 else (-upper, -lower)
 
 
-def mjcf_directory() -> Path:
-    """The folder of the MJCF files: inside the installed package, or next to it in a checkout."""
-    package = Path(__file__).resolve().parent
-    installed = package / "mjcf"
-    return installed if installed.is_dir() else package.parent / "mjcf"
-
-
 def compile_model(
     model: str,
     vehicle: Vehicle,
@@ -214,20 +208,18 @@ def compile_model(
     for name, value in vehicle._asdict().items():
         _require_positive(f"vehicle.{name}", value, "(SI)")
 
-    return mujoco.MjModel.from_xml_string(
-        _compose(
-            model,
-            vehicle,
-            timestep,
-            integrator,
-            userdata_size,
-            tilt_servo,
-            pod,
-            rotor_limits,
-            law_states,
-            visuals,
-        )
+    whole, bare = _compose(
+        model,
+        vehicle,
+        timestep,
+        integrator,
+        userdata_size,
+        tilt_servo,
+        pod,
+        rotor_limits,
+        law_states,
     )
+    return mujoco.MjModel.from_xml_string(whole if visuals else bare)
 
 
 @lru_cache(maxsize=64)  # dm_control takes several times longer than MuJoCo's compiler
@@ -241,10 +233,13 @@ def _compose(
     pod: Pod,
     rotor_limits: RotorLimits,
     law_states: int,
-    visuals: bool,
-) -> str:
-    """The vehicle's complete MJCF; the arguments are `compile_model`'s, found valid."""
-    root = _parse(mjcf_directory() / f"{model}.xml")
+) -> tuple[str, str]:
+    """The vehicle's complete MJCF, and the same without what is only drawn.
+
+    The arguments are `compile_model`'s, found valid. A flight is flown on the one and shown on the
+    other, so both are made at once.
+    """
+    root = _parse(shipped_folder("mjcf") / f"{model}.xml")
     tilting = model == "tiltrotor"
     stops = tilting and tilt_servo.max_angle is not None
 
@@ -263,10 +258,10 @@ def _compose(
     _set_keyframe(root.keyframe.key["hover"], vehicle.hover_rotor_speed)
     _set_keyframe(root.keyframe.key["start"], START_SPEED)
     _add_law_states(root, law_states)
-    if not visuals:
-        for geom in root.find("body", "vehicle").find_all("geom"):
-            geom.remove()
-    return str(root.to_xml_string())
+    whole = str(root.to_xml_string())
+    for geom in root.find("body", "vehicle").find_all("geom"):
+        geom.remove()
+    return whole, str(root.to_xml_string())
 
 
 def _parse(path: Path) -> Any:

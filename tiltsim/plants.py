@@ -18,7 +18,7 @@ from tiltsim import thesis_plant
 from tiltsim.cache import native_code_is_cached
 from tiltsim.engine import EngineName, control_callback, make_engine
 from tiltsim.errors import InputError
-from tiltsim.loop import ControlSetup, Floats, Loop
+from tiltsim.loop import ControlSetup, Floats
 from tiltsim.loops import control_setup, loop_of
 from tiltsim.model import Pod, RotorLimits, TiltServo, compile_model
 from tiltsim.scenario import Scenario
@@ -75,7 +75,7 @@ class MujocoPlant:
 
     def __init__(self, scenario: Scenario) -> None:
         self._loop, self._setup = loop_of(scenario), control_setup(scenario)
-        self.model = build_model(scenario, self._loop, len(self._setup.userdata))
+        self.model = build_model(scenario, userdata_size=len(self._setup.userdata))
         # A diverged state must stay visible; by default MuJoCo would silently start over.
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.data = mujoco.MjData(self.model)
@@ -113,6 +113,8 @@ class MujocoPlant:
         mujoco.mj_resetData(self.model, self.data)  # clears the warnings
         mujoco.mj_setState(self.model, self.data, value, _INTEGRATION)
         mujoco.mj_forward(self.model, self.data)
+        # The state brings its own parameters, which the Python engine reads once.
+        self._engine = make_engine(self.engine, self._loop, self.model, self.data)
 
     @property
     def _steps_taken(self) -> int:
@@ -173,7 +175,7 @@ def quiet_warnings() -> Iterator[None]:
 
 _INTEGRATION: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _WARNINGS: Final = {
-    mujoco.mjtWarning.mjWARN_BADCTRL: "the control law returned NaN",
+    mujoco.mjtWarning.mjWARN_BADCTRL: "the control law returned NaN or a value beyond 1e10",
     mujoco.mjtWarning.mjWARN_BADQPOS: "positions are NaN or beyond 1e10",
     mujoco.mjtWarning.mjWARN_BADQVEL: "velocities are NaN or beyond 1e10",
     mujoco.mjtWarning.mjWARN_BADQACC: "accelerations are NaN or beyond 1e10",
@@ -186,8 +188,10 @@ def disturbing_acceleration(scenario: Scenario) -> Triple:
     return float(x), float(y), float(z)
 
 
-def build_model(scenario: Scenario, loop: Loop, userdata_size: int) -> mujoco.MjModel:
-    """Compile the scenario's vehicle, without what is only drawn.
+def build_model(
+    scenario: Scenario, *, userdata_size: int = 0, visuals: bool = False
+) -> mujoco.MjModel:
+    """Compile the scenario's vehicle, with what is drawn of it only if asked.
 
     Raises `InputError` where MuJoCo cannot build it.
     """
@@ -202,8 +206,8 @@ def build_model(scenario: Scenario, loop: Loop, userdata_size: int) -> mujoco.Mj
             tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump()),
             pod=Pod(**vehicle.pod.model_dump()),
             rotor_limits=RotorLimits(vehicle.min_rotor_speed, vehicle.max_rotor_speed),
-            law_states=loop.law_states,
-            visuals=False,
+            law_states=loop_of(scenario).law_states,
+            visuals=visuals,
         )
     except ValueError as error:
         raise InputError(f"{scenario.address or 'scenario'}: vehicle: {error}") from error
@@ -239,7 +243,10 @@ class ThesisPlant:
 
     @property
     def state(self) -> Floats:
-        """See `Plant.state`: the step count and the state of `tiltsim.thesis_plant`."""
+        """See `Plant.state`: the step count and the state of `tiltsim.thesis_plant`.
+
+        The parameters are the scenario's and stay with the plant.
+        """
         return np.array([self._step_index, *self._state])
 
     @state.setter

@@ -27,6 +27,9 @@ from tiltsim.tables import (
     Vector3,
 )
 
+MAX_STEPS: Final = 100_000_000
+"""Physics steps of a flight, more than a day at one millisecond."""
+
 MAX_TABLE: Final = 1500
 """Numbers in a gait's table of keyframes, which every evaluation of the control law reads."""
 
@@ -108,7 +111,7 @@ class SimulationTable(Table):
     """How the flight is computed."""
 
     duration: Positive = Field(40.0, description="s")
-    timestep: Annotated[float, Field(gt=0.0, le=0.1)] = Field(0.001, description="s, physics")
+    timestep: Annotated[float, Field(ge=1e-6, le=0.1)] = Field(0.001, description="s, physics")
     control_timestep: NonNegative = Field(
         0.0, description="s; 0 evaluates the law at every integrator stage, else sample and hold"
     )
@@ -143,6 +146,14 @@ class SimulationTable(Table):
             if value is None or value == 0.0:
                 continue
             steps = value / self.timestep
+            if steps > MAX_STEPS:
+                raise InvalidValueError(
+                    f"simulation.{key}", value, f"more than {MAX_STEPS:.0e} steps of timestep"
+                )
+            if value > self.duration:
+                raise InvalidValueError(
+                    f"simulation.{key}", value, f"longer than the flight, {self.duration} s"
+                )
             if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
                 raise InvalidValueError(
                     f"simulation.{key}", value, f"must be a multiple of timestep = {self.timestep}"
@@ -514,9 +525,3 @@ class Variant(Table):
     model_config = ConfigDict(extra="allow")
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$")]
-
-
-class ScenarioFile(Scenario):
-    """A scenario file as it is written: a base and, optionally, a family of variants."""
-
-    variant: tuple[Variant, ...] = ()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import copysign
+from math import copysign, hypot, isfinite
 from time import perf_counter
 from typing import Final
 
@@ -47,6 +47,8 @@ def simulate(scenario: Scenario, observer: Observer | None = None) -> Flight:
     plant = make_plant(scenario)
     watch = Watch(scenario)
     samples = [_sample(plant)]
+    if observer is not None:
+        observer(samples[0])
     end = watch.judge(plant, samples[0])
     steps_left = simulation.steps
     start = perf_counter()
@@ -101,20 +103,22 @@ class Watch:
 
     def judge(self, plant: Plant, sample: Floats) -> End | None:
         """The end that a sample spells, None while the flight goes on."""
-        time = float(sample[0])
+        state = dict(zip(self._loop.sample_fields, sample.tolist(), strict=True))
+        time = state["time"]
+        finite = all(map(isfinite, state.values()))
         fault = plant.fault()
         if fault:
-            return End("diverged", time, fault)
-        if not np.isfinite(sample).all():
-            name = self._loop.sample_fields[int(np.argmin(np.isfinite(sample)))]
+            singular = self._judge_singularity(time, state) if finite else None
+            return singular or End("diverged", time, fault)
+        if not finite:
+            name = next(name for name, value in state.items() if not isfinite(value))
             return End("diverged", time, f"{name} is no longer a finite number")
-        state = dict(zip(self._loop.sample_fields, sample.tolist(), strict=True))
         return self._judge_limits(time, state) or self._judge_singularity(time, state)
 
     def _judge_limits(self, time: float, state: dict[str, float]) -> End | None:
         target = position_reference(time, self._reference)
         if self._follows_position:
-            error = float(np.hypot(target[0] - state["x"], target[1] - state["y"]))
+            error = hypot(target[0] - state["x"], target[1] - state["y"])
             if error > MAX_POSITION_ERROR:
                 return End("diverged", time, f"{error:.3g} m away from the reference")
         error = abs(target[2] - state["z"])

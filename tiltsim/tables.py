@@ -7,10 +7,14 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
+# The outer bounds keep arithmetic far from overflow; nothing that flies comes near them.
+Positive = Annotated[float, Field(gt=0.0, le=1e9)]
+NonNegative = Annotated[float, Field(ge=0.0, le=1e9)]
+Period = Annotated[float, Field(ge=1e-3, le=1e9, description="s")]
+Factor = Annotated[float, Field(ge=-1e3, le=1e3)]
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 Angle = Annotated[float, Field(ge=-pi, le=pi, description="rad")]
-Vector3 = Annotated[tuple[float, float, float], Field(strict=False)]
+Vector3 = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(strict=False)]
 Angles2 = Annotated[tuple[Angle, Angle], Field(strict=False)]
 Angles3 = Annotated[tuple[Angle, Angle, Angle], Field(strict=False)]
 Angles4 = Annotated[tuple[Angle, Angle, Angle, Angle], Field(strict=False)]

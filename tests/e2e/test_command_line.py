@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import subprocess
 import sys
 import tomllib
@@ -14,7 +16,9 @@ import pytest
 
 from tiltsim.cli import main
 from tiltsim.flight import COLUMN_UNITS
+from tiltsim.loops.tiltrotor import TILTROTOR
 from tiltsim.metrics import METRICS
+from tiltsim.native import compile_callbacks
 
 SETPOINT = "ch04_tracking/setpoint#rho_065_modified"
 SHORT = ("--set", "simulation.duration=0.2")
@@ -118,10 +122,21 @@ def test_run_of_a_family_lists_its_variants_and_exits_2(capsys):
             ["gait.angles", "0.65", "max_angle = 0.5"],
         ),
         (["check", "no/such/folder"], ["no/such/folder"]),
+        (["check", "--jobs", "0"], ["--jobs", "0", "at least 1"]),
+        (["run"], ["SCENARIO"]),
+        (["fly"], ["fly", "choose from"]),
+        (["run", SETPOINT, "--set", "simulation.duration=1e9"], ["duration", "steps"]),
+        (["run", SETPOINT, "--set", "simulation.timestep=1e-320"], ["timestep", "0.000001"]),
+        (["run", SETPOINT, "--set", "vehicle.arm_length=1e300"], ["arm_length", "1000000000"]),
+        (["run", SETPOINT, "--set", "expect=3"], ["expect = 3", "list"]),
     ],
 )
 def test_bad_input_is_one_clear_line_and_exit_2(capsys, arguments, words):
-    assert main(arguments) == 2
+    try:
+        code = main(arguments)
+    except SystemExit as stopped:  # from the argument parser
+        code = stopped.code
+    assert code == 2
     printed = capsys.readouterr()
     assert printed.out == ""
     assert printed.err.count("\n") == 1
@@ -182,6 +197,64 @@ def test_check_reports_every_outcome_and_writes_junit(tmp_path, capsys):
     assert main(["check", str(good), "--jobs", "1"]) == 0
     assert main(["check", str(tmp_path / "failing.toml"), str(good), "--jobs", "1"]) == 1
     assert main(["check", str(tmp_path / "lost.toml"), "--jobs", "1"]) == 3
+
+
+def test_check_judges_what_speaks_of_the_plant_it_flies(tmp_path, capsys):
+    path = tmp_path / "plants.toml"
+    path.write_text(
+        "[simulation]\nduration = 0.1\n"
+        '[[expect]]\nmetric = "max_abs_roll"\nmax = 1.0\nplant = "mujoco"\n'
+        '[[expect]]\nmetric = "max_abs_roll"\nmax = -1.0\nplant = "thesis"\n'
+    )
+    assert main(["check", str(path)]) == 0
+    assert main(["check", str(path), "--set", "simulation.plant=thesis"]) == 1
+    assert "max_abs_roll = 0, expected <= -1" in capsys.readouterr().out
+
+
+def test_check_survives_a_file_that_cannot_be_read_as_toml(tmp_path, capsys):
+    (tmp_path / "a.toml").write_text("x = 1\nx = 2\n")
+    (tmp_path / "b.toml").write_text(EXPECTING.format(bound=1.0))
+    heavy = "[vehicle.pod]\nmass = 1.0\n[simulation]\nduration = 0.1\n"
+    (tmp_path / "c.toml").write_text(heavy)
+    assert main(["check", str(tmp_path), "--jobs", "1"]) == 2
+    assert "3 scenarios: 2 invalid, 1 passed" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_interrupt_ends_a_whole_check_at_once(tmp_path, jobs):
+    compile_callbacks(TILTROTOR)  # so that the interrupt falls into the flights
+    for name in ("a", "b", "c"):
+        (tmp_path / f"{name}.toml").write_text("[simulation]\nduration = 90.0\n")
+    process = subprocess.Popen(
+        [*COMMAND, "check", str(tmp_path), "--jobs", jobs],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    )
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.communicate(timeout=6.0)
+    os.killpg(process.pid, signal.SIGINT)
+    _, error = process.communicate(timeout=15.0)
+    assert process.returncode == 130
+    assert error.decode().strip().endswith("tiltsim: interrupted")
+
+
+def test_interrupted_run_keeps_its_files_and_says_so(tmp_path):
+    process = subprocess.Popen(
+        [*COMMAND, "run", SETPOINT, "--out", str(tmp_path), "--set", "simulation.duration=2000.0"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    )
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.communicate(timeout=8.0)
+    os.killpg(process.pid, signal.SIGINT)
+    output, error = process.communicate(timeout=15.0)
+    assert process.returncode == 130
+    assert output == b""
+    assert error.decode().startswith("tiltsim: interrupted at t = ")
+    flown = json.loads((tmp_path / "metrics.json").read_text())["duration"]
+    assert 0.0 < flown < 2000.0
 
 
 def test_check_on_several_processes_keeps_the_order_of_junit(tmp_path):

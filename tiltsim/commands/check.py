@@ -8,10 +8,10 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, FLIGHT_LOST, INVALID_INPUT
+
 if TYPE_CHECKING:
     from tiltsim.checking import CheckResult
-
-PASSED, EXPECTATION_FAILED, INVALID, LOST = 0, 1, 2, 3
 
 
 def add_parser(subparsers: Any) -> None:
@@ -27,20 +27,28 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument(
         "--jobs",
-        type=_positive,
+        type=positive_integer,
         default=os.cpu_count() or 1,
         metavar="N",
         help="processes (default: the number of cores)",
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        dest="overrides",
+        help="override a key of every scenario, such as simulation.plant=thesis; repeatable",
     )
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write JUnit XML")
     parser.set_defaults(run=run)
 
 
-def _positive(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError("must be at least 1")
-    return value
+def positive_integer(text: str) -> int:
+    """A whole number of at least 1, from the command line."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text}: must be a whole number of at least 1")
+    return int(text)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -48,27 +56,32 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.checking import check_all, collect, write_junit
     from tiltsim.errors import InputError
     from tiltsim.library import shipped_folder
+    from tiltsim.loading import parse_override
 
-    if arguments.junit is not None and not arguments.junit.absolute().parent.is_dir():
-        raise InputError(f"--junit {arguments.junit}: its folder does not exist")
+    junit: Path | None = arguments.junit
+    if junit is not None and (junit.is_dir() or not junit.absolute().parent.is_dir()):
+        raise InputError(f"--junit {junit}: must be a file in an existing folder")
+    overrides = dict(parse_override(text) for text in arguments.overrides)
     addresses = collect(arguments.paths or [str(shipped_folder("scenarios"))])
     width = max(len(address) for address in addresses)
-    results = check_all(addresses, arguments.jobs, lambda result: _print_result(result, width))
-    if arguments.junit is not None:
-        write_junit(results, arguments.junit)
+    results = check_all(
+        addresses, arguments.jobs, overrides, lambda result: _print_result(result, width)
+    )
+    if junit is not None:
+        write_junit(results, junit)
     counts = Counter(result.status for result in results)
     print(
         f"\n{len(results)} scenarios: " + ", ".join(f"{n} {status}" for status, n in counts.items())
     )
     if counts["invalid"] or counts["crashed"]:
-        return INVALID
+        return INVALID_INPUT
     if counts["lost"]:
-        return LOST
-    return EXPECTATION_FAILED if counts["failed"] else PASSED
+        return FLIGHT_LOST
+    return EXPECTATION_FAILED if counts["failed"] else DONE
 
 
 def _print_result(result: CheckResult, width: int) -> None:
-    held = sum(holds for _, holds, _, _ in result.verdicts)
+    held = sum(verdict.holds for verdict in result.verdicts)
     mark = "ok" if result.status == "passed" else result.status.upper()
     print(
         f"{mark:<8}{result.address:<{width}}  {held}/{len(result.verdicts)} hold"

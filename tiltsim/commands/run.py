@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import argparse
 import sys
+from contextlib import ExitStack
+from importlib import import_module
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.progress import progress_bar
+from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, FLIGHT_LOST, INTERRUPTED
 
 if TYPE_CHECKING:
     from tiltsim.expectations import Verdict
     from tiltsim.flight import Flight
-
-DONE, EXPECTATION_FAILED, FLIGHT_LOST, INTERRUPTED = 0, 1, 3, 130
+    from tiltsim.loop import Floats
+    from tiltsim.rerun_stream import LiveStream
+    from tiltsim.scenario import Scenario
 
 
 def add_parser(subparsers: Any) -> None:
@@ -26,10 +31,19 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "scenario",
         metavar="SCENARIO",
-        help="a TOML file or a name from the library, with #VARIANT for a member of a family",
+        help="a TOML file or a name from the library, with #VARIANT for a member of a family "
+        "(a family without #VARIANT flies its base if --set is given)",
     )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="write metrics.json, flight.parquet, scenario.toml"
+    )
+    parser.add_argument(
+        "--rerun", type=Path, metavar="FILE.rrd", help="save a recording for the Rerun viewer"
+    )
+    live = parser.add_mutually_exclusive_group()
+    live.add_argument("--live", action="store_true", help="watch the flight in the Rerun viewer")
+    live.add_argument(
+        "--connect", metavar="URL", help="stream to a Rerun viewer that is already open"
     )
     parser.add_argument(
         "--set",
@@ -46,36 +60,76 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Fly, save, judge."""
     from tiltsim.expectations import judge
-    from tiltsim.files import prepare_folder
+    from tiltsim.files import prepare_file, prepare_folder
     from tiltsim.loading import load_scenario, parse_override
 
     overrides = dict(parse_override(text) for text in arguments.overrides)
     scenario = load_scenario(arguments.scenario, overrides)
     if arguments.out is not None:
         prepare_folder(arguments.out)
+    if arguments.rerun is not None:
+        prepare_file("--rerun", arguments.rerun)
 
     from tiltsim.analysis import gait_warnings
-    from tiltsim.simulation import simulate
 
     vehicle = scenario.vehicle.resolve()
-    for warning in gait_warnings(scenario.gait.plan(vehicle), vehicle):
-        print(f"tiltsim: warning: gait: {warning}", file=sys.stderr)
-    duration = scenario.simulation.duration
-    with progress_bar(duration, "s", shown=not arguments.quiet) as advance_to:
-        flight = simulate(scenario, lambda sample: advance_to(float(sample[0])))
+    if not arguments.quiet:
+        for warning in gait_warnings(scenario.gait.plan(vehicle), vehicle):
+            print(f"tiltsim: warning: gait: {warning}", file=sys.stderr)
+    flight = fly(scenario, arguments)
     if arguments.out is not None:
         flight.save(arguments.out)
+    if arguments.rerun is not None:
+        from tiltsim.rerun_stream import save_recording
+
+        save_recording([flight], arguments.rerun)
+    if flight.end.kind == "interrupted":
+        kept = f"; the flight so far is in {arguments.out}" if arguments.out is not None else ""
+        print(f"tiltsim: interrupted at t = {flight.end.time:.3f} s{kept}", file=sys.stderr)
+        return INTERRUPTED
     verdicts = judge(scenario, flight.metrics())
     if not arguments.quiet:
         print(summary(flight, verdicts))
         if arguments.out is not None:
             print(f"written to {arguments.out}")
-    if flight.end.kind == "interrupted":
-        return INTERRUPTED
+        if arguments.rerun is not None:
+            print(f"recording written to {arguments.rerun}; open it with: rerun {arguments.rerun}")
     if flight.end.kind != "completed":
         print(f"tiltsim: {lost(flight)}", file=sys.stderr)
         return FLIGHT_LOST
     return DONE if all(verdict.holds for verdict in verdicts) else EXPECTATION_FAILED
+
+
+def fly(scenario: Scenario, arguments: argparse.Namespace) -> Flight:
+    """Simulate, with a progress bar and, if asked, a live view."""
+    from tiltsim.simulation import simulate
+
+    with ExitStack() as stack:
+        live: LiveStream | None = None
+        if arguments.live or arguments.connect is not None:
+            from tiltsim.rerun_stream import LiveStream
+
+            live = stack.enter_context(LiveStream(scenario, arguments.connect))
+        bar = progress_bar(scenario.simulation.duration, "s", shown=not arguments.quiet)
+        advance_to = stack.enter_context(bar)
+
+        # Rerun takes half a second to import; native physics leaves a processor for that, once its
+        # own imports are done.
+        at_start = [Thread(target=import_module, args=("rerun",), daemon=True).start]
+        if arguments.rerun is None:
+            at_start.clear()
+
+        def observe(sample: Floats) -> None:
+            while at_start:
+                at_start.pop()()
+            advance_to(float(sample[0]))
+            if live is not None:
+                live(sample)
+
+        flight = simulate(scenario, observe)
+        if live is not None:
+            live.finish(flight.end)
+    return flight
 
 
 def lost(flight: Flight) -> str:

@@ -33,3 +33,16 @@ def control_setup(scenario: Scenario) -> ControlSetup:
     """Everything the control step of a scenario needs to know."""
     loop = loop_of(scenario)
     return loop.setup(scenario, loop.signature)
+
+
+def follows_position(scenario: Scenario) -> bool:
+    """Whether the law of a scenario follows the reference's horizontal position."""
+    return loop_of(scenario).follows_position(scenario)
+
+
+def law_in_words(scenario: Scenario) -> list[str]:
+    """The law of a scenario for titles, most telling first."""
+    controller = scenario.controller
+    words = [f"{controller.law.replace('_', '-')} law"]
+    decoupler = getattr(controller, "decoupler", "none")  # only laws that lean to steer have one
+    return words if decoupler == "none" else [f"{decoupler} decoupler", *words]

@@ -1,0 +1,39 @@
+"""Short flights for the tests of what shows flights, flown once."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import tiltsim
+
+BASE = {"simulation": {"duration": 1.2, "timestep": 0.002, "engine": "python"}}
+FIXED = {"gait": {"type": "fixed", "angles": [-0.65, -0.65, 0.65, 0.65]}}
+TROT = {
+    "title": "A trot around a circle",
+    "gait": {"type": "trot_continuous", "amplitude": 0.65, "period": 1.0},
+    "reference": {"type": "circle", "radius": 2.0, "angular_frequency": 0.5},
+}
+LIMITED = {"vehicle": {"min_rotor_speed": 150.0, "max_rotor_speed": 390.0}}
+FREE = {
+    "controller": {"decoupler": "none"},
+    "reference": {"type": "attitude_altitude", "roll": 0.1, "altitude": 0.2},
+}
+RECIPES = {
+    "fixed": FIXED,
+    "trot": TROT,
+    "limited": FIXED | LIMITED,
+    "free": FREE,
+}
+
+
+@cache
+def flight(name):
+    """A flight by its name in `RECIPES`; do not change it."""
+    scenario = tiltsim.parse_scenario(BASE | RECIPES[name], f"tests/{name}")
+    return tiltsim.simulate(scenario)
+
+
+def saved(name, folder):
+    """The folder of a flight's results."""
+    flight(name).save(folder / name)
+    return folder / name

@@ -1,0 +1,102 @@
+"""The figure of a flight: what it shows, its formats, its command."""
+
+from __future__ import annotations
+
+import matplotlib
+import numpy as np
+import pytest
+
+from tests.flights import RECIPES, flight, saved
+from tiltsim.cli import main
+from tiltsim.figures.flight import flight_figure
+
+SIGNATURES = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
+PANELS = {
+    *("Attitude", "Altitude", "Position error", "Tilt angles", "Rotor speeds", "Plan view"),
+    "Attitudes flown; shaded: out of reach",
+}
+
+
+def axes_by_title(figure):
+    return {axes.get_title(loc="left"): axes for axes in figure.axes}
+
+
+@pytest.mark.parametrize("name", RECIPES)
+def test_every_flight_can_be_drawn(name):
+    figure = flight_figure(flight(name))
+    figure.canvas.draw()
+    titles = set(axes_by_title(figure))
+    assert titles >= PANELS
+    assert any(title.startswith("Singularity margin, least") for title in titles)
+
+
+def test_the_lines_are_the_flights_columns():
+    this = flight("trot")
+    panels = axes_by_title(flight_figure(this))
+    roll = panels["Attitude"].lines[0]
+    np.testing.assert_array_equal(roll.get_xdata(), this["time"])
+    np.testing.assert_array_equal(roll.get_ydata(), this["roll"])
+    speed = panels["Rotor speeds"].lines[0]
+    np.testing.assert_array_equal(speed.get_ydata(), -this["rotor_speed_1"])
+    path = next(line for line in panels["Plan view"].lines if line.get_label() == "path")
+    np.testing.assert_array_equal(path.get_xdata(), this["x"])
+    error = panels["Position error"].lines[1]
+    np.testing.assert_array_equal(error.get_ydata(), this["x_ref"] - this["x"])
+
+
+def test_axes_say_their_units():
+    for axes in flight_figure(flight("fixed")).axes:
+        assert any(unit in axes.get_ylabel() for unit in ("rad", "m")), axes.get_title(loc="left")
+
+
+def test_rotor_limits_are_drawn_where_there_are_some():
+    limited = axes_by_title(flight_figure(flight("limited")))["Rotor speeds"]
+    free = axes_by_title(flight_figure(flight("fixed")))["Rotor speeds"]
+    levels = {line.get_ydata()[0] for line in limited.lines if len(set(line.get_ydata())) == 1}
+    assert {150.0, 390.0} <= levels
+    assert len(limited.lines) == len(free.lines) + 2
+
+
+def test_the_closest_approach_is_marked():
+    this = flight("trot")
+    plane = axes_by_title(flight_figure(this))["Attitudes flown; shaded: out of reach"]
+    closest = int(np.argmin(np.abs(this["singularity_margin"])))
+    dots = [line.get_xydata()[0] for line in plane.lines if len(line.get_xdata()) == 1]
+    np.testing.assert_allclose(dots, [[this["roll"][closest], this["pitch"][closest]]])
+    (words,) = [text.get_text() for text in plane.texts]
+    assert words == (
+        f"closest: {abs(this['singularity_margin'][closest]):.2f} rad"
+        f" at {this['time'][closest]:.2f} s"
+    )
+
+
+def test_drawing_leaves_no_trace_in_matplotlib():
+    before = dict(matplotlib.rcParams)
+    flight_figure(flight("fixed"))
+    assert dict(matplotlib.rcParams) == before
+
+
+@pytest.mark.parametrize("ending", SIGNATURES)
+def test_the_command_writes_the_format_of_the_ending(ending, tmp_path, capsys):
+    folder = saved("fixed", tmp_path)
+    file = tmp_path / f"figure.{ending}"
+    assert main(["plot", str(folder), "--out", str(file)]) == 0
+    assert file.read_bytes().startswith(SIGNATURES[ending])
+    assert capsys.readouterr().out == f"figure written to {file}\n"
+
+
+@pytest.mark.parametrize("path", ["", "flight.parquet"])
+def test_the_figure_lies_beside_the_flight_by_default(path, tmp_path):
+    folder = saved("fixed", tmp_path)
+    assert main(["plot", str(folder / path)]) == 0
+    assert (folder / "flight.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("out", "words"), [("x.gif", "unknown format '.gif'; choose"), ("no/x.png", "does not exist")]
+)
+def test_a_bad_target_is_one_line_and_exit_code_2(out, words, tmp_path, capsys):
+    folder = saved("fixed", tmp_path)
+    assert main(["plot", str(folder), "--out", str(tmp_path / out)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert words in line

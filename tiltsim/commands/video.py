@@ -1,0 +1,86 @@
+"""``tiltsim video``: a film of a flight."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from tiltsim.commands.progress import progress_bar
+
+
+def add_parser(subparsers: Any) -> None:
+    """Declare the command."""
+    parser = subparsers.add_parser(
+        "video",
+        help="film a flight",
+        description=(
+            "Film a flight with MuJoCo's renderer, the camera following the vehicle; works without "
+            "a screen. The picture in the corner is the roll-pitch plane."
+        ),
+    )
+    parser.add_argument(
+        "flight", type=Path, metavar="FLIGHT", help="a folder of results, or a flight.parquet"
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE.mp4", help="default: flight.mp4 beside the flight"
+    )
+    parser.add_argument(
+        "--size", type=_size, default=(960, 540), metavar="WxH", help="pixels (default 960x540)"
+    )
+    parser.add_argument(
+        "--fps", type=_frame_rate, default=30, metavar="N", help="frames per second (default 30)"
+    )
+    parser.add_argument(
+        "--speed", type=_speed, default=1.0, metavar="X", help="times real time (default 1)"
+    )
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    parser.set_defaults(run=run)
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.lower().partition("x")
+    size = int(width), int(height)
+    if not all(64 <= side <= 4096 and side % 2 == 0 for side in size):
+        raise argparse.ArgumentTypeError("must be even numbers from 64 to 4096, such as 1280x720")
+    return size
+
+
+def _frame_rate(text: str) -> int:
+    value = int(text)
+    if not 1 <= value <= 240:
+        raise argparse.ArgumentTypeError("must be from 1 to 240")
+    return value
+
+
+def _speed(text: str) -> float:
+    value = float(text)
+    if not 0.01 <= value <= 100.0:
+        raise argparse.ArgumentTypeError("must be from 0.01 to 100")
+    return value
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Draw and encode."""
+    from tiltsim.errors import InputError
+    from tiltsim.files import load_flight, prepare_file
+
+    flight = load_flight(arguments.flight)
+    folder = arguments.flight if arguments.flight.is_dir() else arguments.flight.parent
+    out = arguments.out or folder / "flight.mp4"
+    if out.suffix.lower() != ".mp4":
+        raise InputError(f"--out {out}: unknown format {out.suffix!r}; write FILE.mp4")
+    prepare_file("--out", out)
+
+    from tiltsim.video import prefer_offscreen_gl
+
+    prefer_offscreen_gl()  # before anything imports MuJoCo
+    from tiltsim.video.film import Format, film_flight
+
+    width, height = arguments.size
+    form = Format(width, height, arguments.fps, arguments.speed)
+    with progress_bar(float(flight["time"][-1]), "s", shown=not arguments.quiet) as advance_to:
+        film_flight(flight, out, form, advance_to)
+    if not arguments.quiet:
+        print(f"film written to {out}")
+    return 0

@@ -1,0 +1,66 @@
+"""``tiltsim view``: flights and recordings in the Rerun viewer."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+
+def add_parser(subparsers: Any) -> None:
+    """Declare the command."""
+    parser = subparsers.add_parser(
+        "view",
+        help="show flights in the Rerun viewer, several for comparison",
+        description=(
+            "Show a flight in the Rerun viewer, or several in one recording for comparison. "
+            "Recordings (.rrd) are opened as they are."
+        ),
+    )
+    parser.add_argument(
+        "paths",
+        nargs="+",
+        type=Path,
+        metavar="PATH",
+        help="folders of results, flight.parquet files, or .rrd recordings",
+    )
+    target = parser.add_mutually_exclusive_group()
+    target.add_argument(
+        "--rerun", type=Path, metavar="FILE.rrd", help="save the recording and open no viewer"
+    )
+    target.add_argument("--connect", metavar="URL", help="show it in a viewer that is already open")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Open the viewer, or save what it would show."""
+    from tiltsim.errors import InputError
+    from tiltsim.files import load_flight, prepare_file
+
+    recordings = [path for path in arguments.paths if path.suffix == ".rrd"]
+    if recordings:
+        if len(recordings) < len(arguments.paths) or arguments.rerun or arguments.connect:
+            raise InputError(
+                f"{recordings[0]}: a recording is opened as it is; "
+                "to compare, to save or to connect give the flights' folders"
+            )
+        for path in recordings:
+            if not path.is_file():
+                raise InputError(f"{path}: no such file")
+        from tiltsim.rerun_stream import view_recordings
+
+        view_recordings(recordings)
+        return 0
+
+    flights = [load_flight(path) for path in arguments.paths]
+    if arguments.rerun is None:
+        from tiltsim.rerun_stream import view_flights
+
+        view_flights(flights, arguments.connect)
+        return 0
+    from tiltsim.rerun_stream import save_recording
+
+    prepare_file("--rerun", arguments.rerun)
+    save_recording(flights, arguments.rerun)
+    print(f"recording written to {arguments.rerun}; open it with: rerun {arguments.rerun}")
+    return 0

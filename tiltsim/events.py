@@ -1,0 +1,104 @@
+"""What happened in a flight, in words: saturation, closeness to a singularity, the end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+
+from controllers.vehicle import SPIN
+from tiltsim.attitude_plane import MARGIN_THRESHOLD
+from tiltsim.loops import law_in_words
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from tiltsim.flight import End, Flight
+    from tiltsim.scenario import Scenario
+
+Level = Literal["INFO", "WARN", "ERROR"]
+
+QUIET_TIME: Final = 0.5
+"""A condition that returns within this time (s) has not been away: chatter is one event."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something worth telling: when (s), how grave, and what."""
+
+    time: float
+    level: Level
+    text: str
+
+
+def flight_events(flight: Flight) -> list[Event]:
+    """All events of a flight, in order of time."""
+    watch = EventWatch(flight.scenario)
+    return [watch.opening(), *watch.observe(flight), *watch.closing(flight.end)]
+
+
+class EventWatch:
+    """Finds the events of one flight, which may come in pieces."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
+        self._last_seen: dict[str, float] = {}
+        self._lowest = (float("inf"), 0.0)
+
+    def opening(self) -> Event:
+        """What is flown."""
+        scenario = self._scenario
+        text = (
+            f"{scenario.title or scenario.address or 'flight'}: gait {scenario.gait.type}, "
+            f"{', '.join(law_in_words(scenario))}, "
+            f"{scenario.simulation.plant} plant"
+        )
+        return Event(0.0, "INFO", text)
+
+    def observe(self, piece: Flight) -> list[Event]:
+        """The events within a piece of the flight that follows on from the last."""
+        events = [event for found in self._conditions(piece) for event in self._onsets(*found)]
+        margin = np.abs(piece["singularity_margin"])
+        lowest = int(np.argmin(margin))
+        self._lowest = min(self._lowest, (float(margin[lowest]), float(piece["time"][lowest])))
+        return sorted(events, key=lambda event: event.time)
+
+    def closing(self, end: End) -> list[Event]:
+        """How close it came to a singularity, and how it ended."""
+        margin, time = self._lowest
+        closest = Event(
+            end.time, "INFO", f"closest to singular: margin {margin:.3f} rad at t = {time:.2f} s"
+        )
+        level: Level = "INFO" if end.kind == "completed" else "ERROR"
+        cause = f": {end.cause}" if end.cause else ""
+        return [closest, Event(end.time, level, f"flight {end.kind}{cause}")]
+
+    def _conditions(
+        self, piece: Flight
+    ) -> Iterator[tuple[str, npt.NDArray[np.float64], npt.NDArray[np.bool_]]]:
+        """Conditions to report: in words, the samples' times, and where they hold."""
+        time = piece["time"]
+        near = np.abs(piece["singularity_margin"]) < MARGIN_THRESHOLD
+        yield f"singularity margin below {MARGIN_THRESHOLD:g} rad", time, near
+        vehicle = self._scenario.vehicle
+        for rotor, spin in enumerate(SPIN, start=1):
+            speed = spin * piece[f"rotor_speed_{rotor}"]
+            yield f"rotor {rotor} has reversed", time, speed <= 0.0
+            # The integrator stops on a limit to rounding, so a hair's breadth counts as reached.
+            if vehicle.max_rotor_speed is not None:
+                full = speed >= vehicle.max_rotor_speed * (1.0 - 1e-9)
+                yield f"rotor {rotor} saturated at {vehicle.max_rotor_speed:g} rad/s", time, full
+            if vehicle.min_rotor_speed is not None:
+                least = speed <= vehicle.min_rotor_speed * (1.0 + 1e-9)
+                yield f"rotor {rotor} saturated at {vehicle.min_rotor_speed:g} rad/s", time, least
+
+    def _onsets(
+        self, text: str, times: npt.NDArray[np.float64], holds: npt.NDArray[np.bool_]
+    ) -> Iterator[Event]:
+        """An event for every time a condition sets in after it has been away for a while."""
+        for time in times[holds].tolist():
+            if time - self._last_seen.get(text, -np.inf) > QUIET_TIME:
+                yield Event(time, "WARN", text)
+            self._last_seen[text] = time

@@ -1,0 +1,11 @@
+"""Exit codes of the command line, the same for every command."""
+
+from __future__ import annotations
+
+from typing import Final
+
+DONE: Final = 0
+EXPECTATION_FAILED: Final = 1
+INVALID_INPUT: Final = 2
+FLIGHT_LOST: Final = 3
+INTERRUPTED: Final = 130

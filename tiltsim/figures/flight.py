@@ -1,0 +1,230 @@
+"""One flight on a page: time series, path over the ground, and the roll-pitch plane (ch. 4)."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from controllers.vehicle import SPIN
+from tiltsim.attitude_plane import (
+    HALF_WIDTH,
+    MARGIN_THRESHOLD,
+    forbidden_pitch,
+    nearest_singular,
+    singular_curves,
+    torque_free_directions,
+)
+from tiltsim.figures import style
+from tiltsim.loops import follows_position, law_in_words
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tiltsim.flight import Flight
+
+SIZE: Final = (11.4, 7.6)
+"""Width and height of the page, inches: A4 in landscape less its margins."""
+
+FORBIDDEN: Final = "#F6DDD0"
+INSTANTS: Final = 120
+"""Instants of the flight for which the plane shows what its gait forbids."""
+
+_ROTORS: Final = (1, 2, 3, 4)
+_SUBSCRIPTS: Final = "₁₂₃₄"
+# Equal angles and speeds would hide each other: later lines are thinner and broken.
+_ROTOR_LINES: Final[tuple[dict[str, Any], ...]] = (
+    {"color": style.AMBER, "ls": "-", "lw": 3.0},
+    {"color": style.BLUE, "ls": "-", "lw": 1.8},
+    {"color": style.INK, "ls": (0, (4, 2)), "lw": 1.2},
+    {"color": style.SKY, "ls": (0, (1, 1.5)), "lw": 1.2},
+)
+
+
+def flight_figure(flight: Flight) -> Figure:
+    """What the vehicle did and how close it came to a singularity, on one page."""
+    with style.paper_style():
+        figure = style.new_figure(*SIZE)
+        layout: Any = figure.get_layout_engine()
+        layout.set(w_pad=0.06, h_pad=0.06, rect=(0.0, 0.0, 1.0, 0.925))
+        title, line = _headings(flight)
+        figure.text(0.012, 0.972, title, fontsize=12, fontweight="bold", va="center")
+        figure.text(0.012, 0.941, line, fontsize=9.5, color="#555555", va="center")
+        halves: Any = figure.subfigures(1, 2, width_ratios=[2.1, 1.0])
+        left, right = halves
+        panels = (_attitude, _tilt_angles, _altitude, _rotor_speeds, _position_error, _margin)
+        series: Any = left.subplots(3, 2, sharex=True)
+        for axes, panel in zip(series.flat, panels, strict=True):
+            panel(axes, flight)
+            axes.set_xlim(0.0, flight["time"][-1])
+        for axes in series[-1]:
+            axes.set_xlabel("time (s)")
+        above, below = right.subplots(2, 1)
+        _plan_view(above, flight)
+        _roll_pitch_plane(below, flight)
+        return figure
+
+
+def _headings(flight: Flight) -> tuple[str, str]:
+    """The title, and a line on what was flown and how it ended."""
+    scenario = flight.scenario
+    end = flight.end
+    if end.kind == "completed":
+        outcome = f"completed after {end.time:g} s"
+    else:
+        outcome = f"{end.kind} at {end.time:.2f} s"
+    parts = (
+        f"{scenario.gait.type.replace('_', ' ')} gait",
+        *law_in_words(scenario),
+        f"{scenario.simulation.plant} plant",
+        outcome,
+    )
+    return scenario.title or scenario.address or "Flight", "  ·  ".join(parts)
+
+
+def _attitude(axes: Any, flight: Flight) -> None:
+    colors = {"roll": style.BLUE, "pitch": style.RED, "yaw": style.GREEN}
+    for angle, color in colors.items():
+        axes.plot(flight["time"], flight[angle], color=color, label=angle)
+        axes.plot(flight["time"], flight[f"{angle}_ref"], color=style.INK, ls=":", lw=0.8)
+    axes.plot([], [], color=style.INK, ls=":", lw=0.8, label="reference")
+    _label(axes, "Attitude", "rad", columns=4)
+
+
+def _altitude(axes: Any, flight: Flight) -> None:
+    axes.plot(flight["time"], flight["z"], color=style.BLUE, label="actual")
+    axes.plot(flight["time"], flight["z_ref"], color=style.INK, ls=":", lw=1.0, label="reference")
+    _widen(axes, 0.1)
+    _label(axes, "Altitude", "m")
+
+
+def _position_error(axes: Any, flight: Flight) -> None:
+    follows = follows_position(flight.scenario)
+    colors = {"x": style.BLUE, "y": style.RED, "z": style.GREEN}
+    axes.axhline(0.0, color=style.GREY, lw=0.7)
+    for axis in "xyz" if follows else "z":
+        error = flight[f"{axis}_ref"] - flight[axis]
+        axes.plot(flight["time"], error, color=colors[axis], label=axis)
+    _widen(axes, 0.1)
+    _label(axes, "Position error", "m")
+
+
+def _tilt_angles(axes: Any, flight: Flight) -> None:
+    for rotor, line in zip(_ROTORS, _ROTOR_LINES, strict=True):
+        label = f"α{_SUBSCRIPTS[rotor - 1]}"
+        axes.plot(flight["time"], flight[f"alpha_{rotor}"], label=label, **line)
+    _widen(axes, 0.1)
+    _label(axes, "Tilt angles", "rad", columns=4)
+
+
+def _rotor_speeds(axes: Any, flight: Flight) -> None:
+    for rotor, spin, line in zip(_ROTORS, SPIN, _ROTOR_LINES, strict=True):
+        speed = spin * flight[f"rotor_speed_{rotor}"]
+        axes.plot(flight["time"], speed, label=f"{rotor}", **line)
+    vehicle = flight.scenario.vehicle
+    for limit in (vehicle.min_rotor_speed, vehicle.max_rotor_speed):
+        if limit is not None:
+            axes.axhline(limit, color=style.RED, ls="--", lw=0.9)
+    _widen(axes, 20.0)
+    _label(axes, "Rotor speeds", "rad/s", name="along the spin", columns=4)
+
+
+def _margin(axes: Any, flight: Flight) -> None:
+    time, margin = flight["time"], np.abs(flight["singularity_margin"])
+    closest = int(np.argmin(margin))
+    axes.fill_between(time, 0.0, MARGIN_THRESHOLD, color=FORBIDDEN, lw=0.0)
+    axes.plot(time, margin, color=style.BLUE)
+    axes.plot(time[closest], margin[closest], "o", color=style.RED, ms=5, clip_on=False, zorder=5)
+    style.angle_axis(axes, "y", pi / 2)
+    axes.set_ylim(0.0, pi / 2 * 1.04)
+    _label(axes, f"Singularity margin, least {margin[closest]:.2f} rad", "rad")
+
+
+def _plan_view(axes: Any, flight: Flight) -> None:
+    """The path seen from above."""
+    x, y = flight["x"], flight["y"]
+    if follows_position(flight.scenario):
+        reference = flight["x_ref"], flight["y_ref"]
+        if np.ptp(reference[0]) + np.ptp(reference[1]) > 0.0:
+            axes.plot(*reference, color=style.INK, ls=":", lw=1.1, label="reference")
+        else:
+            at = (reference[0][0], reference[1][0])
+            axes.plot(*at, "+", color=style.INK, ms=10, mew=1.5, label="reference")
+    axes.plot(x, y, color=style.BLUE, label="path")
+    axes.plot(x[0], y[0], "o", color=style.INK, mfc="white", ms=5, label="start")
+    axes.plot(x[-1], y[-1], "s", color=style.RED, ms=5, label="end")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.08)
+    axes.set_xlabel("x (m)")
+    _label(axes, "Plan view", "m", name="y", columns=4)
+
+
+def _roll_pitch_plane(axes: Any, flight: Flight) -> None:
+    """The attitudes flown, those out of reach, and the closest approach to a singular one."""
+    n = torque_free_directions(flight.columns, flight.scenario.vehicle.resolve())
+    margin = flight["singularity_margin"]
+    closest = int(np.argmin(np.abs(margin)))
+    side = float(np.sign(margin[0])) or 1.0
+    _shade_forbidden(axes, n, side)
+    attitude = np.stack([flight["roll"], flight["pitch"]], axis=1)
+    axes.plot(*attitude.T, color=style.BLUE, lw=0.9)
+    axes.plot(*singular_curves(n[[closest]], 181)[0].T, color=style.RED, lw=1.8)
+    here = attitude[closest]
+    there = nearest_singular(n[[closest]], attitude[[closest]])[0]
+    axes.plot(*np.stack([here, there]).T, color=style.INK, lw=1.0, ls="--")
+    axes.plot(*here, "o", color=style.RED, ms=5, zorder=5)
+    axes.text(
+        *(0.97, 0.03),
+        f"closest: {abs(margin[closest]):.2f} rad at {flight['time'][closest]:.2f} s",
+        transform=axes.transAxes,
+        ha="right",
+        fontsize=8,
+        bbox={"facecolor": "white", "edgecolor": style.GREY, "linewidth": 0.5, "pad": 2.5},
+    )
+    style.angle_axis(axes, "x", HALF_WIDTH)
+    style.angle_axis(axes, "y", HALF_WIDTH)
+    axes.set_aspect("equal")
+    axes.set_xlabel("roll φ (rad)")
+    axes.set_ylabel("pitch θ (rad)")
+    axes.set_title("Attitudes flown; shaded: out of reach")
+
+
+def _shade_forbidden(axes: Any, n: np.typing.NDArray[np.float64], side: float) -> None:
+    """Shade what the gait puts out of reach, the darker the longer it does."""
+    instants = np.unique(np.linspace(0, len(n) - 1, INSTANTS).round().astype(int))
+    edges = np.linspace(-HALF_WIDTH, HALF_WIDTH, 361)
+    centres = 0.5 * (edges[1:] + edges[:-1])
+    intervals = forbidden_pitch(n[instants], side, centres)[:, np.newaxis]
+    pitch = centres[:, np.newaxis]
+    inside = (pitch > intervals[..., 0]) & (pitch < intervals[..., 1])
+    share = inside.mean(axis=0)
+    axes.grid(False)
+    from matplotlib.colors import LinearSegmentedColormap
+
+    shades = LinearSegmentedColormap.from_list("forbidden", ["#FFFFFF", FORBIDDEN, "#E9B49A"])
+    axes.pcolormesh(edges, edges, share, cmap=shades, vmin=0.0, vmax=1.0, rasterized=True)
+
+
+def _label(axes: Any, title: str, unit: str, *, name: str = "", columns: int = 3) -> None:
+    """Title, unit and, above the plot where it hides nothing, the legend."""
+    axes.set_title(title)
+    axes.set_ylabel(f"{name} ({unit})" if name else unit)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(
+            ncols=columns,
+            loc="lower right",
+            bbox_to_anchor=(1.0, 0.985),
+            borderaxespad=0.0,
+            handlelength=1.4,
+            columnspacing=0.9,
+            handletextpad=0.4,
+        )
+
+
+def _widen(axes: Any, least: float) -> None:
+    """Keep the height of a plot at some size, lest noise fill it."""
+    low, high = axes.get_ylim()
+    if high - low < least:
+        middle = 0.5 * (low + high)
+        axes.set_ylim(middle - 0.5 * least, middle + 0.5 * least)

@@ -1,0 +1,50 @@
+"""Flights in Rerun: recordings saved in bulk, live streams, and the blueprint that shows them.
+
+One `FlightRecorder` writes a flight's rows, whether they come all at once (`save_recording`) or
+piece by piece while the flight goes on (`LiveStream`). Times are on the timeline `TIMELINE`.
+Importing this package imports no Rerun; its functions do.
+
+Entities of a recording, each below the flight's own name where there are several:
+
+- ``world``: the vehicle's bodies as a tree, thrust arrows, trails of vehicle and reference
+- ``plane``: roll-pitch plane with the unacceptable-attitude curve and the attitude, pitch upwards
+- ``attitude``, ``tilt_angles``, ``rotor_speeds``, ``singularity``, ``position_error``: time series
+- ``events``: the log
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from tiltsim.rerun_stream.live import LiveStream
+    from tiltsim.rerun_stream.recording import save_recording
+    from tiltsim.rerun_stream.viewer import view_flights, view_recordings
+
+APPLICATION: Final = "tiltsim"
+TIMELINE: Final = "sim_time"
+
+_HOMES = {
+    "LiveStream": "live",
+    "save_recording": "recording",
+    "view_flights": "viewer",
+    "view_recordings": "viewer",
+}
+
+__all__ = [
+    "APPLICATION",
+    "TIMELINE",
+    "LiveStream",
+    "save_recording",
+    "view_flights",
+    "view_recordings",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name on first use."""
+    from importlib import import_module
+
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

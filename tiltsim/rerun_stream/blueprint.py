@@ -1,0 +1,160 @@
+"""The blueprint: which views a recording opens with, and where they stand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from tiltsim.rerun_stream import TIMELINE
+from tiltsim.rerun_stream.plane import BOUND
+from tiltsim.rerun_stream.series import PANELS
+
+if TYPE_CHECKING:
+    import rerun.blueprint as rrb
+
+EYE: Final = (-2.4, -2.4, 1.9)
+"""Where the camera stands, seen from the vehicle, in radii of it."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What the blueprint must know of a flight."""
+
+    name: str
+    world: str  # entities
+    vehicle: str
+    camera: str
+    floor: str
+    plane: str
+    radius: float  # m
+    thrust_scale: float  # m/N
+    ground: float  # m
+
+
+def flight_blueprint(flights: list[Shown], *, live: bool = False) -> rrb.Blueprint:
+    """Vehicle, trajectory, roll-pitch plane and events on the left, time series on the right."""
+    import rerun.blueprint as rrb
+
+    views = rrb.Horizontal(_vehicle_view(flights), _plane_view(flights), column_shares=[5, 4])
+    below = rrb.Horizontal(_trajectory_view(flights), _events_view(), column_shares=[5, 4])
+    left = rrb.Vertical(views, below, row_shares=[11, 8])
+    plots, heights = _plots(flights)
+    right = rrb.Vertical(*plots, row_shares=heights)
+    return rrb.Blueprint(
+        rrb.Horizontal(left, right, column_shares=[13, 8]),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(
+            timeline=TIMELINE, state="collapsed", play_state="following" if live else "playing"
+        ),
+        auto_views=False,
+    )
+
+
+def _vehicle_view(flights: list[Shown]) -> Any:
+    """The vehicle from near by; the camera goes with it but does not turn."""
+    import rerun.blueprint as rrb
+
+    first = flights[0]
+    return rrb.Spatial3DView(
+        origin=first.camera,
+        contents=[f"{flight.world}/**" for flight in flights],
+        name=f"Vehicle (thrust arrows: {100.0 * first.thrust_scale:g} cm per newton)",
+        eye_controls=rrb.EyeControls3D(
+            position=[first.radius * part for part in EYE],
+            look_target=(0.0, 0.0, 0.15 * first.radius),
+            eye_up=(0.0, 0.0, 1.0),
+        ),
+        line_grid=False,
+        overrides=_trails(flights),
+    )
+
+
+def _trajectory_view(flights: list[Shown]) -> Any:
+    """The whole paths of all vehicles and references."""
+    import rerun.blueprint as rrb
+
+    contents = []
+    for flight in flights:
+        contents += [f"{flight.world}/trail", f"{flight.world}/reference/**"]
+        contents += [f"{flight.vehicle}/**", f"{flight.camera}/**"]
+    return rrb.Spatial3DView(
+        origin="world",
+        contents=contents,
+        name="Trajectory and reference",
+        line_grid=_grid(flights[0].ground),
+        overrides=_trails(flights),
+    )
+
+
+def _plane_view(flights: list[Shown]) -> Any:
+    import rerun.blueprint as rrb
+
+    return rrb.Spatial2DView(
+        origin="plane",
+        name="Attitude among the unacceptable attitudes",
+        visual_bounds=rrb.VisualBounds2D(x_range=(-BOUND, BOUND), y_range=(-BOUND, BOUND)),
+        overrides={f"{flight.plane}/trail": _from_the_start() for flight in flights},
+    )
+
+
+def _events_view() -> Any:
+    import rerun.blueprint as rrb
+
+    return rrb.TextLogView(
+        origin="events",
+        name="Events",
+        columns=rrb.TextLogColumns(
+            timeline_columns=[TIMELINE], text_log_columns=["LogLevel", "Body"]
+        ),
+    )
+
+
+def _plots(flights: list[Shown]) -> tuple[list[Any], list[float]]:
+    """The time series and their heights; of several flights what they are compared by."""
+    if len(flights) == 1:
+        whole = [(panel.title, [f"{panel.path}/**"]) for panel in PANELS]
+        return [_plot(*plot) for plot in whole], [panel.height for panel in PANELS]
+    plots = []
+    for panel in PANELS:
+        levels = [f"{flights[0].name}/{panel.path}/{level}" for level in panel.levels]
+        for series, title in panel.compared:
+            lines = [f"{flight.name}/{panel.path}/{series}" for flight in flights]
+            plots.append(_plot(title, [*lines, *levels]))
+    return plots, [1.0] * len(plots)
+
+
+def _plot(title: str, contents: list[str]) -> Any:
+    import rerun.blueprint as rrb
+
+    return rrb.TimeSeriesView(
+        origin="/",
+        contents=contents,
+        name=title,
+        axis_x=rrb.TimeAxis(link="LinkToGlobal"),
+        plot_legend=rrb.PlotLegend("RightTop"),
+    )
+
+
+def _grid(height: float) -> Any:
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    plane = rr.encodings.Plane3D(normal=(0.0, 0.0, 1.0), distance=height)
+    return rrb.LineGrid3D(visible=True, spacing=1.0, plane=plane)
+
+
+def _trails(flights: list[Shown]) -> dict[str, Any]:
+    return {f"{flight.world}/trail": _from_the_start() for flight in flights}
+
+
+def _from_the_start() -> Any:
+    """Show all that has been drawn so far, not just the latest stretch."""
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    return rrb.VisibleTimeRanges(
+        timeline=TIMELINE,
+        start=rr.TimeRangeBoundary.infinite(),
+        end=rr.TimeRangeBoundary.cursor_relative(),
+    )

@@ -1,0 +1,122 @@
+"""One flight into a recording: all that does not move first, then row after row, then the end."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tiltsim.events import Event, EventWatch
+from tiltsim.replay import thrust_scale, vehicle_radius, visible_model
+from tiltsim.rerun_stream import palette
+from tiltsim.rerun_stream.plane import AttitudePlane
+from tiltsim.rerun_stream.rows import send_rows
+from tiltsim.rerun_stream.scene import Scene
+from tiltsim.rerun_stream.series import TimeSeries, comparison_series, measured_series
+
+if TYPE_CHECKING:
+    import rerun as rr
+
+    from tiltsim.flight import End, Flight
+    from tiltsim.rerun_stream.blueprint import Shown
+    from tiltsim.rerun_stream.palette import Color
+    from tiltsim.scenario import Scenario
+
+_LEVEL_COLORS = {"INFO": palette.GREY, "WARN": palette.AMBER, "ERROR": palette.RED}
+
+
+class FlightRecorder:
+    """Writes one flight into a recording.
+
+    Call `begin` once, `append` with pieces of the flight in order, and `finish`.
+
+    Parameters
+    ----------
+    recording
+        Where to write.
+    scenario
+        What is flown.
+    name
+        The flight's name among several that are compared; empty for a flight on its own.
+    color
+        The flight's colour.
+    first
+        Whether this is the first flight of the recording, which draws what all share.
+    """
+
+    def __init__(
+        self,
+        recording: rr.RecordingStream,
+        scenario: Scenario,
+        *,
+        name: str = "",
+        color: Color = palette.SKY,
+        first: bool = True,
+    ) -> None:
+        import rerun as rr
+
+        part = rr.escape_entity_path_part(name) if name else ""
+        self._recording = recording
+        self._scenario = scenario
+        self._name = name
+        self._first = first
+        self._events = EventWatch(scenario)
+        self._event_path = f"events/{part}" if name else "events"
+        self._model = visible_model(scenario)
+        suffix = f"/{part}" if name else ""
+        self._scene = Scene(recording, scenario, self._model, f"world{suffix}", color, name)
+        self._plane = AttitudePlane(recording, scenario, f"plane{suffix}", color)
+        series = comparison_series(name, color) if name else measured_series(scenario)
+        self._series = TimeSeries(recording, series, f"{part}/" if name else "")
+        self._plane_root, self._scene_root = f"plane{suffix}", f"world{suffix}"
+
+    def shown(self) -> Shown:
+        """What the blueprint must know of this flight."""
+        from tiltsim.rerun_stream.blueprint import Shown
+        from tiltsim.rerun_stream.geometry import ground_height
+
+        return Shown(
+            name=self._name,
+            world=self._scene_root,
+            vehicle=self._scene.vehicle,
+            camera=self._scene.camera,
+            floor=self._scene.floor,
+            plane=self._plane_root,
+            radius=vehicle_radius(self._model),
+            thrust_scale=thrust_scale(self._model),
+            ground=ground_height(self._model),
+        )
+
+    def begin(self, until: float) -> None:
+        """Log all that does not move, for a flight that lasts ``until`` (s) at most."""
+        left_out = self._scene.begin(until)
+        self._plane.begin(paints=self._first)
+        self._series.begin()
+        if self._first:
+            self._series.draw_limits(self._scenario, until)
+        self._log_events([self._events.opening()])
+        if left_out:
+            text = f"not drawn, for Rerun has no such shape: {', '.join(left_out)}"
+            self._log_events([Event(0.0, "WARN", text)])
+
+    def append(self, piece: Flight) -> None:
+        """Log the rows of a piece of the flight that follows on from the last."""
+        self._scene.append(piece)
+        self._plane.append(piece)
+        self._series.append(piece)
+        self._log_events(self._events.observe(piece))
+
+    def finish(self, end: End) -> None:
+        """Log how the flight ended."""
+        self._log_events(self._events.closing(end))
+
+    def _log_events(self, events: list[Event]) -> None:
+        import rerun as rr
+
+        prefix = f"{self._name}: " if self._name else ""
+        rows = rr.TextLog.columns(
+            text=[prefix + event.text for event in events],
+            level=[event.level for event in events],
+            color=[_LEVEL_COLORS[event.level] for event in events],
+        )
+        send_rows(self._recording, self._event_path, np.array([e.time for e in events]), rows)

@@ -1,0 +1,111 @@
+"""Whole flights into recordings, in bulk."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from tiltsim.errors import InputError
+from tiltsim.files import replacing
+from tiltsim.rerun_stream import APPLICATION, palette
+from tiltsim.rerun_stream.blueprint import flight_blueprint
+from tiltsim.rerun_stream.recorder import FlightRecorder
+
+if TYPE_CHECKING:
+    import rerun as rr
+
+    from tiltsim.flight import Flight
+    from tiltsim.scenario import Scenario
+
+
+UNHURRIED: Final = 3600.0
+"""Seconds between flushes by the clock of a recording that is saved in one go."""
+
+
+def save_recording(flights: Sequence[Flight], path: Path) -> None:
+    """Write flights into one recording; the file appears whole or not at all.
+
+    Equal flights give equal recordings. Raises `InputError` where the file cannot be written.
+    """
+    import rerun as rr
+
+    # Flushed by rows and bytes alone: a clock would cut the chunks elsewhere in every run.
+    unhurried = rr.ChunkBatcherConfig(flush_tick=UNHURRIED)
+    recording = new_recording([flight.scenario for flight in flights], batching=unhurried)
+    recorders = make_recorders(recording, flights)
+    blueprint = flight_blueprint([recorder.shown() for recorder in recorders])
+    try:
+        with replacing(path) as temporary:
+            recording.save(temporary, default_blueprint=blueprint)
+            write_flights(recorders, flights)
+            recording.disconnect()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def new_recording(
+    scenarios: Sequence[Scenario],
+    *,
+    salt: str = "",
+    batching: rr.ChunkBatcherConfig | None = None,
+) -> rr.RecordingStream:
+    """An empty recording that is the same for the same scenarios, whenever it is made.
+
+    Recordings of equal name are one to the viewer; ``salt`` tells them apart.
+    """
+    import rerun as rr
+
+    content = "\n".join([*(scenario.model_dump_json() for scenario in scenarios), salt])
+    digest = hashlib.sha256(content.encode()).hexdigest()[:16]
+    recording = rr.RecordingStream(
+        APPLICATION,
+        recording_id=f"{APPLICATION}-{digest}",
+        send_properties=False,
+        batcher_config=batching,
+    )
+    recording.set_log_time_enabled(False)
+    title = " / ".join(scenario.title or scenario.address or "flight" for scenario in scenarios)
+    recording.send_recording_name(title)
+    return recording
+
+
+def make_recorders(
+    recording: rr.RecordingStream, flights: Sequence[Flight]
+) -> list[FlightRecorder]:
+    """A recorder for each flight; several flights get names and colours of their own."""
+    if len(flights) == 1:
+        return [FlightRecorder(recording, flights[0].scenario)]
+    names = flight_names([flight.scenario for flight in flights])
+    return [
+        FlightRecorder(
+            recording,
+            flight.scenario,
+            name=name,
+            color=palette.FLIGHTS[index % len(palette.FLIGHTS)],
+            first=index == 0,
+        )
+        for index, (flight, name) in enumerate(zip(flights, names, strict=True))
+    ]
+
+
+def write_flights(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> None:
+    """Write whole flights."""
+    until = max(float(flight["time"][-1]) for flight in flights)
+    for recorder, flight in zip(recorders, flights, strict=True):
+        recorder.begin(until)
+        recorder.append(flight)
+        recorder.finish(flight.end)
+
+
+def flight_names(scenarios: Sequence[Scenario]) -> list[str]:
+    """A short name for each flight: its variant or file, numbered where two would be equal."""
+    short = []
+    for index, scenario in enumerate(scenarios, start=1):
+        file, _, variant = scenario.address.partition("#")
+        short.append(variant or file.rpartition("/")[2].removesuffix(".toml") or f"flight_{index}")
+    return [
+        name if short.count(name) == 1 else f"{name}_{short[: index + 1].count(name)}"
+        for index, name in enumerate(short)
+    ]
