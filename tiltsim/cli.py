@@ -9,7 +9,7 @@ from typing import Final
 
 from tiltsim.errors import InputError
 
-COMMANDS: Final = ("run", "check", "list", "gait", "map", "bench", "schema")
+COMMANDS: Final = ("run", "check", "list", "gait", "map", "singularity", "bench", "schema")
 INPUT_ERROR: Final = 2
 INTERRUPTED: Final = 130
 

@@ -36,6 +36,11 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--published", metavar="NAME", help="a gait of the thesis, such as ch06_gait_3"
     )
+    parser.add_argument(
+        "--balance",
+        metavar="AX,AY,AZ",
+        help="find the least tilted gait that hovers level under this acceleration, m/s^2, world",
+    )
     parser.add_argument("--vehicle", metavar="PRESET", help="ar_drone_2 (default) or luukkonen")
     parser.add_argument("--roll", metavar="RAD", help="attitude to analyse, default level")
     parser.add_argument("--pitch", metavar="RAD")
@@ -67,9 +72,12 @@ def _choose(arguments: argparse.Namespace) -> tuple[Gait, Vehicle]:
     from controllers.gaits import plans
     from tiltsim.errors import InputError
 
-    sources = [arguments.scenario, arguments.angles, arguments.published]
+    sources = [arguments.scenario, arguments.angles, arguments.published, arguments.balance]
     if sum(source is not None for source in sources) != 1:
-        raise InputError("gait: give one of SCENARIO, --angles A1,A2,A3,A4 and --published NAME")
+        raise InputError(
+            "gait: give one of SCENARIO, --angles A1,A2,A3,A4, --published NAME and "
+            "--balance AX,AY,AZ"
+        )
     if arguments.scenario is not None:
         if arguments.vehicle is not None:
             raise InputError("--vehicle: the scenario has a vehicle of its own; leave one out")
@@ -81,6 +89,8 @@ def _choose(arguments: argparse.Namespace) -> tuple[Gait, Vehicle]:
     vehicle = parse_vehicle(arguments.vehicle)
     if arguments.angles is not None:
         return plans.fixed(parse_angles("--angles", arguments.angles)), vehicle
+    if arguments.balance is not None:
+        return _balanced(arguments.balance, vehicle), vehicle
     from controllers.published_gaits import PUBLISHED_GAITS
 
     if arguments.published not in PUBLISHED_GAITS:
@@ -88,6 +98,23 @@ def _choose(arguments: argparse.Namespace) -> tuple[Gait, Vehicle]:
             f"--published {arguments.published}: unknown; choose {', '.join(PUBLISHED_GAITS)}"
         )
     return PUBLISHED_GAITS[arguments.published].gait, vehicle
+
+
+def _balanced(text: str, vehicle: Vehicle) -> Gait:
+    """The gait that balances an acceleration, given as ``AX,AY,AZ``."""
+    from controllers.balance import balanced_gait
+    from controllers.gaits import plans
+    from tiltsim.errors import InputError
+
+    try:
+        ax, ay, az = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"--balance {text}: must be three numbers, m/s^2") from None
+    try:
+        angles = balanced_gait((ax, ay, az), vehicle)
+    except ValueError as error:
+        raise InputError(f"--balance {text}: {error}") from None
+    return replace(plans.fixed(angles), source=f"balances {text} m/s^2 at level attitude")
 
 
 def _summary(report: dict[str, Any]) -> str:
