@@ -265,7 +265,10 @@ def test_overrides_alone_change_the_default_vehicle(capsys) -> None:
         ("arm_length=", "must be a positive finite number"),
         ("mass=1,mass=2", "mass is given twice"),
         ("luukkonen,ar_drone_2", "'ar_drone_2': write KEY=VALUE after the preset"),
-        ("quad,mass=1", "'quad' is no vehicle; choose ar_drone_2, ar_drone_2_unrounded, luukkonen, or KEY=VALUE"),
+        (
+            "quad,mass=1",
+            "'quad' is no vehicle; choose ar_drone_2, ar_drone_2_unrounded, luukkonen, or KEY=VALUE",
+        ),
         ("", "'' is no vehicle"),
     ],
 )

@@ -17,7 +17,9 @@ def texts(events):
 
 def test_a_quiet_flight_tells_what_it_is_how_close_it_came_and_that_it_ended():
     first, closest, last = flight_events(flight("fixed"))
-    assert first.text.startswith("tests/fixed: gait fixed, attitude_altitude law")
+    assert first.text.startswith(
+        "tests/fixed: gait fixed, modified decoupler, attitude-altitude law"
+    )
     assert "closest to singular: margin" in closest.text
     assert (last.text, last.level, last.time) == ("flight completed", "INFO", pytest.approx(1.2))
 

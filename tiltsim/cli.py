@@ -12,7 +12,7 @@ from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT
 
 COMMANDS: Final = (
     *("run", "check", "list", "view", "plot", "video"),
-    *("gait", "map", "bench", "schema"),
+    *("gait", "map", "singularity", "bench", "schema"),
 )
 
 

@@ -59,6 +59,11 @@ def add_parser(subparsers: Any) -> None:
         "--published", metavar="NAME", help="a gait of the thesis, such as ch06_gait_3"
     )
     parser.add_argument(
+        "--balance",
+        metavar="AX,AY,AZ",
+        help="find the least tilted gait that hovers level under this acceleration, m/s^2, world",
+    )
+    parser.add_argument(
         "--list",
         action="store_true",
         help="the gaits of the thesis and where its robustness claims hold",
@@ -123,7 +128,7 @@ def _check_options(arguments: argparse.Namespace) -> None:
     """Refuse what does not go together, and files that cannot be written."""
     from tiltsim.errors import InputError
 
-    gaits = [arguments.scenario, arguments.angles, arguments.published]
+    gaits = [arguments.scenario, arguments.angles, arguments.published, arguments.balance]
     given = sum(gait is not None for gait in gaits)
     kind = arguments.figure
     if arguments.list:
@@ -137,7 +142,10 @@ def _check_options(arguments: argparse.Namespace) -> None:
         if arguments.roll is not None or arguments.pitch is not None:
             raise InputError("--figure determinant: is drawn at level attitude")
     elif given != 1:
-        raise InputError("gait: give one of SCENARIO, --angles A1,A2,A3,A4 and --published NAME")
+        raise InputError(
+            "gait: give one of SCENARIO, --angles A1,A2,A3,A4, --published NAME and "
+            "--balance AX,AY,AZ"
+        )
     if kind is not None and arguments.plot is None:
         raise InputError(f"--figure {kind}: needs --plot FILE")
     if arguments.case is not None and kind != "determinant":
@@ -170,6 +178,8 @@ def _choose(arguments: argparse.Namespace) -> _Chosen:
     vehicle = parse_vehicle(arguments.vehicle)
     if arguments.angles is not None:
         return _Chosen(plans.fixed(parse_angles("--angles", arguments.angles)), vehicle)
+    if arguments.balance is not None:
+        return _Chosen(_balanced(arguments.balance, vehicle), vehicle)
     from controllers.published_gaits import PUBLISHED_GAITS
 
     if arguments.published not in PUBLISHED_GAITS:
@@ -264,6 +274,23 @@ def _determinant_text(report: dict[str, Any]) -> str:
     ]
     header = ("alpha_1 (rad)", "alpha_3 (rad)", "least R in the triangle U V M")
     return table(header, rows, frozenset({0, 1, 2}))
+
+
+def _balanced(text: str, vehicle: Vehicle) -> Gait:
+    """The gait that balances an acceleration, given as ``AX,AY,AZ``."""
+    from controllers.balance import balanced_gait
+    from controllers.gaits import plans
+    from tiltsim.errors import InputError
+
+    try:
+        ax, ay, az = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"--balance {text}: must be three numbers, m/s^2") from None
+    try:
+        angles = balanced_gait((ax, ay, az), vehicle)
+    except ValueError as error:
+        raise InputError(f"--balance {text}: {error}") from None
+    return replace(plans.fixed(angles), source=f"balances {text} m/s^2 at level attitude")
 
 
 def _summary(report: dict[str, Any]) -> str:

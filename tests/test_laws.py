@@ -1,0 +1,338 @@
+"""Every law in closed loop: engines, restarts, disturbances, and the chapters' experiments."""
+
+from __future__ import annotations
+
+from math import atan
+
+import mujoco
+import numpy as np
+import pytest
+
+import tiltsim
+from controllers.balance import balanced_gait
+from controllers.quadrotor_singularity import normalized_determinant, published_determinant
+from controllers.rotation import rotation_from_euler
+from controllers.vehicle import PRESETS
+from tiltsim.checking import check_one, collect
+from tiltsim.errors import InputError
+from tiltsim.flight import COLUMN_UNITS
+from tiltsim.loops import LOOPS, loop_of
+from tiltsim.model import compile_model
+from tiltsim.plants import MujocoPlant, make_plant
+
+ENGINES = ("python", "native")
+GUST = [{"type": "acceleration", "value": [0.7, -0.4, 0.2]}]
+QUADROTOR = {"model": "quadrotor", "preset": "ar_drone_2_unrounded"}
+CIRCLE = {"type": "circle", "radius": -1.0, "angular_frequency": -0.5, "position": [1.0, 0.0, 0.1]}
+# Loops slow enough to be sampled at a few milliseconds; the published ones are not.
+SLOW = {"position": [40.0, 600.0, 4000.0], "attitude": [40.0, 600.0, 4000.0]}
+LAWS = {
+    "yaw_position": {
+        "vehicle": QUADROTOR,
+        "initial": {"attitude": [0.4, -0.3, 0.2], "angular_velocity": [0.3, -0.2, 0.1]},
+        "controller": {"law": "yaw_position"},
+        "reference": CIRCLE,
+    },
+    "switching": {
+        "vehicle": QUADROTOR,
+        "initial": {"attitude": [0.5, -0.5, 0.1]},
+        "controller": {"law": "switching"},
+        "reference": {**CIRCLE, "roll": 0.05},
+    },
+    "quadrotor_attitude_altitude": {
+        "vehicle": QUADROTOR,
+        "initial": {"attitude": [0.5, -0.5, 0.1]},
+        "controller": {"law": "quadrotor_attitude_altitude"},
+        "reference": {"type": "attitude_altitude", "roll": 0.1, "altitude": 0.3},
+    },
+    "full_pose": {
+        "initial": {"attitude": [0.1, -0.1, 0.1]},
+        "controller": {"law": "full_pose", "max_tilt_rate": 20.0, "gains": SLOW},
+        "gait": {"type": "fixed", "angles": [-0.1, 0.1, -0.2, 0.1]},
+        "reference": {"type": "setpoint", "position": [0.1, 0.0, 0.0], "roll": 0.05},
+    },
+    "attitude_altitude": {
+        "controller": {"decoupling": "exact", "gains": "exact"},
+        "gait": {"type": "trot_continuous", "amplitude": 0.4, "period": 1.0},
+        "reference": {"type": "setpoint", "position": [0.1, 0.0, 0.0]},
+    },
+}
+
+each_law = pytest.mark.parametrize("law", LAWS)
+continuous_and_held = pytest.mark.parametrize("control_timestep", [0.0, 0.003])
+
+
+def scenario(law, simulation=None, **tables):
+    simulation = {"duration": 0.42, **(simulation or {})}
+    return tiltsim.parse_scenario({**LAWS[law], **tables, "simulation": simulation})
+
+
+def fly(law, simulation=None, **tables):
+    return tiltsim.simulate(scenario(law, simulation, **tables))
+
+
+def test_every_law_is_here():
+    assert set(LAWS) == set(LOOPS)
+
+
+@each_law
+@continuous_and_held
+def test_engines_fly_the_same_flight(law, control_timestep):
+    python, native = (
+        fly(law, {"engine": engine, "control_timestep": control_timestep}, disturbance=GUST)
+        for engine in ENGINES
+    )
+    assert (python.engine, native.engine) == ENGINES
+    assert len(python) == 43
+    np.testing.assert_array_equal(python.samples, native.samples)
+
+
+@each_law
+@continuous_and_held
+def test_a_saved_state_restarts_bit_identically(law, control_timestep):
+    wanted = scenario(law, {"engine": "python", "control_timestep": control_timestep})
+    straight = make_plant(wanted)
+    straight.advance(100)
+    saved, seen = straight.state, straight.observe()
+    straight.advance(50)
+
+    restarted = make_plant(wanted)
+    restarted.advance(17)
+    restarted.state = saved
+    assert restarted.observe() == seen
+    restarted.advance(50)
+    np.testing.assert_array_equal(restarted.state, straight.state)
+    assert restarted.observe() == straight.observe()
+
+
+@each_law
+def test_observing_changes_nothing(law):
+    plant = make_plant(scenario(law, {"engine": "python"}))
+    before = plant.state
+    assert plant.observe() == plant.observe()
+    np.testing.assert_array_equal(plant.state, before)
+
+
+@each_law
+def test_the_table_has_the_columns_of_every_flight_and_the_laws_own(law):
+    flight = fly(law, {"duration": 0.05})
+    table = flight.to_arrow()
+    extra = dict(loop_of(flight.scenario).extra_columns)
+    assert table.column_names == [*COLUMN_UNITS, *extra]
+    for field in table.schema:
+        assert field.metadata == {b"unit": flight.units[field.name].encode()}
+    assert all(np.isfinite(column).all() for column in flight.columns.values())
+
+
+# --- what the samples hold ---------------------------------------------------------------------
+
+
+def test_the_quadrotors_rotors_carry_what_its_law_asks_for():
+    flight = fly("yaw_position")
+    total = sum(flight[f"thrust_{rotor}"] for rotor in (1, 2, 3, 4))
+    np.testing.assert_allclose(total, flight["extension_thrust"], rtol=1e-12)
+
+
+def test_determinants_of_the_quadrotor():
+    flight = fly("yaw_position")
+    attitude = flight["roll"], flight["pitch"]
+    vehicle = PRESETS["ar_drone_2_unrounded"]
+    exact = normalized_determinant(*attitude, flight["extension_thrust"], vehicle)
+    np.testing.assert_array_equal(flight["determinant"], exact)
+    published = published_determinant(*attitude)
+    np.testing.assert_array_equal(flight["published_determinant"], published)
+    upright = [rotation_from_euler(roll, pitch, 0.0)[8] for roll, pitch in zip(*attitude)]
+    np.testing.assert_allclose(np.sin(flight["singularity_margin"]), upright, rtol=1e-12)
+
+
+def test_switching_tells_which_law_flies_and_what_it_aims_at():
+    flight = fly("switching", {"duration": 1.0})
+    inside = flight["attitude_zone"] == 1.0
+    assert inside.any()
+    assert not inside.all()
+    assert set(flight["roll_ref"][inside]) == {0.05}
+    np.testing.assert_array_equal(flight["roll_ref"][~inside], flight["roll"][~inside])
+    metrics = flight.metrics()
+    assert metrics["switches"] == 1.0
+    assert metrics["first_switch_time"] == flight["time"][np.argmax(inside)]
+
+
+def test_full_pose_holds_a_position_at_a_tilted_attitude():
+    metrics = fly("full_pose", {"duration": 8.0, "engine": "native"}).metrics()
+    assert abs(metrics["final_position_error_x"]) < 1e-4
+    assert abs(metrics["final_roll"] - 0.05) < 1e-4
+    assert metrics["max_tilt_rate"] < 25.0
+
+
+# --- disturbances ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_a_disturbance_accelerates_the_vehicle_from_the_first_moment(plant):
+    simulation = {"plant": plant, "duration": 0.001, "engine": "python", "record_timestep": 0.001}
+    calm, gusty = (
+        fly("attitude_altitude", simulation, disturbance=gust) for gust in ([], GUST + GUST)
+    )
+    change = [gusty[name][-1] - calm[name][-1] for name in ("vx", "vy", "vz")]
+    np.testing.assert_allclose(change, [0.0014, -0.0008, 0.0004], rtol=1e-3)
+
+
+def test_plants_agree_on_a_gust():
+    gait = {"type": "fixed", "angles": [-0.1, 0.1, -0.2, 0.1]}
+    flights = [
+        fly(
+            "attitude_altitude",
+            {"plant": plant, "duration": 2.0, "engine": "native"},
+            disturbance=GUST,
+            gait=gait,
+        )
+        for plant in ("mujoco", "thesis")
+    ]
+    for name in ("x", "y", "z", "roll", "pitch"):
+        np.testing.assert_allclose(flights[0][name], flights[1][name], atol=1e-4)
+
+
+def test_the_gust_scenarios_gait_is_the_balanced_one():
+    gait = tiltsim.load_scenario("ch01_gust/hover#perfect_gait").gait
+    wanted = balanced_gait((1.0, 0.0, 0.0), PRESETS["ar_drone_2"])
+    np.testing.assert_allclose(gait.angles, wanted, atol=1e-8)
+
+
+# --- the chapters' experiments -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "address", collect(["ch01_gust", "ch02_singular_zone", "ch03_gaits/over_actuated"])
+)
+def test_scenarios_hold(address):
+    result = check_one(address, "native")
+    assert result.status == "passed", result.message
+    assert result.verdicts, "nothing is expected"
+
+
+def test_only_the_thesis_plant_knows_no_gyroscopic_torque_but_both_know_the_gust():
+    perfect = {"simulation.plant": "thesis", "simulation.engine": "native"}
+    flight = tiltsim.simulate(tiltsim.load_scenario("ch01_gust/hover#perfect_gait", perfect))
+    assert abs(flight.metrics()["final_pitch"]) < 1e-3
+
+
+def test_the_quadrotor_leans_into_the_gust():
+    flight = tiltsim.simulate(tiltsim.load_scenario("ch01_gust/hover#quadrotor"))
+    assert flight.metrics()["final_pitch"] == pytest.approx(-atan(1 / 9.8), abs=1e-6)
+
+
+# --- mistakes ----------------------------------------------------------------------------------
+
+MISTAKES = {
+    "law of another vehicle": (
+        {"vehicle": QUADROTOR},
+        'controller.law = "attitude_altitude": flies the tiltrotor, and vehicle.model = '
+        "'quadrotor'; choose yaw_position, switching, quadrotor_attitude_altitude",
+    ),
+    "unknown law": ({"controller": {"law": "pid"}}, 'controller.law = "pid": choose attitude'),
+    "key of another law": (
+        {"vehicle": QUADROTOR, "controller": {"law": "yaw_position", "decoupler": "exact"}},
+        'controller.decoupler = "exact": unknown key; known: allow_unstable, gains, law',
+    ),
+    "unstable gains": (
+        {"vehicle": QUADROTOR, "controller": {"law": "yaw_position", "gains": "ch02"}},
+        "unstable under the exact decoupling matrix by Routh: position [10.0, 20.0, 50.0, 500.0]",
+    ),
+    "gait of a quadrotor": (
+        {**LAWS["yaw_position"], "gait": {"type": "fixed", "angles": [0.1, 0.0, 0.0, 0.0]}},
+        "the quadrotor has no use for it",
+    ),
+    "rotor speed of a quadrotor": (
+        {**LAWS["yaw_position"], "initial": {"rotor_speed": 200.0}},
+        "initial.rotor_speed = 200.0: the quadrotor has no use for it",
+    ),
+    "moving gait under full pose": (
+        {"controller": {"law": "full_pose"}, "gait": LAWS["attitude_altitude"]["gait"]},
+        'gait.type = "trot_continuous": the full_pose law moves the pods itself',
+    ),
+    "attitude for a position law": (
+        {**LAWS["yaw_position"], "reference": {"type": "setpoint", "pitch": 0.1}},
+        "reference.pitch = 0.1: roll and pitch are no outputs of the yaw_position law",
+    ),
+    "reference of another law": (
+        {**LAWS["yaw_position"], "reference": {"type": "attitude_altitude"}},
+        'reference.type = "attitude_altitude": the yaw_position law cannot follow it',
+    ),
+    "feed-forward without a choice": (
+        {**LAWS["yaw_position"], "reference": {**CIRCLE, "acceleration_feedforward": True}},
+        "follows all derivatives anyway",
+    ),
+    "thesis plant": (
+        {**LAWS["yaw_position"], "simulation": {"plant": "thesis"}},
+        'simulation.plant = "thesis": has the attitude_altitude law alone',
+    ),
+    "no circle": (
+        {"reference": {"type": "circle", "radius": 0.0, "angular_frequency": 1.0}},
+        "reference.radius = 0.0: must not be 0",
+    ),
+    "unknown disturbance": (
+        {"disturbance": [{"type": "earthquake", "value": [1.0, 0.0, 0.0]}]},
+        'disturbance.0.type = "earthquake": choose acceleration',
+    ),
+    "zone turned round": (
+        {
+            **LAWS["switching"],
+            "controller": {"law": "switching", "zone": {"roll": [0.2, -0.2]}},
+        },
+        "controller.zone.roll = [0.2, -0.2]: the first must not exceed the second",
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_one_clear_line(mistake):
+    document, message = MISTAKES[mistake]
+    with pytest.raises(InputError) as caught:
+        tiltsim.parse_scenario(document)
+    assert message in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+@each_law
+def test_a_scenario_written_out_reads_back(law):
+    wanted = scenario(law)
+    assert tiltsim.parse_scenario(wanted.model_dump(mode="json")) == wanted
+
+
+def test_a_new_law_on_the_command_line_empties_its_table():
+    changed = tiltsim.load_scenario(
+        "ch03_gaits/stabilization#gait_1",
+        {"controller.tilt_weight": "published", "controller.law": "full_pose"},
+    )
+    assert changed.controller.tilt_weight == "published"
+    assert changed.controller.gains == "ch03"
+
+
+# --- law states --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("model", ["tiltrotor", "quadrotor"])
+def test_law_states_integrate_their_controls_and_act_on_nothing(model):
+    compiled = compile_model(model, PRESETS["ar_drone_2"], law_states=2, visuals=False)
+    plain = compile_model(model, PRESETS["ar_drone_2"], visuals=False)
+    assert (compiled.na, compiled.nu) == (plain.na + 2, plain.nu + 2)
+    data, bare = mujoco.MjData(compiled), mujoco.MjData(plain)
+    for this, its in ((compiled, data), (plain, bare)):
+        mujoco.mj_resetDataKeyframe(this, its, 0)
+    np.testing.assert_array_equal(data.act[-2:], 0.0)
+    data.actuator("law_1").ctrl[0], data.actuator("law_2").ctrl[0] = 5.0, -2.0
+    mujoco.mj_step(compiled, data, 100)
+    mujoco.mj_step(plain, bare, 100)
+    np.testing.assert_allclose(data.act[-2:], [0.5, -0.2], rtol=1e-12)
+    np.testing.assert_array_equal(data.qpos, bare.qpos)
+
+
+def test_a_negative_number_of_law_states_is_refused():
+    with pytest.raises(ValueError, match="law_states = -1"):
+        compile_model("quadrotor", PRESETS["ar_drone_2"], law_states=-1)
+
+
+def test_the_extension_starts_at_the_weight():
+    plant = MujocoPlant(scenario("yaw_position"))
+    vehicle = PRESETS["ar_drone_2_unrounded"]
+    np.testing.assert_array_equal(plant.data.act[4:], [vehicle.mass * vehicle.gravity, 0.0])

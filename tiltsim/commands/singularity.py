@@ -1,0 +1,108 @@
+"""``tiltsim singularity``: where a quadrotor's decoupling matrix is said to be singular, and is."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tiltsim.commands.angles import allow_negative_lists, parse_angle, parse_vehicle
+
+if TYPE_CHECKING:
+    from controllers.vehicle import Vehicle
+
+
+def add_parser(subparsers: Any) -> None:
+    """Declare the command."""
+    parser = subparsers.add_parser(
+        "singularity",
+        help="compare the quadrotor's published and exact determinants",
+        description=(
+            "Ch. 2's determinant surface S(theta, phi) of yaw-position control and its singular "
+            "curve, beside the exact determinant, which in hover is zero nowhere within 90 degrees."
+        ),
+    )
+    allow_negative_lists(parser)
+    parser.add_argument("vehicle_model", metavar="quadrotor", choices=("quadrotor",))
+    parser.add_argument("--vehicle", metavar="PRESET", help="default: ar_drone_2_unrounded")
+    parser.add_argument("--roll", metavar="RAD", default="0", help="attitude to judge, default 0")
+    parser.add_argument("--pitch", metavar="RAD", default="0")
+    parser.add_argument("--json", action="store_true", help="machine-readable, with the curve")
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw surfaces, curve and zone")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Report, draw."""
+    vehicle = parse_vehicle(arguments.vehicle or "ar_drone_2_unrounded")
+    attitude = (
+        parse_angle("--roll", arguments.roll),
+        parse_angle("--pitch", arguments.pitch),
+    )
+    report = _report(vehicle, *attitude)
+    if arguments.plot is not None:
+        from tiltsim.figures.quadrotor_singularity import singularity_figure
+        from tiltsim.figures.style import save
+
+        save(singularity_figure(vehicle), arguments.plot)
+    print(json.dumps(report, indent=2) if arguments.json else _summary(report))
+    return 0
+
+
+def _report(vehicle: Vehicle, roll: float, pitch: float) -> dict[str, Any]:
+    from math import asin, cos
+
+    from controllers.quadrotor_singularity import (
+        exact_determinant,
+        normalized_determinant,
+        published_determinant,
+        published_singular_curve,
+    )
+    from controllers.switching import PUBLISHED_ZONE
+
+    hover = vehicle.mass * vehicle.gravity
+    curve_roll, curve_pitch = published_singular_curve()
+    on_curve = normalized_determinant(curve_roll, curve_pitch, hover, vehicle)
+    return {
+        "vehicle": vehicle._asdict(),
+        "roll": roll,
+        "pitch": pitch,
+        "published_determinant": float(published_determinant(roll, pitch)),
+        "exact_determinant": float(exact_determinant(roll, pitch, hover, vehicle)),
+        "normalized_determinant": float(normalized_determinant(roll, pitch, hover, vehicle)),
+        "singularity_margin": asin(cos(roll) * cos(pitch)),
+        "published_zone": PUBLISHED_ZONE._asdict(),
+        "exact_on_published_curve": {"min": float(on_curve.min()), "max": float(on_curve.max())},
+        "published_curve": {
+            "roll": (curve_roll + 0.0).tolist(),  # no negative zeros
+            "pitch": (curve_pitch + 0.0).tolist(),
+        },
+    }
+
+
+def _summary(report: dict[str, Any]) -> str:
+    zone, on_curve = report["published_zone"], report["exact_on_published_curve"]
+    curve = report["published_curve"]
+    rows = [
+        ("attitude", f"roll {report['roll']:g}, pitch {report['pitch']:g} rad"),
+        ("published determinant S", f"{report['published_determinant']:.6g}"),
+        ("exact determinant", f"{report['normalized_determinant']:.6g} of that in level hover"),
+        ("singularity margin", f"{report['singularity_margin']:.6g} rad, exact"),
+        (
+            "published curve S = 0",
+            f"roll {min(curve['roll']):.4g} to {max(curve['roll']):.4g}, "
+            f"pitch {min(curve['pitch']):.4g} to {max(curve['pitch']):.4g} rad",
+        ),
+        (
+            "exact on that curve",
+            f"{on_curve['min']:.6g} to {on_curve['max']:.6g}, nowhere singular",
+        ),
+        (
+            "published zone",
+            f"roll {zone['roll_min']:.4g} to {zone['roll_max']:.4g}, "
+            f"pitch {zone['pitch_min']:.4g} to {zone['pitch_max']:.4g} rad",
+        ),
+    ]
+    width = max(len(name) for name, _ in rows)
+    return "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
