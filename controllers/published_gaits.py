@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from controllers.gaits import plans
 from controllers.gaits.two_color import BLUE, colored_angles
@@ -39,6 +39,29 @@ SINGULAR: Final = 1e-6
 
 _PERIOD: Final = 1.0
 """Ch. 6 sets the period to 1 s; the margin over a period does not depend on it."""
+
+
+class DeterminantCase(NamedTuple):
+    """A restriction of ch. 3, Sec. 5.1, and the pairs it is looked at with."""
+
+    restriction: str
+    pairs: tuple[tuple[float, float], ...]  # (alpha_1, alpha_3), rad
+
+
+DETERMINANT_CASES: Final = {
+    "equal": DeterminantCase("α₁ = α₃", tuple((a, a) for a in (-0.15, -0.075, 0.0, 0.075, 0.15))),
+    "half": DeterminantCase("α₁ = α₃/2", tuple((a, 2.0 * a) for a in (-0.2, -0.1, 0.0, 0.1, 0.2))),
+    "negative": DeterminantCase(
+        "α₁ = −α₃", tuple((a, 0.0 - a) for a in (-1.4, -0.7, 0.0, 0.7, 1.4))
+    ),
+    "negative_half": DeterminantCase(
+        "α₁ = −α₃/2", tuple((a, 0.0 - 2.0 * a) for a in (-0.3, -0.15, 0.0, 0.15, 0.3))
+    ),
+}
+"""The four restrictions under which ch. 3 draws the determinant at level attitude."""
+
+TRIANGLE: Final = ((-1.5, 1.5), (1.5, -1.5), (1.0, 1.0))
+"""U, V, M of ch. 3, Eq. (22): the region of interest in ``(alpha_2, alpha_4)`` (rad)."""
 
 
 @dataclass(frozen=True)

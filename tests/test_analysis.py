@@ -4,28 +4,34 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from controllers.gaits import plans
-from controllers.published_gaits import PATHS, PUBLISHED_GAITS
+from controllers.published_gaits import DETERMINANT_CASES, PATHS, PUBLISHED_GAITS, TRIANGLE
 from controllers.singularity import residuals
 from controllers.two_color_planner import Circle
 from controllers.vehicle import PRESETS
 from tiltsim.analysis import gait_report, map_report, vehicle_name
 from tiltsim.commands import gait as gait_command
 from tiltsim.commands import map as map_command
+from tiltsim.commands.angles import parse_vehicle
+from tiltsim.commands.text import json_text, number
 from tiltsim.errors import InputError
 from tiltsim.figures import style
 from tiltsim.figures.attainable import attainable_figure
-from tiltsim.figures.determinant import CASES, TRIANGLE, determinant_figure
+from tiltsim.figures.determinant import determinant_figure
 from tiltsim.figures.gait import comparison_figure, gait_figure, margin_figure
 from tiltsim.figures.two_color_map import map_figure
 
 AR_DRONE = PRESETS["ar_drone_2"]
+GAIT_PAGE = Path(__file__).parents[1] / "docs" / "gaits.md"
+ATTAINABLE = ["--figure", "attainable", "--plot", "f.png"]
 
 
 def run(*words: str) -> int:
@@ -133,6 +139,144 @@ def test_published_gaits_by_name(capsys) -> None:
     assert report["min_singularity_margin"] == pytest.approx(np.pi / 2, abs=2e-3)
 
 
+SCENARIOS = {
+    "fixed": ('type = "fixed"\nangles = [-0.65, -0.65, 0.65, 0.65]', None),
+    "trot": ('type = "trot_continuous"\namplitude = 0.65\nperiod = 2.0', 1.0776),
+    "walk": ('type = "walk"\namplitude = 1.0\nperiod = 3.0', -0.5349),
+    "walk_third": ('type = "walk"\namplitude = 1.0\nperiod = 1.0\nscale = 0.3333333', 1.4134),
+    "run": ('type = "run"\namplitude = 1.0\nperiod = 1.0', 0.7412),
+    "transverse": (
+        'type = "transverse_gallop"\namplitude = 1.0\nperiod = 1.0\nscale = 0.3333333',
+        -1.5365,
+    ),
+    "rotary": (
+        'type = "rotary_gallop"\namplitude = 1.0\nperiod = 2.0\nscale = 0.1666667',
+        1.5325,
+    ),
+    "red": (
+        'type = "two_color"\nperiod = 1.0\nrectangle = [[0.2, 0.8], [-0.8, -0.2]]',
+        np.pi / 2,
+    ),
+    "blue": (
+        'type = "two_color"\nperiod = 1.0\ncolor = "blue"\ncentre = [0.5, -0.5]\nradius = 0.2',
+        0.0,
+    ),
+    "waypoints": (
+        'type = "waypoints"\nperiod = 1.0\nangles = [[0.0, 0.0, 0.0, 0.0], [0.1, 0.2, -0.1, 0.3]]',
+        1.4975,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_every_gait_of_a_scenario_shows_its_margin_over_the_period(tmp_path, capsys, name) -> None:
+    table, least = SCENARIOS[name]
+    file = tmp_path / f"{name}.toml"
+    file.write_text(f"[gait]\n{table}\n")
+    report = run_json(capsys, "gait", str(file))
+    if least is None:
+        assert "time" not in report
+        assert report["singularity_margin"] == pytest.approx(1.0776, abs=1e-4)
+        return
+    margins = np.array(report["time"]["singularity_margin"])
+    assert report["time"]["time"][-1] == pytest.approx(report["period"], rel=0.01)
+    assert len(margins) == len(report["time"]["time"]) > 100
+    assert report["min_singularity_margin"] == margins.min() == pytest.approx(least, abs=2e-4)
+
+
+def test_the_table_of_published_gaits(capsys) -> None:
+    rows = {row["key"]: row for row in run_json(capsys, "gait", "--list")}
+    assert list(rows) == list(PUBLISHED_GAITS)
+    for row in rows.values():
+        if row["color"] is not None and "blue" in row["color"]:
+            assert row["margin_exact"] == 0.0
+            assert row["claim_holds"] in (False, None)
+        elif row["margin_biased"] is not None:
+            assert row["claim_holds"] is True
+    assert run("gait", "--list") == 0
+    output = capsys.readouterr().out
+    lines = output.splitlines()
+    assert all(key in output for key in PUBLISHED_GAITS)
+    assert re.search(r"ch06_gait_3 +red +printed +1.57\d\d +1.57\d\d +1.2995 +\S+ +yes", output)
+    assert re.search(r"ch06_gait_1 +blue +printed +-1.3738 +0.0000 +-1.5183 +0 +no", output)
+    assert len({line.index("claim holds") for line in lines if "claim holds" in line}) == 1
+
+
+@pytest.mark.skipif(not GAIT_PAGE.is_file(), reason="the docs are not part of a distribution")
+def test_the_page_on_gaits_shows_the_table_of_today(capsys) -> None:
+    run("gait", "--list")
+    assert capsys.readouterr().out in GAIT_PAGE.read_text(encoding="utf-8")
+
+
+def test_no_number_is_a_negative_zero(capsys) -> None:
+    words = ["--list"], ["--angles", "0,0,0,0"], ["--angles=-0.0,0,0,0", "--roll=-0.0"]
+    for options in (*words, ["--published", "ch06_gait_4"]):
+        for form in ([], ["--json"]):
+            run("gait", *options, *form)
+            assert not re.search(r"-0(\.0*)?(?![\d.e])", capsys.readouterr().out)
+
+
+def test_numbers_as_text() -> None:
+    assert number(-0.0) == number(-1e-9, ".4f").rstrip("0").rstrip(".") == "0"
+    assert number(-0.5) == "-0.5"
+    assert json.loads(json_text({"a": [-0.0, (1, -2.5)], "b": None})) == {
+        "a": [0.0, [1, -2.5]],
+        "b": None,
+    }
+    assert "-0.0" not in json_text([-0.0])
+
+
+def test_a_blue_gait_as_printed_is_said_to_be_nearly_singular(capsys) -> None:
+    report = run_json(capsys, "gait", "--published", "ch09_gait_5")
+    assert report["rank"] == 3
+    assert "tau is nearly singular: its smallest singular value is 0.00011" in report["warnings"][0]
+
+
+@pytest.mark.parametrize(
+    ("text", "changes"),
+    [
+        ("luukkonen,arm_length=0.3", {"arm_length": 0.3}),
+        ("luukkonen, mass=1, gravity=1.62", {"mass": 1.0, "gravity": 1.62}),
+    ],
+)
+def test_a_preset_with_overrides(text, changes) -> None:
+    assert parse_vehicle(text) == PRESETS["luukkonen"]._replace(**changes)
+
+
+def test_overrides_alone_change_the_default_vehicle(capsys) -> None:
+    text = "arm_length=0.2,thrust_coefficient=1e-5,drag_coefficient=2e-7"
+    ratio = 2e-7 / (0.2 * 1e-5)
+    report = run_json(capsys, "gait", "--angles", "0,0,0,0", "--vehicle", text)
+    assert report["drag_ratio"] == pytest.approx(ratio)
+    assert report["vehicle"]["mass"] == AR_DRONE.mass
+    report = run_json(capsys, "map", "--vehicle", text)
+    assert report["P"] == pytest.approx([np.arctan(ratio), -np.arctan(ratio)])
+    assert report["blue"]["alpha_3"]["offset"] == pytest.approx(2 * np.arctan(ratio))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("arm=0.3", "'arm' is no parameter; choose mass, inertia_xx, "),
+        ("luukkonen,arm_length=0", "arm_length = 0: must be a positive finite number"),
+        ("arm_length=-1", "must be a positive finite number"),
+        ("arm_length=nan", "must be a positive finite number"),
+        ("arm_length=inf", "must be a positive finite number"),
+        ("arm_length=", "must be a positive finite number"),
+        ("mass=1,mass=2", "mass is given twice"),
+        ("luukkonen,ar_drone_2", "'ar_drone_2': write KEY=VALUE after the preset"),
+        ("quad,mass=1", "'quad' is no vehicle; choose ar_drone_2, luukkonen, or KEY=VALUE"),
+        ("", "'' is no vehicle"),
+    ],
+)
+@pytest.mark.parametrize("command", [["gait", "--angles", "0,0,0,0"], ["map"]])
+def test_mistakes_in_a_vehicle_are_one_clear_line(command, text, message) -> None:
+    with pytest.raises(InputError) as caught:
+        run(*command, "--vehicle", text)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
 def test_vehicles_are_named_or_listed() -> None:
     assert vehicle_name(PRESETS["luukkonen"]) == "luukkonen"
     assert vehicle_name(AR_DRONE._replace(mass=1.0))["mass"] == 1.0
@@ -154,7 +298,42 @@ def test_vehicles_are_named_or_listed() -> None:
         ([], "give one of SCENARIO"),
         (["some", "--angles", "0,0,0,0"], "give one of SCENARIO"),
         (["--angles", "0,0,0,0", "--plot", "figure.xyz"], "unknown format 'xyz'"),
-        (["--angles", "0,0,0,0", "--plot", "/no/such/folder/f.png"], "No such file"),
+        (["--list", "--published", "ch06_gait_3"], "takes no other option than --json"),
+        (["--angles", "0,0,0,0", "--figure", "margin"], "needs --plot FILE"),
+        (["--angles", "0,0,0,0", "--case", "half"], "goes with --figure determinant"),
+        (["--angles", "0,0,0,0", "--speed-limits", "1,2"], "goes with --figure attainable"),
+        (["--figure", "determinant", "--plot", "f.png", "--angles", "0,0,0,0"], "takes --case"),
+        (["--figure", "determinant", "--plot", "f.png", "--roll", "0"], "at level attitude"),
+        (["--figure", "comparison", "--plot", "f.png", "--angles", "0,0,0,0"], "no bias"),
+        ([*ATTAINABLE, "--published", "ch06_gait_3"], "moves"),
+        (
+            [
+                "--figure",
+                "attainable",
+                "--plot",
+                "f.png",
+                "--angles",
+                "0,0,0,0",
+                "--speed-limits",
+                "3,2",
+            ],
+            "must be less",
+        ),
+        (
+            [
+                "--figure",
+                "attainable",
+                "--plot",
+                "f.png",
+                "--angles",
+                "0,0,0,0",
+                "--speed-limits",
+                "3",
+            ],
+            "needs LEAST,GREATEST",
+        ),
+        (["--angles", "0,0,0,0", "--plot", "figure"], "unknown format ''; choose pdf, png, svg"),
+        (["--angles", "0,0,0,0", "--plot", "/no/such/folder/f.png"], "folder does not exist"),
     ],
 )
 def test_mistakes_are_one_clear_line(words, message) -> None:
@@ -212,6 +391,7 @@ def test_accepted_paths(capsys) -> None:
         ("--leg red 0,0 1", "needs 2 angles"),
         ("--circle red 0,0 -1", "radius -1"),
         ("--circle red 0,0 0.2 --leg red 0,0 1,1", "either --leg or --circle"),
+        ("--plot map.xyz", "unknown format 'xyz'"),
         ("--vehicle none", "choose ar_drone_2, luukkonen"),
     ],
 )
@@ -242,6 +422,77 @@ def test_figures_are_written(tmp_path) -> None:
         assert (tmp_path / name).stat().st_size > 5_000
 
 
+FIGURE_WORDS = {
+    "roll_pitch.svg": ["--published", "ch06_gait_3"],
+    "comparison.png": ["--published", "ch06_gait_4", "--figure", "comparison"],
+    "margin.pdf": ["--published", "ch06_gait_4", "--figure", "margin"],
+    "attainable.png": [
+        "--published",
+        "ch09_gait_2",
+        "--figure",
+        "attainable",
+        "--speed-limits",
+        "250,400",
+    ],
+    "determinant.png": ["--figure", "determinant", "--case", "half"],
+}
+
+
+@pytest.mark.parametrize("name", FIGURE_WORDS)
+def test_every_kind_of_figure_is_written_by_the_command(tmp_path, capsys, name) -> None:
+    target = tmp_path / name
+    assert run("gait", *FIGURE_WORDS[name], "--plot", str(target)) == 0
+    marks = {".svg": b"<?xml", ".png": b"\x89PNG", ".pdf": b"%PDF"}
+    assert target.read_bytes().startswith(marks[target.suffix])
+    assert capsys.readouterr().out
+
+
+def test_equal_figures_give_equal_files(tmp_path) -> None:
+    for ending in style.FORMATS:
+        files = [tmp_path / f"{index}.{ending}" for index in range(2)]
+        for file in files:
+            style.save(gait_figure(plans.fixed([0.1, 0.2, 0.3, 0.4]), AR_DRONE), file)
+        assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_the_margin_figure_shows_the_biased_twin(tmp_path, monkeypatch) -> None:
+    shown = []
+    monkeypatch.setattr(style, "save", lambda figure, path: shown.append(figure))
+    file = tmp_path / "biased.toml"
+    file.write_text(f"[gait]\nbias = 0.8\n{SCENARIOS['red'][0]}\n")
+    for words in (["--published", "ch06_gait_3"], [str(file)], ["--published", "ch09_gait_2"]):
+        run("gait", *words, "--figure", "margin", "--plot", str(tmp_path / "margin.png"))
+    labels = [[text.get_text() for text in f.axes[0].get_legend().get_texts()] for f in shown]
+    assert labels == [
+        ["ch06_gait_3, as printed", "biased, η = 80%"],
+        ["two_color, biased 80%", "without bias"],
+        ["ch09_gait_2, as printed"],
+    ]
+
+
+def test_a_bad_target_is_noticed_before_any_work(tmp_path, monkeypatch) -> None:
+    def work(*_: object, **__: object) -> None:
+        raise AssertionError("worked")
+
+    monkeypatch.setattr(gait_command, "_choose", work)
+    monkeypatch.setattr(map_command, "parse_vehicle", work)
+    closed = tmp_path / "closed.png"
+    closed.touch()
+    monkeypatch.setattr(style.os, "access", lambda path, mode: path != closed)
+    for target, message in (
+        (tmp_path / "f.bmp", "unknown format 'bmp'; choose pdf, png, svg"),
+        (tmp_path / "no" / "f.png", "folder does not exist"),
+        (closed, "permission denied"),
+    ):
+        for words in (["gait", "--angles", "0,0,0,0"], ["map"]):
+            with pytest.raises(InputError, match=message):
+                run(*words, "--plot", str(target))
+
+
+def test_cases_on_the_command_line_are_those_of_the_thesis() -> None:
+    assert tuple(DETERMINANT_CASES) == gait_command.CASES
+
+
 def test_plot_option_writes_a_file(tmp_path, capsys) -> None:
     for words in (["gait", "--angles", "0.1,0.2,0.3,0.4"], ["map"]):
         target = tmp_path / f"{words[0]}.png"
@@ -249,7 +500,7 @@ def test_plot_option_writes_a_file(tmp_path, capsys) -> None:
         assert target.read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", DETERMINANT_CASES)
 def test_the_region_of_interest_is_free_of_singularities(case) -> None:
     """Ch. 3, Figs. 10-13: R > 0 within the triangle for all twenty pairs."""
     share = np.linspace(0.0, 1.0, 151)
@@ -261,7 +512,7 @@ def test_the_region_of_interest_is_free_of_singularities(case) -> None:
         + first[inside, np.newaxis] * (corners[1] - corners[0])
         + second[inside, np.newaxis] * (corners[2] - corners[0])
     )
-    for alpha_1, alpha_3 in CASES[case][1]:
+    for alpha_1, alpha_3 in DETERMINANT_CASES[case].pairs:
         angles = np.insert(points, [0, 1], [alpha_1, alpha_3], axis=1)
         assert residuals(angles, AR_DRONE).R.min() > 0.05
 

@@ -117,11 +117,15 @@ class Gait:
         """All tilt angles divided by ``divisor`` (ch. 5, Eq. 16)."""
         if not (isfinite(divisor) and divisor > 0.0):
             raise ValueError(f"scale 1/{divisor}: must be positive and finite")
+        if divisor == 1.0:
+            return self
         parameters = self.parameters._replace(scale=self.parameters.scale / divisor)
         return replace(self, name=f"{self.name} / {divisor:g}", parameters=parameters)
 
     def biased(self, eta: float) -> Gait:
         """``alpha_3`` and ``alpha_4`` multiplied by ``eta`` (ch. 6, Eqs. 12-15)."""
+        if eta == 1.0:
+            return self
         parameters = self.parameters._replace(bias=self.parameters.bias * eta)
         return replace(self, name=f"{self.name}, biased {eta:.0%}", parameters=parameters)
 

@@ -15,8 +15,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from tiltsim.cli import main
+from tiltsim.control import TILTROTOR
 from tiltsim.flight import COLUMN_UNITS
 from tiltsim.metrics import METRICS
+from tiltsim.native import compile_callbacks
 
 SETPOINT = "ch04_tracking/setpoint#rho_065_modified"
 SHORT = ("--set", "simulation.duration=0.2")
@@ -220,6 +222,7 @@ def test_check_survives_a_file_that_cannot_be_read_as_toml(tmp_path, capsys):
 
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_interrupt_ends_a_whole_check_at_once(tmp_path, jobs):
+    compile_callbacks(TILTROTOR)  # so that the interrupt falls into the flights
     for name in ("a", "b", "c"):
         (tmp_path / f"{name}.toml").write_text("[simulation]\nduration = 90.0\n")
     process = subprocess.Popen(

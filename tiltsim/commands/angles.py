@@ -1,4 +1,4 @@
-"""Reading tilt angles, attitudes and vehicles from the command line: one line for a mistake."""
+"""Reading angles and vehicles from the command line: one line for a mistake."""
 
 from __future__ import annotations
 
@@ -51,12 +51,50 @@ def _checked(option: str, text: str, value: float) -> float:
     return value
 
 
-def parse_vehicle(name: str | None) -> Vehicle:
-    """A vehicle by its preset name, the default for None; `InputError` lists the choices."""
+def parse_vehicle(text: str | None) -> Vehicle:
+    """A vehicle: a preset's name, ``KEY=VALUE`` in place of its parameters, or both.
+
+    The parts are separated by commas, the preset first; without one, and for None, it is
+    ar_drone_2. `InputError` lists the choices.
+    """
     from controllers.vehicle import PRESETS
 
-    if name is None:
-        return PRESETS["ar_drone_2"]
+    parts = [] if text is None else [part.strip() for part in text.split(",")]
+    name = parts.pop(0) if parts and "=" not in parts[0] else "ar_drone_2"
     if name not in PRESETS:
-        raise InputError(f"--vehicle {name}: unknown; choose {', '.join(PRESETS)}")
-    return PRESETS[name]
+        choices = f"{', '.join(PRESETS)}, or KEY=VALUE"
+        raise InputError(f"--vehicle {text}: {name!r} is no vehicle; choose {choices}")
+    vehicle = PRESETS[name]
+    changes: dict[str, float] = {}
+    for part in parts:
+        key, equals, value = part.partition("=")
+        if not equals:
+            raise InputError(f"--vehicle {text}: {part!r}: write KEY=VALUE after the preset")
+        if key not in vehicle._fields:
+            choices = ", ".join(vehicle._fields)
+            raise InputError(f"--vehicle {text}: {key!r} is no parameter; choose {choices}")
+        if key in changes:
+            raise InputError(f"--vehicle {text}: {key} is given twice")
+        changes[key] = _positive(f"--vehicle {text}: {key}", value)
+    return vehicle._replace(**changes)
+
+
+def parse_speed_limits(text: str) -> tuple[float, float]:
+    """Least and greatest rotor speed (rad/s), separated by a comma."""
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise InputError(f"--speed-limits {text}: needs LEAST,GREATEST in rad/s")
+    least, greatest = (_positive(f"--speed-limits {text}: limit", part) for part in parts)
+    if least >= greatest:
+        raise InputError(f"--speed-limits {text}: the first must be less than the second")
+    return least, greatest
+
+
+def _positive(place: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not (isfinite(value) and value > 0.0):
+        raise InputError(f"{place} = {text}: must be a positive finite number")
+    return value

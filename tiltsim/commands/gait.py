@@ -3,16 +3,38 @@
 from __future__ import annotations
 
 import argparse
-import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
-from tiltsim.commands.angles import allow_negative_lists, parse_angle, parse_angles, parse_vehicle
+from tiltsim.commands.angles import (
+    allow_negative_lists,
+    parse_angle,
+    parse_angles,
+    parse_speed_limits,
+    parse_vehicle,
+)
+from tiltsim.commands.text import aligned, json_text, number, numbers, table
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from controllers.gaits.plans import Gait
     from controllers.vehicle import Vehicle
+
+FIGURES: Final = ("roll_pitch", "comparison", "margin", "attainable", "determinant")
+CASES: Final = ("equal", "half", "negative", "negative_half")
+
+
+@dataclass(frozen=True)
+class _Chosen:
+    """The gait to analyse, its vehicle, and the gait it is compared with, if any."""
+
+    gait: Gait
+    vehicle: Vehicle
+    title: str = "gait"
+    twin: Gait | None = None
+    twin_title: str = ""
 
 
 def add_parser(subparsers: Any) -> None:
@@ -36,40 +58,103 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--published", metavar="NAME", help="a gait of the thesis, such as ch06_gait_3"
     )
-    parser.add_argument("--vehicle", metavar="PRESET", help="ar_drone_2 (default) or luukkonen")
+    parser.add_argument(
+        "--list",
+        action="store_true",
+        help="the gaits of the thesis and where its robustness claims hold",
+    )
+    parser.add_argument(
+        "--vehicle",
+        metavar="VEHICLE",
+        help="ar_drone_2 (default), luukkonen, KEY=VALUE,..., or a preset with KEY=VALUE,...",
+    )
     parser.add_argument("--roll", metavar="RAD", help="attitude to analyse, default level")
     parser.add_argument("--pitch", metavar="RAD")
     parser.add_argument("--json", action="store_true", help="machine-readable")
-    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the roll-pitch diagram")
+    parser.add_argument(
+        "--plot", type=Path, metavar="FILE", help="draw a figure: FILE.png, .svg or .pdf"
+    )
+    parser.add_argument(
+        "--figure",
+        choices=FIGURES,
+        help=(
+            "what to draw: roll_pitch (default); comparison, two roll-pitch diagrams, with and "
+            "without bias; margin over a period; attainable torques, thrusts and accelerations "
+            "(ch. 9); determinant surfaces and zero curves (ch. 3), which need no gait"
+        ),
+    )
+    parser.add_argument(
+        "--case",
+        choices=CASES,
+        help="of the determinant figure: how alpha_1 goes with alpha_3 (default: equal)",
+    )
+    parser.add_argument(
+        "--speed-limits",
+        metavar="LEAST,GREATEST",
+        help="of the attainable figure: rotor speeds in rad/s (default: those of ch. 9)",
+    )
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyse, print, draw."""
-    gait, vehicle = _choose(arguments)
+    _check_options(arguments)
+    if arguments.list:
+        _print(arguments, _list_report(), _list_text)
+        return 0
+    if arguments.figure == "determinant":
+        return _run_determinant(arguments)
+    chosen = _choose(arguments)
     roll = None if arguments.roll is None else parse_angle("--roll", arguments.roll)
     pitch = None if arguments.pitch is None else parse_angle("--pitch", arguments.pitch)
 
     from tiltsim.analysis import gait_report
 
-    report = gait_report(gait, vehicle, roll=roll, pitch=pitch)
     if arguments.plot is not None:
-        from tiltsim.figures.gait import gait_figure
         from tiltsim.figures.style import save
 
-        save(gait_figure(gait, vehicle), arguments.plot)
-    print(json.dumps(report, indent=2, allow_nan=False) if arguments.json else _summary(report))
+        save(_draw(arguments, chosen), arguments.plot)
+    report = gait_report(chosen.gait, chosen.vehicle, roll=roll, pitch=pitch)
+    _print(arguments, report, _summary)
     return 0
 
 
-def _choose(arguments: argparse.Namespace) -> tuple[Gait, Vehicle]:
+def _check_options(arguments: argparse.Namespace) -> None:
+    """Refuse what does not go together, and files that cannot be written."""
+    from tiltsim.errors import InputError
+
+    gaits = [arguments.scenario, arguments.angles, arguments.published]
+    given = sum(gait is not None for gait in gaits)
+    kind = arguments.figure
+    if arguments.list:
+        others = [*gaits, arguments.vehicle, arguments.roll, arguments.pitch]
+        others += [arguments.plot, kind, arguments.case, arguments.speed_limits]
+        if any(other is not None for other in others):
+            raise InputError("--list: takes no other option than --json")
+    elif kind == "determinant":
+        if given:
+            raise InputError("--figure determinant: takes --case instead of a gait")
+        if arguments.roll is not None or arguments.pitch is not None:
+            raise InputError("--figure determinant: is drawn at level attitude")
+    elif given != 1:
+        raise InputError("gait: give one of SCENARIO, --angles A1,A2,A3,A4 and --published NAME")
+    if kind is not None and arguments.plot is None:
+        raise InputError(f"--figure {kind}: needs --plot FILE")
+    if arguments.case is not None and kind != "determinant":
+        raise InputError(f"--case {arguments.case}: goes with --figure determinant")
+    if arguments.speed_limits is not None and kind != "attainable":
+        raise InputError("--speed-limits: goes with --figure attainable")
+    if arguments.plot is not None:
+        from tiltsim.figures.style import check_target
+
+        check_target(arguments.plot)
+
+
+def _choose(arguments: argparse.Namespace) -> _Chosen:
     """The gait and the vehicle that the arguments name."""
     from controllers.gaits import plans
     from tiltsim.errors import InputError
 
-    sources = [arguments.scenario, arguments.angles, arguments.published]
-    if sum(source is not None for source in sources) != 1:
-        raise InputError("gait: give one of SCENARIO, --angles A1,A2,A3,A4 and --published NAME")
     if arguments.scenario is not None:
         if arguments.vehicle is not None:
             raise InputError("--vehicle: the scenario has a vehicle of its own; leave one out")
@@ -77,17 +162,108 @@ def _choose(arguments: argparse.Namespace) -> tuple[Gait, Vehicle]:
 
         scenario = load_scenario(arguments.scenario)
         vehicle = scenario.vehicle.resolve()
-        return replace(scenario.gait.plan(vehicle), source=scenario.source), vehicle
+        gait = replace(scenario.gait.plan(vehicle), source=scenario.source)
+        if scenario.gait.bias == 1.0:
+            return _Chosen(gait, vehicle, gait.name)
+        unbiased = scenario.gait.model_copy(update={"bias": 1.0}).plan(vehicle)
+        return _Chosen(gait, vehicle, gait.name, unbiased, "without bias")
     vehicle = parse_vehicle(arguments.vehicle)
     if arguments.angles is not None:
-        return plans.fixed(parse_angles("--angles", arguments.angles)), vehicle
+        return _Chosen(plans.fixed(parse_angles("--angles", arguments.angles)), vehicle)
     from controllers.published_gaits import PUBLISHED_GAITS
 
     if arguments.published not in PUBLISHED_GAITS:
         raise InputError(
             f"--published {arguments.published}: unknown; choose {', '.join(PUBLISHED_GAITS)}"
         )
-    return PUBLISHED_GAITS[arguments.published].gait, vehicle
+    published = PUBLISHED_GAITS[arguments.published]
+    title = f"{published.key}, as printed" if published.printed else published.key
+    twin_title = "" if published.bias is None else f"biased, η = {published.bias:.0%}"
+    return _Chosen(published.gait, vehicle, title, published.biased, twin_title)
+
+
+def _draw(arguments: argparse.Namespace, chosen: _Chosen) -> Figure:
+    """The figure of a gait that the arguments name."""
+    from tiltsim.errors import InputError
+    from tiltsim.figures import attainable, gait
+
+    compared = [(chosen.title, chosen.gait)]
+    if chosen.twin is not None:
+        compared.append((chosen.twin_title, chosen.twin))
+    kind = arguments.figure or "roll_pitch"
+    if kind == "comparison" and len(compared) == 1:
+        raise InputError(f"--figure comparison: {chosen.gait.name} has no bias to compare with")
+    if kind == "attainable":
+        if not chosen.gait.is_constant:
+            raise InputError(f"--figure attainable: {chosen.gait.name} moves; give fixed angles")
+        limits = arguments.speed_limits and parse_speed_limits(arguments.speed_limits)
+        return attainable.attainable_figure(chosen.gait, chosen.vehicle, limits)
+    if kind == "comparison":
+        return gait.comparison_figure(compared, chosen.vehicle)
+    if kind == "margin":
+        return gait.margin_figure(compared, chosen.vehicle)
+    return gait.gait_figure(chosen.gait, chosen.vehicle)
+
+
+def _run_determinant(arguments: argparse.Namespace) -> int:
+    """The restrictions of ch. 3, Sec. 5.1: a figure, and how far from singular they are."""
+    from tiltsim.analysis import determinant_report
+    from tiltsim.figures.determinant import determinant_figure
+    from tiltsim.figures.style import save
+
+    vehicle, case = parse_vehicle(arguments.vehicle), arguments.case or "equal"
+    save(determinant_figure(case, vehicle), arguments.plot)
+    _print(arguments, determinant_report(case, vehicle), _determinant_text)
+    return 0
+
+
+def _print(arguments: argparse.Namespace, report: Any, text: Any) -> None:
+    print(json_text(report) if arguments.json else text(report))
+
+
+def _list_report() -> list[dict[str, Any]]:
+    from dataclasses import asdict
+
+    from controllers.published_gaits import robustness_table
+
+    return [asdict(row) for row in robustness_table()]
+
+
+def _list_text(report: list[dict[str, Any]]) -> str:
+    header = ["gait", "color", "angles", "margin", "on exact lines", "biased"]
+    header += ["conditioning", "claim holds"]
+    claims = {True: "yes", False: "no", None: "-"}
+    rows = [
+        (
+            row["key"],
+            row["color"] or "-",
+            "printed" if row["printed"] else "ours",
+            number(row["margin"], ".4f"),
+            number(row["margin_exact"], ".4f"),
+            "-" if row["margin_biased"] is None else number(row["margin_biased"], ".4f"),
+            number(row["conditioning"], ".2e") if row["conditioning"] > 1e-12 else "0",
+            claims[row["claim_holds"]],
+        )
+        for row in report
+    ]
+    return "\n".join(
+        [
+            table(header, rows, frozenset({3, 4, 5, 6})),
+            "",
+            "margin: smallest over a period at level attitude, rad; negative: R changes sign",
+            "conditioning: smallest over largest singular value of tau on the exact lines, least",
+            "claim: more robust than the biased twin, and not singular itself",
+        ]
+    )
+
+
+def _determinant_text(report: dict[str, Any]) -> str:
+    rows = [
+        (number(pair["alpha_1"]), number(pair["alpha_3"]), number(pair["least_R"]))
+        for pair in report["pairs"]
+    ]
+    header = ("alpha_1 (rad)", "alpha_3 (rad)", "least R in the triangle U V M")
+    return table(header, rows, frozenset({0, 1, 2}))
 
 
 def _summary(report: dict[str, Any]) -> str:
@@ -96,12 +272,12 @@ def _summary(report: dict[str, Any]) -> str:
     rows = [
         ("gait", report["gait"] + (f" ({report['source']})" if report["source"] else "")),
         ("vehicle", str(report["vehicle"])),
-        ("tilt angles", _numbers(report["angles"]) + " rad"),
+        ("tilt angles", numbers(report["angles"]) + " rad"),
         ("rank of tau", str(report["rank"])),
-        ("singular values", _numbers(report["singular_values"]) + " of tau / (L K_f)"),
-        ("R, R_phi, R_theta", _numbers([report["R"], report["R_phi"], report["R_theta"]])),
-        ("torque-free force", _numbers(direction) + " along" if direction else "none"),
-        ("singularity margin", f"{report['singularity_margin']:.6g} rad"),
+        ("singular values", numbers(report["singular_values"]) + " of tau / (L K_f)"),
+        ("R, R_phi, R_theta", numbers([report["R"], report["R_phi"], report["R_theta"]])),
+        ("torque-free force", "along " + numbers(direction) if direction else "none"),
+        ("singularity margin", f"{number(report['singularity_margin'])} rad"),
         (
             "acceptable share",
             f"{100.0 * report['acceptable_share']:.2f} % of the roll-pitch square",
@@ -109,8 +285,8 @@ def _summary(report: dict[str, Any]) -> str:
         ("unacceptable curve", report["unacceptable_attitudes"]["kind"]),
     ]
     if "determinant" in report:
-        attitude = f"roll {report['roll']:g}, pitch {report['pitch']:g} rad"
-        rows.insert(8, ("determinant", f"{report['determinant']:.6g} at {attitude}"))
+        attitude = f"roll {number(report['roll'])}, pitch {number(report['pitch'])} rad"
+        rows.insert(8, ("determinant", f"{number(report['determinant'])} at {attitude}"))
     if "time" in report:
         rate = "jumps" if report["max_rate"] is None else f"{report['max_rate']:.6g} rad/s"
         rows += [
@@ -118,12 +294,6 @@ def _summary(report: dict[str, Any]) -> str:
             ("amplitude", f"{report['amplitude']:.6g} rad"),
             ("largest rate", rate),
             ("least rank", str(report["min_rank"])),
-            ("least margin", f"{report['min_singularity_margin']:.6g} rad over the period"),
+            ("least margin", f"{number(report['min_singularity_margin'])} rad over the period"),
         ]
-    width = max(len(name) for name, _ in rows)
-    lines = [f"{name:<{width}}  {value}" for name, value in rows]
-    return "\n".join([*lines, *(f"warning: {text}" for text in report["warnings"])])
-
-
-def _numbers(values: list[float]) -> str:
-    return ", ".join(f"{value:.6g}" for value in values)
+    return "\n".join([*aligned(rows), *(f"warning: {text}" for text in report["warnings"])])

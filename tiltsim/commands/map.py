@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.angles import allow_negative_lists, parse_angles, parse_vehicle
+from tiltsim.commands.text import aligned, json_text
 
 if TYPE_CHECKING:
     from controllers.two_color_planner import Circle, Polyline
@@ -28,7 +28,11 @@ def add_parser(subparsers: Any) -> None:
         epilog="exit codes: 0 done, 1 the path is refused, 2 invalid input",
     )
     allow_negative_lists(parser)
-    parser.add_argument("--vehicle", metavar="PRESET", help="ar_drone_2 (default) or luukkonen")
+    parser.add_argument(
+        "--vehicle",
+        metavar="VEHICLE",
+        help="ar_drone_2 (default), luukkonen, KEY=VALUE,..., or a preset with KEY=VALUE,...",
+    )
     parser.add_argument(
         "--leg",
         action="append",
@@ -43,7 +47,9 @@ def add_parser(subparsers: Any) -> None:
         help="a circular path: centre and radius in rad",
     )
     parser.add_argument("--json", action="store_true", help="machine-readable")
-    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the map")
+    parser.add_argument(
+        "--plot", type=Path, metavar="FILE", help="draw the map: FILE.png, .svg or .pdf"
+    )
     parser.set_defaults(run=run)
 
 
@@ -52,6 +58,10 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.analysis import map_report
     from tiltsim.errors import InputError
 
+    if arguments.plot is not None:
+        from tiltsim.figures.style import check_target
+
+        check_target(arguments.plot)
     vehicle = parse_vehicle(arguments.vehicle)
     path = _path(arguments, vehicle)
     try:
@@ -63,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
         from tiltsim.figures.two_color_map import map_figure
 
         save(map_figure(vehicle, [("path", path)] if path else None), arguments.plot)
-    print(json.dumps(report, indent=2, allow_nan=False) if arguments.json else _summary(report))
+    print(json_text(report) if arguments.json else _summary(report))
     return ACCEPTED if path is None or report["path"]["accepted"] else REFUSED
 
 
@@ -127,8 +137,7 @@ def _summary(report: dict[str, Any]) -> str:
         ),
         ("their classes", classes),
     ]
-    width = max(len(name) for name, _ in rows)
-    lines = [f"{name:<{width}}  {value}" for name, value in rows]
+    lines = aligned(rows)
     lines += [f"warning: {text}" for text in report["warnings"]]
     if "path" in report:
         path = report["path"]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from controllers.published_gaits import DETERMINANT_CASES, TRIANGLE
 from controllers.singularity import residuals
 from tiltsim.figures import style
 
@@ -14,17 +15,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from controllers.vehicle import Vehicle
-
-CASES: Final = {
-    "equal": ("α₁ = α₃", tuple((a, a) for a in (-0.15, -0.075, 0.0, 0.075, 0.15))),
-    "half": ("α₁ = α₃/2", tuple((a, 2 * a) for a in (-0.2, -0.1, 0.0, 0.1, 0.2))),
-    "negative": ("α₁ = −α₃", tuple((a, -a) for a in (-1.4, -0.7, 0.0, 0.7, 1.4))),
-    "negative_half": ("α₁ = −α₃/2", tuple((a, -2 * a) for a in (-0.3, -0.15, 0.0, 0.15, 0.3))),
-}
-"""Restrictions of ch. 3, Sec. 5.1: title and the five pairs ``(alpha_1, alpha_3)`` (rad)."""
-
-TRIANGLE: Final = ((-1.5, 1.5), (1.5, -1.5), (1.0, 1.0))
-"""U, V, M of ch. 3, Eq. (22): the region of interest in ``(alpha_2, alpha_4)`` (rad)."""
 
 _TICKS: Final = (-2, -1, 0, 1, 2)
 
@@ -42,41 +32,84 @@ def determinant_grid(
 
 
 def determinant_figure(case: str, vehicle: Vehicle) -> Figure:
-    """The five surfaces ``R(alpha_2, alpha_4)`` of a case and their zero curves, side by side."""
-    from matplotlib import colormaps
-    from matplotlib.lines import Line2D
+    """The five surfaces ``R(alpha_2, alpha_4)`` of a case, their zero curves, and sections.
 
-    title, pairs = CASES[case]
+    The surfaces nearly coincide, so each stands by itself; the sections run in the directions of
+    ch. 3, Eqs. (23)-(25).
+    """
+    from matplotlib import colormaps
+
+    restriction, pairs = DETERMINANT_CASES[case]
     shades = colormaps[style.SEQUENTIAL](np.linspace(0.0, 0.9, len(pairs)))
     looks = ["-", (0, (6, 2)), "-", (0, (3, 1.5)), (0, (1, 1))]
+    grids = [determinant_grid(*pair, vehicle) for pair in pairs]
+    largest = max(float(np.abs(R).max()) for _, _, R in grids)
     with style.paper_style():
-        figure = style.new_figure(9.2, 4.2)
-        grid = figure.add_gridspec(1, 2, width_ratios=[1.15, 1.0])
-        surface: Any = figure.add_subplot(grid[0], projection="3d")
-        plane: Any = figure.add_subplot(grid[1])
-        handles = []
-        for (alpha_1, alpha_3), shade, look in zip(pairs, shades, looks, strict=True):
-            alpha_2, alpha_4, R = determinant_grid(alpha_1, alpha_3, vehicle)
-            surface.plot_surface(
-                *(alpha_2, alpha_4, R), color=shade, alpha=0.4, rstride=6, cstride=6, lw=0.2
-            )
-            plane.contour(alpha_2, alpha_4, R, [0.0], colors=[shade], linestyles=[look])
-            handles.append(
-                Line2D([], [], color=shade, ls=look, label=f"α₁ = {alpha_1:g}".replace("-", "−"))
-            )
-        surface.plot_surface(
-            *np.meshgrid([-2.0, 2.0], [-2.0, 2.0]), np.zeros((2, 2)), color=style.GREY, alpha=0.2
+        figure = style.new_figure(9.2, 5.6)
+        parts: Any = figure.subfigures(2, 1, height_ratios=[1.0, 1.45])
+        upper, lower = parts
+        upper.suptitle(
+            f"Determinant R at level attitude, {restriction}", x=0.012, ha="left", fontsize=10
         )
-        surface.set(xlabel="α₂ (rad)", ylabel="α₄ (rad)", zlabel="R", xticks=_TICKS, yticks=_TICKS)
-        surface.view_init(elev=22, azim=-128)
-        surface.set_box_aspect((1.0, 1.0, 0.75), zoom=0.88)
-        surface.set_title(f"Determinant at level attitude, {title}", y=0.98)
-        corners = np.array([*TRIANGLE, TRIANGLE[0]])
-        plane.fill(*corners.T, color=style.PALE, zorder=0)
-        plane.plot(*corners.T, color=style.GREEN, lw=1.2)
-        for name, corner, shift in zip("UVM", TRIANGLE, [(-12, 2), (4, -10), (5, 3)], strict=True):
-            plane.annotate(name, corner, shift, textcoords="offset points", color=style.GREEN)
-        plane.set(xlabel="α₂ (rad)", ylabel="α₄ (rad)", xlim=(-2, 2), ylim=(-2, 2), aspect="equal")
-        plane.set_title("R = 0, and the region of interest")
-        plane.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        for place, (pair, cells) in enumerate(zip(pairs, grids, strict=True), start=1):
+            surface: Any = upper.add_subplot(1, len(pairs), place, projection="3d")
+            _surface(surface, cells, largest)
+            surface.set_title(_label(pair[0]), y=0.93, loc="center")
+        plane, falling, rising = lower.subplots(1, 3, width_ratios=[1.25, 1.0, 1.0])
+        for pair, cells, shade, look in zip(pairs, grids, shades, looks, strict=True):
+            plane.contour(*cells, [0.0], colors=[shade], linestyles=[look], linewidths=[1.6])
+            for axes, start, slope in ((falling, -1.5, -1.0), (rising, 0.0, 1.0)):
+                alpha_2 = np.linspace(start, 1.5 if slope < 0.0 else 1.0, 121)
+                rest = [np.full_like(alpha_2, angle) for angle in pair]
+                angles = np.stack([rest[0], alpha_2, rest[1], slope * alpha_2], axis=-1)
+                R = residuals(angles, vehicle).R
+                axes.plot(alpha_2, R, color=shade, ls=look, lw=1.6, label=_label(pair[0]))
+        _region_of_interest(plane)
+        for axes, title in ((falling, "R along α₄ = −α₂"), (rising, "R along α₄ = α₂")):
+            axes.axhline(0.0, color=style.INK, lw=0.8)
+            axes.set(xlabel="α₂ (rad)", ylabel="R", title=title)
+            axes.margins(x=0.0)
+        handles, labels = falling.get_legend_handles_labels()
+        # Equal and opposite alpha_1 may give one curve: short dashes over long ones show both.
+        lower.legend(handles, labels, loc="outside lower center", ncols=len(pairs))
         return figure
+
+
+def _surface(surface: Any, cells: Any, largest: float) -> None:
+    alpha_2, alpha_4, R = cells
+    surface.plot_surface(
+        *(alpha_2, alpha_4, R),
+        cmap=style.SEQUENTIAL,
+        vmin=-largest,
+        vmax=largest,
+        rcount=60,
+        ccount=60,
+        lw=0.0,
+        antialiased=False,
+    )
+    # Drawn at the foot, where nothing hides it.
+    foot = -1.15 * largest
+    surface.contour(
+        alpha_2, alpha_4, R, [0.0], zdir="z", offset=foot, colors=[style.INK], linewidths=[1.0]
+    )
+    surface.set(xticks=[-2, 0, 2], yticks=[-2, 0, 2], zticks=[-5, 0, 5], zlim=(foot, largest))
+    surface.set_xlabel("α₂", labelpad=-8)
+    surface.set_ylabel("α₄", labelpad=-8)
+    surface.tick_params(pad=-3, labelsize=7)
+    surface.view_init(elev=32, azim=-115)
+    surface.set_box_aspect((1.0, 1.0, 0.8), zoom=1.0)
+
+
+def _region_of_interest(plane: Any) -> None:
+    corners = np.array([*TRIANGLE, TRIANGLE[0]])
+    plane.fill(*corners.T, color=style.PALE, zorder=0)
+    plane.plot(*corners.T, color=style.GREEN, lw=1.2)
+    for name, corner, shift in zip("UVM", TRIANGLE, [(-12, 2), (4, -10), (5, 3)], strict=True):
+        plane.annotate(name, corner, shift, textcoords="offset points", color=style.GREEN)
+    plane.set(xlabel="α₂ (rad)", ylabel="α₄ (rad)", xlim=(-2, 2), ylim=(-2, 2), aspect="equal")
+    plane.set(xticks=_TICKS, yticks=_TICKS)
+    plane.set_title("R = 0, and the region of interest U V M")
+
+
+def _label(alpha_1: float) -> str:
+    return f"α₁ = {alpha_1:g}".replace("-", "−")

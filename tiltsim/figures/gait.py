@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from controllers.singularity import determinant, margin_over_gait
+from controllers.singularity import determinant, margin_over_gait, singular_values
 from controllers.unacceptable_attitudes import unacceptable_attitudes
+from tiltsim.analysis import NEARLY_SINGULAR
 from tiltsim.figures import style
 
 if TYPE_CHECKING:
@@ -21,18 +22,25 @@ if TYPE_CHECKING:
 _CURVES = 24
 """Instants of a period at which the unacceptable-attitude curve is drawn."""
 
+_LAST_SHADE = 0.92
+"""Share of the colour map in use; beyond it, lines fade on white."""
+
 
 def gait_figure(gait: Gait, vehicle: Vehicle) -> Figure:
     """Roll-pitch diagram of a gait, with its angles and margin over a period if it moves."""
     with style.paper_style():
         if gait.is_constant:
-            figure = style.new_figure(4.4, 4.2)
+            figure = style.new_figure(4.2, 4.2)
             axes: Any = figure.subplots()
-            _roll_pitch(figure, axes, gait, vehicle)
+            _roll_pitch(axes, gait, vehicle)
+            _roll_pitch_legend(figure, constant=True)
             return figure
         figure = style.new_figure(8.6, 4.2)
         grid = figure.add_gridspec(2, 2, width_ratios=[1.05, 1.0])
-        _roll_pitch(figure, figure.add_subplot(grid[:, 0]), gait, vehicle)
+        diagram = figure.add_subplot(grid[:, 0])
+        _roll_pitch(diagram, gait, vehicle)
+        _time_bar(figure, [diagram], gait)
+        _roll_pitch_legend(figure)
         upper = figure.add_subplot(grid[0, 1])
         lower = figure.add_subplot(grid[1, 1], sharex=upper)
         _angles(upper, gait)
@@ -47,33 +55,31 @@ def comparison_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure
     ``gaits`` are pairs of title and gait (ch. 6, Figs. 21-28; ch. 8, Figs. 10-14).
     """
     with style.paper_style():
-        figure = style.new_figure(3.7 * len(gaits), 4.0)
+        figure = style.new_figure(3.5 * len(gaits) + 0.8, 4.2)
         row = figure.subplots(1, len(gaits), squeeze=False, sharey=True)[0]
         for axes, (title, gait) in zip(row, gaits, strict=True):
-            _roll_pitch(figure, axes, gait, vehicle, color_bar=axes is row[-1])
+            _roll_pitch(axes, gait, vehicle)
             axes.set_title(title)
             if axes is not row[0]:
                 axes.set_ylabel("")
+        _time_bar(figure, list(row), gaits[-1][1])
+        _roll_pitch_legend(figure)
         return figure
 
 
 def margin_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure:
     """Singularity margin over a period for several gaits, as pairs of label and gait."""
     with style.paper_style():
-        figure = style.new_figure(6.2, 3.2)
+        figure = style.new_figure(5.4, 3.2)
         axes: Any = figure.subplots()
         _margin(axes, [(gait, label) for label, gait in gaits], vehicle)
-        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        axes.legend(ncols=len(gaits), loc="lower left", bbox_to_anchor=(0.0, 1.0))
         return figure
 
 
-def _roll_pitch(
-    figure: Figure, axes: Axes, gait: Gait, vehicle: Vehicle, *, color_bar: bool = True
-) -> None:
+def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> None:
     """Unacceptable-attitude curves at instants of a period; shaded where no instant forbids."""
     from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
 
     period = gait.period or 1.0
     times = np.zeros(1) if gait.is_constant else np.arange(_CURVES) / _CURVES * period
@@ -89,28 +95,21 @@ def _roll_pitch(
 
     if not singular:
         axes.contourf(roll, pitch, allowed, levels=[0.5, 1.5], colors=[style.PALE])
-    colors = colormaps[style.SEQUENTIAL](np.linspace(0.0, 0.92, len(curves)))
+    colors = colormaps[style.SEQUENTIAL](np.arange(len(curves)) / len(curves) * _LAST_SHADE)
     for curve, color in zip(curves, colors, strict=True):
         axes.plot(curve.roll, curve.pitch, color=style.RED if len(curves) == 1 else color, lw=1.3)
+    values = singular_values(angles, vehicle)
+    conditioning = float((values[:, 2] / values[:, 0]).min())
+    if not singular and conditioning < NEARLY_SINGULAR:
+        ratio = f"{conditioning:.0e}".replace("e-0", "e−")
+        _note(axes, 0.75, f"nearly singular at every attitude:\nσ₃/σ₁ of τ is {ratio}")
     if singular:
         share = "at every attitude"
         if singular < len(curves):
             share += f",\nat {singular} of {len(curves)} instants"
         axes.set_facecolor("#F3F3F3")
-        axes.text(
-            *(0.0, 0.75 if singular < len(curves) else 0.35),
-            f"singular {share}",
-            ha="center",
-            va="center",
-            color=style.INK,
-            bbox={"facecolor": "white", "edgecolor": style.GREY, "linewidth": 0.6},
-        )
+        _note(axes, 0.75 if singular < len(curves) else 0.35, f"singular {share}")
     axes.plot(0.0, 0.0, "+", color=style.INK, ms=8, mew=1.2)
-    if gait.period is not None and color_bar:
-        mapping = ScalarMappable(Normalize(0.0, period / 0.92), style.SEQUENTIAL)
-        bar: Any = figure.colorbar(mapping, ax=axes, shrink=0.85, pad=0.02, label="time (s)")
-        bar.ax.set_ylim(0.0, period)
-        bar.outline.set_linewidth(0.5)
     style.angle_axis(axes, "x", pi / 2)
     style.angle_axis(axes, "y", pi / 2)
     axes.set_aspect("equal")
@@ -119,12 +118,46 @@ def _roll_pitch(
     axes.set_title(f"Unacceptable attitudes, {gait.name}")
 
 
+def _note(axes: Axes, height: float, text: str) -> None:
+    box = {"facecolor": "white", "edgecolor": style.GREY, "linewidth": 0.6}
+    axes.text(0.0, height, text, ha="center", va="center", color=style.INK, bbox=box, zorder=8)
+
+
+def _time_bar(figure: Figure, diagrams: list[Axes], gait: Gait) -> None:
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    if gait.period is None:
+        return
+    mapping = ScalarMappable(Normalize(0.0, gait.period / _LAST_SHADE), style.SEQUENTIAL)
+    bar: Any = figure.colorbar(mapping, ax=diagrams, shrink=0.8, pad=0.02, label="time (s)")
+    bar.ax.set_ylim(0.0, gait.period)
+    bar.outline.set_linewidth(0.5)
+
+
+def _roll_pitch_legend(figure: Figure, *, constant: bool = False) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    line = style.RED if constant else style.GREY
+    always = "acceptable" if constant else "acceptable at all times"
+    handles = [
+        Patch(facecolor=style.PALE, edgecolor=style.GREY, linewidth=0.4, label=always),
+        Line2D([], [], color=line, lw=1.3, label="unacceptable"),
+        Line2D([], [], color=style.INK, marker="+", ls="", ms=8, mew=1.2, label="level"),
+    ]
+    figure.legend(handles=handles, loc="outside lower left", ncols=3)
+
+
 def _angles(axes: Axes, gait: Gait) -> None:
     times = gait.sample_times(401)
-    looks = ["-", "--", "-.", ":"]
-    # Equal angles would hide each other: the later ones are thinner and dashed.
-    for index, angle in enumerate(gait.angles(times).T):
-        axes.plot(times, angle, looks[index], lw=2.4 - 0.4 * index, label=f"α{'₁₂₃₄'[index]}")
+    # Opposite arms share a hue; on red they share their angle too, and both must be seen.
+    looks = [(style.SKY, "-", 3.4), (style.AMBER, "-", 3.4)]
+    looks += [(style.BLUE, "--", 1.3), (style.RED, "--", 1.3)]
+    for name, angle, (color, dashes, width) in zip(
+        "₁₂₃₄", gait.angles(times).T, looks, strict=True
+    ):
+        axes.plot(times, angle, dashes, color=color, lw=width, label=f"α{name}")
     axes.set_ylabel("tilt angle (rad)")
     axes.legend(ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
 

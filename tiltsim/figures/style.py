@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,6 +26,9 @@ GREY: Final = "#8A8A8A"
 PALE: Final = "#E4EEF3"
 CYCLE: Final = (BLUE, RED, GREEN, PURPLE, AMBER, SKY, INK)
 SEQUENTIAL: Final = "cividis"
+
+FORMATS: Final = ("pdf", "png", "svg")
+"""File formats of a figure, by the ending of the file."""
 
 _SETTINGS: Final = {
     "font.family": "sans-serif",
@@ -50,7 +54,7 @@ _SETTINGS: Final = {
     "legend.frameon": False,
     "lines.linewidth": 1.4,
     "figure.dpi": 100,
-    "savefig.dpi": 200,
+    "savefig.dpi": 160,
     "svg.hashsalt": "tiltsim",
     "pdf.fonttype": 42,
 }
@@ -85,20 +89,39 @@ def angle_axis(axes: Axes, axis: str, limit: float) -> None:
     set_limits(-limit, limit)
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure; the ending of ``path`` chooses the format.
+def check_target(path: Path) -> None:
+    """Refuse a file that `save` could not write, before any work is done for it.
 
     Raises
     ------
     InputError
-        If the format is unknown or the file cannot be written.
+        If the format is unknown, or the file or its folder is missing or closed.
     """
-    known = sorted(figure.canvas.get_supported_filetypes())
     ending = path.suffix.lstrip(".").lower()
-    if ending not in known:
-        raise InputError(f"--plot {path}: unknown format {ending!r}; choose {', '.join(known)}")
+    if ending not in FORMATS:
+        raise InputError(f"--plot {path}: unknown format {ending!r}; choose {', '.join(FORMATS)}")
+    if path.is_dir():
+        raise InputError(f"--plot {path}: is a folder")
+    if not path.absolute().parent.is_dir():
+        raise InputError(f"--plot {path}: its folder does not exist")
+    if not os.access(path if path.exists() else path.absolute().parent, os.W_OK):
+        raise InputError(f"--plot {path}: cannot be written: permission denied")
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure; the ending of ``path`` chooses the format.
+
+    Equal figures give equal files: no date is written.
+
+    Raises
+    ------
+    InputError
+        As `check_target`, or if writing fails.
+    """
+    check_target(path)
+    undated = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
     try:
         with paper_style():
-            figure.savefig(path)
+            figure.savefig(path, metadata=undated.get(path.suffix.lower()))
     except OSError as error:
         raise InputError(f"--plot {path}: cannot be written: {error.strerror}") from error

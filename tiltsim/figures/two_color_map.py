@@ -45,9 +45,10 @@ def map_figure(vehicle: Vehicle, paths: list[tuple[str, Path]] | None = None) ->
         axes.plot(first, second, "o", color=style.AMBER, mec=style.INK, mew=0.8, ms=7, zorder=7)
         axes.text(-1.3, 1.2, "$S_U$:  R > 0", fontsize=10)
         axes.text(0.75, -1.3, "$S_D$:  R < 0", fontsize=10)
+        shown: set[str] = set()
         for label, path in paths or []:
-            _draw_path(axes, label, path, vehicle)
-        _legend(axes, f"P = ({first:.4f}, {second:.4f})", bool(paths))
+            shown |= _draw_path(axes, label, path, vehicle)
+        _legend(axes, f"P = ({first:.4f}, {second:.4f})".replace("-", "−"), shown)
         style.angle_axis(axes, "x", limit)
         style.angle_axis(axes, "y", limit)
         axes.set_aspect("equal")
@@ -57,7 +58,8 @@ def map_figure(vehicle: Vehicle, paths: list[tuple[str, Path]] | None = None) ->
         return figure
 
 
-def _draw_path(axes: Axes, label: str, path: Path, vehicle: Vehicle) -> None:
+def _draw_path(axes: Axes, label: str, path: Path, vehicle: Vehicle) -> set[str]:
+    """Draw a path; tells which marks the legend must explain."""
     colors = {"red": style.RED, "blue": style.BLUE}
     looks = {"red": "-", "blue": (0, (4, 2))}
     for color, points in _outlines(path):
@@ -72,16 +74,16 @@ def _draw_path(axes: Axes, label: str, path: Path, vehicle: Vehicle) -> None:
         )
     verdict = check_path(path, vehicle)
     outline = np.concatenate([points[:-1] for _, points in _outlines(path)])
-    corner = outline[np.argmax(outline @ [-1.0, 1.0])]
+    corner = outline[np.argmax(outline @ [1.0, 1.0])]
     mark = "" if verdict.accepted else ", refused"
-    axes.annotate(
-        label + mark, corner, (-3, 4), textcoords="offset points", ha="right", fontsize=8.5
-    )
+    axes.annotate(label + mark, corner, (4, 3), textcoords="offset points", ha="left", fontsize=8.5)
     for crossing in verdict.crossings:
         axes.plot(*crossing, "x", color=style.INK, ms=8, mew=1.8, zorder=6)
+    shown = {color for color, _ in _outlines(path)}
+    return shown | ({"crossing"} if verdict.crossings else set())
 
 
-def _legend(axes: Axes, label_of_p: str, with_paths: bool) -> None:
+def _legend(axes: Axes, label_of_p: str, shown: set[str]) -> None:
     from matplotlib.lines import Line2D
 
     dashed = (0, (5, 3))
@@ -91,12 +93,16 @@ def _legend(axes: Axes, label_of_p: str, with_paths: bool) -> None:
         Line2D([], [], color=style.AMBER, marker="o", mec=style.INK, ls="", label=label_of_p),
         Line2D([], [], color=style.GREY, lw=0.8, ls=dashed, label="|α₁|, |α₂| ≤ 1 (ch. 8)"),
     ]
-    if with_paths:
-        handles += [
-            Line2D([], [], color=style.RED, lw=1.8, label="red path"),
-            Line2D([], [], color=style.BLUE, lw=1.8, ls=(0, (4, 2)), label="blue path (rank 2)"),
+    blue = Line2D([], [], color=style.BLUE, lw=1.8, ls=(0, (4, 2)), label="blue path (rank 2)")
+    marks = [
+        (Line2D([], [], color=style.RED, lw=1.8, label="red path"), "red" in shown),
+        (blue, "blue" in shown),
+        (
             Line2D([], [], color=style.INK, marker="x", mew=1.8, ls="", label="red crosses L"),
-        ]
+            "crossing" in shown,
+        ),
+    ]
+    handles += [mark for mark, is_shown in marks if is_shown]
     axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from tiltsim.errors import InputError
 from tiltsim.files import replacing
@@ -20,12 +20,20 @@ if TYPE_CHECKING:
     from tiltsim.scenario import Scenario
 
 
+UNHURRIED: Final = 3600.0
+"""Seconds between flushes by the clock of a recording that is saved in one go."""
+
+
 def save_recording(flights: Sequence[Flight], path: Path) -> None:
     """Write flights into one recording; the file appears whole or not at all.
 
     Equal flights give equal recordings. Raises `InputError` where the file cannot be written.
     """
-    recording = new_recording([flight.scenario for flight in flights])
+    import rerun as rr
+
+    # Flushed by rows and bytes alone: a clock would cut the chunks elsewhere in every run.
+    unhurried = rr.ChunkBatcherConfig(flush_tick=UNHURRIED)
+    recording = new_recording([flight.scenario for flight in flights], batching=unhurried)
     recorders = make_recorders(recording, flights)
     blueprint = flight_blueprint([recorder.shown() for recorder in recorders])
     try:
@@ -37,7 +45,12 @@ def save_recording(flights: Sequence[Flight], path: Path) -> None:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
-def new_recording(scenarios: Sequence[Scenario], *, salt: str = "") -> rr.RecordingStream:
+def new_recording(
+    scenarios: Sequence[Scenario],
+    *,
+    salt: str = "",
+    batching: rr.ChunkBatcherConfig | None = None,
+) -> rr.RecordingStream:
     """An empty recording that is the same for the same scenarios, whenever it is made.
 
     Recordings of equal name are one to the viewer; ``salt`` tells them apart.
@@ -47,7 +60,10 @@ def new_recording(scenarios: Sequence[Scenario], *, salt: str = "") -> rr.Record
     content = "\n".join([*(scenario.model_dump_json() for scenario in scenarios), salt])
     digest = hashlib.sha256(content.encode()).hexdigest()[:16]
     recording = rr.RecordingStream(
-        APPLICATION, recording_id=f"{APPLICATION}-{digest}", send_properties=False
+        APPLICATION,
+        recording_id=f"{APPLICATION}-{digest}",
+        send_properties=False,
+        batcher_config=batching,
     )
     recording.set_log_time_enabled(False)
     title = " / ".join(scenario.title or scenario.address or "flight" for scenario in scenarios)

@@ -1,0 +1,50 @@
+"""Reports as text: aligned lines, tables, and JSON without negative zeros."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+
+def number(value: float, form: str = ".6g") -> str:
+    """A number as text; zero, and what rounds to it, has no sign."""
+    text = format(value, form)
+    return text[1:] if text.startswith("-") and float(text) == 0.0 else text
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Numbers as text, separated by commas."""
+    return ", ".join(number(value) for value in values)
+
+
+def json_text(report: Any) -> str:
+    """A report as JSON; NaN and infinity are errors."""
+    return json.dumps(_unsigned_zeros(report), indent=2, allow_nan=False)
+
+
+def _unsigned_zeros(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _unsigned_zeros(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_unsigned_zeros(item) for item in value]
+    return value + 0.0 if isinstance(value, float) else value
+
+
+def aligned(rows: Sequence[tuple[str, str]]) -> list[str]:
+    """Pairs of name and value as lines, the values under each other."""
+    width = max(len(name) for name, _ in rows)
+    return [f"{name:<{width}}  {value}" for name, value in rows]
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]], numeric: frozenset[int]) -> str:
+    """A table; the columns in ``numeric`` are set flush right."""
+    widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
+    lines = []
+    for row in (header, *rows):
+        cells = [
+            f"{cell:>{width}}" if column in numeric else f"{cell:<{width}}"
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        lines.append("  ".join(cells).rstrip())
+    return "\n".join(lines)
