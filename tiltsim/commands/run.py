@@ -5,9 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from contextlib import ExitStack
-from importlib import import_module
 from pathlib import Path
-from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.progress import progress_bar
@@ -113,15 +111,7 @@ def fly(scenario: Scenario, arguments: argparse.Namespace) -> Flight:
         bar = progress_bar(scenario.simulation.duration, "s", shown=not arguments.quiet)
         advance_to = stack.enter_context(bar)
 
-        # Rerun takes half a second to import; native physics leaves a processor for that, once its
-        # own imports are done.
-        at_start = [Thread(target=import_module, args=("rerun",), daemon=True).start]
-        if arguments.rerun is None:
-            at_start.clear()
-
         def observe(sample: Floats) -> None:
-            while at_start:
-                at_start.pop()()
             advance_to(float(sample[0]))
             if live is not None:
                 live(sample)

@@ -150,7 +150,7 @@ def _plan_view(axes: Any, flight: Flight) -> None:
             axes.plot(*reference, color=style.INK, ls=":", lw=1.1, label="reference")
         else:
             at = (reference[0][0], reference[1][0])
-            axes.plot(*at, "+", color=style.INK, ms=10, mew=1.5, label="reference")
+            axes.plot(*at, "+", color=style.INK, ms=7, mew=1.4, label="reference")
     axes.plot(x, y, color=style.BLUE, label="path")
     axes.plot(x[0], y[0], "o", color=style.INK, mfc="white", ms=5, label="start")
     axes.plot(x[-1], y[-1], "s", color=style.RED, ms=5, label="end")
