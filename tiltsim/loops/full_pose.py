@@ -27,6 +27,9 @@ from tiltsim.loops.tiltrotor import (
 if TYPE_CHECKING:
     from tiltsim.scenario import Scenario
 
+TILT_COMMANDS: Final = tuple(f"tilt_command_{rotor}" for rotor in (1, 2, 3, 4))
+"""The law's own states: the tilt angles that the servos are told, but for their lead."""
+
 
 class ControlParameters(NamedTuple):
     """The head of `userdata`."""
@@ -118,6 +121,7 @@ FULL_POSE: Final = Loop(
     derive=_derive,
     watched=lambda sample, _setup: rotor_stops(sample),
     law_states=4,
-    law_fields=tuple(f"tilt_command_{rotor}" for rotor in (1, 2, 3, 4)),
+    law_fields=TILT_COMMANDS,
+    extra_columns=dict.fromkeys(TILT_COMMANDS, "rad"),
 )
 """Full-pose control around the tiltrotor."""
