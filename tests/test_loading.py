@@ -617,3 +617,29 @@ def test_every_scenario_of_the_library_loads_and_reads_back_equal(address):
 
 def test_addresses_of_the_library_are_unique():
     assert len(set(LIBRARY)) == len(LIBRARY) > 0
+
+
+def test_gains_too_fast_for_the_time_step_are_refused_with_the_longest_step(write):
+    """Under the published matrix a gain of 10 on the acceleration means a pole near 7200 rad/s."""
+    rows = "[[10.0, 10.0, 1.0], [10.0, 10.0, 10.0], [10.0, 10.0, 10.0]]"
+    text = f"[controller.gains]\nattitude = {rows}\naltitude = [10.0, 5.0, 10.0]\n"
+    line = refusal(write(text))
+    assert "simulation.timestep = 0.001" in line
+    assert "roll loop" in line
+    assert "at most 0.000346 s" in line
+    assert load_scenario(write(text + "[simulation]\ntimestep = 1e-4\n")).simulation.steps == 400000
+
+
+def test_control_too_coarse_for_the_loop_is_refused(write):
+    line = refusal(write("[simulation]\ncontrol_timestep = 0.004\n"))
+    assert "simulation.control_timestep = 0.004" in line
+
+
+def test_an_unknown_key_is_told_before_the_one_it_leaves_missing(write):
+    text = '[gait]\ntype = "trot_instant"\namplitude = 0.3\nperod = 2.0\n'
+    assert "gait.perod = 2.0: unknown key; did you mean period?" in refusal(write(text))
+
+
+def test_a_single_table_of_a_list_is_told_how_to_write_it(write):
+    line = refusal(write('[expect]\nmetric = "duration"\nmin = 1.0\n'))
+    assert "expect: one table where a list of tables stands; write [[expect]]" in line

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from difflib import get_close_matches
+from math import pi
 from typing import TYPE_CHECKING, Any, Final, get_args
 
 if TYPE_CHECKING:
@@ -40,6 +41,8 @@ def show(value: object) -> str:
 def one_line(error: ValidationError, document: Mapping[str, Any], schema: type[BaseModel]) -> str:
     """The first mistake in one line, and how many more there are."""
     details = error.errors(include_url=False)
+    # A key misspelt is often a key missing, too: the unknown one tells the user more.
+    details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
     line = _short_list(details, document) or _describe(details[0], document, schema)
     # Missing entries of one list, and the options of one union, are one mistake each.
     more = len({_mistake(detail, document) for detail in details}) - 1
@@ -89,9 +92,17 @@ def _describe(detail: Any, document: Mapping[str, Any], schema: type[BaseModel])
     if kind in {"too_short", "too_long"}:
         length = context.get("min_length", context.get("max_length"))
         return f"{key} = {show(value)}: must have {length} entries"
+    if kind == "tuple_type" and isinstance(value, dict):
+        return f"{key}: one table where a list of tables stands; write [[{key}]]"
+    if kind in {"less_than_equal", "greater_than_equal"} and abs(_bound(context)) == pi:
+        return f"{key} = {show(value)}: angles are in rad, from -3.14159 to 3.14159"
     if kind in _PLAIN_TYPES:
         return f"{key} = {show(value)}: {_PLAIN_TYPES[kind]}"
     return f"{key} = {show(value)}: {detail['msg'].replace('Input should', 'must')}"
+
+
+def _bound(context: Mapping[str, Any]) -> float:
+    return float(context.get("le", context.get("ge", 0.0)))
 
 
 def _locate(

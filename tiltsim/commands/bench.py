@@ -38,5 +38,5 @@ def run(arguments: argparse.Namespace) -> int:
             f"{1e6 / row['steps_per_second']:>9.2f}{row['realtime_factor']:>13.0f}"
             f"{row['ratio']:>8.3f}"
         )
-    print("\nratio: bare mj_step with frozen controls over the closed loop, same model and run")
+    print("\nratio: share of the speed of bare mj_step on the same model in the same run; medians")
     return 0

@@ -37,6 +37,15 @@ class _Chosen:
     twin_title: str = ""
 
 
+CURVES: Final = {
+    "graph": "one pitch for each roll",
+    "vertical": "two rolls, at any pitch",
+    "none": "none: no attitude is out of reach",
+    "everywhere": "every attitude",
+}
+"""Shapes of the unacceptable-attitude curve in words."""
+
+
 def add_parser(subparsers: Any) -> None:
     """Declare the command."""
     parser = subparsers.add_parser(
@@ -309,7 +318,7 @@ def _summary(report: dict[str, Any]) -> str:
             "acceptable share",
             f"{100.0 * report['acceptable_share']:.2f} % of the roll-pitch square",
         ),
-        ("unacceptable curve", report["unacceptable_attitudes"]["kind"]),
+        ("unacceptable curve", CURVES[report["unacceptable_attitudes"]["kind"]]),
     ]
     if "determinant" in report:
         attitude = f"roll {number(report['roll'])}, pitch {number(report['pitch'])} rad"

@@ -85,13 +85,21 @@ def run(arguments: argparse.Namespace) -> int:
         kept = f"; the flight so far is in {arguments.out}" if arguments.out is not None else ""
         print(f"tiltsim: interrupted at t = {flight.end.time:.3f} s{kept}", file=sys.stderr)
         return INTERRUPTED
-    verdicts = judge(scenario, flight.metrics())
+    metrics = flight.metrics()
+    reversed_rotor = flight.end.kind == "completed" and metrics["min_rotor_speed"] < 0.0
+    if reversed_rotor and not arguments.quiet:
+        print(
+            "tiltsim: warning: a rotor came to rest and reversed (min_rotor_speed = "
+            f"{metrics['min_rotor_speed']:.4g} rad/s)",
+            file=sys.stderr,
+        )
+    verdicts = judge(scenario, metrics)
     if not arguments.quiet:
         print(summary(flight, verdicts))
         if arguments.out is not None:
             print(f"written to {arguments.out}")
         if arguments.rerun is not None:
-            print(f"recording written to {arguments.rerun}; open it with: rerun {arguments.rerun}")
+            print(f"recording written to {arguments.rerun}; see: tiltsim view {arguments.rerun}")
     if flight.end.kind != "completed":
         print(f"tiltsim: {lost(flight)}", file=sys.stderr)
         return FLIGHT_LOST
@@ -151,16 +159,25 @@ def summary(flight: Flight, verdicts: list[Verdict]) -> str:
 _IN_HEADER = ("duration", "realtime_factor", "diverged")
 
 
+def _measured(verdict: Verdict) -> str:
+    value, metric = verdict.measured, verdict.expectation.metric
+    if isinstance(value, bool):
+        return str(value).lower()
+    if value is not None:
+        return f"{value:.6g}"
+    return "flight under 20 s" if metric.endswith("after_20s") else "no value"
+
+
 def expectation_lines(verdicts: list[Verdict]) -> list[str]:
     """A table of expectations: verdict, metric, measured, published, bounds."""
     rows = [("", "expected", "measured", "published", "bounds")]
     for verdict in verdicts:
-        wanted, measured = verdict.expectation, verdict.measured
+        wanted = verdict.expectation
         rows.append(
             (
                 "ok" if verdict.holds else "FAILED",
                 wanted.metric,
-                "no value" if measured is None else f"{measured:.6g}",
+                _measured(verdict),
                 "" if wanted.published is None else f"{wanted.published:g}",
                 verdict.bounds,
             )

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from tiltsim.commands.progress import progress_bar
+
+MANY_FRAMES: Final = 100
+"""From here on the user is told how long it may take."""
 
 
 def add_parser(subparsers: Any) -> None:
@@ -79,6 +83,13 @@ def run(arguments: argparse.Namespace) -> int:
 
     width, height = arguments.size
     form = Format(width, height, arguments.fps, arguments.speed)
+    count = int(float(flight["time"][-1]) * form.fps / form.speed) + 1
+    if count > MANY_FRAMES and not arguments.quiet:
+        print(
+            f"{count} frames of {width}x{height}; without a graphics card a frame takes up to half "
+            "a second (--speed, --fps and --size change that)",
+            file=sys.stderr,
+        )
     with progress_bar(float(flight["time"][-1]), "s", shown=not arguments.quiet) as advance_to:
         film_flight(flight, out, form, advance_to)
     if not arguments.quiet:

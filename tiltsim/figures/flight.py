@@ -157,7 +157,9 @@ def _plan_view(axes: Any, flight: Flight) -> None:
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.08)
     axes.set_xlabel("x (m)")
-    _label(axes, "Plan view", "m", name="y", columns=4)
+    axes.set_title("Plan view")
+    axes.set_ylabel("y (m)")
+    axes.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, -0.16), handlelength=1.4)
 
 
 def _roll_pitch_plane(axes: Any, flight: Flight) -> None:
