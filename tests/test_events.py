@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+import tiltsim
 from tests.flights import flight
 from tiltsim.events import EventWatch, flight_events
 from tiltsim.flight import SAMPLE_FIELDS, End
@@ -61,3 +62,15 @@ def test_a_flight_in_pieces_tells_the_same_as_a_whole_one():
     pieces = [replace(this, samples=this.samples[at : at + 7]) for at in range(0, len(this), 7)]
     told = [watch.opening(), *(e for piece in pieces for e in watch.observe(piece))]
     assert [*told, *watch.closing(this.end)] == flight_events(this)
+
+
+def test_switches_between_laws_are_told():
+    scenario = tiltsim.load_scenario(
+        "ch02_singular_zone/experiments#experiment_1", {"simulation.duration": 0.5}
+    )
+    found = [e for e in flight_events(tiltsim.simulate(scenario)) if "switched" in e.text]
+    assert [event.text.rpartition(" to ")[2] for event in found] == [
+        "yaw and position",
+        "attitude and altitude",
+    ]
+    assert found[1].time == pytest.approx(0.308, abs=0.011)

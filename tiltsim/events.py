@@ -82,6 +82,10 @@ class EventWatch:
         time = piece["time"]
         near = np.abs(piece["singularity_margin"]) < MARGIN_THRESHOLD
         yield f"singularity margin below {MARGIN_THRESHOLD:g} rad", time, near
+        if "attitude_zone" in piece.columns:
+            inside = piece["attitude_zone"] > 0.5
+            yield "switched to attitude and altitude", time, inside
+            yield "switched to yaw and position", time, ~inside
         vehicle = self._scenario.vehicle
         for rotor, spin in enumerate(SPIN, start=1):
             speed = spin * piece[f"rotor_speed_{rotor}"]
