@@ -172,7 +172,8 @@ def _shared_engine(addresses: list[str], overrides: Mapping[str, Any]) -> Engine
         return None
     from tiltsim.native import compile_callbacks
 
-    for law in {scenario.controller.law for scenario in scenarios}:
+    # A user's own controller stays in Python.
+    for law in {scenario.controller.law for scenario in scenarios} & LOOPS.keys():
         compile_callbacks(LOOPS[law])
     return "native"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from math import inf, pi
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
@@ -20,6 +21,9 @@ from tiltsim.messages import InvalidValueError
 from tiltsim.tables import Gains2, Positive, Table, Vector3
 
 DEFAULT_LAW: Final = "attitude_altitude"
+
+ANY_VEHICLE: Final = "any"
+"""The vehicle of a law that does not ask which one it flies."""
 
 ReferenceKind = Literal["position", "attitude_altitude", "pose"]
 """What a law can follow: position and yaw, attitude and altitude, or position and attitude."""
@@ -284,6 +288,37 @@ def _attitude_loops(gains: quadrotor_attitude_altitude.Gains) -> list[Loop]:
     return [linear_loop("altitude", gains[:2]), linear_loop("attitude", gains[2:])]
 
 
+# --- a user's own ------------------------------------------------------------------------------
+
+
+class PythonController(LawTable):
+    """A user's own controller in Python; see `tiltsim.controller`."""
+
+    vehicle_model = ANY_VEHICLE
+    reference_kinds = ("position", "pose", "attitude_altitude")
+
+    law: Literal["python"]
+    function: str = Field(
+        description="FILE.py:NAME of a function or class; the file is looked for beside the "
+        "scenario's"
+    )
+
+    @property
+    def file(self) -> Path | None:
+        """The file; None for a controller that was given in Python."""
+        path, _, _ = self.function.rpartition(":")
+        return Path(path) if path.endswith(".py") else None
+
+    @property
+    def attribute(self) -> str:
+        """The name within the file."""
+        return self.function.rpartition(":")[2]
+
+    def closed_loops(self, vehicle: Vehicle) -> list[Loop]:
+        """See `LawTable.closed_loops`: none is known."""
+        return []
+
+
 # --- the table, told apart by its law ----------------------------------------------------------
 
 
@@ -299,7 +334,8 @@ Controller = Annotated[
     | Annotated[FullPoseController, Tag("full_pose")]
     | Annotated[YawPositionController, Tag("yaw_position")]
     | Annotated[SwitchingController, Tag("switching")]
-    | Annotated[QuadrotorAttitudeAltitudeController, Tag("quadrotor_attitude_altitude")],
+    | Annotated[QuadrotorAttitudeAltitudeController, Tag("quadrotor_attitude_altitude")]
+    | Annotated[PythonController, Tag("python")],
     Discriminator(_law),
 ]
 """The ``[controller]`` table, told apart by its law."""

@@ -48,7 +48,8 @@ COLUMN_UNITS: Final = {
 """Columns of every flight and their units, in the order of the file; those of a law follow."""
 
 
-EndKind = Literal["completed", "diverged", "singular", "interrupted"]
+EndKind = Literal["completed", "diverged", "singular", "interrupted", "failed"]
+"""A flight fails where a user's own controller does."""
 
 
 @dataclass(frozen=True)

@@ -118,7 +118,7 @@ class Loop:
     follows_position
         Whether a scenario has the law follow the reference's horizontal position.
     equations
-        The same law on the thesis' own equations.
+        The same law on the thesis' own equations; None where it flies on MuJoCo alone.
     """
 
     model: str
@@ -131,7 +131,7 @@ class Loop:
     observe: Callable[..., tuple[float, ...]]
     derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
     watched: Callable[[Mapping[str, float], ControlSetup], tuple[Watched, ...]]
-    equations: Equations
+    equations: Equations | None = None
     law_states: int = 0
     law_fields: tuple[str, ...] = ()
     extra_columns: Mapping[str, str] = field(default_factory=dict)

@@ -15,7 +15,12 @@ from pydantic import ConfigDict, Field, PrivateAttr, model_validator
 from controllers.references import REFERENCE_TYPES, ReferenceParameters
 from controllers.stability import Loop
 from controllers.vehicle import PRESETS, Vehicle
-from tiltsim.controller_tables import AttitudeAltitudeController, Controller, ReferenceKind
+from tiltsim.controller_tables import (
+    ANY_VEHICLE,
+    AttitudeAltitudeController,
+    Controller,
+    ReferenceKind,
+)
 from tiltsim.gait_tables import FixedGait, Gait
 from tiltsim.messages import InvalidValueError
 from tiltsim.metrics import BOOLEAN_METRICS, METRICS
@@ -375,31 +380,44 @@ class Scenario(Table):
 
     def _check_law(self) -> None:
         law, model = self.controller.law, self.vehicle.model
-        if self.controller.vehicle_model != model:
+        if self.controller.vehicle_model not in {model, ANY_VEHICLE}:
             raise InvalidValueError(
                 "controller.law",
                 law,
                 f"flies the {self.controller.vehicle_model}, and vehicle.model = {model!r}; "
                 f"choose {', '.join(_laws_of(model))}",
             )
+        if law == "python":
+            self._check_own_law()
         if model != "quadrotor":
             return
         vehicle = self.vehicle
-        for key, value, default in (
+        of_tilts = [
             ("gait.type", self.gait.type, "fixed"),
             ("gait", self.gait.model_dump(), FixedGait().model_dump()),
             ("vehicle.tilt_servo", vehicle.tilt_servo.model_dump(), TiltServoTable().model_dump()),
             ("vehicle.pod", vehicle.pod.model_dump(), PodTable().model_dump()),
+        ]
+        of_rotors = [
             ("vehicle.min_rotor_speed", vehicle.min_rotor_speed, None),
             ("vehicle.max_rotor_speed", vehicle.max_rotor_speed, None),
             ("initial.rotor_speed", self.initial.rotor_speed, InitialTable().rotor_speed),
-        ):
+        ]
+        # Commands from outside reach rotors with a speed, limits and all.
+        for key, value, default in of_tilts if law == "python" else [*of_tilts, *of_rotors]:
             if value != default:
                 raise InvalidValueError(
                     key,
                     value,
                     "the quadrotor has no use for it: its rotors do not tilt, and "
                     "make the thrust that its law asks for at once",
+                )
+
+    def _check_own_law(self) -> None:
+        for key, asked, flown in (("plant", "thesis", "mujoco"), ("engine", "native", "python")):
+            if getattr(self.simulation, key) == asked:
+                raise InvalidValueError(
+                    f"simulation.{key}", asked, f"a controller of your own flies on {flown} alone"
                 )
 
     def _check_reference(self) -> None:
@@ -538,7 +556,9 @@ def _laws_of(model: str) -> list[str]:
     union = get_args(get_args(Controller)[0])
     tables = [get_args(option)[0] for option in union]
     return [
-        get_args(t.model_fields["law"].annotation)[0] for t in tables if t.vehicle_model == model
+        get_args(t.model_fields["law"].annotation)[0]
+        for t in tables
+        if t.vehicle_model in {model, ANY_VEHICLE}
     ]
 
 

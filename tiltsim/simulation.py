@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from controllers.references import position_reference
+from tiltsim.controller import Controller, ControllerError, with_controller
 from tiltsim.flight import End, Flight
 from tiltsim.loop import Floats
 from tiltsim.loops import control_setup, loop_of
@@ -26,7 +27,12 @@ SINGULAR: Final = 1e-9
 Observer = Callable[[Floats], None]
 
 
-def simulate(scenario: Scenario, observer: Observer | None = None) -> Flight:
+def simulate(
+    scenario: Scenario,
+    observer: Observer | None = None,
+    *,
+    controller: Controller | type | None = None,
+) -> Flight:
     """Fly a scenario from start to end.
 
     Parameters
@@ -35,16 +41,23 @@ def simulate(scenario: Scenario, observer: Observer | None = None) -> Flight:
         What to fly; see `tiltsim.load_scenario`.
     observer
         Called with every sample (floats in the order of `Loop.sample_fields`) as it is recorded.
+    controller
+        A controller of your own in place of the scenario's law: a function from
+        `tiltsim.Observation` to `tiltsim.Command`, an object with ``__call__`` and, if it has a
+        memory, ``reset(scenario)``, or a class of such objects.
 
     Returns
     -------
     Flight
         All samples up to the end. A flight that diverges or meets a singular decoupling matrix
         is a result, not an error: its log is complete up to there, and ``flight.end`` names the
-        cause and, to one physics step, the time. So is a flight interrupted from the keyboard.
+        cause and, to one physics step, the time. So is a flight interrupted from the keyboard, or
+        by a controller of your own that raises or returns what is no command.
     """
+    if controller is not None:
+        scenario = with_controller(scenario, controller)
     simulation = scenario.simulation
-    plant = make_plant(scenario)
+    plant = make_plant(scenario, controller)
     watch = Watch(scenario)
     samples = [_sample(plant)]
     if observer is not None:
@@ -69,6 +82,13 @@ def simulate(scenario: Scenario, observer: Observer | None = None) -> Flight:
             steps_left -= steps
     except KeyboardInterrupt:
         end = End("interrupted", float(samples[-1][0]), "interrupted from the keyboard")
+    except ControllerError as error:
+        sample = _sample(plant)
+        end = watch.judge(plant, sample) or End("failed", plant.time, str(error))
+        if sample[0] > samples[-1][0] and np.isfinite(sample).all():
+            samples.append(sample)
+            if observer is not None:
+                observer(sample)
     wall_time = perf_counter() - start
     if end is None:
         end = End("completed", plant.time)
