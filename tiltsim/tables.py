@@ -19,6 +19,8 @@ Angles2 = Annotated[tuple[Angle, Angle], Field(strict=False)]
 Angles3 = Annotated[tuple[Angle, Angle, Angle], Field(strict=False)]
 Angles4 = Annotated[tuple[Angle, Angle, Angle, Angle], Field(strict=False)]
 Gains2 = Annotated[tuple[float, float], Field(strict=False)]
+Gains4 = Annotated[tuple[float, float, float, float], Field(strict=False)]
+Positive2 = Annotated[tuple[Positive, Positive], Field(strict=False)]
 Positive4 = Annotated[tuple[Positive, Positive, Positive, Positive], Field(strict=False)]
 
 

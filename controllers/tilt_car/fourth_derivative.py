@@ -11,11 +11,10 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from controllers.references import ReferenceParameters, reference_derivatives
-from controllers.scalar import Quad, Triple, scalar
+from controllers.scalar import Pair, Quad, Triple, scalar
 from controllers.tilt_car.third_derivative import input_columns, minimum_norm
 from controllers.tilt_car.vehicle import (
     STATE_FIELDS,
-    Pair,
     TiltCar,
     body_acceleration,
     turn_share,
@@ -52,6 +51,13 @@ class Parameters(NamedTuple):
     gains: Gains
     reference: ReferenceParameters
     decoupling: float
+
+
+GAIN_SETS: Final = {
+    # Ours, all four poles at -5: the thesis prints none.
+    "ch10": Gains(20.0, 150.0, 500.0, 625.0),
+}
+"""Gains by name."""
 
 
 @scalar

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from controllers.references import ReferenceParameters, reference_derivatives
-from controllers.scalar import scalar
-from controllers.tilt_car.vehicle import Pair, TiltCar, squared_speeds, turned
+from controllers.scalar import Pair, scalar
+from controllers.tilt_car.vehicle import TiltCar, squared_speeds, turned
 
 State = tuple[float, ...]
 

@@ -12,8 +12,8 @@ from math import atan2, nan
 from typing import Final, NamedTuple
 
 from controllers.references import ReferenceParameters, reference_derivatives
-from controllers.scalar import Triple, scalar
-from controllers.tilt_car.vehicle import Pair, TiltCar, body_acceleration, turn_share, turned
+from controllers.scalar import Pair, Triple, scalar
+from controllers.tilt_car.vehicle import TiltCar, body_acceleration, turn_share, turned
 
 State = tuple[float, ...]
 
@@ -85,8 +85,8 @@ def silent_input(columns: tuple[float, ...]) -> Triple:
 def restoring_inputs(lean: float, rate: float, columns: tuple[float, ...], car: TiltCar) -> Triple:
     """Inputs without effect on the outputs that shrink the lean at a rate (1/s).
 
-    The lean is the angle from the thrusts' middle to the acceleration. Zero where a rotor rests, for
-    then no silent input turns the middle.
+    The lean is the angle from the thrusts' middle to the acceleration. Zero where a rotor rests:
+    no silent input turns the middle then.
     """
     n1, n2, n3 = silent_input(columns)
     if n3 == 0.0:

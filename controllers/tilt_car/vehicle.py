@@ -11,9 +11,7 @@ from __future__ import annotations
 from math import cos, pi, sin
 from typing import Final, NamedTuple
 
-from controllers.scalar import scalar
-
-Pair = tuple[float, float]
+from controllers.scalar import Pair, scalar
 
 
 class TiltCar(NamedTuple):
