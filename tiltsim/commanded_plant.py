@@ -41,7 +41,7 @@ class CommandedPlant(MujocoPlant):
         self.tilting = scenario.vehicle.model == "tiltrotor"
         self._first_thrust = 4 if self.tilting else 0
         self._first_rate = self._first_thrust + 4
-        vehicle = scenario.vehicle
+        vehicle = scenario.rotorcraft
         self._slowest = vehicle.min_rotor_speed
         self._fastest = vehicle.max_rotor_speed
         data, setup = self.data, self._setup

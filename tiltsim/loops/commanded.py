@@ -88,9 +88,9 @@ def refreshed_quadrotor_controls(ctrl: Sequence[float], act: Sequence[float]) ->
 
 
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
-    vehicle = scenario.vehicle.resolve()
+    vehicle = scenario.rotorcraft.resolve()
     gait = scenario.gait.plan(vehicle)
-    lead = servo_lead(scenario.vehicle.tilt_servo)
+    lead = servo_lead(scenario.rotorcraft.tilt_servo)
     parameters = ControlParameters(
         signature, lead, vehicle, gait.parameters, scenario.reference.parameters
     )
