@@ -59,7 +59,7 @@ class CommandedPlant(MujocoPlant):
         else:
             act[:] = _signed(self._along_spin(orders))
             ctrl[self._first_thrust : self._first_rate] = rotor_thrust_controls(act.tolist())
-        ctrl[self._first_rate :] = rates
+        ctrl[self._first_rate : self._first_rate + 4] = rates
 
     def _planned_servo_commands(self) -> tuple[float, ...]:
         parameters: ControlParameters = self._setup.parameters
@@ -90,7 +90,7 @@ class CommandedPlant(MujocoPlant):
 
     def advance(self, steps: int) -> None:
         """See `Plant.advance`."""
-        accelerating = self.data.ctrl[self._first_rate :].any()
+        accelerating = self.data.ctrl[self._first_rate : self._first_rate + 4].any()
         callback: Any = self._engine.held() if accelerating else None
         with control_callback(callback), quiet_warnings():
             mujoco.mj_step(self.model, self.data, nstep=steps)

@@ -19,6 +19,8 @@ from tiltsim.library import shipped_folder
 if TYPE_CHECKING:
     import mujoco
 
+    from tiltsim.own_vehicle import OwnVehicle
+
 MODELS: Final = ("tiltrotor", "quadrotor")
 INTEGRATORS: Final = ("Euler", "RK4", "implicit", "implicitfast")
 ROTORS: Final = (1, 2, 3, 4)
@@ -156,6 +158,7 @@ def compile_model(
     rotor_limits: RotorLimits = RotorLimits(),
     law_states: int = 0,
     visuals: bool = True,
+    own: OwnVehicle | None = None,
 ) -> mujoco.MjModel:
     """Compile the MuJoCo model of a vehicle.
 
@@ -186,6 +189,9 @@ def compile_model(
     visuals : bool, default=True
         Whether the vehicle has geoms. They do not touch the physics, but positioning them takes
         about a sixth of a step.
+    own : OwnVehicle, optional
+        A user's own file in place of the shipped one, with its own arms and pods; its geoms may
+        have mass and always stay.
 
     Returns
     -------
@@ -208,7 +214,7 @@ def compile_model(
     for name, value in vehicle._asdict().items():
         _require_positive(f"vehicle.{name}", value, "(SI)")
 
-    whole, bare = _compose(
+    whole, bare, assets = _compose(
         model,
         vehicle,
         timestep,
@@ -218,8 +224,9 @@ def compile_model(
         pod,
         rotor_limits,
         law_states,
+        own,
     )
-    return mujoco.MjModel.from_xml_string(whole if visuals else bare)
+    return mujoco.MjModel.from_xml_string(whole if visuals else bare, assets)
 
 
 @lru_cache(maxsize=64)  # dm_control takes several times longer than MuJoCo's compiler
@@ -233,13 +240,14 @@ def _compose(
     pod: Pod,
     rotor_limits: RotorLimits,
     law_states: int,
-) -> tuple[str, str]:
-    """The vehicle's complete MJCF, and the same without what is only drawn.
+    own: OwnVehicle | None,
+) -> tuple[str, str, dict[str, bytes]]:
+    """The vehicle's complete MJCF, the same without what is only drawn, and the files they name.
 
     The arguments are `compile_model`'s, found valid. A flight is flown on the one and shown on the
     other, so both are made at once.
     """
-    root = parse_mjcf(shipped_folder("mjcf") / f"{model}.xml")
+    root = parse_mjcf(shipped_folder("mjcf") / f"{model}.xml" if own is None else Path(own.path))
     tilting = model == "tiltrotor"
     stops = tilting and tilt_servo.max_angle is not None
 
@@ -250,18 +258,27 @@ def _compose(
     root.option.flag.constraint = "enable" if stops else "disable"
     root.size.nuserdata = userdata_size
 
-    _scale_lengths(root, vehicle.arm_length)
-    _set_inertia(root, vehicle, pod if tilting else None)
+    if own is None:
+        _scale_lengths(root, vehicle.arm_length)
+        _set_inertia(root, vehicle, pod if tilting else None)
+    else:
+        own.set_inertia(root, vehicle)
     _set_rotors(root, vehicle, rotor_limits)
-    if tilting:
+    if tilting and own is None:
         _set_servos(root, tilt_servo, pod)
-    _set_keyframe(root.keyframe.key["hover"], vehicle.hover_rotor_speed)
-    _set_keyframe(root.keyframe.key["start"], START_SPEED)
+    elif tilting and own is not None:
+        own.set_servos(root, tilt_servo)
+    for name, speed in (("hover", vehicle.hover_rotor_speed), ("start", START_SPEED)):
+        key = root.find("key", name)
+        if key is not None:
+            _set_keyframe(key, speed)
     add_law_states(root, law_states)
     whole = str(root.to_xml_string())
+    if own is not None:
+        return whole, whole, dict(root.get_assets())
     for geom in root.find("body", "vehicle").find_all("geom"):
         geom.remove()
-    return whole, str(root.to_xml_string())
+    return whole, str(root.to_xml_string()), {}
 
 
 def parse_mjcf(path: Path) -> Any:

@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from math import pi
-from typing import Annotated, Any, Final, Literal, Self, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, get_args
 
 import numpy as np
 from pydantic import ConfigDict, Discriminator, Field, PrivateAttr, Tag, model_validator
@@ -37,6 +37,9 @@ from tiltsim.tables import (
     Table,
     Vector3,
 )
+
+if TYPE_CHECKING:
+    from tiltsim.own_vehicle import OwnVehicle
 
 MAX_STEPS: Final = 100_000_000
 """Physics steps of a flight, more than a day at one millisecond."""
@@ -85,6 +88,11 @@ class VehicleTable(Table):
 
     model: Literal["tiltrotor", "quadrotor"] = "tiltrotor"
     preset: Literal["ar_drone_2", "ar_drone_2_unrounded", "luukkonen"] = "ar_drone_2"
+    mjcf: str | None = Field(
+        None,
+        description="a file with the vehicle, beside the scenario's, in place of the shipped one; "
+        "it has the parameters that are not given here, and the preset none",
+    )
     mass: Positive | None = Field(None, description="kg, pods included")
     inertia: Annotated[tuple[Positive, Positive, Positive], Field(strict=False)] | None = Field(
         None, description="principal moments about the centre of mass, kg m^2, pods included"
@@ -99,7 +107,7 @@ class VehicleTable(Table):
     pod: PodTable = PodTable()
 
     def resolve(self) -> Vehicle:
-        """The physical parameters: the preset with the given keys in place of its own."""
+        """The physical parameters: the preset's or the file's, but for the keys given."""
         given = {
             key: getattr(self, key)
             for key in ("mass", "arm_length", "thrust_coefficient", "drag_coefficient", "gravity")
@@ -109,10 +117,36 @@ class VehicleTable(Table):
                 zip(("inertia_xx", "inertia_yy", "inertia_zz"), self.inertia, strict=True)
             )
         known = {key: value for key, value in given.items() if value is not None}
-        return PRESETS[self.preset]._replace(**known)
+        own = self.own
+        base = PRESETS[self.preset] if own is None else own.vehicle
+        return base._replace(**known)
+
+    @property
+    def own(self) -> OwnVehicle | None:
+        """The user's own file as measured; None for the shipped vehicles."""
+        if self.mjcf is None:
+            return None
+        from tiltsim.own_vehicle import read_own_vehicle
+
+        try:
+            return read_own_vehicle(self.mjcf, self.model)
+        except ValueError as error:
+            raise InvalidValueError("vehicle.mjcf", self.mjcf, str(error)) from None
+
+    def _check_own(self) -> None:
+        for key, value, default in (
+            ("arm_length", self.arm_length, None),
+            ("pod", self.pod.model_dump(), PodTable().model_dump()),
+        ):
+            if value != default:
+                raise InvalidValueError(
+                    f"vehicle.{key}", value, "vehicle.mjcf has its own; leave it out"
+                )
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        if self.mjcf is not None:
+            self._check_own()
         a, b, c = sorted(self.resolve()[1:4])
         if a + b < c:
             raise InvalidValueError(
@@ -507,8 +541,10 @@ class Scenario(Table):
             )
         if model == "tilt_car":
             self._check_plane()
-        if law == "python":
+        elif law == "python":
             self._check_own_law()
+        else:
+            self._check_layout()
         if model != "quadrotor":
             return
         vehicle = self.rotorcraft
@@ -532,6 +568,16 @@ class Scenario(Table):
                     "the quadrotor has no use for it: its rotors do not tilt, and "
                     "make the thrust that its law asks for at once",
                 )
+
+    def _check_layout(self) -> None:
+        own = self.rotorcraft.own
+        if own is not None and own.misfit:
+            raise InvalidValueError(
+                "vehicle.mjcf",
+                self.rotorcraft.mjcf,
+                f"{own.misfit}; the {self.controller.law} law is for four equal arms at right "
+                "angles, a controller of your own flies any",
+            )
 
     def _check_own_law(self) -> None:
         for key, asked, flown in (("plant", "thesis", "mujoco"), ("engine", "native", "python")):

@@ -71,6 +71,7 @@ def _compile(
         rotor_limits=RotorLimits(vehicle.min_rotor_speed, vehicle.max_rotor_speed),
         law_states=law_states,
         visuals=visuals,
+        own=vehicle.own,
     )
 
 
