@@ -92,7 +92,7 @@ class Flight:
         loop = loop_of(self.scenario)
         known = dict(zip(loop.sample_fields, self.samples.T, strict=True))
         known |= loop.derive(known, control_setup(self.scenario))
-        thrust_coefficient = self.scenario.vehicle.resolve().thrust_coefficient
+        thrust_coefficient = self.scenario.true_vehicle.thrust_coefficient
         for i, sign in zip(_FOUR, SPIN, strict=True):
             speed = known[f"rotor_speed_{i}"]
             known[f"thrust_{i}"] = thrust_coefficient * sign * speed * np.abs(speed)

@@ -25,6 +25,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from controllers.records import record_dtype
 from controllers.scalar import Triple, scalar_functions
+from controllers.vehicle import Vehicle
 from tiltsim import thesis_plant
 from tiltsim.cache import native_code_can_be_kept, native_code_folder
 from tiltsim.engine import EngineName, check_model
@@ -200,11 +201,11 @@ class NativeEngine:
 
 
 @njit(**_OPTIONS)
-def _advance(step_index, values, timestep, steps, control_steps, records, table, gust):  # type: ignore[no-untyped-def]
+def _advance(step_index, values, timestep, steps, control_steps, records, vehicle, table, gust):  # type: ignore[no-untyped-def]
     state = list(values)
     law = records[0].law
     state = thesis_plant.advance(
-        step_index, state, timestep, steps, control_steps, law, table, gust
+        step_index, state, timestep, steps, control_steps, law, vehicle, table, gust
     )
     return np.array(state)
 
@@ -216,6 +217,7 @@ def advance_thesis_plant(
     steps: int,
     control_steps: int,
     userdata: np.ndarray[Any, Any],
+    vehicle: Vehicle,
     disturbance: Triple,
 ) -> list[float]:
     """`tiltsim.thesis_plant.advance`, compiled; ``userdata`` as in a MuJoCo flight."""
@@ -225,6 +227,6 @@ def advance_thesis_plant(
     values = np.array(state)
     result = _advance(
         *(step_index, values, timestep, steps, control_steps),
-        *(userdata[:head].view(layout), userdata[head:], disturbance),
+        *(userdata[:head].view(layout), vehicle, userdata[head:], disturbance),
     )
     return list(result.tolist())

@@ -70,6 +70,28 @@ def choose_engine(scenario: Scenario) -> EngineName:
     return "native" if simulation.steps >= cheap else "python"
 
 
+def shared_engine(examples: Sequence[Scenario], steps: int) -> EngineName | None:
+    """The native engine where many flights of ``steps`` together repay compiling it, else None.
+
+    What the ``examples`` need is then compiled, for all processes to load.
+    """
+    if steps < STEPS_WORTH_COMPILING:
+        return None
+    ready: set[tuple[str, str]] = set()
+    for scenario in examples:
+        kind = (scenario.controller.law, scenario.simulation.plant)
+        if kind not in ready:
+            make_plant(with_engine(scenario, "native")).advance(1)
+            ready.add(kind)
+    return "native"
+
+
+def with_engine(scenario: Scenario, engine: EngineName) -> Scenario:
+    """The scenario with its engine chosen."""
+    simulation = scenario.simulation.model_copy(update={"engine": engine})
+    return scenario.model_copy(update={"simulation": simulation})
+
+
 class MujocoPlant:
     """The compiled MJCF model in MuJoCo, with the control step in its control callback."""
 
@@ -199,7 +221,7 @@ def build_model(
     try:
         model = compile_model(
             vehicle.model,
-            vehicle.resolve(),
+            scenario.true_vehicle,
             timestep=simulation.timestep,
             integrator=simulation.integrator,
             userdata_size=userdata_size,
@@ -223,6 +245,7 @@ class ThesisPlant:
         self._disturbance = disturbing_acceleration(scenario)
         self._setup = control_setup(scenario)
         self._law = slotted(self._setup.parameters.law)
+        self._vehicle = scenario.true_vehicle
         self._timestep = simulation.timestep
         self._control_steps = simulation.control_steps
         self._step_index = 0
@@ -262,13 +285,13 @@ class ThesisPlant:
 
             self._state = advance_thesis_plant(
                 *(self._step_index, self._state, self._timestep, steps, self._control_steps),
-                *(self._setup.userdata, self._disturbance),
+                *(self._setup.userdata, self._vehicle, self._disturbance),
             )
         else:
             try:
                 self._state = thesis_plant.advance(
                     *(self._step_index, self._state, self._timestep, steps, self._control_steps),
-                    *(self._law, self._setup.table, self._disturbance),
+                    *(self._law, self._vehicle, self._setup.table, self._disturbance),
                 )
             except (ArithmeticError, ValueError):
                 self._fault = "the control law left the range of floating-point numbers"

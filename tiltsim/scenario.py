@@ -112,6 +112,36 @@ class VehicleTable(Table):
         return self
 
 
+# --- [model_error] -----------------------------------------------------------------------------
+
+Share = Annotated[float, Field(ge=0.01, le=100.0)]
+
+
+class ModelErrorTable(Table):
+    """By what factors the vehicle that flies differs from the ``[vehicle]`` that the law knows."""
+
+    mass: Share = 1.0
+    inertia: Annotated[tuple[Share, Share, Share], Field(strict=False)] = Field(
+        (1.0, 1.0, 1.0), description="one factor a principal moment"
+    )
+    arm_length: Share = 1.0
+    thrust_coefficient: Share = 1.0
+    drag_coefficient: Share = 1.0
+
+    def apply(self, vehicle: Vehicle) -> Vehicle:
+        """The vehicle that flies, where the law knows ``vehicle``."""
+        xx, yy, zz = self.inertia
+        return vehicle._replace(
+            mass=self.mass * vehicle.mass,
+            inertia_xx=xx * vehicle.inertia_xx,
+            inertia_yy=yy * vehicle.inertia_yy,
+            inertia_zz=zz * vehicle.inertia_zz,
+            arm_length=self.arm_length * vehicle.arm_length,
+            thrust_coefficient=self.thrust_coefficient * vehicle.thrust_coefficient,
+            drag_coefficient=self.drag_coefficient * vehicle.drag_coefficient,
+        )
+
+
 # --- [simulation] and [initial] ----------------------------------------------------------------
 
 
@@ -348,6 +378,7 @@ class Scenario(Table):
     title: str = ""
     source: str = ""
     vehicle: VehicleTable = VehicleTable()
+    model_error: ModelErrorTable = ModelErrorTable()
     simulation: SimulationTable = SimulationTable()
     initial: InitialTable = InitialTable()
     controller: Controller = AttitudeAltitudeController()
@@ -363,9 +394,15 @@ class Scenario(Table):
         """How the scenario is called on the command line; empty when it was built in Python."""
         return self._address
 
+    @property
+    def true_vehicle(self) -> Vehicle:
+        """The vehicle that flies; the law knows ``vehicle.resolve()``."""
+        return self.model_error.apply(self.vehicle.resolve())
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         self._check_law()
+        self._check_model_error()
         self._check_gait()
         self._check_reference()
         self._check_rotor_limits()
@@ -407,6 +444,15 @@ class Scenario(Table):
                     "the quadrotor has no use for it: its rotors do not tilt, and "
                     "make the thrust that its law asks for at once",
                 )
+
+    def _check_model_error(self) -> None:
+        a, b, c = sorted(self.true_vehicle[1:4])
+        if a + b < c:
+            raise InvalidValueError(
+                "model_error.inertia",
+                list(self.model_error.inertia),
+                "no body has it: two moments must exceed the third",
+            )
 
     def _check_reference(self) -> None:
         controller, reference = self.controller, self.reference

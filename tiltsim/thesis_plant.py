@@ -18,7 +18,7 @@ from controllers.decoupling_matrix import body_force, sines_and_cosines, torque_
 from controllers.gaits import GaitParameters, tilt_reference
 from controllers.rotation import rotation_from_euler
 from controllers.scalar import Quad, Triple, scalar
-from controllers.vehicle import drag_ratio
+from controllers.vehicle import Vehicle, drag_ratio
 
 STATE_SIZE: Final = 26
 
@@ -62,20 +62,21 @@ def state_rates(
     time: float,
     state: Sequence[float],
     inputs: Quad,
-    law: Parameters,
+    vehicle: Vehicle,
+    gait: GaitParameters,
     table: Sequence[float],
     disturbance: Triple,
 ) -> tuple[float, ...]:
     """Time derivative of the plant's state under the given rotor accelerations.
 
-    ``disturbance`` is an acceleration (m/s^2, world) that the law does not know of.
+    ``vehicle`` is the one that flies, and ``disturbance`` an acceleration (m/s^2, world); the law
+    may know another vehicle, and does not know of the disturbance.
     """
     r11, r12, r13, r21, r22, r23 = state[6], state[7], state[8], state[9], state[10], state[11]
     r31, r32, r33, p, q, r = state[12], state[13], state[14], state[15], state[16], state[17]
     s1, s2, s3, s4 = state[18], state[19], state[20], state[21]
     u1, u2, u3, u4 = inputs
-    vehicle = law.vehicle
-    alpha_1, alpha_2, alpha_3, alpha_4, _, _, _, _ = tilt_reference(time, law.gait, table)
+    alpha_1, alpha_2, alpha_3, alpha_4, _, _, _, _ = tilt_reference(time, gait, table)
     trig = sines_and_cosines(alpha_1, alpha_2, alpha_3, alpha_4)
     w1, w2, w3, w4 = s1 * abs(s1), s2 * abs(s2), s3 * abs(s3), s4 * abs(s4)
 
@@ -118,13 +119,15 @@ def advance(
     steps: int,
     control_steps: int,
     law: Parameters,
+    vehicle: Vehicle,
     table: Sequence[float],
     disturbance: Triple,
 ) -> list[float]:
     """Integrate ``steps`` fixed steps with ode3, the third-order method of Bogacki and Shampine.
 
     ``control_steps`` is the number of steps for which the law's output is held, 0 to evaluate it
-    at every stage. Returns the new state; the caller counts the steps.
+    at every stage. ``vehicle`` is the one that flies, the law knows its own. Returns the new state;
+    the caller counts the steps.
     """
     for index in range(step_index, step_index + steps):
         time = index * timestep
@@ -135,15 +138,15 @@ def advance(
         continuous = control_steps == 0
 
         inputs = rotor_inputs(time, state, law, table) if continuous else held
-        k1 = state_rates(time, state, inputs, law, table, disturbance)
+        k1 = state_rates(time, state, inputs, vehicle, law.gait, table, disturbance)
         half = stage(state, 0.5 * timestep, k1)
         half_time = time + 0.5 * timestep
         inputs = rotor_inputs(half_time, half, law, table) if continuous else held
-        k2 = state_rates(half_time, half, inputs, law, table, disturbance)
+        k2 = state_rates(half_time, half, inputs, vehicle, law.gait, table, disturbance)
         late = stage(state, 0.75 * timestep, k2)
         late_time = time + 0.75 * timestep
         inputs = rotor_inputs(late_time, late, law, table) if continuous else held
-        k3 = state_rates(late_time, late, inputs, law, table, disturbance)
+        k3 = state_rates(late_time, late, inputs, vehicle, law.gait, table, disturbance)
         state = [
             value + timestep * (2.0 / 9.0 * a + 1.0 / 3.0 * b + 4.0 / 9.0 * c)
             for value, a, b, c in zip(state, k1, k2, k3)
