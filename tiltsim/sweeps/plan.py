@@ -283,6 +283,7 @@ class Plan:
     def _check_names(self) -> None:
         sweep = self.sweep
         rules = [*sweep.derive.values(), *([sweep.bisect.stop] if sweep.bisect else [])]
+        rules += [sweep.plot.x, sweep.plot.y, sweep.plot.lines, sweep.plot.panels]
         read = {name for rule in rules for name in _names_in(rule)}
         targets = [key for axis in sweep.axis for key in axis.targets]
         targets += [sweep.bisect.key] if sweep.bisect is not None else []
@@ -295,8 +296,8 @@ class Plan:
                 raise self._mistake(
                     "axis.key",
                     key,
-                    "a name without a dot must be used in [derive]; keys of the scenario have "
-                    "one, as gait.period",
+                    "a name without a dot must be used in [derive] or [plot]; keys of the "
+                    "scenario have one, as gait.period",
                 )
         for key in sweep.derive:
             if "." not in key:
