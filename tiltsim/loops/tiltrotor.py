@@ -26,14 +26,15 @@ from controllers.decoupling_matrix import sines_and_cosines, torque_entries, tor
 from controllers.gaits import tilt_reference
 from controllers.references import position_reference
 from controllers.rotation import euler_from_quaternion, world_up_in_body
-from controllers.scalar import Quad, scalar
+from controllers.scalar import Quad, Triple, scalar
 from controllers.singularity import determinant, margin_over_gait
 from controllers.vehicle import SPIN, Vehicle, drag_ratio
 from tiltsim.controller_tables import AttitudeAltitudeController
-from tiltsim.loop import ControlSetup, Floats, Loop, Sizes, Watched
+from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
+from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
 
 if TYPE_CHECKING:
-    from tiltsim.scenario import Scenario, TiltServoTable
+    from tiltsim.scenario import Scenario, ServoTable
 
 REFERENCE_COLUMNS: Final = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
 TILT_COLUMNS: Final = ("alpha_1", "alpha_2", "alpha_3", "alpha_4")
@@ -110,7 +111,7 @@ def refreshed_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[flo
     )
 
 
-def servo_lead(servo: TiltServoTable) -> float:
+def servo_lead(servo: ServoTable) -> float:
     """By how much (s) a tilt servo lags behind a command that moves evenly."""
     return 2.0 * servo.damping_ratio / servo.natural_frequency
 
@@ -118,11 +119,11 @@ def servo_lead(servo: TiltServoTable) -> float:
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, AttitudeAltitudeController)
-    vehicle = scenario.vehicle.resolve()
+    vehicle = scenario.rotorcraft.resolve()
     gait = scenario.gait.plan(vehicle)
     parameters = ControlParameters(
         signature,
-        servo_lead(scenario.vehicle.tilt_servo),
+        servo_lead(scenario.rotorcraft.tilt_servo),
         law=Parameters(
             vehicle=vehicle,
             gains=controller.resolve_gains(),
@@ -137,7 +138,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
 
 def initial_rotor_speeds(scenario: Scenario) -> tuple[float, ...]:
     """The signed rotor speeds (rad/s) at time zero."""
-    return tuple(s * speed for s, speed in zip(SPIN, scenario.initial.rotor_speeds, strict=True))
+    return tuple(s * speed for s, speed in zip(SPIN, scenario.initial.rotor_speeds(4), strict=True))
 
 
 def observe_tiltrotor(
@@ -205,6 +206,38 @@ def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Watched,
     return (matrix, *rotor_stops(sample)) if law.decoupling == EXACT_DECOUPLING else (matrix,)
 
 
+@scalar
+def equation_inputs(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> Quad:
+    """The law's rotor accelerations (rad/s^2) on the thesis' equations."""
+    law = parameters.law
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, table)
+    return rotor_accelerations(time, law_state(state, (a1, a2, a3, a4)), law)
+
+
+@scalar
+def equation_rates(
+    time: float,
+    state: Sequence[float],
+    inputs: Quad,
+    parameters: ControlParameters,
+    table: Sequence[float],
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """The thesis' equations with tilt angles that follow the gait exactly."""
+    law = parameters.law
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, table)
+    return equations_of_motion(state, (a1, a2, a3, a4), inputs, law.vehicle, disturbance)
+
+
+def _observe_equations(
+    time: float, state: Sequence[float], _inputs: object, setup: ControlSetup
+) -> tuple[float, ...]:
+    tilts = tilt_reference(time, setup.parameters.law.gait, setup.table)
+    return (*law_state(state, tilts[:4]), *tilts[4:])
+
+
 def _follows_position(scenario: Scenario) -> bool:
     controller = scenario.controller
     assert isinstance(controller, AttitudeAltitudeController)
@@ -223,6 +256,12 @@ TILTROTOR: Final = Loop(
     derive=_derive,
     watched=_watched,
     follows_position=_follows_position,
-    thesis_plant=True,
+    equations=Equations(
+        inputs=equation_inputs,
+        inputs_size=4,
+        rates=equation_rates,
+        initial=lambda s, _setup: initial_state(s, initial_rotor_speeds(s)),
+        observe=_observe_equations,
+    ),
 )
 """The attitude-altitude law around the tiltrotor."""

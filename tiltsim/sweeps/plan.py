@@ -26,7 +26,7 @@ from tiltsim.loading import apply_overrides, key_steps, load_scenario, parse_sce
 from tiltsim.loop import Floats
 from tiltsim.messages import one_line, show
 from tiltsim.metrics import METRICS, WALL_CLOCK_METRICS
-from tiltsim.scenario import Scenario
+from tiltsim.scenario import Scenario, VehicleTable
 from tiltsim.sweeps.expressions import evaluate, names
 from tiltsim.sweeps.tables import (
     LinspaceAxis,
@@ -347,7 +347,10 @@ class Plan:
     @cached_property
     def _known(self) -> dict[str, Any]:
         """The base with the vehicle's numbers written out, for what is relative to them."""
-        vehicle = parse_scenario(self.base).vehicle.resolve()._asdict()
+        scenario = parse_scenario(self.base)
+        if not isinstance(scenario.vehicle, VehicleTable):
+            return self.base
+        vehicle = scenario.vehicle.resolve()._asdict()
         inertia = [vehicle.pop(f"inertia_{axis}") for axis in ("xx", "yy", "zz")]
         numbers = {**vehicle, "inertia": inertia}
         return {**self.base, "vehicle": {**numbers, **self.base["vehicle"]}}
