@@ -17,9 +17,7 @@ from tiltsim.errors import InputError
 from tiltsim.expectations import Verdict, judge
 from tiltsim.library import library_name, read_toml, scenario_files, shipped_folder
 from tiltsim.loading import load_scenario, variant_names
-from tiltsim.loops import LOOPS
-from tiltsim.plants import STEPS_WORTH_COMPILING
-from tiltsim.scenario import Scenario
+from tiltsim.plants import shared_engine, with_engine
 from tiltsim.simulation import simulate
 
 Status = Literal["passed", "failed", "lost", "invalid", "crashed"]
@@ -78,7 +76,7 @@ def check_one(
     try:
         scenario = load_scenario(address, overrides)
         if engine is not None and scenario.simulation.engine == "auto":
-            scenario = _with_engine(scenario, engine)
+            scenario = with_engine(scenario, engine)
         flight = simulate(scenario)
     except InputError as error:
         return CheckResult(address, "invalid", str(error))
@@ -102,11 +100,6 @@ def _number(value: float | bool | None) -> str:
     if value is None:
         return "missing"
     return str(value).lower() if isinstance(value, bool) else f"{value:.6g}"
-
-
-def _with_engine(scenario: Scenario, engine: EngineName) -> Scenario:
-    simulation = scenario.simulation.model_copy(update={"engine": engine})
-    return scenario.model_copy(update={"simulation": simulation})
 
 
 def check_all(
@@ -168,14 +161,7 @@ def _shared_engine(addresses: list[str], overrides: Mapping[str, Any]) -> Engine
             scenarios.append(load_scenario(address, overrides))
         except InputError:
             continue  # it is reported when its turn comes
-    if sum(scenario.simulation.steps for scenario in scenarios) < STEPS_WORTH_COMPILING:
-        return None
-    from tiltsim.native import compile_callbacks
-
-    # A user's own controller stays in Python.
-    for law in {scenario.controller.law for scenario in scenarios} & LOOPS.keys():
-        compile_callbacks(LOOPS[law])
-    return "native"
+    return shared_engine(scenarios, sum(scenario.simulation.steps for scenario in scenarios))
 
 
 def write_junit(results: list[CheckResult], path: Path) -> None:

@@ -74,6 +74,30 @@ def choose_engine(scenario: Scenario) -> EngineName:
     return "native" if simulation.steps >= cheap else "python"
 
 
+def shared_engine(examples: Sequence[Scenario], steps: int) -> EngineName | None:
+    """The native engine where many flights of ``steps`` together repay compiling it, else None.
+
+    What the ``examples`` need is then compiled, for all processes to load.
+    """
+    if steps < STEPS_WORTH_COMPILING:
+        return None
+    ready: set[tuple[str, str]] = set()
+    for scenario in examples:
+        kind = (scenario.controller.law, scenario.simulation.plant)
+        if kind not in ready and scenario.controller.law != "python":
+            make_plant(with_engine(scenario, "native")).advance(1)
+            ready.add(kind)
+    return "native"
+
+
+def with_engine(scenario: Scenario, engine: EngineName) -> Scenario:
+    """The scenario with its engine chosen; a user's own controller stays in Python."""
+    if scenario.controller.law == "python":
+        return scenario
+    simulation = scenario.simulation.model_copy(update={"engine": engine})
+    return scenario.model_copy(update={"simulation": simulation})
+
+
 class MujocoPlant:
     """The compiled MJCF model in MuJoCo, with the control step in its control callback."""
 
