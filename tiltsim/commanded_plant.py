@@ -15,6 +15,7 @@ from controllers.rotation import euler_from_quaternion
 from controllers.scalar import Quad
 from controllers.vehicle import SPIN
 from tiltsim.controller import (
+    ControllerError,
     Observation,
     Orders,
     Reference,
@@ -22,6 +23,7 @@ from tiltsim.controller import (
     own_controller,
 )
 from tiltsim.engine import control_callback
+from tiltsim.loop import Floats
 from tiltsim.loops.commanded import ControlParameters, planned_servo_commands
 from tiltsim.loops.tiltrotor import rotor_thrust_controls
 from tiltsim.plants import MujocoPlant, quiet_warnings
@@ -60,6 +62,21 @@ class CommandedPlant(MujocoPlant):
             act[:] = _signed(self._along_spin(orders))
             ctrl[self._first_thrust : self._first_rate] = rotor_thrust_controls(act.tolist())
         ctrl[self._first_rate : self._first_rate + 4] = rates
+
+    def thrusts_and_tilts(self, orders: Orders) -> Floats:
+        """What orders come to as thrusts (N) and tilt angles (rad), shape (8,) or (4,).
+
+        Raises `ControllerError` for accelerations, which are no thrust yet.
+        """
+        if orders.kind == "rotor_accelerations":
+            raise ControllerError(
+                "commanded rotor_accelerations; thrusts or rotor_speeds are wanted"
+            )
+        coefficient = self._setup.parameters.vehicle.thrust_coefficient
+        thrusts = [coefficient * speed * abs(speed) for speed in self._along_spin(orders)]
+        if not self.tilting:
+            return np.array(thrusts)
+        return np.array([*thrusts, *(orders.tilt_angles or self._planned_servo_commands())])
 
     def _planned_servo_commands(self) -> tuple[float, ...]:
         parameters: ControlParameters = self._setup.parameters

@@ -10,7 +10,7 @@ from __future__ import annotations
 import importlib.util
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -194,13 +194,29 @@ def with_controller(scenario: Scenario, controller: object) -> Scenario:
     Raises `InputError` where it is not callable, or the scenario is one that no controller of a
     user's can fly.
     """
+    if not callable(controller):
+        raise InputError(f"controller = {_short(controller)}: must be callable")
+    return commanded_scenario(scenario, _name_of(controller))
+
+
+def commanded_scenario(
+    scenario: Scenario, name: str, simulation: Mapping[str, Any] | None = None
+) -> Scenario:
+    """The scenario with commands from outside in place of its law.
+
+    ``name`` tells from where they come; ``simulation`` has keys to replace in that table.
+
+    Raises `InputError` where the scenario is one that takes none.
+    """
     from tiltsim.files import without_none
     from tiltsim.loading import parse_scenario
 
-    if not callable(controller):
-        raise InputError(f"controller = {_short(controller)}: must be callable")
+    table = scenario.controller
+    if isinstance(table, PythonController) and table.function == name and not simulation:
+        return scenario
     document = without_none(scenario.model_dump(mode="json"))
-    document["controller"] = {"law": "python", "function": _name_of(controller)}
+    document["controller"] = {"law": "python", "function": name}
+    document["simulation"] |= simulation or {}
     return parse_scenario(document, scenario.address or "scenario")
 
 
