@@ -68,12 +68,12 @@ def _direction(axes: Any, flight: Flight) -> None:
         flight[f"direction{name}"][shown] for name in ("", "_lower", "_upper", "_ref")
     )
     axes.fill_between(time[shown], lower, upper, color=style.PALE, lw=0.0, label="admissible")
-    axes.plot(time[shown], middle, color=style.AMBER, lw=2.2, label="middle of the thrusts")
+    axes.plot(time[shown], middle, color=style.AMBER, lw=2.2, label="middle")
     axes.plot(
         time[shown], wanted, color=style.INK, lw=1.1, ls=(0, (4, 2)), label="acceleration wanted"
     )
     axes.set_xlim(begin, time[-1])
-    label(axes, "Direction of the thrusts", "rad")
+    label(axes, "Direction of the thrusts, and of the acceleration wanted", "rad")
 
 
 def _lean(axes: Any, flight: Flight) -> None:
