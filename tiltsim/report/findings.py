@@ -182,10 +182,10 @@ FINDINGS: Final = (
         "ch. 3, Eq. (12); ch. 4, Prop. 4",
         (
             "Ch. 4's gains (1, 10, 50) fail the thesis' own Routh condition: K₁K₂ = {product} does "
-            "not exceed K₃ = {third}, and the rightmost root of the loop has the real part {root}. Yet the flights come "
-            "out as published if the decoupling matrix is used as it is printed, without the "
-            "factor 2|ϖ| in its three attitude rows: the attitude loops then run with a gain "
-            "about {factor} times higher, and are stable.",
+            "not exceed K₃ = {third}, and the rightmost root of the loop has the real part {root}. "
+            "Yet the flights come out as published if the decoupling matrix is used as it is "
+            "printed, without the factor 2|ϖ| in its three attitude rows: the attitude loops then "
+            "run with a gain about {factor} times higher, and are stable.",
             'Both forms are here: `decoupling = "published"` and `"exact"`, the latter with gains '
             "that pass. A scenario whose gains fail is refused with the numbers.",
         ),
@@ -206,9 +206,10 @@ FINDINGS: Final = (
         (
             "With `tan δ = K_m / (L K_f)` the equations R_φ = R_θ = 0 factor, and their roots are "
             "two families of lines: red, α₃ = α₁ and α₄ = α₂; blue, α₃ = 2δ - α₁ and "
-            "α₄ = -2δ - α₂. 2δ is {ar} rad for the vehicle of ch. 3 and {luukkonen} rad for that of ch. 12. The "
-            "printed 0.334198 comes from searching with coefficients of four digits. So the "
-            "limitation that ch. 12 names, a map known only by numerical search, is gone.",
+            "α₄ = -2δ - α₂. 2δ is {ar} rad for the vehicle of ch. 3 and {luukkonen} rad for that "
+            "of ch. 12. The printed 0.334198 comes from searching with coefficients of four "
+            "digits. So the limitation that ch. 12 names, a map known only by numerical search, "
+            "is gone.",
         ),
         (
             *_in(

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cache, partial
@@ -21,6 +20,7 @@ from typing import TYPE_CHECKING, Final, Literal
 import controllers
 from tiltsim.checking import shared_engine, with_engine
 from tiltsim.errors import InputError
+from tiltsim.files import replacing
 from tiltsim.library import shipped_folder
 from tiltsim.loading import load_scenario
 from tiltsim.parallel import in_processes
@@ -260,9 +260,8 @@ def read_record(folder: Path, key: str) -> Record | None:
 
 def keep(path: Path, content: bytes) -> None:
     """Write a file at once or not at all."""
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
-    draft.write_bytes(content)
-    draft.replace(path)
+    with replacing(path) as draft:
+        draft.write_bytes(content)
 
 
 def flight_key(scenario: Scenario) -> str:
