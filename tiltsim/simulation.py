@@ -121,13 +121,13 @@ class Watch:
             error = hypot(target[0] - state["x"], target[1] - state["y"])
             if error > MAX_POSITION_ERROR:
                 return End("diverged", time, f"{error:.3g} m away from the reference")
-        error = abs(target[2] - state["z"])
+        error = abs(target[2] - state.get("z", target[2]))
         if error > MAX_POSITION_ERROR:
             return End("diverged", time, f"{error:.3g} m away from the reference altitude")
         for name in ("p", "q", "r"):
-            if abs(state[name]) > MAX_BODY_RATE:
+            if abs(state.get(name, 0.0)) > MAX_BODY_RATE:
                 return End("diverged", time, f"body rate {name} = {state[name]:.3g} rad/s")
-        for rotor in (1, 2, 3, 4):
+        for rotor in self._loop.kind.rotors:
             speed = state[f"rotor_speed_{rotor}"]
             if abs(speed) > MAX_ROTOR_SPEED:
                 return End("diverged", time, f"rotor {rotor} at {speed:.3g} rad/s")

@@ -67,7 +67,7 @@ def held_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, .
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, QuadrotorAttitudeAltitudeController)
-    vehicle, gains = scenario.vehicle.resolve(), controller.resolve_gains()
+    vehicle, gains = scenario.rotorcraft.resolve(), controller.resolve_gains()
     return ControlSetup(ControlParameters(signature, vehicle, gains, scenario.reference.parameters))
 
 
