@@ -18,7 +18,7 @@ from tiltsim import thesis_plant
 from tiltsim.cache import native_code_is_cached
 from tiltsim.engine import EngineName, control_callback, make_engine
 from tiltsim.errors import InputError
-from tiltsim.loop import ControlSetup, Floats
+from tiltsim.loop import EVALUATIONS, HEADER_SIZE, RECORDER, ControlSetup, Floats, Header
 from tiltsim.loops import control_setup, loop_of
 from tiltsim.model import Pod, RotorLimits, TiltServo, compile_model
 from tiltsim.scenario import Scenario
@@ -49,6 +49,13 @@ class Plant(Protocol):
     def advance(self, steps: int) -> None:
         """Take physics steps."""
 
+    def record(self, samples: int, steps: int) -> Floats | None:
+        """Take ``samples`` times ``steps`` physics steps and a sample after each time.
+
+        None where a sample or the physics engine tells that something has gone wrong on the way;
+        what state the plant is in then is open.
+        """
+
     def observe(self) -> tuple[float, ...]:
         """What a sample holds after the time; see `tiltsim.loop.Loop.sample_fields`."""
 
@@ -75,18 +82,21 @@ class MujocoPlant:
 
     def __init__(self, scenario: Scenario) -> None:
         self._loop, self._setup = loop_of(scenario), control_setup(scenario)
-        self.model = build_model(scenario, userdata_size=len(self._setup.userdata))
+        self.model = build_model(scenario, userdata_size=HEADER_SIZE + len(self._setup.userdata))
         # A diverged state must stay visible; by default MuJoCo would silently start over.
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.data = mujoco.MjData(self.model)
-        self._control_steps = scenario.simulation.control_steps
+        self._reference = scenario.reference.parameters
+        self._follows_position = self._loop.follows_position(scenario)
         self._set_initial_state(scenario, self._setup)
         self.engine: EngineName = choose_engine(scenario)
         self._engine = make_engine(self.engine, self._loop, self.model, self.data)
 
     def _set_initial_state(self, scenario: Scenario, setup: ControlSetup) -> None:
         initial, data = scenario.initial, self.data
-        data.userdata[:] = setup.userdata
+        period = evaluations_per_step(self.model) * scenario.simulation.control_steps
+        data.userdata[:HEADER_SIZE] = Header(control_period=period)
+        data.userdata[HEADER_SIZE:] = setup.userdata
         data.qpos[:3] = initial.position
         data.qpos[3:7] = quaternion_from_euler(*initial.attitude)
         gait = scenario.gait.plan(scenario.vehicle.resolve())
@@ -116,38 +126,48 @@ class MujocoPlant:
         # The state brings its own parameters, which the Python engine reads once.
         self._engine = make_engine(self.engine, self._loop, self.model, self.data)
 
-    @property
-    def _steps_taken(self) -> int:
-        return round(float(self.data.time) / float(self.model.opt.timestep))
-
     def advance(self, steps: int) -> None:
         """See `Plant.advance`."""
-        model, data, every = self.model, self.data, self._control_steps
-        if every == 0:
-            with control_callback(self._engine.continuous()), quiet_warnings():
-                mujoco.mj_step(model, data, nstep=steps)
-            return
-        with control_callback(self._engine.held()), quiet_warnings():
-            while steps > 0:
-                since_sample = self._steps_taken % every
-                if since_sample == 0:
-                    self._engine.sample(model, data)
-                chunk = min(steps, every - since_sample)
-                mujoco.mj_step(model, data, nstep=chunk)
-                steps -= chunk
+        with control_callback(self._engine.callback()), quiet_warnings():
+            mujoco.mj_step(self.model, self.data, nstep=steps)
+
+    def record(self, samples: int, steps: int) -> Floats | None:
+        """See `Plant.record`: natively, all but the last sample come from the callback."""
+        if self.engine == "native":
+            return self._record_natively(samples, steps)
+        rows = []
+        for _ in range(samples):
+            self.advance(steps)
+            rows.append((self.time, *self.observe()))
+        return None if self.fault() else np.array(rows)
+
+    def _record_natively(self, samples: int, steps: int) -> Floats | None:
+        from tiltsim.native import Recorder
+
+        interval = steps * evaluations_per_step(self.model)
+        recorder = Recorder(
+            *(self._loop, samples, interval, interval, self._reference, self._follows_position)
+        )
+        self.data.userdata[RECORDER] = recorder.address
+        try:
+            self.advance(samples * steps)
+        finally:
+            self.data.userdata[RECORDER] = 0.0
+        if recorder.lost or self.fault():
+            return None
+        return np.vstack([recorder.samples, (self.time, *self.observe())])
 
     def observe(self) -> tuple[float, ...]:
         """See `Plant.observe`."""
         data = self.data
         state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
-        return self._loop.observe(*state, self._controls_in_force)
+        return self._loop.observe(*state, self._controls_in_force(*state))
 
-    def _controls_in_force(self) -> Sequence[float]:
+    def _controls_in_force(self, *state: Sequence[float]) -> Sequence[float]:
         """The controls at the present state; MuJoCo keeps those of its last integrator stage."""
-        data, every = self.data, self._control_steps
-        if every > 0 and self._steps_taken % every != 0:
+        data = self.data
+        if data.userdata[EVALUATIONS] != 0.0 or not self._loop.observes_controls:
             return list(data.ctrl.tolist())
-        state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
         try:
             setup = self._setup
             return self._loop.controls(data.time, *state, setup.parameters, setup.table)
@@ -160,6 +180,11 @@ class MujocoPlant:
             if self.data.warning[warning].number:
                 return words
         return ""
+
+
+def evaluations_per_step(model: mujoco.MjModel) -> int:
+    """How often MuJoCo's integrator asks for controls in a step."""
+    return 4 if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else 1
 
 
 @contextmanager
@@ -273,6 +298,14 @@ class ThesisPlant:
             except (ArithmeticError, ValueError):
                 self._fault = "the control law left the range of floating-point numbers"
         self._step_index += steps
+
+    def record(self, samples: int, steps: int) -> Floats | None:
+        """See `Plant.record`."""
+        rows = []
+        for _ in range(samples):
+            self.advance(steps)
+            rows.append((self.time, *self.observe()))
+        return None if self.fault() else np.array(rows)
 
     def observe(self) -> tuple[float, ...]:
         """See `Plant.observe`."""

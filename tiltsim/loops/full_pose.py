@@ -10,7 +10,7 @@ import numpy as np
 from controllers.full_pose import Parameters, full_pose_inputs
 from controllers.gaits import tilt_reference
 from controllers.references import position_reference
-from controllers.scalar import scalar
+from controllers.scalar import Quad, scalar
 from tiltsim.controller_tables import FullPoseController
 from tiltsim.loop import ControlSetup, Floats, Loop, Sizes
 from tiltsim.loops.tiltrotor import (
@@ -18,6 +18,7 @@ from tiltsim.loops.tiltrotor import (
     gait_singularity,
     initial_rotor_speeds,
     observe_tiltrotor,
+    rotor_spins,
     rotor_stops,
     rotor_thrust_controls,
     servo_lead,
@@ -74,6 +75,20 @@ def refreshed_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[flo
     )
 
 
+@scalar
+def observe_full_pose(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+) -> tuple[float, ...]:
+    """The tiltrotor and the law's own states."""
+    return (*observe_tiltrotor(qpos, qvel, act, ctrl), act[4], act[5], act[6], act[7])
+
+
+@scalar
+def watch_rotor_stops(values: Sequence[float], parameters: ControlParameters) -> Quad:
+    """The rotor speeds along their spin."""
+    return rotor_spins(values)
+
+
 def _initial_tilts(scenario: Scenario) -> tuple[float, ...]:
     gait = scenario.gait.plan(scenario.vehicle.resolve())
     return tilt_reference(0.0, gait.parameters, gait.table)[:4]
@@ -114,12 +129,10 @@ FULL_POSE: Final = Loop(
     refresh=refreshed_controls,
     setup=_setup,
     initial_activations=lambda s, _setup: (*initial_rotor_speeds(s), *_initial_tilts(s)),
-    observe=lambda qpos, qvel, act, controls: (
-        *observe_tiltrotor(qpos, qvel, act, controls),
-        *act[4:],
-    ),
+    observe=observe_full_pose,
     derive=_derive,
     watched=lambda sample, _setup: rotor_stops(sample),
+    watch=watch_rotor_stops,
     law_states=4,
     law_fields=TILT_COMMANDS,
     extra_columns=dict.fromkeys(TILT_COMMANDS, "rad"),

@@ -6,8 +6,8 @@ from the controls and are no states here. The model's four rotor speed states st
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from math import cos, nan
+from collections.abc import Mapping, Sequence
+from math import cos
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -17,9 +17,9 @@ from controllers.quadrotor_singularity import normalized_determinant, published_
 from controllers.references import ReferenceParameters, position_reference
 from controllers.rotation import euler_from_quaternion
 from controllers.scalar import scalar
-from controllers.vehicle import SPIN, Vehicle
+from controllers.vehicle import Vehicle
 from controllers.yaw_position import State
-from tiltsim.loop import ControlSetup, Floats, Sizes, Watched
+from tiltsim.loop import OBSERVED_FIELDS, ControlSetup, Floats, Sizes, Watched
 from tiltsim.loops.tiltrotor import REFERENCE_COLUMNS, TILT_REFERENCE_COLUMNS
 
 if TYPE_CHECKING:
@@ -76,21 +76,33 @@ def extended_activations(scenario: Scenario, _setup: ControlSetup) -> tuple[floa
     return 0.0, 0.0, 0.0, 0.0, vehicle.mass * vehicle.gravity, 0.0
 
 
+@scalar
 def observe_quadrotor(
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    controls: Callable[[], Sequence[float]],
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
 ) -> tuple[float, ...]:
-    """The rigid body, no tilt, rotor speeds from the thrusts in force, the law's own states."""
-    thrusts = controls()[:4]
-    speeds = [s * _speed(thrust) for s, thrust in zip(SPIN, thrusts, strict=True)]
-    body = rigid_body_state(qpos, qvel, 0.0, 0.0)[:12]
-    return (*body, *(0.0,) * 4, *speeds, *(0.0,) * 4, *act[4:])
+    """The rigid body, no tilt, rotor speeds from the thrusts in force."""
+    x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r, _, _ = rigid_body_state(qpos, qvel, 0.0, 0.0)
+    return (
+        *(x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r),
+        *(0.0, 0.0, 0.0, 0.0),
+        *(-speed_along_spin(ctrl[0]), speed_along_spin(ctrl[1])),
+        *(-speed_along_spin(ctrl[2]), speed_along_spin(ctrl[3])),
+        *(0.0, 0.0, 0.0, 0.0),
+    )
 
 
-def _speed(thrust_control: float) -> float:
-    return speed_along_spin(thrust_control) if thrust_control == thrust_control else nan
+@scalar
+def observe_extended_quadrotor(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+) -> tuple[float, ...]:
+    """The quadrotor and the law's own states."""
+    return (*observe_quadrotor(qpos, qvel, act, ctrl), act[4], act[5])
+
+
+@scalar
+def level_thrust(values: Sequence[float]) -> float:
+    """The cosine of the thrust axis' tilt, from what `observe_quadrotor` gives."""
+    return cos(values[6]) * cos(values[7])
 
 
 def references(
@@ -130,7 +142,7 @@ def attitude_watched(sample: Mapping[str, float]) -> Watched:
     """The cosine of the thrust axis' tilt, zero at a roll or pitch of 90 degrees."""
     roll, pitch = sample["roll"], sample["pitch"]
     return Watched(
-        cos(roll) * cos(pitch),
+        level_thrust([sample[name] for name in OBSERVED_FIELDS]),
         "the decoupling matrix became singular: the thrust axis came level, "
         f"at roll = {roll:.3g} rad, pitch = {pitch:.3g} rad",
     )

@@ -16,6 +16,7 @@ from tiltsim.controller_tables import QuadrotorAttitudeAltitudeController
 from tiltsim.loop import ControlSetup, Floats, Loop, Sizes
 from tiltsim.loops.quadrotor import (
     attitude_watched,
+    level_thrust,
     observe_quadrotor,
     references,
     rigid_body_state,
@@ -62,6 +63,12 @@ def held_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, .
     return ctrl[0], ctrl[1], ctrl[2], ctrl[3], ctrl[4], ctrl[5], ctrl[6], ctrl[7]
 
 
+@scalar
+def watch_attitude(values: Sequence[float], parameters: ControlParameters) -> tuple[float]:
+    """The cosine of the thrust axis' tilt."""
+    return (level_thrust(values),)
+
+
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, QuadrotorAttitudeAltitudeController)
@@ -89,8 +96,10 @@ QUADROTOR_ATTITUDE_ALTITUDE: Final = Loop(
     setup=_setup,
     initial_activations=lambda _scenario, _setup: (0.0, 0.0, 0.0, 0.0),
     observe=observe_quadrotor,
+    observes_controls=True,
     derive=_derive,
     watched=lambda sample, _setup: (attitude_watched(sample),),
+    watch=watch_attitude,
     follows_position=lambda _scenario: False,
 )
 """The attitude-altitude law around the quadrotor."""

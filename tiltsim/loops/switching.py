@@ -21,7 +21,8 @@ from tiltsim.loops.quadrotor import (
     extended_controls,
     extended_singularity,
     held_extended_controls,
-    observe_quadrotor,
+    level_thrust,
+    observe_extended_quadrotor,
     references,
     rigid_body_state,
 )
@@ -50,6 +51,12 @@ def switching_controls(
     law = parameters.law
     state = rigid_body_state(qpos, qvel, act[4], act[5])
     return extended_controls(switching_inputs(time, state, law), law.yaw_position.vehicle)
+
+
+@scalar
+def watch_attitude(values: Sequence[float], parameters: ControlParameters) -> tuple[float]:
+    """The cosine of the thrust axis' tilt."""
+    return (level_thrust(values),)
 
 
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
@@ -95,9 +102,11 @@ SWITCHING: Final = Loop(
     refresh=held_extended_controls,
     setup=_setup,
     initial_activations=extended_activations,
-    observe=observe_quadrotor,
+    observe=observe_extended_quadrotor,
+    observes_controls=True,
     derive=_derive,
     watched=_watched,
+    watch=watch_attitude,
     law_states=2,
     law_fields=LAW_FIELDS,
     extra_columns={**EXTENSION_COLUMNS, "attitude_zone": "1"},
