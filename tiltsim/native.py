@@ -27,13 +27,19 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from controllers.records import flatten, record_dtype, record_size
 from controllers.references import ReferenceParameters
-from controllers.scalar import Triple, scalar, scalar_functions
-from tiltsim import thesis_plant
+from controllers.scalar import scalar, scalar_functions
 from tiltsim.cache import native_code_can_be_kept, native_code_folder
 from tiltsim.engine import EngineName, check_model
 from tiltsim.limits import SINGULAR, WITHIN, limit_exceeded
-from tiltsim.loop import CONTROL_PERIOD, EVALUATIONS, HEADER_SIZE, RECORDER, Floats, Loop
-from tiltsim.loops.tiltrotor import ControlParameters
+from tiltsim.loop import (
+    CONTROL_PERIOD,
+    EVALUATIONS,
+    HEADER_SIZE,
+    RECORDER,
+    Floats,
+    Loop,
+)
+from tiltsim.thesis_plant import make_stepper
 
 _State = mujoco.mjtState
 INPUTS: Final = int(
@@ -335,32 +341,65 @@ class NativeEngine:
         return self._callbacks.control.ctypes
 
 
-@njit(**_OPTIONS)
-def _advance(step_index, values, timestep, steps, control_steps, records, table, gust):  # type: ignore[no-untyped-def]
-    state = list(values)
-    law = records[0].law
-    state = thesis_plant.advance(
-        step_index, state, timestep, steps, control_steps, law, table, gust
-    )
-    return np.array(state)
+@cache
+def compile_stepper(loop: Loop) -> tuple[Any, Any]:
+    """Compile the thesis plant's solver for a loop, or load it from the cache on disk.
 
-
-def advance_thesis_plant(
-    step_index: int,
-    state: list[float],
-    timestep: float,
-    steps: int,
-    control_steps: int,
-    userdata: np.ndarray[Any, Any],
-    disturbance: Triple,
-) -> list[float]:
-    """`tiltsim.thesis_plant.advance`, compiled; ``userdata`` as in a MuJoCo flight."""
+    Returns ``(advance, record)``. The first takes and returns what
+    `tiltsim.thesis_plant.make_stepper` says, but for the state, which is an array. The second takes
+    in front of that the address of a `Recorder` and a number of samples; it stops where recording
+    is over. Neither holds Python's lock.
+    """
     _register_scalar_functions()
-    layout = record_dtype(ControlParameters)
-    head = layout.itemsize // userdata.itemsize
-    values = np.array(state)
-    result = _advance(
-        *(step_index, values, timestep, steps, control_steps),
-        *(userdata[:head].view(layout), userdata[head:], disturbance),
-    )
-    return list(result.tolist())
+    inputs, observe = loop.equations.inputs, loop.equations.observe
+    watch = loop.watch or watch_nothing
+    stepper = register_jitable(error_model="numpy")(make_stepper(inputs, loop.equations.rates))
+
+    @njit(nogil=True, **_OPTIONS)
+    def advance(  # type: ignore[no-untyped-def]
+        step_index, state, held, timestep, steps, control_steps, parameters, table, disturbance
+    ):
+        values, held = stepper(
+            *(step_index, list(state), held, timestep, steps),
+            *(control_steps, parameters, table, disturbance),
+        )
+        return np.array(values), held
+
+    @njit(nogil=True, **_OPTIONS)
+    def record(  # type: ignore[no-untyped-def]
+        recorder,
+        samples,
+        step_index,
+        state,
+        held,
+        timestep,
+        steps,
+        control_steps,
+        parameters,
+        table,
+        disturbance,
+    ):
+        values = list(state)
+        for _ in range(samples):
+            values, held = stepper(
+                *(step_index, values, held, timestep, steps),
+                *(control_steps, parameters, table, disturbance),
+            )
+            step_index += steps
+            time = step_index * timestep
+            force = held
+            if control_steps == 0 or step_index % control_steps == 0:
+                force = inputs(time, values, parameters, table)
+            seen = observe(time, values, force, parameters, table)
+            _record(recorder, time, seen, watch(seen, parameters))
+            if _recording_is_over(recorder):
+                break
+        return np.array(values), held
+
+    return advance, record
+
+
+def native_record(loop: Loop, userdata: Floats) -> tuple[Any, Floats]:
+    """The parameter record and the table of a flight as compiled code reads them."""
+    head = loop.record_size
+    return userdata[:head].view(record_dtype(loop.parameters))[0], userdata[head:]

@@ -6,7 +6,7 @@ from the controls and are no states here. The model's four rotor speed states st
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import cos
 from typing import TYPE_CHECKING, Final
 
@@ -19,7 +19,8 @@ from controllers.rotation import euler_from_quaternion
 from controllers.scalar import scalar
 from controllers.vehicle import Vehicle
 from controllers.yaw_position import State
-from tiltsim.loop import OBSERVED_FIELDS, ControlSetup, Floats, Sizes, Watched
+from tiltsim.equations.quadrotor import initial_state
+from tiltsim.loop import OBSERVED_FIELDS, ControlSetup, Equations, Floats, Sizes, Watched
 from tiltsim.loops.tiltrotor import REFERENCE_COLUMNS, TILT_REFERENCE_COLUMNS
 
 if TYPE_CHECKING:
@@ -81,14 +82,38 @@ def observe_quadrotor(
     qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
 ) -> tuple[float, ...]:
     """The rigid body, no tilt, rotor speeds from the thrusts in force."""
-    x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r, _, _ = rigid_body_state(qpos, qvel, 0.0, 0.0)
+    return sample_values(rigid_body_state(qpos, qvel, 0.0, 0.0), ctrl)
+
+
+@scalar
+def sample_values(body: Sequence[float], thrusts: Sequence[float]) -> tuple[float, ...]:
+    """What a sample holds, from the rigid body's twelve states and the thrust controls."""
     return (
-        *(x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r),
+        *(body[0], body[1], body[2], body[3], body[4], body[5]),
+        *(body[6], body[7], body[8], body[9], body[10], body[11]),
         *(0.0, 0.0, 0.0, 0.0),
-        *(-speed_along_spin(ctrl[0]), speed_along_spin(ctrl[1])),
-        *(-speed_along_spin(ctrl[2]), speed_along_spin(ctrl[3])),
+        *(-speed_along_spin(thrusts[0]), speed_along_spin(thrusts[1])),
+        *(-speed_along_spin(thrusts[2]), speed_along_spin(thrusts[3])),
         *(0.0, 0.0, 0.0, 0.0),
     )
+
+
+@scalar
+def observe_equations(
+    state: Sequence[float], inputs: Sequence[float], vehicle: Vehicle
+) -> tuple[float, ...]:
+    """The same of ch. 2's equations: thrust and torques in force tell the rotor speeds."""
+    return sample_values(
+        state, thrust_controls(inputs[0], inputs[1], inputs[2], inputs[3], vehicle)
+    )
+
+
+@scalar
+def observe_extended_equations(
+    state: Sequence[float], inputs: Sequence[float], vehicle: Vehicle
+) -> tuple[float, ...]:
+    """As `observe_equations`, followed by the law's own states."""
+    return (*observe_equations(state, inputs, vehicle), state[12], state[13])
 
 
 @scalar
@@ -103,6 +128,26 @@ def observe_extended_quadrotor(
 def level_thrust(values: Sequence[float]) -> float:
     """The cosine of the thrust axis' tilt, from what `observe_quadrotor` gives."""
     return cos(values[6]) * cos(values[7])
+
+
+def equations(
+    inputs: Callable[..., tuple[float, ...]],
+    inputs_size: int,
+    rates: Callable[..., tuple[float, ...]],
+    observe: Callable[..., tuple[float, ...]],
+) -> Equations:
+    """A law on ch. 2's equations; the functions are those of `tiltsim.loop.Equations`.
+
+    A law whose inputs go on after thrust and torques has states of its own, which these integrate;
+    they start as in MuJoCo.
+    """
+    law_states = inputs_size - 4
+
+    def initial(scenario: Scenario, setup: ControlSetup) -> tuple[float, ...]:
+        extension = extended_activations(scenario, setup)[4:][:law_states]
+        return (*initial_state(scenario), *extension)
+
+    return Equations(inputs, inputs_size, rates, initial, observe)
 
 
 def references(

@@ -26,11 +26,20 @@ from controllers.decoupling_matrix import sines_and_cosines, torque_entries, tor
 from controllers.gaits import tilt_reference
 from controllers.references import position_reference
 from controllers.rotation import euler_from_quaternion, world_up_in_body
-from controllers.scalar import Quad, scalar
+from controllers.scalar import Quad, Triple, scalar
 from controllers.singularity import determinant, margin_over_gait
 from controllers.vehicle import SPIN, Vehicle, drag_ratio
 from tiltsim.controller_tables import AttitudeAltitudeController
-from tiltsim.loop import OBSERVED_FIELDS, ControlSetup, Floats, Loop, Sizes, Watched
+from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
+from tiltsim.loop import (
+    OBSERVED_FIELDS,
+    ControlSetup,
+    Equations,
+    Floats,
+    Loop,
+    Sizes,
+    Watched,
+)
 
 if TYPE_CHECKING:
     from tiltsim.scenario import Scenario, TiltServoTable
@@ -224,6 +233,46 @@ def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Watched,
     return (matrix, *rotor_stops(sample)) if law.decoupling == EXACT_DECOUPLING else (matrix,)
 
 
+@scalar
+def equation_inputs(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> Quad:
+    """The law's rotor accelerations (rad/s^2) on the thesis' equations."""
+    law = parameters.law
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, table)
+    return rotor_accelerations(time, law_state(state, (a1, a2, a3, a4)), law)
+
+
+@scalar
+def equation_rates(
+    time: float,
+    state: Sequence[float],
+    inputs: Quad,
+    parameters: ControlParameters,
+    table: Sequence[float],
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """The thesis' equations with tilt angles that follow the gait exactly."""
+    law = parameters.law
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, table)
+    return equations_of_motion(state, (a1, a2, a3, a4), inputs, law.vehicle, disturbance)
+
+
+@scalar
+def observe_equations(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """What a sample holds, from the state of ch. 3's equations; the tilts are the gait's."""
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(
+        time, parameters.law.gait, table
+    )
+    return (*law_state(state, (a1, a2, a3, a4)), rate_1, rate_2, rate_3, rate_4)
+
+
 def _follows_position(scenario: Scenario) -> bool:
     controller = scenario.controller
     assert isinstance(controller, AttitudeAltitudeController)
@@ -243,6 +292,12 @@ TILTROTOR: Final = Loop(
     watched=_watched,
     watch=watch_tiltrotor,
     follows_position=_follows_position,
-    thesis_plant=True,
+    equations=Equations(
+        inputs=equation_inputs,
+        inputs_size=4,
+        rates=equation_rates,
+        initial=lambda s, _setup: initial_state(s, initial_rotor_speeds(s)),
+        observe=observe_equations,
+    ),
 )
 """The attitude-altitude law around the tiltrotor."""
