@@ -10,6 +10,7 @@ the sources and versions it was made from, and loads in a fraction of the time t
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from functools import cache
 from math import copysign, isfinite, nan
 from pathlib import Path
@@ -171,8 +172,6 @@ def _record(recorder, time, values, watched):  # type: ignore[no-untyped-def]
         lost = limit_exceeded(time, values, reference, follows_position) != WITHIN
     for index in range(len(watched)):
         side = 0.0 if abs(watched[index]) < SINGULAR else copysign(1.0, watched[index])
-        if rest[index] == 0.0:
-            rest[index] = side
         if side == 0.0 or side != rest[index]:
             lost = True
     if lost:
@@ -205,6 +204,8 @@ class Recorder:
         Evaluations of the control step between samples, and between the last two.
     reference, follows_position
         For the limits; see `tiltsim.limits.limit_exceeded`.
+    watched
+        The numbers that the loop watches as they are now: each must keep its sign.
     """
 
     def __init__(
@@ -215,6 +216,7 @@ class Recorder:
         last_interval: int,
         reference: ReferenceParameters,
         follows_position: bool,
+        watched: Sequence[float],
     ) -> None:
         self._width = len(loop.sample_fields)
         self._memory = np.zeros(_RECORDER_SIZE + SIDES + samples * self._width)
@@ -224,6 +226,10 @@ class Recorder:
             *(first, interval, last_interval, 0.0, samples, 0.0, follows_position, reference)
         )
         self._memory[:_RECORDER_SIZE] = list(flatten(head))
+        if len(watched) > SIDES:
+            raise ValueError(f"{loop.model}: {len(watched)} numbers watched, at most {SIDES}")
+        for index, value in enumerate(watched):
+            self._memory[_RECORDER_SIZE + index] = copysign(1.0, value)
 
     @property
     def address(self) -> float:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from math import nan
-from typing import Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import mujoco
 import numpy as np
@@ -18,10 +18,13 @@ from tiltsim import thesis_plant
 from tiltsim.cache import native_code_is_cached
 from tiltsim.engine import EngineName, control_callback, make_engine
 from tiltsim.errors import InputError
-from tiltsim.loop import EVALUATIONS, HEADER_SIZE, RECORDER, ControlSetup, Floats, Header
+from tiltsim.loop import EVALUATIONS, HEADER_SIZE, RECORDER, ControlSetup, Floats, Header, Loop
 from tiltsim.loops import control_setup, loop_of
 from tiltsim.model import Pod, RotorLimits, TiltServo, compile_model
 from tiltsim.scenario import Scenario
+
+if TYPE_CHECKING:
+    from tiltsim.native import Recorder
 
 STEPS_WORTH_LOADING: Final = 15_000
 """Flights of at least this many steps repay loading the native engine, once it is compiled."""
@@ -70,21 +73,26 @@ def make_plant(scenario: Scenario) -> Plant:
 
 def choose_engine(scenario: Scenario) -> EngineName:
     """The engine a scenario asks for; ``auto`` weighs the flight's length against start-up."""
-    simulation = scenario.simulation
-    if simulation.engine != "auto":
-        return simulation.engine
-    cheap = STEPS_WORTH_LOADING if native_code_is_cached() else STEPS_WORTH_COMPILING
-    return "native" if simulation.steps >= cheap else "python"
+    if scenario.simulation.engine != "auto":
+        return scenario.simulation.engine
+    return "native" if worth_native([scenario]) else "python"
+
+
+def worth_native(scenarios: Iterable[Scenario]) -> bool:
+    """Whether flights are together long enough for the native engine."""
+    steps = sum(scenario.simulation.steps for scenario in scenarios)
+    return steps >= (STEPS_WORTH_LOADING if native_code_is_cached() else STEPS_WORTH_COMPILING)
 
 
 class MujocoPlant:
     """The compiled MJCF model in MuJoCo, with the control step in its control callback."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, model: mujoco.MjModel | None = None) -> None:
+        """Build the plant, or take a ``model`` that `flight_model` built for such a scenario."""
         self._loop, self._setup = loop_of(scenario), control_setup(scenario)
-        self.model = build_model(scenario, userdata_size=HEADER_SIZE + len(self._setup.userdata))
-        # A diverged state must stay visible; by default MuJoCo would silently start over.
-        self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+        if model is None:
+            model = flight_model(scenario, len(self._setup.userdata))
+        self.model = model
         self.data = mujoco.MjData(self.model)
         self._reference = scenario.reference.parameters
         self._follows_position = self._loop.follows_position(scenario)
@@ -96,7 +104,8 @@ class MujocoPlant:
         initial, data = scenario.initial, self.data
         period = evaluations_per_step(self.model) * scenario.simulation.control_steps
         data.userdata[:HEADER_SIZE] = Header(control_period=period)
-        data.userdata[HEADER_SIZE:] = setup.userdata
+        parameters = setup.userdata  # a model made for several gaits may have room for more
+        data.userdata[HEADER_SIZE : HEADER_SIZE + len(parameters)] = parameters
         data.qpos[:3] = initial.position
         data.qpos[3:7] = quaternion_from_euler(*initial.attitude)
         gait = scenario.gait.plan(scenario.vehicle.resolve())
@@ -141,13 +150,33 @@ class MujocoPlant:
             rows.append((self.time, *self.observe()))
         return None if self.fault() else np.array(rows)
 
-    def _record_natively(self, samples: int, steps: int) -> Floats | None:
+    @property
+    def callback(self) -> Any:
+        """What MuJoCo is to call for controls; see `tiltsim.engine.Engine.callback`."""
+        return self._engine.callback()
+
+    @property
+    def header_at(self) -> int:
+        """Where in `state` the `tiltsim.loop.Header` begins."""
+        before = int(mujoco.mjtState.mjSTATE_USERDATA) - 1
+        return int(mujoco.mj_stateSize(self.model, _INTEGRATION & before))
+
+    def recorder(self, samples: int, steps: int, last_steps: int) -> Recorder:
+        """Memory for samples every so many steps, the last one after ``last_steps``.
+
+        Its address goes to `RECORDER` in `userdata`. Only for the native engine.
+        """
         from tiltsim.native import Recorder
 
-        interval = steps * evaluations_per_step(self.model)
-        recorder = Recorder(
-            *(self._loop, samples, interval, interval, self._reference, self._follows_position)
+        evaluations = evaluations_per_step(self.model)
+        return Recorder(
+            *(self._loop, samples, steps * evaluations, last_steps * evaluations),
+            *(self._reference, self._follows_position),
+            watched_now(self._loop, self._setup, self.observe()),
         )
+
+    def _record_natively(self, samples: int, steps: int) -> Floats | None:
+        recorder = self.recorder(samples, steps, steps)
         self.data.userdata[RECORDER] = recorder.address
         try:
             self.advance(samples * steps)
@@ -180,6 +209,22 @@ class MujocoPlant:
             if self.data.warning[warning].number:
                 return words
         return ""
+
+
+def watched_now(loop: Loop, setup: ControlSetup, values: Sequence[float]) -> tuple[float, ...]:
+    """The numbers that a loop watches natively; none where it leaves that to Python."""
+    return () if loop.watch is None else loop.watch(values, setup.parameters)
+
+
+def flight_model(scenario: Scenario, parameters: int) -> mujoco.MjModel:
+    """The model that a scenario flies, with room for as many floats of parameters.
+
+    Raises `InputError` where MuJoCo cannot build it.
+    """
+    model = build_model(scenario, userdata_size=HEADER_SIZE + parameters)
+    # A diverged state must stay visible; by default MuJoCo would silently start over.
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return model
 
 
 def evaluations_per_step(model: mujoco.MjModel) -> int:
@@ -317,7 +362,8 @@ class ThesisPlant:
         from tiltsim.native import Recorder
 
         recorder = Recorder(
-            *(self._loop, samples, steps, steps, self._reference, self._follows_position)
+            *(self._loop, samples, steps, steps, self._reference, self._follows_position),
+            watched_now(self._loop, self._setup, self.observe()),
         )
         state, self._held = self._record(
             *(int(recorder.address), samples),
