@@ -66,6 +66,7 @@ def _compile(
         userdata_size=userdata_size,
         tilt_servo=TiltServo(car.tilt_servo.natural_frequency, car.tilt_servo.damping_ratio),
         law_states=law_states,
+        rotor_floor=getattr(scenario.controller, "anti_windup", True),
         visuals=visuals,
     )
 
