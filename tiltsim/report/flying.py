@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cache, partial
@@ -21,6 +20,7 @@ from typing import TYPE_CHECKING, Final, Literal
 import controllers
 from tiltsim.checking import shared_engine, with_engine
 from tiltsim.errors import InputError
+from tiltsim.files import replacing
 from tiltsim.library import shipped_folder
 from tiltsim.loading import load_scenario
 from tiltsim.parallel import in_processes
@@ -76,10 +76,37 @@ Flights = Mapping[tuple[str, Plant], Record | Refusal]
 
 
 @dataclass(frozen=True)
+class Plan:
+    """A scenario of the report, and how it goes on each plant."""
+
+    address: str
+    scenario: Scenario
+    plants: dict[Plant, Scenario | Refusal]
+
+
+@dataclass(frozen=True)
 class _Task:
     address: str
     plant: Plant
     key: str
+
+
+def plan_flights(addresses: list[str]) -> list[Plan]:
+    """Scenarios by address, on both plants. Raises `InputError` where one is invalid."""
+    plans = []
+    for address in addresses:
+        scenario = load_scenario(address)
+        plants: dict[Plant, Scenario | Refusal] = {}
+        for plant in PLANTS:
+            if plant == scenario.simulation.plant:
+                plants[plant] = scenario
+                continue
+            try:
+                plants[plant] = variant_for(address, plant)
+            except InputError as error:
+                plants[plant] = Refusal(str(error).removeprefix(f"{address}: "))
+        plans.append(Plan(address, scenario, plants))
+    return plans
 
 
 def variant_for(address: str, plant: Plant) -> Scenario:
@@ -88,7 +115,7 @@ def variant_for(address: str, plant: Plant) -> Scenario:
 
 
 def fly(
-    addresses: list[str],
+    plans: list[Plan],
     folder: Path,
     jobs: int,
     progress: Callable[[int, int], None] = lambda done, total: None,
@@ -97,8 +124,8 @@ def fly(
 
     Parameters
     ----------
-    addresses
-        Scenarios of the library or files, variants spread out.
+    plans
+        What to fly, from `plan_flights`.
     folder
         Where records are kept; made where it is missing.
     jobs
@@ -109,34 +136,28 @@ def fly(
     Raises
     ------
     InputError
-        If a scenario is invalid, or if a process dies or fails.
+        If a process dies or fails.
     """
     folder.mkdir(parents=True, exist_ok=True)
     flights: dict[tuple[str, Plant], Record | Refusal] = {}
-    missing: list[_Task] = []
-    scenarios: dict[_Task, Scenario] = {}
-    for address in addresses:
-        load_scenario(address)  # an invalid file is an error, not a refusal
-        for plant in PLANTS:
-            try:
-                scenario = variant_for(address, plant)
-            except InputError as error:
-                flights[address, plant] = Refusal(str(error).removeprefix(f"{address}: "))
+    missing: dict[_Task, Scenario] = {}
+    for plan in plans:
+        for plant, scenario in plan.plants.items():
+            if isinstance(scenario, Refusal):
+                flights[plan.address, plant] = scenario
                 continue
             key = flight_key(scenario)
             record = read_record(folder, key)
-            if record is not None:
-                flights[address, plant] = record
+            if record is None:
+                missing[_Task(plan.address, plant, key)] = scenario
             else:
-                task = _Task(address, plant, key)
-                missing.append(task)
-                scenarios[task] = scenario
-    total = len(addresses) * len(PLANTS)
+                flights[plan.address, plant] = record
+    total = len(plans) * len(PLANTS)
     progress(len(flights), total)
     # The longest first, so that no process ends up alone with one of them.
-    missing.sort(key=lambda task: -scenarios[task].simulation.steps)
-    engine = shared_engine(list(scenarios.values())) if missing else None
-    for task, record in _fly_all(missing, partial(_fly_one, folder=folder, engine=engine), jobs):
+    tasks = sorted(missing, key=lambda task: -missing[task].simulation.steps)
+    engine = shared_engine(list(missing.values())) if missing else None
+    for task, record in _fly_all(tasks, partial(_fly_one, folder=folder, engine=engine), jobs):
         flights[task.address, task.plant] = record
         progress(len(flights), total)
     return flights
@@ -239,9 +260,8 @@ def read_record(folder: Path, key: str) -> Record | None:
 
 def keep(path: Path, content: bytes) -> None:
     """Write a file at once or not at all."""
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
-    draft.write_bytes(content)
-    draft.replace(path)
+    with replacing(path) as draft:
+        draft.write_bytes(content)
 
 
 def flight_key(scenario: Scenario) -> str:

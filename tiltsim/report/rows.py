@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from tiltsim.expectations import Verdict, judge
-from tiltsim.loading import load_scenario
 from tiltsim.report.claims import registered_claims
-from tiltsim.report.flying import PLANTS, Flights, Plant, Record, variant_for
+from tiltsim.report.flying import PLANTS, Flights, Plan, Plant, Record
 from tiltsim.report.model import (
     Claim,
     ExpectationClaim,
@@ -21,6 +20,7 @@ from tiltsim.report.model import (
     scenario_claims,
     worst,
 )
+from tiltsim.scenario import Scenario
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -68,13 +68,13 @@ class Failure:
 
 
 def make_rows(
-    addresses: list[str], flights: Flights, values: Mapping[str, Value], *, whole: bool
+    plans: list[Plan], flights: Flights, values: Mapping[str, Value], *, whole: bool
 ) -> list[Row]:
     """All claims that can be judged, in the order of the text.
 
     Parameters
     ----------
-    addresses
+    plans
         The scenarios that were flown, in order.
     flights
         What came of them.
@@ -84,7 +84,7 @@ def make_rows(
         Whether the library was flown as a whole: else the claims that are computed are left out,
         and those about several flights where one of these is missing.
     """
-    rows = _expectation_rows(addresses, flights)
+    rows = _expectation_rows(plans, flights)
     for claim in registered_claims():
         if isinstance(claim, FlightClaim):
             if whole or all((address, "mujoco") in flights for address in claim.flights):
@@ -95,12 +95,12 @@ def make_rows(
     return sorted((row for row in rows if row.cells), key=lambda row: row.claim.chapter)
 
 
-def _expectation_rows(addresses: list[str], flights: Flights) -> list[Row]:
+def _expectation_rows(plans: list[Plan], flights: Flights) -> list[Row]:
     rows: dict[tuple[str, str, str], Row] = {}
-    for address in addresses:
-        for claim in scenario_claims(load_scenario(address)):
+    for plan in plans:
+        for claim in scenario_claims(plan.scenario):
             for plant in PLANTS:
-                record = flights[address, plant]
+                record = flights[plan.address, plant]
                 if claim.expectation.plant in {None, plant} and isinstance(record, Record):
                     row = rows.get(claim.key, Row(claim))
                     cell = _expectation_cell(claim, record)
@@ -138,14 +138,15 @@ def _flight_row(claim: FlightClaim, flights: Flights) -> Row:
     return Row(claim, plants=tuple(cells))
 
 
-def failures(addresses: Iterable[str], flights: Flights) -> list[Failure]:
+def failures(plans: list[Plan], flights: Flights) -> list[Failure]:
     """The bounds that do not hold, on either plant."""
     return [
-        Failure(address, plant, verdict)
-        for address in addresses
-        for plant in PLANTS
-        if isinstance(record := flights[address, plant], Record)
-        for verdict in judge(variant_for(address, plant), record.metrics)
+        Failure(plan.address, plant, verdict)
+        for plan in plans
+        for plant, scenario in plan.plants.items()
+        if isinstance(scenario, Scenario)
+        and isinstance(record := flights[plan.address, plant], Record)
+        for verdict in judge(scenario, record.metrics)
         if not verdict.holds
     ]
 
