@@ -68,10 +68,11 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.rerun is not None:
         prepare_file("--rerun", arguments.rerun)
 
+    from controllers.vehicle import Vehicle
     from tiltsim.analysis import gait_warnings
 
     vehicle = scenario.vehicle.resolve()
-    if not arguments.quiet:
+    if not arguments.quiet and isinstance(vehicle, Vehicle):
         for warning in gait_warnings(scenario.gait.plan(vehicle), vehicle):
             print(f"tiltsim: warning: gait: {warning}", file=sys.stderr)
     flight = fly(scenario, arguments)

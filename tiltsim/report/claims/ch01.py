@@ -15,6 +15,7 @@ from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
 _PERFECT: Final = "ch01_gust/hover#perfect_gait"
 _QUADROTOR: Final = "ch01_gust/hover#quadrotor"
 _FLIGHTS: Final = (_PERFECT, "ch01_gust/hover#imperfect_gait", _QUADROTOR)
+_TILTING: Final = ("ch03_gaits/over_actuated#gait_1", "ch03_gaits/over_actuated#gait_1_planned")
 _GUST: Final = 1.0  # m/s^2 along +x
 
 
@@ -41,6 +42,17 @@ def _some_gait_tilts_more_than_the_quadrotor() -> bool:
     return lean > acos(float(wanted[2]))
 
 
+def _planned_gaits_tilt_less(flights: Mapping[str, Metrics]) -> bool:
+    own, planned = (float(flights[address]["max_tilt_rate"]) for address in _TILTING)
+    return planned < 0.01 * own
+
+
+def _map_enlarges_the_attitudes() -> bool:
+    from controllers.published_gaits import robustness_table
+
+    return all(row.claim_holds for row in robustness_table() if row.claim_holds is not None)
+
+
 CLAIMS = (
     FlightClaim(
         source="ch. 1, Sec. 2, Figs. 2-4",
@@ -61,5 +73,21 @@ CLAIMS = (
         statement="An imperfect gait may need a larger attitude than the quadrotor",
         published=True,
         measure=_some_gait_tilts_more_than_the_quadrotor,
+    ),
+    FlightClaim(
+        source="ch. 1, Abstract of the thesis; Sec. 3, Fig. 5",
+        statement="Planned gaits spare the tilt angles the over-intensive changes that feedback "
+        "linearization of all eight inputs asks for",
+        published=True,
+        flights=_TILTING,
+        measure=_planned_gaits_tilt_less,
+    ),
+    AnalysisClaim(
+        source="ch. 1, Abstract of the thesis",
+        statement="The Two Color Map enlarges the acceptable attitudes of all gaits compared",
+        published=True,
+        wrong=True,
+        why="It does for every red gait and for no blue one, for which no attitude is acceptable.",
+        measure=_map_enlarges_the_attitudes,
     ),
 )

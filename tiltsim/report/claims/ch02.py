@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from math import comb
 from typing import Final
 
 import numpy as np
@@ -15,11 +17,12 @@ from controllers.singularity import world_up
 from controllers.stability import is_hurwitz
 from controllers.vehicle import PRESETS
 from controllers.yaw_position import GAIN_SETS, euler_rates
-from tiltsim.report.model import AnalysisClaim
+from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
 
 _VEHICLE: Final = PRESETS["ar_drone_2_unrounded"]
 _HOVER: Final = _VEHICLE.mass * _VEHICLE.gravity
 _SINGULAR: Final = 1e-9
+_STABLE: Final = "ch02_singular_zone/exact_law#stable_gains"
 _ONE_ENTRY: Final = (
     "Entry (3,1) of Eq. (43) is printed as 0; its own factors make it -cos²θ (cos φ - sin φ), and "
     "with it the determinant is -1 everywhere. The exact determinant, -d³ζ² cos φ / "
@@ -75,6 +78,17 @@ def _attitude_altitude_is_singular() -> bool:
     return False
 
 
+def _crossing_is_harmful(flights: Mapping[str, Metrics]) -> bool:
+    """Whether the law that crosses S = 0 with stable gains is lost there."""
+    metrics = flights[_STABLE]
+    crossed = metrics["min_published_determinant"] < 0.0 < metrics["max_published_determinant"]
+    return bool(metrics["diverged"]) or not crossed
+
+
+def _lost_with_stable_gains(flights: Mapping[str, Metrics]) -> bool:
+    return bool(flights[_STABLE]["diverged"])
+
+
 CLAIMS = (
     AnalysisClaim(
         source="ch. 2, Sec. 3, Eqs. (21), (44)",
@@ -125,5 +139,36 @@ CLAIMS = (
         statement="The gains of the attitude-altitude law stabilize the linearized system",
         published=True,
         measure=_attitude_altitude_gains_are_stable,
+    ),
+    AnalysisClaim(
+        source="ch. 2, Sec. 3.2",
+        statement="Without thrust the yaw-position matrix is singular",
+        published=True,
+        measure=lambda: float(normalized_determinant(0.3, 0.2, 0.0, _VEHICLE)) == 0.0,
+    ),
+    FlightClaim(
+        source="ch. 2, Sec. 4",
+        statement="Crossing the curve S = 0 breaks the law",
+        published=True,
+        wrong=True,
+        why="With stable gains the same law flies through it on the way to the circle, and tracks.",
+        flights=(_STABLE,),
+        measure=_crossing_is_harmful,
+    ),
+    FlightClaim(
+        source="ch. 2, Sec. 6",
+        statement="The singular matrix is why the yaw-position law fails",
+        published=True,
+        wrong=True,
+        why="The gains are: Appendix B's are unstable by themselves, and with stable ones the law "
+        "flies from the same start.",
+        flights=(_STABLE,),
+        measure=_lost_with_stable_gains,
+    ),
+    AnalysisClaim(
+        source="ch. 2, Sec. 6",
+        statement="Choices of four outputs out of six, and of three",
+        published=("15", "20"),
+        measure=lambda: (float(comb(6, 4)), float(comb(6, 3))),
     ),
 )

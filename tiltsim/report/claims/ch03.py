@@ -108,6 +108,47 @@ def _pair(gait: str) -> tuple[str, str]:
     return f"ch03_gaits/over_actuated#{gait}", f"ch03_gaits/over_actuated#{gait}_planned"
 
 
+def _home_is_safe() -> bool:
+    """Whether R stays positive while any gait of the triangle shrinks to no tilt."""
+    share = np.array([(i, j, 20 - i - j) for i in range(21) for j in range(21 - i)]) / 20.0
+    points = share @ np.array(TRIANGLE)
+    for case in DETERMINANT_CASES.values():
+        for alpha_1, alpha_3 in case.pairs:
+            angles = np.insert(points, [0, 1], [alpha_1, alpha_3], axis=1)
+            shrinking = np.linspace(0.0, 1.0, 11)[:, np.newaxis, np.newaxis] * angles
+            if residuals(shrinking, _VEHICLE).R.min() <= 0.0:
+                return False
+    return True
+
+
+def _lifts_at_start() -> bool:
+    lift = 4.0 * _VEHICLE.thrust_coefficient * 300.0**2
+    return lift >= _VEHICLE.mass * _VEHICLE.gravity
+
+
+def _stable_flights(flights: Mapping[str, Metrics]) -> float:
+    """Flights at rest in the end, with every rotor turning its way all along (ch. 3, Sec. 4)."""
+    resting = ("final_roll", "final_pitch", "final_yaw", "final_position_error_z")
+    return float(
+        sum(
+            not metrics["diverged"]
+            and metrics["min_rotor_speed"] > 0.0
+            and all(abs(metrics[name]) < 0.05 for name in resting)
+            for metrics in flights.values()
+        )
+    )
+
+
+def _corners(*corners: str) -> tuple[str, ...]:
+    pairs = ("equal", "half", "negative", "negative_half", "untilted")
+    return tuple(f"ch03_gaits/corners#{pair}_{corner}" for pair in pairs for corner in corners)
+
+
+def _tilts_less(gait: str, flights: Mapping[str, Metrics]) -> bool:
+    own, planned = (flights[address] for address in _pair(gait))
+    return planned["max_tilt_rate"] < 0.01 * own["max_tilt_rate"]
+
+
 _NO_CROSSING: Final = (
     "At α₁ = -α₃ = ±1.4 both ends lie in one region and R stays above 0.5 all the way; the other "
     "three pairs are as published."
@@ -186,5 +227,43 @@ CLAIMS = (
             measure=partial(_overshoots_less, gait),
         )
         for gait, title in _GAITS.items()
+    ),
+    *(
+        FlightClaim(
+            source="ch. 3, Sec. 6.3, Fig. 27",
+            statement="Over-actuated control tilts over-rapidly, the planned gait does not",
+            case=title,
+            published=True,
+            flights=_pair(gait),
+            measure=partial(_tilts_less, gait),
+        )
+        for gait, title in _GAITS.items()
+    ),
+    AnalysisClaim(
+        source="ch. 3, Sec. 5.3",
+        statement="The untilted rotors carry the weight at the initial 300 rad/s",
+        published=False,
+        measure=_lifts_at_start,
+    ),
+    AnalysisClaim(
+        source="ch. 3, Sec. 7",
+        statement="Every gait of the region can return to no tilt without a singularity",
+        published=True,
+        measure=_home_is_safe,
+    ),
+    FlightClaim(
+        source="ch. 3, Sec. 6.2, Figs. 20-23",
+        statement="Stable corners (-1.3, 1.3), (1.3, -1.3), (1, 1) of five pairs, each restriction "
+        "at its largest tilt and no tilt",
+        published="15",
+        flights=_corners("s", "t", "m"),
+        measure=_stable_flights,
+    ),
+    FlightClaim(
+        source="ch. 3, Sec. 7",
+        statement="Stable gaits beyond them, at (-1.5, 1.5) and (1.5, -1.5), of the same pairs",
+        published="0",
+        flights=_corners("u", "v"),
+        measure=_stable_flights,
     ),
 )
