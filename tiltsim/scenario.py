@@ -27,6 +27,7 @@ from tiltsim.tables import (
     Positive,
     Positive2,
     Positive4,
+    Range,
     Table,
     Vector3,
 )
@@ -55,6 +56,11 @@ class ServoTable(Table):
     natural_frequency: Positive = Field(300.0, description="rad/s")
     damping_ratio: Positive = 1.0
 
+    @property
+    def stops(self) -> bool:
+        """Whether the servo has mechanical stops."""
+        return False
+
 
 class TiltServoTable(ServoTable):
     """The servos that tilt the pods."""
@@ -62,6 +68,11 @@ class TiltServoTable(ServoTable):
     max_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
         None, description="rad; the gait must stay within"
     )
+
+    @property
+    def stops(self) -> bool:
+        """Whether the servo has mechanical stops."""
+        return self.max_angle is not None
 
 
 class PodTable(Table):
@@ -371,7 +382,20 @@ class Expectation(Table):
     """A bound on a metric, judged after the flight."""
 
     metric: str
-    published: float | None = Field(None, description="the thesis' figure, shown beside ours")
+    claim: str = Field("", description="what the thesis states, in our words, for the report")
+    published: float | bool | None = Field(
+        None,
+        description="the thesis' figure, shown beside ours; true or false: does the metric, or the "
+        "statement that it lies within the bounds, hold in the thesis",
+    )
+    published_tolerance: NonNegative | None = Field(
+        None, description="how near counts as reproduced; default: half a unit of the last digit"
+    )
+    in_kind: Range | None = Field(
+        None, description="where the claim still holds though the number differs"
+    )
+    wrong: bool = Field(False, description="the claim is refuted, not merely not seen; needs why")
+    why: str = Field("", description="the reason where the claim does not come out")
     min: float | None = None
     max: float | None = None
     equals: bool | None = Field(None, description="for metrics that are true or false")
@@ -393,7 +417,33 @@ class Expectation(Table):
             raise InvalidValueError("expect.metric", self.metric, "a number: give min, max or both")
         if self.min is not None and self.max is not None and self.min > self.max:
             raise InvalidValueError("expect.min", self.min, f"must not exceed max = {self.max}")
+        self._check_claim(boolean)
         return self
+
+    def _check_claim(self, boolean: bool) -> None:
+        published = self.published
+        if boolean and published is not None and not isinstance(published, bool):
+            raise InvalidValueError(
+                "expect.published", published, f"{self.metric} is true or false"
+            )
+        if published is None:
+            for key in ("claim", "why", "wrong"):
+                if getattr(self, key):
+                    raise InvalidValueError(
+                        f"expect.{key}",
+                        getattr(self, key),
+                        "needs published: a number, true, false",
+                    )
+        if published is None or isinstance(published, bool):
+            for key in ("published_tolerance", "in_kind"):
+                if getattr(self, key) is not None:
+                    raise InvalidValueError(
+                        f"expect.{key}", getattr(self, key), "needs a published number"
+                    )
+        if self.wrong and not self.why:
+            raise InvalidValueError("expect.wrong", True, "needs why")
+        if self.in_kind is not None and not self.in_kind[0] <= self.in_kind[1]:
+            raise InvalidValueError("expect.in_kind", self.in_kind, "write [low, high]")
 
 
 # --- the whole ---------------------------------------------------------------------------------

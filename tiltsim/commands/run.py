@@ -169,6 +169,12 @@ def _measured(verdict: Verdict) -> str:
     return "flight under 20 s" if metric.endswith("after_20s") else "no value"
 
 
+def _published(value: float | bool | None) -> str:
+    if value is None:
+        return ""
+    return str(value).lower() if isinstance(value, bool) else f"{value:g}"
+
+
 def expectation_lines(verdicts: list[Verdict]) -> list[str]:
     """A table of expectations: verdict, metric, measured, published, bounds."""
     rows = [("", "expected", "measured", "published", "bounds")]
@@ -179,7 +185,7 @@ def expectation_lines(verdicts: list[Verdict]) -> list[str]:
                 "ok" if verdict.holds else "FAILED",
                 wanted.metric,
                 _measured(verdict),
-                "" if wanted.published is None else f"{wanted.published:g}",
+                _published(wanted.published),
                 verdict.bounds,
             )
         )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 from controllers.gaits import tilt_reference
 from controllers.tilt_car.vehicle import yaw_share
 from tiltsim.kinds import Floats, Kind
+from tiltsim.limits import tilt_car_limit_exceeded
 
 if TYPE_CHECKING:
     import mujoco
@@ -95,5 +96,6 @@ TILT_CAR: Final = Kind(
     thrusts=_thrusts,
     compile=_compile,
     initial_motion=_initial_motion,
+    limit_exceeded=tilt_car_limit_exceeded,
 )
 """The tilt-car."""
