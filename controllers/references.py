@@ -37,6 +37,9 @@ class ReferenceParameters(NamedTuple):
     pitch: float = 0.0
     yaw: float = 0.0  # rad, all types
     acceleration_feedforward: float = 0.0  # 1 or 0: pass the acceleration on to the controller
+    acceleration_x: float = 0.0  # m/s^2, line
+    acceleration_y: float = 0.0
+    acceleration_z: float = 0.0
 
 
 @scalar
@@ -64,16 +67,19 @@ def position_reference(time: float, reference: ReferenceParameters) -> tuple[flo
             centripetal * across,
             0.0,
         )
+    ax, ay, az = reference.acceleration_x, reference.acceleration_y, reference.acceleration_z
+    half = 0.5 * time * time
+    feedforward = reference.acceleration_feedforward
     return (
-        reference.x + reference.velocity_x * time,
-        reference.y + reference.velocity_y * time,
-        reference.z + reference.velocity_z * time,
-        reference.velocity_x,
-        reference.velocity_y,
-        reference.velocity_z,
-        0.0,
-        0.0,
-        0.0,
+        reference.x + reference.velocity_x * time + ax * half,
+        reference.y + reference.velocity_y * time + ay * half,
+        reference.z + reference.velocity_z * time + az * half,
+        reference.velocity_x + ax * time,
+        reference.velocity_y + ay * time,
+        reference.velocity_z + az * time,
+        feedforward * ax,
+        feedforward * ay,
+        feedforward * az,
     )
 
 
@@ -97,4 +103,5 @@ def reference_derivatives(time: float, reference: ReferenceParameters) -> tuple[
             *(square * square * along, square * square * across, 0.0),
         )
     x, y, z, vx, vy, vz, _, _, _ = position_reference(time, reference)
-    return (x, y, z, vx, vy, vz, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    ax, ay, az = reference.acceleration_x, reference.acceleration_y, reference.acceleration_z
+    return (x, y, z, vx, vy, vz, ax, ay, az, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -39,16 +39,16 @@ def altitude_error(time: float, values: Sequence[float], reference: ReferencePar
 
 
 @scalar
-def limit_exceeded(
+def rotorcraft_limit_exceeded(
     time: float,
     values: Sequence[float],
     reference: ReferenceParameters,
     follows_position: float,
 ) -> int:
-    """The code of the first limit that a sample exceeds, `WITHIN` if none.
+    """The code of the first limit that a sample of a rotorcraft exceeds, `WITHIN` if none.
 
-    ``values`` begin as `tiltsim.loop.OBSERVED_FIELDS`; ``follows_position`` is 0 where the
-    horizontal position is free.
+    ``values`` begin as `tiltsim.kinds.rotorcraft.OBSERVED_FIELDS`; ``follows_position`` is 0 where
+    the horizontal position is free.
     """
     if follows_position != 0.0 and horizontal_error(time, values, reference) > MAX_POSITION_ERROR:
         return HORIZONTAL_ERROR
@@ -59,5 +59,21 @@ def limit_exceeded(
             return BODY_RATE + axis
     for rotor in range(4):
         if abs(values[16 + rotor]) > MAX_ROTOR_SPEED:
+            return ROTOR_SPEED + rotor
+    return WITHIN
+
+
+@scalar
+def tilt_car_limit_exceeded(
+    time: float,
+    values: Sequence[float],
+    reference: ReferenceParameters,
+    follows_position: float,
+) -> int:
+    """As `rotorcraft_limit_exceeded`, for `tiltsim.kinds.tilt_car.OBSERVED_FIELDS`."""
+    if follows_position != 0.0 and horizontal_error(time, values, reference) > MAX_POSITION_ERROR:
+        return HORIZONTAL_ERROR
+    for rotor in range(2):
+        if abs(values[8 + rotor]) > MAX_ROTOR_SPEED:
             return ROTOR_SPEED + rotor
     return WITHIN

@@ -6,21 +6,19 @@ import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from controllers.attitude_altitude import STATE_FIELDS
 from controllers.records import flatten, record_dtype, record_size
+from tiltsim.kinds import Kind
+from tiltsim.kinds.rotorcraft import ROTORCRAFT
 
 if TYPE_CHECKING:
     from tiltsim.scenario import Scenario
 
 Floats = npt.NDArray[np.float64]
-
-OBSERVED_FIELDS: Final = (*STATE_FIELDS, *(f"alpha_rate_{rotor}" for rotor in (1, 2, 3, 4)))
-"""What every loop can tell of its vehicle: rigid body, tilts, rotor speeds, tilt rates."""
 
 
 class Header(NamedTuple):
@@ -119,7 +117,7 @@ class Loop:
     initial_activations
         ``(scenario, setup) -> act`` at time zero.
     observe
-        Scalar function ``(qpos, qvel, act, ctrl) -> values`` of `OBSERVED_FIELDS` and
+        Scalar function ``(qpos, qvel, act, ctrl) -> values`` of the kind's fields and
         ``law_fields``; ``ctrl`` are the controls in force if it ``observes_controls``.
     derive
         ``(samples by field, setup) -> columns``: references, determinant, margin and
@@ -134,13 +132,15 @@ class Loop:
     law_states
         Number of activations that are states of the law.
     law_fields
-        Fields of a sample beyond `OBSERVED_FIELDS`.
+        Fields of a sample beyond those of the vehicle's kind.
     extra_columns
         Columns of a flight that other loops do not have, with their units.
     follows_position
         Whether a scenario has the law follow the reference's horizontal position.
     equations
         The same law on the thesis' own equations.
+    kind
+        What holds for all loops around such a vehicle.
     """
 
     model: str
@@ -160,6 +160,7 @@ class Loop:
     law_fields: tuple[str, ...] = ()
     extra_columns: Mapping[str, str] = field(default_factory=dict)
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
+    kind: Kind = ROTORCRAFT
 
     @cached_property
     def signature(self) -> float:
@@ -175,4 +176,9 @@ class Loop:
     @cached_property
     def sample_fields(self) -> tuple[str, ...]:
         """What a recorded sample holds, in order."""
-        return ("time", *OBSERVED_FIELDS, *self.law_fields)
+        return ("time", *self.kind.observed_fields, *self.law_fields)
+
+    @cached_property
+    def units(self) -> dict[str, str]:
+        """The columns of a flight and their units, in order."""
+        return dict(self.kind.columns) | dict(self.extra_columns)

@@ -31,7 +31,7 @@ from controllers.references import ReferenceParameters
 from controllers.scalar import scalar, scalar_functions
 from tiltsim.cache import native_code_can_be_kept, native_code_folder
 from tiltsim.engine import EngineName, check_model
-from tiltsim.limits import SINGULAR, WITHIN, limit_exceeded
+from tiltsim.limits import SINGULAR, WITHIN
 from tiltsim.loop import (
     CONTROL_PERIOD,
     EVALUATIONS,
@@ -151,7 +151,7 @@ def _sample_is_due(recorder):  # type: ignore[no-untyped-def]
 
 
 @register_jitable(error_model="numpy")
-def _record(recorder, time, values, watched):  # type: ignore[no-untyped-def]
+def _record(recorder, time, values, watched, limit_exceeded):  # type: ignore[no-untyped-def]
     """Keep a sample and judge it as `tiltsim.simulation.Watch` does."""
     head = carray(_bytes_at(recorder), (1,), _RECORDER)
     samples = int(head[0].samples)
@@ -203,7 +203,7 @@ class Recorder:
     interval, last_interval
         Evaluations of the control step between samples, and between the last two.
     reference, follows_position
-        For the limits; see `tiltsim.limits.limit_exceeded`.
+        For the limits; see `tiltsim.kinds.Kind`.
     watched
         The numbers that the loop watches as they are now: each must keep its sign.
     """
@@ -286,6 +286,7 @@ def compile_callbacks(loop: Loop) -> Callbacks:
     _register_scalar_functions()
     controls, refresh, signature = loop.controls, loop.refresh, loop.signature
     observe, watch = loop.observe, loop.watch or watch_nothing
+    limit_exceeded = loop.kind.limit_exceeded
     nq, nv, na, nu = loop.sizes
     qpos, qvel, act, header = 1, 1 + nq, 1 + nq + nv, 1 + nq + nv + na
     period, evaluated, recording = header + CONTROL_PERIOD, header + EVALUATIONS, header + RECORDER
@@ -322,7 +323,7 @@ def compile_callbacks(loop: Loop) -> Callbacks:
             recorder = int(buffer[recording])
             if _sample_is_due(recorder):
                 seen = observe(positions, velocities, activations, values)
-                _record(recorder, buffer[0], seen, watch(seen, parameters))
+                _record(recorder, buffer[0], seen, watch(seen, parameters), limit_exceeded)
             if _recording_is_over(recorder):
                 for index in range(nu):
                     scratch[index] = nan
@@ -359,6 +360,7 @@ def compile_stepper(loop: Loop) -> tuple[Any, Any]:
     _register_scalar_functions()
     inputs, observe = loop.equations.inputs, loop.equations.observe
     watch = loop.watch or watch_nothing
+    limit_exceeded = loop.kind.limit_exceeded
     stepper = register_jitable(error_model="numpy")(make_stepper(inputs, loop.equations.rates))
 
     @njit(nogil=True, **_OPTIONS)
@@ -397,7 +399,7 @@ def compile_stepper(loop: Loop) -> tuple[Any, Any]:
             if control_steps == 0 or step_index % control_steps == 0:
                 force = inputs(time, values, parameters, table)
             seen = observe(time, values, force, parameters, table)
-            _record(recorder, time, seen, watch(seen, parameters))
+            _record(recorder, time, seen, watch(seen, parameters), limit_exceeded)
             if _recording_is_over(recorder):
                 break
         return np.array(values), held

@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 import mujoco
 import numpy as np
 
-from controllers.gaits import tilt_reference
 from controllers.records import slotted
-from controllers.rotation import quaternion_from_euler
 from controllers.scalar import Triple
 from tiltsim import thesis_plant
 from tiltsim.cache import native_code_is_cached
@@ -20,7 +18,6 @@ from tiltsim.engine import EngineName, control_callback, make_engine
 from tiltsim.errors import InputError
 from tiltsim.loop import EVALUATIONS, HEADER_SIZE, RECORDER, ControlSetup, Floats, Header, Loop
 from tiltsim.loops import control_setup, loop_of
-from tiltsim.model import Pod, RotorLimits, TiltServo, compile_model
 from tiltsim.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -101,17 +98,12 @@ class MujocoPlant:
         self._engine = make_engine(self.engine, self._loop, self.model, self.data)
 
     def _set_initial_state(self, scenario: Scenario, setup: ControlSetup) -> None:
-        initial, data = scenario.initial, self.data
+        data = self.data
         period = evaluations_per_step(self.model) * scenario.simulation.control_steps
         data.userdata[:HEADER_SIZE] = Header(control_period=period)
         parameters = setup.userdata  # a model made for several gaits may have room for more
         data.userdata[HEADER_SIZE : HEADER_SIZE + len(parameters)] = parameters
-        data.qpos[:3] = initial.position
-        data.qpos[3:7] = quaternion_from_euler(*initial.attitude)
-        gait = scenario.gait.plan(scenario.vehicle.resolve())
-        data.qpos[7:] = tilt_reference(0.0, gait.parameters, gait.table)[: self.model.nq - 7]
-        data.qvel[:3] = initial.velocity
-        data.qvel[3:6] = initial.angular_velocity
+        data.qpos[:], data.qvel[:] = self._loop.kind.initial_motion(scenario)
         data.act[:] = self._loop.initial_activations(scenario, setup)
         mujoco.mj_forward(self.model, data)
 
@@ -265,20 +257,9 @@ def build_model(
 
     Raises `InputError` where MuJoCo cannot build it.
     """
-    vehicle, simulation = scenario.vehicle, scenario.simulation
+    loop = loop_of(scenario)
     try:
-        model = compile_model(
-            vehicle.model,
-            vehicle.resolve(),
-            timestep=simulation.timestep,
-            integrator=simulation.integrator,
-            userdata_size=userdata_size,
-            tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump()),
-            pod=Pod(**vehicle.pod.model_dump()),
-            rotor_limits=RotorLimits(vehicle.min_rotor_speed, vehicle.max_rotor_speed),
-            law_states=loop_of(scenario).law_states,
-            visuals=visuals,
-        )
+        model = loop.kind.compile(scenario, loop.law_states, userdata_size, visuals)
     except ValueError as error:
         raise InputError(f"{scenario.address or 'scenario'}: vehicle: {error}") from error
     model.opt.gravity += disturbing_acceleration(scenario)

@@ -19,7 +19,6 @@ from tiltsim.limits import (
     WITHIN,
     altitude_error,
     horizontal_error,
-    limit_exceeded,
 )
 from tiltsim.loop import Floats
 from tiltsim.loops import control_setup, loop_of
@@ -167,7 +166,9 @@ class Watch:
 
     def _judge_limits(self, time: float, state: dict[str, float]) -> End | None:
         values = list(state.values())[1:]
-        code = limit_exceeded(time, values, self._reference, self._follows_position)
+        code = self._loop.kind.limit_exceeded(
+            time, values, self._reference, self._follows_position
+        )
         if code == WITHIN:
             return None
         if code == HORIZONTAL_ERROR:

@@ -68,10 +68,11 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.rerun is not None:
         prepare_file("--rerun", arguments.rerun)
 
+    from controllers.vehicle import Vehicle
     from tiltsim.analysis import gait_warnings
 
     vehicle = scenario.vehicle.resolve()
-    if not arguments.quiet:
+    if not arguments.quiet and isinstance(vehicle, Vehicle):
         for warning in gait_warnings(scenario.gait.plan(vehicle), vehicle):
             print(f"tiltsim: warning: gait: {warning}", file=sys.stderr)
     flight = fly(scenario, arguments)
@@ -168,6 +169,12 @@ def _measured(verdict: Verdict) -> str:
     return "flight under 20 s" if metric.endswith("after_20s") else "no value"
 
 
+def _published(value: float | bool | None) -> str:
+    if value is None:
+        return ""
+    return str(value).lower() if isinstance(value, bool) else f"{value:g}"
+
+
 def expectation_lines(verdicts: list[Verdict]) -> list[str]:
     """A table of expectations: verdict, metric, measured, published, bounds."""
     rows = [("", "expected", "measured", "published", "bounds")]
@@ -178,7 +185,7 @@ def expectation_lines(verdicts: list[Verdict]) -> list[str]:
                 "ok" if verdict.holds else "FAILED",
                 wanted.metric,
                 _measured(verdict),
-                "" if wanted.published is None else f"{wanted.published:g}",
+                _published(wanted.published),
                 verdict.bounds,
             )
         )

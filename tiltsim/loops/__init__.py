@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Final
 from tiltsim.loops.full_pose import FULL_POSE
 from tiltsim.loops.quadrotor_attitude_altitude import QUADROTOR_ATTITUDE_ALTITUDE
 from tiltsim.loops.switching import SWITCHING
+from tiltsim.loops.tilt_car_fourth_derivative import FOURTH_DERIVATIVE
+from tiltsim.loops.tilt_car_planned_direction import PLANNED_DIRECTION
+from tiltsim.loops.tilt_car_third_derivative import THIRD_DERIVATIVE
 from tiltsim.loops.tiltrotor import TILTROTOR
 from tiltsim.loops.yaw_position import YAW_POSITION
 
@@ -20,6 +23,9 @@ LOOPS: Final[dict[str, Loop]] = {
     "yaw_position": YAW_POSITION,
     "switching": SWITCHING,
     "quadrotor_attitude_altitude": QUADROTOR_ATTITUDE_ALTITUDE,
+    "tilt_car_third_derivative": THIRD_DERIVATIVE,
+    "tilt_car_fourth_derivative": FOURTH_DERIVATIVE,
+    "tilt_car_planned_direction": PLANNED_DIRECTION,
 }
 """Loops by the name a scenario gives their law."""
 

@@ -91,14 +91,14 @@ def watch_rotor_stops(values: Sequence[float], parameters: ControlParameters) ->
 
 
 def _initial_tilts(scenario: Scenario) -> tuple[float, ...]:
-    gait = scenario.gait.plan(scenario.vehicle.resolve())
+    gait = scenario.gait.plan(scenario.rotorcraft.resolve())
     return tilt_reference(0.0, gait.parameters, gait.table)[:4]
 
 
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, FullPoseController)
-    vehicle = scenario.vehicle.resolve()
+    vehicle = scenario.rotorcraft.resolve()
     law = Parameters(
         vehicle,
         controller.resolve_gains(),
@@ -106,7 +106,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
         controller.resolve_limits(),
         controller.resolve_tilt_weight(vehicle),
     )
-    lead = servo_lead(scenario.vehicle.tilt_servo)
+    lead = servo_lead(scenario.rotorcraft.tilt_servo)
     return ControlSetup(ControlParameters(signature, lead, law))
 
 

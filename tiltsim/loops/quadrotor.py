@@ -73,7 +73,7 @@ def held_extended_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple
 
 def extended_activations(scenario: Scenario, _setup: ControlSetup) -> tuple[float, ...]:
     """The extension starts with the thrust of hover, at rest."""
-    vehicle = scenario.vehicle.resolve()
+    vehicle = scenario.rotorcraft.resolve()
     return 0.0, 0.0, 0.0, 0.0, vehicle.mass * vehicle.gravity, 0.0
 
 

@@ -75,7 +75,7 @@ def watch_attitude(values: Sequence[float], parameters: ControlParameters) -> tu
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, QuadrotorAttitudeAltitudeController)
-    vehicle, gains = scenario.vehicle.resolve(), controller.resolve_gains()
+    vehicle, gains = scenario.rotorcraft.resolve(), controller.resolve_gains()
     return ControlSetup(ControlParameters(signature, vehicle, gains, scenario.reference.parameters))
 
 

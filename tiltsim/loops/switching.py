@@ -67,7 +67,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     assert isinstance(controller, SwitchingController)
     law = Parameters(
         yaw_position.Parameters(
-            scenario.vehicle.resolve(), controller.resolve_gains(), scenario.reference.parameters
+            scenario.rotorcraft.resolve(), controller.resolve_gains(), scenario.reference.parameters
         ),
         controller.resolve_attitude_gains(),
         Zone(*controller.zone.roll, *controller.zone.pitch),

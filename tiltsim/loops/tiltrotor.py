@@ -42,7 +42,7 @@ from tiltsim.loop import (
 )
 
 if TYPE_CHECKING:
-    from tiltsim.scenario import Scenario, TiltServoTable
+    from tiltsim.scenario import Scenario, ServoTable
 
 REFERENCE_COLUMNS: Final = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
 TILT_COLUMNS: Final = ("alpha_1", "alpha_2", "alpha_3", "alpha_4")
@@ -119,7 +119,7 @@ def refreshed_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[flo
     )
 
 
-def servo_lead(servo: TiltServoTable) -> float:
+def servo_lead(servo: ServoTable) -> float:
     """By how much (s) a tilt servo lags behind a command that moves evenly."""
     return 2.0 * servo.damping_ratio / servo.natural_frequency
 
@@ -127,11 +127,11 @@ def servo_lead(servo: TiltServoTable) -> float:
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, AttitudeAltitudeController)
-    vehicle = scenario.vehicle.resolve()
+    vehicle = scenario.rotorcraft.resolve()
     gait = scenario.gait.plan(vehicle)
     parameters = ControlParameters(
         signature,
-        servo_lead(scenario.vehicle.tilt_servo),
+        servo_lead(scenario.rotorcraft.tilt_servo),
         law=Parameters(
             vehicle=vehicle,
             gains=controller.resolve_gains(),
@@ -146,7 +146,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
 
 def initial_rotor_speeds(scenario: Scenario) -> tuple[float, ...]:
     """The signed rotor speeds (rad/s) at time zero."""
-    return tuple(s * speed for s, speed in zip(SPIN, scenario.initial.rotor_speeds, strict=True))
+    return tuple(s * speed for s, speed in zip(SPIN, scenario.initial.rotor_speeds(4), strict=True))
 
 
 @scalar

@@ -57,7 +57,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, YawPositionController)
     law = Parameters(
-        scenario.vehicle.resolve(), controller.resolve_gains(), scenario.reference.parameters
+        scenario.rotorcraft.resolve(), controller.resolve_gains(), scenario.reference.parameters
     )
     return ControlSetup(ControlParameters(signature, law))
 
