@@ -149,7 +149,7 @@ def _way_to_fly(scenario: Scenario, native: bool) -> str:
     if simulation.plant == "thesis":
         return "thesis"
     # A stop of the tilt servos is a constraint, which gives a state more numbers.
-    return f"{scenario.controller.law} {scenario.vehicle.tilt_servo.max_angle is not None}"
+    return f"{scenario.controller.law} {scenario.vehicle.tilt_servo.stops}"
 
 
 def _in_order(

@@ -166,9 +166,7 @@ class Watch:
 
     def _judge_limits(self, time: float, state: dict[str, float]) -> End | None:
         values = list(state.values())[1:]
-        code = self._loop.kind.limit_exceeded(
-            time, values, self._reference, self._follows_position
-        )
+        code = self._loop.kind.limit_exceeded(time, values, self._reference, self._follows_position)
         if code == WITHIN:
             return None
         if code == HORIZONTAL_ERROR:

@@ -20,7 +20,8 @@ from controllers.scalar import scalar
 from controllers.vehicle import Vehicle
 from controllers.yaw_position import State
 from tiltsim.equations.quadrotor import initial_state
-from tiltsim.loop import OBSERVED_FIELDS, ControlSetup, Equations, Floats, Sizes, Watched
+from tiltsim.kinds.rotorcraft import OBSERVED_FIELDS
+from tiltsim.loop import ControlSetup, Equations, Floats, Sizes, Watched
 from tiltsim.loops.tiltrotor import REFERENCE_COLUMNS, TILT_REFERENCE_COLUMNS
 
 if TYPE_CHECKING:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from controllers.scalar import Triple, scalar
@@ -24,6 +24,7 @@ from tiltsim.loops.tilt_car import (
     rotors_at_rest,
     running_speed,
     speed_squares,
+    squares_of_speeds,
 )
 from tiltsim.loops.tiltrotor import servo_lead
 
@@ -159,23 +160,27 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     return ControlSetup(ControlParameters(signature, lead, initial_heading(scenario), law))
 
 
-def _observe(
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    _controls: Callable[[], Sequence[float]],
+@scalar
+def observe_fourth_derivative(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
 ) -> tuple[float, ...]:
+    """The car and the law's own states."""
     x, y, vx, vy, yaw, alpha, speed_1, speed_2 = car_state(qpos, qvel, act[0], act[1])
-    return x, y, vx, vy, yaw, qvel[2], alpha, qvel[3], speed_1, speed_2, *act[2:], *act[:2]
+    return (
+        *(x, y, vx, vy, yaw, qvel[2], alpha, qvel[3], speed_1, speed_2),
+        *(act[2], act[3], act[4], act[5], act[0], act[1]),
+    )
 
 
-def _observe_equations(
-    _time: float,
+@scalar
+def observe_fourth_derivative_equations(
+    time: float,
     state: Sequence[float],
-    _inputs: Callable[[], Sequence[float]],
-    setup: ControlSetup,
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
 ) -> tuple[float, ...]:
-    parameters = setup.parameters
+    """The same of the thesis' equations."""
     law_state = fourth_derivative_law_state(state, parameters)
     x, y, vx, vy, yaw, alpha, speed_1, speed_2, tilt_rate, rate_1, rate_2 = law_state
     r = yaw_of(tilt_rate, 0.0, parameters.law.car)
@@ -202,9 +207,10 @@ FOURTH_DERIVATIVE: Final = Loop(
         *initial_rotor_speeds(s),
         *(initial_tilt(s)[0], 0.0, 0.0, 0.0),
     ),
-    observe=_observe,
+    observe=observe_fourth_derivative,
     derive=_derive,
     watched=lambda sample, _setup: rotors_at_rest(sample),
+    watch=squares_of_speeds,
     equations=Equations(
         inputs=fourth_derivative_equation_inputs,
         inputs_size=3,
@@ -216,7 +222,7 @@ FOURTH_DERIVATIVE: Final = Loop(
             *initial_rotor_speeds(s),
             *(0.0, 0.0, 0.0),
         ),
-        observe=_observe_equations,
+        observe=observe_fourth_derivative_equations,
     ),
     law_states=4,
     law_fields=("alpha_ref", "alpha_ref_rate", *ACCELERATIONS, *SPEEDS),

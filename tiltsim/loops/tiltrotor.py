@@ -31,8 +31,8 @@ from controllers.singularity import determinant, margin_over_gait
 from controllers.vehicle import SPIN, Vehicle, drag_ratio
 from tiltsim.controller_tables import AttitudeAltitudeController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
+from tiltsim.kinds.rotorcraft import OBSERVED_FIELDS
 from tiltsim.loop import (
-    OBSERVED_FIELDS,
     ControlSetup,
     Equations,
     Floats,
