@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import tiltsim
+import tiltsim.rows
 from controllers.gaits import GAIT_TYPES
 from tests.test_laws import GUST, LAWS
 from tiltsim.batch import fly_all
@@ -178,3 +179,15 @@ def test_native_watching_sees_what_python_watches(law):
         numbers = loop.watch(values, setup.parameters)
         assert list(numbers[: len(watched)]) == watched
         assert set(numbers[len(watched) :]) <= {1.0}
+
+
+@pytest.mark.parametrize("gait", GAITS)
+@pytest.mark.parametrize("decoupler", ["none", "conventional", "modified", "exact"])
+def test_references_are_the_same_floats_natively(gait, decoupler, monkeypatch):
+    tables = {"gait": {"type": gait, **GAITS[gait]}, "controller": {"decoupler": decoupler}}
+    flight = tiltsim.simulate(scenario(tables, engine="python", duration=0.1))
+    in_python = dict(flight.columns)
+    monkeypatch.setattr(tiltsim.rows, "ROWS_WORTH_COMPILING", 0)
+    del flight.__dict__["columns"]
+    for name, column in flight.columns.items():
+        np.testing.assert_array_equal(column, in_python[name])

@@ -10,7 +10,7 @@ the sources and versions it was made from, and loads in a fraction of the time t
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from math import copysign, isfinite, nan
 from pathlib import Path
@@ -37,6 +37,7 @@ from tiltsim.loop import (
     EVALUATIONS,
     HEADER_SIZE,
     RECORDER,
+    ControlSetup,
     Floats,
     Loop,
 )
@@ -411,3 +412,32 @@ def native_record(loop: Loop, userdata: Floats) -> tuple[Any, Floats]:
     """The parameter record and the table of a flight as compiled code reads them."""
     head = loop.record_size
     return userdata[:head].view(record_dtype(loop.parameters))[0], userdata[head:]
+
+
+@cache
+def _compile_rows(function: Callable[..., tuple[float, ...]]) -> Any:
+    _register_scalar_functions()
+
+    @njit(nogil=True, **_OPTIONS)
+    def rows(time, states, parameters, table):  # type: ignore[no-untyped-def]
+        width = len(function(time[0], states[0], parameters, table))
+        values = np.empty((len(time), width))
+        for index in range(len(time)):
+            row = function(time[index], states[index], parameters, table)
+            for column in range(width):
+                values[index, column] = row[column]
+        return values
+
+    return rows
+
+
+def evaluate_natively(
+    function: Callable[..., tuple[float, ...]], time: Floats, states: Floats, setup: ControlSetup
+) -> Floats:
+    """See `tiltsim.rows.evaluate_rows`, which takes at least one row to here."""
+    head = record_size(type(setup.parameters))
+    parameters = setup.userdata[:head].view(record_dtype(type(setup.parameters)))[0]
+    time, states = np.ascontiguousarray(time), np.ascontiguousarray(states)
+    table = np.array(setup.table)
+    values: Floats = _compile_rows(function)(time, states, parameters, table)
+    return values
