@@ -441,3 +441,23 @@ def evaluate_natively(
     table = np.array(setup.table)
     values: Floats = _compile_rows(function)(time, states, parameters, table)
     return values
+
+
+@cache
+def compile_floor() -> tuple[Any, Any]:
+    """Callbacks for measurements: one that does nothing, one that reads state, writes controls."""
+
+    @cfunc(types.void(types.intp, types.intp), **_OPTIONS)
+    def empty(model, data):  # type: ignore[no-untyped-def]
+        pass
+
+    @cfunc(types.void(types.intp, types.intp), **_OPTIONS)
+    def state(model, data):  # type: ignore[no-untyped-def]
+        address = _stack_buffer()
+        if _state_size(model, INPUTS) > CAPACITY:
+            return
+        _get_state(model, data, address, CONTROLS)
+        _set_state(model, data, address, CONTROLS)
+        _get_state(model, data, address, INPUTS)
+
+    return empty, state
