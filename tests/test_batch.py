@@ -191,3 +191,17 @@ def test_references_are_the_same_floats_natively(gait, decoupler, monkeypatch):
     del flight.__dict__["columns"]
     for name, column in flight.columns.items():
         np.testing.assert_array_equal(column, in_python[name])
+
+
+def test_whether_native_code_is_cached_is_known_by_law_and_plant(monkeypatch, tmp_path):
+    import tiltsim.cache as cache
+    from tiltsim.plants import choose_engine
+
+    monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
+    wanted = scenario({}, engine="auto", duration=20.0)  # 20,000 steps: worth loading only
+    assert choose_engine(wanted) == "python"
+    cache.native_code_was_compiled(LOOPS["full_pose"].native_name("mujoco"))
+    cache.native_code_was_compiled(LOOPS["attitude_altitude"].native_name("thesis"))
+    assert choose_engine(wanted) == "python"
+    cache.native_code_was_compiled(LOOPS["attitude_altitude"].native_name("mujoco"))
+    assert choose_engine(wanted) == "native"

@@ -154,7 +154,7 @@ def bench_flights(vehicles: int, duration: float, integrator: str, timestep: flo
     ]
 
 
-def bench_accuracy(vehicles: int = 2 * BATCH_ROWS) -> Rows:
+def bench_accuracy(vehicles: int = BATCH_ROWS) -> Rows:
     """Position error of RK4 against the step, and what all cores fly of it together.
 
     The error (m) is the largest difference of any coordinate from the flight with the reference

@@ -215,21 +215,21 @@ def compile_model(
     )
     likeness = (model, vehicle.arm_length, *description, visuals)
     if likeness in _compiled:
-        return _with_parameters(_compiled[likeness], vehicle, pod, law_states)
+        return _with_parameters(*_compiled[likeness], vehicle, pod, law_states)
     whole, bare = _compose(model, vehicle, *description)
     compiled = mujoco.MjModel.from_xml_string(whole if visuals else bare)
     if model != "tiltrotor" or tilt_servo.max_angle is None:
         if len(_compiled) >= LIKENESSES:
             _compiled.clear()
-        _compiled[likeness] = copy(compiled)
+        _compiled[likeness] = copy(compiled), mujoco.MjData(compiled)
     return compiled
 
 
 LIKENESSES: Final = 32
 """How many models are kept to make others of them."""
 
-_compiled: dict[tuple[Any, ...], mujoco.MjModel] = {}
-"""Compiled models by all that `_with_parameters` cannot change.
+_compiled: dict[tuple[Any, ...], tuple[mujoco.MjModel, mujoco.MjData]] = {}
+"""Compiled models, with data to work in, by all that `_with_parameters` cannot change.
 
 Models with stops are not among them: MuJoCo's solver scales with a mean inertia that only its
 compiler computes.
@@ -237,7 +237,7 @@ compiler computes.
 
 
 def _with_parameters(
-    compiled: mujoco.MjModel, vehicle: Vehicle, pod: Pod, law_states: int
+    compiled: mujoco.MjModel, data: mujoco.MjData, vehicle: Vehicle, pod: Pod, law_states: int
 ) -> mujoco.MjModel:
     """A copy of a model with another vehicle's mass, inertia, coefficients and gravity.
 
@@ -258,7 +258,7 @@ def _with_parameters(
     model.key_act[hover, :4] = [spin * speed for spin in SPIN]
     thrusts = model.nu - law_states - 8
     model.key_ctrl[hover, thrusts : thrusts + 4] = speed**2
-    mujoco.mj_setConst(model, mujoco.MjData(model))
+    mujoco.mj_setConst(model, data)
     return model
 
 

@@ -29,7 +29,11 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from controllers.records import flatten, record_dtype, record_size
 from controllers.references import ReferenceParameters
 from controllers.scalar import scalar, scalar_functions
-from tiltsim.cache import native_code_can_be_kept, native_code_folder
+from tiltsim.cache import (
+    native_code_can_be_kept,
+    native_code_folder,
+    native_code_was_compiled,
+)
 from tiltsim.engine import EngineName, check_model
 from tiltsim.limits import SINGULAR, WITHIN
 from tiltsim.loop import (
@@ -330,6 +334,7 @@ def compile_callbacks(loop: Loop) -> Callbacks:
                     scratch[index] = nan
         _set_state(model, data, address + 8 * CAPACITY, CONTROLS)
 
+    native_code_was_compiled(loop.native_name("mujoco"))
     return Callbacks(control)
 
 
