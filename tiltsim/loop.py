@@ -171,6 +171,10 @@ class Loop:
         layout = (self.model, self.sizes, record_dtype(self.parameters))
         return float(zlib.crc32(repr(layout).encode()))
 
+    def native_name(self, plant: str) -> str:
+        """Name of the loop's compiled code on a plant, as a file's name."""
+        return f"{plant}.{self.controls.__module__}.{self.controls.__qualname__}"
+
     @cached_property
     def record_size(self) -> int:
         """Number of floats of the parameter record."""
