@@ -335,8 +335,8 @@ PICTURES: Final[tuple[Picture, ...]] = (
     FlightPicture(
         5,
         "walk",
-        "The walk, scaled by 1/3, along the line (MuJoCo).",
-        address="ch05_gaits/line#walk_third",
+        "The walk at 1/3 with a period of 1 s along the line, modified decoupler (MuJoCo).",
+        address="ch05_gaits/line#walk_third_t1_modified",
     ),
     AnalysisPicture(
         6,
@@ -360,11 +360,41 @@ PICTURES: Final[tuple[Picture, ...]] = (
         "singular at every attitude.",
         draw=partial(_gait_and_twin, "ch06_gait_1"),
     ),
+    FlightPicture(
+        7,
+        "red-circle",
+        "Gait 2 (red) on the circle, modified decoupler (MuJoCo).",
+        address="ch07_robust_gaits/circle#gait_2",
+    ),
+    AnalysisPicture(
+        8,
+        "circle-and-biased",
+        "Gait 2 of ch. 8, a circle on red, and its biased twin.",
+        draw=partial(_gait_and_twin, "ch08_gait_2"),
+    ),
     AnalysisPicture(
         9,
         "attainable",
         "Gait 2 of ch. 9: torques and thrust within the rotor limits at zero yaw torque.",
         draw=partial(_attainable, "ch09_gait_2"),
+    ),
+    FlightPicture(
+        9,
+        "ellipse",
+        "The circle at 1.5 rad/s with gait 2: the vehicle flies an ellipse (MuJoCo).",
+        address="ch09_input_limits/circle#omega_15",
+    ),
+    FlightPicture(
+        10,
+        "drift",
+        "Two thousand seconds on the circle: no error, and rotor speeds that part (MuJoCo).",
+        address="ch10_state_drift/third_derivative#two_thousand_seconds",
+    ),
+    FlightPicture(
+        11,
+        "penguin",
+        "The large swing: the error along y ends in a limit cycle (MuJoCo).",
+        address="ch11_penguin/straight_line#large",
     ),
     AnalysisPicture(
         12,
