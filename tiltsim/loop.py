@@ -141,6 +141,8 @@ class Loop:
         The same law on the thesis' own equations.
     kind
         What holds for all loops around such a vehicle.
+    flies_gait
+        Whether the scenario's gait has a part in the flight.
     """
 
     model: str
@@ -161,6 +163,7 @@ class Loop:
     extra_columns: Mapping[str, str] = field(default_factory=dict)
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
     kind: Kind = ROTORCRAFT
+    flies_gait: bool = True
 
     @cached_property
     def signature(self) -> float:
