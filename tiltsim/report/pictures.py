@@ -32,17 +32,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
-_DPI: Final = 144
+DPI: Final = 144
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure: where it belongs, what it shows in words, and for those who do not see it."""
+    """A figure: where it belongs and, in words, what it shows."""
 
     chapter: int
     name: str
     caption: str
-    wide: bool = True
 
 
 @dataclass(frozen=True)
@@ -174,7 +173,7 @@ def png(figure: Figure) -> bytes:
 
     buffer = BytesIO()
     with paper_style():
-        figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
+        figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
     return buffer.getvalue()
 
 
@@ -321,7 +320,6 @@ PICTURES: Final[tuple[Picture, ...]] = (
         "Steady errors at the setpoint (ch. 4, Fig. 4): dots measured in MuJoCo, squares "
         "published. A is the conventional decoupler, B the modified one; 1 to 5 run from ρ = 0.65 "
         "to -0.65.",
-        wide=False,
         addresses=_SETPOINTS,
         draw=_setpoint_errors,
     ),
@@ -342,7 +340,6 @@ PICTURES: Final[tuple[Picture, ...]] = (
         6,
         "map",
         "The Two Color Map for the vehicle of ch. 3 and the examples E1 to E4 of ch. 8.",
-        wide=False,
         draw=partial(_map, "ar_drone_2", examples=True),
     ),
     AnalysisPicture(
@@ -400,7 +397,6 @@ PICTURES: Final[tuple[Picture, ...]] = (
         12,
         "map-luukkonen",
         "The Two Color Map for the vehicle of ch. 12.",
-        wide=False,
         draw=partial(_map, "luukkonen"),
     ),
 )
