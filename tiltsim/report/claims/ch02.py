@@ -51,7 +51,7 @@ def _eq_43_as_printed() -> bool:
         second = sp * st * cf - sp * st * sf - cp * sf - cp * cf
         matrix = [[first, sp * cf, cp], [second, -cp * cf, sp], [0.0, sf, st]]
         worst = max(worst, abs(np.linalg.det(matrix) - published_determinant(phi, theta)))
-    return worst < 1e-12
+    return bool(worst < 1e-12)
 
 
 def _position_gains_are_stable() -> bool:
