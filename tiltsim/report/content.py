@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
 from dataclasses import dataclass
 from decimal import Decimal
 from itertools import groupby
-from math import isfinite
+from math import ceil, isfinite, log10
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.report.findings import FINDINGS, Finding
@@ -88,8 +88,9 @@ class Group:
 
     @property
     def sources(self) -> str:
-        """Where the claims stand, without the chapter, each place once."""
-        return "; ".join(dict.fromkeys(row.claim.section for row in self.rows))
+        """Where the claims stand, without the chapter and what tells the cases apart."""
+        places = (re.sub(r" \([^()]*\)$", "", row.claim.section) for row in self.rows)
+        return "; ".join(dict.fromkeys(places))
 
     @property
     def shared_why(self) -> str:
@@ -139,17 +140,22 @@ def _measured_number(value: float, claim: Claim) -> str:
         return str(value)
     if isinstance(claim.published, bool):
         return _sign(f"{value:.4g}")
-    decimals = max(_decimals(claim) + 1, 0)
+    finest = ceil(-log10(_tolerance(claim)) - 1e-9)
+    decimals = max(max(_decimals(claim), finest) + 1, 0)
     text = f"{value:.{decimals}f}"
     if len(text) > 12:
         text = f"{value:.4g}"
-    return _sign("0" if float(text) == 0.0 and abs(value) < 1e-12 else text)
+    return _sign(text)
 
 
 def _decimals(claim: Claim) -> int:
     published = claim.published if isinstance(claim.published, tuple) else (claim.published,)
     texts = [one if isinstance(one, str) else f"{one:g}" for one in published]
     return max(-int(Decimal(text).as_tuple().exponent) for text in texts)
+
+
+def _tolerance(claim: Claim) -> float:
+    return max(min(tolerance for _, tolerance in claim.numbers()), 1e-12)
 
 
 def _sign(text: str) -> str:
@@ -185,8 +191,3 @@ def _flies(scenario: object) -> bool:
     from tiltsim.scenario import Scenario
 
     return isinstance(scenario, Scenario)
-
-
-def outcomes_of(rows: Iterable[Row]) -> list[Outcome]:
-    """The verdicts of rows."""
-    return [row.outcome for row in rows]

@@ -44,13 +44,11 @@ def make_report(
     flights = fly(plans, folder, jobs, progress)
     values = analyse(folder, jobs) if whole else {}
     rows = make_rows(plans, flights, values, whole=whole)
-    drawings = draw_all(plans, flights, folder, jobs)
-    chapters = {row.claim.chapter for row in rows}
     return Report(
         plans=plans,
         flights=flights,
         rows=rows,
         failures=failures(plans, flights),
-        drawings=[d for d in drawings if d.picture.chapter in chapters],
+        drawings=draw_all(plans, flights, folder, jobs, whole=whole),
         findings=FINDINGS if whole else (),
     )

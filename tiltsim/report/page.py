@@ -179,8 +179,10 @@ def _group(group: Group) -> Iterator[str]:
         why = why_of(row) if not group.shared_why else ""
         note = f'<span class="why">{_prose(why)}</span>' if why else ""
         kind = "" if single else ' class="case"'
+        # On narrow screens the verdicts are out of sight until the table is scrolled.
+        dot = f'<span class="mark dot {_CLASSES[row.outcome]}" aria-hidden="true"></span>'
         yield (
-            f'<tr{kind}><th class="what" scope="row">{head}</th>'
+            f'<tr{kind}><th class="what" scope="row">{dot}{head}</th>'
             f'<td class="n">{_number(published_text(row.claim), row)}</td>{_measured(row)}'
             f'<td class="verdict">{_mark(row.outcome)}{note}</td></tr>'
         )

@@ -76,8 +76,21 @@ class Drawing:
     png: bytes
 
 
-def draw_all(plans: list[Plan], flights: Flights, folder: Path, jobs: int) -> list[Drawing]:
+def draw_all(
+    plans: list[Plan], flights: Flights, folder: Path, jobs: int, *, whole: bool
+) -> list[Drawing]:
     """Draw what can be drawn of the flights there are; drawings are kept in the folder.
+
+    Parameters
+    ----------
+    plans, flights
+        The scenarios and what came of them.
+    folder
+        Where drawings are kept.
+    jobs
+        Processes.
+    whole
+        Whether to draw what needs no flight, too.
 
     Raises
     ------
@@ -96,6 +109,8 @@ def draw_all(plans: list[Plan], flights: Flights, folder: Path, jobs: int) -> li
     keys: dict[str, str] = {}
     jobs_to_do: list[tuple[str, str]] = []
     for picture in PICTURES:
+        if isinstance(picture, AnalysisPicture) and not whole:
+            continue
         content = _content(picture, scenarios, metrics)
         if content is None:
             continue
