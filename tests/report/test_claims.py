@@ -87,7 +87,9 @@ def test_no_claim_stands_twice():
     assert len(set(seen)) == len(seen)
 
 
-@pytest.mark.parametrize("claim", FLOWN, ids=lambda claim: f"{claim.chapter}-{claim.key}"[:80])
+@pytest.mark.parametrize(
+    "claim", FLOWN, ids=lambda claim: f"{claim.chapter}-{claim.statement} {claim.case}"[:99]
+)
 def test_a_comparison_of_flights_can_come_out_either_way(claim):
     outcomes = set()
     for seed in range(1000):
