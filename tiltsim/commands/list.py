@@ -6,7 +6,7 @@ import argparse
 import json
 from typing import Any
 
-from tiltsim.library import library_entries
+from tiltsim.library import library_entries, library_families
 
 
 def add_parser(subparsers: Any) -> None:
@@ -14,20 +14,25 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "list",
         help="list the scenario library",
-        description="List the scenario library with titles and sources in the thesis.",
+        description="List the scenario library with titles and sources in the thesis. A line that "
+        "begins with # is a variant of the file above it: tiltsim run 'FILE#VARIANT'.",
     )
     parser.add_argument("--json", action="store_true", help="machine-readable")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print one line a scenario."""
-    entries = list(library_entries())
+    """Print a line a file, and one a variant below."""
     if arguments.json:
+        entries = library_entries()
         keys = ("scenario", "title", "source")
         print(json.dumps([dict(zip(keys, entry)) for entry in entries], indent=2))
         return 0
-    width = max((len(address) for address, _, _ in entries), default=0)
-    for address, title, source in entries:
-        print(f"{address:<{width}}  {title}" + (f" ({source})" if source else ""))
+    for family in library_families():
+        name, title, source = family.entry
+        print(f"{name}  {title}" + (f" ({source})" if source else ""))
+        width = max((len(member.address) for member in family.members), default=0)
+        for member in family.members:
+            note = f" ({member.source})" if member.source else ""
+            print(f"  {member.address:<{width}}  {member.title}{note}")
     return 0
