@@ -342,19 +342,20 @@ def _plane_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure:
             # The outline in the order of the directions, closed.
             turn = np.argsort(np.arctan2(y[reached], x[reached]), kind="stable")
             outline = np.append(turn, turn[:1])
+            width = max(0.8, 4.0 - 0.8 * number)  # so that lines show under lines
             label = name if reached.any() else f"{name}: fails at {bisect.start:g}"
             axes.plot(
                 *(x[reached][outline], y[reached][outline], "-"),
-                **{"lw": 1.1, "color": color, "label": label},
+                **{"lw": width, "color": color, "label": label},
             )
-            axes.plot(x[reached & ~whole], y[reached & ~whole], "o", ms=4.5, color=color)
-            axes.plot(x[whole], y[whole], "^", ms=5.5, mfc="none", color=color)
+            axes.plot(x[reached & ~whole], y[reached & ~whole], "o", ms=width + 3.5, color=color)
+            axes.plot(x[whole], y[whole], "^", ms=width + 4.5, color=color)
         axes.axhline(0.0, color=GREY, lw=0.6)
         axes.axvline(0.0, color=GREY, lw=0.6)
         axes.set_aspect("equal", adjustable="datalim")
         axes.set_title(title)
-        axes.set_xlabel(plot.x)
-        axes.set_ylabel(plot.y)
+        axes.set_xlabel(_label(plot.x))
+        axes.set_ylabel(_label(plot.y))
         _legend(axes, plot.lines)
     for axes in grid.flat[len(columns) :]:
         axes.set_axis_off()
