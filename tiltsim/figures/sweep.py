@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -11,7 +12,6 @@ from tiltsim.errors import InputError
 from tiltsim.figures.style import (
     CYCLE,
     GREY,
-    INK,
     PALE,
     RED,
     SEQUENTIAL,
@@ -69,7 +69,8 @@ def sweep_figure(results: SweepResults, metrics: tuple[str, ...] = ()) -> Figure
         title = results.plan.sweep.title or results.plan.definition.address
         missing = len(results.plan) - len(results)
         more = f" ({missing} of {len(results.plan)} points still to come)" if missing else ""
-        figure.suptitle(title + more, x=0.01, ha="left", fontsize=10.5)
+        lines = fill(title + more, round(11.0 * figure.get_figwidth()))
+        figure.suptitle(lines, x=0.01, ha="left", fontsize=10.5)
         return figure
 
 
@@ -193,11 +194,9 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
             axes.set_ylabel(_label(metric))
             axes.set_xlabel(_label(x))
     _share_limits(grid)
-    _legend(grid[0][0], lines)
     if not completed.all():
-        grid[-1][0].annotate(
-            "× lost", (0.99, 0.03), xycoords="axes fraction", ha="right", color=INK, fontsize=8
-        )
+        grid[0][0].plot([], [], "x", color=GREY, ms=4, label="lost")
+    _legend(grid[0][0], lines)
     return figure
 
 
