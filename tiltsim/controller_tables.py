@@ -327,6 +327,9 @@ class FourthDerivativeController(LawTable):
     decoupling: Literal["published", "exact"] = Field(
         "exact", description="the tilt's column as printed, or with the yaw's answer"
     )
+    anti_windup: bool = Field(
+        False, description="whether the rotor speeds that the law integrates stop at zero"
+    )
     gains: Annotated[
         Annotated[Literal["ch10"], Tag("named")] | Annotated[Gains4, Tag("table")],
         Discriminator(_gain_kind),

@@ -56,6 +56,11 @@ class ServoTable(Table):
     natural_frequency: Positive = Field(300.0, description="rad/s")
     damping_ratio: Positive = 1.0
 
+    @property
+    def stops(self) -> bool:
+        """Whether the servo has mechanical stops."""
+        return False
+
 
 class TiltServoTable(ServoTable):
     """The servos that tilt the pods."""
@@ -63,6 +68,11 @@ class TiltServoTable(ServoTable):
     max_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
         None, description="rad; the gait must stay within"
     )
+
+    @property
+    def stops(self) -> bool:
+        """Whether the servo has mechanical stops."""
+        return self.max_angle is not None
 
 
 class PodTable(Table):

@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.sweeps.files import boundary_sweep, short_sweep
+from tiltsim import batch
 from tiltsim.errors import InputError
 from tiltsim.loading import parse_scenario
 from tiltsim.simulation import simulate
@@ -142,6 +143,7 @@ def test_a_bad_flight_becomes_a_row(tmp_path, monkeypatch):
         return original(scenario)
 
     monkeypatch.setattr(flying, "simulate", simulate)
+    monkeypatch.setattr(batch, "simulate", simulate)
     run_sweep(load_definition(short_sweep(tmp_path / "sweep.toml")), tmp_path / "out")
     for row in rows(tmp_path / "out"):
         bad = row["initial.attitude[0]"] > 0.0

@@ -84,7 +84,7 @@ def _kind(results: SweepResults) -> str:
 
 def _drawn(results: SweepResults) -> list[str]:
     axes = results.plan.sweep.axis
-    return [key for a in axes if isinstance(a, UniformAxis | NormalAxis) for key in a.targets]
+    return [a.targets[0] for a in axes if isinstance(a, UniformAxis | NormalAxis)]
 
 
 def _numeric_axes(results: SweepResults) -> list[str]:

@@ -12,6 +12,7 @@ from controllers.gaits import tilt_reference
 from controllers.rotation import quaternion_from_euler
 from controllers.vehicle import SPIN
 from tiltsim.kinds import Floats, Kind
+from tiltsim.limits import rotorcraft_limit_exceeded
 
 if TYPE_CHECKING:
     import mujoco
@@ -92,5 +93,6 @@ ROTORCRAFT: Final = Kind(
     thrusts=rotor_thrusts,
     compile=_compile,
     initial_motion=_initial_motion,
+    limit_exceeded=rotorcraft_limit_exceeded,
 )
 """Tiltrotor and quadrotor."""

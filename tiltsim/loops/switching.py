@@ -23,7 +23,9 @@ from tiltsim.loops.quadrotor import (
     extended_controls,
     extended_singularity,
     held_extended_controls,
-    observe_quadrotor,
+    level_thrust,
+    observe_extended_equations,
+    observe_extended_quadrotor,
     references,
     rigid_body_state,
 )
@@ -52,6 +54,12 @@ def switching_controls(
     law = parameters.law
     state = rigid_body_state(qpos, qvel, act[4], act[5])
     return extended_controls(switching_inputs(time, state, law), law.yaw_position.vehicle)
+
+
+@scalar
+def watch_attitude(values: Sequence[float], parameters: ControlParameters) -> tuple[float]:
+    """The cosine of the thrust axis' tilt."""
+    return (level_thrust(values),)
 
 
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
@@ -112,6 +120,18 @@ def equation_rates(
     )
 
 
+@scalar
+def observe_in_equations(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """What a sample holds, from the state of the thesis' equations."""
+    return observe_extended_equations(state, inputs, parameters.law.yaw_position.vehicle)
+
+
 SWITCHING: Final = Loop(
     model="quadrotor",
     sizes=SIZES,
@@ -120,9 +140,11 @@ SWITCHING: Final = Loop(
     refresh=held_extended_controls,
     setup=_setup,
     initial_activations=extended_activations,
-    observe=observe_quadrotor,
+    observe=observe_extended_quadrotor,
+    observes_controls=True,
     derive=_derive,
     watched=_watched,
+    watch=watch_attitude,
     law_states=2,
     law_fields=LAW_FIELDS,
     extra_columns={**EXTENSION_COLUMNS, "attitude_zone": "1"},
@@ -130,7 +152,7 @@ SWITCHING: Final = Loop(
     follows_position=lambda _scenario: False,
     equations=equations(
         *(equation_inputs, 6, equation_rates),
-        vehicle_of=lambda setup: setup.parameters.law.yaw_position.vehicle,
+        observe=observe_in_equations,
     ),
 )
 """Switching between yaw-position and attitude-altitude control of the quadrotor."""

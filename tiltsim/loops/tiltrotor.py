@@ -7,7 +7,7 @@ every engine. It is a pure function of time, `qpos`, `qvel`, `act` and the param
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -31,7 +31,15 @@ from controllers.singularity import determinant, margin_over_gait
 from controllers.vehicle import SPIN, Vehicle, drag_ratio
 from tiltsim.controller_tables import AttitudeAltitudeController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
-from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
+from tiltsim.kinds.rotorcraft import OBSERVED_FIELDS
+from tiltsim.loop import (
+    ControlSetup,
+    Equations,
+    Floats,
+    Loop,
+    Sizes,
+    Watched,
+)
 
 if TYPE_CHECKING:
     from tiltsim.scenario import Scenario, ServoTable
@@ -141,14 +149,12 @@ def initial_rotor_speeds(scenario: Scenario) -> tuple[float, ...]:
     return tuple(s * speed for s, speed in zip(SPIN, scenario.initial.rotor_speeds(4), strict=True))
 
 
+@scalar
 def observe_tiltrotor(
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    _controls: Callable[[], Sequence[float]],
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
 ) -> tuple[float, ...]:
     """Rigid body, tilts, rotor speeds and tilt rates: all of them states of the simulation."""
-    return (*tiltrotor_state(qpos, qvel, act), *qvel[6:])
+    return (*tiltrotor_state(qpos, qvel, act), qvel[6], qvel[7], qvel[8], qvel[9])
 
 
 def gait_singularity(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict[str, Floats]:
@@ -188,21 +194,42 @@ def rotor_stops(sample: Mapping[str, float]) -> tuple[Watched, ...]:
     )
 
 
+@scalar
+def rotor_spins(values: Sequence[float]) -> Quad:
+    """Rotor speeds along their spin, from what `observe_tiltrotor` gives."""
+    return -values[16], values[17], -values[18], values[19]
+
+
+@scalar
+def watch_tiltrotor(
+    values: Sequence[float], parameters: ControlParameters
+) -> tuple[float, float, float, float, float]:
+    """The determinant of the decoupling matrix, and the rotor speeds where it vanishes with them.
+
+    As published, the factor ``2 |varpi|`` stands in one row alone, and a rotor at rest is harmless.
+    """
+    law = parameters.law
+    ratio = drag_ratio(law.vehicle)
+    trig = sines_and_cosines(values[12], values[13], values[14], values[15])
+    nx, ny, nz = torque_free_force(trig, torque_entries(trig, ratio), ratio)
+    ux, uy, uz = world_up_in_body(values[6], values[7])
+    matrix = nx * ux + ny * uy + nz * uz
+    if law.decoupling == EXACT_DECOUPLING:
+        spin_1, spin_2, spin_3, spin_4 = rotor_spins(values)
+        return matrix, spin_1, spin_2, spin_3, spin_4
+    return matrix, 1.0, 1.0, 1.0, 1.0
+
+
 def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Watched, ...]:
     law = setup.parameters.law
     roll, pitch = sample["roll"], sample["pitch"]
-    tilts = [sample[name] for name in TILT_COLUMNS]
-    ratio = drag_ratio(law.vehicle)
-    trig = sines_and_cosines(*tilts)
-    n = torque_free_force(trig, torque_entries(trig, ratio), ratio)
-    up = world_up_in_body(roll, pitch)
-    angles = ", ".join(f"{tilt:.3g}" for tilt in tilts)
+    angles = ", ".join(f"{sample[name]:.3g}" for name in TILT_COLUMNS)
+    values = [sample[name] for name in OBSERVED_FIELDS]
     matrix = Watched(
-        n[0] * up[0] + n[1] * up[1] + n[2] * up[2],
+        watch_tiltrotor(values, setup.parameters)[0],
         f"the decoupling matrix became singular at roll = {roll:.3g} rad, "
         f"pitch = {pitch:.3g} rad, tilt angles ({angles}) rad",
     )
-    # As published, the factor 2 |varpi| stands in one row alone, and a rotor at rest is harmless.
     return (matrix, *rotor_stops(sample)) if law.decoupling == EXACT_DECOUPLING else (matrix,)
 
 
@@ -231,11 +258,19 @@ def equation_rates(
     return equations_of_motion(state, (a1, a2, a3, a4), inputs, law.vehicle, disturbance)
 
 
-def _observe_equations(
-    time: float, state: Sequence[float], _inputs: object, setup: ControlSetup
+@scalar
+def observe_equations(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
 ) -> tuple[float, ...]:
-    tilts = tilt_reference(time, setup.parameters.law.gait, setup.table)
-    return (*law_state(state, tilts[:4]), *tilts[4:])
+    """What a sample holds, from the state of ch. 3's equations; the tilts are the gait's."""
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(
+        time, parameters.law.gait, table
+    )
+    return (*law_state(state, (a1, a2, a3, a4)), rate_1, rate_2, rate_3, rate_4)
 
 
 def _follows_position(scenario: Scenario) -> bool:
@@ -255,13 +290,14 @@ TILTROTOR: Final = Loop(
     observe=observe_tiltrotor,
     derive=_derive,
     watched=_watched,
+    watch=watch_tiltrotor,
     follows_position=_follows_position,
     equations=Equations(
         inputs=equation_inputs,
         inputs_size=4,
         rates=equation_rates,
         initial=lambda s, _setup: initial_state(s, initial_rotor_speeds(s)),
-        observe=_observe_equations,
+        observe=observe_equations,
     ),
 )
 """The attitude-altitude law around the tiltrotor."""

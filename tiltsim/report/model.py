@@ -113,6 +113,11 @@ class AnalysisClaim(Claim):
 
     measure: Callable[[], Value]
 
+    @property
+    def key(self) -> str:
+        """Tells it from every other claim."""
+        return f"{self.source}: {self.statement} [{self.case}]"
+
 
 @dataclass(frozen=True, kw_only=True)
 class FlightClaim(Claim):
@@ -169,6 +174,14 @@ def _agrees(claim: Claim, measured: Value) -> bool:
         isfinite(value) and abs(value - printed) <= tolerance * ROUNDING
         for value, (printed, tolerance) in zip(values, numbers)
     )
+
+
+def plain(measured: object) -> Value:
+    """A measured value in plain Python types: NumPy's own are unwrapped."""
+    if isinstance(measured, tuple | list):
+        return tuple(float(value) for value in measured)
+    value = measured.item() if hasattr(measured, "item") else measured
+    return value if isinstance(value, bool) else float(value)  # type: ignore[arg-type]
 
 
 def worst(outcomes: list[Outcome]) -> Outcome:
