@@ -31,8 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     if not arguments.sweeps:
         _print_families()
-        print("
-sweeps, for tiltsim sweep:")
+        print("\nsweeps, for tiltsim sweep:")
     for sweep in library_sweeps():
         print(_line(sweep, sweep.address))
     return 0
