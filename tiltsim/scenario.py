@@ -428,13 +428,18 @@ class Scenario(Table):
             raise InvalidValueError(
                 "reference.type", reference.type, f"the {controller.law} law cannot follow it"
             )
+        own = isinstance(controller, AttitudeAltitudeController)
+        exact = isinstance(controller, AttitudeAltitudeController) and (
+            controller.gait_rate_feedforward
+        )
+        if (not own or exact) and getattr(reference, "acceleration_feedforward", False):
+            law = "attitude_altitude law with gait_rate_feedforward" if exact else controller.law
+            raise InvalidValueError(
+                "reference.acceleration_feedforward",
+                True,
+                f"the {law} follows all derivatives anyway; leave it out",
+            )
         if not isinstance(controller, AttitudeAltitudeController):
-            if getattr(reference, "acceleration_feedforward", False):
-                raise InvalidValueError(
-                    "reference.acceleration_feedforward",
-                    True,
-                    f"the {controller.law} law follows all derivatives anyway; leave it out",
-                )
             return
         decoupler = controller.decoupler
         free = kind == "attitude_altitude"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.loops.full_pose import FULL_POSE
+from tiltsim.loops.gait_feedforward import GAIT_FEEDFORWARD
 from tiltsim.loops.quadrotor_attitude_altitude import QUADROTOR_ATTITUDE_ALTITUDE
 from tiltsim.loops.switching import SWITCHING
 from tiltsim.loops.tiltrotor import TILTROTOR
@@ -16,17 +17,18 @@ if TYPE_CHECKING:
 
 LOOPS: Final[dict[str, Loop]] = {
     "attitude_altitude": TILTROTOR,
+    "gait_feedforward": GAIT_FEEDFORWARD,  # the same law with gait_rate_feedforward = true
     "full_pose": FULL_POSE,
     "yaw_position": YAW_POSITION,
     "switching": SWITCHING,
     "quadrotor_attitude_altitude": QUADROTOR_ATTITUDE_ALTITUDE,
 }
-"""Loops by the name a scenario gives their law."""
+"""Loops by the name of their law; see `tiltsim.controller_tables.LawTable.loop_name`."""
 
 
 def loop_of(scenario: Scenario) -> Loop:
     """The loop that a scenario flies."""
-    return LOOPS[scenario.controller.law]
+    return LOOPS[scenario.controller.loop_name]
 
 
 def control_setup(scenario: Scenario) -> ControlSetup:

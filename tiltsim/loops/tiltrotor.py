@@ -187,25 +187,31 @@ def rotor_stops(sample: Mapping[str, float]) -> tuple[Watched, ...]:
     )
 
 
-def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Watched, ...]:
-    law = setup.parameters.law
+def singular_matrix(sample: Mapping[str, float], vehicle: Vehicle) -> Watched:
+    """The determinant of the attitude-altitude law at the present tilts and attitude."""
     roll, pitch = sample["roll"], sample["pitch"]
     tilts = [sample[name] for name in TILT_COLUMNS]
-    ratio = drag_ratio(law.vehicle)
+    ratio = drag_ratio(vehicle)
     trig = sines_and_cosines(*tilts)
     n = torque_free_force(trig, torque_entries(trig, ratio), ratio)
     up = world_up_in_body(roll, pitch)
     angles = ", ".join(f"{tilt:.3g}" for tilt in tilts)
-    matrix = Watched(
+    return Watched(
         n[0] * up[0] + n[1] * up[1] + n[2] * up[2],
         f"the decoupling matrix became singular at roll = {roll:.3g} rad, "
         f"pitch = {pitch:.3g} rad, tilt angles ({angles}) rad",
     )
+
+
+def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Watched, ...]:
+    law = setup.parameters.law
+    matrix = singular_matrix(sample, law.vehicle)
     # As published, the factor 2 |varpi| stands in one row alone, and a rotor at rest is harmless.
     return (matrix, *rotor_stops(sample)) if law.decoupling == EXACT_DECOUPLING else (matrix,)
 
 
-def _follows_position(scenario: Scenario) -> bool:
+def follows_position(scenario: Scenario) -> bool:
+    """Whether a decoupler steers the vehicle to the reference's horizontal position."""
     controller = scenario.controller
     assert isinstance(controller, AttitudeAltitudeController)
     return controller.decoupler != "none"
@@ -222,7 +228,7 @@ TILTROTOR: Final = Loop(
     observe=observe_tiltrotor,
     derive=_derive,
     watched=_watched,
-    follows_position=_follows_position,
+    follows_position=follows_position,
     thesis_plant=True,
 )
 """The attitude-altitude law around the tiltrotor."""

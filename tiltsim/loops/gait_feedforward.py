@@ -1,0 +1,144 @@
+"""The attitude-altitude law that counts its gait's rates in, around the tiltrotor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from controllers.attitude_altitude import STATE_FIELDS
+from controllers.decouplers import DECOUPLERS
+from controllers.gait_feedforward import INTEGRAL_FIELDS, Parameters, tracking_inputs
+from controllers.gaits import tilt_reference
+from controllers.references import position_reference
+from controllers.scalar import scalar
+from tiltsim.controller_tables import AttitudeAltitudeController
+from tiltsim.loop import ControlSetup, Floats, Loop, Sizes, Watched
+from tiltsim.loops.tiltrotor import (
+    REFERENCE_COLUMNS,
+    TILT_REFERENCE_COLUMNS,
+    follows_position,
+    gait_singularity,
+    initial_rotor_speeds,
+    observe_tiltrotor,
+    rotor_stops,
+    rotor_thrust_controls,
+    servo_lead,
+    singular_matrix,
+    tiltrotor_state,
+)
+
+if TYPE_CHECKING:
+    from tiltsim.scenario import Scenario
+
+TILT_RATE_COLUMNS: Final = tuple(f"alpha_rate_{rotor}" for rotor in (1, 2, 3, 4))
+
+
+class ControlParameters(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float  # see `tiltsim.loop.Loop.signature`
+    servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
+    law: Parameters
+
+
+@scalar
+def gait_feedforward_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All fifteen controls: tilt servos, thrusts, rotor accelerations, rates of the integrals."""
+    law = parameters.law
+    lead = parameters.servo_lead
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, law.gait, table)
+    u1, u2, u3, u4, x_rate, y_rate, z_rate, _roll, _pitch, _yaw = tracking_inputs(
+        time,
+        tiltrotor_state(qpos, qvel, act),
+        (qvel[6], qvel[7], qvel[8], qvel[9]),
+        (act[4], act[5], act[6]),
+        law,
+        table,
+    )
+    return (
+        *(a1 + lead * rate_1, a2 + lead * rate_2, a3 + lead * rate_3, a4 + lead * rate_4),
+        *rotor_thrust_controls(act),
+        *(u1, u2, u3, u4, x_rate, y_rate, z_rate),
+    )
+
+
+@scalar
+def refreshed_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
+    """Held controls with the thrusts that belong to the present rotor speeds."""
+    return (
+        *(ctrl[0], ctrl[1], ctrl[2], ctrl[3]),
+        *rotor_thrust_controls(act),
+        *(ctrl[8], ctrl[9], ctrl[10], ctrl[11], ctrl[12], ctrl[13], ctrl[14]),
+    )
+
+
+def _setup(scenario: Scenario, signature: float) -> ControlSetup:
+    controller = scenario.controller
+    assert isinstance(controller, AttitudeAltitudeController)
+    vehicle = scenario.vehicle.resolve()
+    gait = scenario.gait.plan(vehicle)
+    law = Parameters(
+        vehicle=vehicle,
+        gains=controller.resolve_gains(),
+        integral=controller.resolve_integral_gains(),
+        max_acceleration=controller.max_acceleration,
+        max_angular_acceleration=controller.max_angular_acceleration,
+        # The thesis' own equations leave the gyroscopic torque out.
+        ingredients=controller.resolve_ingredients(
+            gyroscopic_torque=scenario.simulation.plant != "thesis"
+        ),
+        gait=gait.parameters,
+        reference=scenario.reference.parameters,
+        decoupler=DECOUPLERS[controller.decoupler],
+    )
+    lead = servo_lead(scenario.vehicle.tilt_servo)
+    return ControlSetup(ControlParameters(signature, lead, law), gait.table)
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    law, table = setup.parameters.law, setup.table
+    fields = (*STATE_FIELDS, *TILT_RATE_COLUMNS, *INTEGRAL_FIELDS)
+    values = np.stack([samples[name] for name in fields], axis=-1).tolist()
+    rows = []
+    for time, value in zip(samples["time"].tolist(), values, strict=True):
+        position = position_reference(time, law.reference)[:3]
+        attitude = tracking_inputs(time, value[:20], value[20:24], value[24:], law, table)[7:]
+        rows.append((*position, *attitude, *tilt_reference(time, law.gait, table)[:4]))
+    names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)
+    columns = np.array(rows).reshape(len(rows), len(names))
+    return dict(zip(names, columns.T, strict=True)) | gait_singularity(samples, law.vehicle)
+
+
+def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Watched, ...]:
+    return (singular_matrix(sample, setup.parameters.law.vehicle), *rotor_stops(sample))
+
+
+GAIT_FEEDFORWARD: Final = Loop(
+    model="tiltrotor",
+    sizes=Sizes(qpos=11, qvel=10, act=7, ctrl=15),
+    parameters=ControlParameters,
+    controls=gait_feedforward_controls,
+    refresh=refreshed_controls,
+    setup=_setup,
+    initial_activations=lambda s, _setup: (*initial_rotor_speeds(s), 0.0, 0.0, 0.0),
+    observe=lambda qpos, qvel, act, controls: (
+        *observe_tiltrotor(qpos, qvel, act, controls),
+        *act[4:],
+    ),
+    derive=_derive,
+    watched=_watched,
+    law_states=3,
+    law_fields=INTEGRAL_FIELDS,
+    extra_columns=dict.fromkeys(INTEGRAL_FIELDS, "m s"),
+    follows_position=follows_position,
+)
+"""The attitude-altitude law with gait-rate feed-forward around the tiltrotor."""
