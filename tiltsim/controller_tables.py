@@ -144,13 +144,18 @@ class AttitudeAltitudeController(LawTable):
         False, description="count the gait's rates in: the exact law with integral action"
     )
     max_acceleration: Positive = Field(
-        5.0,
+        3.0,
         description="m/s^2, horizontal, of the position feedback; integrators stop there; needs "
         "gait_rate_feedforward",
     )
     max_angular_acceleration: Positive = Field(
-        100.0,
-        description="rad/s^2, each axis, of the attitude feedback; needs gait_rate_feedforward",
+        60.0,
+        description="rad/s^2, each axis, asked of the body; needs gait_rate_feedforward",
+    )
+    anticipation: NonNegative = Field(
+        0.12,
+        description="s before and after a corner of the gait in which the body turns, at most half "
+        "of the gait's shortest line; needs gait_rate_feedforward",
     )
     leave_out: Annotated[tuple[Ingredient, ...], Field(strict=False)] = Field(
         (), description="ingredients of gait_rate_feedforward to fly without, for comparison"
@@ -159,7 +164,9 @@ class AttitudeAltitudeController(LawTable):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if not self.gait_rate_feedforward:
-            for key in ("leave_out", "max_acceleration", "max_angular_acceleration"):
+            for key in (
+                *("leave_out", "anticipation", "max_acceleration", "max_angular_acceleration"),
+            ):
                 if getattr(self, key) != type(self).model_fields[key].default:
                     raise InvalidValueError(
                         f"controller.{key}",

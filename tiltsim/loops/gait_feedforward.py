@@ -92,6 +92,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
         integral=controller.resolve_integral_gains(),
         max_acceleration=controller.max_acceleration,
         max_angular_acceleration=controller.max_angular_acceleration,
+        anticipation=min(controller.anticipation, 0.5 * gait.shortest_line),
         # The thesis' own equations leave the gyroscopic torque out.
         ingredients=controller.resolve_ingredients(
             gyroscopic_torque=scenario.simulation.plant != "thesis"
