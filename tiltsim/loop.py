@@ -52,6 +52,33 @@ class Watched(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
+class Equations:
+    """A law around the equations of motion that the thesis prints for its vehicle.
+
+    Attributes
+    ----------
+    inputs
+        Scalar function ``(time, state, parameters, table) -> inputs``: the law.
+    inputs_size
+        How many inputs there are.
+    rates
+        Scalar function ``(time, state, inputs, parameters, table, disturbance) -> derivative`` of
+        the state; the disturbance is an acceleration (m/s^2, world).
+    initial
+        ``(scenario, setup) -> state`` at time zero.
+    observe
+        ``(time, state, inputs, setup) -> values`` of the loop's `sample_fields` after the time;
+        ``inputs()`` gives the inputs in force.
+    """
+
+    inputs: Callable[..., tuple[float, ...]]
+    inputs_size: int
+    rates: Callable[..., tuple[float, ...]]
+    initial: Callable[[Scenario, ControlSetup], Sequence[float]]
+    observe: Callable[..., tuple[float, ...]]
+
+
+@dataclass(frozen=True, eq=False)
 class Loop:
     """A law around a model, for all that is the same whichever law flies.
 
@@ -90,8 +117,8 @@ class Loop:
         Columns of a flight that other loops do not have, with their units.
     follows_position
         Whether a scenario has the law follow the reference's horizontal position.
-    thesis_plant
-        Whether the law flies on the thesis' own equations, too.
+    equations
+        The same law on the thesis' own equations.
     """
 
     model: str
@@ -104,11 +131,11 @@ class Loop:
     observe: Callable[..., tuple[float, ...]]
     derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
     watched: Callable[[Mapping[str, float], ControlSetup], tuple[Watched, ...]]
+    equations: Equations
     law_states: int = 0
     law_fields: tuple[str, ...] = ()
     extra_columns: Mapping[str, str] = field(default_factory=dict)
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
-    thesis_plant: bool = False
 
     @cached_property
     def signature(self) -> float:

@@ -24,12 +24,11 @@ from numba.extending import intrinsic, register_jitable
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from controllers.records import record_dtype
-from controllers.scalar import Triple, scalar_functions
-from tiltsim import thesis_plant
+from controllers.scalar import scalar_functions
 from tiltsim.cache import native_code_can_be_kept, native_code_folder
 from tiltsim.engine import EngineName, check_model
-from tiltsim.loop import Loop
-from tiltsim.loops.tiltrotor import ControlParameters
+from tiltsim.loop import Equations, Floats, Loop
+from tiltsim.thesis_plant import make_stepper
 
 _State = mujoco.mjtState
 INPUTS: Final = int(
@@ -199,32 +198,30 @@ class NativeEngine:
         self._callbacks.continuous.ctypes(model._address, data._address)
 
 
-@njit(**_OPTIONS)
-def _advance(step_index, values, timestep, steps, control_steps, records, table, gust):  # type: ignore[no-untyped-def]
-    state = list(values)
-    law = records[0].law
-    state = thesis_plant.advance(
-        step_index, state, timestep, steps, control_steps, law, table, gust
-    )
-    return np.array(state)
+@cache
+def compile_stepper(equations: Equations) -> Any:
+    """Compile the thesis plant's solver for a law, or load it from the cache on disk.
 
-
-def advance_thesis_plant(
-    step_index: int,
-    state: list[float],
-    timestep: float,
-    steps: int,
-    control_steps: int,
-    userdata: np.ndarray[Any, Any],
-    disturbance: Triple,
-) -> list[float]:
-    """`tiltsim.thesis_plant.advance`, compiled; ``userdata`` as in a MuJoCo flight."""
+    The compiled function takes and returns what `tiltsim.thesis_plant.make_stepper` says, but for
+    the state, which is an array.
+    """
     _register_scalar_functions()
-    layout = record_dtype(ControlParameters)
-    head = layout.itemsize // userdata.itemsize
-    values = np.array(state)
-    result = _advance(
-        *(step_index, values, timestep, steps, control_steps),
-        *(userdata[:head].view(layout), userdata[head:], disturbance),
-    )
-    return list(result.tolist())
+    stepper = register_jitable(error_model="numpy")(make_stepper(equations.inputs, equations.rates))
+
+    @njit(nogil=True, **_OPTIONS)
+    def advance(  # type: ignore[no-untyped-def]
+        step_index, state, held, timestep, steps, control_steps, parameters, table, disturbance
+    ):
+        values, held = stepper(
+            *(step_index, list(state), held, timestep, steps),
+            *(control_steps, parameters, table, disturbance),
+        )
+        return np.array(values), held
+
+    return advance
+
+
+def native_record(loop: Loop, userdata: Floats) -> tuple[Any, Floats]:
+    """The parameter record and the table of a flight as compiled code reads them."""
+    head = loop.record_size
+    return userdata[:head].view(record_dtype(loop.parameters))[0], userdata[head:]

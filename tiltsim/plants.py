@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from math import nan
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 import mujoco
 import numpy as np
@@ -219,22 +219,27 @@ class ThesisPlant:
     """The thesis' equations with ode3; see `tiltsim.thesis_plant`."""
 
     def __init__(self, scenario: Scenario) -> None:
-        simulation, initial = scenario.simulation, scenario.initial
+        simulation = scenario.simulation
+        loop, setup = loop_of(scenario), control_setup(scenario)
+        self._equations, self._setup = loop.equations, setup
         self._disturbance = disturbing_acceleration(scenario)
-        self._setup = control_setup(scenario)
-        self._law = slotted(self._setup.parameters.law)
         self._timestep = simulation.timestep
         self._control_steps = simulation.control_steps
         self._step_index = 0
-        self._state: list[float] = thesis_plant.plant_state(
-            (
-                *(*initial.position, *initial.velocity),
-                *(*initial.attitude, *initial.angular_velocity, 0.0, 0.0, 0.0, 0.0),
-                *loop_of(scenario).initial_activations(scenario, self._setup),
-            )
-        )
+        self._state = list(map(float, self._equations.initial(scenario, setup)))
+        self._held = (0.0,) * self._equations.inputs_size
         self._fault = ""
         self.engine: EngineName = choose_engine(scenario)
+        self._advance: thesis_plant.Stepper
+        self._law: tuple[Any, Any]  # parameters and table, as the stepper reads them
+        if self.engine == "native":
+            from tiltsim.native import compile_stepper, native_record
+
+            self._advance = compile_stepper(self._equations)
+            self._law = native_record(loop, setup.userdata)
+        else:
+            self._advance = thesis_plant.make_stepper(self._equations.inputs, self._equations.rates)
+            self._law = slotted(setup.parameters), setup.table
 
     @property
     def time(self) -> float:
@@ -243,42 +248,47 @@ class ThesisPlant:
 
     @property
     def state(self) -> Floats:
-        """See `Plant.state`: the step count and the state of `tiltsim.thesis_plant`.
+        """See `Plant.state`: the step count, the inputs held and the state of the equations.
 
         The parameters are the scenario's and stay with the plant.
         """
-        return np.array([self._step_index, *self._state])
+        return np.array([self._step_index, *self._held, *self._state])
 
     @state.setter
     def state(self, value: Floats) -> None:
+        split = 1 + len(self._held)
         self._step_index = int(value[0])
-        self._state = value[1:].tolist()
+        self._held = tuple(value[1:split].tolist())
+        self._state = value[split:].tolist()
         self._fault = ""
 
     def advance(self, steps: int) -> None:
         """See `Plant.advance`."""
-        if self.engine == "native":
-            from tiltsim.native import advance_thesis_plant
-
-            self._state = advance_thesis_plant(
-                *(self._step_index, self._state, self._timestep, steps, self._control_steps),
-                *(self._setup.userdata, self._disturbance),
+        native = self.engine == "native"
+        state = np.array(self._state) if native else self._state
+        try:
+            state, self._held = self._advance(
+                *(self._step_index, state, self._held, self._timestep, steps),
+                *(self._control_steps, *self._law, self._disturbance),
             )
-        else:
-            try:
-                self._state = thesis_plant.advance(
-                    *(self._step_index, self._state, self._timestep, steps, self._control_steps),
-                    *(self._law, self._setup.table, self._disturbance),
-                )
-            except (ArithmeticError, ValueError):
-                self._fault = "the control law left the range of floating-point numbers"
+            self._state = list(state)
+        except (ArithmeticError, ValueError):
+            self._fault = "the control law left the range of floating-point numbers"
         self._step_index += steps
 
     def observe(self) -> tuple[float, ...]:
         """See `Plant.observe`."""
-        gait, table = self._setup.parameters.law.gait, self._setup.table
-        state: tuple[float, ...] = thesis_plant.vehicle_state(self.time, self._state, gait, table)
-        return (*state, *tilt_reference(self.time, gait, table)[4:])
+        return self._equations.observe(self.time, self._state, self._inputs_in_force, self._setup)
+
+    def _inputs_in_force(self) -> Sequence[float]:
+        every = self._control_steps
+        if every > 0 and self._step_index % every != 0:
+            return self._held
+        try:
+            setup = self._setup
+            return self._equations.inputs(self.time, self._state, setup.parameters, setup.table)
+        except (ArithmeticError, ValueError):
+            return [nan] * len(self._held)
 
     def fault(self) -> str:
         """See `Plant.fault`."""

@@ -382,12 +382,6 @@ class Scenario(Table):
                 f"flies the {self.controller.vehicle_model}, and vehicle.model = {model!r}; "
                 f"choose {', '.join(_laws_of(model))}",
             )
-        if self.simulation.plant == "thesis" and law != "attitude_altitude":
-            raise InvalidValueError(
-                "simulation.plant",
-                "thesis",
-                f"has the attitude_altitude law alone, and controller.law = {law!r}; use mujoco",
-            )
         if model != "quadrotor":
             return
         vehicle = self.vehicle

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -10,9 +10,10 @@ import numpy as np
 from controllers.full_pose import Parameters, full_pose_inputs
 from controllers.gaits import tilt_reference
 from controllers.references import position_reference
-from controllers.scalar import scalar
+from controllers.scalar import Triple, scalar
 from tiltsim.controller_tables import FullPoseController
-from tiltsim.loop import ControlSetup, Floats, Loop, Sizes
+from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
+from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes
 from tiltsim.loops.tiltrotor import (
     REFERENCE_COLUMNS,
     gait_singularity,
@@ -106,6 +107,44 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     return dict(zip(REFERENCE_COLUMNS, columns, strict=True)) | told | singularity
 
 
+@scalar
+def equation_inputs(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """The law's rotor accelerations and tilt rates on the thesis' equations."""
+    tilts = state[22], state[23], state[24], state[25]
+    return full_pose_inputs(time, law_state(state, tilts), parameters.law)
+
+
+@scalar
+def equation_rates(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """The thesis' equations, the tilt angles being states whose rates are inputs."""
+    tilts = state[22], state[23], state[24], state[25]
+    accelerations = inputs[0], inputs[1], inputs[2], inputs[3]
+    vehicle = parameters.law.vehicle
+    return (
+        *equations_of_motion(state, tilts, accelerations, vehicle, disturbance),
+        *(inputs[4], inputs[5], inputs[6], inputs[7]),
+    )
+
+
+def _observe_equations(
+    _time: float,
+    state: Sequence[float],
+    inputs: Callable[[], Sequence[float]],
+    _setup: ControlSetup,
+) -> tuple[float, ...]:
+    alpha_1, alpha_2, alpha_3, alpha_4 = tilts = state[22:]
+    return (*law_state(state, (alpha_1, alpha_2, alpha_3, alpha_4)), *inputs()[4:], *tilts)
+
+
 FULL_POSE: Final = Loop(
     model="tiltrotor",
     sizes=Sizes(qpos=11, qvel=10, act=8, ctrl=16),
@@ -120,6 +159,16 @@ FULL_POSE: Final = Loop(
     ),
     derive=_derive,
     watched=lambda sample, _setup: rotor_stops(sample),
+    equations=Equations(
+        inputs=equation_inputs,
+        inputs_size=8,
+        rates=equation_rates,
+        initial=lambda s, _setup: (
+            *initial_state(s, initial_rotor_speeds(s)),
+            *_initial_tilts(s),
+        ),
+        observe=_observe_equations,
+    ),
     law_states=4,
     law_fields=TILT_COMMANDS,
     extra_columns=dict.fromkeys(TILT_COMMANDS, "rad"),

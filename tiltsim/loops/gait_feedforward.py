@@ -12,9 +12,10 @@ from controllers.decouplers import DECOUPLERS
 from controllers.gait_feedforward import INTEGRAL_FIELDS, Parameters, tracking_inputs
 from controllers.gaits import tilt_reference
 from controllers.references import position_reference
-from controllers.scalar import scalar
+from controllers.scalar import Triple, scalar
 from tiltsim.controller_tables import AttitudeAltitudeController
-from tiltsim.loop import ControlSetup, Floats, Loop, Sizes, Watched
+from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
+from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
 from tiltsim.loops.tiltrotor import (
     REFERENCE_COLUMNS,
     TILT_REFERENCE_COLUMNS,
@@ -123,6 +124,50 @@ def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Watched,
     return (singular_matrix(sample, setup.parameters.law.vehicle), *rotor_stops(sample))
 
 
+@scalar
+def equation_inputs(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """The law's rotor accelerations and the rates of its integrals on the thesis' equations."""
+    law = parameters.law
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, law.gait, table)
+    u1, u2, u3, u4, x_rate, y_rate, z_rate, _roll, _pitch, _yaw = tracking_inputs(
+        time,
+        law_state(state, (a1, a2, a3, a4)),
+        (rate_1, rate_2, rate_3, rate_4),
+        (state[22], state[23], state[24]),
+        law,
+        table,
+    )
+    return u1, u2, u3, u4, x_rate, y_rate, z_rate
+
+
+@scalar
+def equation_rates(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """The thesis' equations with tilt angles that follow the gait exactly, and the integrals."""
+    law = parameters.law
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, table)
+    accelerations = inputs[0], inputs[1], inputs[2], inputs[3]
+    return (
+        *equations_of_motion(state, (a1, a2, a3, a4), accelerations, law.vehicle, disturbance),
+        *(inputs[4], inputs[5], inputs[6]),
+    )
+
+
+def _observe_equations(
+    time: float, state: Sequence[float], _inputs: object, setup: ControlSetup
+) -> tuple[float, ...]:
+    tilts = tilt_reference(time, setup.parameters.law.gait, setup.table)
+    return (*law_state(state, tilts[:4]), *tilts[4:], *state[22:])
+
+
 GAIT_FEEDFORWARD: Final = Loop(
     model="tiltrotor",
     sizes=Sizes(qpos=11, qvel=10, act=7, ctrl=15),
@@ -137,6 +182,13 @@ GAIT_FEEDFORWARD: Final = Loop(
     ),
     derive=_derive,
     watched=_watched,
+    equations=Equations(
+        inputs=equation_inputs,
+        inputs_size=7,
+        rates=equation_rates,
+        initial=lambda s, _setup: (*initial_state(s, initial_rotor_speeds(s)), 0.0, 0.0, 0.0),
+        observe=_observe_equations,
+    ),
     law_states=3,
     law_fields=INTEGRAL_FIELDS,
     extra_columns=dict.fromkeys(INTEGRAL_FIELDS, "m s"),

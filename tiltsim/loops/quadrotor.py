@@ -19,7 +19,8 @@ from controllers.rotation import euler_from_quaternion
 from controllers.scalar import scalar
 from controllers.vehicle import SPIN, Vehicle
 from controllers.yaw_position import State
-from tiltsim.loop import ControlSetup, Floats, Sizes, Watched
+from tiltsim.equations.quadrotor import initial_state, thrusts_in_force
+from tiltsim.loop import ControlSetup, Equations, Floats, Sizes, Watched
 from tiltsim.loops.tiltrotor import REFERENCE_COLUMNS, TILT_REFERENCE_COLUMNS
 
 if TYPE_CHECKING:
@@ -83,14 +84,48 @@ def observe_quadrotor(
     controls: Callable[[], Sequence[float]],
 ) -> tuple[float, ...]:
     """The rigid body, no tilt, rotor speeds from the thrusts in force, the law's own states."""
-    thrusts = controls()[:4]
-    speeds = [s * _speed(thrust) for s, thrust in zip(SPIN, thrusts, strict=True)]
     body = rigid_body_state(qpos, qvel, 0.0, 0.0)[:12]
-    return (*body, *(0.0,) * 4, *speeds, *(0.0,) * 4, *act[4:])
+    return _sample(body, controls()[:4], act[4:])
+
+
+def _sample(
+    body: Sequence[float], thrusts: Sequence[float], law_states: Sequence[float]
+) -> tuple[float, ...]:
+    speeds = [s * _speed(thrust) for s, thrust in zip(SPIN, thrusts, strict=True)]
+    return (*body, *(0.0,) * 4, *speeds, *(0.0,) * 4, *law_states)
 
 
 def _speed(thrust_control: float) -> float:
     return speed_along_spin(thrust_control) if thrust_control == thrust_control else nan
+
+
+def equations(
+    inputs: Callable[..., tuple[float, ...]],
+    inputs_size: int,
+    rates: Callable[..., tuple[float, ...]],
+    vehicle_of: Callable[[ControlSetup], Vehicle],
+) -> Equations:
+    """A law on ch. 2's equations; ``vehicle_of`` finds the vehicle in the law's parameters.
+
+    A law whose inputs go on after thrust and torques has states of its own, which these integrate;
+    they start as in MuJoCo.
+    """
+    law_states = inputs_size - 4
+
+    def initial(scenario: Scenario, setup: ControlSetup) -> tuple[float, ...]:
+        extension = extended_activations(scenario, setup)[4:][:law_states]
+        return (*initial_state(scenario), *extension)
+
+    def observe(
+        _time: float,
+        state: Sequence[float],
+        inputs_in_force: Callable[[], Sequence[float]],
+        setup: ControlSetup,
+    ) -> tuple[float, ...]:
+        thrusts = thrusts_in_force(inputs_in_force, vehicle_of(setup))
+        return _sample(state[:12], thrusts, state[12:])
+
+    return Equations(inputs, inputs_size, rates, initial, observe)
 
 
 def references(

@@ -10,12 +10,14 @@ import numpy as np
 from controllers.quadrotor_attitude_altitude import Gains, attitude_altitude_inputs
 from controllers.quadrotor_mixer import thrust_controls
 from controllers.references import ReferenceParameters
-from controllers.scalar import scalar
+from controllers.scalar import Triple, scalar
 from controllers.vehicle import Vehicle
 from tiltsim.controller_tables import QuadrotorAttitudeAltitudeController
+from tiltsim.equations.quadrotor import equations_of_motion, rigid_body
 from tiltsim.loop import ControlSetup, Floats, Loop, Sizes
 from tiltsim.loops.quadrotor import (
     attitude_watched,
+    equations,
     observe_quadrotor,
     references,
     rigid_body_state,
@@ -80,6 +82,30 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     }
 
 
+@scalar
+def equation_inputs(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """The law on the thesis' equations."""
+    return attitude_altitude_inputs(
+        *(time, rigid_body(state), parameters.vehicle),
+        *(parameters.gains, parameters.reference),
+    )
+
+
+@scalar
+def equation_rates(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """The thesis' equations under this law."""
+    return equations_of_motion(state, inputs, parameters.vehicle, disturbance)
+
+
 QUADROTOR_ATTITUDE_ALTITUDE: Final = Loop(
     model="quadrotor",
     sizes=Sizes(qpos=7, qvel=6, act=4, ctrl=8),
@@ -92,5 +118,9 @@ QUADROTOR_ATTITUDE_ALTITUDE: Final = Loop(
     derive=_derive,
     watched=lambda sample, _setup: (attitude_watched(sample),),
     follows_position=lambda _scenario: False,
+    equations=equations(
+        *(equation_inputs, 4, equation_rates),
+        vehicle_of=lambda setup: setup.parameters.vehicle,
+    ),
 )
 """The attitude-altitude law around the quadrotor."""

@@ -8,15 +8,17 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 import controllers.yaw_position as yaw_position
-from controllers.scalar import scalar
+from controllers.scalar import Triple, scalar
 from controllers.switching import EXTENSIONS, Parameters, Zone, in_attitude_zone, switching_inputs
 from tiltsim.controller_tables import SwitchingController
+from tiltsim.equations.quadrotor import extended_equations_of_motion, law_state
 from tiltsim.loop import ControlSetup, Floats, Loop, Watched
 from tiltsim.loops.quadrotor import (
     EXTENSION_COLUMNS,
     LAW_FIELDS,
     SIZES,
     attitude_watched,
+    equations,
     extended_activations,
     extended_controls,
     extended_singularity,
@@ -87,6 +89,29 @@ def _watched(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[Watched
     return (attitude_watched(sample),)
 
 
+@scalar
+def equation_inputs(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """The law on the thesis' equations."""
+    return switching_inputs(time, law_state(state), parameters.law)
+
+
+@scalar
+def equation_rates(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """The thesis' equations under this law."""
+    return extended_equations_of_motion(
+        state, inputs, parameters.law.yaw_position.vehicle, disturbance
+    )
+
+
 SWITCHING: Final = Loop(
     model="quadrotor",
     sizes=SIZES,
@@ -103,5 +128,9 @@ SWITCHING: Final = Loop(
     extra_columns={**EXTENSION_COLUMNS, "attitude_zone": "1"},
     # In the zone, where the law is meant to end up, the position is free.
     follows_position=lambda _scenario: False,
+    equations=equations(
+        *(equation_inputs, 6, equation_rates),
+        vehicle_of=lambda setup: setup.parameters.law.yaw_position.vehicle,
+    ),
 )
 """Switching between yaw-position and attitude-altitude control of the quadrotor."""

@@ -26,11 +26,12 @@ from controllers.decoupling_matrix import sines_and_cosines, torque_entries, tor
 from controllers.gaits import tilt_reference
 from controllers.references import position_reference
 from controllers.rotation import euler_from_quaternion, world_up_in_body
-from controllers.scalar import Quad, scalar
+from controllers.scalar import Quad, Triple, scalar
 from controllers.singularity import determinant, margin_over_gait
 from controllers.vehicle import SPIN, Vehicle, drag_ratio
 from tiltsim.controller_tables import AttitudeAltitudeController
-from tiltsim.loop import ControlSetup, Floats, Loop, Sizes, Watched
+from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
+from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
 
 if TYPE_CHECKING:
     from tiltsim.scenario import Scenario, TiltServoTable
@@ -210,6 +211,38 @@ def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Watched,
     return (matrix, *rotor_stops(sample)) if law.decoupling == EXACT_DECOUPLING else (matrix,)
 
 
+@scalar
+def equation_inputs(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> Quad:
+    """The law's rotor accelerations (rad/s^2) on the thesis' equations."""
+    law = parameters.law
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, table)
+    return rotor_accelerations(time, law_state(state, (a1, a2, a3, a4)), law)
+
+
+@scalar
+def equation_rates(
+    time: float,
+    state: Sequence[float],
+    inputs: Quad,
+    parameters: ControlParameters,
+    table: Sequence[float],
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """The thesis' equations with tilt angles that follow the gait exactly."""
+    law = parameters.law
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, table)
+    return equations_of_motion(state, (a1, a2, a3, a4), inputs, law.vehicle, disturbance)
+
+
+def _observe_equations(
+    time: float, state: Sequence[float], _inputs: object, setup: ControlSetup
+) -> tuple[float, ...]:
+    tilts = tilt_reference(time, setup.parameters.law.gait, setup.table)
+    return (*law_state(state, tilts[:4]), *tilts[4:])
+
+
 def follows_position(scenario: Scenario) -> bool:
     """Whether a decoupler steers the vehicle to the reference's horizontal position."""
     controller = scenario.controller
@@ -229,6 +262,12 @@ TILTROTOR: Final = Loop(
     derive=_derive,
     watched=_watched,
     follows_position=follows_position,
-    thesis_plant=True,
+    equations=Equations(
+        inputs=equation_inputs,
+        inputs_size=4,
+        rates=equation_rates,
+        initial=lambda s, _setup: initial_state(s, initial_rotor_speeds(s)),
+        observe=_observe_equations,
+    ),
 )
 """The attitude-altitude law around the tiltrotor."""

@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from controllers.scalar import scalar
+from controllers.scalar import Triple, scalar
 from controllers.yaw_position import Parameters, yaw_position_inputs
 from tiltsim.controller_tables import YawPositionController
+from tiltsim.equations.quadrotor import extended_equations_of_motion, law_state
 from tiltsim.loop import ControlSetup, Floats, Loop, Watched
 from tiltsim.loops.quadrotor import (
     EXTENSION_COLUMNS,
     LAW_FIELDS,
     SIZES,
     attitude_watched,
+    equations,
     extended_activations,
     extended_controls,
     extended_singularity,
@@ -72,6 +74,27 @@ def extension_watched(sample: Mapping[str, float]) -> Watched:
     return Watched(thrust, "the decoupling matrix became singular: the thrust came to zero")
 
 
+@scalar
+def equation_inputs(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """The law on the thesis' equations."""
+    return yaw_position_inputs(time, law_state(state), parameters.law)
+
+
+@scalar
+def equation_rates(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """The thesis' equations under this law."""
+    return extended_equations_of_motion(state, inputs, parameters.law.vehicle, disturbance)
+
+
 YAW_POSITION: Final = Loop(
     model="quadrotor",
     sizes=SIZES,
@@ -86,5 +109,9 @@ YAW_POSITION: Final = Loop(
     law_states=2,
     law_fields=LAW_FIELDS,
     extra_columns=EXTENSION_COLUMNS,
+    equations=equations(
+        *(equation_inputs, 6, equation_rates),
+        vehicle_of=lambda setup: setup.parameters.law.vehicle,
+    ),
 )
 """The yaw-position law around the quadrotor."""

@@ -1,0 +1,1 @@
+"""The thesis' own equations of motion, one module a vehicle, for `tiltsim.plants.ThesisPlant`."""

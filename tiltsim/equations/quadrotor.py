@@ -1,0 +1,83 @@
+"""The quadrotor as ch. 2 models it (Eq. 15): a rigid body in Euler angles under thrust and torques.
+
+The state begins with position, velocity, roll, pitch, yaw and body rates, the inputs with the total
+thrust and the three torques. Two states of a law, integrated by what follows in the inputs, may
+come after them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from controllers.quadrotor_mixer import thrust_controls
+from controllers.rotation import rotation_from_euler
+from controllers.scalar import Triple, scalar
+from controllers.vehicle import Vehicle
+from controllers.yaw_position import State, euler_rates, gyroscopic_acceleration
+
+if TYPE_CHECKING:
+    from tiltsim.scenario import Scenario
+
+
+@scalar
+def rigid_body(state: Sequence[float]) -> State:
+    """The laws' state (`controllers.yaw_position.STATE_FIELDS`), for laws without states."""
+    return (
+        *(state[0], state[1], state[2], state[3], state[4], state[5], state[6]),
+        *(state[7], state[8], state[9], state[10], state[11], 0.0, 0.0),
+    )
+
+
+@scalar
+def law_state(state: Sequence[float]) -> State:
+    """The laws' state as `rigid_body`, for laws with states of their own."""
+    return (
+        *(state[0], state[1], state[2], state[3], state[4], state[5], state[6]),
+        *(state[7], state[8], state[9], state[10], state[11], state[12], state[13]),
+    )
+
+
+@scalar
+def equations_of_motion(
+    state: Sequence[float], inputs: Sequence[float], vehicle: Vehicle, disturbance: Triple
+) -> tuple[float, ...]:
+    """Time derivative of the rigid body's twelve states.
+
+    ``inputs`` are the thrust (N) and the torques (N m, body axes). ``disturbance`` is an
+    acceleration (m/s^2, world) that the law does not know of.
+    """
+    roll, pitch, yaw, p, q, r = state[6], state[7], state[8], state[9], state[10], state[11]
+    gust_x, gust_y, gust_z = disturbance
+    _, _, up_x, _, _, up_y, _, _, up_z = rotation_from_euler(roll, pitch, yaw)
+    lift = inputs[0] / vehicle.mass
+    roll_rate, pitch_rate, yaw_rate = euler_rates(roll, pitch, p, q, r)
+    p_drift, q_drift, r_drift = gyroscopic_acceleration(p, q, r, vehicle)
+    return (
+        *(state[3], state[4], state[5]),
+        *(lift * up_x + gust_x, lift * up_y + gust_y, lift * up_z - vehicle.gravity + gust_z),
+        *(roll_rate, pitch_rate, yaw_rate),
+        p_drift + inputs[1] / vehicle.inertia_xx,
+        q_drift + inputs[2] / vehicle.inertia_yy,
+        r_drift + inputs[3] / vehicle.inertia_zz,
+    )
+
+
+@scalar
+def extended_equations_of_motion(
+    state: Sequence[float], inputs: Sequence[float], vehicle: Vehicle, disturbance: Triple
+) -> tuple[float, ...]:
+    """As `equations_of_motion`, followed by the law's own two states."""
+    return (*equations_of_motion(state, inputs, vehicle, disturbance), inputs[4], inputs[5])
+
+
+def initial_state(scenario: Scenario) -> tuple[float, ...]:
+    """The rigid body's states at time zero."""
+    initial = scenario.initial
+    return (*initial.position, *initial.velocity, *initial.attitude, *initial.angular_velocity)
+
+
+def thrusts_in_force(inputs: Callable[[], Sequence[float]], vehicle: Vehicle) -> Sequence[float]:
+    """What the four rotors do (`controllers.quadrotor_mixer`) under the inputs in force."""
+    thrust, roll_torque, pitch_torque, yaw_torque = inputs()[:4]
+    return thrust_controls(thrust, roll_torque, pitch_torque, yaw_torque, vehicle)
