@@ -35,19 +35,19 @@ from controllers.decoupling_matrix import (
 from controllers.gains import IntegralGains
 from controllers.gaits import (
     FIXED,
-    NO_KEYFRAMES,
     TWO_COLOR_CIRCLE,
     GaitParameters,
     tilt_acceleration,
     tilt_reference,
 )
+from controllers.gaits.keyframes import NO_KEYFRAMES
 from controllers.jets import (
-    ZERO,
     Jet,
     jet_angle,
     jet_cosine,
     jet_product,
     jet_quotient,
+    jet_scaled,
     jet_sine,
     jet_square_root,
     jet_sum,
@@ -115,7 +115,7 @@ def torque_free_force_jet(
     lift_13 = jet_sum(1.0, jet_sum(1.0, cos_13, 1.0, jet_cosine(gap_13)), r, sin_13)
     lift_24 = jet_sum(1.0, jet_sum(1.0, cos_24, 1.0, jet_cosine(gap_24)), -r, sin_24)
     return (
-        jet_product(jet_sum(-1.0, jet_sine(gap_24), 0.0, ZERO), yaw_13),
+        jet_product(jet_scaled(-1.0, jet_sine(gap_24)), yaw_13),
         jet_product(jet_sine(gap_13), yaw_24),
         jet_sum(-1.0, jet_product(lift_13, yaw_24), -1.0, jet_product(lift_24, yaw_13)),
     )
@@ -134,11 +134,7 @@ def exact_decoupler_jet(
     dx = jet_sum(1.0, jet_product(ax, cos_yaw), 1.0, jet_product(ay, sin_yaw))
     dy = jet_sum(1.0, jet_product(ay, cos_yaw), -1.0, jet_product(ax, sin_yaw))
     side = 1.0 if nz[0] >= 0.0 else -1.0
-    nx, ny, nz = (
-        jet_sum(side, nx, 0.0, ZERO),
-        jet_sum(side, ny, 0.0, ZERO),
-        jet_sum(side, nz, 0.0, ZERO),
-    )
+    nx, ny, nz = jet_scaled(side, nx), jet_scaled(side, ny), jet_scaled(side, nz)
     across = jet_sum(1.0, jet_product(ny, ny), 1.0, jet_product(nz, nz))
     if across[0] == 0.0:
         return (nan, nan, nan), (nan, nan, nan)
@@ -147,7 +143,7 @@ def exact_decoupler_jet(
     length = jet_sum(1.0, wanted, 1.0, jet_product(dy, dy))
     if length[0] == 0.0:
         return (nan, nan, nan), (nan, nan, nan)
-    # Roll must make  n_y cos(roll) - n_z sin(roll) = d_y |n| / |d|,  the part across the pitch axis.
+    # Roll makes  n_y cos(roll) - n_z sin(roll) = d_y |n| / |d|,  the part across the pitch axis.
     reach = jet_product(dy, jet_square_root(jet_quotient(force, length)))
     rest = jet_sum(1.0, across, -1.0, jet_product(reach, reach))
     turned = jet_angle(nz, ny)
@@ -156,9 +152,7 @@ def exact_decoupler_jet(
     else:
         nearest = atan2(0.0, reach[0])
         roll = (nearest - turned[0], 0.0, 0.0)
-    forward = jet_sum(
-        1.0, jet_product(ny, jet_sine(roll)), 1.0, jet_product(nz, jet_cosine(roll))
-    )
+    forward = jet_sum(1.0, jet_product(ny, jet_sine(roll)), 1.0, jet_product(nz, jet_cosine(roll)))
     pitch = jet_sum(1.0, jet_angle(dx, lift), -1.0, jet_angle(nx, forward))
     return roll, pitch
 
@@ -498,16 +492,16 @@ def tracking_inputs(
     # Third-order laws on the attitude, as ch. 4, Eq. (26), around references that move.
     most = parameters.max_angular_acceleration
     yaw_error = atan2(sin(reference.yaw - yaw), cos(reference.yaw - yaw))
-    roll_jerk = attitude_jerk(
-        roll_ref, roll_now, gains.roll_1, gains.roll_2, gains.roll_3, most
-    )
+    roll_jerk = attitude_jerk(roll_ref, roll_now, gains.roll_1, gains.roll_2, gains.roll_3, most)
     pitch_jerk = attitude_jerk(
         pitch_ref, pitch_now, gains.pitch_1, gains.pitch_2, gains.pitch_3, most
     )
     yaw_ref = (yaw + yaw_error, 0.0, 0.0)
     yaw_jerk = attitude_jerk(yaw_ref, yaw_now, gains.yaw_1, gains.yaw_2, gains.yaw_3, most)
     jerk = (roll_jerk, pitch_jerk, yaw_jerk)
-    wanted = jerk if ingredients.euler_rates == 0.0 else body_jerk(roll_now, pitch_now, yaw_now, jerk)
+    wanted = (
+        jerk if ingredients.euler_rates == 0.0 else body_jerk(roll_now, pitch_now, yaw_now, jerk)
+    )
 
     # The torques must change so that omega'' comes out; what turns by itself is taken off.
     ox, oy, oz = omega_rate

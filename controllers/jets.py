@@ -8,19 +8,22 @@ differences. A jet is a triple ``(value, first, second)``, in native code three 
 from __future__ import annotations
 
 from math import atan2, cos, sin, sqrt
-from typing import Final
 
 from controllers.scalar import scalar
 
 Jet = tuple[float, float, float]
-
-ZERO: Final = (0.0, 0.0, 0.0)
 
 
 @scalar
 def jet_sum(a: float, x: Jet, b: float, y: Jet) -> Jet:
     """The combination ``a x + b y`` with constant ``a`` and ``b``."""
     return a * x[0] + b * y[0], a * x[1] + b * y[1], a * x[2] + b * y[2]
+
+
+@scalar
+def jet_scaled(a: float, x: Jet) -> Jet:
+    """The product ``a x`` with constant ``a``."""
+    return a * x[0], a * x[1], a * x[2]
 
 
 @scalar
