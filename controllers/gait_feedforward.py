@@ -414,7 +414,7 @@ def tracking_inputs(
         yaw_now = (yaw, d_yaw, dd_yaw)
 
     # The position reference, and how far from it the vehicle is.
-    motion = reference_derivatives(time, reference)
+    motion = reference_derivatives(time, reference, table)
     known = ingredients.reference_derivatives
     x_ref, y_ref, z_ref, vx_ref, vy_ref, vz_ref = motion[:6]
     ax_ref, ay_ref, az_ref = known * motion[6], known * motion[7], known * motion[8]

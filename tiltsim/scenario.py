@@ -6,15 +6,19 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from functools import lru_cache
 from math import pi
 from typing import Annotated, Final, Literal, Self, get_args
 
 import numpy as np
 from pydantic import ConfigDict, Field, PrivateAttr, model_validator
 
+from controllers.gaits.keyframes import NO_KEYFRAMES
 from controllers.references import REFERENCE_TYPES, ReferenceParameters
 from controllers.stability import Loop
 from controllers.vehicle import PRESETS, Vehicle
+from controllers.waypoints import minimum_snap_table
 from tiltsim.controller_tables import AttitudeAltitudeController, Controller, ReferenceKind
 from tiltsim.gait_tables import FixedGait, Gait
 from tiltsim.messages import InvalidValueError
@@ -33,7 +37,7 @@ MAX_STEPS: Final = 100_000_000
 """Physics steps of a flight, more than a day at one millisecond."""
 
 MAX_TABLE: Final = 1500
-"""Numbers in a gait's table of keyframes, which every evaluation of the control law reads."""
+"""Numbers in the table of a gait and a reference, which every evaluation of the law reads."""
 
 MAX_LOOP_STEP: Final = 2.5
 """Largest product of timestep and closed-loop pole; RK4 turns unstable at 2.78, ode3 at 2.51."""
@@ -193,7 +197,27 @@ class InitialTable(Table):
 Tilt = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
 
 
-class _PositionReference(Table):
+class _Reference(Table, ABC):
+    """What every reference can tell of itself."""
+
+    @property
+    @abstractmethod
+    def parameters(self) -> ReferenceParameters:
+        """The record that the law reads."""
+
+    @property
+    def table(self) -> tuple[float, ...]:
+        """The numbers beside the record, for references of any length."""
+        return NO_KEYFRAMES
+
+    def placed(self, table: tuple[float, ...]) -> tuple[ReferenceParameters, tuple[float, ...]]:
+        """Record and table where a gait's table lies before the reference's own."""
+        if self.table == NO_KEYFRAMES:
+            return self.parameters, table
+        return self.parameters._replace(offset=float(len(table))), (*table, *self.table)
+
+
+class _PositionReference(_Reference):
     roll: Tilt = Field(0.0, description="rad, for laws of the whole pose and for switching")
     pitch: Tilt = Field(0.0, description="rad, likewise")
     yaw: Angle = 0.0
@@ -266,7 +290,86 @@ class CircleReference(_PositionReference):
         return self
 
 
-class AttitudeAltitudeReference(Table):
+class LissajousReference(_PositionReference):
+    """A sine along each axis: ``position + amplitude sin(angular_frequency t + phase)``."""
+
+    type: Literal["lissajous"]
+    position: Vector3 = Field((0.0, 0.0, 0.0), description="the centre, m")
+    amplitude: Vector3 = Field(description="m")
+    angular_frequency: Vector3 = Field(description="rad/s")
+    phase: Angles3 = Field((0.0, 0.0, 0.0), description="rad")
+
+    @property
+    def parameters(self) -> ReferenceParameters:
+        """The record that the law reads."""
+        return self._parameters(
+            self.type,
+            self.position,
+            **_by_axis("amplitude", self.amplitude),
+            **_by_axis("frequency", self.angular_frequency),
+            **_by_axis("phase", self.phase),
+        )
+
+
+class FigureEightReference(_PositionReference):
+    """A lying eight, from its crossing towards +x and +y; a lissajous of one to two."""
+
+    type: Literal["figure_eight"]
+    position: Vector3 = Field((0.0, 0.0, 0.0), description="where it crosses itself, m")
+    length: Positive = Field(description="m, along x")
+    width: Positive = Field(description="m, along y")
+    angular_frequency: Positive = Field(description="rad/s, once around")
+
+    @property
+    def parameters(self) -> ReferenceParameters:
+        """The record that the law reads."""
+        once = self.angular_frequency
+        return self._parameters(
+            self.type,
+            self.position,
+            **_by_axis("amplitude", (0.5 * self.length, 0.5 * self.width, 0.0)),
+            **_by_axis("frequency", (once, 2.0 * once, 0.0)),
+        )
+
+
+class WaypointReference(_PositionReference):
+    """From rest to rest through points at given times, with the least snap."""
+
+    type: Literal["waypoints"]
+    positions: Annotated[tuple[Vector3, ...], Field(min_length=2, max_length=50, strict=False)] = (
+        Field(description="m; the first is the start")
+    )
+    times: Annotated[tuple[float, ...], Field(strict=False)] = Field(
+        description="s, one a point, from 0; after the last the reference rests"
+    )
+
+    @property
+    def parameters(self) -> ReferenceParameters:
+        """The record that the law reads."""
+        return self._parameters(self.type, (0.0, 0.0, 0.0), segments=float(len(self.times)))
+
+    @property
+    def table(self) -> tuple[float, ...]:
+        """The polynomials of the motion; see `controllers.waypoints.minimum_snap_table`."""
+        return _minimum_snap_table(self.positions, self.times)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        try:
+            _ = self.table
+        except ValueError as error:
+            raise InvalidValueError("reference.times", self.times, str(error)) from None
+        return self
+
+
+_minimum_snap_table = lru_cache(maxsize=64)(minimum_snap_table)
+
+
+def _by_axis(name: str, values: tuple[float, float, float]) -> dict[str, float]:
+    return {f"{name}_{axis}": value for axis, value in zip("xyz", values, strict=True)}
+
+
+class AttitudeAltitudeReference(_Reference):
     """Attitude and altitude to hold; the horizontal position is free (ch. 3)."""
 
     type: Literal["attitude_altitude"]
@@ -293,7 +396,13 @@ class AttitudeAltitudeReference(Table):
 
 
 Reference = Annotated[
-    SetpointReference | LineReference | CircleReference | AttitudeAltitudeReference,
+    SetpointReference
+    | LineReference
+    | CircleReference
+    | LissajousReference
+    | FigureEightReference
+    | WaypointReference
+    | AttitudeAltitudeReference,
     Field(discriminator="type"),
 ]
 
@@ -462,11 +571,17 @@ class Scenario(Table):
                 f"tilts by {gait.amplitude:.4g} rad, beyond the servo limit "
                 f"vehicle.tilt_servo.max_angle = {limit}",
             )
-        if len(gait.table) > MAX_TABLE:
+        rows = len(gait.table)
+        if rows > MAX_TABLE:
             raise InvalidValueError(
-                f"gait.{key}",
-                value,
-                f"too many keyframes: {len(gait.table)} numbers, at most {MAX_TABLE}",
+                f"gait.{key}", value, f"too many keyframes: {rows} numbers, at most {MAX_TABLE}"
+            )
+        total = len(self.reference.placed(gait.table)[1])
+        if total > MAX_TABLE:
+            raise InvalidValueError(
+                "reference.times",
+                len(getattr(self.reference, "times", ())),
+                f"too many waypoints: {total} numbers with the gait's, at most {MAX_TABLE}",
             )
         if self.controller.law == "full_pose" and not gait.is_constant:
             raise InvalidValueError(

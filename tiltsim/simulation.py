@@ -98,6 +98,7 @@ class Watch:
     def __init__(self, scenario: Scenario) -> None:
         self._loop, self._setup = loop_of(scenario), control_setup(scenario)
         self._reference = scenario.reference.parameters
+        self._table = scenario.reference.table
         self._follows_position = self._loop.follows_position(scenario)
         self._sides: dict[int, float] = {}
 
@@ -116,7 +117,7 @@ class Watch:
         return self._judge_limits(time, state) or self._judge_singularity(time, state)
 
     def _judge_limits(self, time: float, state: dict[str, float]) -> End | None:
-        target = position_reference(time, self._reference)
+        target = position_reference(time, self._reference, self._table)
         if self._follows_position:
             error = hypot(target[0] - state["x"], target[1] - state["y"])
             if error > MAX_POSITION_ERROR:

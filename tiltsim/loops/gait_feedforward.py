@@ -87,6 +87,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     assert isinstance(controller, AttitudeAltitudeController)
     vehicle = scenario.vehicle.resolve()
     gait = scenario.gait.plan(vehicle)
+    reference, table = scenario.reference.placed(gait.table)
     law = Parameters(
         vehicle=vehicle,
         gains=controller.resolve_gains(),
@@ -99,11 +100,11 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
             gyroscopic_torque=scenario.simulation.plant != "thesis"
         ),
         gait=gait.parameters,
-        reference=scenario.reference.parameters,
+        reference=reference,
         decoupler=DECOUPLERS[controller.decoupler],
     )
     lead = servo_lead(scenario.vehicle.tilt_servo)
-    return ControlSetup(ControlParameters(signature, lead, law), gait.table)
+    return ControlSetup(ControlParameters(signature, lead, law), table)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -112,7 +113,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     values = np.stack([samples[name] for name in fields], axis=-1).tolist()
     rows = []
     for time, value in zip(samples["time"].tolist(), values, strict=True):
-        position = position_reference(time, law.reference)[:3]
+        position = position_reference(time, law.reference, table)[:3]
         attitude = tracking_inputs(time, value[:20], value[20:24], value[24:], law, table)[7:]
         rows.append((*position, *attitude, *tilt_reference(time, law.gait, table)[:4]))
     names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)

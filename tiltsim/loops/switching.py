@@ -51,7 +51,7 @@ def switching_controls(
     """All ten controls: thrusts, idle rotor states, the law's own states."""
     law = parameters.law
     state = rigid_body_state(qpos, qvel, act[4], act[5])
-    return extended_controls(switching_inputs(time, state, law), law.yaw_position.vehicle)
+    return extended_controls(switching_inputs(time, state, law, table), law.yaw_position.vehicle)
 
 
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
@@ -66,7 +66,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
         EXTENSIONS[controller.extension],
         controller.extension_rate,
     )
-    return ControlSetup(ControlParameters(signature, law))
+    return ControlSetup(ControlParameters(signature, law), scenario.reference.table)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -78,7 +78,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     roll = np.where(inside > 0.0, reference.roll, samples["roll"])
     pitch = np.where(inside > 0.0, reference.pitch, samples["pitch"])
     return {
-        **references(samples, reference, (roll, pitch, reference.yaw)),
+        **references(samples, reference, setup.table, (roll, pitch, reference.yaw)),
         **extended_singularity(samples, law.yaw_position.vehicle),
         "attitude_zone": inside,
     }
@@ -94,7 +94,7 @@ def equation_inputs(
     time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
 ) -> tuple[float, ...]:
     """The law on the thesis' equations."""
-    return switching_inputs(time, law_state(state), parameters.law)
+    return switching_inputs(time, law_state(state), parameters.law, table)
 
 
 @scalar

@@ -97,7 +97,7 @@ def tiltrotor_controls(
     return (
         *(a1 + lead * rate_1, a2 + lead * rate_2, a3 + lead * rate_3, a4 + lead * rate_4),
         *rotor_thrust_controls(act),
-        *rotor_accelerations(time, tiltrotor_state(qpos, qvel, act), law),
+        *rotor_accelerations(time, tiltrotor_state(qpos, qvel, act), law, table),
     )
 
 
@@ -121,6 +121,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     assert isinstance(controller, AttitudeAltitudeController)
     vehicle = scenario.vehicle.resolve()
     gait = scenario.gait.plan(vehicle)
+    reference, table = scenario.reference.placed(gait.table)
     parameters = ControlParameters(
         signature,
         servo_lead(scenario.vehicle.tilt_servo),
@@ -128,12 +129,12 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
             vehicle=vehicle,
             gains=controller.resolve_gains(),
             gait=gait.parameters,
-            reference=scenario.reference.parameters,
+            reference=reference,
             decoupler=DECOUPLERS[controller.decoupler],
             decoupling=DECOUPLINGS[controller.decoupling],
         ),
     )
-    return ControlSetup(parameters, gait.table)
+    return ControlSetup(parameters, table)
 
 
 def initial_rotor_speeds(scenario: Scenario) -> tuple[float, ...]:
@@ -169,8 +170,8 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     for time, state in zip(samples["time"].tolist(), states, strict=True):
         trig = sines_and_cosines(*state[12:16])
         torque = torque_entries(trig, ratio)
-        position = position_reference(time, law.reference)[:3]
-        attitude = attitude_reference(time, state, trig, torque, law)[:3]
+        position = position_reference(time, law.reference, table)[:3]
+        attitude = attitude_reference(time, state, trig, torque, law, table)[:3]
         rows.append((*position, *attitude, *tilt_reference(time, law.gait, table)[:4]))
     names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)
     values = np.array(rows).reshape(len(rows), len(names))
@@ -218,7 +219,7 @@ def equation_inputs(
     """The law's rotor accelerations (rad/s^2) on the thesis' equations."""
     law = parameters.law
     a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, table)
-    return rotor_accelerations(time, law_state(state, (a1, a2, a3, a4)), law)
+    return rotor_accelerations(time, law_state(state, (a1, a2, a3, a4)), law, table)
 
 
 @scalar

@@ -166,8 +166,9 @@ class Scene:
         import rerun as rr
 
         reference = self._scenario.reference.parameters
+        table = self._scenario.reference.table
         times = np.linspace(0.0, until, REFERENCE_POINTS).tolist()
-        path = np.array([position_reference(time, reference)[:3] for time in times])
+        path = np.array([position_reference(time, reference, table)[:3] for time in times])
         size = 0.08 * vehicle_radius(self._model)
         color = palette.WHITE
         now = rr.Points3D.from_fields(colors=[color], radii=[size])
