@@ -55,6 +55,7 @@ from controllers.jets import (
 from controllers.references import ReferenceParameters, reference_derivatives
 from controllers.rotation import rotation_from_euler
 from controllers.scalar import Quad, Triple, scalar
+from controllers.supervisor import Supervisor, gait_share
 from controllers.vehicle import Vehicle, drag_ratio
 
 
@@ -86,6 +87,7 @@ class Parameters(NamedTuple):
     gait: GaitParameters
     reference: ReferenceParameters
     decoupler: float  # NONE or EXACT
+    supervisor: Supervisor = Supervisor()
 
 
 INTEGRAL_FIELDS: Final = ("integral_x", "integral_y", "integral_z")
@@ -328,14 +330,25 @@ def anticipated_tilts(
 
 @scalar
 def planned_force(
-    time: float, parameters: Parameters, table: Sequence[float]
+    time: float, roll: float, pitch: float, parameters: Parameters, table: Sequence[float]
 ) -> tuple[Jet, Jet, Jet]:
-    """The torque-free force ``n`` of the planned gait, with how it moves (body axes)."""
+    """The torque-free force ``n`` of the planned gait, with how it moves (body axes).
+
+    At an attitude where a supervisor lets only a share of the gait pass, of that share.
+    """
     alpha_1, alpha_2, alpha_3, alpha_4 = anticipated_tilts(
         time, parameters.gait, table, parameters.anticipation
     )
     ratio = drag_ratio(parameters.vehicle)
-    return torque_free_force_jet(alpha_1, alpha_2, alpha_3, alpha_4, ratio)
+    planned = tilt_reference(time, parameters.gait, table)
+    share = gait_share(planned, roll, pitch, parameters.supervisor, ratio)
+    return torque_free_force_jet(
+        jet_scaled(share, alpha_1),
+        jet_scaled(share, alpha_2),
+        jet_scaled(share, alpha_3),
+        jet_scaled(share, alpha_4),
+        ratio,
+    )
 
 
 @scalar
@@ -440,7 +453,7 @@ def tracking_inputs(
     xi_rate = yi_rate = 0.0
     roll_ref, pitch_ref = (reference.roll, 0.0, 0.0), (reference.pitch, 0.0, 0.0)
     if parameters.decoupler != NONE:
-        nx, ny, nz = planned_force(time, parameters, table)
+        nx, ny, nz = planned_force(time, roll, pitch, parameters, table)
         # Jerk of the body if its force stays along n: it turns with the body and with the gait.
         length = jet_square_root(
             jet_sum(

@@ -21,6 +21,7 @@ from controllers.gains import (
 )
 from controllers.gait_feedforward import Ingredients
 from controllers.stability import Loop, closed_loops, feedforward_loops, linear_loop
+from controllers.supervisor import Supervisor
 from controllers.switching import PUBLISHED_ZONE
 from controllers.vehicle import Vehicle
 from tiltsim.messages import InvalidValueError
@@ -125,6 +126,17 @@ Ingredient = Literal[
 ]
 
 
+class SupervisorTable(Table):
+    """Keeps a gait away from singular matrices; see `controllers.supervisor`."""
+
+    min_margin: Annotated[float, Field(ge=0.0, lt=pi / 2)] = Field(
+        0.2, description="singularity margin to keep, rad; 0: none"
+    )
+    min_determinant: Annotated[float, Field(ge=0.0, lt=4.0)] = Field(
+        0.5, description="determinant to keep, 4 for a level untilted vehicle; 0: none"
+    )
+
+
 class AttitudeAltitudeController(LawTable):
     """Attitude-altitude control of the tiltrotor, the gait planned (ch. 3 to 9)."""
 
@@ -140,6 +152,9 @@ class AttitudeAltitudeController(LawTable):
         | Annotated[PolePlacementTable, Tag("poles")],
         Discriminator(_attitude_altitude_gain_kind),
     ] = "ch04"
+    supervisor: SupervisorTable | None = Field(
+        None, description="scales the gait down before its decoupling matrix becomes singular"
+    )
     gait_rate_feedforward: bool = Field(
         False, description="count the gait's rates in: the exact law with integral action"
     )
@@ -202,6 +217,11 @@ class AttitudeAltitudeController(LawTable):
         if isinstance(self.gains, PolePlacementTable):
             return self.gains.resolve()[1]
         return IntegralGains()
+
+    def resolve_supervisor(self) -> Supervisor:
+        """The supervisor's thresholds, zero without one."""
+        table = self.supervisor
+        return Supervisor(table.min_margin, table.min_determinant) if table else Supervisor()
 
     def resolve_ingredients(self, *, gyroscopic_torque: bool) -> Ingredients:
         """What the law counts in, on a plant with or without gyroscopic torque."""

@@ -20,7 +20,7 @@ from tiltsim.engine import EngineName, control_callback, make_engine
 from tiltsim.errors import InputError
 from tiltsim.loop import ControlSetup, Floats
 from tiltsim.loops import control_setup, loop_of
-from tiltsim.model import Pod, RotorLimits, TiltServo, compile_model
+from tiltsim.model import Ground, Pod, RotorLimits, TiltServo, compile_model
 from tiltsim.scenario import Scenario
 
 STEPS_WORTH_LOADING: Final = 15_000
@@ -195,7 +195,7 @@ def build_model(
 
     Raises `InputError` where MuJoCo cannot build it.
     """
-    vehicle, simulation = scenario.vehicle, scenario.simulation
+    vehicle, simulation, ground = scenario.vehicle, scenario.simulation, scenario.ground
     try:
         model = compile_model(
             vehicle.model,
@@ -207,6 +207,7 @@ def build_model(
             pod=Pod(**vehicle.pod.model_dump()),
             rotor_limits=RotorLimits(vehicle.min_rotor_speed, vehicle.max_rotor_speed),
             law_states=loop_of(scenario).law_states,
+            ground=None if ground is None else Ground(ground.height, ground.friction),
             visuals=visuals,
         )
     except ValueError as error:

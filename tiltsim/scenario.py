@@ -406,6 +406,16 @@ Reference = Annotated[
     Field(discriminator="type"),
 ]
 
+# --- [ground] ----------------------------------------------------------------------------------
+
+
+class GroundTable(Table):
+    """Ground to take off from and land on; without the table nothing touches."""
+
+    height: float = Field(0.0, description="m, world")
+    friction: Positive = Field(0.8, description="coefficient of sliding friction")
+
+
 # --- [[disturbance]] ---------------------------------------------------------------------------
 
 
@@ -462,6 +472,7 @@ class Scenario(Table):
     controller: Controller = AttitudeAltitudeController()
     gait: Gait = FixedGait()
     reference: Reference = SetpointReference()
+    ground: GroundTable | None = None
     disturbance: Annotated[tuple[Disturbance, ...], Field(strict=False)] = ()
     expect: Annotated[tuple[Expectation, ...], Field(strict=False)] = ()
 
@@ -478,6 +489,7 @@ class Scenario(Table):
         self._check_gait()
         self._check_reference()
         self._check_rotor_limits()
+        self._check_ground()
         self._check_servo()
         self._check_stability()
         return self
@@ -544,6 +556,12 @@ class Scenario(Table):
             )
         if not isinstance(controller, AttitudeAltitudeController):
             return
+        if controller.supervisor is not None and self.simulation.plant == "thesis":
+            raise InvalidValueError(
+                "simulation.plant",
+                "thesis",
+                "its tilt angles follow the gait whatever controller.supervisor says; use mujoco",
+            )
         decoupler = controller.decoupler
         free = kind == "attitude_altitude"
         if free and decoupler != "none":
@@ -588,6 +606,20 @@ class Scenario(Table):
                 "gait.type",
                 self.gait.type,
                 "the full_pose law moves the pods itself; give the angles at the start as fixed",
+            )
+
+    def _check_ground(self) -> None:
+        if self.ground is None:
+            return
+        if self.simulation.plant == "thesis":
+            raise InvalidValueError(
+                "simulation.plant", "thesis", "the thesis' equations know no ground; use mujoco"
+            )
+        if self.initial.position[2] < self.ground.height:
+            raise InvalidValueError(
+                "initial.position",
+                self.initial.position,
+                f"below ground.height = {self.ground.height}",
             )
 
     def _check_rotor_limits(self) -> None:

@@ -13,6 +13,8 @@ from controllers.gait_feedforward import INTEGRAL_FIELDS, Parameters, tracking_i
 from controllers.gaits import tilt_reference
 from controllers.references import position_reference
 from controllers.scalar import Triple, scalar
+from controllers.supervisor import gait_share
+from controllers.vehicle import drag_ratio
 from tiltsim.controller_tables import AttitudeAltitudeController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
@@ -25,6 +27,7 @@ from tiltsim.loops.tiltrotor import (
     observe_tiltrotor,
     rotor_stops,
     rotor_thrust_controls,
+    servo_commands,
     servo_lead,
     singular_matrix,
     tiltrotor_state,
@@ -55,18 +58,19 @@ def gait_feedforward_controls(
 ) -> tuple[float, ...]:
     """All fifteen controls: tilt servos, thrusts, rotor accelerations, rates of the integrals."""
     law = parameters.law
-    lead = parameters.servo_lead
-    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, law.gait, table)
+    state = tiltrotor_state(qpos, qvel, act)
+    planned = tilt_reference(time, law.gait, table)
+    share = gait_share(planned, state[6], state[7], law.supervisor, drag_ratio(law.vehicle))
     u1, u2, u3, u4, x_rate, y_rate, z_rate, _roll, _pitch, _yaw = tracking_inputs(
         time,
-        tiltrotor_state(qpos, qvel, act),
+        state,
         (qvel[6], qvel[7], qvel[8], qvel[9]),
         (act[4], act[5], act[6]),
         law,
         table,
     )
     return (
-        *(a1 + lead * rate_1, a2 + lead * rate_2, a3 + lead * rate_3, a4 + lead * rate_4),
+        *servo_commands(planned, share, parameters.servo_lead),
         *rotor_thrust_controls(act),
         *(u1, u2, u3, u4, x_rate, y_rate, z_rate),
     )
@@ -102,6 +106,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
         gait=gait.parameters,
         reference=reference,
         decoupler=DECOUPLERS[controller.decoupler],
+        supervisor=controller.resolve_supervisor(),
     )
     lead = servo_lead(scenario.vehicle.tilt_servo)
     return ControlSetup(ControlParameters(signature, lead, law), table)
@@ -111,11 +116,14 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     law, table = setup.parameters.law, setup.table
     fields = (*STATE_FIELDS, *TILT_RATE_COLUMNS, *INTEGRAL_FIELDS)
     values = np.stack([samples[name] for name in fields], axis=-1).tolist()
+    ratio = drag_ratio(law.vehicle)
     rows = []
     for time, value in zip(samples["time"].tolist(), values, strict=True):
         position = position_reference(time, law.reference, table)[:3]
         attitude = tracking_inputs(time, value[:20], value[20:24], value[24:], law, table)[7:]
-        rows.append((*position, *attitude, *tilt_reference(time, law.gait, table)[:4]))
+        planned = tilt_reference(time, law.gait, table)
+        share = gait_share(planned, value[6], value[7], law.supervisor, ratio)
+        rows.append((*position, *attitude, *servo_commands(planned, share, 0.0)))
     names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)
     columns = np.array(rows).reshape(len(rows), len(names))
     return dict(zip(names, columns.T, strict=True)) | gait_singularity(samples, law.vehicle)

@@ -24,10 +24,12 @@ from controllers.attitude_altitude import (
 from controllers.decouplers import DECOUPLERS
 from controllers.decoupling_matrix import sines_and_cosines, torque_entries, torque_free_force
 from controllers.gaits import tilt_reference
+from controllers.gaits.trot import TiltsAndRates
 from controllers.references import position_reference
 from controllers.rotation import euler_from_quaternion, world_up_in_body
 from controllers.scalar import Quad, Triple, scalar
 from controllers.singularity import determinant, margin_over_gait
+from controllers.supervisor import Supervisor, gait_share
 from controllers.vehicle import SPIN, Vehicle, drag_ratio
 from tiltsim.controller_tables import AttitudeAltitudeController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
@@ -47,6 +49,7 @@ class ControlParameters(NamedTuple):
     signature: float  # see `tiltsim.loop.Loop.signature`
     servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
     law: Parameters
+    supervisor: Supervisor = Supervisor()
 
 
 @scalar
@@ -78,6 +81,18 @@ def rotor_thrust_controls(act: Sequence[float]) -> Quad:
 
 
 @scalar
+def servo_commands(planned: TiltsAndRates, share: float, lead: float) -> Quad:
+    """Commands (rad) of the tilt servos for a ``share`` of the planned gait."""
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = planned
+    return (
+        share * (a1 + lead * rate_1),
+        share * (a2 + lead * rate_2),
+        share * (a3 + lead * rate_3),
+        share * (a4 + lead * rate_4),
+    )
+
+
+@scalar
 def tiltrotor_controls(
     time: float,
     qpos: Sequence[float],
@@ -92,12 +107,13 @@ def tiltrotor_controls(
     follows a moving gait and not only a resting one.
     """
     law = parameters.law
-    lead = parameters.servo_lead
-    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, law.gait, table)
+    state = tiltrotor_state(qpos, qvel, act)
+    planned = tilt_reference(time, law.gait, table)
+    share = gait_share(planned, state[6], state[7], parameters.supervisor, drag_ratio(law.vehicle))
     return (
-        *(a1 + lead * rate_1, a2 + lead * rate_2, a3 + lead * rate_3, a4 + lead * rate_4),
+        *servo_commands(planned, share, parameters.servo_lead),
         *rotor_thrust_controls(act),
-        *rotor_accelerations(time, tiltrotor_state(qpos, qvel, act), law, table),
+        *rotor_accelerations(time, state, law, table),
     )
 
 
@@ -133,6 +149,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
             decoupler=DECOUPLERS[controller.decoupler],
             decoupling=DECOUPLINGS[controller.decoupling],
         ),
+        supervisor=controller.resolve_supervisor(),
     )
     return ControlSetup(parameters, table)
 
@@ -163,7 +180,7 @@ def gait_singularity(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict[st
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    law, table = setup.parameters.law, setup.table
+    law, table, supervisor = setup.parameters.law, setup.table, setup.parameters.supervisor
     ratio = drag_ratio(law.vehicle)
     states = np.stack([samples[name] for name in STATE_FIELDS], axis=-1).tolist()
     rows = []
@@ -172,7 +189,9 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
         torque = torque_entries(trig, ratio)
         position = position_reference(time, law.reference, table)[:3]
         attitude = attitude_reference(time, state, trig, torque, law, table)[:3]
-        rows.append((*position, *attitude, *tilt_reference(time, law.gait, table)[:4]))
+        planned = tilt_reference(time, law.gait, table)
+        share = gait_share(planned, state[6], state[7], supervisor, ratio)
+        rows.append((*position, *attitude, *servo_commands(planned, share, 0.0)))
     names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)
     values = np.array(rows).reshape(len(rows), len(names))
     return dict(zip(names, values.T, strict=True)) | gait_singularity(samples, law.vehicle)
