@@ -56,6 +56,9 @@ class ReferenceParameters(NamedTuple):
     phase_z: float = 0.0
     segments: float = 0.0  # number of rows of the table, waypoints
     offset: float = 0.0  # where in the table of the flight they begin, waypoints
+    acceleration_x: float = 0.0  # m/s^2, line
+    acceleration_y: float = 0.0
+    acceleration_z: float = 0.0
 
 
 @scalar
@@ -106,15 +109,20 @@ def reference_derivatives(
         )
     if reference.type == WAYPOINTS:
         return waypoint_motion(time, reference.segments, reference.offset, table)
-    still = 0.0 if reference.type == SETPOINT else 1.0
-    vx, vy, vz = (
-        still * reference.velocity_x,
-        still * reference.velocity_y,
-        still * reference.velocity_z,
-    )
+    if reference.type == SETPOINT:
+        return (
+            *(reference.x, reference.y, reference.z),
+            *(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        )
+    vx, vy, vz = reference.velocity_x, reference.velocity_y, reference.velocity_z
+    ax, ay, az = reference.acceleration_x, reference.acceleration_y, reference.acceleration_z
+    half = 0.5 * time * time
     return (
-        *(reference.x + vx * time, reference.y + vy * time, reference.z + vz * time),
-        *(vx, vy, vz, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        reference.x + vx * time + ax * half,
+        reference.y + vy * time + ay * half,
+        reference.z + vz * time + az * half,
+        *(vx + ax * time, vy + ay * time, vz + az * time),
+        *(ax, ay, az, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     )
 
 
@@ -153,14 +161,17 @@ def position_reference(
             *(motion[0], motion[1], motion[2], motion[3], motion[4], motion[5]),
             *(known * motion[6], known * motion[7], known * motion[8]),
         )
+    ax, ay, az = reference.acceleration_x, reference.acceleration_y, reference.acceleration_z
+    half = 0.5 * time * time
+    feedforward = reference.acceleration_feedforward
     return (
-        reference.x + reference.velocity_x * time,
-        reference.y + reference.velocity_y * time,
-        reference.z + reference.velocity_z * time,
-        reference.velocity_x,
-        reference.velocity_y,
-        reference.velocity_z,
-        0.0,
-        0.0,
-        0.0,
+        reference.x + reference.velocity_x * time + ax * half,
+        reference.y + reference.velocity_y * time + ay * half,
+        reference.z + reference.velocity_z * time + az * half,
+        reference.velocity_x + ax * time,
+        reference.velocity_y + ay * time,
+        reference.velocity_z + az * time,
+        feedforward * ax,
+        feedforward * ay,
+        feedforward * az,
     )

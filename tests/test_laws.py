@@ -16,6 +16,7 @@ from controllers.vehicle import PRESETS
 from tiltsim.errors import InputError
 from tiltsim.files import load_flight
 from tiltsim.flight import COLUMN_UNITS
+from tiltsim.kinds.rotorcraft import ROTORCRAFT
 from tiltsim.loops import LOOPS, loop_of
 from tiltsim.model import compile_model
 from tiltsim.plants import MujocoPlant, make_plant
@@ -88,7 +89,8 @@ def fly(law, simulation=None, **tables):
 
 
 def test_every_law_is_here():
-    assert set(LAWS) == set(LOOPS)
+    # Those of the tilt-car have tests of their own.
+    assert set(LAWS) == {name for name, loop in LOOPS.items() if loop.kind is ROTORCRAFT}
 
 
 @each_law

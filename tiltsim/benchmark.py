@@ -43,7 +43,7 @@ def bench_single(integrator: str, rounds: int = ROUNDS) -> list[dict[str, Any]]:
     plant = flying_plant(integrator)
     model, data, state = plant.model, plant.data, plant.state
     callbacks = {"bare": None} | {
-        name: make_engine(name, TILTROTOR, model, data).continuous() for name in ENGINES
+        name: make_engine(name, TILTROTOR, model, data).callback() for name in ENGINES
     }
     seconds: dict[str, list[float]] = {name: [] for name in callbacks}
     for turn in range(rounds + 1):

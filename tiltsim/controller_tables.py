@@ -10,6 +10,9 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 import controllers.full_pose as full_pose
 import controllers.quadrotor_attitude_altitude as quadrotor_attitude_altitude
+import controllers.tilt_car.fourth_derivative as fourth_derivative
+import controllers.tilt_car.planned_direction as planned_direction
+import controllers.tilt_car.third_derivative as third_derivative
 import controllers.yaw_position as yaw_position
 from controllers.attitude_altitude import DECOUPLINGS, Gains
 from controllers.gains import (
@@ -25,7 +28,7 @@ from controllers.supervisor import Supervisor
 from controllers.switching import PUBLISHED_ZONE
 from controllers.vehicle import Vehicle
 from tiltsim.messages import InvalidValueError
-from tiltsim.tables import Gains2, NonNegative, Positive, Table, Vector3
+from tiltsim.tables import Gains2, Gains4, NonNegative, Positive, Table, Vector3
 
 DEFAULT_LAW: Final = "attitude_altitude"
 
@@ -38,11 +41,12 @@ class LawTable(Table, ABC):
 
     vehicle_model: ClassVar[str]
     reference_kinds: ClassVar[tuple[ReferenceKind, ...]]
+    gait_types: ClassVar[tuple[str, ...]] = ("fixed",)  # of laws around the tilt-car
 
     allow_unstable: bool = Field(False, description="fly gains that fail the Routh condition")
 
     @abstractmethod
-    def closed_loops(self, vehicle: Vehicle) -> list[Loop]:
+    def closed_loops(self, vehicle: Any) -> list[Loop]:
         """The linear closed loops that the gains make."""
 
     @property
@@ -437,6 +441,99 @@ def _attitude_loops(gains: quadrotor_attitude_altitude.Gains) -> list[Loop]:
     return [linear_loop("altitude", gains[:2]), linear_loop("attitude", gains[2:])]
 
 
+# --- tilt-car ----------------------------------------------------------------------------------
+
+
+class ThirdDerivativeController(LawTable):
+    """Third-derivative feedback linearization of the tilt-car (ch. 10, Sec. 3.1)."""
+
+    vehicle_model = "tilt_car"
+    reference_kinds = ("position",)
+
+    law: Literal["tilt_car_third_derivative"]
+    gains: Annotated[
+        Annotated[Literal["ch10"], Tag("named")] | Annotated[Vector3, Tag("table")],
+        Discriminator(_gain_kind),
+    ] = Field("ch10", description="a set by name, or gains on acceleration, velocity and position")
+    restoring_rate: NonNegative = Field(
+        0.0, description="1/s, of turning the thrusts' middle to the acceleration; 0 as published"
+    )
+
+    def resolve_gains(self) -> third_derivative.Gains:
+        """The numbers behind a named set or a list."""
+        if isinstance(self.gains, str):
+            return third_derivative.GAIN_SETS[self.gains]
+        return third_derivative.Gains(*self.gains)
+
+    def closed_loops(self, vehicle: Any) -> list[Loop]:
+        """See `LawTable.closed_loops`."""
+        return [linear_loop("position", self.resolve_gains())]
+
+
+class FourthDerivativeController(LawTable):
+    """Fourth-derivative feedback linearization of the tilt-car (ch. 10, Sec. 6.1)."""
+
+    vehicle_model = "tilt_car"
+    reference_kinds = ("position",)
+
+    law: Literal["tilt_car_fourth_derivative"]
+    decoupling: Literal["published", "exact"] = Field(
+        "exact", description="the tilt's column as printed, or with the yaw's answer"
+    )
+    anti_windup: bool = Field(
+        False, description="whether the rotor speeds that the law integrates stop at zero"
+    )
+    gains: Annotated[
+        Annotated[Literal["ch10"], Tag("named")] | Annotated[Gains4, Tag("table")],
+        Discriminator(_gain_kind),
+    ] = Field(
+        "ch10", description="a set by name, or gains on jerk, acceleration, velocity and position"
+    )
+
+    def resolve_gains(self) -> fourth_derivative.Gains:
+        """The numbers behind a named set or a list."""
+        if isinstance(self.gains, str):
+            return fourth_derivative.GAIN_SETS[self.gains]
+        return fourth_derivative.Gains(*self.gains)
+
+    def closed_loops(self, vehicle: Any) -> list[Loop]:
+        """See `LawTable.closed_loops`."""
+        return [linear_loop("position", self.resolve_gains())]
+
+
+class PlannedDirectionGainTable(Table):
+    """Gains of the planned-direction law written out."""
+
+    x: Gains2 = Field(description="K_X1, K_X2, on velocity and position")
+    y: Gains2 = Field(description="K_Y1, K_Y2, on velocity and position")
+
+
+class PlannedDirectionController(LawTable):
+    """Control of the tilt-car with its thrusts' direction planned (ch. 10, Sec. 5; ch. 11)."""
+
+    vehicle_model = "tilt_car"
+    reference_kinds = ("position",)
+    gait_types = ("penguin_small", "penguin_large", "rotating")
+
+    law: Literal["tilt_car_planned_direction"]
+    gains: Annotated[
+        Annotated[Literal["ch10", "ch11"], Tag("named")]
+        | Annotated[PlannedDirectionGainTable, Tag("table")],
+        Discriminator(_gain_kind),
+    ] = "ch11"
+
+    def resolve_gains(self) -> planned_direction.Gains:
+        """The numbers behind a named set or a table."""
+        if isinstance(self.gains, PlannedDirectionGainTable):
+            return planned_direction.Gains(*self.gains.x, *self.gains.y)
+        return planned_direction.GAIN_SETS[self.gains]
+
+    def closed_loops(self, vehicle: Any) -> list[Loop]:
+        """See `LawTable.closed_loops`."""
+        gains = self.resolve_gains()
+        return [linear_loop("x", gains[:2]), linear_loop("y", gains[2:])]
+
+
 # --- the table, told apart by its law ----------------------------------------------------------
 
 
@@ -452,7 +549,10 @@ Controller = Annotated[
     | Annotated[FullPoseController, Tag("full_pose")]
     | Annotated[YawPositionController, Tag("yaw_position")]
     | Annotated[SwitchingController, Tag("switching")]
-    | Annotated[QuadrotorAttitudeAltitudeController, Tag("quadrotor_attitude_altitude")],
+    | Annotated[QuadrotorAttitudeAltitudeController, Tag("quadrotor_attitude_altitude")]
+    | Annotated[ThirdDerivativeController, Tag("tilt_car_third_derivative")]
+    | Annotated[FourthDerivativeController, Tag("tilt_car_fourth_derivative")]
+    | Annotated[PlannedDirectionController, Tag("tilt_car_planned_direction")],
     Discriminator(_law),
 ]
 """The ``[controller]`` table, told apart by its law."""

@@ -11,16 +11,31 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from controllers.attitude_altitude import STATE_FIELDS
 from controllers.records import flatten, record_dtype, record_size
+from tiltsim.kinds import Kind
+from tiltsim.kinds.rotorcraft import ROTORCRAFT
 
 if TYPE_CHECKING:
     from tiltsim.scenario import Scenario
 
 Floats = npt.NDArray[np.float64]
 
-OBSERVED_FIELDS: Final = (*STATE_FIELDS, *(f"alpha_rate_{rotor}" for rotor in (1, 2, 3, 4)))
-"""What every loop can tell of its vehicle: rigid body, tilts, rotor speeds, tilt rates."""
+
+class Header(NamedTuple):
+    """What `userdata` begins with, before the parameters of the law.
+
+    A held law counts the evaluations of the callback, so that it needs nothing but MuJoCo's state
+    to know when to sample: a saved state restarts between two samples, too.
+    """
+
+    control_period: float = 0.0  # evaluations between samples of a held law; 0 if continuous
+    evaluations: float = 0.0  # since the last sample
+    recorder: float = 0.0  # address of the memory that samples go to, 0 while none are recorded
+
+
+HEADER_SIZE: Final = len(Header._fields)
+CONTROL_PERIOD, EVALUATIONS, RECORDER = range(HEADER_SIZE)
+"""Where in `userdata` the fields of the `Header` lie."""
 
 
 class Sizes(NamedTuple):
@@ -40,7 +55,7 @@ class ControlSetup(NamedTuple):
 
     @property
     def userdata(self) -> Floats:
-        """Record and table as MuJoCo's `userdata` holds them."""
+        """Record and table as MuJoCo's `userdata` holds them after its `Header`."""
         return np.array([*flatten(self.parameters), *self.table])
 
 
@@ -67,8 +82,8 @@ class Equations:
     initial
         ``(scenario, setup) -> state`` at time zero.
     observe
-        ``(time, state, inputs, setup) -> values`` of the loop's `sample_fields` after the time;
-        ``inputs()`` gives the inputs in force.
+        Scalar function ``(time, state, inputs, parameters, table) -> values`` of the loop's
+        `sample_fields` after the time; ``inputs`` are those in force.
     """
 
     inputs: Callable[..., tuple[float, ...]]
@@ -102,23 +117,30 @@ class Loop:
     initial_activations
         ``(scenario, setup) -> act`` at time zero.
     observe
-        ``(qpos, qvel, act, controls) -> values`` of `OBSERVED_FIELDS` and ``law_fields``;
-        ``controls()`` gives the controls in force.
+        Scalar function ``(qpos, qvel, act, ctrl) -> values`` of the kind's fields and
+        ``law_fields``; ``ctrl`` are the controls in force if it ``observes_controls``.
     derive
         ``(samples by field, setup) -> columns``: references, determinant, margin and
         ``extra_columns``.
     watched
         ``(sample by field, setup) -> Watched, ...``: where the law ends.
+    watch
+        Scalar function ``(values, parameters) -> numbers``: at least the numbers of ``watched``,
+        from ``values`` as ``observe`` gives them. None leaves watching to Python.
+    observes_controls
+        Whether ``observe`` reads the controls in force.
     law_states
         Number of activations that are states of the law.
     law_fields
-        Fields of a sample beyond `OBSERVED_FIELDS`.
+        Fields of a sample beyond those of the vehicle's kind.
     extra_columns
         Columns of a flight that other loops do not have, with their units.
     follows_position
         Whether a scenario has the law follow the reference's horizontal position.
     equations
         The same law on the thesis' own equations.
+    kind
+        What holds for all loops around such a vehicle.
     """
 
     model: str
@@ -132,10 +154,13 @@ class Loop:
     derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
     watched: Callable[[Mapping[str, float], ControlSetup], tuple[Watched, ...]]
     equations: Equations
+    watch: Callable[..., tuple[float, ...]] | None = None
+    observes_controls: bool = False
     law_states: int = 0
     law_fields: tuple[str, ...] = ()
     extra_columns: Mapping[str, str] = field(default_factory=dict)
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
+    kind: Kind = ROTORCRAFT
 
     @cached_property
     def signature(self) -> float:
@@ -151,4 +176,9 @@ class Loop:
     @cached_property
     def sample_fields(self) -> tuple[str, ...]:
         """What a recorded sample holds, in order."""
-        return ("time", *OBSERVED_FIELDS, *self.law_fields)
+        return ("time", *self.kind.observed_fields, *self.law_fields)
+
+    @cached_property
+    def units(self) -> dict[str, str]:
+        """The columns of a flight and their units, in order."""
+        return dict(self.kind.columns) | dict(self.extra_columns)

@@ -265,7 +265,7 @@ def _compose(
     The arguments are `compile_model`'s, found valid. A flight is flown on the one and shown on the
     other, so both are made at once.
     """
-    root = _parse(shipped_folder("mjcf") / f"{model}.xml")
+    root = parse_mjcf(shipped_folder("mjcf") / f"{model}.xml")
     tilting = model == "tiltrotor"
     stops = tilting and tilt_servo.max_angle is not None
 
@@ -283,7 +283,7 @@ def _compose(
         _set_servos(root, tilt_servo, pod)
     _set_keyframe(root.keyframe.key["hover"], vehicle.hover_rotor_speed)
     _set_keyframe(root.keyframe.key["start"], START_SPEED)
-    _add_law_states(root, law_states)
+    add_law_states(root, law_states)
     if ground is not None:
         _set_ground(root, ground)
     whole = str(root.to_xml_string())
@@ -293,7 +293,8 @@ def _compose(
     return whole, str(root.to_xml_string())
 
 
-def _parse(path: Path) -> Any:
+def parse_mjcf(path: Path) -> Any:
+    """An MJCF file as dm_control's tree."""
     with warnings.catch_warnings():
         # dm_control tries its window systems on import; without a screen GLFW complains.
         warnings.filterwarnings("ignore", module="glfw")
@@ -384,7 +385,7 @@ def _set_keyframe(key: Any, rotor_speed: float) -> None:
     key.ctrl = ctrl
 
 
-def _add_law_states(root: Any, count: int) -> None:
+def add_law_states(root: Any, count: int) -> None:
     """Append integrators that act on nothing; in the keyframes they rest at zero."""
     for index in range(1, count + 1):
         root.actuator.add(

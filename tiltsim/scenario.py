@@ -9,14 +9,15 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from functools import lru_cache
 from math import pi
-from typing import Annotated, Final, Literal, Self, get_args
+from typing import Annotated, Any, Final, Literal, Self, get_args
 
 import numpy as np
-from pydantic import ConfigDict, Field, PrivateAttr, model_validator
+from pydantic import ConfigDict, Discriminator, Field, PrivateAttr, Tag, model_validator
 
 from controllers.gaits.keyframes import NO_KEYFRAMES
 from controllers.references import REFERENCE_TYPES, ReferenceParameters
 from controllers.stability import Loop
+from controllers.tilt_car.vehicle import THESIS_CAR, TiltCar
 from controllers.vehicle import PRESETS, Vehicle
 from controllers.waypoints import minimum_snap_table
 from tiltsim.controller_tables import AttitudeAltitudeController, Controller, ReferenceKind
@@ -28,7 +29,9 @@ from tiltsim.tables import (
     Angles3,
     NonNegative,
     Positive,
+    Positive2,
     Positive4,
+    Range,
     Table,
     Vector3,
 )
@@ -51,14 +54,29 @@ MAX_SERVO_STEP: Final = 2.6
 # --- [vehicle] ---------------------------------------------------------------------------------
 
 
-class TiltServoTable(Table):
-    """The servos that tilt the pods: second order, ideal but for what is given here."""
+class ServoTable(Table):
+    """A position servo: second order, ideal but for what is given here."""
 
     natural_frequency: Positive = Field(300.0, description="rad/s")
     damping_ratio: Positive = 1.0
+
+    @property
+    def stops(self) -> bool:
+        """Whether the servo has mechanical stops."""
+        return False
+
+
+class TiltServoTable(ServoTable):
+    """The servos that tilt the pods."""
+
     max_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
         None, description="rad; the gait must stay within"
     )
+
+    @property
+    def stops(self) -> bool:
+        """Whether the servo has mechanical stops."""
+        return self.max_angle is not None
 
 
 class PodTable(Table):
@@ -71,7 +89,7 @@ class PodTable(Table):
 
 
 class VehicleTable(Table):
-    """The vehicle: a preset and what differs from it."""
+    """A rotorcraft: a preset and what differs from it."""
 
     model: Literal["tiltrotor", "quadrotor"] = "tiltrotor"
     preset: Literal["ar_drone_2", "ar_drone_2_unrounded", "luukkonen"] = "ar_drone_2"
@@ -115,6 +133,52 @@ class VehicleTable(Table):
             )
         return self
 
+
+class TiltCarTable(Table):
+    """The tilt-car of ch. 10; the defaults are `controllers.tilt_car.vehicle.THESIS_CAR`."""
+
+    model: Literal["tilt_car"]
+    mass: Positive = Field(THESIS_CAR.mass, description="kg; the thesis does not give it")
+    top_inertia: Positive = Field(
+        THESIS_CAR.top_inertia, description="I_T, of the top disc about the axis, kg m^2"
+    )
+    bottom_inertia: Positive = Field(
+        THESIS_CAR.bottom_inertia,
+        description="of the bottom disc alone about the axis, kg m^2; I_B is both discs'",
+    )
+    half_angle: Annotated[float, Field(gt=0.0, lt=pi / 2)] = Field(
+        THESIS_CAR.half_angle, description="theta, from the middle of the thrusts to either, rad"
+    )
+    thrust_coefficient: Positive = Field(
+        THESIS_CAR.thrust_coefficient, description="K_F, N s^2/rad^2"
+    )
+    tilt_servo: ServoTable = ServoTable()
+
+    def resolve(self) -> TiltCar:
+        """The physical parameters."""
+        return TiltCar(
+            self.mass,
+            self.top_inertia,
+            self.bottom_inertia,
+            self.half_angle,
+            self.thrust_coefficient,
+        )
+
+
+def _model(value: Any) -> str:
+    if isinstance(value, VehicleTable | TiltCarTable):
+        return "tilt_car" if isinstance(value, TiltCarTable) else "tiltrotor"
+    model = value.get("model", "tiltrotor") if isinstance(value, dict) else "tiltrotor"
+    if not isinstance(model, str):
+        return ""
+    return "tiltrotor" if model == "quadrotor" else model
+
+
+VehicleUnion = Annotated[
+    Annotated[VehicleTable, Tag("tiltrotor")] | Annotated[TiltCarTable, Tag("tilt_car")],
+    Discriminator(_model),
+]
+"""The ``[vehicle]`` table, told apart by its model."""
 
 # --- [simulation] and [initial] ----------------------------------------------------------------
 
@@ -180,15 +244,14 @@ class InitialTable(Table):
     velocity: Vector3 = Field((0.0, 0.0, 0.0), description="m/s, world")
     attitude: Angles3 = Field((0.0, 0.0, 0.0), description="roll, pitch, yaw, rad")
     angular_velocity: Vector3 = Field((0.0, 0.0, 0.0), description="p, q, r, rad/s, body")
-    rotor_speed: Positive | Positive4 = Field(
-        300.0, description="absolute value, rad/s; one for all rotors or four"
+    rotor_speed: Positive | Positive4 | Positive2 = Field(
+        300.0, description="absolute value, rad/s; one for all rotors, or one each"
     )
 
-    @property
-    def rotor_speeds(self) -> tuple[float, float, float, float]:
-        """Absolute rotor speeds, one each."""
+    def rotor_speeds(self, rotors: int) -> tuple[float, ...]:
+        """Absolute rotor speeds of so many rotors, one each."""
         speed = self.rotor_speed
-        return speed if isinstance(speed, tuple) else (speed, speed, speed, speed)
+        return speed if isinstance(speed, tuple) else (speed,) * rotors
 
 
 # --- [reference] -------------------------------------------------------------------------------
@@ -255,18 +318,22 @@ class SetpointReference(_PositionReference):
 
 
 class LineReference(_PositionReference):
-    """Uniform motion along a line."""
+    """Motion along a line, uniform or at a constant acceleration."""
 
     type: Literal["line"]
     position: Vector3 = Field((0.0, 0.0, 0.0), description="m, at time zero")
-    velocity: Vector3 = Field(description="m/s")
+    velocity: Vector3 = Field(description="m/s, at time zero")
+    acceleration: Vector3 = Field((0.0, 0.0, 0.0), description="m/s^2")
 
     @property
     def parameters(self) -> ReferenceParameters:
         """The record that the law reads."""
-        vx, vy, vz = self.velocity
-        own = {"velocity_x": vx, "velocity_y": vy, "velocity_z": vz}
-        return self._parameters(self.type, self.position, **own)
+        return self._parameters(
+            self.type,
+            self.position,
+            **_by_axis("velocity", self.velocity),
+            **_by_axis("acceleration", self.acceleration),
+        )
 
 
 class CircleReference(_PositionReference):
@@ -433,7 +500,20 @@ class Expectation(Table):
     """A bound on a metric, judged after the flight."""
 
     metric: str
-    published: float | None = Field(None, description="the thesis' figure, shown beside ours")
+    claim: str = Field("", description="what the thesis states, in our words, for the report")
+    published: float | bool | None = Field(
+        None,
+        description="the thesis' figure, shown beside ours; true or false: does the metric, or the "
+        "statement that it lies within the bounds, hold in the thesis",
+    )
+    published_tolerance: NonNegative | None = Field(
+        None, description="how near counts as reproduced; default: half a unit of the last digit"
+    )
+    in_kind: Range | None = Field(
+        None, description="where the claim still holds though the number differs"
+    )
+    wrong: bool = Field(False, description="the claim is refuted, not merely not seen; needs why")
+    why: str = Field("", description="the reason where the claim does not come out")
     min: float | None = None
     max: float | None = None
     equals: bool | None = Field(None, description="for metrics that are true or false")
@@ -455,7 +535,33 @@ class Expectation(Table):
             raise InvalidValueError("expect.metric", self.metric, "a number: give min, max or both")
         if self.min is not None and self.max is not None and self.min > self.max:
             raise InvalidValueError("expect.min", self.min, f"must not exceed max = {self.max}")
+        self._check_claim(boolean)
         return self
+
+    def _check_claim(self, boolean: bool) -> None:
+        published = self.published
+        if boolean and published is not None and not isinstance(published, bool):
+            raise InvalidValueError(
+                "expect.published", published, f"{self.metric} is true or false"
+            )
+        if published is None:
+            for key in ("claim", "why", "wrong"):
+                if getattr(self, key):
+                    raise InvalidValueError(
+                        f"expect.{key}",
+                        getattr(self, key),
+                        "needs published: a number, true, false",
+                    )
+        if published is None or isinstance(published, bool):
+            for key in ("published_tolerance", "in_kind"):
+                if getattr(self, key) is not None:
+                    raise InvalidValueError(
+                        f"expect.{key}", getattr(self, key), "needs a published number"
+                    )
+        if self.wrong and not self.why:
+            raise InvalidValueError("expect.wrong", True, "needs why")
+        if self.in_kind is not None and not self.in_kind[0] <= self.in_kind[1]:
+            raise InvalidValueError("expect.in_kind", self.in_kind, "write [low, high]")
 
 
 # --- the whole ---------------------------------------------------------------------------------
@@ -466,7 +572,7 @@ class Scenario(Table):
 
     title: str = ""
     source: str = ""
-    vehicle: VehicleTable = VehicleTable()
+    vehicle: VehicleUnion = VehicleTable()
     simulation: SimulationTable = SimulationTable()
     initial: InitialTable = InitialTable()
     controller: Controller = AttitudeAltitudeController()
@@ -483,6 +589,20 @@ class Scenario(Table):
         """How the scenario is called on the command line; empty when it was built in Python."""
         return self._address
 
+    @property
+    def rotorcraft(self) -> VehicleTable:
+        """The vehicle of a tiltrotor or quadrotor. Raises TypeError for other vehicles."""
+        if not isinstance(self.vehicle, VehicleTable):
+            raise TypeError(f"the {self.vehicle.model} is no rotorcraft")
+        return self.vehicle
+
+    @property
+    def tilt_car(self) -> TiltCarTable:
+        """The vehicle of a tilt-car. Raises TypeError for other vehicles."""
+        if not isinstance(self.vehicle, TiltCarTable):
+            raise TypeError(f"the {self.vehicle.model} is no tilt-car")
+        return self.vehicle
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         self._check_law()
@@ -494,6 +614,11 @@ class Scenario(Table):
         self._check_stability()
         return self
 
+    def reference_and_table(self) -> tuple[ReferenceParameters, tuple[float, ...]]:
+        """The reference's record, and the table of the flight: the gait's and the reference's."""
+        gait = self.gait.plan(self.vehicle.resolve())
+        return self.reference.placed(gait.table)
+
     def _check_law(self) -> None:
         law, model = self.controller.law, self.vehicle.model
         if self.controller.vehicle_model != model:
@@ -503,9 +628,17 @@ class Scenario(Table):
                 f"flies the {self.controller.vehicle_model}, and vehicle.model = {model!r}; "
                 f"choose {', '.join(_laws_of(model))}",
             )
+        rotors = 2 if model == "tilt_car" else 4
+        speed = self.initial.rotor_speed
+        if isinstance(speed, tuple) and len(speed) != rotors:
+            raise InvalidValueError(
+                "initial.rotor_speed", speed, f"the {model} has {rotors} rotors; give one or all"
+            )
+        if model == "tilt_car":
+            self._check_plane()
         if model != "quadrotor":
             return
-        vehicle = self.vehicle
+        vehicle = self.rotorcraft
         for key, value, default in (
             ("gait.type", self.gait.type, "fixed"),
             ("gait", self.gait.model_dump(), FixedGait().model_dump()),
@@ -522,6 +655,46 @@ class Scenario(Table):
                     "the quadrotor has no use for it: its rotors do not tilt, and "
                     "make the thrust that its law asks for at once",
                 )
+
+    def _check_plane(self) -> None:
+        """Refuse what would lift a tilt-car off its plane, or yaw it where yaw is no output."""
+        initial, reference = self.initial, self.reference
+        vectors: dict[str, tuple[tuple[float, ...], slice]] = {
+            "initial.position": (initial.position, slice(2, 3)),
+            "initial.velocity": (initial.velocity, slice(2, 3)),
+            "initial.attitude": (initial.attitude, slice(0, 2)),
+            "initial.angular_velocity": (initial.angular_velocity, slice(0, 2)),
+        }
+        for name in ("position", "velocity", "acceleration"):
+            vector = getattr(reference, name, None)
+            if vector is not None:
+                vectors[f"reference.{name}"] = (vector, slice(2, 3))
+        for key, (vector, upwards) in vectors.items():
+            if any(vector[upwards]):
+                raise InvalidValueError(
+                    key,
+                    vector,
+                    "the tilt_car stays on its plane: x, y and yaw alone may differ from 0",
+                )
+        if reference.yaw != 0.0:
+            raise InvalidValueError(
+                "reference.yaw", reference.yaw, "yaw is no output of the tilt_car's laws"
+            )
+        wanted = self.controller.gait_types
+        if self.gait.type not in wanted:
+            raise InvalidValueError(
+                "gait.type",
+                self.gait.type,
+                f"the {self.controller.law} law takes none; leave the table out"
+                if wanted == ("fixed",)
+                else f"the {self.controller.law} law needs one of {', '.join(wanted)}",
+            )
+        if wanted == ("fixed",) and self.gait != FixedGait():
+            raise InvalidValueError(
+                "gait",
+                self.gait.model_dump(mode="json"),
+                f"the {self.controller.law} law moves the tilt itself; leave the table out",
+            )
 
     def _check_reference(self) -> None:
         controller, reference = self.controller, self.reference
@@ -542,6 +715,10 @@ class Scenario(Table):
                 )
             raise InvalidValueError(
                 "reference.type", reference.type, f"the {controller.law} law cannot follow it"
+            )
+        if reference.type == "waypoints" and self.vehicle.model == "tilt_car":
+            raise InvalidValueError(
+                "reference.type", reference.type, "the tilt_car's laws cannot follow it"
             )
         own = isinstance(controller, AttitudeAltitudeController)
         exact = isinstance(controller, AttitudeAltitudeController) and (
@@ -581,7 +758,7 @@ class Scenario(Table):
             gait = self.gait.plan(self.vehicle.resolve())
         except ValueError as error:
             raise InvalidValueError(f"gait.{key}", value, str(error)) from None
-        limit = self.vehicle.tilt_servo.max_angle
+        limit = getattr(self.vehicle.tilt_servo, "max_angle", None)
         if limit is not None and gait.amplitude > limit:
             raise InvalidValueError(
                 f"gait.{key}",
@@ -611,6 +788,10 @@ class Scenario(Table):
     def _check_ground(self) -> None:
         if self.ground is None:
             return
+        if self.vehicle.model == "tilt_car":
+            raise InvalidValueError(
+                "ground", self.ground.model_dump(), "the tilt_car moves in a plane without one"
+            )
         if self.simulation.plant == "thesis":
             raise InvalidValueError(
                 "simulation.plant", "thesis", "the thesis' equations know no ground; use mujoco"
@@ -623,6 +804,8 @@ class Scenario(Table):
             )
 
     def _check_rotor_limits(self) -> None:
+        if not isinstance(self.vehicle, VehicleTable):
+            return
         low, high = self.vehicle.min_rotor_speed, self.vehicle.max_rotor_speed
         if self.simulation.plant == "thesis" and (low is not None or high is not None):
             raise InvalidValueError(
@@ -630,7 +813,7 @@ class Scenario(Table):
                 "thesis",
                 "the thesis' equations know no rotor limits; use mujoco",
             )
-        for speed in self.initial.rotor_speeds:
+        for speed in self.initial.rotor_speeds(4):
             if (low is not None and speed < low) or (high is not None and speed > high):
                 raise InvalidValueError(
                     "initial.rotor_speed",
@@ -642,7 +825,7 @@ class Scenario(Table):
         servo, timestep = self.vehicle.tilt_servo, self.simulation.timestep
         # The fastest pole of the servo must stay where explicit integration is stable.
         fastest = servo.natural_frequency * max(1.0, 2.0 * servo.damping_ratio)
-        tilts = self.vehicle.model == "tiltrotor"
+        tilts = self.vehicle.model != "quadrotor"
         if tilts and self.simulation.plant == "mujoco" and fastest * timestep > MAX_SERVO_STEP:
             raise InvalidValueError(
                 "simulation.timestep",
@@ -655,7 +838,8 @@ class Scenario(Table):
         controller = self.controller
         if controller.allow_unstable:
             return
-        for loop in controller.closed_loops(self.vehicle.resolve()):
+        vehicle: Any = self.vehicle.resolve()  # each law's table takes its own vehicle's
+        for loop in controller.closed_loops(vehicle):
             if not loop.stable:
                 raise InvalidValueError(
                     "controller.gains",

@@ -122,7 +122,7 @@ def _rotor_speeds(axes: Any, flight: Flight) -> None:
     for rotor, spin, line in zip(_ROTORS, SPIN, _ROTOR_LINES, strict=True):
         speed = spin * flight[f"rotor_speed_{rotor}"]
         axes.plot(flight["time"], speed, label=f"{rotor}", **line)
-    vehicle = flight.scenario.vehicle
+    vehicle = flight.scenario.rotorcraft
     for limit in (vehicle.min_rotor_speed, vehicle.max_rotor_speed):
         if limit is not None:
             axes.axhline(limit, color=style.RED, ls="--", lw=0.9)
@@ -164,7 +164,7 @@ def _plan_view(axes: Any, flight: Flight) -> None:
 
 def _roll_pitch_plane(axes: Any, flight: Flight) -> None:
     """The attitudes flown, those out of reach, and the closest approach to a singular one."""
-    n = torque_free_directions(flight.columns, flight.scenario.vehicle.resolve())
+    n = torque_free_directions(flight.columns, flight.scenario.rotorcraft.resolve())
     margin = flight["singularity_margin"]
     closest = int(np.argmin(np.abs(margin)))
     side = float(np.sign(margin[0])) or 1.0

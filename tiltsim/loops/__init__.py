@@ -8,6 +8,9 @@ from tiltsim.loops.full_pose import FULL_POSE
 from tiltsim.loops.gait_feedforward import GAIT_FEEDFORWARD
 from tiltsim.loops.quadrotor_attitude_altitude import QUADROTOR_ATTITUDE_ALTITUDE
 from tiltsim.loops.switching import SWITCHING
+from tiltsim.loops.tilt_car_fourth_derivative import FOURTH_DERIVATIVE
+from tiltsim.loops.tilt_car_planned_direction import PLANNED_DIRECTION
+from tiltsim.loops.tilt_car_third_derivative import THIRD_DERIVATIVE
 from tiltsim.loops.tiltrotor import TILTROTOR
 from tiltsim.loops.yaw_position import YAW_POSITION
 
@@ -22,6 +25,9 @@ LOOPS: Final[dict[str, Loop]] = {
     "yaw_position": YAW_POSITION,
     "switching": SWITCHING,
     "quadrotor_attitude_altitude": QUADROTOR_ATTITUDE_ALTITUDE,
+    "tilt_car_third_derivative": THIRD_DERIVATIVE,
+    "tilt_car_fourth_derivative": FOURTH_DERIVATIVE,
+    "tilt_car_planned_direction": PLANNED_DIRECTION,
 }
 """Loops by the name of their law; see `tiltsim.controller_tables.LawTable.loop_name`."""
 
@@ -46,5 +52,7 @@ def law_in_words(scenario: Scenario) -> list[str]:
     """The law of a scenario for titles, most telling first."""
     controller = scenario.controller
     words = [f"{controller.law.replace('_', '-')} law"]
+    if getattr(controller, "gait_rate_feedforward", False):
+        words.append("gait rates fed forward")
     decoupler = getattr(controller, "decoupler", "none")  # only laws that lean to steer have one
     return words if decoupler == "none" else [f"{decoupler} decoupler", *words]

@@ -25,6 +25,8 @@ from tiltsim.loops.tiltrotor import (
     gait_singularity,
     initial_rotor_speeds,
     observe_tiltrotor,
+    regularity,
+    rotor_spins,
     rotor_stops,
     rotor_thrust_controls,
     servo_commands,
@@ -89,9 +91,9 @@ def refreshed_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[flo
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, AttitudeAltitudeController)
-    vehicle = scenario.vehicle.resolve()
+    vehicle = scenario.rotorcraft.resolve()
     gait = scenario.gait.plan(vehicle)
-    reference, table = scenario.reference.placed(gait.table)
+    reference, table = scenario.reference_and_table()
     law = Parameters(
         vehicle=vehicle,
         gains=controller.resolve_gains(),
@@ -108,7 +110,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
         decoupler=DECOUPLERS[controller.decoupler],
         supervisor=controller.resolve_supervisor(),
     )
-    lead = servo_lead(scenario.vehicle.tilt_servo)
+    lead = servo_lead(scenario.rotorcraft.tilt_servo)
     return ControlSetup(ControlParameters(signature, lead, law), table)
 
 
@@ -127,6 +129,23 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)
     columns = np.array(rows).reshape(len(rows), len(names))
     return dict(zip(names, columns.T, strict=True)) | gait_singularity(samples, law.vehicle)
+
+
+@scalar
+def observe_gait_feedforward(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+) -> tuple[float, ...]:
+    """The tiltrotor and the law's own states."""
+    return (*observe_tiltrotor(qpos, qvel, act, ctrl), act[4], act[5], act[6])
+
+
+@scalar
+def watch_gait_feedforward(
+    values: Sequence[float], parameters: ControlParameters
+) -> tuple[float, float, float, float, float]:
+    """The determinant of the decoupling matrix, and the rotor speeds with which it vanishes."""
+    spin_1, spin_2, spin_3, spin_4 = rotor_spins(values)
+    return regularity(values, parameters.law.vehicle), spin_1, spin_2, spin_3, spin_4
 
 
 def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Watched, ...]:
@@ -170,11 +189,22 @@ def equation_rates(
     )
 
 
-def _observe_equations(
-    time: float, state: Sequence[float], _inputs: object, setup: ControlSetup
+@scalar
+def observe_equations(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
 ) -> tuple[float, ...]:
-    tilts = tilt_reference(time, setup.parameters.law.gait, setup.table)
-    return (*law_state(state, tilts[:4]), *tilts[4:], *state[22:])
+    """What a sample holds, from the state of ch. 3's equations; the tilts are the gait's."""
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(
+        time, parameters.law.gait, table
+    )
+    return (
+        *law_state(state, (a1, a2, a3, a4)),
+        *(rate_1, rate_2, rate_3, rate_4, state[22], state[23], state[24]),
+    )
 
 
 GAIT_FEEDFORWARD: Final = Loop(
@@ -185,18 +215,16 @@ GAIT_FEEDFORWARD: Final = Loop(
     refresh=refreshed_controls,
     setup=_setup,
     initial_activations=lambda s, _setup: (*initial_rotor_speeds(s), 0.0, 0.0, 0.0),
-    observe=lambda qpos, qvel, act, controls: (
-        *observe_tiltrotor(qpos, qvel, act, controls),
-        *act[4:],
-    ),
+    observe=observe_gait_feedforward,
     derive=_derive,
     watched=_watched,
+    watch=watch_gait_feedforward,
     equations=Equations(
         inputs=equation_inputs,
         inputs_size=7,
         rates=equation_rates,
         initial=lambda s, _setup: (*initial_state(s, initial_rotor_speeds(s)), 0.0, 0.0, 0.0),
-        observe=_observe_equations,
+        observe=observe_equations,
     ),
     law_states=3,
     law_fields=INTEGRAL_FIELDS,

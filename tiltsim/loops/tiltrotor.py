@@ -7,7 +7,7 @@ every engine. It is a pure function of time, `qpos`, `qvel`, `act` and the param
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -33,10 +33,18 @@ from controllers.supervisor import Supervisor, gait_share
 from controllers.vehicle import SPIN, Vehicle, drag_ratio
 from tiltsim.controller_tables import AttitudeAltitudeController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
-from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
+from tiltsim.kinds.rotorcraft import OBSERVED_FIELDS
+from tiltsim.loop import (
+    ControlSetup,
+    Equations,
+    Floats,
+    Loop,
+    Sizes,
+    Watched,
+)
 
 if TYPE_CHECKING:
-    from tiltsim.scenario import Scenario, TiltServoTable
+    from tiltsim.scenario import Scenario, ServoTable
 
 REFERENCE_COLUMNS: Final = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
 TILT_COLUMNS: Final = ("alpha_1", "alpha_2", "alpha_3", "alpha_4")
@@ -127,7 +135,7 @@ def refreshed_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[flo
     )
 
 
-def servo_lead(servo: TiltServoTable) -> float:
+def servo_lead(servo: ServoTable) -> float:
     """By how much (s) a tilt servo lags behind a command that moves evenly."""
     return 2.0 * servo.damping_ratio / servo.natural_frequency
 
@@ -135,12 +143,12 @@ def servo_lead(servo: TiltServoTable) -> float:
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, AttitudeAltitudeController)
-    vehicle = scenario.vehicle.resolve()
+    vehicle = scenario.rotorcraft.resolve()
     gait = scenario.gait.plan(vehicle)
-    reference, table = scenario.reference.placed(gait.table)
+    reference, table = scenario.reference_and_table()
     parameters = ControlParameters(
         signature,
-        servo_lead(scenario.vehicle.tilt_servo),
+        servo_lead(scenario.rotorcraft.tilt_servo),
         law=Parameters(
             vehicle=vehicle,
             gains=controller.resolve_gains(),
@@ -156,17 +164,15 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
 
 def initial_rotor_speeds(scenario: Scenario) -> tuple[float, ...]:
     """The signed rotor speeds (rad/s) at time zero."""
-    return tuple(s * speed for s, speed in zip(SPIN, scenario.initial.rotor_speeds, strict=True))
+    return tuple(s * speed for s, speed in zip(SPIN, scenario.initial.rotor_speeds(4), strict=True))
 
 
+@scalar
 def observe_tiltrotor(
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    _controls: Callable[[], Sequence[float]],
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
 ) -> tuple[float, ...]:
     """Rigid body, tilts, rotor speeds and tilt rates: all of them states of the simulation."""
-    return (*tiltrotor_state(qpos, qvel, act), *qvel[6:])
+    return (*tiltrotor_state(qpos, qvel, act), qvel[6], qvel[7], qvel[8], qvel[9])
 
 
 def gait_singularity(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict[str, Floats]:
@@ -208,26 +214,51 @@ def rotor_stops(sample: Mapping[str, float]) -> tuple[Watched, ...]:
     )
 
 
+@scalar
+def rotor_spins(values: Sequence[float]) -> Quad:
+    """Rotor speeds along their spin, from what `observe_tiltrotor` gives."""
+    return -values[16], values[17], -values[18], values[19]
+
+
+@scalar
+def regularity(values: Sequence[float], vehicle: Vehicle) -> float:
+    """The determinant of the decoupling matrix but for the rotor speeds, of a sample's values."""
+    ratio = drag_ratio(vehicle)
+    trig = sines_and_cosines(values[12], values[13], values[14], values[15])
+    nx, ny, nz = torque_free_force(trig, torque_entries(trig, ratio), ratio)
+    ux, uy, uz = world_up_in_body(values[6], values[7])
+    return nx * ux + ny * uy + nz * uz
+
+
+@scalar
+def watch_tiltrotor(
+    values: Sequence[float], parameters: ControlParameters
+) -> tuple[float, float, float, float, float]:
+    """The determinant of the decoupling matrix, and the rotor speeds where it vanishes with them.
+
+    As published, the factor ``2 |varpi|`` stands in one row alone, and a rotor at rest is harmless.
+    """
+    law = parameters.law
+    matrix = regularity(values, law.vehicle)
+    if law.decoupling == EXACT_DECOUPLING:
+        spin_1, spin_2, spin_3, spin_4 = rotor_spins(values)
+        return matrix, spin_1, spin_2, spin_3, spin_4
+    return matrix, 1.0, 1.0, 1.0, 1.0
+
+
 def singular_matrix(sample: Mapping[str, float], vehicle: Vehicle) -> Watched:
     """The determinant of the attitude-altitude law at the present tilts and attitude."""
-    roll, pitch = sample["roll"], sample["pitch"]
-    tilts = [sample[name] for name in TILT_COLUMNS]
-    ratio = drag_ratio(vehicle)
-    trig = sines_and_cosines(*tilts)
-    n = torque_free_force(trig, torque_entries(trig, ratio), ratio)
-    up = world_up_in_body(roll, pitch)
-    angles = ", ".join(f"{tilt:.3g}" for tilt in tilts)
+    angles = ", ".join(f"{sample[name]:.3g}" for name in TILT_COLUMNS)
     return Watched(
-        n[0] * up[0] + n[1] * up[1] + n[2] * up[2],
-        f"the decoupling matrix became singular at roll = {roll:.3g} rad, "
-        f"pitch = {pitch:.3g} rad, tilt angles ({angles}) rad",
+        regularity([sample[name] for name in OBSERVED_FIELDS], vehicle),
+        f"the decoupling matrix became singular at roll = {sample['roll']:.3g} rad, "
+        f"pitch = {sample['pitch']:.3g} rad, tilt angles ({angles}) rad",
     )
 
 
 def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Watched, ...]:
     law = setup.parameters.law
     matrix = singular_matrix(sample, law.vehicle)
-    # As published, the factor 2 |varpi| stands in one row alone, and a rotor at rest is harmless.
     return (matrix, *rotor_stops(sample)) if law.decoupling == EXACT_DECOUPLING else (matrix,)
 
 
@@ -256,11 +287,19 @@ def equation_rates(
     return equations_of_motion(state, (a1, a2, a3, a4), inputs, law.vehicle, disturbance)
 
 
-def _observe_equations(
-    time: float, state: Sequence[float], _inputs: object, setup: ControlSetup
+@scalar
+def observe_equations(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
 ) -> tuple[float, ...]:
-    tilts = tilt_reference(time, setup.parameters.law.gait, setup.table)
-    return (*law_state(state, tilts[:4]), *tilts[4:])
+    """What a sample holds, from the state of ch. 3's equations; the tilts are the gait's."""
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(
+        time, parameters.law.gait, table
+    )
+    return (*law_state(state, (a1, a2, a3, a4)), rate_1, rate_2, rate_3, rate_4)
 
 
 def follows_position(scenario: Scenario) -> bool:
@@ -281,13 +320,14 @@ TILTROTOR: Final = Loop(
     observe=observe_tiltrotor,
     derive=_derive,
     watched=_watched,
+    watch=watch_tiltrotor,
     follows_position=follows_position,
     equations=Equations(
         inputs=equation_inputs,
         inputs_size=4,
         rates=equation_rates,
         initial=lambda s, _setup: initial_state(s, initial_rotor_speeds(s)),
-        observe=_observe_equations,
+        observe=observe_equations,
     ),
 )
 """The attitude-altitude law around the tiltrotor."""

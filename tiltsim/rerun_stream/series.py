@@ -106,7 +106,7 @@ def limit_series(scenario: Scenario) -> list[tuple[Series, float]]:
         ("singularity/threshold", f"threshold {MARGIN_THRESHOLD:g}", MARGIN_THRESHOLD),
         ("singularity/singular", "singular", 0.0),
     ]
-    vehicle = scenario.vehicle
+    vehicle = scenario.rotorcraft
     if vehicle.min_rotor_speed is not None:
         lines.append(("rotor_speeds/min", "lower limit", vehicle.min_rotor_speed))
     if vehicle.max_rotor_speed is not None:

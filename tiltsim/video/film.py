@@ -110,7 +110,7 @@ class _Stage:
         self._radius = vehicle_radius(model)
         self._arrow_scale = thrust_scale(model)
         self._reference = _reference_path(flight)
-        self._n = torque_free_directions(flight.columns, flight.scenario.vehicle.resolve())
+        self._n = torque_free_directions(flight.columns, flight.scenario.rotorcraft.resolve())
         self._attitude = np.stack([flight["roll"], flight["pitch"]], axis=1)
         side = float(np.sign(flight["singularity_margin"][0])) or 1.0
         self._inset = PlaneInset(round(INSET_SHARE * form.height), side)
