@@ -51,7 +51,7 @@ class ControlSetup(NamedTuple):
     """What the control step of one flight reads besides the state."""
 
     parameters: Any  # the loop's record
-    table: tuple[float, ...] = ()  # keyframes of the gait
+    table: tuple[float, ...] = ()  # keyframes of the gait, then waypoints of the reference
 
     @property
     def userdata(self) -> Floats:

@@ -145,6 +145,27 @@ class RotorLimits:
         return (lower, upper) if spin > 0.0 else (-upper, -lower)
 
 
+@dataclass(frozen=True)
+class Ground:
+    """Level ground that the vehicle can stand on.
+
+    Attributes
+    ----------
+    height : float
+        m, world.
+    friction : float
+        Coefficient of sliding friction.
+    """
+
+    height: float = 0.0
+    friction: float = 0.8
+
+    def __post_init__(self) -> None:
+        if not isfinite(self.height):
+            raise ValueError(f"ground.height = {self.height!r}: must be finite")
+        _require_positive("ground.friction", self.friction, "")
+
+
 def compile_model(
     model: str,
     vehicle: Vehicle,
@@ -156,12 +177,13 @@ def compile_model(
     pod: Pod = Pod(),
     rotor_limits: RotorLimits = RotorLimits(),
     law_states: int = 0,
+    ground: Ground | None = None,
     visuals: bool = True,
 ) -> mujoco.MjModel:
     """Compile the MuJoCo model of a vehicle.
 
     Mass and inertia of the compiled model are the vehicle's at any tilt: what the pods weigh is
-    taken from the body. Nothing collides.
+    taken from the body. Nothing collides but, if there is ground, the vehicle with it.
 
     Parameters
     ----------
@@ -184,6 +206,8 @@ def compile_model(
     law_states : int, default=0
         Number of states of a control law of its own: integrators ``law_1``, ``law_2``, ... after
         all other actuators, which act on nothing; ctrl is the state's rate.
+    ground : Ground, optional
+        Ground to take off from and land on; without it there are no contacts to look for.
     visuals : bool, default=True
         Whether the vehicle has geoms. They do not touch the physics, but positioning them takes
         about a sixth of a step.
@@ -211,7 +235,7 @@ def compile_model(
 
     description = (
         *(timestep, integrator, userdata_size),
-        *(tilt_servo, pod, rotor_limits, law_states),
+        *(tilt_servo, pod, rotor_limits, law_states, ground),
     )
     likeness = (model, vehicle.arm_length, *description, visuals)
     if likeness in _compiled:
@@ -273,6 +297,7 @@ def _compose(
     pod: Pod,
     rotor_limits: RotorLimits,
     law_states: int,
+    ground: Ground | None,
 ) -> tuple[str, str]:
     """The vehicle's complete MJCF, and the same without what is only drawn.
 
@@ -286,8 +311,8 @@ def _compose(
     root.option.timestep = timestep
     root.option.integrator = integrator
     root.option.gravity = (0.0, 0.0, -vehicle.gravity)
-    root.option.flag.contact = "disable"
-    root.option.flag.constraint = "enable" if stops else "disable"
+    root.option.flag.contact = "disable" if ground is None else "enable"
+    root.option.flag.constraint = "disable" if ground is None and not stops else "enable"
     root.size.nuserdata = userdata_size
 
     _scale_lengths(root, vehicle.arm_length)
@@ -298,9 +323,12 @@ def _compose(
     _set_keyframe(root.keyframe.key["hover"], vehicle.hover_rotor_speed)
     _set_keyframe(root.keyframe.key["start"], START_SPEED)
     add_law_states(root, law_states)
+    if ground is not None:
+        _set_ground(root, ground)
     whole = str(root.to_xml_string())
     for geom in root.find("body", "vehicle").find_all("geom"):
-        geom.remove()
+        if ground is None or not geom.name.endswith("collision"):
+            geom.remove()
     return whole, str(root.to_xml_string())
 
 
@@ -383,6 +411,18 @@ def _set_servos(root: Any, servo: TiltServo, pod: Pod) -> None:
         defaults.joint.solreflimit = (2.0 * root.option.timestep, 1.0)
         defaults.joint.solimplimit = (0.99, 0.99, 0.001, 0.5, 2.0)
         defaults.position.ctrlrange = angle_range
+
+
+def _set_ground(root: Any, ground: Ground) -> None:
+    """Let the vehicle's collision shapes touch the ground, and nothing else."""
+    plane = root.find("geom", "ground")
+    plane.pos = (0.0, 0.0, ground.height)
+    plane.friction = (ground.friction, 0.005, 0.0001)
+    plane.priority = 1  # its friction counts, not the larger of the two
+    plane.conaffinity = 1
+    for geom in root.find("body", "vehicle").find_all("geom"):
+        if geom.name.endswith("collision"):
+            geom.contype = 1
 
 
 def _set_keyframe(key: Any, rotor_speed: float) -> None:

@@ -95,7 +95,7 @@ class MujocoPlant:
             model = flight_model(scenario, len(self._setup.userdata))
         self.model = model
         self.data = mujoco.MjData(self.model)
-        self._reference = scenario.reference.parameters
+        self._reference, _ = scenario.reference_and_table()
         self._follows_position = self._loop.follows_position(scenario)
         self._set_initial_state(scenario, self._setup)
         self.engine: EngineName = choose_engine(scenario)
@@ -277,7 +277,7 @@ class ThesisPlant:
         simulation = scenario.simulation
         loop, setup = loop_of(scenario), control_setup(scenario)
         self._loop, self._equations, self._setup = loop, loop.equations, setup
-        self._reference = scenario.reference.parameters
+        self._reference, _ = scenario.reference_and_table()
         self._follows_position = loop.follows_position(scenario)
         self._disturbance = disturbing_acceleration(scenario)
         self._timestep = simulation.timestep
