@@ -12,7 +12,7 @@ from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT
 
 COMMANDS: Final = (
     *("run", "check", "sweep", "list", "view", "plot", "video"),
-    *("gait", "map", "singularity", "bench", "schema"),
+    *("gait", "map", "singularity", "report", "bench", "schema"),
 )
 
 

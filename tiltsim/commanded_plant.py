@@ -108,15 +108,25 @@ class CommandedPlant(MujocoPlant):
     def advance(self, steps: int) -> None:
         """See `Plant.advance`."""
         accelerating = self.data.ctrl[self._first_rate : self._first_rate + 4].any()
-        callback: Any = self._engine.held() if accelerating else None
-        with control_callback(callback), quiet_warnings():
+        with control_callback(self._hold if accelerating else None), quiet_warnings():
             mujoco.mj_step(self.model, self.data, nstep=steps)
+
+    def _hold(self, _model: mujoco.MjModel, called: mujoco.MjData) -> None:
+        """Let the thrusts follow the rotor speeds, all other controls held."""
+        data = self.data
+        if called is data:
+            data.ctrl[:] = self._loop.refresh(data.ctrl.tolist(), data.act.tolist())
+
+    @property
+    def steps_taken(self) -> int:
+        """Physics steps since time zero."""
+        return round(float(self.data.time) / float(self.model.opt.timestep))
 
     def seen(self) -> Observation:
         """The present state as a controller sees it."""
         data, parameters = self.data, self._setup.parameters
         time = float(data.time)
-        motion = np.array(reference_derivatives(time, parameters.reference)[:9])
+        motion = np.array(reference_derivatives(time, parameters.reference, self._setup.table)[:9])
         wanted = parameters.reference
         planned = np.zeros(8)
         if self.tilting:
@@ -134,7 +144,7 @@ class CommandedPlant(MujocoPlant):
         speeds = _signed(data.act.tolist())
         return observation(time, qpos, data.qvel, speeds, attitude, reference, parameters.vehicle)
 
-    def _controls_in_force(self) -> Sequence[float]:
+    def _controls_in_force(self, *_state: Sequence[float]) -> Sequence[float]:
         return list(self.data.ctrl.tolist())
 
 
@@ -161,7 +171,7 @@ class ControlledPlant(CommandedPlant):
 
     def advance(self, steps: int) -> None:
         """See `Plant.advance`. Raises `ControllerError` at the time the controller fails."""
-        step = self._steps_taken
+        step = self.steps_taken
         self._answers = {known: answer for known, answer in self._answers.items() if known >= step}
         end = step + steps
         while step < end:

@@ -6,7 +6,7 @@ import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,23 @@ if TYPE_CHECKING:
     from tiltsim.scenario import Scenario
 
 Floats = npt.NDArray[np.float64]
+
+
+class Header(NamedTuple):
+    """What `userdata` begins with, before the parameters of the law.
+
+    A held law counts the evaluations of the callback, so that it needs nothing but MuJoCo's state
+    to know when to sample: a saved state restarts between two samples, too.
+    """
+
+    control_period: float = 0.0  # evaluations between samples of a held law; 0 if continuous
+    evaluations: float = 0.0  # since the last sample
+    recorder: float = 0.0  # address of the memory that samples go to, 0 while none are recorded
+
+
+HEADER_SIZE: Final = len(Header._fields)
+CONTROL_PERIOD, EVALUATIONS, RECORDER = range(HEADER_SIZE)
+"""Where in `userdata` the fields of the `Header` lie."""
 
 
 class Sizes(NamedTuple):
@@ -34,11 +51,11 @@ class ControlSetup(NamedTuple):
     """What the control step of one flight reads besides the state."""
 
     parameters: Any  # the loop's record
-    table: tuple[float, ...] = ()  # keyframes of the gait
+    table: tuple[float, ...] = ()  # keyframes of the gait, then waypoints of the reference
 
     @property
     def userdata(self) -> Floats:
-        """Record and table as MuJoCo's `userdata` holds them."""
+        """Record and table as MuJoCo's `userdata` holds them after its `Header`."""
         return np.array([*flatten(self.parameters), *self.table])
 
 
@@ -65,8 +82,8 @@ class Equations:
     initial
         ``(scenario, setup) -> state`` at time zero.
     observe
-        ``(time, state, inputs, setup) -> values`` of the loop's `sample_fields` after the time;
-        ``inputs()`` gives the inputs in force.
+        Scalar function ``(time, state, inputs, parameters, table) -> values`` of the loop's
+        `sample_fields` after the time; ``inputs`` are those in force.
     """
 
     inputs: Callable[..., tuple[float, ...]]
@@ -100,13 +117,18 @@ class Loop:
     initial_activations
         ``(scenario, setup) -> act`` at time zero.
     observe
-        ``(qpos, qvel, act, controls) -> values`` of the kind's fields and ``law_fields``;
-        ``controls()`` gives the controls in force.
+        Scalar function ``(qpos, qvel, act, ctrl) -> values`` of the kind's fields and
+        ``law_fields``; ``ctrl`` are the controls in force if it ``observes_controls``.
     derive
         ``(samples by field, setup) -> columns``: references, determinant, margin and
         ``extra_columns``.
     watched
         ``(sample by field, setup) -> Watched, ...``: where the law ends.
+    watch
+        Scalar function ``(values, parameters) -> numbers``: at least the numbers of ``watched``,
+        from ``values`` as ``observe`` gives them. None leaves watching to Python.
+    observes_controls
+        Whether ``observe`` reads the controls in force.
     law_states
         Number of activations that are states of the law.
     law_fields
@@ -119,6 +141,8 @@ class Loop:
         The same law on the thesis' own equations; None where it flies on MuJoCo alone.
     kind
         What holds for all loops around such a vehicle.
+    flies_gait
+        Whether the scenario's gait has a part in the flight.
     """
 
     model: str
@@ -132,17 +156,24 @@ class Loop:
     derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
     watched: Callable[[Mapping[str, float], ControlSetup], tuple[Watched, ...]]
     equations: Equations | None = None
+    watch: Callable[..., tuple[float, ...]] | None = None
+    observes_controls: bool = False
     law_states: int = 0
     law_fields: tuple[str, ...] = ()
     extra_columns: Mapping[str, str] = field(default_factory=dict)
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
     kind: Kind = ROTORCRAFT
+    flies_gait: bool = True
 
     @cached_property
     def signature(self) -> float:
         """A checksum of the layout of `userdata`, which tells our models from foreign ones."""
         layout = (self.model, self.sizes, record_dtype(self.parameters))
         return float(zlib.crc32(repr(layout).encode()))
+
+    def native_name(self, plant: str) -> str:
+        """Name of the loop's compiled code on a plant, as a file's name."""
+        return f"{plant}.{self.controls.__module__}.{self.controls.__qualname__}"
 
     @cached_property
     def record_size(self) -> int:

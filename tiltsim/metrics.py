@@ -20,6 +20,9 @@ METRICS: Final = {
     "final_position_error_y": "reference minus actual, mean over the last second, m",
     "final_position_error_z": "reference minus actual, mean over the last second, m",
     "sup_position_error_after_20s": "largest horizontal position error from 20 s on, m",
+    "least_position_error_after_20s": "smallest horizontal position error from 20 s on, m",
+    "max_orbit_radius_after_20s": "largest distance from the reference circle's centre, m",
+    "min_orbit_radius_after_20s": "smallest distance from the reference circle's centre, m",
     "final_roll": "mean over the last second, rad",
     "final_pitch": "mean over the last second, rad",
     "final_yaw": "mean over the last second, rad",
@@ -81,6 +84,13 @@ def _rotorcraft_metrics(flight: Flight) -> dict[str, float | bool]:
     if follows_position and settled.any():
         horizontal = np.hypot(errors["x"], errors["y"])
         metrics["sup_position_error_after_20s"] = float(horizontal[settled].max())
+        metrics["least_position_error_after_20s"] = float(horizontal[settled].min())
+        reference = flight.scenario.reference
+        if reference.type == "circle":
+            centre_x, centre_y, _ = reference.position
+            orbit = np.hypot(columns["x"] - centre_x, columns["y"] - centre_y)[settled]
+            metrics["max_orbit_radius_after_20s"] = float(orbit.max())
+            metrics["min_orbit_radius_after_20s"] = float(orbit.min())
     for angle in ("roll", "pitch", "yaw"):
         metrics[f"final_{angle}"] = final(columns[angle])
     metrics["final_attitude_error"] = max(

@@ -27,6 +27,7 @@ def compile_tilt_car(
     userdata_size: int = 0,
     tilt_servo: TiltServo = IDEAL_SERVO,
     law_states: int = 0,
+    rotor_floor: bool = True,
     visuals: bool = True,
 ) -> mujoco.MjModel:
     """Compile the MuJoCo model of a tilt-car.
@@ -45,6 +46,8 @@ def compile_tilt_car(
         The servo that turns the discs against each other; its angle is not limited.
     law_states : int, default=0
         Number of states of a control law of its own, as in `tiltsim.model.compile_model`.
+    rotor_floor : bool, default=True
+        Whether the rotor speeds, states of the simulation, stop at zero.
     visuals : bool, default=True
         Whether the car has geoms. They do not touch the physics.
 
@@ -70,7 +73,9 @@ def compile_tilt_car(
     for name, size in (("userdata_size", userdata_size), ("law_states", law_states)):
         if size < 0:
             raise ValueError(f"{name} = {size!r}: must be at least 0")
-    whole, bare = _compose(car, timestep, integrator, userdata_size, tilt_servo, law_states)
+    whole, bare = _compose(
+        car, timestep, integrator, userdata_size, tilt_servo, law_states, rotor_floor
+    )
     return mujoco.MjModel.from_xml_string(whole if visuals else bare)
 
 
@@ -82,6 +87,7 @@ def _compose(
     userdata_size: int,
     tilt_servo: TiltServo,
     law_states: int,
+    rotor_floor: bool,
 ) -> tuple[str, str]:
     """The car's complete MJCF, and the same without what is only drawn."""
     root = parse_mjcf(shipped_folder("mjcf") / "tilt_car.xml")
@@ -93,6 +99,8 @@ def _compose(
     _set_inertia(root, car)
     _set_thrusts(root, car)
     _set_servo(root, car, tilt_servo)
+    if not rotor_floor:
+        del root.find("default", "rotor_speed").general.actrange
     start = root.keyframe.key["start"]
     start.act = [START_SPEED] * 2
     start.ctrl = [0.0, START_SPEED**2, START_SPEED**2, 0.0, 0.0]

@@ -4,6 +4,10 @@ The inputs are the second derivatives of both rotor speeds and of the tilt angle
 derivatives are states of the law. As printed, the tilt's column of the decoupling matrix (Eq. 27)
 lacks the factor ``1 - I_T / I_B``, for the yaw answers the tilt's acceleration, too: `PUBLISHED`
 leaves it out, `EXACT` puts it in.
+
+The rotor speeds that the law integrates may drift below zero, where no thrust follows them. As the
+chapter's run, the law then goes on with speeds that no rotor has (windup), and fails; with
+``anti_windup`` they stop at zero, and the other rotor and the tilt go on alone.
 """
 
 from __future__ import annotations
@@ -51,11 +55,12 @@ class Parameters(NamedTuple):
     gains: Gains
     reference: ReferenceParameters
     decoupling: float
+    anti_windup: float  # 1 or 0: whether the law's rotor speeds stop at zero
 
 
 GAIN_SETS: Final = {
-    # Ours, all four poles at -5: the thesis prints none.
-    "ch10": Gains(20.0, 150.0, 500.0, 625.0),
+    # Ours, all four poles at -3: the thesis prints none.
+    "ch10": Gains(12.0, 54.0, 108.0, 81.0),
 }
 """Gains by name."""
 

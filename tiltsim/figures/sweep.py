@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -11,7 +12,6 @@ from tiltsim.errors import InputError
 from tiltsim.figures.style import (
     CYCLE,
     GREY,
-    INK,
     PALE,
     RED,
     SEQUENTIAL,
@@ -69,7 +69,8 @@ def sweep_figure(results: SweepResults, metrics: tuple[str, ...] = ()) -> Figure
         title = results.plan.sweep.title or results.plan.definition.address
         missing = len(results.plan) - len(results)
         more = f" ({missing} of {len(results.plan)} points still to come)" if missing else ""
-        figure.suptitle(title + more, x=0.01, ha="left", fontsize=10.5)
+        lines = fill(title + more, round(11.0 * figure.get_figwidth()))
+        figure.suptitle(lines, x=0.01, ha="left", fontsize=10.5)
         return figure
 
 
@@ -83,7 +84,7 @@ def _kind(results: SweepResults) -> str:
 
 def _drawn(results: SweepResults) -> list[str]:
     axes = results.plan.sweep.axis
-    return [key for a in axes if isinstance(a, UniformAxis | NormalAxis) for key in a.targets]
+    return [a.targets[0] for a in axes if isinstance(a, UniformAxis | NormalAxis)]
 
 
 def _numeric_axes(results: SweepResults) -> list[str]:
@@ -193,11 +194,9 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
             axes.set_ylabel(_label(metric))
             axes.set_xlabel(_label(x))
     _share_limits(grid)
-    _legend(grid[0][0], lines)
     if not completed.all():
-        grid[-1][0].annotate(
-            "× lost", (0.99, 0.03), xycoords="axes fraction", ha="right", color=INK, fontsize=8
-        )
+        grid[0][0].plot([], [], "x", color=GREY, ms=4, label="lost")
+    _legend(grid[0][0], lines)
     return figure
 
 
@@ -342,19 +341,20 @@ def _plane_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure:
             # The outline in the order of the directions, closed.
             turn = np.argsort(np.arctan2(y[reached], x[reached]), kind="stable")
             outline = np.append(turn, turn[:1])
+            width = max(0.8, 4.0 - 0.8 * number)  # so that lines show under lines
             label = name if reached.any() else f"{name}: fails at {bisect.start:g}"
             axes.plot(
                 *(x[reached][outline], y[reached][outline], "-"),
-                **{"lw": 1.1, "color": color, "label": label},
+                **{"lw": width, "color": color, "label": label},
             )
-            axes.plot(x[reached & ~whole], y[reached & ~whole], "o", ms=4.5, color=color)
-            axes.plot(x[whole], y[whole], "^", ms=5.5, mfc="none", color=color)
+            axes.plot(x[reached & ~whole], y[reached & ~whole], "o", ms=width + 3.5, color=color)
+            axes.plot(x[whole], y[whole], "^", ms=width + 4.5, color=color)
         axes.axhline(0.0, color=GREY, lw=0.6)
         axes.axvline(0.0, color=GREY, lw=0.6)
         axes.set_aspect("equal", adjustable="datalim")
         axes.set_title(title)
-        axes.set_xlabel(plot.x)
-        axes.set_ylabel(plot.y)
+        axes.set_xlabel(_label(plot.x))
+        axes.set_ylabel(_label(plot.y))
         _legend(axes, plot.lines)
     for axes in grid.flat[len(columns) :]:
         axes.set_axis_off()

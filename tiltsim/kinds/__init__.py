@@ -36,6 +36,9 @@ class Kind:
         MuJoCo cannot build it.
     initial_motion
         ``(scenario) -> qpos, qvel`` at time zero.
+    limit_exceeded
+        Scalar function ``(time, values, reference, table, follows_position) -> code`` of the first
+        limit of `tiltsim.limits` that a sample exceeds; ``values`` begin with the observed fields.
     """
 
     name: str
@@ -44,6 +47,7 @@ class Kind:
     thrusts: Callable[[Mapping[str, Floats], Scenario], dict[str, Floats]]
     compile: Callable[[Scenario, int, int, bool], mujoco.MjModel]
     initial_motion: Callable[[Scenario], tuple[Sequence[float], Sequence[float]]]
+    limit_exceeded: Callable[..., int]
 
     @property
     def rotors(self) -> tuple[int, ...]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 from controllers.gaits import tilt_reference
 from controllers.tilt_car.vehicle import yaw_share
 from tiltsim.kinds import Floats, Kind
+from tiltsim.limits import tilt_car_limit_exceeded
 
 if TYPE_CHECKING:
     import mujoco
@@ -65,6 +66,7 @@ def _compile(
         userdata_size=userdata_size,
         tilt_servo=TiltServo(car.tilt_servo.natural_frequency, car.tilt_servo.damping_ratio),
         law_states=law_states,
+        rotor_floor=getattr(scenario.controller, "anti_windup", True),
         visuals=visuals,
     )
 
@@ -94,5 +96,6 @@ TILT_CAR: Final = Kind(
     thrusts=_thrusts,
     compile=_compile,
     initial_motion=_initial_motion,
+    limit_exceeded=tilt_car_limit_exceeded,
 )
 """The tilt-car."""

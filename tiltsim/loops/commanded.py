@@ -6,7 +6,7 @@ of their rotors as states here, so that they can be told speeds, thrusts or acce
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -90,26 +90,36 @@ def refreshed_quadrotor_controls(ctrl: Sequence[float], act: Sequence[float]) ->
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     vehicle = scenario.rotorcraft.resolve()
     gait = scenario.gait.plan(vehicle)
+    reference, table = scenario.reference_and_table()
     lead = servo_lead(scenario.rotorcraft.tilt_servo)
-    parameters = ControlParameters(
-        signature, lead, vehicle, gait.parameters, scenario.reference.parameters
-    )
-    return ControlSetup(parameters, gait.table)
+    parameters = ControlParameters(signature, lead, vehicle, gait.parameters, reference)
+    return ControlSetup(parameters, table)
 
 
-def _observe_quadrotor(
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    _controls: Callable[[], Sequence[float]],
+@scalar
+def observe_commanded_quadrotor(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
 ) -> tuple[float, ...]:
-    body = rigid_body_state(qpos, qvel, 0.0, 0.0)[:12]
-    return (*body, *(0.0,) * 4, *act[:4], *(0.0,) * 4)
+    """The rigid body, no tilt, the rotor speeds, which are states here, no tilt rates."""
+    return (
+        *rigid_body_state(qpos, qvel, 0.0, 0.0)[:12],
+        *(0.0, 0.0, 0.0, 0.0, act[0], act[1], act[2], act[3], 0.0, 0.0, 0.0, 0.0),
+    )
+
+
+@scalar
+def observe_commanded_tiltrotor(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+) -> tuple[float, ...]:
+    """As of any tiltrotor, and what its servos are told."""
+    return (*observe_tiltrotor(qpos, qvel, act, ctrl), ctrl[0], ctrl[1], ctrl[2], ctrl[3])
 
 
 def _references(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     reference = setup.parameters.reference
-    return references(samples, reference, (reference.roll, reference.pitch, reference.yaw))
+    return references(
+        samples, reference, setup.table, (reference.roll, reference.pitch, reference.yaw)
+    )
 
 
 def _derive_tiltrotor(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -141,10 +151,7 @@ TILTROTOR: Final = Loop(
     refresh=refreshed_controls,
     setup=_setup,
     initial_activations=lambda scenario, _setup: initial_rotor_speeds(scenario),
-    observe=lambda qpos, qvel, act, controls: (
-        *observe_tiltrotor(qpos, qvel, act, controls),
-        *controls()[:4],
-    ),
+    observe=observe_commanded_tiltrotor,
     derive=_derive_tiltrotor,
     watched=lambda _sample, _setup: (),
     law_fields=TILT_COMMANDS,
@@ -161,7 +168,7 @@ QUADROTOR: Final = Loop(
     refresh=refreshed_quadrotor_controls,
     setup=_setup,
     initial_activations=lambda scenario, _setup: initial_rotor_speeds(scenario),
-    observe=_observe_quadrotor,
+    observe=observe_commanded_quadrotor,
     derive=_derive_quadrotor,
     watched=lambda _sample, _setup: (),
     follows_position=_follows_position,

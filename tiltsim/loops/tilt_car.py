@@ -77,6 +77,12 @@ def rotors_at_rest(sample: Mapping[str, float]) -> tuple[Watched, ...]:
     return (Watched(squares, "the decoupling matrix became singular: both rotors came to rest"),)
 
 
+@scalar
+def squares_of_speeds(values: Sequence[float], parameters: object) -> tuple[float]:
+    """What `rotors_at_rest` watches, from what a loop around the car observes."""
+    return (values[8] * values[8] + values[9] * values[9],)
+
+
 def initial_rotor_speeds(scenario: Scenario) -> tuple[float, float]:
     """The rotor speeds (rad/s) at time zero."""
     speed_1, speed_2 = scenario.initial.rotor_speeds(2)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from controllers.scalar import Triple, scalar
@@ -24,6 +24,7 @@ from tiltsim.loops.tilt_car import (
     rotors_at_rest,
     running_speed,
     speed_squares,
+    squares_of_speeds,
 )
 from tiltsim.loops.tiltrotor import servo_lead
 
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from tiltsim.scenario import Scenario
 
 ACCELERATIONS: Final = ("rotor_acceleration_1", "rotor_acceleration_2")
+SPEEDS: Final = ("law_speed_1", "law_speed_2")
+"""The rotor speeds that the law integrates; those that turn are never below zero."""
 
 
 class ControlParameters(NamedTuple):
@@ -40,6 +43,12 @@ class ControlParameters(NamedTuple):
     servo_lead: float  # s, rate feed-forward of the tilt servo, 2 zeta / omega_n
     heading: float  # rad, yaw at zero tilt, for the thesis' equations
     law: Parameters
+
+
+@scalar
+def law_speed(speed: float, anti_windup: float) -> float:
+    """A rotor speed (rad/s) as the law integrates it: below zero only without anti-windup."""
+    return 0.0 if anti_windup == 1.0 and speed < 0.0 else speed
 
 
 @scalar
@@ -57,7 +66,12 @@ def fourth_derivative_controls(
     accelerations.
     """
     tilt, tilt_rate, rate_1, rate_2 = act[2], act[3], act[4], act[5]
-    state = (*car_state(qpos, qvel, act[0], act[1]), tilt_rate, rate_1, rate_2)
+    speed_1 = law_speed(act[0], parameters.law.anti_windup)
+    speed_2 = law_speed(act[1], parameters.law.anti_windup)
+    state = (
+        *(qpos[0], qpos[1], qvel[0], qvel[1], qpos[2], qpos[3]),
+        *(speed_1, speed_2, tilt_rate, rate_1, rate_2),
+    )
     second_1, second_2, second_tilt = fourth_derivative_inputs(time, state, parameters.law)
     return (
         tilt + parameters.servo_lead * tilt_rate,
@@ -86,7 +100,8 @@ def fourth_derivative_law_state(
     return (
         *(state[0], state[1], state[2], state[3]),
         *(yaw_of(state[4], parameters.heading, parameters.law.car), state[4]),
-        *(running_speed(state[5]), running_speed(state[6])),
+        law_speed(state[5], parameters.law.anti_windup),
+        law_speed(state[6], parameters.law.anti_windup),
         *(state[7], state[8], state[9]),
     )
 
@@ -101,6 +116,12 @@ def fourth_derivative_equation_inputs(
 
 
 @scalar
+def integrated_rate(speed: float, rate: float, anti_windup: float) -> float:
+    """The rate (rad/s^2) at which the law's rotor speed changes."""
+    return limited_rate(speed, rate) if anti_windup == 1.0 else rate
+
+
+@scalar
 def fourth_derivative_equation_rates(
     time: float,
     state: Sequence[float],
@@ -111,13 +132,15 @@ def fourth_derivative_equation_rates(
 ) -> tuple[float, ...]:
     """The thesis' equations with the inputs integrated twice."""
     law_state = fourth_derivative_law_state(state, parameters)
-    square_1, square_2 = law_state[6] * law_state[6], law_state[7] * law_state[7]
+    speed_1, speed_2 = running_speed(state[5]), running_speed(state[6])
+    square_1, square_2 = speed_1 * speed_1, speed_2 * speed_2
     direction = law_state[4] + law_state[5]
     second_1, second_2, second_tilt = inputs
     return (
         *equations_of_motion(state, direction, square_1, square_2, parameters.law.car, disturbance),
         state[7],
-        *(limited_rate(state[5], state[8]), limited_rate(state[6], state[9])),
+        integrated_rate(state[5], state[8], parameters.law.anti_windup),
+        integrated_rate(state[6], state[9], parameters.law.anti_windup),
         *(second_tilt, second_1, second_2),
     )
 
@@ -131,34 +154,39 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
         controller.resolve_gains(),
         scenario.reference.parameters,
         DECOUPLINGS[controller.decoupling],
+        float(controller.anti_windup),
     )
     lead = servo_lead(vehicle.tilt_servo)
     return ControlSetup(ControlParameters(signature, lead, initial_heading(scenario), law))
 
 
-def _observe(
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    _controls: Callable[[], Sequence[float]],
+@scalar
+def observe_fourth_derivative(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
 ) -> tuple[float, ...]:
+    """The car and the law's own states."""
     x, y, vx, vy, yaw, alpha, speed_1, speed_2 = car_state(qpos, qvel, act[0], act[1])
-    return x, y, vx, vy, yaw, qvel[2], alpha, qvel[3], speed_1, speed_2, *act[2:]
+    return (
+        *(x, y, vx, vy, yaw, qvel[2], alpha, qvel[3], speed_1, speed_2),
+        *(act[2], act[3], act[4], act[5], act[0], act[1]),
+    )
 
 
-def _observe_equations(
-    _time: float,
+@scalar
+def observe_fourth_derivative_equations(
+    time: float,
     state: Sequence[float],
-    _inputs: Callable[[], Sequence[float]],
-    setup: ControlSetup,
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
 ) -> tuple[float, ...]:
-    parameters = setup.parameters
+    """The same of the thesis' equations."""
     law_state = fourth_derivative_law_state(state, parameters)
     x, y, vx, vy, yaw, alpha, speed_1, speed_2, tilt_rate, rate_1, rate_2 = law_state
     r = yaw_of(tilt_rate, 0.0, parameters.law.car)
     return (
-        *(x, y, vx, vy, yaw, r, alpha, tilt_rate, speed_1, speed_2),
-        *(alpha, tilt_rate, rate_1, rate_2),
+        *(x, y, vx, vy, yaw, r, alpha, tilt_rate, running_speed(speed_1), running_speed(speed_2)),
+        *(alpha, tilt_rate, rate_1, rate_2, speed_1, speed_2),
     )
 
 
@@ -179,9 +207,10 @@ FOURTH_DERIVATIVE: Final = Loop(
         *initial_rotor_speeds(s),
         *(initial_tilt(s)[0], 0.0, 0.0, 0.0),
     ),
-    observe=_observe,
+    observe=observe_fourth_derivative,
     derive=_derive,
     watched=lambda sample, _setup: rotors_at_rest(sample),
+    watch=squares_of_speeds,
     equations=Equations(
         inputs=fourth_derivative_equation_inputs,
         inputs_size=3,
@@ -193,11 +222,16 @@ FOURTH_DERIVATIVE: Final = Loop(
             *initial_rotor_speeds(s),
             *(0.0, 0.0, 0.0),
         ),
-        observe=_observe_equations,
+        observe=observe_fourth_derivative_equations,
     ),
     law_states=4,
-    law_fields=("alpha_ref", "alpha_ref_rate", *ACCELERATIONS),
-    extra_columns={"alpha_ref_rate": "rad/s", **dict.fromkeys(ACCELERATIONS, "rad/s^2")},
+    law_fields=("alpha_ref", "alpha_ref_rate", *ACCELERATIONS, *SPEEDS),
+    extra_columns={
+        "alpha_ref_rate": "rad/s",
+        **dict.fromkeys(ACCELERATIONS, "rad/s^2"),
+        **dict.fromkeys(SPEEDS, "rad/s"),
+    },
     kind=TILT_CAR,
+    flies_gait=False,
 )
 """Fourth-derivative feedback linearization around the tilt-car."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import nan, sqrt
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -116,33 +116,46 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     return ControlSetup(ControlParameters(signature, lead, heading, gait.parameters, law))
 
 
-def _speed(square: float) -> float:
-    return sqrt(square) if square == square else nan
+@scalar
+def speed_of_square(square: float) -> float:
+    """The rotor speed (rad/s) of a control, NaN where the law gave none."""
+    return sqrt(square) if square >= 0.0 else nan
 
 
-def _observe(
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    _act: Sequence[float],
-    controls: Callable[[], Sequence[float]],
+@scalar
+def observe_planned_direction(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
 ) -> tuple[float, ...]:
+    """The car, its rotor speeds from the controls in force."""
     x, y, vx, vy, yaw, alpha, _, _ = car_state(qpos, qvel, 0.0, 0.0)
-    _, square_1, square_2, _, _ = controls()
-    return x, y, vx, vy, yaw, qvel[2], alpha, qvel[3], _speed(square_1), _speed(square_2)
+    return (
+        *(x, y, vx, vy, yaw, qvel[2], alpha, qvel[3]),
+        *(speed_of_square(ctrl[1]), speed_of_square(ctrl[2])),
+    )
 
 
-def _observe_equations(
+@scalar
+def observe_planned_direction_equations(
     time: float,
     state: Sequence[float],
-    inputs: Callable[[], Sequence[float]],
-    setup: ControlSetup,
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
 ) -> tuple[float, ...]:
-    parameters, table = setup
+    """The same of the thesis' equations."""
     x, y, vx, vy, yaw, alpha, _, _ = planned_direction_law_state(time, state, parameters, table)
     tilt_rate = tilt_reference(time, parameters.gait, table)[4]
     r = yaw_of(tilt_rate, 0.0, parameters.law.car)
-    square_1, square_2 = inputs()
-    return x, y, vx, vy, yaw, r, alpha, tilt_rate, _speed(square_1), _speed(square_2)
+    return (
+        *(x, y, vx, vy, yaw, r, alpha, tilt_rate),
+        *(speed_of_square(inputs[0]), speed_of_square(inputs[1])),
+    )
+
+
+@scalar
+def nothing_to_watch(values: Sequence[float], parameters: ControlParameters) -> tuple[float]:
+    """The law ends nowhere."""
+    return (1.0,)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -175,15 +188,17 @@ PLANNED_DIRECTION: Final = Loop(
     refresh=held_planned_direction_controls,
     setup=_setup,
     initial_activations=lambda _scenario, _setup: (0.0, 0.0),
-    observe=_observe,
+    observe=observe_planned_direction,
+    observes_controls=True,
     derive=_derive,
     watched=lambda _sample, _setup: (),
+    watch=nothing_to_watch,
     equations=Equations(
         inputs=planned_direction_equation_inputs,
         inputs_size=2,
         rates=planned_direction_equation_rates,
         initial=lambda s, _setup: (*s.initial.position[:2], *s.initial.velocity[:2]),
-        observe=_observe_equations,
+        observe=observe_planned_direction_equations,
     ),
     extra_columns={
         **{f"wanted_square_{rotor}": "rad^2/s^2" for rotor in ROTORS},

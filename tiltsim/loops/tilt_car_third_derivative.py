@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from controllers.scalar import Triple, scalar
@@ -21,6 +21,7 @@ from tiltsim.loops.tilt_car import (
     rotors_at_rest,
     running_speed,
     speed_squares,
+    squares_of_speeds,
 )
 from tiltsim.loops.tiltrotor import servo_lead
 
@@ -121,25 +122,26 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     return ControlSetup(ControlParameters(signature, lead, initial_heading(scenario), law))
 
 
-def _observe(
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    _controls: Callable[[], Sequence[float]],
+@scalar
+def observe_third_derivative(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
 ) -> tuple[float, ...]:
+    """The car and the tilt angle that its servo is told."""
     x, y, vx, vy, yaw, alpha, speed_1, speed_2 = car_state(qpos, qvel, act[0], act[1])
     return x, y, vx, vy, yaw, qvel[2], alpha, qvel[3], speed_1, speed_2, act[2]
 
 
-def _observe_equations(
-    _time: float,
+@scalar
+def observe_third_derivative_equations(
+    time: float,
     state: Sequence[float],
-    inputs: Callable[[], Sequence[float]],
-    setup: ControlSetup,
+    inputs: Triple,
+    parameters: ControlParameters,
+    table: Sequence[float],
 ) -> tuple[float, ...]:
-    parameters = setup.parameters
+    """The same of the thesis' equations."""
     x, y, vx, vy, yaw, alpha, speed_1, speed_2 = third_derivative_law_state(state, parameters)
-    tilt_rate = inputs()[2]
+    tilt_rate = inputs[2]
     r = yaw_of(tilt_rate, 0.0, parameters.law.car)
     return x, y, vx, vy, yaw, r, alpha, tilt_rate, speed_1, speed_2, alpha
 
@@ -158,9 +160,10 @@ THIRD_DERIVATIVE: Final = Loop(
     refresh=refreshed_third_derivative_controls,
     setup=_setup,
     initial_activations=lambda s, _setup: (*initial_rotor_speeds(s), initial_tilt(s)[0]),
-    observe=_observe,
+    observe=observe_third_derivative,
     derive=_derive,
     watched=lambda sample, _setup: rotors_at_rest(sample),
+    watch=squares_of_speeds,
     equations=Equations(
         inputs=third_derivative_equation_inputs,
         inputs_size=3,
@@ -171,10 +174,11 @@ THIRD_DERIVATIVE: Final = Loop(
             initial_tilt(s)[0],
             *initial_rotor_speeds(s),
         ),
-        observe=_observe_equations,
+        observe=observe_third_derivative_equations,
     ),
     law_states=1,
     law_fields=("alpha_ref",),
     kind=TILT_CAR,
+    flies_gait=False,
 )
 """Third-derivative feedback linearization around the tilt-car."""

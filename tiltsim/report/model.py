@@ -113,6 +113,11 @@ class AnalysisClaim(Claim):
 
     measure: Callable[[], Value]
 
+    @property
+    def key(self) -> str:
+        """Tells it from every other claim."""
+        return f"{self.source}: {self.statement} [{self.case}]"
+
 
 @dataclass(frozen=True, kw_only=True)
 class FlightClaim(Claim):
@@ -171,6 +176,14 @@ def _agrees(claim: Claim, measured: Value) -> bool:
     )
 
 
+def plain(measured: object) -> Value:
+    """A measured value in plain Python types: NumPy's own are unwrapped."""
+    if isinstance(measured, tuple | list):
+        return tuple(float(value) for value in measured)
+    value = measured.item() if hasattr(measured, "item") else measured
+    return value if isinstance(value, bool) else float(value)  # type: ignore[arg-type]
+
+
 def worst(outcomes: list[Outcome]) -> Outcome:
     """The least favourable of several verdicts."""
     return max(outcomes, key=lambda outcome: outcome.rank)
@@ -202,12 +215,14 @@ def scenario_claims(scenario: Scenario) -> list[ExpectationClaim]:
     ]
 
 
-_UNITS: Final = frozenset({"m", "rad", "s", "rad/s", "m/s", "m/s^2", "N", "N m"})
+_UNITS: Final = frozenset(
+    {"m", "rad", "s", "rad/s", "m/s", "m/s^2", "N", "N m", "m^2/s^2", "rad^2/s^2"}
+)
 
 
 def unit_of(metric: str) -> str:
     """The unit of a metric, empty where it has none."""
-    unit = METRICS[metric].rpartition(", ")[2]
+    unit = METRICS[metric].rpartition(", ")[2].partition(" (")[0]
     return unit if unit in _UNITS and metric not in BOOLEAN_METRICS else ""
 
 

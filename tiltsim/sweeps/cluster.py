@@ -63,7 +63,8 @@ def _fly(
             key=f"tiltsim-{digest}-{number}",
         )
 
-    flying = as_completed([submit() for _ in range(min(len(waiting), _window(client)))])
+    first = [submit() for _ in range(min(len(waiting), _window(client)))]
+    flying = as_completed(first, loop=client.loop)
     for future in flying:
         try:
             part = future.result()

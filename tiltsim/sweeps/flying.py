@@ -15,12 +15,13 @@ from functools import lru_cache
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, Final
 
+from tiltsim.batch import fly_all
+from tiltsim.checking import with_engine
 from tiltsim.engine import EngineName
 from tiltsim.errors import InputError
 from tiltsim.expectations import Verdict
 from tiltsim.files import without_none
 from tiltsim.metrics import BOOLEAN_METRICS
-from tiltsim.plants import with_engine
 from tiltsim.scenario import Scenario
 from tiltsim.simulation import simulate
 from tiltsim.sweeps.plan import VERSIONS, Definition, Plan
@@ -29,7 +30,7 @@ from tiltsim.sweeps.search import boundary
 if TYPE_CHECKING:
     import pyarrow
 
-    from tiltsim.flight import Flight
+    from tiltsim.flight import End, Flight
 
 _ONE_FLIGHT_AT_A_TIME: Final = threading.Lock()
 """MuJoCo's control callback is global to the process, and a cluster may use threads."""
@@ -72,26 +73,34 @@ class Part:
 
 
 def fly_chunk(scenarios: Sequence[Scenario], *, keep_flights: bool = False) -> list[Outcome]:
-    """Fly scenarios, in any order, and tell what is kept of each, in the order given.
+    """Fly scenarios, and tell what is kept of each, in the order given.
 
     Raises KeyboardInterrupt where the keyboard interrupted a flight.
     """
     with _ONE_FLIGHT_AT_A_TIME:
-        return [_fly(scenario, keep_flights) for scenario in scenarios]
+        try:
+            results = list(fly_all(scenarios, threads=1, keep_samples=keep_flights))
+        except Exception:
+            # One bad flight must not take the others down: find it by flying one at a time.
+            return [_fly_alone(scenario, keep_flights) for scenario in scenarios]
+    return [_outcome(r.metrics, r.end, r.flight) for r in results]
 
 
-def _fly(scenario: Scenario, keep_flight: bool) -> Outcome:
+def _fly_alone(scenario: Scenario, keep_flight: bool) -> Outcome:
     try:
         flight = simulate(scenario)
         metrics = flight.metrics()
     except InputError as error:
         return Outcome({}, "invalid", None, str(error))
-    except Exception as error:  # one bad flight must not take the others down
+    except Exception as error:
         return Outcome({}, "crashed", None, f"{type(error).__name__}: {error}")
-    end = flight.end
-    if end.kind == "interrupted":
+    if flight.end.kind == "interrupted":
         raise KeyboardInterrupt
-    table = _flight_file(flight) if keep_flight else None
+    return _outcome(metrics, flight.end, flight if keep_flight else None)
+
+
+def _outcome(metrics: Mapping[str, float | bool], end: End, flight: Flight | None) -> Outcome:
+    table = None if flight is None else _flight_file(flight)
     return Outcome(metrics, end.kind, end.time, end.cause, table)
 
 

@@ -12,9 +12,9 @@ from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Final
 
+from tiltsim.checking import shared_engine
 from tiltsim.engine import EngineName
 from tiltsim.errors import InputError
-from tiltsim.plants import shared_engine
 from tiltsim.scenario import Scenario
 from tiltsim.sweeps.flying import Part, fly_numbered_chunk
 from tiltsim.sweeps.folder import open_folder

@@ -204,6 +204,9 @@ class Sweep(Table):
             if metric in WALL_CLOCK_METRICS or metric not in METRICS:
                 allowed = ", ".join(name for name in METRICS if name not in WALL_CLOCK_METRICS)
                 raise InvalidValueError("metrics", metric, f"choose {allowed}")
+        for metric in self.plot.metrics:
+            if metric not in (METRICS if self.metrics is None else self.metrics):
+                raise InvalidValueError("plot.metrics", metric, "is not among the metrics kept")
         if not self.axis and self.bisect is None:
             raise InvalidValueError("axis", [], "a sweep needs at least one [[axis]] or a [bisect]")
         drawn = [a for a in self.axis if isinstance(a, UniformAxis | NormalAxis)]
