@@ -287,7 +287,7 @@ def test_the_page_has_the_chapters_panels():
     assert titles == [
         "Dynamic state error, reference minus actual",
         "Inputs squared",
-        "Direction of the thrusts, and of the acceleration wanted",
+        "Direction of the thrusts",
         "Lyapunov candidate, ½ ė² + ½ K e², along y",
         "Plan view",
         "Error along y and its rate",
