@@ -78,6 +78,20 @@ LAWS |= {
         "reference": {"type": "line", "velocity": [0.5, 0.0, 0.0], "acceleration": [1.0, 0.0, 0.0]},
     },
 }
+LAWS["gait_feedforward"] = {
+    "controller": {
+        "decoupling": "exact",
+        "decoupler": "exact",
+        "gait_rate_feedforward": True,
+        "gains": {
+            "attitude": {"bandwidth": 20.0},
+            "altitude": {"bandwidth": 8.0, "integral": 0.5},
+            "position": {"bandwidth": 1.5, "integral": 0.5},
+        },
+    },
+    "gait": {"type": "trot_continuous", "amplitude": 0.4, "period": 0.6},
+    "reference": {"type": "circle", "radius": 0.5, "angular_frequency": 0.4},
+}
 
 each_law = pytest.mark.parametrize("law", LAWS)
 on_both_plants = pytest.mark.parametrize("plant", ["mujoco", "thesis"])
@@ -159,6 +173,7 @@ AGREEMENT = {
     "tilt_car_third_derivative": 1e-2,
     "tilt_car_fourth_derivative": 1e-2,
     "tilt_car_planned_direction": 2.1,
+    "gait_feedforward": 5e-3,
 }
 
 
