@@ -280,14 +280,13 @@ def _quantiles_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure
     _legend(above.axes[0], lines)
     for axes, key in zip(np.atleast_1d(below.subplots(1, len(drawn), sharey=True)), drawn):
         for number, (_, group) in enumerate(groups):
-            color, lost = CYCLE[number % MAX_LINES], group & ~completed
-            flown = group & completed
+            color, flown, fallen = CYCLE[number % MAX_LINES], group & completed, group & ~completed
             axes.plot(
                 *(results.columns[key][flown], results.columns[metrics[0]][flown], "o"),
                 **{"ms": 2.5, "alpha": 0.7, "mew": 0, "color": color},
             )
             axes.plot(
-                *(results.columns[key][lost], np.full(lost.sum(), 1.03 + 0.04 * number), "x"),
+                *(results.columns[key][fallen], np.full(fallen.sum(), 1.03 + 0.04 * number), "x"),
                 **{"ms": 3.0, "color": color, "clip_on": False, "mew": 0.8},
                 transform=axes.get_xaxis_transform(),
             )
