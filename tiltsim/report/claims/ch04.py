@@ -268,5 +268,6 @@ CLAIMS = (
         published=True,
         flights=_ALL_TROTS,
         measure=_no_rotor_stops,
+        why="In MuJoCo a rotor of the flight that is lost (see above) reverses.",
     ),
 )
