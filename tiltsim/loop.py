@@ -51,7 +51,7 @@ class ControlSetup(NamedTuple):
     """What the control step of one flight reads besides the state."""
 
     parameters: Any  # the loop's record
-    table: tuple[float, ...] = ()  # keyframes of the gait
+    table: tuple[float, ...] = ()  # keyframes of the gait, then waypoints of the reference
 
     @property
     def userdata(self) -> Floats:
@@ -170,6 +170,10 @@ class Loop:
         """A checksum of the layout of `userdata`, which tells our models from foreign ones."""
         layout = (self.model, self.sizes, record_dtype(self.parameters))
         return float(zlib.crc32(repr(layout).encode()))
+
+    def native_name(self, plant: str) -> str:
+        """Name of the loop's compiled code on a plant, as a file's name."""
+        return f"{plant}.{self.controls.__module__}.{self.controls.__qualname__}"
 
     @cached_property
     def record_size(self) -> int:

@@ -137,7 +137,7 @@ class Watch:
 
     def __init__(self, scenario: Scenario) -> None:
         self._loop, self._setup = loop_of(scenario), control_setup(scenario)
-        self._reference = scenario.reference.parameters
+        self._reference, self._table = scenario.reference_and_table()
         self._follows_position = self._loop.follows_position(scenario)
         self._sides: dict[int, float] = {}
 
@@ -166,14 +166,15 @@ class Watch:
 
     def _judge_limits(self, time: float, state: dict[str, float]) -> End | None:
         values = list(state.values())[1:]
-        code = self._loop.kind.limit_exceeded(time, values, self._reference, self._follows_position)
+        limits = self._reference, self._table, self._follows_position
+        code = self._loop.kind.limit_exceeded(time, values, *limits)
         if code == WITHIN:
             return None
         if code == HORIZONTAL_ERROR:
-            error = horizontal_error(time, values, self._reference)
+            error = horizontal_error(time, values, self._reference, self._table)
             cause = f"{error:.3g} m away from the reference"
         elif code == ALTITUDE_ERROR:
-            error = altitude_error(time, values, self._reference)
+            error = altitude_error(time, values, self._reference, self._table)
             cause = f"{error:.3g} m away from the reference altitude"
         elif code < ROTOR_SPEED:
             name = "pqr"[code - BODY_RATE]

@@ -152,11 +152,14 @@ def equations(
 
 
 def references(
-    samples: Mapping[str, Floats], reference: ReferenceParameters, attitude: Sequence[object]
+    samples: Mapping[str, Floats],
+    reference: ReferenceParameters,
+    table: Sequence[float],
+    attitude: Sequence[object],
 ) -> dict[str, Floats]:
     """Reference columns; ``attitude`` are those of roll, pitch and yaw, arrays or constants."""
     time = samples["time"]
-    position = np.array([position_reference(t, reference)[:3] for t in time.tolist()])
+    position = np.array([position_reference(t, reference, table)[:3] for t in time.tolist()])
     columns = [*position.reshape(len(time), 3).T]
     columns += [np.broadcast_to(np.asarray(angle, dtype=float), time.shape) for angle in attitude]
     tilts = dict.fromkeys(TILT_REFERENCE_COLUMNS, np.zeros_like(time))
