@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
@@ -153,12 +153,15 @@ def _engine_for(addresses: list[str], overrides: Mapping[str, Any]) -> EngineNam
     return shared_engine(scenarios)
 
 
-def shared_engine(scenarios: list[Scenario]) -> EngineName | None:
+def shared_engine(scenarios: Sequence[Scenario], steps: int | None = None) -> EngineName | None:
     """The native engine where the flights together repay compiling it, None elsewhere.
 
-    What the scenarios need is compiled here once, for all processes to load.
+    What the scenarios need is compiled here once, for all processes to load. Where they are but
+    examples of the flights to come, ``steps`` is the physics steps of all flights.
     """
-    if sum(scenario.simulation.steps for scenario in scenarios) < STEPS_WORTH_COMPILING:
+    if steps is None:
+        steps = sum(scenario.simulation.steps for scenario in scenarios)
+    if steps < STEPS_WORTH_COMPILING:
         return None
     ready: set[tuple[str, str]] = set()
     for scenario in scenarios:

@@ -141,6 +141,8 @@ class Loop:
         The same law on the thesis' own equations.
     kind
         What holds for all loops around such a vehicle.
+    flies_gait
+        Whether the scenario's gait has a part in the flight.
     """
 
     model: str
@@ -161,12 +163,17 @@ class Loop:
     extra_columns: Mapping[str, str] = field(default_factory=dict)
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
     kind: Kind = ROTORCRAFT
+    flies_gait: bool = True
 
     @cached_property
     def signature(self) -> float:
         """A checksum of the layout of `userdata`, which tells our models from foreign ones."""
         layout = (self.model, self.sizes, record_dtype(self.parameters))
         return float(zlib.crc32(repr(layout).encode()))
+
+    def native_name(self, plant: str) -> str:
+        """Name of the loop's compiled code on a plant, as a file's name."""
+        return f"{plant}.{self.controls.__module__}.{self.controls.__qualname__}"
 
     @cached_property
     def record_size(self) -> int:

@@ -7,6 +7,7 @@ scales what is drawn with the arms, and compiles.
 from __future__ import annotations
 
 import warnings
+from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
 from math import inf, isfinite
@@ -232,19 +233,57 @@ def compile_model(
     for name, value in vehicle._asdict().items():
         _require_positive(f"vehicle.{name}", value, "(SI)")
 
-    whole, bare = _compose(
-        model,
-        vehicle,
-        timestep,
-        integrator,
-        userdata_size,
-        tilt_servo,
-        pod,
-        rotor_limits,
-        law_states,
-        ground,
+    description = (
+        *(timestep, integrator, userdata_size),
+        *(tilt_servo, pod, rotor_limits, law_states, ground),
     )
-    return mujoco.MjModel.from_xml_string(whole if visuals else bare)
+    likeness = (model, vehicle.arm_length, *description, visuals)
+    if likeness in _compiled:
+        return _with_parameters(*_compiled[likeness], vehicle, pod, law_states)
+    whole, bare = _compose(model, vehicle, *description)
+    compiled = mujoco.MjModel.from_xml_string(whole if visuals else bare)
+    if model != "tiltrotor" or tilt_servo.max_angle is None:
+        if len(_compiled) >= LIKENESSES:
+            _compiled.clear()
+        _compiled[likeness] = copy(compiled), mujoco.MjData(compiled)
+    return compiled
+
+
+LIKENESSES: Final = 32
+"""How many models are kept to make others of them."""
+
+_compiled: dict[tuple[Any, ...], tuple[mujoco.MjModel, mujoco.MjData]] = {}
+"""Compiled models, with data to work in, by all that `_with_parameters` cannot change.
+
+Models with stops are not among them: MuJoCo's solver scales with a mean inertia that only its
+compiler computes.
+"""
+
+
+def _with_parameters(
+    compiled: mujoco.MjModel, data: mujoco.MjData, vehicle: Vehicle, pod: Pod, law_states: int
+) -> mujoco.MjModel:
+    """A copy of a model with another vehicle's mass, inertia, coefficients and gravity.
+
+    Bit for bit what compiling gives, a hundred times faster, but for the mean mass and inertia in
+    ``stat``, which nothing here reads.
+    """
+    import mujoco
+
+    model = copy(compiled)
+    body = model.body("vehicle").id
+    model.body_mass[body], model.body_inertia[body] = _body_inertia(
+        vehicle, pod if model.njnt > 1 else None
+    )
+    for i, spin in zip(ROTORS, SPIN, strict=True):
+        model.actuator(f"thrust_{i}").gear[:] = _thrust_gear(vehicle, spin)
+    model.opt.gravity[:] = (0.0, 0.0, -vehicle.gravity)
+    hover, speed = model.key("hover").id, vehicle.hover_rotor_speed
+    model.key_act[hover, :4] = [spin * speed for spin in SPIN]
+    thrusts = model.nu - law_states - 8
+    model.key_ctrl[hover, thrusts : thrusts + 4] = speed**2
+    mujoco.mj_setConst(model, data)
+    return model
 
 
 @lru_cache(maxsize=64)  # dm_control takes several times longer than MuJoCo's compiler
@@ -317,16 +356,31 @@ def _scale_lengths(root: Any, arm_length: float) -> None:
 
 def _set_rotors(root: Any, vehicle: Vehicle, limits: RotorLimits) -> None:
     for i, spin in zip(ROTORS, SPIN, strict=True):
-        drag = -spin * vehicle.drag_coefficient
-        thrust = root.find("actuator", f"thrust_{i}")
-        thrust.gear = (0.0, 0.0, vehicle.thrust_coefficient, 0.0, 0.0, drag)
+        root.find("actuator", f"thrust_{i}").gear = _thrust_gear(vehicle, spin)
         speed_range = limits.speed_range(spin)
         if speed_range is not None:
             root.find("actuator", f"rotor_speed_{i}").actrange = speed_range
 
 
+def _thrust_gear(vehicle: Vehicle, spin: float) -> tuple[float, ...]:
+    """Thrust and drag torque per unit of control."""
+    drag = -spin * vehicle.drag_coefficient
+    return 0.0, 0.0, vehicle.thrust_coefficient, 0.0, 0.0, drag
+
+
 def _set_inertia(root: Any, vehicle: Vehicle, pod: Pod | None) -> None:
     """Give the pods their mass and inertia and the body the rest of the vehicle's."""
+    inertial = root.find("body", "vehicle").inertial
+    inertial.mass, inertial.diaginertia = _body_inertia(vehicle, pod)
+    if pod is not None:
+        for i in ROTORS:
+            inertial = root.find("body", f"pod_{i}").inertial
+            inertial.mass = pod.mass
+            inertial.diaginertia = [pod.inertia] * 3
+
+
+def _body_inertia(vehicle: Vehicle, pod: Pod | None) -> tuple[float, list[float]]:
+    """Mass and principal moments of inertia of the body: the vehicle's less its pods'."""
     mass = vehicle.mass
     moments = [vehicle.inertia_xx, vehicle.inertia_yy, vehicle.inertia_zz]
     if pod is not None:
@@ -334,10 +388,6 @@ def _set_inertia(root: Any, vehicle: Vehicle, pod: Pod | None) -> None:
         of_two_opposite_pods = 2.0 * pod.mass * vehicle.arm_length**2  # point masses
         for axis, pairs in enumerate((1.0, 1.0, 2.0)):  # the pairs that lie off this axis
             moments[axis] -= 4.0 * pod.inertia + pairs * of_two_opposite_pods
-        for i in ROTORS:
-            inertial = root.find("body", f"pod_{i}").inertial
-            inertial.mass = pod.mass
-            inertial.diaginertia = [pod.inertia] * 3
     if mass <= 0.0 or min(moments) <= 0.0 or 2.0 * max(moments) > sum(moments):
         raise ValueError(
             f"vehicle.mass = {vehicle.mass!r}, vehicle.inertia = {list(vehicle[1:4])}, pods {pod}:"
@@ -345,9 +395,7 @@ def _set_inertia(root: Any, vehicle: Vehicle, pod: Pod | None) -> None:
             f" {', '.join(f'{moment:.6g}' for moment in moments)} kg m^2; all must be above 0, and"
             " none larger than the sum of the other two"
         )
-    inertial = root.find("body", "vehicle").inertial
-    inertial.mass = mass
-    inertial.diaginertia = moments
+    return mass, moments
 
 
 def _set_servos(root: Any, servo: TiltServo, pod: Pod) -> None:

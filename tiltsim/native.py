@@ -10,7 +10,7 @@ the sources and versions it was made from, and loads in a fraction of the time t
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from math import copysign, isfinite, nan
 from pathlib import Path
@@ -29,7 +29,11 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from controllers.records import flatten, record_dtype, record_size
 from controllers.references import ReferenceParameters
 from controllers.scalar import scalar, scalar_functions
-from tiltsim.cache import native_code_can_be_kept, native_code_folder
+from tiltsim.cache import (
+    native_code_can_be_kept,
+    native_code_folder,
+    native_code_was_compiled,
+)
 from tiltsim.engine import EngineName, check_model
 from tiltsim.limits import SINGULAR, WITHIN
 from tiltsim.loop import (
@@ -37,6 +41,7 @@ from tiltsim.loop import (
     EVALUATIONS,
     HEADER_SIZE,
     RECORDER,
+    ControlSetup,
     Floats,
     Loop,
 )
@@ -330,6 +335,7 @@ def compile_callbacks(loop: Loop) -> Callbacks:
                     scratch[index] = nan
         _set_state(model, data, address + 8 * CAPACITY, CONTROLS)
 
+    native_code_was_compiled(loop.native_name("mujoco"))
     return Callbacks(control)
 
 
@@ -413,3 +419,52 @@ def native_record(loop: Loop, userdata: Floats) -> tuple[Any, Floats]:
     """The parameter record and the table of a flight as compiled code reads them."""
     head = loop.record_size
     return userdata[:head].view(record_dtype(loop.parameters))[0], userdata[head:]
+
+
+@cache
+def _compile_rows(function: Callable[..., tuple[float, ...]]) -> Any:
+    _register_scalar_functions()
+
+    @njit(nogil=True, **_OPTIONS)
+    def rows(time, states, parameters, table):  # type: ignore[no-untyped-def]
+        width = len(function(time[0], states[0], parameters, table))
+        values = np.empty((len(time), width))
+        for index in range(len(time)):
+            row = function(time[index], states[index], parameters, table)
+            for column in range(width):
+                values[index, column] = row[column]
+        return values
+
+    return rows
+
+
+def evaluate_natively(
+    function: Callable[..., tuple[float, ...]], time: Floats, states: Floats, setup: ControlSetup
+) -> Floats:
+    """See `tiltsim.rows.evaluate_rows`, which takes at least one row to here."""
+    head = record_size(type(setup.parameters))
+    parameters = setup.userdata[:head].view(record_dtype(type(setup.parameters)))[0]
+    time, states = np.ascontiguousarray(time), np.ascontiguousarray(states)
+    table = np.array(setup.table)
+    values: Floats = _compile_rows(function)(time, states, parameters, table)
+    return values
+
+
+@cache
+def compile_floor() -> tuple[Any, Any]:
+    """Callbacks for measurements: one that does nothing, one that reads state, writes controls."""
+
+    @cfunc(types.void(types.intp, types.intp), **_OPTIONS)
+    def empty(model, data):  # type: ignore[no-untyped-def]
+        pass
+
+    @cfunc(types.void(types.intp, types.intp), **_OPTIONS)
+    def state(model, data):  # type: ignore[no-untyped-def]
+        address = _stack_buffer()
+        if _state_size(model, INPUTS) > CAPACITY:
+            return
+        _get_state(model, data, address, CONTROLS)
+        _set_state(model, data, address, CONTROLS)
+        _get_state(model, data, address, INPUTS)
+
+    return empty, state

@@ -13,7 +13,7 @@ import numpy as np
 from controllers.records import slotted
 from controllers.scalar import Triple
 from tiltsim import thesis_plant
-from tiltsim.cache import native_code_is_cached
+from tiltsim.cache import native_code_is_cached, native_code_was_compiled
 from tiltsim.engine import EngineName, control_callback, make_engine
 from tiltsim.errors import InputError
 from tiltsim.loop import EVALUATIONS, HEADER_SIZE, RECORDER, ControlSetup, Floats, Header, Loop
@@ -77,8 +77,12 @@ def choose_engine(scenario: Scenario) -> EngineName:
 
 def worth_native(scenarios: Iterable[Scenario]) -> bool:
     """Whether flights are together long enough for the native engine."""
-    steps = sum(scenario.simulation.steps for scenario in scenarios)
-    return steps >= (STEPS_WORTH_LOADING if native_code_is_cached() else STEPS_WORTH_COMPILING)
+    steps, names = 0, set()
+    for scenario in scenarios:
+        steps += scenario.simulation.steps
+        names.add(loop_of(scenario).native_name(scenario.simulation.plant))
+    cached = all(map(native_code_is_cached, names))
+    return steps >= (STEPS_WORTH_LOADING if cached else STEPS_WORTH_COMPILING)
 
 
 class MujocoPlant:
@@ -352,6 +356,7 @@ class ThesisPlant:
             *(self._control_steps, *self._law, self._disturbance),
         )
         self._state = list(state)
+        native_code_was_compiled(self._loop.native_name("thesis"))
         self._step_index += samples * steps
         return None if recorder.lost else recorder.samples
 

@@ -180,6 +180,36 @@ VehicleUnion = Annotated[
 ]
 """The ``[vehicle]`` table, told apart by its model."""
 
+# --- [model_error] -----------------------------------------------------------------------------
+
+Share = Annotated[float, Field(ge=0.01, le=100.0)]
+
+
+class ModelErrorTable(Table):
+    """By what factors the vehicle that flies differs from the ``[vehicle]`` that the law knows."""
+
+    mass: Share = 1.0
+    inertia: Annotated[tuple[Share, Share, Share], Field(strict=False)] = Field(
+        (1.0, 1.0, 1.0), description="one factor a principal moment"
+    )
+    arm_length: Share = 1.0
+    thrust_coefficient: Share = 1.0
+    drag_coefficient: Share = 1.0
+
+    def apply(self, vehicle: Vehicle) -> Vehicle:
+        """The vehicle that flies, where the law knows ``vehicle``."""
+        xx, yy, zz = self.inertia
+        return vehicle._replace(
+            mass=self.mass * vehicle.mass,
+            inertia_xx=xx * vehicle.inertia_xx,
+            inertia_yy=yy * vehicle.inertia_yy,
+            inertia_zz=zz * vehicle.inertia_zz,
+            arm_length=self.arm_length * vehicle.arm_length,
+            thrust_coefficient=self.thrust_coefficient * vehicle.thrust_coefficient,
+            drag_coefficient=self.drag_coefficient * vehicle.drag_coefficient,
+        )
+
+
 # --- [simulation] and [initial] ----------------------------------------------------------------
 
 
@@ -573,6 +603,7 @@ class Scenario(Table):
     title: str = ""
     source: str = ""
     vehicle: VehicleUnion = VehicleTable()
+    model_error: ModelErrorTable = ModelErrorTable()
     simulation: SimulationTable = SimulationTable()
     initial: InitialTable = InitialTable()
     controller: Controller = AttitudeAltitudeController()
@@ -597,6 +628,11 @@ class Scenario(Table):
         return self.vehicle
 
     @property
+    def true_rotorcraft(self) -> Vehicle:
+        """The vehicle that flies; the law knows ``rotorcraft.resolve()``."""
+        return self.model_error.apply(self.rotorcraft.resolve())
+
+    @property
     def tilt_car(self) -> TiltCarTable:
         """The vehicle of a tilt-car. Raises TypeError for other vehicles."""
         if not isinstance(self.vehicle, TiltCarTable):
@@ -606,6 +642,7 @@ class Scenario(Table):
     @model_validator(mode="after")
     def _check(self) -> Self:
         self._check_law()
+        self._check_model_error()
         self._check_gait()
         self._check_reference()
         self._check_rotor_limits()
@@ -655,6 +692,26 @@ class Scenario(Table):
                     "the quadrotor has no use for it: its rotors do not tilt, and "
                     "make the thrust that its law asks for at once",
                 )
+
+    def _check_model_error(self) -> None:
+        error = self.model_error
+        if error == ModelErrorTable():
+            return
+        thesis, car = self.simulation.plant == "thesis", not isinstance(self.vehicle, VehicleTable)
+        if thesis or car:
+            key, value = (
+                ("simulation.plant", "thesis") if thesis else ("vehicle.model", self.vehicle.model)
+            )
+            raise InvalidValueError(
+                key, value, "takes no [model_error]; use a rotorcraft on the mujoco plant"
+            )
+        a, b, c = sorted(self.true_rotorcraft[1:4])
+        if a + b < c:
+            raise InvalidValueError(
+                "model_error.inertia",
+                list(error.inertia),
+                "no body has it: two moments must exceed the third",
+            )
 
     def _check_plane(self) -> None:
         """Refuse what would lift a tilt-car off its plane, or yaw it where yaw is no output."""

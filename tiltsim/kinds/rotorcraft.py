@@ -44,7 +44,7 @@ COLUMN_UNITS: Final = {
 
 def rotor_thrusts(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str, Floats]:
     """Thrusts (N) of the four rotors, negative where one turns against its spin."""
-    coefficient = scenario.rotorcraft.resolve().thrust_coefficient
+    coefficient = scenario.true_rotorcraft.thrust_coefficient
     return {
         f"thrust_{i}": coefficient
         * sign
@@ -63,7 +63,7 @@ def _compile(
     simulation, ground = scenario.simulation, scenario.ground
     return compile_model(
         vehicle.model,
-        vehicle.resolve(),
+        scenario.true_rotorcraft,
         timestep=simulation.timestep,
         integrator=simulation.integrator,
         userdata_size=userdata_size,

@@ -48,6 +48,11 @@ def follows_position(scenario: Scenario) -> bool:
     return loop_of(scenario).follows_position(scenario)
 
 
+def gait_in_words(scenario: Scenario) -> list[str]:
+    """The gait of a scenario for titles; nothing where its law flies none."""
+    return [f"{scenario.gait.type} gait"] if loop_of(scenario).flies_gait else []
+
+
 def law_in_words(scenario: Scenario) -> list[str]:
     """The law of a scenario for titles, most telling first."""
     controller = scenario.controller

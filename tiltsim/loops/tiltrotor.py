@@ -42,6 +42,7 @@ from tiltsim.loop import (
     Sizes,
     Watched,
 )
+from tiltsim.rows import evaluate_rows
 
 if TYPE_CHECKING:
     from tiltsim.scenario import Scenario, ServoTable
@@ -185,22 +186,29 @@ def gait_singularity(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict[st
     }
 
 
-def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    law, table, supervisor = setup.parameters.law, setup.table, setup.parameters.supervisor
+@scalar
+def references_in_force(
+    time: float, state: State, parameters: ControlParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """`REFERENCE_COLUMNS` and `TILT_REFERENCE_COLUMNS` at a time and state of the law."""
+    law = parameters.law
     ratio = drag_ratio(law.vehicle)
-    states = np.stack([samples[name] for name in STATE_FIELDS], axis=-1).tolist()
-    rows = []
-    for time, state in zip(samples["time"].tolist(), states, strict=True):
-        trig = sines_and_cosines(*state[12:16])
-        torque = torque_entries(trig, ratio)
-        position = position_reference(time, law.reference, table)[:3]
-        attitude = attitude_reference(time, state, trig, torque, law, table)[:3]
-        planned = tilt_reference(time, law.gait, table)
-        share = gait_share(planned, state[6], state[7], supervisor, ratio)
-        rows.append((*position, *attitude, *servo_commands(planned, share, 0.0)))
+    trig = sines_and_cosines(state[12], state[13], state[14], state[15])
+    torque = torque_entries(trig, ratio)
+    x, y, z, _, _, _, _, _, _ = position_reference(time, law.reference, table)
+    roll, pitch, yaw, _, _, _ = attitude_reference(time, state, trig, torque, law, table)
+    planned = tilt_reference(time, law.gait, table)
+    share = gait_share(planned, state[6], state[7], parameters.supervisor, ratio)
+    a1, a2, a3, a4 = servo_commands(planned, share, 0.0)
+    return x, y, z, roll, pitch, yaw, a1, a2, a3, a4
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    states = np.stack([samples[name] for name in STATE_FIELDS], axis=-1)
+    rows = evaluate_rows(references_in_force, samples["time"], states, setup)
     names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)
-    values = np.array(rows).reshape(len(rows), len(names))
-    return dict(zip(names, values.T, strict=True)) | gait_singularity(samples, law.vehicle)
+    columns = dict(zip(names, rows.reshape(-1, len(names)).T, strict=True))
+    return columns | gait_singularity(samples, setup.parameters.law.vehicle)
 
 
 def rotor_stops(sample: Mapping[str, float]) -> tuple[Watched, ...]:
