@@ -104,7 +104,9 @@ def _number(value: float | bool | None) -> str:
 
 
 def with_engine(scenario: Scenario, engine: EngineName) -> Scenario:
-    """The scenario with its engine chosen."""
+    """The scenario with its engine chosen; a user's own controller stays in Python."""
+    if scenario.controller.law == "python":
+        return scenario
     simulation = scenario.simulation.model_copy(update={"engine": engine})
     return scenario.model_copy(update={"simulation": simulation})
 
@@ -170,7 +172,7 @@ def shared_engine(scenarios: Sequence[Scenario], steps: int | None = None) -> En
     ready: set[tuple[str, str]] = set()
     for scenario in scenarios:
         kind = (scenario.controller.law, scenario.simulation.plant)
-        if kind not in ready:
+        if kind not in ready and scenario.controller.law != "python":
             make_plant(with_engine(scenario, "native")).advance(1)
             ready.add(kind)
     return "native"
