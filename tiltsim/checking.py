@@ -123,7 +123,8 @@ def check_all(
     scenarios down that it was working on, and they are reported as crashed. An interrupt from the
     keyboard ends all processes at once.
     """
-    engine = _engine_for(addresses, overrides)
+    scenarios = _valid(addresses, overrides)
+    engine = shared_engine(list(scenarios.values()))
     if jobs == 1 or len(addresses) == 1:
         results = []
         for address in addresses:
@@ -132,7 +133,10 @@ def check_all(
         return results
     by_address: dict[str, CheckResult] = {}
     work = partial(check_one, overrides=overrides, engine=engine)
-    for address, future in in_processes(work, addresses, jobs):
+    # The longest first, so that no process ends up alone with one of them.
+    steps = {address: scenario.simulation.steps for address, scenario in scenarios.items()}
+    by_length = sorted(addresses, key=lambda address: -steps.get(address, 0))
+    for address, future in in_processes(work, by_length, jobs):
         by_address[address] = _result(address, future)
         report(by_address[address])
     return [by_address[address] for address in addresses]
@@ -145,14 +149,14 @@ def _result(address: str, future: Future[CheckResult]) -> CheckResult:
     return future.result()
 
 
-def _engine_for(addresses: list[str], overrides: Mapping[str, Any]) -> EngineName | None:
-    scenarios = []
+def _valid(addresses: list[str], overrides: Mapping[str, Any]) -> dict[str, Scenario]:
+    scenarios = {}
     for address in addresses:
         try:
-            scenarios.append(load_scenario(address, overrides))
+            scenarios[address] = load_scenario(address, overrides)
         except InputError:
             continue  # it is reported when its turn comes
-    return shared_engine(scenarios)
+    return scenarios
 
 
 def shared_engine(scenarios: Sequence[Scenario], steps: int | None = None) -> EngineName | None:
