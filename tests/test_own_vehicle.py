@@ -292,3 +292,12 @@ def test_ones_own_controller_flies_any_layout(write):
     )
     assert flight.end.kind == "completed"
     assert abs(flight["z"][-1]) < 1e-6
+
+
+def test_a_ground_needs_geoms_to_touch_it(write):
+    with pytest.raises(InputError, match=r"ground.*needs a geom 'ground', and geoms"):
+        scenario(write(), ground={"height": -1.0})
+    path = write(changed('<geom name="hull" type', '<geom name="hull_collision" type'))
+    model = build_model(scenario(path, ground={"height": -1.0}))
+    assert model.geom("hull_collision").contype[0] == 1
+    assert model.geom("ground").pos[2] == -1.0

@@ -437,7 +437,7 @@ def _set_ground(root: Any, ground: Ground) -> None:
     plane.priority = 1  # its friction counts, not the larger of the two
     plane.conaffinity = 1
     for geom in root.find("body", "vehicle").find_all("geom"):
-        if geom.name.endswith("collision"):
+        if (geom.name or "").endswith("collision"):
             geom.contype = 1
 
 

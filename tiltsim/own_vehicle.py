@@ -64,6 +64,8 @@ class OwnVehicle:
         Its inertia about the body's origin, (3, 3), kg m^2.
     center
         The whole vehicle's centre of mass, m, body axes.
+    can_touch
+        Whether it has the geoms by which a scenario's ground is touched.
     """
 
     path: str
@@ -75,6 +77,7 @@ class OwnVehicle:
     rest_moment: Floats
     rest_inertia: Floats
     center: Floats
+    can_touch: bool
 
     def set_inertia(self, root: Any, vehicle: Vehicle) -> None:
         """Let mass and inertia of the whole be a vehicle's; what differs goes into the body.
@@ -191,6 +194,7 @@ def _read(path: str, model: str, modified: int) -> OwnVehicle:
         tuple(float(compiled.dof_M0[dof]) for dof in tilts),
         *rest,
         center,
+        _can_touch(compiled),
     )
 
 
@@ -225,6 +229,11 @@ def _check_names(compiled: mujoco.MjModel, model: str) -> None:
             raise ValueError(f"joint {name!r} must be a {kind}")
     if compiled.joint("vehicle").bodyid[0] != compiled.body("vehicle").id:
         raise ValueError("the free joint 'vehicle' must be that of the body 'vehicle'")
+
+
+def _can_touch(compiled: mujoco.MjModel) -> bool:
+    names = [compiled.geom(g).name for g in range(compiled.ngeom)]
+    return "ground" in names and any(name.endswith("collision") for name in names)
 
 
 def _check_complete(kind: str, found: Iterable[str], wanted: Iterable[str], model: str) -> None:

@@ -922,6 +922,13 @@ class Scenario(Table):
             raise InvalidValueError(
                 "simulation.plant", "thesis", "the thesis' equations know no ground; use mujoco"
             )
+        own = self.rotorcraft.own
+        if own is not None and not own.can_touch:
+            raise InvalidValueError(
+                "ground",
+                self.ground.model_dump(),
+                "vehicle.mjcf needs a geom 'ground', and geoms whose names end in 'collision'",
+            )
         if self.initial.position[2] < self.ground.height:
             raise InvalidValueError(
                 "initial.position",
