@@ -73,6 +73,7 @@ def _compile(
         law_states=law_states,
         ground=None if ground is None else Ground(ground.height, ground.friction),
         visuals=visuals,
+        own=vehicle.own,
     )
 
 

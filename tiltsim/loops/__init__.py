@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from tiltsim.loops.commanded import COMMANDED
 from tiltsim.loops.full_pose import FULL_POSE
 from tiltsim.loops.gait_feedforward import GAIT_FEEDFORWARD
 from tiltsim.loops.quadrotor_attitude_altitude import QUADROTOR_ATTITUDE_ALTITUDE
@@ -34,6 +35,8 @@ LOOPS: Final[dict[str, Loop]] = {
 
 def loop_of(scenario: Scenario) -> Loop:
     """The loop that a scenario flies."""
+    if scenario.controller.law == "python":
+        return COMMANDED[scenario.vehicle.model]
     return LOOPS[scenario.controller.loop_name]
 
 
