@@ -38,8 +38,7 @@ class CommandedPlant(MujocoPlant):
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        simulation = scenario.simulation.model_copy(update={"engine": "python"})
-        super().__init__(scenario.model_copy(update={"simulation": simulation}))
+        super().__init__(scenario)
         self.tilting = scenario.vehicle.model == "tiltrotor"
         self._first_thrust = 4 if self.tilting else 0
         self._first_rate = self._first_thrust + 4

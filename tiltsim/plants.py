@@ -76,7 +76,12 @@ def make_plant(scenario: Scenario, controller: Any = None) -> Plant:
 
 
 def choose_engine(scenario: Scenario) -> EngineName:
-    """The engine a scenario asks for; ``auto`` weighs the flight's length against start-up."""
+    """The engine a scenario asks for; ``auto`` weighs the flight's length against start-up.
+
+    A user's own controller is Python, whatever is asked for.
+    """
+    if scenario.controller.law == "python":
+        return "python"
     if scenario.simulation.engine != "auto":
         return scenario.simulation.engine
     return "native" if worth_native([scenario]) else "python"
