@@ -35,6 +35,7 @@ def test_a_flight_at_rest_on_its_setpoint_has_these_metrics():
         "sup_position_error_after_20s": 0.0,
         "least_position_error_after_20s": 0.0,
         **{"final_roll": 0.0, "final_pitch": 0.0, "final_yaw": 0.0},
+        "final_attitude_error": 0.0,
         **{"max_abs_roll": 0.0, "max_abs_pitch": 0.0},
         **{"min_rotor_speed": 360.0, "max_rotor_speed": 360.0, "max_tilt_rate": 0.0},
         **{"altitude_overshoot": 0.0, "altitude_settling_time": 0.0},

@@ -11,7 +11,7 @@ from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT
 
 COMMANDS: Final = (
-    *("run", "check", "list", "view", "plot", "video"),
+    *("run", "check", "sweep", "list", "view", "plot", "video"),
     *("gait", "map", "singularity", "report", "bench", "schema"),
 )
 

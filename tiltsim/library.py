@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from tiltsim.errors import InputError
+
+_SWEEP: Final = re.compile(r"^\s*\[\[?\s*(axis|bisect)\s*\]", re.MULTILINE)
+"""The tables that tell a sweep from a scenario."""
 
 
 def shipped_folder(name: str) -> Path:
@@ -50,8 +54,18 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def scenario_files(path: Path) -> list[Path]:
-    """All scenario files under a folder, sorted; a file stands for itself."""
-    return sorted(path.rglob("*.toml")) if path.is_dir() else [path]
+    """All scenario files under a folder, sorted, sweeps left out; a file stands for itself."""
+    if not path.is_dir():
+        return [path]
+    return sorted(file for file in path.rglob("*.toml") if not is_sweep(file))
+
+
+def is_sweep(file: Path) -> bool:
+    """Whether a TOML file defines a sweep: it has ``[[axis]]`` or ``[bisect]`` tables."""
+    try:
+        return _SWEEP.search(file.read_text(encoding="utf-8-sig")) is not None
+    except (OSError, UnicodeDecodeError):
+        return False  # whoever reads it will say what is wrong
 
 
 def library_name(path: Path) -> str:
@@ -126,3 +140,11 @@ def _shorter(source: str, family: str) -> str:
     while len(parts) > 1 and shared and parts[0] == shared[0]:
         parts, shared = parts[1:], shared[1:]
     return ", ".join(parts)
+
+
+def library_sweeps() -> Iterator[Entry]:
+    """Every sweep of the library."""
+    for path in sorted(shipped_folder("scenarios").rglob("*.toml")):
+        if is_sweep(path):
+            document = read_toml(path)
+            yield Entry(library_name(path), document.get("title", ""), document.get("source", ""))

@@ -26,6 +26,7 @@ METRICS: Final = {
     "final_roll": "mean over the last second, rad",
     "final_pitch": "mean over the last second, rad",
     "final_yaw": "mean over the last second, rad",
+    "final_attitude_error": "largest error of roll, pitch or yaw over the last second, rad",
     "max_abs_roll": "largest absolute roll, rad",
     "max_abs_pitch": "largest absolute pitch, rad",
     "min_rotor_speed": "smallest rotor speed along its spin, negative where one reversed, rad/s",
@@ -44,11 +45,14 @@ METRICS: Final = {
     "min_singularity_margin": "smallest rotation left to a singular attitude, negative beyond, rad",
     "min_decoupling_condition": "smallest over largest singular value of [tau/(L Kf); r3 F/Kf]",
     "saturated_fraction": "share of samples with a rotor at its speed limit",
-    "diverged": "true where the flight ended early, by divergence or a singular matrix",
+    "diverged": "true where the flight was lost: divergence, singular matrix, failed controller",
     "duration": "time flown, s",
     "realtime_factor": "time flown over wall time of the integration",
 }
 """Every metric by name, with its meaning. Metrics that have none for a flight are left out."""
+
+WALL_CLOCK_METRICS: Final = frozenset({"realtime_factor"})
+"""Metrics that tell of the computer; equal flights differ in them."""
 
 BOOLEAN_METRICS: Final = frozenset({"diverged"})
 
@@ -89,6 +93,10 @@ def _rotorcraft_metrics(flight: Flight) -> dict[str, float | bool]:
             metrics["min_orbit_radius_after_20s"] = float(orbit.min())
     for angle in ("roll", "pitch", "yaw"):
         metrics[f"final_{angle}"] = final(columns[angle])
+    metrics["final_attitude_error"] = max(
+        float(np.abs(_wrapped(columns[f"{angle}_ref"] - columns[angle])[last_second]).max())
+        for angle in ("roll", "pitch", "yaw")
+    )
     for angle in ("roll", "pitch"):
         metrics[f"max_abs_{angle}"] = float(np.abs(columns[angle]).max())
 
@@ -112,7 +120,7 @@ def _rotorcraft_metrics(flight: Flight) -> dict[str, float | bool]:
     metrics["min_singularity_margin"] = float(columns["singularity_margin"].min())
     metrics["min_decoupling_condition"] = _min_decoupling_condition(flight)
     metrics["saturated_fraction"] = _saturated_fraction(flight, spins)
-    metrics["diverged"] = flight.end.kind in {"diverged", "singular"}
+    metrics["diverged"] = flight.end.kind in {"diverged", "singular", "failed"}
     metrics["duration"] = float(time[-1])
     metrics["realtime_factor"] = float(time[-1] / max(flight.wall_time, 1e-9))
     return metrics
@@ -148,6 +156,11 @@ def _tilt_car_metrics(flight: Flight) -> dict[str, float | bool]:
 
 
 _METRICS_OF_KIND: Final = {"rotorcraft": _rotorcraft_metrics, "tilt_car": _tilt_car_metrics}
+
+
+def _wrapped(angle: Floats) -> Floats:
+    """An angle within half a turn of zero."""
+    return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
 
 
 def _saturated_fraction(flight: Flight, spins: Floats) -> float:

@@ -156,7 +156,7 @@ def _sample_is_due(recorder):  # type: ignore[no-untyped-def]
 
 
 @register_jitable(error_model="numpy")
-def _record(recorder, time, values, watched, limit_exceeded):  # type: ignore[no-untyped-def]
+def _record(recorder, time, values, watched, limit_exceeded, table):  # type: ignore[no-untyped-def]
     """Keep a sample and judge it as `tiltsim.simulation.Watch` does."""
     head = carray(_bytes_at(recorder), (1,), _RECORDER)
     samples = int(head[0].samples)
@@ -174,7 +174,7 @@ def _record(recorder, time, values, watched, limit_exceeded):  # type: ignore[no
     lost = not finite
     if finite:
         reference, follows_position = head[0].reference, head[0].follows_position
-        lost = limit_exceeded(time, values, reference, follows_position) != WITHIN
+        lost = limit_exceeded(time, values, reference, table, follows_position) != WITHIN
     for index in range(len(watched)):
         side = 0.0 if abs(watched[index]) < SINGULAR else copysign(1.0, watched[index])
         if side == 0.0 or side != rest[index]:
@@ -328,7 +328,8 @@ def compile_callbacks(loop: Loop) -> Callbacks:
             recorder = int(buffer[recording])
             if _sample_is_due(recorder):
                 seen = observe(positions, velocities, activations, values)
-                _record(recorder, buffer[0], seen, watch(seen, parameters), limit_exceeded)
+                watched, table = watch(seen, parameters), buffer[head:size]
+                _record(recorder, buffer[0], seen, watched, limit_exceeded, table)
             if _recording_is_over(recorder):
                 for index in range(nu):
                     scratch[index] = nan
@@ -364,6 +365,7 @@ def compile_stepper(loop: Loop) -> tuple[Any, Any]:
     is over. Neither holds Python's lock.
     """
     _register_scalar_functions()
+    assert loop.equations is not None
     inputs, observe = loop.equations.inputs, loop.equations.observe
     watch = loop.watch or watch_nothing
     limit_exceeded = loop.kind.limit_exceeded
@@ -405,7 +407,8 @@ def compile_stepper(loop: Loop) -> tuple[Any, Any]:
             if control_steps == 0 or step_index % control_steps == 0:
                 force = inputs(time, values, parameters, table)
             seen = observe(time, values, force, parameters, table)
-            _record(recorder, time, seen, watch(seen, parameters), limit_exceeded)
+            watched = watch(seen, parameters)
+            _record(recorder, time, seen, watched, limit_exceeded, table)
             if _recording_is_over(recorder):
                 break
         return np.array(values), held

@@ -63,8 +63,15 @@ class Plant(Protocol):
         """What the physics engine has found wrong so far, in a few words; else empty."""
 
 
-def make_plant(scenario: Scenario) -> Plant:
-    """The plant that a scenario asks for, at its initial state."""
+def make_plant(scenario: Scenario, controller: Any = None) -> Plant:
+    """The plant that a scenario asks for, at its initial state.
+
+    ``controller`` is a user's own, for scenarios whose law is ``python``.
+    """
+    if scenario.controller.law == "python":
+        from tiltsim.commanded_plant import ControlledPlant
+
+        return ControlledPlant(scenario, controller)
     return ThesisPlant(scenario) if scenario.simulation.plant == "thesis" else MujocoPlant(scenario)
 
 
@@ -95,7 +102,7 @@ class MujocoPlant:
             model = flight_model(scenario, len(self._setup.userdata))
         self.model = model
         self.data = mujoco.MjData(self.model)
-        self._reference = scenario.reference.parameters
+        self._reference, _ = scenario.reference_and_table()
         self._follows_position = self._loop.follows_position(scenario)
         self._set_initial_state(scenario, self._setup)
         self.engine: EngineName = choose_engine(scenario)
@@ -276,8 +283,9 @@ class ThesisPlant:
     def __init__(self, scenario: Scenario) -> None:
         simulation = scenario.simulation
         loop, setup = loop_of(scenario), control_setup(scenario)
+        assert loop.equations is not None  # scenarios that ask for others are refused
         self._loop, self._equations, self._setup = loop, loop.equations, setup
-        self._reference = scenario.reference.parameters
+        self._reference, _ = scenario.reference_and_table()
         self._follows_position = loop.follows_position(scenario)
         self._disturbance = disturbing_acceleration(scenario)
         self._timestep = simulation.timestep

@@ -296,6 +296,7 @@ def test_schema_knows_every_table_and_the_variants(capsys):
     assert main(["schema"]) == 0
     schema = json.loads(capsys.readouterr().out)
     tables = {"vehicle", "simulation", "initial", "controller", "gait", "reference"}
+    tables |= {"model_error"}
     lists = {"disturbance", "expect", "variant"}
     assert tables | lists | {"title", "source"} == set(schema["properties"])
     assert schema["additionalProperties"] is False

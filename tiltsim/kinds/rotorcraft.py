@@ -44,7 +44,7 @@ COLUMN_UNITS: Final = {
 
 def rotor_thrusts(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str, Floats]:
     """Thrusts (N) of the four rotors, negative where one turns against its spin."""
-    coefficient = scenario.rotorcraft.resolve().thrust_coefficient
+    coefficient = scenario.true_rotorcraft.thrust_coefficient
     return {
         f"thrust_{i}": coefficient
         * sign
@@ -57,13 +57,13 @@ def rotor_thrusts(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str
 def _compile(
     scenario: Scenario, law_states: int, userdata_size: int, visuals: bool
 ) -> mujoco.MjModel:
-    from tiltsim.model import Pod, RotorLimits, TiltServo, compile_model
+    from tiltsim.model import Ground, Pod, RotorLimits, TiltServo, compile_model
 
     vehicle: VehicleTable = scenario.rotorcraft
-    simulation = scenario.simulation
+    simulation, ground = scenario.simulation, scenario.ground
     return compile_model(
         vehicle.model,
-        vehicle.resolve(),
+        scenario.true_rotorcraft,
         timestep=simulation.timestep,
         integrator=simulation.integrator,
         userdata_size=userdata_size,
@@ -71,7 +71,9 @@ def _compile(
         pod=Pod(**vehicle.pod.model_dump()),
         rotor_limits=RotorLimits(vehicle.min_rotor_speed, vehicle.max_rotor_speed),
         law_states=law_states,
+        ground=None if ground is None else Ground(ground.height, ground.friction),
         visuals=visuals,
+        own=vehicle.own,
     )
 
 

@@ -145,7 +145,7 @@ def _measured_number(value: float, claim: Claim) -> str:
         return str(value)
     if isinstance(claim.published, bool):
         return _sign(f"{value:.4g}")
-    if value == int(value) and _decimals(claim) == 0:
+    if not claim.unit and value == int(value) and _decimals(claim) == 0:
         return _sign(f"{value:.0f}")  # a count
     finest = floor(-log10(_tolerance(claim)) + 1e-9)
     decimals = max(max(_decimals(claim), finest) + 1, 0)

@@ -217,9 +217,9 @@ class Scene:
 
 def reference_path(scenario: Scenario, until: float) -> Floats:
     """Points of the reference from the start to a time (s), shape (N, 3)."""
-    reference = scenario.reference.parameters
+    reference, table = scenario.reference.parameters, scenario.reference.table
     times = np.linspace(0.0, until, REFERENCE_POINTS).tolist()
-    return np.array([position_reference(time, reference)[:3] for time in times])
+    return np.array([position_reference(time, reference, table)[:3] for time in times])
 
 
 def _axis_in_body(model: mujoco.MjModel, site: int) -> Floats:

@@ -204,6 +204,7 @@ def _reference_path(flight: Flight) -> Floats | None:
     if not follows_position(flight.scenario):
         return None
     reference = flight.scenario.reference.parameters
+    table = flight.scenario.reference.table
     times = np.linspace(0.0, float(flight["time"][-1]), REFERENCE_POINTS).tolist()
-    path = np.array([position_reference(time, reference)[:3] for time in times])
+    path = np.array([position_reference(time, reference, table)[:3] for time in times])
     return path if np.ptp(path, axis=0).max() > 0.0 else path[:1]
