@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from controllers.attitude_altitude import Gains
+    from controllers.gains import IntegralGains
     from controllers.vehicle import Vehicle
 
 
@@ -98,3 +99,18 @@ def closed_loops(gains: Gains, vehicle: Vehicle, decoupling: float) -> list[Loop
     stable = is_hurwitz(position)
     condition = "" if stable else f"position gains {list(position[1:])} must both be positive"
     return [*third_order, Loop("position", position, stable, condition)]
+
+
+def feedforward_loops(gains: Gains, integral: IntegralGains) -> list[Loop]:
+    """The closed loops of the law that knows its gait's rates, with its integrals."""
+    altitude = (gains.altitude_1, gains.altitude_2, gains.altitude_3)
+    position = (gains.position_1, gains.position_2)
+    with_altitude = (*altitude, integral.altitude) if integral.altitude else altitude
+    with_position = (*position, integral.position) if integral.position else position
+    return [
+        linear_loop("roll", (gains.roll_1, gains.roll_2, gains.roll_3)),
+        linear_loop("pitch", (gains.pitch_1, gains.pitch_2, gains.pitch_3)),
+        linear_loop("yaw", (gains.yaw_1, gains.yaw_2, gains.yaw_3)),
+        linear_loop("altitude", with_altitude),
+        linear_loop("position", with_position),
+    ]

@@ -50,8 +50,9 @@ class EventWatch:
     def opening(self) -> Event:
         """What is flown."""
         scenario = self._scenario
+        gait = f"gait {scenario.gait.type}, " if loop_of(scenario).flies_gait else ""
         text = (
-            f"{scenario.title or scenario.address or 'flight'}: gait {scenario.gait.type}, "
+            f"{scenario.title or scenario.address or 'flight'}: {gait}"
             f"{', '.join(law_in_words(scenario))}, "
             f"{scenario.simulation.plant} plant"
         )

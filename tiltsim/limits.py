@@ -26,16 +26,20 @@ ROTOR_SPEED: Final = 6
 
 
 @scalar
-def horizontal_error(time: float, values: Sequence[float], reference: ReferenceParameters) -> float:
+def horizontal_error(
+    time: float, values: Sequence[float], reference: ReferenceParameters, table: Sequence[float]
+) -> float:
     """Horizontal distance (m) to the reference."""
-    target = position_reference(time, reference)
+    target = position_reference(time, reference, table)
     return hypot(target[0] - values[0], target[1] - values[1])
 
 
 @scalar
-def altitude_error(time: float, values: Sequence[float], reference: ReferenceParameters) -> float:
+def altitude_error(
+    time: float, values: Sequence[float], reference: ReferenceParameters, table: Sequence[float]
+) -> float:
     """Absolute altitude error (m)."""
-    return abs(position_reference(time, reference)[2] - values[2])
+    return abs(position_reference(time, reference, table)[2] - values[2])
 
 
 @scalar
@@ -43,6 +47,7 @@ def rotorcraft_limit_exceeded(
     time: float,
     values: Sequence[float],
     reference: ReferenceParameters,
+    table: Sequence[float],
     follows_position: float,
 ) -> int:
     """The code of the first limit that a sample of a rotorcraft exceeds, `WITHIN` if none.
@@ -50,9 +55,10 @@ def rotorcraft_limit_exceeded(
     ``values`` begin as `tiltsim.kinds.rotorcraft.OBSERVED_FIELDS`; ``follows_position`` is 0 where
     the horizontal position is free.
     """
-    if follows_position != 0.0 and horizontal_error(time, values, reference) > MAX_POSITION_ERROR:
+    away = follows_position * horizontal_error(time, values, reference, table)
+    if away > MAX_POSITION_ERROR:
         return HORIZONTAL_ERROR
-    if altitude_error(time, values, reference) > MAX_POSITION_ERROR:
+    if altitude_error(time, values, reference, table) > MAX_POSITION_ERROR:
         return ALTITUDE_ERROR
     for axis in range(3):
         if abs(values[9 + axis]) > MAX_BODY_RATE:
@@ -68,10 +74,12 @@ def tilt_car_limit_exceeded(
     time: float,
     values: Sequence[float],
     reference: ReferenceParameters,
+    table: Sequence[float],
     follows_position: float,
 ) -> int:
     """As `rotorcraft_limit_exceeded`, for `tiltsim.kinds.tilt_car.OBSERVED_FIELDS`."""
-    if follows_position != 0.0 and horizontal_error(time, values, reference) > MAX_POSITION_ERROR:
+    away = follows_position * horizontal_error(time, values, reference, table)
+    if away > MAX_POSITION_ERROR:
         return HORIZONTAL_ERROR
     for rotor in range(2):
         if abs(values[8 + rotor]) > MAX_ROTOR_SPEED:

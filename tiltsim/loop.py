@@ -51,7 +51,7 @@ class ControlSetup(NamedTuple):
     """What the control step of one flight reads besides the state."""
 
     parameters: Any  # the loop's record
-    table: tuple[float, ...] = ()  # keyframes of the gait
+    table: tuple[float, ...] = ()  # keyframes of the gait, then waypoints of the reference
 
     @property
     def userdata(self) -> Floats:
@@ -138,9 +138,11 @@ class Loop:
     follows_position
         Whether a scenario has the law follow the reference's horizontal position.
     equations
-        The same law on the thesis' own equations.
+        The same law on the thesis' own equations; None where it flies on MuJoCo alone.
     kind
         What holds for all loops around such a vehicle.
+    flies_gait
+        Whether the scenario's gait has a part in the flight.
     """
 
     model: str
@@ -153,7 +155,7 @@ class Loop:
     observe: Callable[..., tuple[float, ...]]
     derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
     watched: Callable[[Mapping[str, float], ControlSetup], tuple[Watched, ...]]
-    equations: Equations
+    equations: Equations | None = None
     watch: Callable[..., tuple[float, ...]] | None = None
     observes_controls: bool = False
     law_states: int = 0
@@ -161,12 +163,17 @@ class Loop:
     extra_columns: Mapping[str, str] = field(default_factory=dict)
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
     kind: Kind = ROTORCRAFT
+    flies_gait: bool = True
 
     @cached_property
     def signature(self) -> float:
         """A checksum of the layout of `userdata`, which tells our models from foreign ones."""
         layout = (self.model, self.sizes, record_dtype(self.parameters))
         return float(zlib.crc32(repr(layout).encode()))
+
+    def native_name(self, plant: str) -> str:
+        """Name of the loop's compiled code on a plant, as a file's name."""
+        return f"{plant}.{self.controls.__module__}.{self.controls.__qualname__}"
 
     @cached_property
     def record_size(self) -> int:

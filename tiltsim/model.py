@@ -7,6 +7,7 @@ scales what is drawn with the arms, and compiles.
 from __future__ import annotations
 
 import warnings
+from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
 from math import inf, isfinite
@@ -18,6 +19,8 @@ from tiltsim.library import shipped_folder
 
 if TYPE_CHECKING:
     import mujoco
+
+    from tiltsim.own_vehicle import OwnVehicle
 
 MODELS: Final = ("tiltrotor", "quadrotor")
 INTEGRATORS: Final = ("Euler", "RK4", "implicit", "implicitfast")
@@ -144,6 +147,27 @@ class RotorLimits:
         return (lower, upper) if spin > 0.0 else (-upper, -lower)
 
 
+@dataclass(frozen=True)
+class Ground:
+    """Level ground that the vehicle can stand on.
+
+    Attributes
+    ----------
+    height : float
+        m, world.
+    friction : float
+        Coefficient of sliding friction.
+    """
+
+    height: float = 0.0
+    friction: float = 0.8
+
+    def __post_init__(self) -> None:
+        if not isfinite(self.height):
+            raise ValueError(f"ground.height = {self.height!r}: must be finite")
+        _require_positive("ground.friction", self.friction, "")
+
+
 def compile_model(
     model: str,
     vehicle: Vehicle,
@@ -155,12 +179,14 @@ def compile_model(
     pod: Pod = Pod(),
     rotor_limits: RotorLimits = RotorLimits(),
     law_states: int = 0,
+    ground: Ground | None = None,
     visuals: bool = True,
+    own: OwnVehicle | None = None,
 ) -> mujoco.MjModel:
     """Compile the MuJoCo model of a vehicle.
 
     Mass and inertia of the compiled model are the vehicle's at any tilt: what the pods weigh is
-    taken from the body. Nothing collides.
+    taken from the body. Nothing collides but, if there is ground, the vehicle with it.
 
     Parameters
     ----------
@@ -183,9 +209,14 @@ def compile_model(
     law_states : int, default=0
         Number of states of a control law of its own: integrators ``law_1``, ``law_2``, ... after
         all other actuators, which act on nothing; ctrl is the state's rate.
+    ground : Ground, optional
+        Ground to take off from and land on; without it there are no contacts to look for.
     visuals : bool, default=True
         Whether the vehicle has geoms. They do not touch the physics, but positioning them takes
         about a sixth of a step.
+    own : OwnVehicle, optional
+        A user's own file in place of the shipped one, with its own arms and pods; its geoms may
+        have mass and always stay.
 
     Returns
     -------
@@ -208,18 +239,57 @@ def compile_model(
     for name, value in vehicle._asdict().items():
         _require_positive(f"vehicle.{name}", value, "(SI)")
 
-    whole, bare = _compose(
-        model,
-        vehicle,
-        timestep,
-        integrator,
-        userdata_size,
-        tilt_servo,
-        pod,
-        rotor_limits,
-        law_states,
+    description = (
+        *(timestep, integrator, userdata_size),
+        *(tilt_servo, pod, rotor_limits, law_states, ground),
     )
-    return mujoco.MjModel.from_xml_string(whole if visuals else bare)
+    likeness = (model, vehicle.arm_length, *description, visuals)
+    if own is None and likeness in _compiled:
+        return _with_parameters(*_compiled[likeness], vehicle, pod, law_states)
+    whole, bare, assets = _compose(model, vehicle, *description, own)
+    compiled = mujoco.MjModel.from_xml_string(whole if visuals else bare, assets)
+    if own is None and (model != "tiltrotor" or tilt_servo.max_angle is None):
+        if len(_compiled) >= LIKENESSES:
+            _compiled.clear()
+        _compiled[likeness] = copy(compiled), mujoco.MjData(compiled)
+    return compiled
+
+
+LIKENESSES: Final = 32
+"""How many models are kept to make others of them."""
+
+_compiled: dict[tuple[Any, ...], tuple[mujoco.MjModel, mujoco.MjData]] = {}
+"""Compiled models, with data to work in, by all that `_with_parameters` cannot change.
+
+Models with stops are not among them: MuJoCo's solver scales with a mean inertia that only its
+compiler computes.
+"""
+
+
+def _with_parameters(
+    compiled: mujoco.MjModel, data: mujoco.MjData, vehicle: Vehicle, pod: Pod, law_states: int
+) -> mujoco.MjModel:
+    """A copy of a model with another vehicle's mass, inertia, coefficients and gravity.
+
+    Bit for bit what compiling gives, a hundred times faster, but for the mean mass and inertia in
+    ``stat``, which nothing here reads.
+    """
+    import mujoco
+
+    model = copy(compiled)
+    body = model.body("vehicle").id
+    model.body_mass[body], model.body_inertia[body] = _body_inertia(
+        vehicle, pod if model.njnt > 1 else None
+    )
+    for i, spin in zip(ROTORS, SPIN, strict=True):
+        model.actuator(f"thrust_{i}").gear[:] = _thrust_gear(vehicle, spin)
+    model.opt.gravity[:] = (0.0, 0.0, -vehicle.gravity)
+    hover, speed = model.key("hover").id, vehicle.hover_rotor_speed
+    model.key_act[hover, :4] = [spin * speed for spin in SPIN]
+    thrusts = model.nu - law_states - 8
+    model.key_ctrl[hover, thrusts : thrusts + 4] = speed**2
+    mujoco.mj_setConst(model, data)
+    return model
 
 
 @lru_cache(maxsize=64)  # dm_control takes several times longer than MuJoCo's compiler
@@ -233,35 +303,49 @@ def _compose(
     pod: Pod,
     rotor_limits: RotorLimits,
     law_states: int,
-) -> tuple[str, str]:
-    """The vehicle's complete MJCF, and the same without what is only drawn.
+    ground: Ground | None,
+    own: OwnVehicle | None,
+) -> tuple[str, str, dict[str, bytes]]:
+    """The vehicle's complete MJCF, the same without what is only drawn, and the files they name.
 
     The arguments are `compile_model`'s, found valid. A flight is flown on the one and shown on the
     other, so both are made at once.
     """
-    root = parse_mjcf(shipped_folder("mjcf") / f"{model}.xml")
+    root = parse_mjcf(shipped_folder("mjcf") / f"{model}.xml" if own is None else Path(own.path))
     tilting = model == "tiltrotor"
     stops = tilting and tilt_servo.max_angle is not None
 
     root.option.timestep = timestep
     root.option.integrator = integrator
     root.option.gravity = (0.0, 0.0, -vehicle.gravity)
-    root.option.flag.contact = "disable"
-    root.option.flag.constraint = "enable" if stops else "disable"
+    root.option.flag.contact = "disable" if ground is None else "enable"
+    root.option.flag.constraint = "disable" if ground is None and not stops else "enable"
     root.size.nuserdata = userdata_size
 
-    _scale_lengths(root, vehicle.arm_length)
-    _set_inertia(root, vehicle, pod if tilting else None)
+    if own is None:
+        _scale_lengths(root, vehicle.arm_length)
+        _set_inertia(root, vehicle, pod if tilting else None)
+    else:
+        own.set_inertia(root, vehicle)
     _set_rotors(root, vehicle, rotor_limits)
-    if tilting:
+    if tilting and own is None:
         _set_servos(root, tilt_servo, pod)
-    _set_keyframe(root.keyframe.key["hover"], vehicle.hover_rotor_speed)
-    _set_keyframe(root.keyframe.key["start"], START_SPEED)
+    elif tilting and own is not None:
+        own.set_servos(root, tilt_servo)
+    for name, speed in (("hover", vehicle.hover_rotor_speed), ("start", START_SPEED)):
+        key = root.find("key", name)
+        if key is not None:
+            _set_keyframe(key, speed)
     add_law_states(root, law_states)
+    if ground is not None:
+        _set_ground(root, ground)
     whole = str(root.to_xml_string())
+    if own is not None:
+        return whole, whole, dict(root.get_assets())
     for geom in root.find("body", "vehicle").find_all("geom"):
-        geom.remove()
-    return whole, str(root.to_xml_string())
+        if ground is None or not geom.name.endswith("collision"):
+            geom.remove()
+    return whole, str(root.to_xml_string()), {}
 
 
 def parse_mjcf(path: Path) -> Any:
@@ -288,16 +372,31 @@ def _scale_lengths(root: Any, arm_length: float) -> None:
 
 def _set_rotors(root: Any, vehicle: Vehicle, limits: RotorLimits) -> None:
     for i, spin in zip(ROTORS, SPIN, strict=True):
-        drag = -spin * vehicle.drag_coefficient
-        thrust = root.find("actuator", f"thrust_{i}")
-        thrust.gear = (0.0, 0.0, vehicle.thrust_coefficient, 0.0, 0.0, drag)
+        root.find("actuator", f"thrust_{i}").gear = _thrust_gear(vehicle, spin)
         speed_range = limits.speed_range(spin)
         if speed_range is not None:
             root.find("actuator", f"rotor_speed_{i}").actrange = speed_range
 
 
+def _thrust_gear(vehicle: Vehicle, spin: float) -> tuple[float, ...]:
+    """Thrust and drag torque per unit of control."""
+    drag = -spin * vehicle.drag_coefficient
+    return 0.0, 0.0, vehicle.thrust_coefficient, 0.0, 0.0, drag
+
+
 def _set_inertia(root: Any, vehicle: Vehicle, pod: Pod | None) -> None:
     """Give the pods their mass and inertia and the body the rest of the vehicle's."""
+    inertial = root.find("body", "vehicle").inertial
+    inertial.mass, inertial.diaginertia = _body_inertia(vehicle, pod)
+    if pod is not None:
+        for i in ROTORS:
+            inertial = root.find("body", f"pod_{i}").inertial
+            inertial.mass = pod.mass
+            inertial.diaginertia = [pod.inertia] * 3
+
+
+def _body_inertia(vehicle: Vehicle, pod: Pod | None) -> tuple[float, list[float]]:
+    """Mass and principal moments of inertia of the body: the vehicle's less its pods'."""
     mass = vehicle.mass
     moments = [vehicle.inertia_xx, vehicle.inertia_yy, vehicle.inertia_zz]
     if pod is not None:
@@ -305,10 +404,6 @@ def _set_inertia(root: Any, vehicle: Vehicle, pod: Pod | None) -> None:
         of_two_opposite_pods = 2.0 * pod.mass * vehicle.arm_length**2  # point masses
         for axis, pairs in enumerate((1.0, 1.0, 2.0)):  # the pairs that lie off this axis
             moments[axis] -= 4.0 * pod.inertia + pairs * of_two_opposite_pods
-        for i in ROTORS:
-            inertial = root.find("body", f"pod_{i}").inertial
-            inertial.mass = pod.mass
-            inertial.diaginertia = [pod.inertia] * 3
     if mass <= 0.0 or min(moments) <= 0.0 or 2.0 * max(moments) > sum(moments):
         raise ValueError(
             f"vehicle.mass = {vehicle.mass!r}, vehicle.inertia = {list(vehicle[1:4])}, pods {pod}:"
@@ -316,9 +411,7 @@ def _set_inertia(root: Any, vehicle: Vehicle, pod: Pod | None) -> None:
             f" {', '.join(f'{moment:.6g}' for moment in moments)} kg m^2; all must be above 0, and"
             " none larger than the sum of the other two"
         )
-    inertial = root.find("body", "vehicle").inertial
-    inertial.mass = mass
-    inertial.diaginertia = moments
+    return mass, moments
 
 
 def _set_servos(root: Any, servo: TiltServo, pod: Pod) -> None:
@@ -334,6 +427,18 @@ def _set_servos(root: Any, servo: TiltServo, pod: Pod) -> None:
         defaults.joint.solreflimit = (2.0 * root.option.timestep, 1.0)
         defaults.joint.solimplimit = (0.99, 0.99, 0.001, 0.5, 2.0)
         defaults.position.ctrlrange = angle_range
+
+
+def _set_ground(root: Any, ground: Ground) -> None:
+    """Let the vehicle's collision shapes touch the ground, and nothing else."""
+    plane = root.find("geom", "ground")
+    plane.pos = (0.0, 0.0, ground.height)
+    plane.friction = (ground.friction, 0.005, 0.0001)
+    plane.priority = 1  # its friction counts, not the larger of the two
+    plane.conaffinity = 1
+    for geom in root.find("body", "vehicle").find_all("geom"):
+        if geom.name.endswith("collision"):
+            geom.contype = 1
 
 
 def _set_keyframe(key: Any, rotor_speed: float) -> None:

@@ -10,7 +10,7 @@ the sources and versions it was made from, and loads in a fraction of the time t
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from math import copysign, isfinite, nan
 from pathlib import Path
@@ -29,7 +29,11 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from controllers.records import flatten, record_dtype, record_size
 from controllers.references import ReferenceParameters
 from controllers.scalar import scalar, scalar_functions
-from tiltsim.cache import native_code_can_be_kept, native_code_folder
+from tiltsim.cache import (
+    native_code_can_be_kept,
+    native_code_folder,
+    native_code_was_compiled,
+)
 from tiltsim.engine import EngineName, check_model
 from tiltsim.limits import SINGULAR, WITHIN
 from tiltsim.loop import (
@@ -37,6 +41,7 @@ from tiltsim.loop import (
     EVALUATIONS,
     HEADER_SIZE,
     RECORDER,
+    ControlSetup,
     Floats,
     Loop,
 )
@@ -151,7 +156,7 @@ def _sample_is_due(recorder):  # type: ignore[no-untyped-def]
 
 
 @register_jitable(error_model="numpy")
-def _record(recorder, time, values, watched, limit_exceeded):  # type: ignore[no-untyped-def]
+def _record(recorder, time, values, watched, limit_exceeded, table):  # type: ignore[no-untyped-def]
     """Keep a sample and judge it as `tiltsim.simulation.Watch` does."""
     head = carray(_bytes_at(recorder), (1,), _RECORDER)
     samples = int(head[0].samples)
@@ -169,7 +174,7 @@ def _record(recorder, time, values, watched, limit_exceeded):  # type: ignore[no
     lost = not finite
     if finite:
         reference, follows_position = head[0].reference, head[0].follows_position
-        lost = limit_exceeded(time, values, reference, follows_position) != WITHIN
+        lost = limit_exceeded(time, values, reference, table, follows_position) != WITHIN
     for index in range(len(watched)):
         side = 0.0 if abs(watched[index]) < SINGULAR else copysign(1.0, watched[index])
         if side == 0.0 or side != rest[index]:
@@ -323,12 +328,14 @@ def compile_callbacks(loop: Loop) -> Callbacks:
             recorder = int(buffer[recording])
             if _sample_is_due(recorder):
                 seen = observe(positions, velocities, activations, values)
-                _record(recorder, buffer[0], seen, watch(seen, parameters), limit_exceeded)
+                watched, table = watch(seen, parameters), buffer[head:size]
+                _record(recorder, buffer[0], seen, watched, limit_exceeded, table)
             if _recording_is_over(recorder):
                 for index in range(nu):
                     scratch[index] = nan
         _set_state(model, data, address + 8 * CAPACITY, CONTROLS)
 
+    native_code_was_compiled(loop.native_name("mujoco"))
     return Callbacks(control)
 
 
@@ -358,6 +365,7 @@ def compile_stepper(loop: Loop) -> tuple[Any, Any]:
     is over. Neither holds Python's lock.
     """
     _register_scalar_functions()
+    assert loop.equations is not None
     inputs, observe = loop.equations.inputs, loop.equations.observe
     watch = loop.watch or watch_nothing
     limit_exceeded = loop.kind.limit_exceeded
@@ -399,7 +407,8 @@ def compile_stepper(loop: Loop) -> tuple[Any, Any]:
             if control_steps == 0 or step_index % control_steps == 0:
                 force = inputs(time, values, parameters, table)
             seen = observe(time, values, force, parameters, table)
-            _record(recorder, time, seen, watch(seen, parameters), limit_exceeded)
+            watched = watch(seen, parameters)
+            _record(recorder, time, seen, watched, limit_exceeded, table)
             if _recording_is_over(recorder):
                 break
         return np.array(values), held
@@ -411,3 +420,52 @@ def native_record(loop: Loop, userdata: Floats) -> tuple[Any, Floats]:
     """The parameter record and the table of a flight as compiled code reads them."""
     head = loop.record_size
     return userdata[:head].view(record_dtype(loop.parameters))[0], userdata[head:]
+
+
+@cache
+def _compile_rows(function: Callable[..., tuple[float, ...]]) -> Any:
+    _register_scalar_functions()
+
+    @njit(nogil=True, **_OPTIONS)
+    def rows(time, states, parameters, table):  # type: ignore[no-untyped-def]
+        width = len(function(time[0], states[0], parameters, table))
+        values = np.empty((len(time), width))
+        for index in range(len(time)):
+            row = function(time[index], states[index], parameters, table)
+            for column in range(width):
+                values[index, column] = row[column]
+        return values
+
+    return rows
+
+
+def evaluate_natively(
+    function: Callable[..., tuple[float, ...]], time: Floats, states: Floats, setup: ControlSetup
+) -> Floats:
+    """See `tiltsim.rows.evaluate_rows`, which takes at least one row to here."""
+    head = record_size(type(setup.parameters))
+    parameters = setup.userdata[:head].view(record_dtype(type(setup.parameters)))[0]
+    time, states = np.ascontiguousarray(time), np.ascontiguousarray(states)
+    table = np.array(setup.table)
+    values: Floats = _compile_rows(function)(time, states, parameters, table)
+    return values
+
+
+@cache
+def compile_floor() -> tuple[Any, Any]:
+    """Callbacks for measurements: one that does nothing, one that reads state, writes controls."""
+
+    @cfunc(types.void(types.intp, types.intp), **_OPTIONS)
+    def empty(model, data):  # type: ignore[no-untyped-def]
+        pass
+
+    @cfunc(types.void(types.intp, types.intp), **_OPTIONS)
+    def state(model, data):  # type: ignore[no-untyped-def]
+        address = _stack_buffer()
+        if _state_size(model, INPUTS) > CAPACITY:
+            return
+        _get_state(model, data, address, CONTROLS)
+        _set_state(model, data, address, CONTROLS)
+        _get_state(model, data, address, INPUTS)
+
+    return empty, state

@@ -13,7 +13,7 @@ import numpy as np
 from controllers.records import slotted
 from controllers.scalar import Triple
 from tiltsim import thesis_plant
-from tiltsim.cache import native_code_is_cached
+from tiltsim.cache import native_code_is_cached, native_code_was_compiled
 from tiltsim.engine import EngineName, control_callback, make_engine
 from tiltsim.errors import InputError
 from tiltsim.loop import EVALUATIONS, HEADER_SIZE, RECORDER, ControlSetup, Floats, Header, Loop
@@ -63,8 +63,15 @@ class Plant(Protocol):
         """What the physics engine has found wrong so far, in a few words; else empty."""
 
 
-def make_plant(scenario: Scenario) -> Plant:
-    """The plant that a scenario asks for, at its initial state."""
+def make_plant(scenario: Scenario, controller: Any = None) -> Plant:
+    """The plant that a scenario asks for, at its initial state.
+
+    ``controller`` is a user's own, for scenarios whose law is ``python``.
+    """
+    if scenario.controller.law == "python":
+        from tiltsim.commanded_plant import ControlledPlant
+
+        return ControlledPlant(scenario, controller)
     return ThesisPlant(scenario) if scenario.simulation.plant == "thesis" else MujocoPlant(scenario)
 
 
@@ -77,8 +84,12 @@ def choose_engine(scenario: Scenario) -> EngineName:
 
 def worth_native(scenarios: Iterable[Scenario]) -> bool:
     """Whether flights are together long enough for the native engine."""
-    steps = sum(scenario.simulation.steps for scenario in scenarios)
-    return steps >= (STEPS_WORTH_LOADING if native_code_is_cached() else STEPS_WORTH_COMPILING)
+    steps, names = 0, set()
+    for scenario in scenarios:
+        steps += scenario.simulation.steps
+        names.add(loop_of(scenario).native_name(scenario.simulation.plant))
+    cached = all(map(native_code_is_cached, names))
+    return steps >= (STEPS_WORTH_LOADING if cached else STEPS_WORTH_COMPILING)
 
 
 class MujocoPlant:
@@ -91,7 +102,7 @@ class MujocoPlant:
             model = flight_model(scenario, len(self._setup.userdata))
         self.model = model
         self.data = mujoco.MjData(self.model)
-        self._reference = scenario.reference.parameters
+        self._reference, _ = scenario.reference_and_table()
         self._follows_position = self._loop.follows_position(scenario)
         self._set_initial_state(scenario, self._setup)
         self.engine: EngineName = choose_engine(scenario)
@@ -272,8 +283,9 @@ class ThesisPlant:
     def __init__(self, scenario: Scenario) -> None:
         simulation = scenario.simulation
         loop, setup = loop_of(scenario), control_setup(scenario)
+        assert loop.equations is not None  # scenarios that ask for others are refused
         self._loop, self._equations, self._setup = loop, loop.equations, setup
-        self._reference = scenario.reference.parameters
+        self._reference, _ = scenario.reference_and_table()
         self._follows_position = loop.follows_position(scenario)
         self._disturbance = disturbing_acceleration(scenario)
         self._timestep = simulation.timestep
@@ -352,6 +364,7 @@ class ThesisPlant:
             *(self._control_steps, *self._law, self._disturbance),
         )
         self._state = list(state)
+        native_code_was_compiled(self._loop.native_name("thesis"))
         self._step_index += samples * steps
         return None if recorder.lost else recorder.samples
 

@@ -6,17 +6,27 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from functools import lru_cache
 from math import pi
-from typing import Annotated, Any, Final, Literal, Self, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, get_args
 
 import numpy as np
 from pydantic import ConfigDict, Discriminator, Field, PrivateAttr, Tag, model_validator
 
+from controllers.gaits.keyframes import NO_KEYFRAMES
 from controllers.references import REFERENCE_TYPES, ReferenceParameters
 from controllers.stability import Loop
 from controllers.tilt_car.vehicle import THESIS_CAR, TiltCar
 from controllers.vehicle import PRESETS, Vehicle
-from tiltsim.controller_tables import AttitudeAltitudeController, Controller, ReferenceKind
+from controllers.waypoints import minimum_snap_table
+from tiltsim.controller_tables import (
+    ANY_ROTORCRAFT,
+    AttitudeAltitudeController,
+    Controller,
+    LawTable,
+    ReferenceKind,
+)
 from tiltsim.gait_tables import FixedGait, Gait
 from tiltsim.messages import InvalidValueError
 from tiltsim.metrics import BOOLEAN_METRICS, METRICS
@@ -32,11 +42,14 @@ from tiltsim.tables import (
     Vector3,
 )
 
+if TYPE_CHECKING:
+    from tiltsim.own_vehicle import OwnVehicle
+
 MAX_STEPS: Final = 100_000_000
 """Physics steps of a flight, more than a day at one millisecond."""
 
 MAX_TABLE: Final = 1500
-"""Numbers in a gait's table of keyframes, which every evaluation of the control law reads."""
+"""Numbers in the table of a gait and a reference, which every evaluation of the law reads."""
 
 MAX_LOOP_STEP: Final = 2.5
 """Largest product of timestep and closed-loop pole; RK4 turns unstable at 2.78, ode3 at 2.51."""
@@ -89,6 +102,11 @@ class VehicleTable(Table):
 
     model: Literal["tiltrotor", "quadrotor"] = "tiltrotor"
     preset: Literal["ar_drone_2", "ar_drone_2_unrounded", "luukkonen"] = "ar_drone_2"
+    mjcf: str | None = Field(
+        None,
+        description="a file with the vehicle, beside the scenario's, in place of the shipped one; "
+        "it has the parameters that are not given here, and the preset none",
+    )
     mass: Positive | None = Field(None, description="kg, pods included")
     inertia: Annotated[tuple[Positive, Positive, Positive], Field(strict=False)] | None = Field(
         None, description="principal moments about the centre of mass, kg m^2, pods included"
@@ -103,7 +121,7 @@ class VehicleTable(Table):
     pod: PodTable = PodTable()
 
     def resolve(self) -> Vehicle:
-        """The physical parameters: the preset with the given keys in place of its own."""
+        """The physical parameters: the preset's or the file's, but for the keys given."""
         given = {
             key: getattr(self, key)
             for key in ("mass", "arm_length", "thrust_coefficient", "drag_coefficient", "gravity")
@@ -113,10 +131,36 @@ class VehicleTable(Table):
                 zip(("inertia_xx", "inertia_yy", "inertia_zz"), self.inertia, strict=True)
             )
         known = {key: value for key, value in given.items() if value is not None}
-        return PRESETS[self.preset]._replace(**known)
+        own = self.own
+        base = PRESETS[self.preset] if own is None else own.vehicle
+        return base._replace(**known)
+
+    @property
+    def own(self) -> OwnVehicle | None:
+        """The user's own file as measured; None for the shipped vehicles."""
+        if self.mjcf is None:
+            return None
+        from tiltsim.own_vehicle import read_own_vehicle
+
+        try:
+            return read_own_vehicle(self.mjcf, self.model)
+        except ValueError as error:
+            raise InvalidValueError("vehicle.mjcf", self.mjcf, str(error)) from None
+
+    def _check_own(self) -> None:
+        for key, value, default in (
+            ("arm_length", self.arm_length, None),
+            ("pod", self.pod.model_dump(), PodTable().model_dump()),
+        ):
+            if value != default:
+                raise InvalidValueError(
+                    f"vehicle.{key}", value, "vehicle.mjcf has its own; leave it out"
+                )
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        if self.mjcf is not None:
+            self._check_own()
         a, b, c = sorted(self.resolve()[1:4])
         if a + b < c:
             raise InvalidValueError(
@@ -286,7 +330,27 @@ class InitialTable(Table):
 Tilt = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
 
 
-class _PositionReference(Table):
+class _Reference(Table, ABC):
+    """What every reference can tell of itself."""
+
+    @property
+    @abstractmethod
+    def parameters(self) -> ReferenceParameters:
+        """The record that the law reads."""
+
+    @property
+    def table(self) -> tuple[float, ...]:
+        """The numbers beside the record, for references of any length."""
+        return NO_KEYFRAMES
+
+    def placed(self, table: tuple[float, ...]) -> tuple[ReferenceParameters, tuple[float, ...]]:
+        """Record and table where a gait's table lies before the reference's own."""
+        if self.table == NO_KEYFRAMES:
+            return self.parameters, table
+        return self.parameters._replace(offset=float(len(table))), (*table, *self.table)
+
+
+class _PositionReference(_Reference):
     roll: Tilt = Field(0.0, description="rad, for laws of the whole pose and for switching")
     pitch: Tilt = Field(0.0, description="rad, likewise")
     yaw: Angle = 0.0
@@ -334,13 +398,12 @@ class LineReference(_PositionReference):
     @property
     def parameters(self) -> ReferenceParameters:
         """The record that the law reads."""
-        motion = {"velocity": self.velocity, "acceleration": self.acceleration}
-        own = {
-            f"{name}_{axis}": value
-            for name, vector in motion.items()
-            for axis, value in zip("xyz", vector, strict=True)
-        }
-        return self._parameters(self.type, self.position, **own)
+        return self._parameters(
+            self.type,
+            self.position,
+            **_by_axis("velocity", self.velocity),
+            **_by_axis("acceleration", self.acceleration),
+        )
 
 
 class CircleReference(_PositionReference):
@@ -364,7 +427,86 @@ class CircleReference(_PositionReference):
         return self
 
 
-class AttitudeAltitudeReference(Table):
+class LissajousReference(_PositionReference):
+    """A sine along each axis: ``position + amplitude sin(angular_frequency t + phase)``."""
+
+    type: Literal["lissajous"]
+    position: Vector3 = Field((0.0, 0.0, 0.0), description="the centre, m")
+    amplitude: Vector3 = Field(description="m")
+    angular_frequency: Vector3 = Field(description="rad/s")
+    phase: Angles3 = Field((0.0, 0.0, 0.0), description="rad")
+
+    @property
+    def parameters(self) -> ReferenceParameters:
+        """The record that the law reads."""
+        return self._parameters(
+            self.type,
+            self.position,
+            **_by_axis("amplitude", self.amplitude),
+            **_by_axis("frequency", self.angular_frequency),
+            **_by_axis("phase", self.phase),
+        )
+
+
+class FigureEightReference(_PositionReference):
+    """A lying eight, from its crossing towards +x and +y; a lissajous of one to two."""
+
+    type: Literal["figure_eight"]
+    position: Vector3 = Field((0.0, 0.0, 0.0), description="where it crosses itself, m")
+    length: Positive = Field(description="m, along x")
+    width: Positive = Field(description="m, along y")
+    angular_frequency: Positive = Field(description="rad/s, once around")
+
+    @property
+    def parameters(self) -> ReferenceParameters:
+        """The record that the law reads."""
+        once = self.angular_frequency
+        return self._parameters(
+            self.type,
+            self.position,
+            **_by_axis("amplitude", (0.5 * self.length, 0.5 * self.width, 0.0)),
+            **_by_axis("frequency", (once, 2.0 * once, 0.0)),
+        )
+
+
+class WaypointReference(_PositionReference):
+    """From rest to rest through points at given times, with the least snap."""
+
+    type: Literal["waypoints"]
+    positions: Annotated[tuple[Vector3, ...], Field(min_length=2, max_length=50, strict=False)] = (
+        Field(description="m; the first is the start")
+    )
+    times: Annotated[tuple[float, ...], Field(strict=False)] = Field(
+        description="s, one a point, from 0; after the last the reference rests"
+    )
+
+    @property
+    def parameters(self) -> ReferenceParameters:
+        """The record that the law reads."""
+        return self._parameters(self.type, (0.0, 0.0, 0.0), segments=float(len(self.times)))
+
+    @property
+    def table(self) -> tuple[float, ...]:
+        """The polynomials of the motion; see `controllers.waypoints.minimum_snap_table`."""
+        return _minimum_snap_table(self.positions, self.times)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        try:
+            _ = self.table
+        except ValueError as error:
+            raise InvalidValueError("reference.times", self.times, str(error)) from None
+        return self
+
+
+_minimum_snap_table = lru_cache(maxsize=64)(minimum_snap_table)
+
+
+def _by_axis(name: str, values: tuple[float, float, float]) -> dict[str, float]:
+    return {f"{name}_{axis}": value for axis, value in zip("xyz", values, strict=True)}
+
+
+class AttitudeAltitudeReference(_Reference):
     """Attitude and altitude to hold; the horizontal position is free (ch. 3)."""
 
     type: Literal["attitude_altitude"]
@@ -391,9 +533,25 @@ class AttitudeAltitudeReference(Table):
 
 
 Reference = Annotated[
-    SetpointReference | LineReference | CircleReference | AttitudeAltitudeReference,
+    SetpointReference
+    | LineReference
+    | CircleReference
+    | LissajousReference
+    | FigureEightReference
+    | WaypointReference
+    | AttitudeAltitudeReference,
     Field(discriminator="type"),
 ]
+
+# --- [ground] ----------------------------------------------------------------------------------
+
+
+class GroundTable(Table):
+    """Ground to take off from and land on; without the table nothing touches."""
+
+    height: float = Field(0.0, description="m, world")
+    friction: Positive = Field(0.8, description="coefficient of sliding friction")
+
 
 # --- [[disturbance]] ---------------------------------------------------------------------------
 
@@ -491,6 +649,7 @@ class Scenario(Table):
     controller: Controller = AttitudeAltitudeController()
     gait: Gait = FixedGait()
     reference: Reference = SetpointReference()
+    ground: GroundTable | None = None
     disturbance: Annotated[tuple[Disturbance, ...], Field(strict=False)] = ()
     expect: Annotated[tuple[Expectation, ...], Field(strict=False)] = ()
 
@@ -527,13 +686,19 @@ class Scenario(Table):
         self._check_gait()
         self._check_reference()
         self._check_rotor_limits()
+        self._check_ground()
         self._check_servo()
         self._check_stability()
         return self
 
+    def reference_and_table(self) -> tuple[ReferenceParameters, tuple[float, ...]]:
+        """The reference's record, and the table of the flight: the gait's and the reference's."""
+        gait = self.gait.plan(self.vehicle.resolve())
+        return self.reference.placed(gait.table)
+
     def _check_law(self) -> None:
         law, model = self.controller.law, self.vehicle.model
-        if self.controller.vehicle_model != model:
+        if not _flies(self.controller, model):
             raise InvalidValueError(
                 "controller.law",
                 law,
@@ -548,24 +713,49 @@ class Scenario(Table):
             )
         if model == "tilt_car":
             self._check_plane()
+        elif law == "python":
+            self._check_own_law()
+        else:
+            self._check_layout()
         if model != "quadrotor":
             return
         vehicle = self.rotorcraft
-        for key, value, default in (
+        of_tilts = [
             ("gait.type", self.gait.type, "fixed"),
             ("gait", self.gait.model_dump(), FixedGait().model_dump()),
             ("vehicle.tilt_servo", vehicle.tilt_servo.model_dump(), TiltServoTable().model_dump()),
             ("vehicle.pod", vehicle.pod.model_dump(), PodTable().model_dump()),
+        ]
+        of_rotors = [
             ("vehicle.min_rotor_speed", vehicle.min_rotor_speed, None),
             ("vehicle.max_rotor_speed", vehicle.max_rotor_speed, None),
             ("initial.rotor_speed", self.initial.rotor_speed, InitialTable().rotor_speed),
-        ):
+        ]
+        # Commands from outside reach rotors with a speed, limits and all.
+        for key, value, default in of_tilts if law == "python" else [*of_tilts, *of_rotors]:
             if value != default:
                 raise InvalidValueError(
                     key,
                     value,
                     "the quadrotor has no use for it: its rotors do not tilt, and "
                     "make the thrust that its law asks for at once",
+                )
+
+    def _check_layout(self) -> None:
+        own = self.rotorcraft.own
+        if own is not None and own.misfit:
+            raise InvalidValueError(
+                "vehicle.mjcf",
+                self.rotorcraft.mjcf,
+                f"{own.misfit}; the {self.controller.law} law is for four equal arms at right "
+                "angles, a controller of your own flies any",
+            )
+
+    def _check_own_law(self) -> None:
+        for key, asked, flown in (("plant", "thesis", "mujoco"), ("engine", "native", "python")):
+            if getattr(self.simulation, key) == asked:
+                raise InvalidValueError(
+                    f"simulation.{key}", asked, f"a controller of your own flies on {flown} alone"
                 )
 
     def _check_model_error(self) -> None:
@@ -579,6 +769,10 @@ class Scenario(Table):
             )
             raise InvalidValueError(
                 key, value, "takes no [model_error]; use a rotorcraft on the mujoco plant"
+            )
+        if error.arm_length != 1.0 and self.rotorcraft.mjcf is not None:
+            raise InvalidValueError(
+                "model_error.arm_length", error.arm_length, "vehicle.mjcf has its own arms"
             )
         a, b, c = sorted(self.true_rotorcraft[1:4])
         if a + b < c:
@@ -648,14 +842,29 @@ class Scenario(Table):
             raise InvalidValueError(
                 "reference.type", reference.type, f"the {controller.law} law cannot follow it"
             )
+        if reference.type == "waypoints" and self.vehicle.model == "tilt_car":
+            raise InvalidValueError(
+                "reference.type", reference.type, "the tilt_car's laws cannot follow it"
+            )
+        own = isinstance(controller, AttitudeAltitudeController)
+        exact = isinstance(controller, AttitudeAltitudeController) and (
+            controller.gait_rate_feedforward
+        )
+        if (not own or exact) and getattr(reference, "acceleration_feedforward", False):
+            law = "attitude_altitude law with gait_rate_feedforward" if exact else controller.law
+            raise InvalidValueError(
+                "reference.acceleration_feedforward",
+                True,
+                f"the {law} follows all derivatives anyway; leave it out",
+            )
         if not isinstance(controller, AttitudeAltitudeController):
-            if getattr(reference, "acceleration_feedforward", False):
-                raise InvalidValueError(
-                    "reference.acceleration_feedforward",
-                    True,
-                    f"the {controller.law} law follows all derivatives anyway; leave it out",
-                )
             return
+        if controller.supervisor is not None and self.simulation.plant == "thesis":
+            raise InvalidValueError(
+                "simulation.plant",
+                "thesis",
+                "its tilt angles follow the gait whatever controller.supervisor says; use mujoco",
+            )
         decoupler = controller.decoupler
         free = kind == "attitude_altitude"
         if free and decoupler != "none":
@@ -683,17 +892,41 @@ class Scenario(Table):
                 f"tilts by {gait.amplitude:.4g} rad, beyond the servo limit "
                 f"vehicle.tilt_servo.max_angle = {limit}",
             )
-        if len(gait.table) > MAX_TABLE:
+        rows = len(gait.table)
+        if rows > MAX_TABLE:
             raise InvalidValueError(
-                f"gait.{key}",
-                value,
-                f"too many keyframes: {len(gait.table)} numbers, at most {MAX_TABLE}",
+                f"gait.{key}", value, f"too many keyframes: {rows} numbers, at most {MAX_TABLE}"
+            )
+        total = len(self.reference.placed(gait.table)[1])
+        if total > MAX_TABLE:
+            raise InvalidValueError(
+                "reference.times",
+                len(getattr(self.reference, "times", ())),
+                f"too many waypoints: {total} numbers with the gait's, at most {MAX_TABLE}",
             )
         if self.controller.law == "full_pose" and not gait.is_constant:
             raise InvalidValueError(
                 "gait.type",
                 self.gait.type,
                 "the full_pose law moves the pods itself; give the angles at the start as fixed",
+            )
+
+    def _check_ground(self) -> None:
+        if self.ground is None:
+            return
+        if self.vehicle.model == "tilt_car":
+            raise InvalidValueError(
+                "ground", self.ground.model_dump(), "the tilt_car moves in a plane without one"
+            )
+        if self.simulation.plant == "thesis":
+            raise InvalidValueError(
+                "simulation.plant", "thesis", "the thesis' equations know no ground; use mujoco"
+            )
+        if self.initial.position[2] < self.ground.height:
+            raise InvalidValueError(
+                "initial.position",
+                self.initial.position,
+                f"below ground.height = {self.ground.height}",
             )
 
     def _check_rotor_limits(self) -> None:
@@ -766,9 +999,12 @@ class Scenario(Table):
 def _laws_of(model: str) -> list[str]:
     union = get_args(get_args(Controller)[0])
     tables = [get_args(option)[0] for option in union]
-    return [
-        get_args(t.model_fields["law"].annotation)[0] for t in tables if t.vehicle_model == model
-    ]
+    return [get_args(t.model_fields["law"].annotation)[0] for t in tables if _flies(t, model)]
+
+
+def _flies(law: LawTable | type[LawTable], model: str) -> bool:
+    either = law.vehicle_model == ANY_ROTORCRAFT and model in {"tiltrotor", "quadrotor"}
+    return either or law.vehicle_model == model
 
 
 class Variant(Table):

@@ -7,13 +7,14 @@ what a scenario or a chapter states, and knows period, amplitude, rate and conti
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import cos, pi, sin
 from typing import Final, NamedTuple
 
 from controllers.gaits.keyframes import NO_KEYFRAMES, keyframe_gait
 from controllers.gaits.penguin import penguin_swing, rotating
 from controllers.gaits.trot import TiltsAndRates, continuous_trot, instant_trot
-from controllers.gaits.two_color import two_color_circle
-from controllers.scalar import scalar
+from controllers.gaits.two_color import RED, two_color_circle
+from controllers.scalar import Quad, scalar
 
 FIXED: Final = 0
 TROT_INSTANT: Final = 1
@@ -111,3 +112,18 @@ def tilt_reference(
         back * rate_3,
         back * rate_4,
     )
+
+
+@scalar
+def tilt_acceleration(time: float, gait: GaitParameters) -> Quad:
+    """The second derivatives (rad/s^2) of the planned tilt angles at a time (s).
+
+    Zero for constant gaits and for those made of straight lines, whose rates jump at the corners.
+    """
+    if gait.type != TWO_COLOR_CIRCLE:
+        return 0.0, 0.0, 0.0, 0.0
+    turning = 2.0 * pi / gait.period
+    inward = -gait.scale * gait.radius * turning * turning
+    front_1, front_2 = inward * cos(turning * time), inward * sin(turning * time)
+    slope = gait.bias if gait.color == RED else -gait.bias
+    return front_1, front_2, slope * front_1, slope * front_2

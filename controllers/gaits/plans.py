@@ -96,6 +96,16 @@ class Gait:
         eighths = np.arange(8) / 8.0 * self.parameters.period
         return float(np.abs(self.rates(eighths)).max())
 
+    @property
+    def shortest_line(self) -> float:
+        """The shortest time (s) between two corners; infinite without corners, 0 with jumps."""
+        if not self.is_continuous:
+            return 0.0
+        rows = self._rows()
+        if rows is not None:
+            return float(np.diff(rows[:, 0]).min()) * self.parameters.period
+        return 0.5 * self.parameters.period if self.parameters.type == TROT_CONTINUOUS else inf
+
     def angles(self, time: ArrayLike) -> Array:
         """Tilt angles (rad) at times (s) of shape (...), as an array of shape (..., 4)."""
         return self._evaluate(time)[..., :4]

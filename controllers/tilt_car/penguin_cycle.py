@@ -4,8 +4,9 @@ With ``e_x = 0`` the error along y obeys ``e'' = -K_Y1 e' - K_Y2 e`` while both 
 ``e'' = -+ tan(Lambda - theta)`` while one has stopped (ch. 11, Eqs. 30-32). The latter, and with it
 Lemma 3, needs ``Lambda + theta = pi / 2``: the rotor that would have to pull then has no part in x,
 and leaving it out leaves ``e_x`` at zero. Over half a period the state ``(e_y, e_y')`` goes through
-a map; the swing to the other side is its mirror image. A fixed point of the map followed by the mirror, ``-P(s) = s``, is a limit cycle, stable if
-the eigenvalues of the map's Jacobian there lie within the unit circle.
+a map; the swing to the other side is its mirror image. A fixed point of the map followed by the
+mirror, ``-P(s) = s``, is a limit cycle, stable if the eigenvalues of the map's Jacobian there lie
+within the unit circle.
 
 `half_period` takes the state at the start of a half period with the thrusts' middle at ``+Lambda``.
 Everything is in the frame of that half: for the other one change both signs.
@@ -13,8 +14,8 @@ Everything is in the frame of that half: for the other one change both signs.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
-from itertools import pairwise
 from math import cos, exp, isclose, pi, sin, sqrt, tan
 
 import numpy as np
@@ -112,7 +113,7 @@ def half_period(swing: Swing, start: State) -> Half:
     if not swing.both_push(start):
         return Half(swing.pushed(swing.half_period, start), 0.0)
     times = np.linspace(0.0, swing.half_period, STEPS + 1).tolist()
-    for low, high in pairwise(times):
+    for low, high in itertools.pairwise(times):
         if not swing.both_push(swing.free(high, start)):
             switch = _bisect(swing, start, low, high)
             between = swing.free(switch, start)

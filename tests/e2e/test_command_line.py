@@ -267,16 +267,29 @@ def test_check_on_several_processes_keeps_the_order_of_junit(tmp_path):
     assert names == ["a.toml", "b.toml", "c.toml"]
 
 
+def split_address(address):
+    family, hash_, variant = address.partition("#")
+    return [family, hash_ + variant] if variant else [family]
+
+
 def test_list_shows_every_scenario_with_title_and_source(capsys):
     assert main(["list"]) == 0
-    printed = capsys.readouterr().out
-    assert any(
-        line.startswith(SETPOINT) and "modified decoupler" in line and "Fig. 4 (B1)" in line
-        for line in printed.splitlines()
-    )
+    lines = capsys.readouterr().out.splitlines()
+    family, _, variant = SETPOINT.partition("#")
+    first = next(i for i, line in enumerate(lines) if line.startswith(f"{family}  "))
+    assert "Setpoint with the trot angle fixed (ch. 4, Sec. 6.1, Fig. 4)" in lines[first]
+    member = next(line for line in lines[first:] if line.lstrip().startswith(f"#{variant} "))
+    assert "modified decoupler" in member
+    assert member.endswith(" (Fig. 4 (B1))")
     assert main(["list", "--json"]) == 0
     entries = json.loads(capsys.readouterr().out)
     assert all(entry["title"] and entry["source"] for entry in entries)
+    # A member without a title is told by what it changes; a title is not repeated.
+    trots = [line for line in lines if line.lstrip().startswith("#continuous_t3_modified ")]
+    assert all("type = trot_continuous" in line and "period = 3.0" in line for line in trots)
+    assert len(trots) == 2
+    shown = {line.split()[0] for line in lines}
+    assert all(part in shown for e in entries for part in split_address(e["scenario"]))
 
 
 def test_schema_knows_every_table_and_the_variants(capsys):
@@ -311,13 +324,30 @@ def test_bench_prints_ratios_for_every_engine_and_integrator():
     rows = json.loads(done.stdout)
     keys = {"case", "engine", "integrator", "vehicles", "threads", "steps_per_second", "ratio"}
     assert all(keys | {"realtime_factor"} == set(row) for row in rows)
-    cases = {(row["integrator"], row["engine"]) for row in rows}
+    cases = {(row["case"], row["engine"]) for row in rows}
     assert cases == {
-        (integrator, engine)
-        for integrator in ("RK4", "implicitfast", "Euler")
-        for engine in ("bare", "python", "native")
+        *(("single", name) for name in ("bare", "empty", "state", "python", "native")),
+        *(("recorded", "native"), ("batch", "bare"), ("batch", "native")),
     }
+    for case in cases:
+        integrators = {r["integrator"] for r in rows if (r["case"], r["engine"]) == case}
+        assert integrators == {"RK4", "implicitfast", "Euler"}
     assert all(row["ratio"] == 1.0 for row in rows if row["engine"] == "bare")
+
+
+def test_bench_of_many_flights_tells_time_and_memory():
+    done = tiltsim("bench", "--vehicles", "3", "--duration", "0.05", "--json")
+    assert done.returncode == 0, done.stderr
+    (row,) = json.loads(done.stdout)
+    assert (row["case"], row["vehicles"], row["completed"]) == ("flights", 3, 3)
+    assert row["steps_per_second"] == pytest.approx(3 * 50 / row["seconds"])
+    assert row["realtime_factor"] == pytest.approx(3 * 0.05 / row["seconds"])
+    assert 1e7 < row["memory"] < 2**30
+
+
+def test_bench_of_no_flights_is_a_mistake(capsys):
+    assert main(["bench", "--vehicles", "0"]) == 2
+    assert capsys.readouterr().err == "tiltsim: --vehicles 0: must be at least 1\n"
 
 
 def test_library_scenarios_are_shipped_beside_the_package():

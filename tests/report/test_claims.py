@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
+import random
+
 import numpy as np
 import pytest
 
 from controllers.singularity import residuals
 from controllers.vehicle import PRESETS
 from tiltsim.library import library_entries
+from tiltsim.loading import load_scenario
 from tiltsim.report.claims import registered_claims
 from tiltsim.report.claims.ch03 import EQ_17, EQ_19
 from tiltsim.report.measures import determinant_coefficients
-from tiltsim.report.model import AnalysisClaim, FlightClaim, Outcome, judge_value, plain
+from tiltsim.report.model import (
+    AnalysisClaim,
+    FlightClaim,
+    Outcome,
+    judge_value,
+    plain,
+    scenario_claims,
+)
 
 AR_DRONE = PRESETS["ar_drone_2"]
 CLAIMS = registered_claims()
 ANALYSED = [claim for claim in CLAIMS if isinstance(claim, AnalysisClaim)]
+FLOWN = [claim for claim in CLAIMS if isinstance(claim, FlightClaim)]
 
 
 def test_coefficients_multiply_out_to_the_residuals():
@@ -63,3 +74,51 @@ def test_flights_of_claims_are_in_the_library():
     for claim in CLAIMS:
         if isinstance(claim, FlightClaim):
             assert set(claim.flights) <= library, claim.statement
+
+
+def test_every_chapter_has_claims():
+    entries = [load_scenario(address) for address, _, _ in library_entries()]
+    chapters = {claim.chapter for scenario in entries for claim in scenario_claims(scenario)}
+    assert chapters | {claim.chapter for claim in CLAIMS} >= {*range(1, 13)}
+
+
+def test_no_claim_stands_twice():
+    seen = [(claim.source, claim.statement, claim.case) for claim in CLAIMS]
+    assert len(set(seen)) == len(seen)
+
+
+@pytest.mark.parametrize(
+    "claim", FLOWN, ids=lambda claim: f"{claim.chapter}-{claim.statement} {claim.case}"[:99]
+)
+def test_a_comparison_of_flights_can_come_out_either_way(claim):
+    outcomes = set()
+    for seed in range(1000):
+        bad = (0.0, 0.2, 1.0)[seed % 3]
+        flights = {address: RandomMetrics(f"{seed} {address}", bad) for address in claim.flights}
+        outcomes.add(plain(claim.measure(flights)))
+        if len(outcomes) > 1:
+            return
+    pytest.fail(f"always {outcomes}")
+
+
+class RandomMetrics(dict):
+    """A flight with random metrics of all sizes; a share ``bad`` is lost or reverses a rotor."""
+
+    def __init__(self, seed, bad):
+        self.random, self.bad = random.Random(seed), bad
+        super().__init__(diverged=self._is_bad())
+
+    def _is_bad(self):
+        return self.random.random() < self.bad
+
+    def __missing__(self, name):
+        # A rotor may rest and nothing saturate; what else is exactly zero says little.
+        can_be_zero = name in {"min_rotor_speed", "saturated_fraction"}
+        zero = can_be_zero and self._is_bad()
+        value = 0.0 if zero else 10.0 ** self.random.uniform(-3.0, 1.0)
+        below = name == "min_published_determinant" or (name.startswith("min") and self._is_bad())
+        self[name] = -value if below else value
+        return self[name]
+
+    def get(self, name, default=None):
+        return self[name]

@@ -35,6 +35,12 @@ def add_parser(subparsers: Any) -> None:
         "(a family without #VARIANT flies its base if --set is given)",
     )
     parser.add_argument(
+        "--controller",
+        metavar="FILE.py:NAME",
+        help="fly a controller of your own, a function or class of a Python file; short for --set "
+        "controller.law=python and controller.function",
+    )
+    parser.add_argument(
         "--out", type=Path, metavar="DIR", help="write metrics.json, flight.parquet, scenario.toml"
     )
     parser.add_argument(
@@ -64,6 +70,8 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.loading import load_scenario, parse_override
 
     overrides = dict(parse_override(text) for text in arguments.overrides)
+    if arguments.controller is not None:
+        overrides |= {"controller.law": "python", "controller.function": arguments.controller}
     scenario = load_scenario(arguments.scenario, overrides)
     if arguments.out is not None:
         prepare_folder(arguments.out)

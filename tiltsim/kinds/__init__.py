@@ -37,8 +37,8 @@ class Kind:
     initial_motion
         ``(scenario) -> qpos, qvel`` at time zero.
     limit_exceeded
-        Scalar function ``(time, values, reference, follows_position) -> code`` of the first limit
-        of `tiltsim.limits` that a sample exceeds; ``values`` begin with the observed fields.
+        Scalar function ``(time, values, reference, table, follows_position) -> code`` of the first
+        limit of `tiltsim.limits` that a sample exceeds; ``values`` begin with the observed fields.
     """
 
     name: str

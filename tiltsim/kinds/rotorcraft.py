@@ -57,10 +57,10 @@ def rotor_thrusts(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str
 def _compile(
     scenario: Scenario, law_states: int, userdata_size: int, visuals: bool
 ) -> mujoco.MjModel:
-    from tiltsim.model import Pod, RotorLimits, TiltServo, compile_model
+    from tiltsim.model import Ground, Pod, RotorLimits, TiltServo, compile_model
 
     vehicle: VehicleTable = scenario.rotorcraft
-    simulation = scenario.simulation
+    simulation, ground = scenario.simulation, scenario.ground
     return compile_model(
         vehicle.model,
         scenario.true_rotorcraft,
@@ -71,7 +71,9 @@ def _compile(
         pod=Pod(**vehicle.pod.model_dump()),
         rotor_limits=RotorLimits(vehicle.min_rotor_speed, vehicle.max_rotor_speed),
         law_states=law_states,
+        ground=None if ground is None else Ground(ground.height, ground.friction),
         visuals=visuals,
+        own=vehicle.own,
     )
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from tiltsim.loops.commanded import COMMANDED
 from tiltsim.loops.full_pose import FULL_POSE
+from tiltsim.loops.gait_feedforward import GAIT_FEEDFORWARD
 from tiltsim.loops.quadrotor_attitude_altitude import QUADROTOR_ATTITUDE_ALTITUDE
 from tiltsim.loops.switching import SWITCHING
 from tiltsim.loops.tilt_car_fourth_derivative import FOURTH_DERIVATIVE
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
 
 LOOPS: Final[dict[str, Loop]] = {
     "attitude_altitude": TILTROTOR,
+    "gait_feedforward": GAIT_FEEDFORWARD,  # the same law with gait_rate_feedforward = true
     "full_pose": FULL_POSE,
     "yaw_position": YAW_POSITION,
     "switching": SWITCHING,
@@ -27,12 +30,14 @@ LOOPS: Final[dict[str, Loop]] = {
     "tilt_car_fourth_derivative": FOURTH_DERIVATIVE,
     "tilt_car_planned_direction": PLANNED_DIRECTION,
 }
-"""Loops by the name a scenario gives their law."""
+"""Loops by the name of their law; see `tiltsim.controller_tables.LawTable.loop_name`."""
 
 
 def loop_of(scenario: Scenario) -> Loop:
     """The loop that a scenario flies."""
-    return LOOPS[scenario.controller.law]
+    if scenario.controller.law == "python":
+        return COMMANDED[scenario.vehicle.model]
+    return LOOPS[scenario.controller.loop_name]
 
 
 def control_setup(scenario: Scenario) -> ControlSetup:
@@ -46,9 +51,16 @@ def follows_position(scenario: Scenario) -> bool:
     return loop_of(scenario).follows_position(scenario)
 
 
+def gait_in_words(scenario: Scenario) -> list[str]:
+    """The gait of a scenario for titles; nothing where its law flies none."""
+    return [f"{scenario.gait.type} gait"] if loop_of(scenario).flies_gait else []
+
+
 def law_in_words(scenario: Scenario) -> list[str]:
     """The law of a scenario for titles, most telling first."""
     controller = scenario.controller
     words = [f"{controller.law.replace('_', '-')} law"]
+    if getattr(controller, "gait_rate_feedforward", False):
+        words.append("gait rates fed forward")
     decoupler = getattr(controller, "decoupler", "none")  # only laws that lean to steer have one
     return words if decoupler == "none" else [f"{decoupler} decoupler", *words]

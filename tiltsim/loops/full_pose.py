@@ -57,7 +57,9 @@ def full_pose_controls(
     """
     lead = parameters.servo_lead
     state = tiltrotor_state(qpos, qvel, act)
-    u1, u2, u3, u4, rate_1, rate_2, rate_3, rate_4 = full_pose_inputs(time, state, parameters.law)
+    u1, u2, u3, u4, rate_1, rate_2, rate_3, rate_4 = full_pose_inputs(
+        time, state, parameters.law, table
+    )
     return (
         *(act[4] + lead * rate_1, act[5] + lead * rate_2),
         *(act[6] + lead * rate_3, act[7] + lead * rate_4),
@@ -99,22 +101,23 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, FullPoseController)
     vehicle = scenario.rotorcraft.resolve()
+    reference, table = scenario.reference_and_table()
     law = Parameters(
         vehicle,
         controller.resolve_gains(),
-        scenario.reference.parameters,
+        reference,
         controller.resolve_limits(),
         controller.resolve_tilt_weight(vehicle),
     )
     lead = servo_lead(scenario.rotorcraft.tilt_servo)
-    return ControlSetup(ControlParameters(signature, lead, law))
+    return ControlSetup(ControlParameters(signature, lead, law), table)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     law = setup.parameters.law
     reference = law.reference
     time = samples["time"]
-    position = np.array([position_reference(t, reference)[:3] for t in time.tolist()])
+    position = np.array([position_reference(t, reference, setup.table)[:3] for t in time.tolist()])
     attitude = (reference.roll, reference.pitch, reference.yaw)
     columns = [*position.reshape(len(time), 3).T, *(np.full_like(time, a) for a in attitude)]
     told = {f"alpha_ref_{i}": samples[f"tilt_command_{i}"] for i in (1, 2, 3, 4)}
@@ -128,7 +131,7 @@ def equation_inputs(
 ) -> tuple[float, ...]:
     """The law's rotor accelerations and tilt rates on the thesis' equations."""
     tilts = state[22], state[23], state[24], state[25]
-    return full_pose_inputs(time, law_state(state, tilts), parameters.law)
+    return full_pose_inputs(time, law_state(state, tilts), parameters.law, table)
 
 
 @scalar

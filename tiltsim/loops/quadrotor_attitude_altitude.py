@@ -83,7 +83,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     reference = setup.parameters.reference
     attitude = (reference.roll, reference.pitch, reference.yaw)
     return {
-        **references(samples, reference, attitude),
+        **references(samples, reference, setup.table, attitude),
         # cos(roll) cos(pitch) of the altitude times 1 / cos(pitch) of the Euler angles
         "determinant": np.cos(samples["roll"]),
         "singularity_margin": upright_margin(samples),

@@ -53,7 +53,7 @@ def switching_controls(
     """All ten controls: thrusts, idle rotor states, the law's own states."""
     law = parameters.law
     state = rigid_body_state(qpos, qvel, act[4], act[5])
-    return extended_controls(switching_inputs(time, state, law), law.yaw_position.vehicle)
+    return extended_controls(switching_inputs(time, state, law, table), law.yaw_position.vehicle)
 
 
 @scalar
@@ -65,16 +65,17 @@ def watch_attitude(values: Sequence[float], parameters: ControlParameters) -> tu
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, SwitchingController)
+    reference, table = scenario.reference_and_table()
     law = Parameters(
         yaw_position.Parameters(
-            scenario.rotorcraft.resolve(), controller.resolve_gains(), scenario.reference.parameters
+            scenario.rotorcraft.resolve(), controller.resolve_gains(), reference
         ),
         controller.resolve_attitude_gains(),
         Zone(*controller.zone.roll, *controller.zone.pitch),
         EXTENSIONS[controller.extension],
         controller.extension_rate,
     )
-    return ControlSetup(ControlParameters(signature, law))
+    return ControlSetup(ControlParameters(signature, law), table)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -86,7 +87,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     roll = np.where(inside > 0.0, reference.roll, samples["roll"])
     pitch = np.where(inside > 0.0, reference.pitch, samples["pitch"])
     return {
-        **references(samples, reference, (roll, pitch, reference.yaw)),
+        **references(samples, reference, setup.table, (roll, pitch, reference.yaw)),
         **extended_singularity(samples, law.yaw_position.vehicle),
         "attitude_zone": inside,
     }
@@ -102,7 +103,7 @@ def equation_inputs(
     time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
 ) -> tuple[float, ...]:
     """The law on the thesis' equations."""
-    return switching_inputs(time, law_state(state), parameters.law)
+    return switching_inputs(time, law_state(state), parameters.law, table)
 
 
 @scalar

@@ -232,5 +232,6 @@ FOURTH_DERIVATIVE: Final = Loop(
         **dict.fromkeys(SPEEDS, "rad/s"),
     },
     kind=TILT_CAR,
+    flies_gait=False,
 )
 """Fourth-derivative feedback linearization around the tilt-car."""

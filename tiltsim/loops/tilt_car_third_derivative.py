@@ -179,5 +179,6 @@ THIRD_DERIVATIVE: Final = Loop(
     law_states=1,
     law_fields=("alpha_ref",),
     kind=TILT_CAR,
+    flies_gait=False,
 )
 """Third-derivative feedback linearization around the tilt-car."""

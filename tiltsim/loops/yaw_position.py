@@ -50,23 +50,22 @@ def yaw_position_controls(
     """All ten controls: thrusts, idle rotor states, the law's own states."""
     law = parameters.law
     state = rigid_body_state(qpos, qvel, act[4], act[5])
-    return extended_controls(yaw_position_inputs(time, state, law), law.vehicle)
+    return extended_controls(yaw_position_inputs(time, state, law, table), law.vehicle)
 
 
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, YawPositionController)
-    law = Parameters(
-        scenario.rotorcraft.resolve(), controller.resolve_gains(), scenario.reference.parameters
-    )
-    return ControlSetup(ControlParameters(signature, law))
+    reference, table = scenario.reference_and_table()
+    law = Parameters(scenario.rotorcraft.resolve(), controller.resolve_gains(), reference)
+    return ControlSetup(ControlParameters(signature, law), table)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     law = setup.parameters.law
     # Roll and pitch are no outputs: they are what the position takes.
     attitude = (samples["roll"], samples["pitch"], law.reference.yaw)
-    columns = references(samples, law.reference, attitude)
+    columns = references(samples, law.reference, setup.table, attitude)
     return columns | extended_singularity(samples, law.vehicle)
 
 
@@ -89,7 +88,7 @@ def equation_inputs(
     time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
 ) -> tuple[float, ...]:
     """The law on the thesis' equations."""
-    return yaw_position_inputs(time, law_state(state), parameters.law)
+    return yaw_position_inputs(time, law_state(state), parameters.law, table)
 
 
 @scalar

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from decimal import Decimal
 from itertools import groupby
-from math import ceil, isfinite, log10
+from math import floor, isfinite, log10
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.report.findings import FINDINGS, Finding
@@ -89,14 +89,19 @@ class Group:
     @property
     def sources(self) -> str:
         """Where the claims stand, without the chapter and what tells the cases apart."""
-        places = (re.sub(r" \([^()]*\)$", "", row.claim.section) for row in self.rows)
-        return "; ".join(dict.fromkeys(places))
+        panels = (re.sub(r" \([A-Z]\d*\)$", "", row.claim.section) for row in self.rows)
+        texts, last = [], ""
+        for place in dict.fromkeys(panels):
+            section, comma, rest = place.partition(", ")
+            texts.append(rest if comma and section == last else place)
+            last = section
+        return "; ".join(texts)
 
     @property
     def shared_why(self) -> str:
         """The reason, where all that fails here fails for the same one."""
-        reasons = {why_of(row) for row in self.rows} - {""}
-        return reasons.pop() if len(reasons) == 1 and len(self.rows) > 1 else ""
+        reasons = [reason for row in self.rows if (reason := why_of(row))]
+        return reasons[0] if len(reasons) > 1 and len(set(reasons)) == 1 else ""
 
 
 def why_of(row: Row) -> str:
@@ -140,7 +145,9 @@ def _measured_number(value: float, claim: Claim) -> str:
         return str(value)
     if isinstance(claim.published, bool):
         return _sign(f"{value:.4g}")
-    finest = ceil(-log10(_tolerance(claim)) - 1e-9)
+    if not claim.unit and value == int(value) and _decimals(claim) == 0:
+        return _sign(f"{value:.0f}")  # a count
+    finest = floor(-log10(_tolerance(claim)) + 1e-9)
     decimals = max(max(_decimals(claim), finest) + 1, 0)
     text = f"{value:.{decimals}f}"
     if len(text) > 12:

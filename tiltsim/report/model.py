@@ -215,12 +215,14 @@ def scenario_claims(scenario: Scenario) -> list[ExpectationClaim]:
     ]
 
 
-_UNITS: Final = frozenset({"m", "rad", "s", "rad/s", "m/s", "m/s^2", "N", "N m"})
+_UNITS: Final = frozenset(
+    {"m", "rad", "s", "rad/s", "m/s", "m/s^2", "N", "N m", "m^2/s^2", "rad^2/s^2"}
+)
 
 
 def unit_of(metric: str) -> str:
     """The unit of a metric, empty where it has none."""
-    unit = METRICS[metric].rpartition(", ")[2]
+    unit = METRICS[metric].rpartition(", ")[2].partition(" (")[0]
     return unit if unit in _UNITS and metric not in BOOLEAN_METRICS else ""
 
 

@@ -27,7 +27,7 @@ from tiltsim.report.content import (
 from tiltsim.report.findings import Finding
 from tiltsim.report.flying import PLANTS
 from tiltsim.report.model import Outcome
-from tiltsim.report.pictures import Drawing
+from tiltsim.report.pictures import DPI, Drawing
 from tiltsim.report.rows import Cell, Row, count
 
 _CLASSES: Final = {
@@ -36,6 +36,8 @@ _CLASSES: Final = {
     Outcome.NOT_REPRODUCED: "not-reproduced",
     Outcome.WRONG: "wrong",
 }
+
+_SHOWN_DPI: Final = 108
 
 
 def page(report: Report) -> str:
@@ -215,11 +217,12 @@ def _number(text: str, row: Row) -> str:
 def _figure(drawing: Drawing) -> str:
     picture = drawing.picture
     data = b64encode(drawing.png).decode()
-    kind = "" if picture.wide else ' class="narrow"'
-    width, height = (int.from_bytes(drawing.png[i : i + 4], "big") for i in (16, 20))
+    # Drawn finer than shown, for screens of high density and print.
+    pixels = (int.from_bytes(drawing.png[i : i + 4], "big") for i in (16, 20))
+    width, height = (round(size * _SHOWN_DPI / DPI) for size in pixels)
     return (
-        f'<figure{kind} id="figure-{picture.name}"><img alt="{escape(picture.caption)}" '
-        f'width="{width // 2}" height="{height // 2}" loading="lazy" '
+        f'<figure id="figure-{picture.name}"><img alt="{escape(picture.caption)}" '
+        f'width="{width}" height="{height}" '
         f'src="data:image/png;base64,{data}"><figcaption>{_prose(picture.caption)}'
         "</figcaption></figure>"
     )

@@ -32,17 +32,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
-_DPI: Final = 144
+DPI: Final = 144
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure: where it belongs, what it shows in words, and for those who do not see it."""
+    """A figure: where it belongs and, in words, what it shows."""
 
     chapter: int
     name: str
     caption: str
-    wide: bool = True
 
 
 @dataclass(frozen=True)
@@ -174,7 +173,7 @@ def png(figure: Figure) -> bytes:
 
     buffer = BytesIO()
     with paper_style():
-        figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
+        figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
     return buffer.getvalue()
 
 
@@ -321,7 +320,6 @@ PICTURES: Final[tuple[Picture, ...]] = (
         "Steady errors at the setpoint (ch. 4, Fig. 4): dots measured in MuJoCo, squares "
         "published. A is the conventional decoupler, B the modified one; 1 to 5 run from ρ = 0.65 "
         "to -0.65.",
-        wide=False,
         addresses=_SETPOINTS,
         draw=_setpoint_errors,
     ),
@@ -335,14 +333,13 @@ PICTURES: Final[tuple[Picture, ...]] = (
     FlightPicture(
         5,
         "walk",
-        "The walk, scaled by 1/3, along the line (MuJoCo).",
-        address="ch05_gaits/line#walk_third",
+        "The walk at 1/3 with a period of 1 s along the line, modified decoupler (MuJoCo).",
+        address="ch05_gaits/line#walk_third_t1_modified",
     ),
     AnalysisPicture(
         6,
         "map",
         "The Two Color Map for the vehicle of ch. 3 and the examples E1 to E4 of ch. 8.",
-        wide=False,
         draw=partial(_map, "ar_drone_2", examples=True),
     ),
     AnalysisPicture(
@@ -360,17 +357,46 @@ PICTURES: Final[tuple[Picture, ...]] = (
         "singular at every attitude.",
         draw=partial(_gait_and_twin, "ch06_gait_1"),
     ),
+    FlightPicture(
+        7,
+        "red-circle",
+        "Gait 2 (red) on the circle, modified decoupler (MuJoCo).",
+        address="ch07_robust_gaits/circle#gait_2",
+    ),
+    AnalysisPicture(
+        8,
+        "circle-and-biased",
+        "Gait 2 of ch. 8, a circle on red, and its biased twin.",
+        draw=partial(_gait_and_twin, "ch08_gait_2"),
+    ),
     AnalysisPicture(
         9,
         "attainable",
         "Gait 2 of ch. 9: torques and thrust within the rotor limits at zero yaw torque.",
         draw=partial(_attainable, "ch09_gait_2"),
     ),
+    FlightPicture(
+        9,
+        "ellipse",
+        "The circle at 1.5 rad/s with gait 2: the vehicle flies an ellipse (MuJoCo).",
+        address="ch09_input_limits/circle#omega_15",
+    ),
+    FlightPicture(
+        10,
+        "drift",
+        "Two thousand seconds on the circle: no error, and rotor speeds that part (MuJoCo).",
+        address="ch10_state_drift/third_derivative#two_thousand_seconds",
+    ),
+    FlightPicture(
+        11,
+        "penguin",
+        "The large swing: the error along y ends in a limit cycle (MuJoCo).",
+        address="ch11_penguin/straight_line#large",
+    ),
     AnalysisPicture(
         12,
         "map-luukkonen",
         "The Two Color Map for the vehicle of ch. 12.",
-        wide=False,
         draw=partial(_map, "luukkonen"),
     ),
 )

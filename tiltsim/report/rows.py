@@ -116,7 +116,7 @@ def _expectation_cell(claim: ExpectationClaim, record: Record) -> Cell:
 
 
 def _ending(record: Record) -> str:
-    return f"lost at {record.end_time:.3g} s" if record.lost else ""
+    return f"lost at {f'{record.end_time:#.3g}'.rstrip('.')} s" if record.lost else ""
 
 
 def _flight_row(claim: FlightClaim, flights: Flights) -> Row:
@@ -127,13 +127,12 @@ def _flight_row(claim: FlightClaim, flights: Flights) -> Row:
         if len(flown) < len(records):
             continue
         metrics = {record.address: record.metrics for record in flown}
-        lost = [record for record in flown if record.lost]
+        lost = any(record.lost for record in flown)
         try:
             value: Value | None = plain(claim.measure(metrics))
         except KeyError:  # a lost flight has no final values
             value = None
-        names = ", ".join(record.address.rpartition("#")[2] for record in lost)
-        note = f"lost: {names}" if value is None and lost else ""
+        note = "lost" if value is None and lost else ""
         cells.append((plant, Cell(value, judge_value(claim, value), note)))
     return Row(claim, plants=tuple(cells))
 

@@ -51,7 +51,7 @@ def _eq_43_as_printed() -> bool:
         second = sp * st * cf - sp * st * sf - cp * sf - cp * cf
         matrix = [[first, sp * cf, cp], [second, -cp * cf, sp], [0.0, sf, st]]
         worst = max(worst, abs(np.linalg.det(matrix) - published_determinant(phi, theta)))
-    return worst < 1e-12
+    return bool(worst < 1e-12)
 
 
 def _position_gains_are_stable() -> bool:
@@ -76,6 +76,18 @@ def _attitude_altitude_is_singular() -> bool:
             if abs(lift * np.linalg.det(rates)) < _SINGULAR:
                 return True
     return False
+
+
+def _signs_of_axes_matter() -> bool:
+    """Whether turning the body axes round changes where S or the exact determinant vanish."""
+    angles = np.linspace(-1.5, 1.5, 61)
+    roll, pitch = np.meshgrid(angles, angles)
+    published = published_determinant(roll, pitch) - published_determinant(roll, -pitch)
+    exact = normalized_determinant(roll, pitch, _HOVER, _VEHICLE)
+    return bool(
+        np.abs(published).max() > _SINGULAR
+        or np.abs(exact - normalized_determinant(-roll, -pitch, _HOVER, _VEHICLE)).max() > _SINGULAR
+    )
 
 
 def _crossing_is_harmful(flights: Mapping[str, Metrics]) -> bool:
@@ -164,6 +176,12 @@ CLAIMS = (
         "flies from the same start.",
         flights=(_STABLE,),
         measure=_lost_with_stable_gains,
+    ),
+    AnalysisClaim(
+        source="ch. 2, Sec. 4",
+        statement="The direction of the body-fixed axes has no influence on the result",
+        published=True,
+        measure=lambda: not _signs_of_axes_matter(),
     ),
     AnalysisClaim(
         source="ch. 2, Sec. 6",

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from controllers.published_gaits import DETERMINANT_CASES, TRIANGLE
-from controllers.singularity import determinant, residuals
+from controllers.singularity import decoupling_matrix, determinant, residuals
 from controllers.vehicle import PRESETS
 from tiltsim.report.measures import Coefficients, determinant_coefficients, worst_coefficient
 from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
@@ -118,6 +118,19 @@ def _home_is_safe() -> bool:
             shrinking = np.linspace(0.0, 1.0, 11)[:, np.newaxis, np.newaxis] * angles
             if residuals(shrinking, _VEHICLE).R.min() <= 0.0:
                 return False
+    return True
+
+
+def _rest_is_singular(*, exact: bool) -> bool:
+    """Whether the matrix of Eq. (12) is singular, level, with one rotor of gait 1 at rest."""
+    matrix = decoupling_matrix((-0.1, 0.1, -0.2, 0.1), 0.0, 0.0, _VEHICLE)
+    matrix = matrix / np.abs(matrix).max(axis=1, keepdims=True)
+    for rotor in range(4):
+        speeds = np.where(np.arange(4) == rotor, 0.0, 1.0)
+        stopped = matrix.copy()
+        stopped[0 if exact else 3 :] *= speeds
+        if abs(np.linalg.det(stopped)) > 1e-9:
+            return False
     return True
 
 
@@ -238,6 +251,22 @@ CLAIMS = (
             measure=partial(_tilts_less, gait),
         )
         for gait, title in _GAITS.items()
+    ),
+    AnalysisClaim(
+        source="ch. 3, Sec. 6.1.1, Eq. (12)",
+        statement="A rotor at rest makes the decoupling matrix singular",
+        case="with the factor 2|ϖ| in all rows",
+        published=True,
+        measure=partial(_rest_is_singular, exact=True),
+    ),
+    AnalysisClaim(
+        source="ch. 3, Sec. 6.1.1, Eq. (12)",
+        statement="A rotor at rest makes the decoupling matrix singular",
+        case="as printed, in the fourth row alone",
+        published=True,
+        why="As printed the column of the resting rotor keeps its torques: regular. It is the "
+        "exact matrix, without the slip, for which the statement holds.",
+        measure=partial(_rest_is_singular, exact=False),
     ),
     AnalysisClaim(
         source="ch. 3, Sec. 5.3",

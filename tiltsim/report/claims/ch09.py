@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -96,7 +97,7 @@ def _faster_is_worse(flights: Mapping[str, Metrics]) -> bool:
         np.inf if metrics["diverged"] else float(metrics["sup_position_error_after_20s"])
         for metrics in flights.values()
     ]
-    return bool((np.diff(errors) > 0.0).all())
+    return all(slower < faster for slower, faster in pairwise(errors))
 
 
 def _first_four_repeat(flights: Mapping[str, Metrics]) -> bool:
