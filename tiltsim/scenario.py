@@ -791,7 +791,7 @@ class Scenario(Table):
             "initial.attitude": (initial.attitude, slice(0, 2)),
             "initial.angular_velocity": (initial.angular_velocity, slice(0, 2)),
         }
-        for name in ("position", "velocity", "acceleration"):
+        for name in ("position", "velocity", "acceleration", "amplitude"):
             vector = getattr(reference, name, None)
             if vector is not None:
                 vectors[f"reference.{name}"] = (vector, slice(2, 3))
