@@ -17,7 +17,7 @@ from tiltsim.errors import InputError
 from tiltsim.expectations import Verdict, judge
 from tiltsim.library import library_name, read_toml, scenario_files, shipped_folder
 from tiltsim.loading import load_scenario, variant_names
-from tiltsim.loops import LOOPS
+from tiltsim.loops import loop_of
 from tiltsim.plants import STEPS_WORTH_COMPILING
 from tiltsim.scenario import Scenario
 from tiltsim.simulation import simulate
@@ -172,8 +172,8 @@ def _shared_engine(addresses: list[str], overrides: Mapping[str, Any]) -> Engine
         return None
     from tiltsim.native import compile_callbacks
 
-    for law in {scenario.controller.law for scenario in scenarios}:
-        compile_callbacks(LOOPS[law])
+    for loop in {loop_of(scenario) for scenario in scenarios}:
+        compile_callbacks(loop)
     return "native"
 
 

@@ -75,6 +75,12 @@ class AttitudeAltitudeController(LawTable):
         Discriminator(_gain_kind),
     ] = "ch04"
     gait_rate_feedforward: Literal[False] = False
+    allocation: Literal["inversion", "prioritized"] = Field(
+        "inversion", description="within rotor limits: each for itself, or attitude first"
+    )
+    allocation_horizon: Positive = Field(
+        0.02, description="s for which prioritized allocation keeps within the limits"
+    )
 
     def resolve_gains(self) -> Gains:
         """The numbers behind a named set or a table."""

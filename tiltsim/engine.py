@@ -70,7 +70,16 @@ class PythonEngine:
             if called is data:
                 write_controls(ctrl, 0, *refresh(ctrl.tolist(), act.tolist()))
 
-        self._sample, self._hold = sample, hold
+        def hold_with_state(_model: mujoco.MjModel, called: mujoco.MjData) -> None:
+            if called is not data or loop.hold is None:
+                return
+            try:
+                state = data.time, qpos.tolist(), qvel.tolist(), act.tolist()
+                write_controls(ctrl, 0, *loop.hold(*state, ctrl.tolist(), parameters))
+            except (ArithmeticError, ValueError):
+                ctrl[:] = nan
+
+        self._sample, self._hold = sample, hold if loop.hold is None else hold_with_state
 
     def continuous(self) -> Callback:
         """See `Engine.continuous`."""

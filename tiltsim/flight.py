@@ -95,7 +95,8 @@ class Flight:
         thrust_coefficient = self.scenario.vehicle.resolve().thrust_coefficient
         for i, sign in zip(_FOUR, SPIN, strict=True):
             speed = known[f"rotor_speed_{i}"]
-            known[f"thrust_{i}"] = thrust_coefficient * sign * speed * np.abs(speed)
+            thrust = thrust_coefficient * sign * speed * np.abs(speed)
+            known[f"thrust_{i}"] = thrust * known.get(f"thrust_factor_{i}", 1.0)  # of a fault
         return {name: known[name] for name in self.units}
 
     @cached_property

@@ -32,6 +32,14 @@ class Sizes(NamedTuple):
     ctrl: int
 
 
+class ExtraActuators(NamedTuple):
+    """Actuators that a layer around a law appends to the vehicle's, in this order."""
+
+    states: int = 0  # integrators that act on nothing: ctrl is the rate of an activation
+    memories: int = 0  # act on nothing and have no state: a held ctrl is all there is
+    wrench: bool = False  # force (N) and torque (N m) on the body, six, in body axes
+
+
 class ControlSetup(NamedTuple):
     """What the control step of one flight reads besides the state."""
 
@@ -97,6 +105,9 @@ class Loop:
         Scalar function ``(time, qpos, qvel, act, parameters, table) -> ctrl``: the whole step.
     refresh
         Scalar function ``(ctrl, act) -> ctrl``: what moves between the samples of a held law.
+    hold
+        Scalar function ``(time, qpos, qvel, act, ctrl, parameters) -> ctrl`` in place of
+        ``refresh``, where more than the activations decides what moves between samples.
     setup
         ``(scenario, signature) -> ControlSetup``.
     initial_activations
@@ -111,6 +122,8 @@ class Loop:
         ``(sample by field, setup) -> Watched, ...``: where the law ends.
     law_states
         Number of activations that are states of the law.
+    extra_actuators
+        What layers around the law append to the model's actuators, the innermost first.
     law_fields
         Fields of a sample beyond `OBSERVED_FIELDS`.
     extra_columns
@@ -133,9 +146,11 @@ class Loop:
     watched: Callable[[Mapping[str, float], ControlSetup], tuple[Watched, ...]]
     equations: Equations
     law_states: int = 0
+    extra_actuators: tuple[ExtraActuators, ...] = ()
     law_fields: tuple[str, ...] = ()
     extra_columns: Mapping[str, str] = field(default_factory=dict)
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
+    hold: Callable[..., tuple[float, ...]] | None = None
 
     @cached_property
     def signature(self) -> float:

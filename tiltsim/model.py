@@ -19,6 +19,8 @@ from tiltsim.library import shipped_folder
 if TYPE_CHECKING:
     import mujoco
 
+    from tiltsim.loop import ExtraActuators
+
 MODELS: Final = ("tiltrotor", "quadrotor")
 INTEGRATORS: Final = ("Euler", "RK4", "implicit", "implicitfast")
 ROTORS: Final = (1, 2, 3, 4)
@@ -155,6 +157,7 @@ def compile_model(
     pod: Pod = Pod(),
     rotor_limits: RotorLimits = RotorLimits(),
     law_states: int = 0,
+    extra_actuators: tuple[ExtraActuators, ...] = (),
     visuals: bool = True,
 ) -> mujoco.MjModel:
     """Compile the MuJoCo model of a vehicle.
@@ -183,6 +186,8 @@ def compile_model(
     law_states : int, default=0
         Number of states of a control law of its own: integrators ``law_1``, ``law_2``, ... after
         all other actuators, which act on nothing; ctrl is the state's rate.
+    extra_actuators : tuple, optional
+        What layers around the law append after these; see `tiltsim.loop.ExtraActuators`.
     visuals : bool, default=True
         Whether the vehicle has geoms. They do not touch the physics, but positioning them takes
         about a sixth of a step.
@@ -218,6 +223,7 @@ def compile_model(
         pod,
         rotor_limits,
         law_states,
+        extra_actuators,
     )
     return mujoco.MjModel.from_xml_string(whole if visuals else bare)
 
@@ -233,6 +239,7 @@ def _compose(
     pod: Pod,
     rotor_limits: RotorLimits,
     law_states: int,
+    extra_actuators: tuple[ExtraActuators, ...],
 ) -> tuple[str, str]:
     """The vehicle's complete MJCF, and the same without what is only drawn.
 
@@ -257,7 +264,12 @@ def _compose(
         _set_servos(root, tilt_servo, pod)
     _set_keyframe(root.keyframe.key["hover"], vehicle.hover_rotor_speed)
     _set_keyframe(root.keyframe.key["start"], START_SPEED)
-    _add_law_states(root, law_states)
+    _add_states(root, "law", law_states)
+    for index, extra in enumerate(extra_actuators, start=1):
+        _add_states(root, f"layer_{index}_state", extra.states)
+        _add_memories(root, f"layer_{index}_memory", extra.memories)
+        if extra.wrench:
+            _add_wrench(root, f"layer_{index}")
     whole = str(root.to_xml_string())
     for geom in root.find("body", "vehicle").find_all("geom"):
         geom.remove()
@@ -343,17 +355,45 @@ def _set_keyframe(key: Any, rotor_speed: float) -> None:
     key.ctrl = ctrl
 
 
-def _add_law_states(root: Any, count: int) -> None:
+def _add_states(root: Any, name: str, count: int) -> None:
     """Append integrators that act on nothing; in the keyframes they rest at zero."""
     for index in range(1, count + 1):
         root.actuator.add(
             "general",
-            name=f"law_{index}",
+            name=f"{name}_{index}",
             site="imu",
             dyntype="integrator",
             gainprm=[0.0],
             gear=(0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
         )
+    _extend_keyframes(root, act=count, ctrl=count)
+
+
+def _add_memories(root: Any, name: str, count: int) -> None:
+    """Append actuators without gain, whose controls remember what a held law has said."""
+    for index in range(1, count + 1):
+        root.actuator.add(
+            "general",
+            name=f"{name}_{index}",
+            site="imu",
+            gainprm=[0.0],
+            gear=(0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
+        )
+    _extend_keyframes(root, ctrl=count)
+
+
+def _add_wrench(root: Any, name: str) -> None:
+    """Append a force and a torque on the body at its centre, in body axes."""
+    for index, axis in enumerate(
+        ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z")
+    ):
+        gear = [0.0] * 6
+        gear[index] = 1.0
+        root.actuator.add("general", name=f"{name}_{axis}", site="imu", gear=gear)
+    _extend_keyframes(root, ctrl=6)
+
+
+def _extend_keyframes(root: Any, act: int = 0, ctrl: int = 0) -> None:
     for key in root.keyframe.key:
-        key.act = [*key.act, *[0.0] * count]
-        key.ctrl = [*key.ctrl, *[0.0] * count]
+        key.act = [*key.act, *[0.0] * act]
+        key.ctrl = [*key.ctrl, *[0.0] * ctrl]

@@ -173,7 +173,29 @@ def compile_callbacks(loop: Loop) -> Callbacks:
         values = refresh(to_fixed_tuple(buffer[0:nu], nu), activations)
         _write_controls(model, data, address, values)
 
-    return Callbacks(continuous, held)
+    hold = loop.hold
+    if hold is None:
+        return Callbacks(continuous, held)
+
+    @cfunc(types.void(types.intp, types.intp), **_OPTIONS)
+    def held_with_state(model, data):  # type: ignore[no-untyped-def]
+        address = _stack_buffer()
+        size = _read_inputs(model, data, address, head, userdata, signature)
+        if size == 0 or size + nu > CAPACITY:
+            return
+        buffer = carray(_floats_at(address), (CAPACITY,))
+        _get_state(model, data, address + 8 * size, CONTROLS)
+        values = hold(
+            buffer[0],
+            to_fixed_tuple(buffer[qpos:qvel], nq),
+            to_fixed_tuple(buffer[qvel:act], nv),
+            to_fixed_tuple(buffer[act:userdata], na),
+            to_fixed_tuple(buffer[size : size + nu], nu),
+            carray(_bytes_at(address + 8 * userdata), (1,), layout)[0],
+        )
+        _write_controls(model, data, address, values)
+
+    return Callbacks(continuous, held_with_state)
 
 
 class NativeEngine:

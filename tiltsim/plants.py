@@ -195,7 +195,7 @@ def build_model(
 
     Raises `InputError` where MuJoCo cannot build it.
     """
-    vehicle, simulation = scenario.vehicle, scenario.simulation
+    vehicle, simulation, loop = scenario.vehicle, scenario.simulation, loop_of(scenario)
     try:
         model = compile_model(
             vehicle.model,
@@ -203,10 +203,11 @@ def build_model(
             timestep=simulation.timestep,
             integrator=simulation.integrator,
             userdata_size=userdata_size,
-            tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump()),
+            tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump(exclude={"max_rate"})),
             pod=Pod(**vehicle.pod.model_dump()),
             rotor_limits=RotorLimits(vehicle.min_rotor_speed, vehicle.max_rotor_speed),
-            law_states=loop_of(scenario).law_states,
+            law_states=loop.law_states,
+            extra_actuators=loop.extra_actuators,
             visuals=visuals,
         )
     except ValueError as error:

@@ -44,6 +44,9 @@ MAX_HELD_STEP: Final = 2.0
 MAX_SERVO_STEP: Final = 2.6
 """Largest product of timestep and servo pole; RK4 turns unstable at 2.78."""
 
+MAX_LATENCY_STEPS: Final = 20
+"""Control samples on their way at once; each is eight states of the simulation."""
+
 # --- [vehicle] ---------------------------------------------------------------------------------
 
 
@@ -52,6 +55,7 @@ class TiltServoTable(Table):
 
     natural_frequency: Positive = Field(300.0, description="rad/s")
     damping_ratio: Positive = 1.0
+    max_rate: Positive | None = Field(None, description="rad/s")
     max_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
         None, description="rad; the gait must stay within"
     )
@@ -81,6 +85,9 @@ class VehicleTable(Table):
     gravity: Positive | None = Field(None, description="m/s^2")
     min_rotor_speed: Positive | None = Field(None, description="rad/s, absolute value")
     max_rotor_speed: Positive | None = Field(None, description="rad/s, absolute value")
+    rotor_time_constant: Positive | None = Field(
+        None, description="s, of the lag between the speed a rotor is told and its own"
+    )
     tilt_servo: TiltServoTable = TiltServoTable()
     pod: PodTable = PodTable()
 
@@ -123,6 +130,9 @@ class SimulationTable(Table):
     control_timestep: NonNegative = Field(
         0.0, description="s; 0 evaluates the law at every integrator stage, else sample and hold"
     )
+    control_latency: NonNegative = Field(
+        0.0, description="s from a reading to its command; a multiple of control_timestep"
+    )
     record_timestep: Positive | None = Field(
         None, description="s between recorded samples; default: the multiple of timestep near 0.01"
     )
@@ -140,6 +150,11 @@ class SimulationTable(Table):
     def control_steps(self) -> int:
         """Physics steps between control samples; 0 where control is continuous."""
         return round(self.control_timestep / self.timestep)
+
+    @property
+    def latency_steps(self) -> int:
+        """Control samples between a reading and its command; 0 where there is no latency."""
+        return round(self.control_latency / self.control_timestep) if self.control_latency else 0
 
     @property
     def record_steps(self) -> int:
@@ -166,7 +181,26 @@ class SimulationTable(Table):
                 raise InvalidValueError(
                     f"simulation.{key}", value, f"must be a multiple of timestep = {self.timestep}"
                 )
+        self._check_latency()
         return self
+
+    def _check_latency(self) -> None:
+        latency, period = self.control_latency, self.control_timestep
+        if latency == 0.0:
+            return
+        if period == 0.0:
+            raise InvalidValueError(
+                "simulation.control_latency",
+                latency,
+                "needs a control_timestep, of which it is a multiple",
+            )
+        steps = latency / period
+        if abs(steps - round(steps)) > 1e-6 * steps or not 1 <= round(steps) <= MAX_LATENCY_STEPS:
+            raise InvalidValueError(
+                "simulation.control_latency",
+                latency,
+                f"must be 1 to {MAX_LATENCY_STEPS} times control_timestep = {period}",
+            )
 
 
 class InitialTable(Table):
@@ -307,6 +341,67 @@ class Disturbance(Table):
     value: Vector3 = Field(description="m/s^2, world; acts on all that has mass, as gravity does")
 
 
+# --- [sensors] and [[fault]] -------------------------------------------------------------------
+
+
+class SensorTable(Table):
+    """What the law is told of its vehicle's motion; the truth by default.
+
+    Every reading has its own zero-mean normal error of the given standard deviation on each axis,
+    drawn from ``simulation.seed``, and stands until the next. Tilts and rotor speeds are known.
+    """
+
+    position_noise: NonNegative = Field(0.0, description="m")
+    position_bias: Vector3 = Field((0.0, 0.0, 0.0), description="m, world")
+    velocity_noise: NonNegative = Field(0.0, description="m/s")
+    velocity_bias: Vector3 = Field((0.0, 0.0, 0.0), description="m/s, world")
+    attitude_noise: NonNegative = Field(0.0, description="rad, about each body axis")
+    attitude_bias: Vector3 = Field((0.0, 0.0, 0.0), description="rad, about the body axes")
+    body_rates_noise: NonNegative = Field(0.0, description="rad/s")
+    body_rates_bias: Vector3 = Field((0.0, 0.0, 0.0), description="rad/s, body")
+    sample_time: Positive | None = Field(
+        None, description="s between readings; default: control_timestep, 0.01 if continuous"
+    )
+
+    @property
+    def are_imperfect(self) -> bool:
+        """Whether any reading differs from the truth."""
+        return self.model_dump(exclude={"sample_time"}) != _PERFECT
+
+
+_PERFECT: Final = SensorTable().model_dump(exclude={"sample_time"})
+
+Rotor = Annotated[int, Field(ge=1, le=4)]
+
+
+class RotorLoss(Table):
+    """A rotor that makes neither thrust nor torque any more; its motor turns on."""
+
+    type: Literal["rotor_loss"]
+    rotor: Rotor
+    time: NonNegative = Field(description="s")
+
+
+class PartialThrust(Table):
+    """A rotor that makes only part of its thrust and drag torque."""
+
+    type: Literal["partial_thrust"]
+    rotor: Rotor
+    time: NonNegative = Field(description="s")
+    factor: Annotated[float, Field(ge=0.0, le=2.0)] = Field(description="what is left, 1 for all")
+
+
+class StuckServo(Table):
+    """A tilt servo that holds one angle whatever it is told."""
+
+    type: Literal["stuck_servo"]
+    rotor: Rotor
+    time: NonNegative = Field(description="s")
+    angle: Angle | None = Field(None, description="rad; default: what the gait plans at the time")
+
+
+Fault = Annotated[RotorLoss | PartialThrust | StuckServo, Field(discriminator="type")]
+
 # --- [[expect]] --------------------------------------------------------------------------------
 
 
@@ -354,6 +449,8 @@ class Scenario(Table):
     gait: Gait = FixedGait()
     reference: Reference = SetpointReference()
     disturbance: Annotated[tuple[Disturbance, ...], Field(strict=False)] = ()
+    sensors: SensorTable = SensorTable()
+    fault: Annotated[tuple[Fault, ...], Field(strict=False)] = ()
     expect: Annotated[tuple[Expectation, ...], Field(strict=False)] = ()
 
     _address: str = PrivateAttr("")
@@ -363,9 +460,27 @@ class Scenario(Table):
         """How the scenario is called on the command line; empty when it was built in Python."""
         return self._address
 
+    @property
+    def has_real_actuators(self) -> bool:
+        """Whether anything between law and vehicle is less than ideal; see `_real_actuators`."""
+        return any(value != ideal for _, value, ideal in self._real_actuators())
+
+    def _real_actuators(self) -> list[tuple[str, object, object]]:
+        """What `tiltsim.loops.actuation` is for: key, value and what the ideal would be."""
+        controller = self.controller
+        return [
+            ("vehicle.rotor_time_constant", self.vehicle.rotor_time_constant, None),
+            ("vehicle.tilt_servo.max_rate", self.vehicle.tilt_servo.max_rate, None),
+            ("simulation.control_latency", self.simulation.control_latency, 0.0),
+            ("sensors", self.sensors.model_dump(exclude={"sample_time"}), _PERFECT),
+            ("fault", [fault.type for fault in self.fault], []),
+            ("controller.allocation", getattr(controller, "allocation", "inversion"), "inversion"),
+        ]
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         self._check_law()
+        self._check_actuators()
         self._check_gait()
         self._check_reference()
         self._check_rotor_limits()
@@ -401,6 +516,35 @@ class Scenario(Table):
                     "the quadrotor has no use for it: its rotors do not tilt, and "
                     "make the thrust that its law asks for at once",
                 )
+
+    def _check_actuators(self) -> None:
+        for key, value, ideal in self._real_actuators():
+            if value == ideal:
+                continue
+            if self.vehicle.model != "tiltrotor":
+                raise InvalidValueError(
+                    key, value, f"the {self.vehicle.model} flies without; leave it out"
+                )
+            if self.simulation.plant == "thesis":
+                raise InvalidValueError(
+                    "simulation.plant", "thesis", f"the thesis' equations know no {key}; use mujoco"
+                )
+        kinds = [(f.rotor, f.type == "stuck_servo") for f in self.fault]
+        for fault, kind in zip(self.fault, kinds, strict=True):
+            if kinds.count(kind) > 1:
+                raise InvalidValueError(
+                    "fault.rotor",
+                    fault.rotor,
+                    f"has more than one {'stuck servo' if kind[1] else 'loss of thrust'}",
+                )
+        controller = self.controller
+        low, high = self.vehicle.min_rotor_speed, self.vehicle.max_rotor_speed
+        if getattr(controller, "allocation", "") == "prioritized" and low is None and high is None:
+            raise InvalidValueError(
+                "controller.allocation",
+                "prioritized",
+                "nothing limits the rotors; give vehicle.min_rotor_speed or max_rotor_speed",
+            )
 
     def _check_reference(self) -> None:
         controller, reference = self.controller, self.reference

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from tiltsim.loops.actuation import with_actuation
 from tiltsim.loops.full_pose import FULL_POSE
 from tiltsim.loops.quadrotor_attitude_altitude import QUADROTOR_ATTITUDE_ALTITUDE
 from tiltsim.loops.switching import SWITCHING
@@ -25,8 +26,11 @@ LOOPS: Final[dict[str, Loop]] = {
 
 
 def loop_of(scenario: Scenario) -> Loop:
-    """The loop that a scenario flies."""
-    return LOOPS[scenario.controller.law]
+    """The loop that a scenario flies: its law, within layers for what is not ideal."""
+    loop = LOOPS[scenario.controller.law]
+    if scenario.has_real_actuators:
+        loop = with_actuation(loop, scenario.simulation.latency_steps)
+    return loop
 
 
 def control_setup(scenario: Scenario) -> ControlSetup:
