@@ -17,7 +17,7 @@ from controllers.stability import Loop, closed_loops, linear_loop
 from controllers.switching import PUBLISHED_ZONE
 from controllers.vehicle import Vehicle
 from tiltsim.messages import InvalidValueError
-from tiltsim.tables import Gains2, Positive, Table, Vector3
+from tiltsim.tables import Gains2, NonNegative, Positive, Table, Vector3
 
 DEFAULT_LAW: Final = "attitude_altitude"
 
@@ -120,6 +120,10 @@ class FullPoseController(LawTable):
         "even",
         description="of tilt rates in the norm: by the force they move, or number for number",
     )
+    failed_rotor: Annotated[int, Field(ge=1, le=4)] | None = Field(
+        None, description="a rotor that the law knows to be lost and does not count on"
+    )
+    failure_known_from: NonNegative = Field(0.0, description="s, since when failed_rotor is known")
     max_tilt_rate: Positive | None = Field(None, description="rad/s, held by the law")
     max_tilt_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
         None, description="rad, held by the law"
@@ -136,6 +140,12 @@ class FullPoseController(LawTable):
         if self.tilt_weight == "published":
             return full_pose.PUBLISHED_TILT_WEIGHT
         return full_pose.even_tilt_weight(vehicle)
+
+    def resolve_failure(self) -> full_pose.Failure:
+        """What the law knows of a lost rotor."""
+        if self.failed_rotor is None:
+            return full_pose.Failure()
+        return full_pose.Failure(float(self.failed_rotor), self.failure_known_from)
 
     def resolve_limits(self) -> full_pose.Limits:
         """The limits that the law holds, infinite where there are none."""

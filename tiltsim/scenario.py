@@ -22,6 +22,7 @@ from tiltsim.metrics import BOOLEAN_METRICS, METRICS
 from tiltsim.tables import (
     Angle,
     Angles3,
+    Coordinate,
     NonNegative,
     Positive,
     Positive4,
@@ -402,6 +403,82 @@ class StuckServo(Table):
 
 Fault = Annotated[RotorLoss | PartialThrust | StuckServo, Field(discriminator="type")]
 
+# --- [air] -------------------------------------------------------------------------------------
+
+NonNegative3 = Annotated[tuple[NonNegative, NonNegative, NonNegative], Field(strict=False)]
+
+
+class DragTable(Table):
+    """The force against the motion through the air, along each body axis."""
+
+    linear: NonNegative3 = Field((0.0, 0.0, 0.0), description="N s/m")
+    area: NonNegative3 = Field(
+        (0.0, 0.0, 0.0), description="m^2, drag coefficient times the area seen along the axis"
+    )
+
+
+class GustTable(Table):
+    """A discrete gust, one minus cosine (MIL-F-8785C)."""
+
+    velocity: Vector3 = Field(description="m/s, world, at its peak")
+    start: NonNegative = Field(0.0, description="s")
+    rise: Positive = Field(description="s, up to the peak and down again")
+    duration: NonNegative = Field(0.0, description="s, from start to end; 0: it stays")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if 0.0 < self.duration < 2.0 * self.rise:
+            raise InvalidValueError(
+                "air.gust.duration",
+                self.duration,
+                f"must be 0 or at least twice rise = {self.rise}",
+            )
+        return self
+
+
+class TurbulenceTable(Table):
+    """Dryden turbulence, low-altitude model (MIL-F-8785C), drawn from ``simulation.seed``."""
+
+    wind_at_6m: Positive = Field(description="m/s, mean wind 20 ft above the ground")
+    height: Annotated[float, Field(ge=3.048, le=304.8)] = Field(
+        10.0, description="m above the ground, for intensity and scale"
+    )
+    sample_time: Positive = Field(0.01, description="s for which a draw of the noise stands")
+
+
+class GroundTable(Table):
+    """Ground effect on each rotor (Cheeseman and Bennett)."""
+
+    rotor_radius: Positive = Field(0.1, description="m")
+    height: Coordinate = Field(description="m, z of the ground in the world")
+
+
+class AirTable(Table):
+    """The air around the vehicle; none by default."""
+
+    density: Positive = Field(1.225, description="kg/m^3")
+    wind: Vector3 = Field((0.0, 0.0, 0.0), description="m/s, world: where the air goes")
+    drag: DragTable = DragTable()
+    gust: GustTable | None = None
+    turbulence: TurbulenceTable | None = None
+    ground: GroundTable | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if any(self.drag.linear) or any(self.drag.area):
+            return self
+        for key, moves in (
+            ("wind", any(self.wind)),
+            ("gust", self.gust),
+            ("turbulence", self.turbulence),
+        ):
+            if moves:
+                raise InvalidValueError(
+                    f"air.{key}", getattr(self, key), "acts through drag; give air.drag"
+                )
+        return self
+
+
 # --- [[expect]] --------------------------------------------------------------------------------
 
 
@@ -449,6 +526,7 @@ class Scenario(Table):
     gait: Gait = FixedGait()
     reference: Reference = SetpointReference()
     disturbance: Annotated[tuple[Disturbance, ...], Field(strict=False)] = ()
+    air: AirTable = AirTable()
     sensors: SensorTable = SensorTable()
     fault: Annotated[tuple[Fault, ...], Field(strict=False)] = ()
     expect: Annotated[tuple[Expectation, ...], Field(strict=False)] = ()
@@ -464,6 +542,11 @@ class Scenario(Table):
     def has_real_actuators(self) -> bool:
         """Whether anything between law and vehicle is less than ideal; see `_real_actuators`."""
         return any(value != ideal for _, value, ideal in self._real_actuators())
+
+    @property
+    def has_air(self) -> bool:
+        """Whether the air does anything to the vehicle."""
+        return self.air != AirTable()
 
     def _real_actuators(self) -> list[tuple[str, object, object]]:
         """What `tiltsim.loops.actuation` is for: key, value and what the ideal would be."""
@@ -518,6 +601,10 @@ class Scenario(Table):
                 )
 
     def _check_actuators(self) -> None:
+        if self.has_air and self.simulation.plant == "thesis":
+            raise InvalidValueError(
+                "simulation.plant", "thesis", "the thesis' equations know no air; use mujoco"
+            )
         for key, value, ideal in self._real_actuators():
             if value == ideal:
                 continue

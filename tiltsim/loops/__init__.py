@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.loops.actuation import with_actuation
+from tiltsim.loops.air import with_air
 from tiltsim.loops.full_pose import FULL_POSE
 from tiltsim.loops.quadrotor_attitude_altitude import QUADROTOR_ATTITUDE_ALTITUDE
 from tiltsim.loops.switching import SWITCHING
@@ -30,7 +31,7 @@ def loop_of(scenario: Scenario) -> Loop:
     loop = LOOPS[scenario.controller.law]
     if scenario.has_real_actuators:
         loop = with_actuation(loop, scenario.simulation.latency_steps)
-    return loop
+    return with_air(loop) if scenario.has_air else loop
 
 
 def control_setup(scenario: Scenario) -> ControlSetup:

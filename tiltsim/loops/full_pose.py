@@ -90,6 +90,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
         scenario.reference.parameters,
         controller.resolve_limits(),
         controller.resolve_tilt_weight(vehicle),
+        controller.resolve_failure(),
     )
     lead = servo_lead(scenario.vehicle.tilt_servo)
     return ControlSetup(ControlParameters(signature, lead, law))
