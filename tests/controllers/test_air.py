@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import integrate, signal
+from scipy import integrate, linalg, signal
 
 from controllers.air import (
     FOOT,
@@ -21,6 +21,7 @@ from controllers.air import (
     gust_profile,
     low_altitude_turbulence,
     stationary_states,
+    white_noise,
 )
 
 speeds = st.floats(-20.0, 20.0)
@@ -81,16 +82,20 @@ def test_the_spectrum_integrates_to_the_variance(axis):
     assert total == pytest.approx(sigma**2, rel=1e-6)
 
 
-def response(omega, turbulence):
-    """Velocity per unit noise of each filter, from the rates themselves, shape (3, N)."""
-
-    zero = turbulence._replace(sample_time=1e30)  # the noise vanishes, the filters remain
-    matrix = np.array([dryden_rates(0.0, tuple(row), zero) for row in np.eye(5)]).T
+def filters(turbulence):
+    """The filters' matrices, taken from the rates: dynamics, drive of the noises, output."""
+    quiet = turbulence._replace(sample_time=1e30)  # the noise vanishes, the filters remain
+    matrix = np.array([dryden_rates(0.0, tuple(row), quiet) for row in np.eye(5)]).T
     output = np.array([dryden_velocity(tuple(row), turbulence) for row in np.eye(5)]).T
-    # What noise drives moves at its own decay rate.
     drive = np.zeros((5, 3))
-    for column, state in enumerate((0, 1, 3)):
-        drive[state, column] = -matrix[state, state]
+    for noise, state in enumerate((0, 1, 3)):  # what noise drives, it drives at its decay rate
+        drive[state, noise] = -matrix[state, state]
+    return matrix, drive, output
+
+
+def response(omega, turbulence):
+    """Velocity per unit noise of each filter, shape (3, N)."""
+    matrix, drive, output = filters(turbulence)
     found = [output @ np.linalg.solve(1j * w * np.eye(5) - matrix, drive) for w in omega]
     return np.abs(np.array([[h[axis, axis] for h in found] for axis in range(3)]))
 
@@ -105,19 +110,33 @@ def test_the_filters_have_the_spectrum():
         )
 
 
-def simulated(turbulence, duration, step):
-    """The turbulent velocities, shape (N, 3), with the noise held as in flight."""
-    states = np.array(stationary_states(turbulence))
-    rows = []
-    for index in range(round(duration / step)):
-        rows.append(dryden_velocity(tuple(states), turbulence))
-        states = states + step * np.array(dryden_rates(index * step, tuple(states), turbulence))
-    return np.array(rows)
+def simulated(turbulence, count):
+    """The turbulent velocities at every draw of the noise, shape (count, 3)."""
+    matrix, drive, output = filters(turbulence)
+    step = turbulence.sample_time
+    decay = linalg.expm(step * matrix)
+    noise = [
+        [white_noise(index * step, 20.0 + axis, turbulence) for axis in range(3)]
+        for index in range(count)
+    ]
+    kicks = np.array(noise) @ (np.linalg.solve(matrix, decay - np.eye(5)) @ drive).T
+    states = np.empty((count, 5))
+    states[0] = stationary_states(turbulence)
+    for index in range(1, count):
+        states[index] = decay @ states[index - 1] + kicks[index - 1]
+    return states @ output.T
+
+
+def test_the_rates_are_driven_by_the_noise():
+    rates = dryden_rates(3.3, (0.0,) * 5, TURBULENCE)
+    _, drive, _ = filters(TURBULENCE)
+    noise = [white_noise(3.3, 20.0 + axis, TURBULENCE) for axis in range(3)]
+    np.testing.assert_allclose(rates, drive @ noise)
 
 
 def test_the_process_has_the_spectrum():
     fast = TURBULENCE._replace(sample_time=0.02, length_u=6.0, length_w=3.0)  # 1 s and 0.5 s
-    velocity = simulated(fast, 1200.0, 0.02)
+    velocity = simulated(fast, 60_000)
     for column, axis in enumerate("uvw"):
         frequency, density = signal.welch(velocity[:, column], fs=50.0, nperseg=2048)
         band = (frequency > 0.05) & (frequency < 4.0)
