@@ -165,6 +165,8 @@ def dryden_rates(
     one for u, two in a row for v and for w.
     """
     u, v1, v2, w1, w2 = states
+    if turbulence.intensity_u == 0.0 and turbulence.intensity_w == 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0  # nobody sees them move
     rate_u = turbulence.speed / turbulence.length_u
     rate_w = turbulence.speed / turbulence.length_w
     return (

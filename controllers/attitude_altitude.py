@@ -8,6 +8,7 @@ meets them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import nan
 from typing import Final, NamedTuple
 
@@ -29,6 +30,7 @@ from controllers.decoupling_matrix import (
     vertical_force_entries,
 )
 from controllers.gaits import GaitParameters
+from controllers.gaits.keyframes import NO_KEYFRAMES
 from controllers.references import ReferenceParameters, position_reference
 from controllers.rotation import world_up_in_body
 from controllers.scalar import Quad, scalar
@@ -88,7 +90,12 @@ STATE_FIELDS: Final = (
 
 @scalar
 def attitude_reference(
-    time: float, state: State, trig: Octet, torque: Octet, parameters: Parameters
+    time: float,
+    state: State,
+    trig: Octet,
+    torque: Octet,
+    parameters: Parameters,
+    table: Sequence[float] = NO_KEYFRAMES,
 ) -> tuple[float, float, float, float, float, float]:
     """Attitude and altitude to track, with the altitude's derivatives (ch. 4, Eqs. 28-30).
 
@@ -97,7 +104,7 @@ def attitude_reference(
     """
     reference = parameters.reference
     x_ref, y_ref, z_ref, vx_ref, vy_ref, vz_ref, ax_ref, ay_ref, az_ref = position_reference(
-        time, reference
+        time, reference, table
     )
     yaw_ref = reference.yaw
     if parameters.decoupler == NONE:
@@ -123,7 +130,9 @@ def attitude_reference(
 
 
 @scalar
-def rotor_accelerations(time: float, state: State, parameters: Parameters) -> Quad:
+def rotor_accelerations(
+    time: float, state: State, parameters: Parameters, table: Sequence[float] = NO_KEYFRAMES
+) -> Quad:
     """The rotor accelerations (rad/s^2) of the feedback linearization at a time and state.
 
     Third-order laws (ch. 4, Eqs. 26-27) on the outputs give the wanted third derivatives; the
@@ -139,7 +148,7 @@ def rotor_accelerations(time: float, state: State, parameters: Parameters) -> Qu
     torque = torque_entries(trig, drag_ratio(vehicle))
     x2, x4, y1, y3, z1, z2, z3, z4 = torque
     roll_ref, pitch_ref, yaw_ref, z_ref, vz_ref, az_ref = attitude_reference(
-        time, state, trig, torque, parameters
+        time, state, trig, torque, parameters, table
     )
 
     # Second derivatives of the outputs, Eq. (10), from w_i = varpi_i |varpi_i|.

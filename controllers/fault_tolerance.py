@@ -192,7 +192,8 @@ def least_hover_speed(
     Returns
     -------
     float
-        Of the largest rotor speed; a limit below it means that no hover is possible.
+        Of the largest rotor speed; a limit below it means that no hover is possible. The vehicle
+        may lean as it likes, even upside down.
     """
     from scipy.optimize import minimize
 
@@ -221,6 +222,11 @@ def least_hover_speed(
     for speed in (0.5, 0.8):  # without the one that is broken
         three = hover_on_three(weak, vehicle, opposite_speed=speed * vehicle.hover_rotor_speed)
         starts.append([*three.tilts, *(np.array(three.rotor_speeds) ** 2 / weight)])
+    if stuck is not None:  # with the opposite pod turned alike, or in the mirror
+        for angle in (stuck[1], -stuck[1]):
+            alike = [0.0, 0.0, 0.0, 0.0, 0.25, 0.25, 0.25, 0.25]
+            alike[(stuck[0] + 1) % 4] = angle
+            starts.append(alike)
     for start in starts:
         found = minimize(
             lambda x: float(x[8]),

@@ -15,10 +15,12 @@ author's public model of this vehicle. Like ch. 3's own law, it leaves out the g
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import copysign, inf, nan
 from typing import Final, NamedTuple
 
 from controllers.decoupling_matrix import Octet, body_force, sines_and_cosines, torque_entries
+from controllers.gaits.keyframes import NO_KEYFRAMES
 from controllers.references import ReferenceParameters, reference_derivatives
 from controllers.rotation import rotation_from_euler
 from controllers.scalar import Quad, Triple, scalar
@@ -242,7 +244,9 @@ def limited_tilt_rate(rate: float, angle: float, limits: Limits) -> float:
 
 
 @scalar
-def full_pose_inputs(time: float, state: State, parameters: Parameters) -> Octet:
+def full_pose_inputs(
+    time: float, state: State, parameters: Parameters, table: Sequence[float] = NO_KEYFRAMES
+) -> Octet:
     """The rotor accelerations (rad/s^2) and tilt rates (rad/s), four each, at a time and state.
 
     ``state`` is that of `controllers.attitude_altitude.STATE_FIELDS`, world z up. The reference
@@ -283,7 +287,7 @@ def full_pose_inputs(time: float, state: State, parameters: Parameters) -> Octet
     r_rate = per_yaw * (z1 * w1 + z2 * w2 + z3 * w3 + z4 * w4)
 
     # Third-order laws; the attitude to reach is constant.
-    ref = reference_derivatives(time, reference)
+    ref = reference_derivatives(time, reference, table)
     k1, k2, k3 = gains.position_1, gains.position_2, gains.position_3
     jx = ref[9] + k1 * (ref[6] - ax) + k2 * (ref[3] - vx) + k3 * (ref[0] - x)
     jy = ref[10] + k1 * (ref[7] - ay) + k2 * (ref[4] - vy) + k3 * (ref[1] - y)

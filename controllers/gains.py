@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from controllers.attitude_altitude import Gains
 
@@ -26,6 +26,53 @@ def gains_from_rows(
         *altitude,
         *position,
     )
+
+
+class IntegralGains(NamedTuple):
+    """Gains on the integrals of the position error, for laws that have them."""
+
+    position: float = 0.0  # 1/s^3, x and y
+    altitude: float = 0.0  # 1/s^4
+
+
+class Poles(NamedTuple):
+    """Where the poles of a closed loop shall lie."""
+
+    bandwidth: float  # [omega] natural frequency of its pair of poles, rad/s
+    damping: float = 1.0  # [zeta] of the pair
+    integral: float = 0.0  # [lambda] pole at -lambda for an integral, rad/s; 0 for none
+
+
+def second_order_gains(poles: Poles) -> tuple[float, float, float]:
+    """Gains of ``(s^2 + 2 zeta omega s + omega^2)(s + lambda)``, the integral's last."""
+    omega, zeta, integral = poles
+    return (
+        2.0 * zeta * omega + integral,
+        omega * omega + 2.0 * zeta * omega * integral,
+        omega * omega * integral,
+    )
+
+
+def third_order_gains(poles: Poles) -> tuple[float, float, float, float]:
+    """Gains of ``(s^2 + 2 zeta omega s + omega^2)(s + omega)(s + lambda)``, the integral's last."""
+    omega, zeta, integral = poles
+    k1, k2, k3 = (1.0 + 2.0 * zeta) * omega, (1.0 + 2.0 * zeta) * omega**2, omega**3
+    return k1 + integral, k2 + k1 * integral, k3 + k2 * integral, k3 * integral
+
+
+def gains_from_poles(
+    attitude: Poles, yaw: Poles, altitude: Poles, position: Poles
+) -> tuple[Gains, IntegralGains]:
+    """Gains by pole placement, under the exact decoupling matrix.
+
+    Attitude (roll and pitch), yaw and altitude are loops of third order, with a real pole at the
+    bandwidth beside the pair; position is of second order. An integral adds a pole of its own.
+    """
+    lean, turn = third_order_gains(attitude)[:3], third_order_gains(yaw)[:3]
+    *climb, climb_integral = third_order_gains(altitude)
+    *move, move_integral = second_order_gains(position)
+    gains = Gains(*lean, *lean, *turn, *climb, *move)
+    return gains, IntegralGains(move_integral, climb_integral)
 
 
 GAIN_SETS: Final = {

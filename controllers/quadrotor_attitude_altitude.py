@@ -7,9 +7,11 @@ roll or pitch of 90 degrees.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import cos, nan, sin
 from typing import Final, NamedTuple
 
+from controllers.gaits.keyframes import NO_KEYFRAMES
 from controllers.references import ReferenceParameters, position_reference
 from controllers.scalar import Quad, scalar
 from controllers.vehicle import Vehicle
@@ -31,7 +33,12 @@ GAIN_SETS: Final = {"ch02": Gains(10.0, 10.0, 10.0, 10.0)}
 
 @scalar
 def attitude_altitude_inputs(
-    time: float, state: State, vehicle: Vehicle, gains: Gains, reference: ReferenceParameters
+    time: float,
+    state: State,
+    vehicle: Vehicle,
+    gains: Gains,
+    reference: ReferenceParameters,
+    table: Sequence[float] = NO_KEYFRAMES,
 ) -> Quad:
     """Thrust (N) and the three torques (N m, body axes) of the law (ch. 2, Eq. A7).
 
@@ -44,7 +51,7 @@ def attitude_altitude_inputs(
     sin_pitch, cos_pitch = sin(pitch), cos(pitch)
     if cos_roll == 0.0 or cos_pitch == 0.0:
         return nan, nan, nan, nan
-    _, _, z_ref, _, _, vz_ref, _, _, _ = position_reference(time, reference)
+    _, _, z_ref, _, _, vz_ref, _, _, _ = position_reference(time, reference, table)
 
     lift = vehicle.gravity + gains.altitude_1 * (vz_ref - vz) + gains.altitude_2 * (z_ref - z)
     thrust = vehicle.mass * lift / (cos_roll * cos_pitch)

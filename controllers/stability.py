@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from controllers.attitude_altitude import Gains
+    from controllers.gains import IntegralGains
     from controllers.vehicle import Vehicle
 
 
@@ -124,3 +125,18 @@ def delay_margin(gains: Sequence[float]) -> float:
     s = 1j * crossing
     phase = np.angle((k1 * s * s + k2 * s + k3) / s**3)
     return float((np.pi + phase) % (2.0 * np.pi)) / crossing
+
+
+def feedforward_loops(gains: Gains, integral: IntegralGains) -> list[Loop]:
+    """The closed loops of the law that knows its gait's rates, with its integrals."""
+    altitude = (gains.altitude_1, gains.altitude_2, gains.altitude_3)
+    position = (gains.position_1, gains.position_2)
+    with_altitude = (*altitude, integral.altitude) if integral.altitude else altitude
+    with_position = (*position, integral.position) if integral.position else position
+    return [
+        linear_loop("roll", (gains.roll_1, gains.roll_2, gains.roll_3)),
+        linear_loop("pitch", (gains.pitch_1, gains.pitch_2, gains.pitch_3)),
+        linear_loop("yaw", (gains.yaw_1, gains.yaw_2, gains.yaw_3)),
+        linear_loop("altitude", with_altitude),
+        linear_loop("position", with_position),
+    ]

@@ -11,11 +11,13 @@ rate go on without a step when the yaw-position law takes over again.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import cos, nan, tan
 from typing import Final, NamedTuple
 
 import controllers.quadrotor_attitude_altitude as attitude_altitude
 import controllers.yaw_position as yaw_position
+from controllers.gaits.keyframes import NO_KEYFRAMES
 from controllers.quadrotor_attitude_altitude import attitude_altitude_inputs
 from controllers.references import position_reference
 from controllers.scalar import scalar
@@ -64,12 +66,18 @@ def in_attitude_zone(roll: float, pitch: float, zone: Zone) -> bool:
 
 
 @scalar
-def flown_thrust_rate(time: float, state: State, thrust: float, parameters: Parameters) -> float:
+def flown_thrust_rate(
+    time: float,
+    state: State,
+    thrust: float,
+    parameters: Parameters,
+    table: Sequence[float] = NO_KEYFRAMES,
+) -> float:
     """Rate (N/s) of the thrust that the attitude-altitude law makes, ``thrust`` in N."""
     vz, roll, pitch = state[5], state[6], state[7]
     vehicle, gains = parameters.yaw_position.vehicle, parameters.attitude_altitude
     _, _, _, _, _, vz_ref, _, _, az_ref = position_reference(
-        time, parameters.yaw_position.reference
+        time, parameters.yaw_position.reference, table
     )
     upright = cos(roll) * cos(pitch)
     if upright == 0.0:
@@ -83,20 +91,22 @@ def flown_thrust_rate(time: float, state: State, thrust: float, parameters: Para
 
 
 @scalar
-def switching_inputs(time: float, state: State, parameters: Parameters) -> Inputs:
+def switching_inputs(
+    time: float, state: State, parameters: Parameters, table: Sequence[float] = NO_KEYFRAMES
+) -> Inputs:
     """Thrust, torques and the rates of the extension's states (`INPUT_FIELDS`), world z up."""
     law = parameters.yaw_position
     if not in_attitude_zone(state[6], state[7], parameters.zone):
-        return yaw_position_inputs(time, state, law)
+        return yaw_position_inputs(time, state, law, table)
     thrust, roll_torque, pitch_torque, yaw_torque = attitude_altitude_inputs(
-        time, state, law.vehicle, parameters.attitude_altitude, law.reference
+        time, state, law.vehicle, parameters.attitude_altitude, law.reference, table
     )
     zeta, xi = state[12], state[13]
     zeta_rate, xi_rate = 0.0, 0.0
     if parameters.extension == RUNNING:
-        _, _, _, _, zeta_rate, xi_rate = yaw_position_inputs(time, state, law)
+        _, _, _, _, zeta_rate, xi_rate = yaw_position_inputs(time, state, law, table)
     elif parameters.extension == BUMPLESS:
-        thrust_rate = flown_thrust_rate(time, state, thrust, parameters)
+        thrust_rate = flown_thrust_rate(time, state, thrust, parameters, table)
         zeta_rate = thrust_rate + parameters.extension_rate * (thrust - zeta)
         xi_rate = parameters.extension_rate * (thrust_rate - xi)
     return thrust, roll_torque, pitch_torque, yaw_torque, zeta_rate, xi_rate

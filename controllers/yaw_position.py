@@ -13,9 +13,11 @@ ch. 2's, z down; `yaw_position_inputs` takes and returns ours.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import cos, nan, sin
 from typing import Final, NamedTuple
 
+from controllers.gaits.keyframes import NO_KEYFRAMES
 from controllers.references import ReferenceParameters, reference_derivatives
 from controllers.rotation import rotation_from_euler
 from controllers.scalar import Quad, Triple, scalar
@@ -189,13 +191,15 @@ def solve_decoupling(z_down: State, vehicle: Vehicle, wanted: Quad) -> Quad:
 
 
 @scalar
-def wanted_derivatives(time: float, z_down: State, parameters: Parameters) -> Quad:
+def wanted_derivatives(
+    time: float, z_down: State, parameters: Parameters, table: Sequence[float] = NO_KEYFRAMES
+) -> Quad:
     """The fourth derivative of the position and the second of yaw to ask for (Eqs. A2-A6)."""
     x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r, _, _ = z_down
     gains = parameters.gains
     k1, k2, k3, k4 = gains.position_1, gains.position_2, gains.position_3, gains.position_4
     ax, ay, az, jx, jy, jz = acceleration_and_jerk(z_down, parameters.vehicle)
-    reference = reference_derivatives(time, parameters.reference)
+    reference = reference_derivatives(time, parameters.reference, table)
     x_ref, y_ref, z_ref = turned_over(reference[0], reference[1], reference[2])
     vx_ref, vy_ref, vz_ref = turned_over(reference[3], reference[4], reference[5])
     ax_ref, ay_ref, az_ref = turned_over(reference[6], reference[7], reference[8])
@@ -212,7 +216,9 @@ def wanted_derivatives(time: float, z_down: State, parameters: Parameters) -> Qu
 
 
 @scalar
-def yaw_position_inputs(time: float, state: State, parameters: Parameters) -> Inputs:
+def yaw_position_inputs(
+    time: float, state: State, parameters: Parameters, table: Sequence[float] = NO_KEYFRAMES
+) -> Inputs:
     """Thrust, torques and the rates of the law's own states (`INPUT_FIELDS`), world z up.
 
     The inputs of ch. 2, Eqs. (1)-(8), with ``u_2`` to ``u_4`` turned from forces at the arms into
@@ -220,7 +226,7 @@ def yaw_position_inputs(time: float, state: State, parameters: Parameters) -> In
     """
     z_down = state_turned_over(state)
     vehicle = parameters.vehicle
-    sx, sy, sz, yaw_acceleration = wanted_derivatives(time, z_down, parameters)
+    sx, sy, sz, yaw_acceleration = wanted_derivatives(time, z_down, parameters, table)
     drift_x, drift_y, drift_z, drift_yaw = drift(z_down, vehicle)
     wanted = (sx - drift_x, sy - drift_y, sz - drift_z, yaw_acceleration - drift_yaw)
     u1, u2, u3, u4 = solve_decoupling(z_down, vehicle, wanted)

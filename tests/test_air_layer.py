@@ -21,7 +21,7 @@ STORM = {
     "wind": [4.0, 1.0, 0.0],
     "turbulence": {"wind_at_6m": 4.0},
     "gust": {"velocity": [3.0, 0.0, 1.0], "start": 0.2, "rise": 0.2},
-    "ground": {"height": -0.15},
+    "ground_effect": {"height": -0.15},
 }
 LATE = {"control_timestep": 0.004, "control_latency": 0.008}
 QUADROTOR = {"vehicle": {"model": "quadrotor"}, "controller": {"law": "yaw_position"}}
@@ -126,20 +126,20 @@ def accelerations(air, height, roll):
     plant.data.qpos[:7] = [0.0, 0.0, height, np.cos(roll / 2.0), np.sin(roll / 2.0), 0.0, 0.0]
     plant.data.act[:4] = [-hover, hover, -hover, hover]
     plant.data.qvel[:] = 0.0
-    with control_callback(plant._engine.continuous()):
+    with control_callback(plant._engine.callback()):
         mujoco.mj_forward(plant.model, plant.data)
     return plant.data.qacc[:6].copy()
 
 
 def test_near_the_ground_the_same_speed_lifts_more():
-    lifted = accelerations({"ground": {"height": -0.15}}, 0.0, 0.0)
+    lifted = accelerations({"ground_effect": {"height": -0.15}}, 0.0, 0.0)
     wanted = 9.8 * (ground_effect(0.15, 0.1) - 1.0)
     np.testing.assert_allclose(lifted, [0.0, 0.0, wanted, 0.0, 0.0, 0.0], atol=1e-9)
 
 
 def test_near_the_ground_the_lower_side_is_lifted_more():
     roll, arm = 0.2, 0.1785  # rolling to the right lifts rotor 2, on the left
-    found = accelerations({"ground": {"height": -0.15}}, 0.0, roll)
+    found = accelerations({"ground_effect": {"height": -0.15}}, 0.0, roll)
     high, low = (ground_effect(0.15 + side * arm * np.sin(roll), 0.1) for side in (1.0, -1.0))
     thrust = 0.429 * 9.8 / 4.0
     assert found[3] == pytest.approx(arm * thrust * (high - low) / 2.24e-3, rel=1e-6)

@@ -33,6 +33,7 @@ def test_a_flight_at_rest_on_its_setpoint_has_these_metrics():
     assert metrics == {
         **{f"final_position_error_{axis}": 0.0 for axis in "xyz"},
         "sup_position_error_after_20s": 0.0,
+        "least_position_error_after_20s": 0.0,
         **{"final_roll": 0.0, "final_pitch": 0.0, "final_yaw": 0.0},
         **{"max_abs_roll": 0.0, "max_abs_pitch": 0.0},
         **{"min_rotor_speed": 360.0, "max_rotor_speed": 360.0, "max_tilt_rate": 0.0},
@@ -49,8 +50,27 @@ def test_all_metrics_are_declared_and_in_this_order():
     metrics = fly().metrics()
     of_the_quadrotor = {"max_published_determinant", "min_published_determinant"}
     of_switching = {"switches", "first_switch_time"}
-    assert set(METRICS) - set(metrics) == of_the_quadrotor | of_switching
+    of_circles = {"max_orbit_radius_after_20s", "min_orbit_radius_after_20s"}
+    of_the_car = {"max_abs_error_x", "max_abs_error_y", "max_lyapunov", "final_input_split"}
+    others = of_the_quadrotor | of_switching | of_circles | of_the_car
+    assert set(METRICS) - set(metrics) == others
     assert list(metrics) == [name for name in METRICS if name in metrics]
+
+
+def test_orbits_are_measured_from_the_centre_of_the_circle():
+    circle = {"type": "circle", "position": [1.0, -2.0, 0.0], "radius": 5.0}
+    scenario = {"reference": circle | {"angular_frequency": 0.1}}
+    # An ellipse about the centre after 20 s; what was before does not count.
+    radius_x, radius_y = np.where(TIMES < 20.0, 99.0, 6.0), np.where(TIMES < 20.0, 0.1, 4.0)
+    turn = 0.5 * pi * TIMES
+    x, y = 1.0 + radius_x * np.cos(turn), -2.0 + radius_y * np.sin(turn)
+    metrics = fly(scenario, x=x, y=y).metrics()
+    assert metrics["max_orbit_radius_after_20s"] == pytest.approx(6.0)
+    assert metrics["min_orbit_radius_after_20s"] == pytest.approx(4.0)
+    x_ref, y_ref = 1.0 + 5.0 * np.cos(0.1 * TIMES), -2.0 + 5.0 * np.sin(0.1 * TIMES)
+    errors = np.hypot(x_ref - x, y_ref - y)[TIMES >= 20.0]
+    assert metrics["least_position_error_after_20s"] == pytest.approx(errors.min())
+    assert metrics["sup_position_error_after_20s"] == pytest.approx(errors.max())
 
 
 def test_metrics_are_plain_numbers_and_truth_values():

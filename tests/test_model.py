@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from math import cos, inf, sin
 
 import mujoco
@@ -443,3 +443,48 @@ def test_models_compiled_alike_are_independent():
 def test_bad_arguments_are_refused_by_name_and_value(build, message):
     with pytest.raises(ValueError, match=message):
         build()
+
+
+# --- models made of compiled ones --------------------------------------------------------------
+
+
+def numbers(model):
+    """Every array of a compiled model by name, options included."""
+    for part in (model, model.opt):
+        for name in dir(part):
+            value = getattr(part, name) if not name.startswith("_") else None
+            if isinstance(value, np.ndarray | float | int):
+                yield name, np.array(value)
+
+
+@pytest.mark.parametrize("kind", ["tiltrotor", "quadrotor"])
+@pytest.mark.parametrize("law_states", [0, 2])
+def test_a_model_made_of_another_is_what_compiling_gives(kind, law_states):
+    import tiltsim.model
+
+    vehicle = PRESETS["ar_drone_2"]
+    other = vehicle._replace(
+        mass=0.47123,
+        inertia_xx=2.31e-3,
+        inertia_yy=2.8e-3,
+        inertia_zz=4.7e-3,
+        thrust_coefficient=8.3e-6,
+        drag_coefficient=2.5e-7,
+        gravity=9.81,
+    )
+    heavy = tiltsim.model.Pod(mass=0.01, inertia=1e-6)
+    compile_this = partial(compile_model, kind, law_states=law_states, userdata_size=3, pod=heavy)
+    tiltsim.model._compiled.clear()
+    compiled = dict(numbers(compile_this(other)))
+    tiltsim.model._compiled.clear()
+    compile_this(vehicle)
+    assert len(tiltsim.model._compiled) == 1
+    made = dict(numbers(compile_this(other)))
+    assert made.keys() == compiled.keys()
+    assert len(made) > 200
+    different = [name for name in made if not np.array_equal(made[name], compiled[name])]
+    assert different == []
+    # The model that others are made of is not for anybody to change.
+    again = compile_this(vehicle)
+    again.body_mass[:] = 1.0
+    np.testing.assert_array_equal(compile_this(other).body_mass, compiled["body_mass"])

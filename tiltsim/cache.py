@@ -24,9 +24,20 @@ def native_code_folder() -> Path:
     return Path(base) / "tiltsim" / digest.hexdigest()[:16]
 
 
-def native_code_is_cached() -> bool:
-    """Whether the native engine would load rather than compile."""
-    return any(native_code_folder().rglob("*.nbc"))
+def native_code_is_cached(name: str) -> bool:
+    """Whether native code of this name would be loaded rather than compiled."""
+    return _mark(name).exists()
+
+
+def native_code_was_compiled(name: str) -> None:
+    """Remember that native code of this name is on disk now, if it can be kept."""
+    if native_code_can_be_kept():
+        _mark(name).touch()
+
+
+def _mark(name: str) -> Path:
+    """An empty file: numba's own files do not tell which law they hold."""
+    return native_code_folder() / f"{name}.compiled"
 
 
 def native_code_can_be_kept() -> bool:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import signal
-from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Literal
@@ -18,7 +17,8 @@ from tiltsim.expectations import Verdict, judge
 from tiltsim.library import library_name, read_toml, scenario_files, shipped_folder
 from tiltsim.loading import load_scenario, variant_names
 from tiltsim.loops import loop_of
-from tiltsim.plants import STEPS_WORTH_COMPILING
+from tiltsim.parallel import in_processes
+from tiltsim.plants import STEPS_WORTH_COMPILING, make_plant
 from tiltsim.scenario import Scenario
 from tiltsim.simulation import simulate
 
@@ -78,7 +78,7 @@ def check_one(
     try:
         scenario = load_scenario(address, overrides)
         if engine is not None and scenario.simulation.engine == "auto":
-            scenario = _with_engine(scenario, engine)
+            scenario = with_engine(scenario, engine)
         flight = simulate(scenario)
     except InputError as error:
         return CheckResult(address, "invalid", str(error))
@@ -104,7 +104,8 @@ def _number(value: float | bool | None) -> str:
     return str(value).lower() if isinstance(value, bool) else f"{value:.6g}"
 
 
-def _with_engine(scenario: Scenario, engine: EngineName) -> Scenario:
+def with_engine(scenario: Scenario, engine: EngineName) -> Scenario:
+    """The scenario with its engine chosen."""
     simulation = scenario.simulation.model_copy(update={"engine": engine})
     return scenario.model_copy(update={"simulation": simulation})
 
@@ -121,7 +122,7 @@ def check_all(
     scenarios down that it was working on, and they are reported as crashed. An interrupt from the
     keyboard ends all processes at once.
     """
-    engine = _shared_engine(addresses, overrides)
+    engine = _engine_for(addresses, overrides)
     if jobs == 1 or len(addresses) == 1:
         results = []
         for address in addresses:
@@ -129,28 +130,11 @@ def check_all(
             report(results[-1])
         return results
     by_address: dict[str, CheckResult] = {}
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(
-        min(jobs, len(addresses)), mp_context=context, initializer=_leave_interrupts_to_the_parent
-    ) as pool:
-        futures = {
-            pool.submit(check_one, address, overrides, engine): address for address in addresses
-        }
-        try:
-            for future in as_completed(futures):
-                address = futures[future]
-                by_address[address] = _result(address, future)
-                report(by_address[address])
-        except KeyboardInterrupt:
-            for process in multiprocessing.active_children():
-                process.terminate()
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    work = partial(check_one, overrides=overrides, engine=engine)
+    for address, future in in_processes(work, addresses, jobs):
+        by_address[address] = _result(address, future)
+        report(by_address[address])
     return [by_address[address] for address in addresses]
-
-
-def _leave_interrupts_to_the_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _result(address: str, future: Future[CheckResult]) -> CheckResult:
@@ -160,20 +144,32 @@ def _result(address: str, future: Future[CheckResult]) -> CheckResult:
     return future.result()
 
 
-def _shared_engine(addresses: list[str], overrides: Mapping[str, Any]) -> EngineName | None:
-    """The native engine, compiled for all to load, where the flights together repay that."""
+def _engine_for(addresses: list[str], overrides: Mapping[str, Any]) -> EngineName | None:
     scenarios = []
     for address in addresses:
         try:
             scenarios.append(load_scenario(address, overrides))
         except InputError:
             continue  # it is reported when its turn comes
-    if sum(scenario.simulation.steps for scenario in scenarios) < STEPS_WORTH_COMPILING:
-        return None
-    from tiltsim.native import compile_callbacks
+    return shared_engine(scenarios)
 
-    for loop in {loop_of(scenario) for scenario in scenarios}:
-        compile_callbacks(loop)
+
+def shared_engine(scenarios: Sequence[Scenario], steps: int | None = None) -> EngineName | None:
+    """The native engine where the flights together repay compiling it, None elsewhere.
+
+    What the scenarios need is compiled here once, for all processes to load. Where they are but
+    examples of the flights to come, ``steps`` is the physics steps of all flights.
+    """
+    if steps is None:
+        steps = sum(scenario.simulation.steps for scenario in scenarios)
+    if steps < STEPS_WORTH_COMPILING:
+        return None
+    ready: set[tuple[object, str]] = set()
+    for scenario in scenarios:
+        kind = (loop_of(scenario), scenario.simulation.plant)
+        if kind not in ready:
+            make_plant(with_engine(scenario, "native")).advance(1)
+            ready.add(kind)
     return "native"
 
 

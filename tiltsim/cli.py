@@ -11,8 +11,8 @@ from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT
 
 COMMANDS: Final = (
-    *("run", "check", "list", "view", "plot", "video"),
-    *("gait", "map", "singularity", "bench", "schema"),
+    *("run", "check", "sweep", "list", "view", "plot", "video"),
+    *("gait", "map", "singularity", "report", "bench", "schema"),
 )
 
 

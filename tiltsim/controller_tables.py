@@ -10,14 +10,25 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 import controllers.full_pose as full_pose
 import controllers.quadrotor_attitude_altitude as quadrotor_attitude_altitude
+import controllers.tilt_car.fourth_derivative as fourth_derivative
+import controllers.tilt_car.planned_direction as planned_direction
+import controllers.tilt_car.third_derivative as third_derivative
 import controllers.yaw_position as yaw_position
 from controllers.attitude_altitude import DECOUPLINGS, Gains
-from controllers.gains import GAIN_SETS, gains_from_rows
-from controllers.stability import Loop, closed_loops, linear_loop
+from controllers.gains import (
+    GAIN_SETS,
+    IntegralGains,
+    Poles,
+    gains_from_poles,
+    gains_from_rows,
+)
+from controllers.gait_feedforward import Ingredients
+from controllers.stability import Loop, closed_loops, feedforward_loops, linear_loop
+from controllers.supervisor import Supervisor
 from controllers.switching import PUBLISHED_ZONE
 from controllers.vehicle import Vehicle
 from tiltsim.messages import InvalidValueError
-from tiltsim.tables import Gains2, NonNegative, Positive, Table, Vector3
+from tiltsim.tables import Gains2, Gains4, NonNegative, Positive, Table, Vector3
 
 DEFAULT_LAW: Final = "attitude_altitude"
 
@@ -30,11 +41,12 @@ class LawTable(Table, ABC):
 
     vehicle_model: ClassVar[str]
     reference_kinds: ClassVar[tuple[ReferenceKind, ...]]
+    gait_types: ClassVar[tuple[str, ...]] = ("fixed",)  # of laws around the tilt-car
 
     allow_unstable: bool = Field(False, description="fly gains that fail the Routh condition")
 
     @abstractmethod
-    def closed_loops(self, vehicle: Vehicle) -> list[Loop]:
+    def closed_loops(self, vehicle: Any) -> list[Loop]:
         """The linear closed loops that the gains make."""
 
     @property
@@ -42,9 +54,21 @@ class LawTable(Table, ABC):
         """Under what the closed loops are linear, in words."""
         return "the exact decoupling matrix"
 
+    @property
+    def loop_name(self) -> str:
+        """The name of the loop that flies the law, in `tiltsim.loops.LOOPS`."""
+        return str(getattr(self, "law"))  # noqa: B009
+
 
 def _gain_kind(value: object) -> str:
     return "named" if isinstance(value, str) else "table"
+
+
+def _attitude_altitude_gain_kind(value: object) -> str:
+    if isinstance(value, PolePlacementTable):
+        return "poles"
+    loops = value.values() if isinstance(value, dict) else ()
+    return "poles" if any(isinstance(loop, dict) for loop in loops) else _gain_kind(value)
 
 
 # --- tiltrotor ---------------------------------------------------------------------------------
@@ -60,6 +84,63 @@ class GainTable(Table):
     position: Gains2 = Field((1.0, 1.0), description="K_X1, K_X2")
 
 
+class PoleTable(Table):
+    """The poles of one closed loop: a pair, and at its bandwidth a real one where third order."""
+
+    bandwidth: Positive = Field(description="natural frequency, rad/s")
+    damping: Positive = Field(1.0, description="damping ratio of the pair")
+
+    @property
+    def poles(self) -> Poles:
+        """The poles as the design takes them."""
+        return Poles(self.bandwidth, self.damping, getattr(self, "integral", 0.0))
+
+
+class IntegralPoleTable(PoleTable):
+    """The poles of a loop that may have an integral."""
+
+    integral: NonNegative = Field(
+        0.0, description="pole of integral action, rad/s; 0: none. Needs gait_rate_feedforward"
+    )
+
+
+class PolePlacementTable(Table):
+    """Gains by pole placement; see `controllers.gains.gains_from_poles`."""
+
+    attitude: PoleTable = Field(description="roll and pitch")
+    yaw: PoleTable | None = Field(None, description="default: as attitude")
+    altitude: IntegralPoleTable
+    position: IntegralPoleTable = IntegralPoleTable(bandwidth=1.0, damping=0.5)
+
+    def resolve(self) -> tuple[Gains, IntegralGains]:
+        """The numbers of the law."""
+        yaw = self.yaw or self.attitude
+        return gains_from_poles(
+            self.attitude.poles, yaw.poles, self.altitude.poles, self.position.poles
+        )
+
+
+Ingredient = Literal[
+    "gait_rates",
+    "attitude_rates",
+    "reference_derivatives",
+    "euler_rates",
+    "gyroscopic_torque",
+    "integral_action",
+]
+
+
+class SupervisorTable(Table):
+    """Keeps a gait away from singular matrices; see `controllers.supervisor`."""
+
+    min_margin: Annotated[float, Field(ge=0.0, lt=pi / 2)] = Field(
+        0.2, description="singularity margin to keep, rad; 0: none"
+    )
+    min_determinant: Annotated[float, Field(ge=0.0, lt=4.0)] = Field(
+        0.5, description="determinant to keep, 4 for a level untilted vehicle; 0: none"
+    )
+
+
 class AttitudeAltitudeController(LawTable):
     """Attitude-altitude control of the tiltrotor, the gait planned (ch. 3 to 9)."""
 
@@ -71,26 +152,102 @@ class AttitudeAltitudeController(LawTable):
     decoupler: Literal["none", "conventional", "modified", "exact"] = "modified"
     gains: Annotated[
         Annotated[Literal["ch03", "ch04", "exact"], Tag("named")]
-        | Annotated[GainTable, Tag("table")],
-        Discriminator(_gain_kind),
+        | Annotated[GainTable, Tag("table")]
+        | Annotated[PolePlacementTable, Tag("poles")],
+        Discriminator(_attitude_altitude_gain_kind),
     ] = "ch04"
-    gait_rate_feedforward: Literal[False] = False
     allocation: Literal["inversion", "prioritized"] = Field(
         "inversion", description="within rotor limits: each for itself, or attitude first"
     )
     allocation_horizon: Positive = Field(
         0.02, description="s for which prioritized allocation keeps within the limits"
     )
+    supervisor: SupervisorTable | None = Field(
+        None, description="scales the gait down before its decoupling matrix becomes singular"
+    )
+    gait_rate_feedforward: bool = Field(
+        False, description="count the gait's rates in: the exact law with integral action"
+    )
+    max_acceleration: Positive = Field(
+        3.0,
+        description="m/s^2, horizontal, of the position feedback; integrators stop there; needs "
+        "gait_rate_feedforward",
+    )
+    max_angular_acceleration: Positive = Field(
+        60.0,
+        description="rad/s^2, each axis, asked of the body; needs gait_rate_feedforward",
+    )
+    anticipation: NonNegative = Field(
+        0.12,
+        description="s before and after a corner of the gait in which the body turns, at most half "
+        "of the gait's shortest line; needs gait_rate_feedforward",
+    )
+    leave_out: Annotated[tuple[Ingredient, ...], Field(strict=False)] = Field(
+        (), description="ingredients of gait_rate_feedforward to fly without, for comparison"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if not self.gait_rate_feedforward:
+            for key in (
+                *("leave_out", "anticipation", "max_acceleration", "max_angular_acceleration"),
+            ):
+                if getattr(self, key) != type(self).model_fields[key].default:
+                    raise InvalidValueError(
+                        f"controller.{key}",
+                        getattr(self, key),
+                        "needs controller.gait_rate_feedforward = true",
+                    )
+            if any(self.resolve_integral_gains()):
+                raise InvalidValueError(
+                    "controller.gains",
+                    self.model_dump()["gains"],
+                    "an integral needs controller.gait_rate_feedforward = true",
+                )
+            return self
+        for key, choices in (("decoupling", ("exact",)), ("decoupler", ("exact", "none"))):
+            if getattr(self, key) not in choices:
+                raise InvalidValueError(
+                    f"controller.{key}",
+                    getattr(self, key),
+                    f"gait_rate_feedforward = true needs {' or '.join(choices)}",
+                )
+        return self
 
     def resolve_gains(self) -> Gains:
-        """The numbers behind a named set or a table."""
+        """The numbers behind a named set, a table or poles."""
         if isinstance(self.gains, GainTable):
             return gains_from_rows(self.gains.attitude, self.gains.altitude, self.gains.position)
+        if isinstance(self.gains, PolePlacementTable):
+            return self.gains.resolve()[0]
         return GAIN_SETS[self.gains]
+
+    def resolve_integral_gains(self) -> IntegralGains:
+        """The gains on the integrals, zero unless poles ask for them."""
+        if isinstance(self.gains, PolePlacementTable):
+            return self.gains.resolve()[1]
+        return IntegralGains()
+
+    def resolve_supervisor(self) -> Supervisor:
+        """The supervisor's thresholds, zero without one."""
+        table = self.supervisor
+        return Supervisor(table.min_margin, table.min_determinant) if table else Supervisor()
+
+    def resolve_ingredients(self, *, gyroscopic_torque: bool) -> Ingredients:
+        """What the law counts in, on a plant with or without gyroscopic torque."""
+        ingredients = Ingredients(gyroscopic_torque=float(gyroscopic_torque))
+        return ingredients._replace(**dict.fromkeys(self.leave_out, 0.0))
 
     def closed_loops(self, vehicle: Vehicle) -> list[Loop]:
         """See `LawTable.closed_loops`."""
+        if self.gait_rate_feedforward:
+            return feedforward_loops(self.resolve_gains(), self.resolve_integral_gains())
         return closed_loops(self.resolve_gains(), vehicle, DECOUPLINGS[self.decoupling])
+
+    @property
+    def loop_name(self) -> str:
+        """See `LawTable.loop_name`."""
+        return "gait_feedforward" if self.gait_rate_feedforward else self.law
 
     @property
     def linearization(self) -> str:
@@ -300,6 +457,99 @@ def _attitude_loops(gains: quadrotor_attitude_altitude.Gains) -> list[Loop]:
     return [linear_loop("altitude", gains[:2]), linear_loop("attitude", gains[2:])]
 
 
+# --- tilt-car ----------------------------------------------------------------------------------
+
+
+class ThirdDerivativeController(LawTable):
+    """Third-derivative feedback linearization of the tilt-car (ch. 10, Sec. 3.1)."""
+
+    vehicle_model = "tilt_car"
+    reference_kinds = ("position",)
+
+    law: Literal["tilt_car_third_derivative"]
+    gains: Annotated[
+        Annotated[Literal["ch10"], Tag("named")] | Annotated[Vector3, Tag("table")],
+        Discriminator(_gain_kind),
+    ] = Field("ch10", description="a set by name, or gains on acceleration, velocity and position")
+    restoring_rate: NonNegative = Field(
+        0.0, description="1/s, of turning the thrusts' middle to the acceleration; 0 as published"
+    )
+
+    def resolve_gains(self) -> third_derivative.Gains:
+        """The numbers behind a named set or a list."""
+        if isinstance(self.gains, str):
+            return third_derivative.GAIN_SETS[self.gains]
+        return third_derivative.Gains(*self.gains)
+
+    def closed_loops(self, vehicle: Any) -> list[Loop]:
+        """See `LawTable.closed_loops`."""
+        return [linear_loop("position", self.resolve_gains())]
+
+
+class FourthDerivativeController(LawTable):
+    """Fourth-derivative feedback linearization of the tilt-car (ch. 10, Sec. 6.1)."""
+
+    vehicle_model = "tilt_car"
+    reference_kinds = ("position",)
+
+    law: Literal["tilt_car_fourth_derivative"]
+    decoupling: Literal["published", "exact"] = Field(
+        "exact", description="the tilt's column as printed, or with the yaw's answer"
+    )
+    anti_windup: bool = Field(
+        False, description="whether the rotor speeds that the law integrates stop at zero"
+    )
+    gains: Annotated[
+        Annotated[Literal["ch10"], Tag("named")] | Annotated[Gains4, Tag("table")],
+        Discriminator(_gain_kind),
+    ] = Field(
+        "ch10", description="a set by name, or gains on jerk, acceleration, velocity and position"
+    )
+
+    def resolve_gains(self) -> fourth_derivative.Gains:
+        """The numbers behind a named set or a list."""
+        if isinstance(self.gains, str):
+            return fourth_derivative.GAIN_SETS[self.gains]
+        return fourth_derivative.Gains(*self.gains)
+
+    def closed_loops(self, vehicle: Any) -> list[Loop]:
+        """See `LawTable.closed_loops`."""
+        return [linear_loop("position", self.resolve_gains())]
+
+
+class PlannedDirectionGainTable(Table):
+    """Gains of the planned-direction law written out."""
+
+    x: Gains2 = Field(description="K_X1, K_X2, on velocity and position")
+    y: Gains2 = Field(description="K_Y1, K_Y2, on velocity and position")
+
+
+class PlannedDirectionController(LawTable):
+    """Control of the tilt-car with its thrusts' direction planned (ch. 10, Sec. 5; ch. 11)."""
+
+    vehicle_model = "tilt_car"
+    reference_kinds = ("position",)
+    gait_types = ("penguin_small", "penguin_large", "rotating")
+
+    law: Literal["tilt_car_planned_direction"]
+    gains: Annotated[
+        Annotated[Literal["ch10", "ch11"], Tag("named")]
+        | Annotated[PlannedDirectionGainTable, Tag("table")],
+        Discriminator(_gain_kind),
+    ] = "ch11"
+
+    def resolve_gains(self) -> planned_direction.Gains:
+        """The numbers behind a named set or a table."""
+        if isinstance(self.gains, PlannedDirectionGainTable):
+            return planned_direction.Gains(*self.gains.x, *self.gains.y)
+        return planned_direction.GAIN_SETS[self.gains]
+
+    def closed_loops(self, vehicle: Any) -> list[Loop]:
+        """See `LawTable.closed_loops`."""
+        gains = self.resolve_gains()
+        return [linear_loop("x", gains[:2]), linear_loop("y", gains[2:])]
+
+
 # --- the table, told apart by its law ----------------------------------------------------------
 
 
@@ -315,7 +565,10 @@ Controller = Annotated[
     | Annotated[FullPoseController, Tag("full_pose")]
     | Annotated[YawPositionController, Tag("yaw_position")]
     | Annotated[SwitchingController, Tag("switching")]
-    | Annotated[QuadrotorAttitudeAltitudeController, Tag("quadrotor_attitude_altitude")],
+    | Annotated[QuadrotorAttitudeAltitudeController, Tag("quadrotor_attitude_altitude")]
+    | Annotated[ThirdDerivativeController, Tag("tilt_car_third_derivative")]
+    | Annotated[FourthDerivativeController, Tag("tilt_car_fourth_derivative")]
+    | Annotated[PlannedDirectionController, Tag("tilt_car_planned_direction")],
     Discriminator(_law),
 ]
 """The ``[controller]`` table, told apart by its law."""

@@ -17,7 +17,7 @@ from typing import Any, Literal, Protocol
 import mujoco
 
 from controllers.records import slotted, unflatten
-from tiltsim.loop import Loop, Sizes
+from tiltsim.loop import CONTROL_PERIOD, EVALUATIONS, HEADER_SIZE, Loop, Sizes
 
 EngineName = Literal["python", "native"]
 
@@ -25,18 +25,16 @@ Callback = Callable[[mujoco.MjModel, mujoco.MjData], None]
 
 
 class Engine(Protocol):
-    """Evaluates the control step of one model, at every integrator stage or when asked."""
+    """Evaluates the control step of one model whenever MuJoCo asks for controls."""
 
     name: EngineName
 
-    def continuous(self) -> Any:
-        """The callback that evaluates the whole step at every call."""
+    def callback(self) -> Any:
+        """What MuJoCo calls: the whole step, or between the samples of a held law the rest of it.
 
-    def held(self) -> Any:
-        """The callback that only lets the thrust follow the rotor speeds, other controls held."""
-
-    def sample(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        """Evaluate the whole step once, into ``data.ctrl``."""
+        Under a held law the controls stay as sampled but for what follows the state by itself, as
+        thrust follows the rotor speed.
+        """
 
 
 class PythonEngine:
@@ -48,11 +46,12 @@ class PythonEngine:
         check_model(loop, model, data)
         controls, refresh = loop.controls, loop.refresh
         # Parameters never change during a flight: read once what native code reads at every call.
-        values = data.userdata.tolist()
+        values = data.userdata[HEADER_SIZE:].tolist()
         parameters = slotted(unflatten(loop.parameters, values))
         table = tuple(values[loop.record_size :])
         # Views of MuJoCo's own memory; looking them up anew would cost a tenth of the callback.
         qpos, qvel, act, ctrl = data.qpos, data.qvel, data.act, data.ctrl
+        header = data.userdata[:HEADER_SIZE]
         write_controls = Struct(f"{len(ctrl)}d").pack_into
 
         def sample(_model: mujoco.MjModel, called: mujoco.MjData) -> None:
@@ -66,38 +65,37 @@ class PythonEngine:
                 # Where floats raise (sin of infinity), native code has NaN; MuJoCo reports both.
                 ctrl[:] = nan
 
-        def hold(_model: mujoco.MjModel, called: mujoco.MjData) -> None:
-            if called is data:
-                write_controls(ctrl, 0, *refresh(ctrl.tolist(), act.tolist()))
-
-        def hold_with_state(_model: mujoco.MjModel, called: mujoco.MjData) -> None:
-            if called is not data or loop.hold is None:
-                return
+        def between_samples() -> tuple[float, ...]:
+            if loop.hold is None:
+                return refresh(ctrl.tolist(), act.tolist())
             try:
                 state = data.time, qpos.tolist(), qvel.tolist(), act.tolist()
-                write_controls(ctrl, 0, *loop.hold(*state, ctrl.tolist(), parameters))
+                return loop.hold(*state, ctrl.tolist(), parameters)
             except (ArithmeticError, ValueError):
-                ctrl[:] = nan
+                return (nan,) * len(ctrl)
 
-        self._sample, self._hold = sample, hold if loop.hold is None else hold_with_state
+        def hold(model: mujoco.MjModel, called: mujoco.MjData) -> None:
+            if called is not data:
+                return
+            period, evaluations, _ = header.tolist()
+            if evaluations == 0.0:
+                sample(model, called)
+            else:
+                write_controls(ctrl, 0, *between_samples())
+            header[EVALUATIONS] = evaluations + 1.0 if evaluations + 1.0 < period else 0.0
 
-    def continuous(self) -> Callback:
-        """See `Engine.continuous`."""
-        return self._sample
+        self._callback = hold if header[CONTROL_PERIOD] > 0.0 else sample
 
-    def held(self) -> Callback:
-        """See `Engine.held`."""
-        return self._hold
-
-    def sample(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        """See `Engine.sample`."""
-        self._sample(model, data)
+    def callback(self) -> Callback:
+        """See `Engine.callback`."""
+        return self._callback
 
 
 def check_model(loop: Loop, model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Raise ValueError unless model and data are those of a flight of this loop."""
     sizes = Sizes(model.nq, model.nv, model.na, model.nu)
-    signed = model.nuserdata >= loop.record_size and data.userdata[0] == loop.signature
+    head = HEADER_SIZE + loop.record_size
+    signed = model.nuserdata >= head and data.userdata[HEADER_SIZE] == loop.signature
     if sizes != loop.sizes or not signed:
         raise ValueError(
             f"not a flight of the {loop.model}: {sizes}, expected {loop.sizes} with the "

@@ -10,7 +10,7 @@ import numpy as np
 
 from controllers.vehicle import SPIN
 from tiltsim.attitude_plane import MARGIN_THRESHOLD
-from tiltsim.loops import law_in_words
+from tiltsim.loops import law_in_words, loop_of
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -50,8 +50,9 @@ class EventWatch:
     def opening(self) -> Event:
         """What is flown."""
         scenario = self._scenario
+        gait = f"gait {scenario.gait.type}, " if loop_of(scenario).flies_gait else ""
         text = (
-            f"{scenario.title or scenario.address or 'flight'}: gait {scenario.gait.type}, "
+            f"{scenario.title or scenario.address or 'flight'}: {gait}"
             f"{', '.join(law_in_words(scenario))}, "
             f"{scenario.simulation.plant} plant"
         )
@@ -60,25 +61,39 @@ class EventWatch:
     def observe(self, piece: Flight) -> list[Event]:
         """The events within a piece of the flight that follows on from the last."""
         events = [event for found in self._conditions(piece) for event in self._onsets(*found)]
-        margin = np.abs(piece["singularity_margin"])
-        lowest = int(np.argmin(margin))
-        self._lowest = min(self._lowest, (float(margin[lowest]), float(piece["time"][lowest])))
+        if "singularity_margin" in piece.columns:
+            margin = np.abs(piece["singularity_margin"])
+            lowest = int(np.argmin(margin))
+            self._lowest = min(self._lowest, (float(margin[lowest]), float(piece["time"][lowest])))
         return sorted(events, key=lambda event: event.time)
 
     def closing(self, end: End) -> list[Event]:
         """How close it came to a singularity, and how it ended."""
         margin, time = self._lowest
-        closest = Event(
-            end.time, "INFO", f"closest to singular: margin {margin:.3f} rad at t = {time:.2f} s"
-        )
         level: Level = "INFO" if end.kind == "completed" else "ERROR"
         cause = f": {end.cause}" if end.cause else ""
-        return [closest, Event(end.time, level, f"flight {end.kind}{cause}")]
+        ending = Event(end.time, level, f"flight {end.kind}{cause}")
+        if margin == float("inf"):
+            return [ending]
+        text = f"closest to singular: margin {margin:.3f} rad at t = {time:.2f} s"
+        return [Event(end.time, "INFO", text), ending]
 
     def _conditions(
         self, piece: Flight
     ) -> Iterator[tuple[str, npt.NDArray[np.float64], npt.NDArray[np.bool_]]]:
         """Conditions to report: in words, the samples' times, and where they hold."""
+        of_kind = {"rotorcraft": self._rotorcraft, "tilt_car": self._tilt_car}
+        return of_kind[loop_of(self._scenario).kind.name](piece)
+
+    def _tilt_car(
+        self, piece: Flight
+    ) -> Iterator[tuple[str, npt.NDArray[np.float64], npt.NDArray[np.bool_]]]:
+        for rotor in (1, 2):
+            yield f"rotor {rotor} saturated at zero", piece["time"], piece[f"thrust_{rotor}"] <= 0.0
+
+    def _rotorcraft(
+        self, piece: Flight
+    ) -> Iterator[tuple[str, npt.NDArray[np.float64], npt.NDArray[np.bool_]]]:
         time = piece["time"]
         near = np.abs(piece["singularity_margin"]) < MARGIN_THRESHOLD
         yield f"singularity margin below {MARGIN_THRESHOLD:g} rad", time, near
@@ -86,7 +101,7 @@ class EventWatch:
             inside = piece["attitude_zone"] > 0.5
             yield "switched to attitude and altitude", time, inside
             yield "switched to yaw and position", time, ~inside
-        vehicle = self._scenario.vehicle
+        vehicle = self._scenario.rotorcraft
         for rotor, spin in enumerate(SPIN, start=1):
             speed = spin * piece[f"rotor_speed_{rotor}"]
             yield f"rotor {rotor} has reversed", time, speed <= 0.0

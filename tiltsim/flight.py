@@ -13,10 +13,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 
-import numpy as np
-
-from controllers.vehicle import SPIN
-from tiltsim.loop import OBSERVED_FIELDS, Floats
+from tiltsim.kinds import Floats
+from tiltsim.kinds.rotorcraft import COLUMN_UNITS as COLUMN_UNITS
+from tiltsim.kinds.rotorcraft import OBSERVED_FIELDS
 from tiltsim.loops import control_setup, loop_of
 
 if TYPE_CHECKING:
@@ -26,27 +25,7 @@ if TYPE_CHECKING:
     from tiltsim.scenario import Scenario
 
 SAMPLE_FIELDS: Final = ("time", *OBSERVED_FIELDS)
-"""What a recorded sample of any vehicle begins with; a law's own states follow."""
-
-_FOUR: Final = (1, 2, 3, 4)
-COLUMN_UNITS: Final = {
-    "time": "s",
-    **dict.fromkeys(("x", "y", "z"), "m"),
-    **dict.fromkeys(("vx", "vy", "vz"), "m/s"),
-    **dict.fromkeys(("roll", "pitch", "yaw"), "rad"),
-    **dict.fromkeys(("p", "q", "r"), "rad/s"),
-    **{f"alpha_{i}": "rad" for i in _FOUR},
-    **{f"alpha_ref_{i}": "rad" for i in _FOUR},
-    **{f"alpha_rate_{i}": "rad/s" for i in _FOUR},
-    **{f"rotor_speed_{i}": "rad/s" for i in _FOUR},
-    **{f"thrust_{i}": "N" for i in _FOUR},
-    **dict.fromkeys(("x_ref", "y_ref", "z_ref"), "m"),
-    **dict.fromkeys(("roll_ref", "pitch_ref", "yaw_ref"), "rad"),
-    "singularity_margin": "rad",
-    "determinant": "1",
-}
-"""Columns of every flight and their units, in the order of the file; those of a law follow."""
-
+"""What a recorded sample of any rotorcraft begins with; a law's own states follow."""
 
 EndKind = Literal["completed", "diverged", "singular", "interrupted"]
 
@@ -84,7 +63,7 @@ class Flight:
     @cached_property
     def units(self) -> dict[str, str]:
         """The columns of this flight and their units, in order."""
-        return COLUMN_UNITS | dict(loop_of(self.scenario).extra_columns)
+        return loop_of(self.scenario).units
 
     @cached_property
     def columns(self) -> dict[str, Floats]:
@@ -92,11 +71,7 @@ class Flight:
         loop = loop_of(self.scenario)
         known = dict(zip(loop.sample_fields, self.samples.T, strict=True))
         known |= loop.derive(known, control_setup(self.scenario))
-        thrust_coefficient = self.scenario.vehicle.resolve().thrust_coefficient
-        for i, sign in zip(_FOUR, SPIN, strict=True):
-            speed = known[f"rotor_speed_{i}"]
-            thrust = thrust_coefficient * sign * speed * np.abs(speed)
-            known[f"thrust_{i}"] = thrust * known.get(f"thrust_factor_{i}", 1.0)  # of a fault
+        known |= loop.kind.thrusts(known, self.scenario)
         return {name: known[name] for name in self.units}
 
     @cached_property

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Annotated, Literal, Self
+from math import pi
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
 from controllers.gaits import plans
 from controllers.gaits.plans import Gait as PlannedGait
+from controllers.tilt_car.vehicle import TiltCar, turn_share
 from controllers.two_color_planner import Circle, Leg, Path, Polyline, four_angle_gait, rectangle
 from controllers.vehicle import Vehicle
 from tiltsim.messages import InvalidValueError
@@ -23,12 +25,12 @@ class GaitTable(Table, ABC):
     )
     bias: Factor = Field(1.0, description="eta, multiplies alpha_3 and alpha_4 (ch. 6)")
 
-    def plan(self, vehicle: Vehicle) -> PlannedGait:
+    def plan(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         """The gait, ready to be flown. Raises ValueError where the numbers make none."""
         return self.unscaled(vehicle).scaled(1.0 / self.scale).biased(self.bias)
 
     @abstractmethod
-    def unscaled(self, vehicle: Vehicle) -> PlannedGait:
+    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         """The gait before scale and bias."""
 
     @property
@@ -43,7 +45,7 @@ class FixedGait(GaitTable):
     type: Literal["fixed"] = "fixed"
     angles: Angles4 = Field((0.0, 0.0, 0.0, 0.0), description="alpha_1..4, rad")
 
-    def unscaled(self, vehicle: Vehicle) -> PlannedGait:
+    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         """See `GaitTable.unscaled`."""
         return plans.fixed(self.angles)
 
@@ -60,7 +62,7 @@ class TrotGait(GaitTable):
     amplitude: Angle = Field(description="rho, rad")
     period: Period = Field(description="T, s")
 
-    def unscaled(self, vehicle: Vehicle) -> PlannedGait:
+    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         """See `GaitTable.unscaled`."""
         trot = plans.instant_trot if self.type == "trot_instant" else plans.continuous_trot
         return trot(self.amplitude, self.period)
@@ -78,7 +80,7 @@ class CatGait(GaitTable):
     amplitude: Angle = Field(description="rad")
     period: Period = Field(description="T, s")
 
-    def unscaled(self, vehicle: Vehicle) -> PlannedGait:
+    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         """See `GaitTable.unscaled`."""
         return plans.cat(self.type, self.amplitude, self.period)
 
@@ -100,7 +102,7 @@ class WaypointGait(GaitTable):
         None, description="share of the period of each waypoint, from 0; default: evenly spread"
     )
 
-    def unscaled(self, vehicle: Vehicle) -> PlannedGait:
+    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         """See `GaitTable.unscaled`."""
         return plans.waypoints(self.angles, self.period, self.phases)
 
@@ -155,8 +157,10 @@ class TwoColorGait(GaitTable):
             return Circle(self.color, self.centre, self.radius)
         return Polyline(tuple(Leg(leg.color, leg.vertices) for leg in self.path))
 
-    def unscaled(self, vehicle: Vehicle) -> PlannedGait:
+    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         """See `GaitTable.unscaled`."""
+        if not isinstance(vehicle, Vehicle):
+            raise ValueError("a gait of four tilt angles; the tilt_car has one")
         return four_angle_gait(self.curve, self.period, vehicle)
 
     @property
@@ -167,7 +171,66 @@ class TwoColorGait(GaitTable):
         return ("radius", self.radius) if self.radius is not None else ("path", len(self.path))
 
 
+class TiltCarGait(GaitTable):
+    """What the tilt-car's gaits share: they plan the direction of the thrusts."""
+
+    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+        """See `GaitTable.unscaled`."""
+        if not isinstance(vehicle, TiltCar):
+            raise ValueError("a gait of the tilt_car's; this vehicle has four tilt angles")
+        # The bottom disc turns back, so that the tilt must go further than the thrusts.
+        return self.tilt(1.0 / turn_share(vehicle))
+
+    @abstractmethod
+    def tilt(self, per_direction: float) -> PlannedGait:
+        """The gait of the tilt angle, given how far it turns for a thrust direction of 1 rad."""
+
+
+PENGUIN_SWINGS: Final = {"penguin_small": pi / 8, "penguin_large": pi / 3}
+"""Directions of the thrusts (rad) between which the penguins swing (ch. 11, Figs. 7 and 8)."""
+
+
+class PenguinGait(TiltCarGait):
+    """The penguin-inspired swings of ch. 11: to one side for half a period, then to the other."""
+
+    type: Literal["penguin_small", "penguin_large"]
+    amplitude: Angle | None = Field(
+        None, description="of the thrusts' direction, rad; default: pi/8 (small), pi/3 (large)"
+    )
+    period: Period = Field(2.0, description="T, s")
+
+    def tilt(self, per_direction: float) -> PlannedGait:
+        """See `TiltCarGait.tilt`."""
+        swing = PENGUIN_SWINGS[self.type] if self.amplitude is None else self.amplitude
+        return plans.penguin(self.type, swing * per_direction, self.period)
+
+    @property
+    def size(self) -> tuple[str, object]:
+        """See `GaitTable.size`."""
+        return "amplitude", self.amplitude
+
+
+class RotatingGait(TiltCarGait):
+    """Thrusts that turn at a constant rate (ch. 10, Eq. 18)."""
+
+    type: Literal["rotating"]
+    rate: Annotated[float, Field(ge=-1e3, le=1e3)] = Field(
+        description="of the thrusts' direction, rad/s"
+    )
+    start: Angle = Field(0.0, description="direction at time zero, rad")
+
+    def tilt(self, per_direction: float) -> PlannedGait:
+        """See `TiltCarGait.tilt`."""
+        return plans.rotating(self.start * per_direction, self.rate * per_direction)
+
+    @property
+    def size(self) -> tuple[str, object]:
+        """See `GaitTable.size`."""
+        return "rate", self.rate
+
+
 Gait = Annotated[
-    FixedGait | TrotGait | CatGait | WaypointGait | TwoColorGait, Field(discriminator="type")
+    FixedGait | TrotGait | CatGait | WaypointGait | TwoColorGait | PenguinGait | RotatingGait,
+    Field(discriminator="type"),
 ]
 """The ``[gait]`` table, told apart by its type."""

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 from tiltsim.errors import InputError
+
+_SWEEP: Final = re.compile(r"^\s*\[\[?\s*(axis|bisect)\s*\]", re.MULTILINE)
+"""The tables that tell a sweep from a scenario."""
 
 
 def shipped_folder(name: str) -> Path:
@@ -50,8 +54,18 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def scenario_files(path: Path) -> list[Path]:
-    """All scenario files under a folder, sorted; a file stands for itself."""
-    return sorted(path.rglob("*.toml")) if path.is_dir() else [path]
+    """All scenario files under a folder, sorted, sweeps left out; a file stands for itself."""
+    if not path.is_dir():
+        return [path]
+    return sorted(file for file in path.rglob("*.toml") if not is_sweep(file))
+
+
+def is_sweep(file: Path) -> bool:
+    """Whether a TOML file defines a sweep: it has ``[[axis]]`` or ``[bisect]`` tables."""
+    try:
+        return _SWEEP.search(file.read_text(encoding="utf-8-sig")) is not None
+    except (OSError, UnicodeDecodeError):
+        return False  # whoever reads it will say what is wrong
 
 
 def library_name(path: Path) -> str:
@@ -63,13 +77,74 @@ def library_name(path: Path) -> str:
     return str(path)
 
 
-def library_entries() -> Iterator[tuple[str, str, str]]:
+class Entry(NamedTuple):
+    """A scenario of the library."""
+
+    address: str
+    title: str
+    source: str
+
+
+class Family(NamedTuple):
+    """A file of the library, and what its members add to it."""
+
+    entry: Entry
+    members: tuple[Entry, ...]  # "#name", own title or else what differs, source where it differs
+
+
+def library_entries() -> Iterator[Entry]:
     """Address, title and source of every scenario of the library, variants included."""
-    for path in scenario_files(shipped_folder("scenarios")):
-        document = read_toml(path)
-        name = library_name(path)
+    for name, document in _documents():
         variants = document.get("variant", [])
         for variant in variants or [{}]:
             address = f"{name}#{variant['name']}" if "name" in variant else name
             title = variant.get("title", document.get("title", ""))
-            yield address, title, variant.get("source", document.get("source", ""))
+            yield Entry(address, title, variant.get("source", document.get("source", "")))
+
+
+def library_families() -> Iterator[Family]:
+    """The files of the library; a file without variants has no members."""
+    for name, document in _documents():
+        title, source = document.get("title", ""), document.get("source", "")
+        members = tuple(
+            Entry(
+                f"#{variant['name']}",
+                variant.get("title", "") or _differences(document, variant),
+                _shorter(variant.get("source", source), source),
+            )
+            for variant in document.get("variant", [])
+        )
+        yield Family(Entry(name, title, source), members)
+
+
+def _documents() -> Iterator[tuple[str, dict[str, Any]]]:
+    for path in scenario_files(shipped_folder("scenarios")):
+        yield library_name(path), read_toml(path)
+
+
+def _differences(document: dict[str, Any], variant: dict[str, Any]) -> str:
+    """The keys that a variant sets otherwise than its family, with their values."""
+    changes: dict[str, Any] = {}
+    for table, values in variant.items():
+        if isinstance(values, dict):
+            base = document.get(table, {})
+            changes |= {key: value for key, value in values.items() if base.get(key) != value}
+    return ", ".join(f"{key} = {value}" for key, value in changes.items()) or "as the family"
+
+
+def _shorter(source: str, family: str) -> str:
+    """A member's source without the chapter and section that it shares with its family."""
+    if source == family:
+        return ""
+    parts, shared = source.split(", "), family.split(", ")
+    while len(parts) > 1 and shared and parts[0] == shared[0]:
+        parts, shared = parts[1:], shared[1:]
+    return ", ".join(parts)
+
+
+def library_sweeps() -> Iterator[Entry]:
+    """Every sweep of the library."""
+    for path in sorted(shipped_folder("scenarios").rglob("*.toml")):
+        if is_sweep(path):
+            document = read_toml(path)
+            yield Entry(library_name(path), document.get("title", ""), document.get("source", ""))

@@ -46,9 +46,17 @@ def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) 
     elif names and not overrides:
         raise InputError(f"{address}: choose a variant with #: {', '.join(names)}")
     document.pop("variant", None)
-    for key, value in _kinds_first(overrides or {}):
-        _override(address, document, key, value)
+    apply_overrides(document, overrides or {}, address)
     return parse_scenario(document, address)
+
+
+def apply_overrides(document: dict[str, Any], overrides: Mapping[str, Any], address: str) -> None:
+    """Put values in a document by dotted key, entries of lists as ``gait.angles[0]``.
+
+    Raises `InputError` where a key leads nowhere; ``address`` names the document in messages.
+    """
+    for key, value in _kinds_first(overrides):
+        _override(address, document, key, value)
 
 
 def parse_scenario(document: Mapping[str, Any], address: str = "scenario") -> Scenario:
@@ -118,15 +126,42 @@ def _kinds_first(overrides: Mapping[str, Any]) -> list[tuple[str, Any]]:
 
 
 def _override(address: str, document: dict[str, Any], key: str, value: object) -> None:
-    *tables, last = key.split(".")
+    *path, last = key_steps(key)
     target: Any = document
-    for name in tables:
-        target = target.setdefault(name, {}) if isinstance(target, dict) else None
-    if not isinstance(target, dict):
+    for step in path:
+        target = _enter(target, step)
+    if isinstance(last, int):
+        if not isinstance(target, list) or last >= len(target):
+            raise InputError(
+                f"{address}: {key} = {show(value)}: there is no such entry; give the whole list "
+                f"{key.rpartition('[')[0]}"
+            )
+    elif not isinstance(target, dict):
         raise InputError(f"{address}: {key} = {show(value)}: {key.rpartition('.')[0]} is no table")
-    if last in KIND_KEYS and target.get(last, KIND_KEYS[last]) != value:
+    elif last in KIND_KEYS and target.get(last, KIND_KEYS[last]) != value:
         target.clear()
     target[last] = value
+
+
+def _enter(target: object, step: str | int) -> object:
+    """What lies under one step of a key; a table that is not there yet begins empty."""
+    if isinstance(step, int):
+        return target[step] if isinstance(target, list) and step < len(target) else None
+    return target.setdefault(step, {}) if isinstance(target, dict) else None
+
+
+def key_steps(key: str) -> list[str | int]:
+    """A dotted key as names and positions: ``gait.angles[1]`` is ``gait``, ``angles``, ``1``."""
+    steps: list[str | int] = []
+    for name in key.split("."):
+        plain, *positions = name.split("[")
+        steps.append(plain)
+        for position in positions:
+            closed = position.endswith("]") and position[:-1].isdecimal()
+            if not closed:
+                raise InputError(f"{key}: entries of lists are written NAME[0], NAME[1], ...")
+            steps.append(int(position[:-1]))
+    return steps
 
 
 def parse_override(text: str) -> tuple[str, Any]:

@@ -11,16 +11,31 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from controllers.attitude_altitude import STATE_FIELDS
 from controllers.records import flatten, record_dtype, record_size
+from tiltsim.kinds import Kind
+from tiltsim.kinds.rotorcraft import ROTORCRAFT
 
 if TYPE_CHECKING:
     from tiltsim.scenario import Scenario
 
 Floats = npt.NDArray[np.float64]
 
-OBSERVED_FIELDS: Final = (*STATE_FIELDS, *(f"alpha_rate_{rotor}" for rotor in (1, 2, 3, 4)))
-"""What every loop can tell of its vehicle: rigid body, tilts, rotor speeds, tilt rates."""
+
+class Header(NamedTuple):
+    """What `userdata` begins with, before the parameters of the law.
+
+    A held law counts the evaluations of the callback, so that it needs nothing but MuJoCo's state
+    to know when to sample: a saved state restarts between two samples, too.
+    """
+
+    control_period: float = 0.0  # evaluations between samples of a held law; 0 if continuous
+    evaluations: float = 0.0  # since the last sample
+    recorder: float = 0.0  # address of the memory that samples go to, 0 while none are recorded
+
+
+HEADER_SIZE: Final = len(Header._fields)
+CONTROL_PERIOD, EVALUATIONS, RECORDER = range(HEADER_SIZE)
+"""Where in `userdata` the fields of the `Header` lie."""
 
 
 class Sizes(NamedTuple):
@@ -44,11 +59,11 @@ class ControlSetup(NamedTuple):
     """What the control step of one flight reads besides the state."""
 
     parameters: Any  # the loop's record
-    table: tuple[float, ...] = ()  # keyframes of the gait
+    table: tuple[float, ...] = ()  # keyframes of the gait, then waypoints of the reference
 
     @property
     def userdata(self) -> Floats:
-        """Record and table as MuJoCo's `userdata` holds them."""
+        """Record and table as MuJoCo's `userdata` holds them after its `Header`."""
         return np.array([*flatten(self.parameters), *self.table])
 
 
@@ -75,8 +90,8 @@ class Equations:
     initial
         ``(scenario, setup) -> state`` at time zero.
     observe
-        ``(time, state, inputs, setup) -> values`` of the loop's `sample_fields` after the time;
-        ``inputs()`` gives the inputs in force.
+        Scalar function ``(time, state, inputs, parameters, table) -> values`` of the loop's
+        `sample_fields` after the time; ``inputs`` are those in force.
     """
 
     inputs: Callable[..., tuple[float, ...]]
@@ -113,25 +128,34 @@ class Loop:
     initial_activations
         ``(scenario, setup) -> act`` at time zero.
     observe
-        ``(qpos, qvel, act, controls) -> values`` of `OBSERVED_FIELDS` and ``law_fields``;
-        ``controls()`` gives the controls in force.
+        Scalar function ``(qpos, qvel, act, ctrl) -> values`` of the kind's fields and
+        ``law_fields``; ``ctrl`` are the controls in force if it ``observes_controls``.
     derive
         ``(samples by field, setup) -> columns``: references, determinant, margin and
         ``extra_columns``.
     watched
         ``(sample by field, setup) -> Watched, ...``: where the law ends.
+    watch
+        Scalar function ``(values, parameters) -> numbers``: at least the numbers of ``watched``,
+        from ``values`` as ``observe`` gives them. None leaves watching to Python.
+    observes_controls
+        Whether ``observe`` reads the controls in force.
     law_states
         Number of activations that are states of the law.
     extra_actuators
         What layers around the law append to the model's actuators, the innermost first.
     law_fields
-        Fields of a sample beyond `OBSERVED_FIELDS`.
+        Fields of a sample beyond those of the vehicle's kind.
     extra_columns
         Columns of a flight that other loops do not have, with their units.
     follows_position
         Whether a scenario has the law follow the reference's horizontal position.
     equations
         The same law on the thesis' own equations.
+    kind
+        What holds for all loops around such a vehicle.
+    flies_gait
+        Whether the scenario's gait has a part in the flight.
     """
 
     model: str
@@ -145,18 +169,26 @@ class Loop:
     derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
     watched: Callable[[Mapping[str, float], ControlSetup], tuple[Watched, ...]]
     equations: Equations
+    watch: Callable[..., tuple[float, ...]] | None = None
+    observes_controls: bool = False
     law_states: int = 0
     extra_actuators: tuple[ExtraActuators, ...] = ()
     law_fields: tuple[str, ...] = ()
     extra_columns: Mapping[str, str] = field(default_factory=dict)
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
     hold: Callable[..., tuple[float, ...]] | None = None
+    kind: Kind = ROTORCRAFT
+    flies_gait: bool = True
 
     @cached_property
     def signature(self) -> float:
         """A checksum of the layout of `userdata`, which tells our models from foreign ones."""
         layout = (self.model, self.sizes, record_dtype(self.parameters))
         return float(zlib.crc32(repr(layout).encode()))
+
+    def native_name(self, plant: str) -> str:
+        """Name of the loop's compiled code on a plant, as a file's name."""
+        return f"{plant}.{self.controls.__module__}.{self.controls.__qualname__}"
 
     @cached_property
     def record_size(self) -> int:
@@ -166,4 +198,9 @@ class Loop:
     @cached_property
     def sample_fields(self) -> tuple[str, ...]:
         """What a recorded sample holds, in order."""
-        return ("time", *OBSERVED_FIELDS, *self.law_fields)
+        return ("time", *self.kind.observed_fields, *self.law_fields)
+
+    @cached_property
+    def units(self) -> dict[str, str]:
+        """The columns of a flight and their units, in order."""
+        return dict(self.kind.columns) | dict(self.extra_columns)

@@ -137,7 +137,7 @@ def _tags(schema: Any, location: tuple[Any, ...]) -> tuple[str, list[str]]:
 
 def _tag_key(fields: Mapping[str, Any]) -> str:
     """The key of a table that tells it apart from others; empty where there is none."""
-    return next((key for key in ("type", "law") if key in fields), "")
+    return next((key for key in ("type", "law", "model") if key in fields), "")
 
 
 def _known_keys(schema: Any, location: tuple[Any, ...], key: str) -> str:

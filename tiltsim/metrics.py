@@ -20,9 +20,13 @@ METRICS: Final = {
     "final_position_error_y": "reference minus actual, mean over the last second, m",
     "final_position_error_z": "reference minus actual, mean over the last second, m",
     "sup_position_error_after_20s": "largest horizontal position error from 20 s on, m",
+    "least_position_error_after_20s": "smallest horizontal position error from 20 s on, m",
+    "max_orbit_radius_after_20s": "largest distance from the reference circle's centre, m",
+    "min_orbit_radius_after_20s": "smallest distance from the reference circle's centre, m",
     "final_roll": "mean over the last second, rad",
     "final_pitch": "mean over the last second, rad",
     "final_yaw": "mean over the last second, rad",
+    "final_attitude_error": "largest error of roll, pitch or yaw over the last second, rad",
     "max_abs_roll": "largest absolute roll, rad",
     "max_abs_pitch": "largest absolute pitch, rad",
     "min_rotor_speed": "smallest rotor speed along its spin, negative where one reversed, rad/s",
@@ -33,6 +37,10 @@ METRICS: Final = {
     "min_published_determinant": "smallest determinant surface S as published (ch. 2)",
     "switches": "switches between two laws, from sample to sample",
     "first_switch_time": "first sample after a switch, s",
+    "max_abs_error_x": "largest absolute position error along x, m (tilt_car)",
+    "max_abs_error_y": "largest absolute position error along y, m (tilt_car)",
+    "max_lyapunov": "largest Lyapunov candidate e_y'^2/2 + K_Y2 e_y^2/2 (ch. 11), m^2/s^2",
+    "final_input_split": "omega_1^2 - omega_2^2, mean over the last second, rad^2/s^2 (tilt_car)",
     "max_tilt_rate": "largest absolute tilt rate, rad/s",
     "min_singularity_margin": "smallest rotation left to a singular attitude, negative beyond, rad",
     "min_decoupling_condition": "smallest over largest singular value of [tau/(L Kf); r3 F/Kf]",
@@ -43,6 +51,9 @@ METRICS: Final = {
 }
 """Every metric by name, with its meaning. Metrics that have none for a flight are left out."""
 
+WALL_CLOCK_METRICS: Final = frozenset({"realtime_factor"})
+"""Metrics that tell of the computer; equal flights differ in them."""
+
 BOOLEAN_METRICS: Final = frozenset({"diverged"})
 
 SETTLED_ALTITUDE: Final = 0.005  # m
@@ -51,6 +62,11 @@ SETTLED: Final = 20.0  # s, from when the supremum of the position error counts
 
 def compute_metrics(flight: Flight) -> dict[str, float | bool]:
     """All metrics of a flight, over its recorded samples."""
+    metrics = _METRICS_OF_KIND[loop_of(flight.scenario).kind.name](flight)
+    return {name: value for name, value in metrics.items() if isfinite(value)}
+
+
+def _rotorcraft_metrics(flight: Flight) -> dict[str, float | bool]:
     columns = flight.columns
     time = columns["time"]
     last_second = time >= time[-1] - 1.0
@@ -68,8 +84,19 @@ def compute_metrics(flight: Flight) -> dict[str, float | bool]:
     if follows_position and settled.any():
         horizontal = np.hypot(errors["x"], errors["y"])
         metrics["sup_position_error_after_20s"] = float(horizontal[settled].max())
+        metrics["least_position_error_after_20s"] = float(horizontal[settled].min())
+        reference = flight.scenario.reference
+        if reference.type == "circle":
+            centre_x, centre_y, _ = reference.position
+            orbit = np.hypot(columns["x"] - centre_x, columns["y"] - centre_y)[settled]
+            metrics["max_orbit_radius_after_20s"] = float(orbit.max())
+            metrics["min_orbit_radius_after_20s"] = float(orbit.min())
     for angle in ("roll", "pitch", "yaw"):
         metrics[f"final_{angle}"] = final(columns[angle])
+    metrics["final_attitude_error"] = max(
+        float(np.abs(_wrapped(columns[f"{angle}_ref"] - columns[angle])[last_second]).max())
+        for angle in ("roll", "pitch", "yaw")
+    )
     for angle in ("roll", "pitch"):
         metrics[f"max_abs_{angle}"] = float(np.abs(columns[angle]).max())
 
@@ -96,11 +123,48 @@ def compute_metrics(flight: Flight) -> dict[str, float | bool]:
     metrics["diverged"] = flight.end.kind in {"diverged", "singular"}
     metrics["duration"] = float(time[-1])
     metrics["realtime_factor"] = float(time[-1] / max(flight.wall_time, 1e-9))
-    return {name: value for name, value in metrics.items() if isfinite(value)}
+    return metrics
+
+
+def _tilt_car_metrics(flight: Flight) -> dict[str, float | bool]:
+    columns = flight.columns
+    time = columns["time"]
+    last_second, settled = time >= time[-1] - 1.0, time >= SETTLED
+    errors = {axis: columns[f"{axis}_ref"] - columns[axis] for axis in ("x", "y")}
+    speeds = np.array([columns["rotor_speed_1"], columns["rotor_speed_2"]])
+    metrics: dict[str, float | bool] = {}
+    for axis, error in errors.items():
+        metrics[f"final_position_error_{axis}"] = float(np.mean(error[last_second]))
+    if settled.any():
+        horizontal = np.hypot(errors["x"], errors["y"])
+        metrics["sup_position_error_after_20s"] = float(horizontal[settled].max())
+    for axis, error in errors.items():
+        metrics[f"max_abs_error_{axis}"] = float(np.abs(error).max())
+    if "lyapunov" in columns:
+        metrics["max_lyapunov"] = float(columns["lyapunov"].max())
+    metrics["final_input_split"] = float(np.mean(columns["input_split"][last_second]))
+    metrics["final_yaw"] = float(np.mean(columns["yaw"][last_second]))
+    metrics["min_rotor_speed"] = float(speeds.min())
+    metrics["max_rotor_speed"] = float(speeds.max())
+    metrics["max_tilt_rate"] = float(np.abs(columns["alpha_rate"]).max())
+    # A thrust cannot pull: at rest a rotor is at its limit.
+    metrics["saturated_fraction"] = float((speeds <= 0.0).any(axis=0).mean())
+    metrics["diverged"] = flight.end.kind in {"diverged", "singular"}
+    metrics["duration"] = float(time[-1])
+    metrics["realtime_factor"] = float(time[-1] / max(flight.wall_time, 1e-9))
+    return metrics
+
+
+_METRICS_OF_KIND: Final = {"rotorcraft": _rotorcraft_metrics, "tilt_car": _tilt_car_metrics}
+
+
+def _wrapped(angle: Floats) -> Floats:
+    """An angle within half a turn of zero."""
+    return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
 
 
 def _saturated_fraction(flight: Flight, spins: Floats) -> float:
-    vehicle = flight.scenario.vehicle
+    vehicle = flight.scenario.rotorcraft
     saturated = np.zeros(len(flight), dtype=bool)
     # The integrator stops on the limit to rounding, so a hair's breadth counts as reached.
     if vehicle.max_rotor_speed is not None:
@@ -115,6 +179,6 @@ def _min_decoupling_condition(flight: Flight) -> float:
     tilts = np.stack([columns[f"alpha_{rotor}"] for rotor in (1, 2, 3, 4)], axis=-1)
     up = world_up(columns["roll"], columns["pitch"])
     lift = np.einsum("ni,nij->nj", up, force_matrix(tilts))[:, np.newaxis]
-    torque = torque_matrix(tilts, flight.scenario.vehicle.resolve())
+    torque = torque_matrix(tilts, flight.scenario.rotorcraft.resolve())
     values = np.linalg.svd(np.concatenate([torque, lift], axis=1), compute_uv=False)
     return float((values[:, -1] / values[:, 0]).min())

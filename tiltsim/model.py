@@ -7,6 +7,7 @@ scales what is drawn with the arms, and compiles.
 from __future__ import annotations
 
 import warnings
+from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
 from math import inf, isfinite
@@ -146,6 +147,27 @@ class RotorLimits:
         return (lower, upper) if spin > 0.0 else (-upper, -lower)
 
 
+@dataclass(frozen=True)
+class Ground:
+    """Level ground that the vehicle can stand on.
+
+    Attributes
+    ----------
+    height : float
+        m, world.
+    friction : float
+        Coefficient of sliding friction.
+    """
+
+    height: float = 0.0
+    friction: float = 0.8
+
+    def __post_init__(self) -> None:
+        if not isfinite(self.height):
+            raise ValueError(f"ground.height = {self.height!r}: must be finite")
+        _require_positive("ground.friction", self.friction, "")
+
+
 def compile_model(
     model: str,
     vehicle: Vehicle,
@@ -158,12 +180,13 @@ def compile_model(
     rotor_limits: RotorLimits = RotorLimits(),
     law_states: int = 0,
     extra_actuators: tuple[ExtraActuators, ...] = (),
+    ground: Ground | None = None,
     visuals: bool = True,
 ) -> mujoco.MjModel:
     """Compile the MuJoCo model of a vehicle.
 
     Mass and inertia of the compiled model are the vehicle's at any tilt: what the pods weigh is
-    taken from the body. Nothing collides.
+    taken from the body. Nothing collides but, if there is ground, the vehicle with it.
 
     Parameters
     ----------
@@ -188,6 +211,8 @@ def compile_model(
         all other actuators, which act on nothing; ctrl is the state's rate.
     extra_actuators : tuple, optional
         What layers around the law append after these; see `tiltsim.loop.ExtraActuators`.
+    ground : Ground, optional
+        Ground to take off from and land on; without it there are no contacts to look for.
     visuals : bool, default=True
         Whether the vehicle has geoms. They do not touch the physics, but positioning them takes
         about a sixth of a step.
@@ -213,19 +238,57 @@ def compile_model(
     for name, value in vehicle._asdict().items():
         _require_positive(f"vehicle.{name}", value, "(SI)")
 
-    whole, bare = _compose(
-        model,
-        vehicle,
-        timestep,
-        integrator,
-        userdata_size,
-        tilt_servo,
-        pod,
-        rotor_limits,
-        law_states,
-        extra_actuators,
+    description = (
+        *(timestep, integrator, userdata_size),
+        *(tilt_servo, pod, rotor_limits, law_states, extra_actuators, ground),
     )
-    return mujoco.MjModel.from_xml_string(whole if visuals else bare)
+    likeness = (model, vehicle.arm_length, *description, visuals)
+    if likeness in _compiled:
+        return _with_parameters(*_compiled[likeness], vehicle, pod)
+    whole, bare = _compose(model, vehicle, *description)
+    compiled = mujoco.MjModel.from_xml_string(whole if visuals else bare)
+    if model != "tiltrotor" or tilt_servo.max_angle is None:
+        if len(_compiled) >= LIKENESSES:
+            _compiled.clear()
+        _compiled[likeness] = copy(compiled), mujoco.MjData(compiled)
+    return compiled
+
+
+LIKENESSES: Final = 32
+"""How many models are kept to make others of them."""
+
+_compiled: dict[tuple[Any, ...], tuple[mujoco.MjModel, mujoco.MjData]] = {}
+"""Compiled models, with data to work in, by all that `_with_parameters` cannot change.
+
+Models with stops are not among them: MuJoCo's solver scales with a mean inertia that only its
+compiler computes.
+"""
+
+
+def _with_parameters(
+    compiled: mujoco.MjModel, data: mujoco.MjData, vehicle: Vehicle, pod: Pod
+) -> mujoco.MjModel:
+    """A copy of a model with another vehicle's mass, inertia, coefficients and gravity.
+
+    Bit for bit what compiling gives, a hundred times faster, but for the mean mass and inertia in
+    ``stat``, which nothing here reads.
+    """
+    import mujoco
+
+    model = copy(compiled)
+    body = model.body("vehicle").id
+    model.body_mass[body], model.body_inertia[body] = _body_inertia(
+        vehicle, pod if model.njnt > 1 else None
+    )
+    for i, spin in zip(ROTORS, SPIN, strict=True):
+        model.actuator(f"thrust_{i}").gear[:] = _thrust_gear(vehicle, spin)
+    model.opt.gravity[:] = (0.0, 0.0, -vehicle.gravity)
+    hover, speed = model.key("hover").id, vehicle.hover_rotor_speed
+    model.key_act[hover, :4] = [spin * speed for spin in SPIN]
+    thrusts = model.actuator("thrust_1").id
+    model.key_ctrl[hover, thrusts : thrusts + 4] = speed**2
+    mujoco.mj_setConst(model, data)
+    return model
 
 
 @lru_cache(maxsize=64)  # dm_control takes several times longer than MuJoCo's compiler
@@ -240,21 +303,22 @@ def _compose(
     rotor_limits: RotorLimits,
     law_states: int,
     extra_actuators: tuple[ExtraActuators, ...],
+    ground: Ground | None,
 ) -> tuple[str, str]:
     """The vehicle's complete MJCF, and the same without what is only drawn.
 
     The arguments are `compile_model`'s, found valid. A flight is flown on the one and shown on the
     other, so both are made at once.
     """
-    root = _parse(shipped_folder("mjcf") / f"{model}.xml")
+    root = parse_mjcf(shipped_folder("mjcf") / f"{model}.xml")
     tilting = model == "tiltrotor"
     stops = tilting and tilt_servo.max_angle is not None
 
     root.option.timestep = timestep
     root.option.integrator = integrator
     root.option.gravity = (0.0, 0.0, -vehicle.gravity)
-    root.option.flag.contact = "disable"
-    root.option.flag.constraint = "enable" if stops else "disable"
+    root.option.flag.contact = "disable" if ground is None else "enable"
+    root.option.flag.constraint = "disable" if ground is None and not stops else "enable"
     root.size.nuserdata = userdata_size
 
     _scale_lengths(root, vehicle.arm_length)
@@ -264,19 +328,23 @@ def _compose(
         _set_servos(root, tilt_servo, pod)
     _set_keyframe(root.keyframe.key["hover"], vehicle.hover_rotor_speed)
     _set_keyframe(root.keyframe.key["start"], START_SPEED)
-    _add_states(root, "law", law_states)
+    add_law_states(root, law_states)
     for index, extra in enumerate(extra_actuators, start=1):
         _add_states(root, f"layer_{index}_state", extra.states)
         _add_memories(root, f"layer_{index}_memory", extra.memories)
         if extra.wrench:
             _add_wrench(root, f"layer_{index}")
+    if ground is not None:
+        _set_ground(root, ground)
     whole = str(root.to_xml_string())
     for geom in root.find("body", "vehicle").find_all("geom"):
-        geom.remove()
+        if ground is None or not geom.name.endswith("collision"):
+            geom.remove()
     return whole, str(root.to_xml_string())
 
 
-def _parse(path: Path) -> Any:
+def parse_mjcf(path: Path) -> Any:
+    """An MJCF file as dm_control's tree."""
     with warnings.catch_warnings():
         # dm_control tries its window systems on import; without a screen GLFW complains.
         warnings.filterwarnings("ignore", module="glfw")
@@ -299,16 +367,31 @@ def _scale_lengths(root: Any, arm_length: float) -> None:
 
 def _set_rotors(root: Any, vehicle: Vehicle, limits: RotorLimits) -> None:
     for i, spin in zip(ROTORS, SPIN, strict=True):
-        drag = -spin * vehicle.drag_coefficient
-        thrust = root.find("actuator", f"thrust_{i}")
-        thrust.gear = (0.0, 0.0, vehicle.thrust_coefficient, 0.0, 0.0, drag)
+        root.find("actuator", f"thrust_{i}").gear = _thrust_gear(vehicle, spin)
         speed_range = limits.speed_range(spin)
         if speed_range is not None:
             root.find("actuator", f"rotor_speed_{i}").actrange = speed_range
 
 
+def _thrust_gear(vehicle: Vehicle, spin: float) -> tuple[float, ...]:
+    """Thrust and drag torque per unit of control."""
+    drag = -spin * vehicle.drag_coefficient
+    return 0.0, 0.0, vehicle.thrust_coefficient, 0.0, 0.0, drag
+
+
 def _set_inertia(root: Any, vehicle: Vehicle, pod: Pod | None) -> None:
     """Give the pods their mass and inertia and the body the rest of the vehicle's."""
+    inertial = root.find("body", "vehicle").inertial
+    inertial.mass, inertial.diaginertia = _body_inertia(vehicle, pod)
+    if pod is not None:
+        for i in ROTORS:
+            inertial = root.find("body", f"pod_{i}").inertial
+            inertial.mass = pod.mass
+            inertial.diaginertia = [pod.inertia] * 3
+
+
+def _body_inertia(vehicle: Vehicle, pod: Pod | None) -> tuple[float, list[float]]:
+    """Mass and principal moments of inertia of the body: the vehicle's less its pods'."""
     mass = vehicle.mass
     moments = [vehicle.inertia_xx, vehicle.inertia_yy, vehicle.inertia_zz]
     if pod is not None:
@@ -316,10 +399,6 @@ def _set_inertia(root: Any, vehicle: Vehicle, pod: Pod | None) -> None:
         of_two_opposite_pods = 2.0 * pod.mass * vehicle.arm_length**2  # point masses
         for axis, pairs in enumerate((1.0, 1.0, 2.0)):  # the pairs that lie off this axis
             moments[axis] -= 4.0 * pod.inertia + pairs * of_two_opposite_pods
-        for i in ROTORS:
-            inertial = root.find("body", f"pod_{i}").inertial
-            inertial.mass = pod.mass
-            inertial.diaginertia = [pod.inertia] * 3
     if mass <= 0.0 or min(moments) <= 0.0 or 2.0 * max(moments) > sum(moments):
         raise ValueError(
             f"vehicle.mass = {vehicle.mass!r}, vehicle.inertia = {list(vehicle[1:4])}, pods {pod}:"
@@ -327,9 +406,7 @@ def _set_inertia(root: Any, vehicle: Vehicle, pod: Pod | None) -> None:
             f" {', '.join(f'{moment:.6g}' for moment in moments)} kg m^2; all must be above 0, and"
             " none larger than the sum of the other two"
         )
-    inertial = root.find("body", "vehicle").inertial
-    inertial.mass = mass
-    inertial.diaginertia = moments
+    return mass, moments
 
 
 def _set_servos(root: Any, servo: TiltServo, pod: Pod) -> None:
@@ -347,12 +424,29 @@ def _set_servos(root: Any, servo: TiltServo, pod: Pod) -> None:
         defaults.position.ctrlrange = angle_range
 
 
+def _set_ground(root: Any, ground: Ground) -> None:
+    """Let the vehicle's collision shapes touch the ground, and nothing else."""
+    plane = root.find("geom", "ground")
+    plane.pos = (0.0, 0.0, ground.height)
+    plane.friction = (ground.friction, 0.005, 0.0001)
+    plane.priority = 1  # its friction counts, not the larger of the two
+    plane.conaffinity = 1
+    for geom in root.find("body", "vehicle").find_all("geom"):
+        if geom.name.endswith("collision"):
+            geom.contype = 1
+
+
 def _set_keyframe(key: Any, rotor_speed: float) -> None:
     """Let all rotors of an upright, untilted vehicle turn at this speed (rad/s)."""
     key.act = [spin * rotor_speed for spin in SPIN]
     ctrl = key.ctrl.copy()
     ctrl[-8:-4] = rotor_speed**2  # the thrust actuators stand before the four rotor speeds
     key.ctrl = ctrl
+
+
+def add_law_states(root: Any, count: int) -> None:
+    """Append the states of a law: integrators that act on nothing."""
+    _add_states(root, "law", count)
 
 
 def _add_states(root: Any, name: str, count: int) -> None:

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from math import nan
-from typing import Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import mujoco
 import numpy as np
 
-from controllers.gaits import tilt_reference
 from controllers.records import slotted
-from controllers.rotation import quaternion_from_euler
 from controllers.scalar import Triple
 from tiltsim import thesis_plant
-from tiltsim.cache import native_code_is_cached
+from tiltsim.cache import native_code_is_cached, native_code_was_compiled
 from tiltsim.engine import EngineName, control_callback, make_engine
 from tiltsim.errors import InputError
-from tiltsim.loop import ControlSetup, Floats
+from tiltsim.loop import EVALUATIONS, HEADER_SIZE, RECORDER, ControlSetup, Floats, Header, Loop
 from tiltsim.loops import control_setup, loop_of
-from tiltsim.model import Pod, RotorLimits, TiltServo, compile_model
 from tiltsim.scenario import Scenario
+
+if TYPE_CHECKING:
+    from tiltsim.native import Recorder
 
 STEPS_WORTH_LOADING: Final = 15_000
 """Flights of at least this many steps repay loading the native engine, once it is compiled."""
@@ -49,6 +49,13 @@ class Plant(Protocol):
     def advance(self, steps: int) -> None:
         """Take physics steps."""
 
+    def record(self, samples: int, steps: int) -> Floats | None:
+        """Take ``samples`` times ``steps`` physics steps and a sample after each time.
+
+        None where a sample or the physics engine tells that something has gone wrong on the way;
+        what state the plant is in then is open.
+        """
+
     def observe(self) -> tuple[float, ...]:
         """What a sample holds after the time; see `tiltsim.loop.Loop.sample_fields`."""
 
@@ -63,36 +70,44 @@ def make_plant(scenario: Scenario) -> Plant:
 
 def choose_engine(scenario: Scenario) -> EngineName:
     """The engine a scenario asks for; ``auto`` weighs the flight's length against start-up."""
-    simulation = scenario.simulation
-    if simulation.engine != "auto":
-        return simulation.engine
-    cheap = STEPS_WORTH_LOADING if native_code_is_cached() else STEPS_WORTH_COMPILING
-    return "native" if simulation.steps >= cheap else "python"
+    if scenario.simulation.engine != "auto":
+        return scenario.simulation.engine
+    return "native" if worth_native([scenario]) else "python"
+
+
+def worth_native(scenarios: Iterable[Scenario]) -> bool:
+    """Whether flights are together long enough for the native engine."""
+    steps, names = 0, set()
+    for scenario in scenarios:
+        steps += scenario.simulation.steps
+        names.add(loop_of(scenario).native_name(scenario.simulation.plant))
+    cached = all(map(native_code_is_cached, names))
+    return steps >= (STEPS_WORTH_LOADING if cached else STEPS_WORTH_COMPILING)
 
 
 class MujocoPlant:
     """The compiled MJCF model in MuJoCo, with the control step in its control callback."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, model: mujoco.MjModel | None = None) -> None:
+        """Build the plant, or take a ``model`` that `flight_model` built for such a scenario."""
         self._loop, self._setup = loop_of(scenario), control_setup(scenario)
-        self.model = build_model(scenario, userdata_size=len(self._setup.userdata))
-        # A diverged state must stay visible; by default MuJoCo would silently start over.
-        self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+        if model is None:
+            model = flight_model(scenario, len(self._setup.userdata))
+        self.model = model
         self.data = mujoco.MjData(self.model)
-        self._control_steps = scenario.simulation.control_steps
+        self._reference, _ = scenario.reference_and_table()
+        self._follows_position = self._loop.follows_position(scenario)
         self._set_initial_state(scenario, self._setup)
         self.engine: EngineName = choose_engine(scenario)
         self._engine = make_engine(self.engine, self._loop, self.model, self.data)
 
     def _set_initial_state(self, scenario: Scenario, setup: ControlSetup) -> None:
-        initial, data = scenario.initial, self.data
-        data.userdata[:] = setup.userdata
-        data.qpos[:3] = initial.position
-        data.qpos[3:7] = quaternion_from_euler(*initial.attitude)
-        gait = scenario.gait.plan(scenario.vehicle.resolve())
-        data.qpos[7:] = tilt_reference(0.0, gait.parameters, gait.table)[: self.model.nq - 7]
-        data.qvel[:3] = initial.velocity
-        data.qvel[3:6] = initial.angular_velocity
+        data = self.data
+        period = evaluations_per_step(self.model) * scenario.simulation.control_steps
+        data.userdata[:HEADER_SIZE] = Header(control_period=period)
+        parameters = setup.userdata  # a model made for several gaits may have room for more
+        data.userdata[HEADER_SIZE : HEADER_SIZE + len(parameters)] = parameters
+        data.qpos[:], data.qvel[:] = self._loop.kind.initial_motion(scenario)
         data.act[:] = self._loop.initial_activations(scenario, setup)
         mujoco.mj_forward(self.model, data)
 
@@ -116,38 +131,68 @@ class MujocoPlant:
         # The state brings its own parameters, which the Python engine reads once.
         self._engine = make_engine(self.engine, self._loop, self.model, self.data)
 
-    @property
-    def _steps_taken(self) -> int:
-        return round(float(self.data.time) / float(self.model.opt.timestep))
-
     def advance(self, steps: int) -> None:
         """See `Plant.advance`."""
-        model, data, every = self.model, self.data, self._control_steps
-        if every == 0:
-            with control_callback(self._engine.continuous()), quiet_warnings():
-                mujoco.mj_step(model, data, nstep=steps)
-            return
-        with control_callback(self._engine.held()), quiet_warnings():
-            while steps > 0:
-                since_sample = self._steps_taken % every
-                if since_sample == 0:
-                    self._engine.sample(model, data)
-                chunk = min(steps, every - since_sample)
-                mujoco.mj_step(model, data, nstep=chunk)
-                steps -= chunk
+        with control_callback(self._engine.callback()), quiet_warnings():
+            mujoco.mj_step(self.model, self.data, nstep=steps)
+
+    def record(self, samples: int, steps: int) -> Floats | None:
+        """See `Plant.record`: natively, all but the last sample come from the callback."""
+        if self.engine == "native":
+            return self._record_natively(samples, steps)
+        rows = []
+        for _ in range(samples):
+            self.advance(steps)
+            rows.append((self.time, *self.observe()))
+        return None if self.fault() else np.array(rows)
+
+    @property
+    def callback(self) -> Any:
+        """What MuJoCo is to call for controls; see `tiltsim.engine.Engine.callback`."""
+        return self._engine.callback()
+
+    @property
+    def header_at(self) -> int:
+        """Where in `state` the `tiltsim.loop.Header` begins."""
+        before = int(mujoco.mjtState.mjSTATE_USERDATA) - 1
+        return int(mujoco.mj_stateSize(self.model, _INTEGRATION & before))
+
+    def recorder(self, samples: int, steps: int, last_steps: int) -> Recorder:
+        """Memory for samples every so many steps, the last one after ``last_steps``.
+
+        Its address goes to `RECORDER` in `userdata`. Only for the native engine.
+        """
+        from tiltsim.native import Recorder
+
+        evaluations = evaluations_per_step(self.model)
+        return Recorder(
+            *(self._loop, samples, steps * evaluations, last_steps * evaluations),
+            *(self._reference, self._follows_position),
+            watched_now(self._loop, self._setup, self.observe()),
+        )
+
+    def _record_natively(self, samples: int, steps: int) -> Floats | None:
+        recorder = self.recorder(samples, steps, steps)
+        self.data.userdata[RECORDER] = recorder.address
+        try:
+            self.advance(samples * steps)
+        finally:
+            self.data.userdata[RECORDER] = 0.0
+        if recorder.lost or self.fault():
+            return None
+        return np.vstack([recorder.samples, (self.time, *self.observe())])
 
     def observe(self) -> tuple[float, ...]:
         """See `Plant.observe`."""
         data = self.data
         state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
-        return self._loop.observe(*state, self._controls_in_force)
+        return self._loop.observe(*state, self._controls_in_force(*state))
 
-    def _controls_in_force(self) -> Sequence[float]:
+    def _controls_in_force(self, *state: Sequence[float]) -> Sequence[float]:
         """The controls at the present state; MuJoCo keeps those of its last integrator stage."""
-        data, every = self.data, self._control_steps
-        if every > 0 and self._steps_taken % every != 0:
+        data = self.data
+        if data.userdata[EVALUATIONS] != 0.0 or not self._loop.observes_controls:
             return list(data.ctrl.tolist())
-        state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
         try:
             setup = self._setup
             return self._loop.controls(data.time, *state, setup.parameters, setup.table)
@@ -160,6 +205,27 @@ class MujocoPlant:
             if self.data.warning[warning].number:
                 return words
         return ""
+
+
+def watched_now(loop: Loop, setup: ControlSetup, values: Sequence[float]) -> tuple[float, ...]:
+    """The numbers that a loop watches natively; none where it leaves that to Python."""
+    return () if loop.watch is None else loop.watch(values, setup.parameters)
+
+
+def flight_model(scenario: Scenario, parameters: int) -> mujoco.MjModel:
+    """The model that a scenario flies, with room for as many floats of parameters.
+
+    Raises `InputError` where MuJoCo cannot build it.
+    """
+    model = build_model(scenario, userdata_size=HEADER_SIZE + parameters)
+    # A diverged state must stay visible; by default MuJoCo would silently start over.
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return model
+
+
+def evaluations_per_step(model: mujoco.MjModel) -> int:
+    """How often MuJoCo's integrator asks for controls in a step."""
+    return 4 if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else 1
 
 
 @contextmanager
@@ -195,20 +261,10 @@ def build_model(
 
     Raises `InputError` where MuJoCo cannot build it.
     """
-    vehicle, simulation, loop = scenario.vehicle, scenario.simulation, loop_of(scenario)
+    loop = loop_of(scenario)
     try:
-        model = compile_model(
-            vehicle.model,
-            vehicle.resolve(),
-            timestep=simulation.timestep,
-            integrator=simulation.integrator,
-            userdata_size=userdata_size,
-            tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump(exclude={"max_rate"})),
-            pod=Pod(**vehicle.pod.model_dump()),
-            rotor_limits=RotorLimits(vehicle.min_rotor_speed, vehicle.max_rotor_speed),
-            law_states=loop.law_states,
-            extra_actuators=loop.extra_actuators,
-            visuals=visuals,
+        model = loop.kind.compile(
+            scenario, loop.law_states, loop.extra_actuators, userdata_size, visuals
         )
     except ValueError as error:
         raise InputError(f"{scenario.address or 'scenario'}: vehicle: {error}") from error
@@ -222,7 +278,9 @@ class ThesisPlant:
     def __init__(self, scenario: Scenario) -> None:
         simulation = scenario.simulation
         loop, setup = loop_of(scenario), control_setup(scenario)
-        self._equations, self._setup = loop.equations, setup
+        self._loop, self._equations, self._setup = loop, loop.equations, setup
+        self._reference, _ = scenario.reference_and_table()
+        self._follows_position = loop.follows_position(scenario)
         self._disturbance = disturbing_acceleration(scenario)
         self._timestep = simulation.timestep
         self._control_steps = simulation.control_steps
@@ -236,7 +294,7 @@ class ThesisPlant:
         if self.engine == "native":
             from tiltsim.native import compile_stepper, native_record
 
-            self._advance = compile_stepper(self._equations)
+            self._advance, self._record = compile_stepper(loop)
             self._law = native_record(loop, setup.userdata)
         else:
             self._advance = thesis_plant.make_stepper(self._equations.inputs, self._equations.rates)
@@ -277,9 +335,39 @@ class ThesisPlant:
             self._fault = "the control law left the range of floating-point numbers"
         self._step_index += steps
 
+    def record(self, samples: int, steps: int) -> Floats | None:
+        """See `Plant.record`."""
+        if self.engine == "native":
+            return self._record_natively(samples, steps)
+        rows = []
+        for _ in range(samples):
+            self.advance(steps)
+            rows.append((self.time, *self.observe()))
+        return None if self.fault() else np.array(rows)
+
+    def _record_natively(self, samples: int, steps: int) -> Floats | None:
+        from tiltsim.native import Recorder
+
+        recorder = Recorder(
+            *(self._loop, samples, steps, steps, self._reference, self._follows_position),
+            watched_now(self._loop, self._setup, self.observe()),
+        )
+        state, self._held = self._record(
+            *(int(recorder.address), samples),
+            *(self._step_index, np.array(self._state), self._held, self._timestep, steps),
+            *(self._control_steps, *self._law, self._disturbance),
+        )
+        self._state = list(state)
+        native_code_was_compiled(self._loop.native_name("thesis"))
+        self._step_index += samples * steps
+        return None if recorder.lost else recorder.samples
+
     def observe(self) -> tuple[float, ...]:
         """See `Plant.observe`."""
-        return self._equations.observe(self.time, self._state, self._inputs_in_force, self._setup)
+        setup = self._setup
+        return self._equations.observe(
+            self.time, self._state, self._inputs_in_force(), setup.parameters, setup.table
+        )
 
     def _inputs_in_force(self) -> Sequence[float]:
         every = self._control_steps

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 Columns = Mapping[str, Floats]
 
-COLUMN_OF_JOINT: Final = {f"tilt_{i}": f"alpha_{i}" for i in (1, 2, 3, 4)}
+COLUMN_OF_JOINT: Final = {f"tilt_{i}": f"alpha_{i}" for i in (1, 2, 3, 4)} | {"tilt": "alpha"}
 """Columns of joints that do not bear the column's name."""
 
 
@@ -128,6 +128,18 @@ def _product(left: Floats, right: Floats) -> Floats:
     scalar = scalar - np.sum(left[..., 1:] * right[..., 1:], axis=-1, keepdims=True)
     vector = left[..., :1] * right[..., 1:] + right[..., :1] * left[..., 1:]
     return np.concatenate([scalar, vector + np.cross(left[..., 1:], right[..., 1:])], axis=-1)
+
+
+def positions(columns: Columns) -> Floats:
+    """The vehicle's positions at every sample, shape (N, 3); 0 along axes that it has not."""
+    zero = np.zeros_like(columns["time"])
+    return np.stack([columns.get(axis, zero) for axis in "xyz"], axis=1)
+
+
+def reference_positions(columns: Columns) -> Floats:
+    """The reference's positions at every sample, shape (N, 3); 0 along axes that it leaves out."""
+    zero = np.zeros_like(columns["time"])
+    return np.stack([columns.get(f"{axis}_ref", zero) for axis in "xyz"], axis=1)
 
 
 def _stack(columns: Columns, names: tuple[str, ...]) -> Floats:

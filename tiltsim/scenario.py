@@ -6,15 +6,20 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from functools import lru_cache
 from math import pi
-from typing import Annotated, Final, Literal, Self, get_args
+from typing import Annotated, Any, Final, Literal, Self, get_args
 
 import numpy as np
-from pydantic import ConfigDict, Field, PrivateAttr, model_validator
+from pydantic import ConfigDict, Discriminator, Field, PrivateAttr, Tag, model_validator
 
+from controllers.gaits.keyframes import NO_KEYFRAMES
 from controllers.references import REFERENCE_TYPES, ReferenceParameters
 from controllers.stability import Loop
+from controllers.tilt_car.vehicle import THESIS_CAR, TiltCar
 from controllers.vehicle import PRESETS, Vehicle
+from controllers.waypoints import minimum_snap_table
 from tiltsim.controller_tables import AttitudeAltitudeController, Controller, ReferenceKind
 from tiltsim.gait_tables import FixedGait, Gait
 from tiltsim.messages import InvalidValueError
@@ -25,7 +30,9 @@ from tiltsim.tables import (
     Coordinate,
     NonNegative,
     Positive,
+    Positive2,
     Positive4,
+    Range,
     Table,
     Vector3,
 )
@@ -34,7 +41,7 @@ MAX_STEPS: Final = 100_000_000
 """Physics steps of a flight, more than a day at one millisecond."""
 
 MAX_TABLE: Final = 1500
-"""Numbers in a gait's table of keyframes, which every evaluation of the control law reads."""
+"""Numbers in the table of a gait and a reference, which every evaluation of the law reads."""
 
 MAX_LOOP_STEP: Final = 2.5
 """Largest product of timestep and closed-loop pole; RK4 turns unstable at 2.78, ode3 at 2.51."""
@@ -51,15 +58,30 @@ MAX_LATENCY_STEPS: Final = 20
 # --- [vehicle] ---------------------------------------------------------------------------------
 
 
-class TiltServoTable(Table):
-    """The servos that tilt the pods: second order, ideal but for what is given here."""
+class ServoTable(Table):
+    """A position servo: second order, ideal but for what is given here."""
 
     natural_frequency: Positive = Field(300.0, description="rad/s")
     damping_ratio: Positive = 1.0
+
+    @property
+    def stops(self) -> bool:
+        """Whether the servo has mechanical stops."""
+        return False
+
+
+class TiltServoTable(ServoTable):
+    """The servos that tilt the pods."""
+
     max_rate: Positive | None = Field(None, description="rad/s")
     max_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
         None, description="rad; the gait must stay within"
     )
+
+    @property
+    def stops(self) -> bool:
+        """Whether the servo has mechanical stops."""
+        return self.max_angle is not None
 
 
 class PodTable(Table):
@@ -72,7 +94,7 @@ class PodTable(Table):
 
 
 class VehicleTable(Table):
-    """The vehicle: a preset and what differs from it."""
+    """A rotorcraft: a preset and what differs from it."""
 
     model: Literal["tiltrotor", "quadrotor"] = "tiltrotor"
     preset: Literal["ar_drone_2", "ar_drone_2_unrounded", "luukkonen"] = "ar_drone_2"
@@ -118,6 +140,82 @@ class VehicleTable(Table):
                 "vehicle.min_rotor_speed", low, f"must be below max_rotor_speed = {high}"
             )
         return self
+
+
+class TiltCarTable(Table):
+    """The tilt-car of ch. 10; the defaults are `controllers.tilt_car.vehicle.THESIS_CAR`."""
+
+    model: Literal["tilt_car"]
+    mass: Positive = Field(THESIS_CAR.mass, description="kg; the thesis does not give it")
+    top_inertia: Positive = Field(
+        THESIS_CAR.top_inertia, description="I_T, of the top disc about the axis, kg m^2"
+    )
+    bottom_inertia: Positive = Field(
+        THESIS_CAR.bottom_inertia,
+        description="of the bottom disc alone about the axis, kg m^2; I_B is both discs'",
+    )
+    half_angle: Annotated[float, Field(gt=0.0, lt=pi / 2)] = Field(
+        THESIS_CAR.half_angle, description="theta, from the middle of the thrusts to either, rad"
+    )
+    thrust_coefficient: Positive = Field(
+        THESIS_CAR.thrust_coefficient, description="K_F, N s^2/rad^2"
+    )
+    tilt_servo: ServoTable = ServoTable()
+
+    def resolve(self) -> TiltCar:
+        """The physical parameters."""
+        return TiltCar(
+            self.mass,
+            self.top_inertia,
+            self.bottom_inertia,
+            self.half_angle,
+            self.thrust_coefficient,
+        )
+
+
+def _model(value: Any) -> str:
+    if isinstance(value, VehicleTable | TiltCarTable):
+        return "tilt_car" if isinstance(value, TiltCarTable) else "tiltrotor"
+    model = value.get("model", "tiltrotor") if isinstance(value, dict) else "tiltrotor"
+    if not isinstance(model, str):
+        return ""
+    return "tiltrotor" if model == "quadrotor" else model
+
+
+VehicleUnion = Annotated[
+    Annotated[VehicleTable, Tag("tiltrotor")] | Annotated[TiltCarTable, Tag("tilt_car")],
+    Discriminator(_model),
+]
+"""The ``[vehicle]`` table, told apart by its model."""
+
+# --- [model_error] -----------------------------------------------------------------------------
+
+Share = Annotated[float, Field(ge=0.01, le=100.0)]
+
+
+class ModelErrorTable(Table):
+    """By what factors the vehicle that flies differs from the ``[vehicle]`` that the law knows."""
+
+    mass: Share = 1.0
+    inertia: Annotated[tuple[Share, Share, Share], Field(strict=False)] = Field(
+        (1.0, 1.0, 1.0), description="one factor a principal moment"
+    )
+    arm_length: Share = 1.0
+    thrust_coefficient: Share = 1.0
+    drag_coefficient: Share = 1.0
+
+    def apply(self, vehicle: Vehicle) -> Vehicle:
+        """The vehicle that flies, where the law knows ``vehicle``."""
+        xx, yy, zz = self.inertia
+        return vehicle._replace(
+            mass=self.mass * vehicle.mass,
+            inertia_xx=xx * vehicle.inertia_xx,
+            inertia_yy=yy * vehicle.inertia_yy,
+            inertia_zz=zz * vehicle.inertia_zz,
+            arm_length=self.arm_length * vehicle.arm_length,
+            thrust_coefficient=self.thrust_coefficient * vehicle.thrust_coefficient,
+            drag_coefficient=self.drag_coefficient * vehicle.drag_coefficient,
+        )
 
 
 # --- [simulation] and [initial] ----------------------------------------------------------------
@@ -211,15 +309,14 @@ class InitialTable(Table):
     velocity: Vector3 = Field((0.0, 0.0, 0.0), description="m/s, world")
     attitude: Angles3 = Field((0.0, 0.0, 0.0), description="roll, pitch, yaw, rad")
     angular_velocity: Vector3 = Field((0.0, 0.0, 0.0), description="p, q, r, rad/s, body")
-    rotor_speed: Positive | Positive4 = Field(
-        300.0, description="absolute value, rad/s; one for all rotors or four"
+    rotor_speed: Positive | Positive4 | Positive2 = Field(
+        300.0, description="absolute value, rad/s; one for all rotors, or one each"
     )
 
-    @property
-    def rotor_speeds(self) -> tuple[float, float, float, float]:
-        """Absolute rotor speeds, one each."""
+    def rotor_speeds(self, rotors: int) -> tuple[float, ...]:
+        """Absolute rotor speeds of so many rotors, one each."""
         speed = self.rotor_speed
-        return speed if isinstance(speed, tuple) else (speed, speed, speed, speed)
+        return speed if isinstance(speed, tuple) else (speed,) * rotors
 
 
 # --- [reference] -------------------------------------------------------------------------------
@@ -228,7 +325,27 @@ class InitialTable(Table):
 Tilt = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
 
 
-class _PositionReference(Table):
+class _Reference(Table, ABC):
+    """What every reference can tell of itself."""
+
+    @property
+    @abstractmethod
+    def parameters(self) -> ReferenceParameters:
+        """The record that the law reads."""
+
+    @property
+    def table(self) -> tuple[float, ...]:
+        """The numbers beside the record, for references of any length."""
+        return NO_KEYFRAMES
+
+    def placed(self, table: tuple[float, ...]) -> tuple[ReferenceParameters, tuple[float, ...]]:
+        """Record and table where a gait's table lies before the reference's own."""
+        if self.table == NO_KEYFRAMES:
+            return self.parameters, table
+        return self.parameters._replace(offset=float(len(table))), (*table, *self.table)
+
+
+class _PositionReference(_Reference):
     roll: Tilt = Field(0.0, description="rad, for laws of the whole pose and for switching")
     pitch: Tilt = Field(0.0, description="rad, likewise")
     yaw: Angle = 0.0
@@ -266,18 +383,22 @@ class SetpointReference(_PositionReference):
 
 
 class LineReference(_PositionReference):
-    """Uniform motion along a line."""
+    """Motion along a line, uniform or at a constant acceleration."""
 
     type: Literal["line"]
     position: Vector3 = Field((0.0, 0.0, 0.0), description="m, at time zero")
-    velocity: Vector3 = Field(description="m/s")
+    velocity: Vector3 = Field(description="m/s, at time zero")
+    acceleration: Vector3 = Field((0.0, 0.0, 0.0), description="m/s^2")
 
     @property
     def parameters(self) -> ReferenceParameters:
         """The record that the law reads."""
-        vx, vy, vz = self.velocity
-        own = {"velocity_x": vx, "velocity_y": vy, "velocity_z": vz}
-        return self._parameters(self.type, self.position, **own)
+        return self._parameters(
+            self.type,
+            self.position,
+            **_by_axis("velocity", self.velocity),
+            **_by_axis("acceleration", self.acceleration),
+        )
 
 
 class CircleReference(_PositionReference):
@@ -301,7 +422,86 @@ class CircleReference(_PositionReference):
         return self
 
 
-class AttitudeAltitudeReference(Table):
+class LissajousReference(_PositionReference):
+    """A sine along each axis: ``position + amplitude sin(angular_frequency t + phase)``."""
+
+    type: Literal["lissajous"]
+    position: Vector3 = Field((0.0, 0.0, 0.0), description="the centre, m")
+    amplitude: Vector3 = Field(description="m")
+    angular_frequency: Vector3 = Field(description="rad/s")
+    phase: Angles3 = Field((0.0, 0.0, 0.0), description="rad")
+
+    @property
+    def parameters(self) -> ReferenceParameters:
+        """The record that the law reads."""
+        return self._parameters(
+            self.type,
+            self.position,
+            **_by_axis("amplitude", self.amplitude),
+            **_by_axis("frequency", self.angular_frequency),
+            **_by_axis("phase", self.phase),
+        )
+
+
+class FigureEightReference(_PositionReference):
+    """A lying eight, from its crossing towards +x and +y; a lissajous of one to two."""
+
+    type: Literal["figure_eight"]
+    position: Vector3 = Field((0.0, 0.0, 0.0), description="where it crosses itself, m")
+    length: Positive = Field(description="m, along x")
+    width: Positive = Field(description="m, along y")
+    angular_frequency: Positive = Field(description="rad/s, once around")
+
+    @property
+    def parameters(self) -> ReferenceParameters:
+        """The record that the law reads."""
+        once = self.angular_frequency
+        return self._parameters(
+            self.type,
+            self.position,
+            **_by_axis("amplitude", (0.5 * self.length, 0.5 * self.width, 0.0)),
+            **_by_axis("frequency", (once, 2.0 * once, 0.0)),
+        )
+
+
+class WaypointReference(_PositionReference):
+    """From rest to rest through points at given times, with the least snap."""
+
+    type: Literal["waypoints"]
+    positions: Annotated[tuple[Vector3, ...], Field(min_length=2, max_length=50, strict=False)] = (
+        Field(description="m; the first is the start")
+    )
+    times: Annotated[tuple[float, ...], Field(strict=False)] = Field(
+        description="s, one a point, from 0; after the last the reference rests"
+    )
+
+    @property
+    def parameters(self) -> ReferenceParameters:
+        """The record that the law reads."""
+        return self._parameters(self.type, (0.0, 0.0, 0.0), segments=float(len(self.times)))
+
+    @property
+    def table(self) -> tuple[float, ...]:
+        """The polynomials of the motion; see `controllers.waypoints.minimum_snap_table`."""
+        return _minimum_snap_table(self.positions, self.times)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        try:
+            _ = self.table
+        except ValueError as error:
+            raise InvalidValueError("reference.times", self.times, str(error)) from None
+        return self
+
+
+_minimum_snap_table = lru_cache(maxsize=64)(minimum_snap_table)
+
+
+def _by_axis(name: str, values: tuple[float, float, float]) -> dict[str, float]:
+    return {f"{name}_{axis}": value for axis, value in zip("xyz", values, strict=True)}
+
+
+class AttitudeAltitudeReference(_Reference):
     """Attitude and altitude to hold; the horizontal position is free (ch. 3)."""
 
     type: Literal["attitude_altitude"]
@@ -328,9 +528,25 @@ class AttitudeAltitudeReference(Table):
 
 
 Reference = Annotated[
-    SetpointReference | LineReference | CircleReference | AttitudeAltitudeReference,
+    SetpointReference
+    | LineReference
+    | CircleReference
+    | LissajousReference
+    | FigureEightReference
+    | WaypointReference
+    | AttitudeAltitudeReference,
     Field(discriminator="type"),
 ]
+
+# --- [ground] ----------------------------------------------------------------------------------
+
+
+class GroundTable(Table):
+    """Ground to take off from and land on; without the table nothing touches."""
+
+    height: float = Field(0.0, description="m, world")
+    friction: Positive = Field(0.8, description="coefficient of sliding friction")
+
 
 # --- [[disturbance]] ---------------------------------------------------------------------------
 
@@ -367,10 +583,8 @@ class SensorTable(Table):
     @property
     def are_imperfect(self) -> bool:
         """Whether any reading differs from the truth."""
-        return self.model_dump(exclude={"sample_time"}) != _PERFECT
+        return self.model_copy(update={"sample_time": None}) != SensorTable()
 
-
-_PERFECT: Final = SensorTable().model_dump(exclude={"sample_time"})
 
 Rotor = Annotated[int, Field(ge=1, le=4)]
 
@@ -446,7 +660,7 @@ class TurbulenceTable(Table):
     sample_time: Positive = Field(0.01, description="s for which a draw of the noise stands")
 
 
-class GroundTable(Table):
+class GroundEffectTable(Table):
     """Ground effect on each rotor (Cheeseman and Bennett)."""
 
     rotor_radius: Positive = Field(0.1, description="m")
@@ -461,7 +675,7 @@ class AirTable(Table):
     drag: DragTable = DragTable()
     gust: GustTable | None = None
     turbulence: TurbulenceTable | None = None
-    ground: GroundTable | None = None
+    ground_effect: GroundEffectTable | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -486,7 +700,20 @@ class Expectation(Table):
     """A bound on a metric, judged after the flight."""
 
     metric: str
-    published: float | None = Field(None, description="the thesis' figure, shown beside ours")
+    claim: str = Field("", description="what the thesis states, in our words, for the report")
+    published: float | bool | None = Field(
+        None,
+        description="the thesis' figure, shown beside ours; true or false: does the metric, or the "
+        "statement that it lies within the bounds, hold in the thesis",
+    )
+    published_tolerance: NonNegative | None = Field(
+        None, description="how near counts as reproduced; default: half a unit of the last digit"
+    )
+    in_kind: Range | None = Field(
+        None, description="where the claim still holds though the number differs"
+    )
+    wrong: bool = Field(False, description="the claim is refuted, not merely not seen; needs why")
+    why: str = Field("", description="the reason where the claim does not come out")
     min: float | None = None
     max: float | None = None
     equals: bool | None = Field(None, description="for metrics that are true or false")
@@ -508,7 +735,33 @@ class Expectation(Table):
             raise InvalidValueError("expect.metric", self.metric, "a number: give min, max or both")
         if self.min is not None and self.max is not None and self.min > self.max:
             raise InvalidValueError("expect.min", self.min, f"must not exceed max = {self.max}")
+        self._check_claim(boolean)
         return self
+
+    def _check_claim(self, boolean: bool) -> None:
+        published = self.published
+        if boolean and published is not None and not isinstance(published, bool):
+            raise InvalidValueError(
+                "expect.published", published, f"{self.metric} is true or false"
+            )
+        if published is None:
+            for key in ("claim", "why", "wrong"):
+                if getattr(self, key):
+                    raise InvalidValueError(
+                        f"expect.{key}",
+                        getattr(self, key),
+                        "needs published: a number, true, false",
+                    )
+        if published is None or isinstance(published, bool):
+            for key in ("published_tolerance", "in_kind"):
+                if getattr(self, key) is not None:
+                    raise InvalidValueError(
+                        f"expect.{key}", getattr(self, key), "needs a published number"
+                    )
+        if self.wrong and not self.why:
+            raise InvalidValueError("expect.wrong", True, "needs why")
+        if self.in_kind is not None and not self.in_kind[0] <= self.in_kind[1]:
+            raise InvalidValueError("expect.in_kind", self.in_kind, "write [low, high]")
 
 
 # --- the whole ---------------------------------------------------------------------------------
@@ -519,12 +772,14 @@ class Scenario(Table):
 
     title: str = ""
     source: str = ""
-    vehicle: VehicleTable = VehicleTable()
+    vehicle: VehicleUnion = VehicleTable()
+    model_error: ModelErrorTable = ModelErrorTable()
     simulation: SimulationTable = SimulationTable()
     initial: InitialTable = InitialTable()
     controller: Controller = AttitudeAltitudeController()
     gait: Gait = FixedGait()
     reference: Reference = SetpointReference()
+    ground: GroundTable | None = None
     disturbance: Annotated[tuple[Disturbance, ...], Field(strict=False)] = ()
     air: AirTable = AirTable()
     sensors: SensorTable = SensorTable()
@@ -551,25 +806,56 @@ class Scenario(Table):
     def _real_actuators(self) -> list[tuple[str, object, object]]:
         """What `tiltsim.loops.actuation` is for: key, value and what the ideal would be."""
         controller = self.controller
+        servo = getattr(self.vehicle, "tilt_servo", None)
         return [
-            ("vehicle.rotor_time_constant", self.vehicle.rotor_time_constant, None),
-            ("vehicle.tilt_servo.max_rate", self.vehicle.tilt_servo.max_rate, None),
+            (
+                "vehicle.rotor_time_constant",
+                getattr(self.vehicle, "rotor_time_constant", None),
+                None,
+            ),
+            ("vehicle.tilt_servo.max_rate", getattr(servo, "max_rate", None), None),
             ("simulation.control_latency", self.simulation.control_latency, 0.0),
-            ("sensors", self.sensors.model_dump(exclude={"sample_time"}), _PERFECT),
+            ("sensors", self.sensors.are_imperfect, False),
             ("fault", [fault.type for fault in self.fault], []),
             ("controller.allocation", getattr(controller, "allocation", "inversion"), "inversion"),
         ]
+
+    @property
+    def rotorcraft(self) -> VehicleTable:
+        """The vehicle of a tiltrotor or quadrotor. Raises TypeError for other vehicles."""
+        if not isinstance(self.vehicle, VehicleTable):
+            raise TypeError(f"the {self.vehicle.model} is no rotorcraft")
+        return self.vehicle
+
+    @property
+    def true_rotorcraft(self) -> Vehicle:
+        """The vehicle that flies; the law knows ``rotorcraft.resolve()``."""
+        return self.model_error.apply(self.rotorcraft.resolve())
+
+    @property
+    def tilt_car(self) -> TiltCarTable:
+        """The vehicle of a tilt-car. Raises TypeError for other vehicles."""
+        if not isinstance(self.vehicle, TiltCarTable):
+            raise TypeError(f"the {self.vehicle.model} is no tilt-car")
+        return self.vehicle
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         self._check_law()
         self._check_actuators()
+        self._check_model_error()
         self._check_gait()
         self._check_reference()
         self._check_rotor_limits()
+        self._check_ground()
         self._check_servo()
         self._check_stability()
         return self
+
+    def reference_and_table(self) -> tuple[ReferenceParameters, tuple[float, ...]]:
+        """The reference's record, and the table of the flight: the gait's and the reference's."""
+        gait = self.gait.plan(self.vehicle.resolve())
+        return self.reference.placed(gait.table)
 
     def _check_law(self) -> None:
         law, model = self.controller.law, self.vehicle.model
@@ -580,9 +866,17 @@ class Scenario(Table):
                 f"flies the {self.controller.vehicle_model}, and vehicle.model = {model!r}; "
                 f"choose {', '.join(_laws_of(model))}",
             )
+        rotors = 2 if model == "tilt_car" else 4
+        speed = self.initial.rotor_speed
+        if isinstance(speed, tuple) and len(speed) != rotors:
+            raise InvalidValueError(
+                "initial.rotor_speed", speed, f"the {model} has {rotors} rotors; give one or all"
+            )
+        if model == "tilt_car":
+            self._check_plane()
         if model != "quadrotor":
             return
-        vehicle = self.vehicle
+        vehicle = self.rotorcraft
         for key, value, default in (
             ("gait.type", self.gait.type, "fixed"),
             ("gait", self.gait.model_dump(), FixedGait().model_dump()),
@@ -601,6 +895,11 @@ class Scenario(Table):
                 )
 
     def _check_actuators(self) -> None:
+        car = not isinstance(self.vehicle, VehicleTable)
+        if self.has_air and car:
+            raise InvalidValueError(
+                "vehicle.model", self.vehicle.model, "has no air around it; leave air out"
+            )
         if self.has_air and self.simulation.plant == "thesis":
             raise InvalidValueError(
                 "simulation.plant", "thesis", "the thesis' equations know no air; use mujoco"
@@ -625,12 +924,76 @@ class Scenario(Table):
                     f"has more than one {'stuck servo' if kind[1] else 'loss of thrust'}",
                 )
         controller = self.controller
-        low, high = self.vehicle.min_rotor_speed, self.vehicle.max_rotor_speed
-        if getattr(controller, "allocation", "") == "prioritized" and low is None and high is None:
+        prioritized = getattr(controller, "allocation", "inversion") == "prioritized"
+        if (
+            prioritized
+            and self.rotorcraft.min_rotor_speed is None
+            and self.rotorcraft.max_rotor_speed is None
+        ):
             raise InvalidValueError(
                 "controller.allocation",
                 "prioritized",
                 "nothing limits the rotors; give vehicle.min_rotor_speed or max_rotor_speed",
+            )
+
+    def _check_model_error(self) -> None:
+        error = self.model_error
+        if error == ModelErrorTable():
+            return
+        thesis, car = self.simulation.plant == "thesis", not isinstance(self.vehicle, VehicleTable)
+        if thesis or car:
+            key, value = (
+                ("simulation.plant", "thesis") if thesis else ("vehicle.model", self.vehicle.model)
+            )
+            raise InvalidValueError(
+                key, value, "takes no [model_error]; use a rotorcraft on the mujoco plant"
+            )
+        a, b, c = sorted(self.true_rotorcraft[1:4])
+        if a + b < c:
+            raise InvalidValueError(
+                "model_error.inertia",
+                list(error.inertia),
+                "no body has it: two moments must exceed the third",
+            )
+
+    def _check_plane(self) -> None:
+        """Refuse what would lift a tilt-car off its plane, or yaw it where yaw is no output."""
+        initial, reference = self.initial, self.reference
+        vectors: dict[str, tuple[tuple[float, ...], slice]] = {
+            "initial.position": (initial.position, slice(2, 3)),
+            "initial.velocity": (initial.velocity, slice(2, 3)),
+            "initial.attitude": (initial.attitude, slice(0, 2)),
+            "initial.angular_velocity": (initial.angular_velocity, slice(0, 2)),
+        }
+        for name in ("position", "velocity", "acceleration"):
+            vector = getattr(reference, name, None)
+            if vector is not None:
+                vectors[f"reference.{name}"] = (vector, slice(2, 3))
+        for key, (vector, upwards) in vectors.items():
+            if any(vector[upwards]):
+                raise InvalidValueError(
+                    key,
+                    vector,
+                    "the tilt_car stays on its plane: x, y and yaw alone may differ from 0",
+                )
+        if reference.yaw != 0.0:
+            raise InvalidValueError(
+                "reference.yaw", reference.yaw, "yaw is no output of the tilt_car's laws"
+            )
+        wanted = self.controller.gait_types
+        if self.gait.type not in wanted:
+            raise InvalidValueError(
+                "gait.type",
+                self.gait.type,
+                f"the {self.controller.law} law takes none; leave the table out"
+                if wanted == ("fixed",)
+                else f"the {self.controller.law} law needs one of {', '.join(wanted)}",
+            )
+        if wanted == ("fixed",) and self.gait != FixedGait():
+            raise InvalidValueError(
+                "gait",
+                self.gait.model_dump(mode="json"),
+                f"the {self.controller.law} law moves the tilt itself; leave the table out",
             )
 
     def _check_reference(self) -> None:
@@ -653,14 +1016,29 @@ class Scenario(Table):
             raise InvalidValueError(
                 "reference.type", reference.type, f"the {controller.law} law cannot follow it"
             )
+        if reference.type == "waypoints" and self.vehicle.model == "tilt_car":
+            raise InvalidValueError(
+                "reference.type", reference.type, "the tilt_car's laws cannot follow it"
+            )
+        own = isinstance(controller, AttitudeAltitudeController)
+        exact = isinstance(controller, AttitudeAltitudeController) and (
+            controller.gait_rate_feedforward
+        )
+        if (not own or exact) and getattr(reference, "acceleration_feedforward", False):
+            law = "attitude_altitude law with gait_rate_feedforward" if exact else controller.law
+            raise InvalidValueError(
+                "reference.acceleration_feedforward",
+                True,
+                f"the {law} follows all derivatives anyway; leave it out",
+            )
         if not isinstance(controller, AttitudeAltitudeController):
-            if getattr(reference, "acceleration_feedforward", False):
-                raise InvalidValueError(
-                    "reference.acceleration_feedforward",
-                    True,
-                    f"the {controller.law} law follows all derivatives anyway; leave it out",
-                )
             return
+        if controller.supervisor is not None and self.simulation.plant == "thesis":
+            raise InvalidValueError(
+                "simulation.plant",
+                "thesis",
+                "its tilt angles follow the gait whatever controller.supervisor says; use mujoco",
+            )
         decoupler = controller.decoupler
         free = kind == "attitude_altitude"
         if free and decoupler != "none":
@@ -680,7 +1058,7 @@ class Scenario(Table):
             gait = self.gait.plan(self.vehicle.resolve())
         except ValueError as error:
             raise InvalidValueError(f"gait.{key}", value, str(error)) from None
-        limit = self.vehicle.tilt_servo.max_angle
+        limit = getattr(self.vehicle.tilt_servo, "max_angle", None)
         if limit is not None and gait.amplitude > limit:
             raise InvalidValueError(
                 f"gait.{key}",
@@ -688,11 +1066,17 @@ class Scenario(Table):
                 f"tilts by {gait.amplitude:.4g} rad, beyond the servo limit "
                 f"vehicle.tilt_servo.max_angle = {limit}",
             )
-        if len(gait.table) > MAX_TABLE:
+        rows = len(gait.table)
+        if rows > MAX_TABLE:
             raise InvalidValueError(
-                f"gait.{key}",
-                value,
-                f"too many keyframes: {len(gait.table)} numbers, at most {MAX_TABLE}",
+                f"gait.{key}", value, f"too many keyframes: {rows} numbers, at most {MAX_TABLE}"
+            )
+        total = len(self.reference.placed(gait.table)[1])
+        if total > MAX_TABLE:
+            raise InvalidValueError(
+                "reference.times",
+                len(getattr(self.reference, "times", ())),
+                f"too many waypoints: {total} numbers with the gait's, at most {MAX_TABLE}",
             )
         if self.controller.law == "full_pose" and not gait.is_constant:
             raise InvalidValueError(
@@ -701,7 +1085,27 @@ class Scenario(Table):
                 "the full_pose law moves the pods itself; give the angles at the start as fixed",
             )
 
+    def _check_ground(self) -> None:
+        if self.ground is None:
+            return
+        if self.vehicle.model == "tilt_car":
+            raise InvalidValueError(
+                "ground", self.ground.model_dump(), "the tilt_car moves in a plane without one"
+            )
+        if self.simulation.plant == "thesis":
+            raise InvalidValueError(
+                "simulation.plant", "thesis", "the thesis' equations know no ground; use mujoco"
+            )
+        if self.initial.position[2] < self.ground.height:
+            raise InvalidValueError(
+                "initial.position",
+                self.initial.position,
+                f"below ground.height = {self.ground.height}",
+            )
+
     def _check_rotor_limits(self) -> None:
+        if not isinstance(self.vehicle, VehicleTable):
+            return
         low, high = self.vehicle.min_rotor_speed, self.vehicle.max_rotor_speed
         if self.simulation.plant == "thesis" and (low is not None or high is not None):
             raise InvalidValueError(
@@ -709,7 +1113,7 @@ class Scenario(Table):
                 "thesis",
                 "the thesis' equations know no rotor limits; use mujoco",
             )
-        for speed in self.initial.rotor_speeds:
+        for speed in self.initial.rotor_speeds(4):
             if (low is not None and speed < low) or (high is not None and speed > high):
                 raise InvalidValueError(
                     "initial.rotor_speed",
@@ -721,7 +1125,7 @@ class Scenario(Table):
         servo, timestep = self.vehicle.tilt_servo, self.simulation.timestep
         # The fastest pole of the servo must stay where explicit integration is stable.
         fastest = servo.natural_frequency * max(1.0, 2.0 * servo.damping_ratio)
-        tilts = self.vehicle.model == "tiltrotor"
+        tilts = self.vehicle.model != "quadrotor"
         if tilts and self.simulation.plant == "mujoco" and fastest * timestep > MAX_SERVO_STEP:
             raise InvalidValueError(
                 "simulation.timestep",
@@ -734,7 +1138,8 @@ class Scenario(Table):
         controller = self.controller
         if controller.allow_unstable:
             return
-        for loop in controller.closed_loops(self.vehicle.resolve()):
+        vehicle: Any = self.vehicle.resolve()  # each law's table takes its own vehicle's
+        for loop in controller.closed_loops(vehicle):
             if not loop.stable:
                 raise InvalidValueError(
                     "controller.gains",

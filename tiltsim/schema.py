@@ -1,4 +1,4 @@
-"""The JSON Schema of scenario files, from the same models that validate them."""
+"""The JSON Schemas of scenario and sweep files, from the same models that validate them."""
 
 from __future__ import annotations
 
@@ -23,4 +23,14 @@ def scenario_schema() -> dict[str, Any]:
     variant["additionalProperties"] = False
     schema["$defs"]["Variant"] = variant
     schema["properties"]["variant"] = {"type": "array", "items": {"$ref": "#/$defs/Variant"}}
+    return schema
+
+
+def sweep_schema() -> dict[str, Any]:
+    """The schema of a sweep file."""
+    from tiltsim.sweeps.tables import Sweep
+
+    schema = Sweep.model_json_schema()
+    schema["title"] = "tiltsim sweep"
+    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     return schema

@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from math import copysign, hypot, isfinite
+from collections.abc import Callable, Iterable
+from math import copysign, isfinite
 from time import perf_counter
 from typing import Final
 
 import numpy as np
 
-from controllers.references import position_reference
 from tiltsim.flight import End, Flight
+from tiltsim.limits import (
+    ALTITUDE_ERROR,
+    BODY_RATE,
+    HORIZONTAL_ERROR,
+    ROTOR_SPEED,
+    SINGULAR,
+    WITHIN,
+    altitude_error,
+    horizontal_error,
+)
 from tiltsim.loop import Floats
 from tiltsim.loops import control_setup, loop_of
 from tiltsim.plants import Plant, make_plant
 from tiltsim.scenario import Scenario
 
-MAX_POSITION_ERROR: Final = 1e4  # m
-MAX_BODY_RATE: Final = 1e3  # rad/s, far above what any rotorcraft survives
-MAX_ROTOR_SPEED: Final = 1e5  # rad/s
+CHUNK_TIME: Final = 0.1
+"""How long (s) native code flies before Python looks at the samples and at the keyboard."""
 
-SINGULAR: Final = 1e-9
-"""What counts as zero, for a determinant of order one and all else that a loop watches."""
+FIRST_CHUNK: Final = 8  # samples
+LARGEST_CHUNK: Final = 100_000
 
 Observer = Callable[[Floats], None]
 
@@ -46,27 +54,29 @@ def simulate(scenario: Scenario, observer: Observer | None = None) -> Flight:
     simulation = scenario.simulation
     plant = make_plant(scenario)
     watch = Watch(scenario)
-    samples = [_sample(plant)]
-    if observer is not None:
-        observer(samples[0])
-    end = watch.judge(plant, samples[0])
-    steps_left = simulation.steps
+    samples: list[Floats] = []
+
+    def keep(sample: Floats) -> None:
+        samples.append(sample)
+        if observer is not None:
+            observer(sample)
+
     start = perf_counter()
     try:
+        keep(_sample(plant))
+        end = watch.judge(plant, samples[0])
+        steps_left, chunk = simulation.steps, FIRST_CHUNK if plant.engine == "native" else 1
         while steps_left > 0 and end is None:
             steps = min(simulation.record_steps, steps_left)
-            before = plant.state
-            plant.advance(steps)
-            sample = _sample(plant)
-            end = watch.judge(plant, sample)
-            if end is not None:
-                plant.state = before
-                sample, end = _first_bad_step(plant, watch, steps, sample, end)
-            if np.isfinite(sample).all():
-                samples.append(sample)
-                if observer is not None:
-                    observer(sample)
-            steps_left -= steps
+            count = max(1, min(chunk, steps_left // steps))
+            began = perf_counter()
+            flown, end = fly_chunk(plant, watch, count, steps)
+            for sample in flown:
+                keep(sample)
+            steps_left -= count * steps
+            if plant.engine == "native":
+                pace = CHUNK_TIME / max(perf_counter() - began, 1e-9)
+                chunk = max(1, min(int(count * pace), 2 * count, LARGEST_CHUNK))
     except KeyboardInterrupt:
         end = End("interrupted", float(samples[-1][0]), "interrupted from the keyboard")
     wall_time = perf_counter() - start
@@ -77,6 +87,36 @@ def simulate(scenario: Scenario, observer: Observer | None = None) -> Flight:
 
 def _sample(plant: Plant) -> Floats:
     return np.array([plant.time, *plant.observe()])
+
+
+def fly_chunk(
+    plant: Plant, watch: Watch, samples: int, steps: int
+) -> tuple[Iterable[Floats], End | None]:
+    """Fly ``samples`` intervals of ``steps`` steps; the samples, and the end if it came.
+
+    Where something goes wrong on the way the flight is repeated, sample by sample and in the end
+    step by step, to find the very step.
+    """
+    before = plant.state
+    if samples > 1:
+        flown = plant.record(samples, steps)
+        if flown is not None and watch.finds_nothing(plant, flown):
+            return flown, None
+        plant.state = before
+    kept = []
+    for _ in range(samples):
+        before = plant.state
+        plant.advance(steps)
+        sample = _sample(plant)
+        end = watch.judge(plant, sample)
+        if end is not None:
+            plant.state = before
+            sample, end = _first_bad_step(plant, watch, steps, sample, end)
+        if np.isfinite(sample).all():
+            kept.append(sample)
+        if end is not None:
+            return kept, end
+    return kept, None
 
 
 def _first_bad_step(
@@ -97,7 +137,7 @@ class Watch:
 
     def __init__(self, scenario: Scenario) -> None:
         self._loop, self._setup = loop_of(scenario), control_setup(scenario)
-        self._reference = scenario.reference.parameters
+        self._reference, self._table = scenario.reference_and_table()
         self._follows_position = self._loop.follows_position(scenario)
         self._sides: dict[int, float] = {}
 
@@ -115,23 +155,34 @@ class Watch:
             return End("diverged", time, f"{name} is no longer a finite number")
         return self._judge_limits(time, state) or self._judge_singularity(time, state)
 
+    def finds_nothing(self, plant: Plant, samples: Floats) -> bool:
+        """Whether the flight goes on after samples that the plant found sound when recording them.
+
+        A plant that records natively has judged all but the last; see `tiltsim.native.Recorder`.
+        """
+        if plant.engine == "native" and self._loop.watch is not None:
+            samples = samples[-1:]
+        return all(self.judge(plant, sample) is None for sample in samples)
+
     def _judge_limits(self, time: float, state: dict[str, float]) -> End | None:
-        target = position_reference(time, self._reference)
-        if self._follows_position:
-            error = hypot(target[0] - state["x"], target[1] - state["y"])
-            if error > MAX_POSITION_ERROR:
-                return End("diverged", time, f"{error:.3g} m away from the reference")
-        error = abs(target[2] - state["z"])
-        if error > MAX_POSITION_ERROR:
-            return End("diverged", time, f"{error:.3g} m away from the reference altitude")
-        for name in ("p", "q", "r"):
-            if abs(state[name]) > MAX_BODY_RATE:
-                return End("diverged", time, f"body rate {name} = {state[name]:.3g} rad/s")
-        for rotor in (1, 2, 3, 4):
-            speed = state[f"rotor_speed_{rotor}"]
-            if abs(speed) > MAX_ROTOR_SPEED:
-                return End("diverged", time, f"rotor {rotor} at {speed:.3g} rad/s")
-        return None
+        values = list(state.values())[1:]
+        limits = self._reference, self._table, self._follows_position
+        code = self._loop.kind.limit_exceeded(time, values, *limits)
+        if code == WITHIN:
+            return None
+        if code == HORIZONTAL_ERROR:
+            error = horizontal_error(time, values, self._reference, self._table)
+            cause = f"{error:.3g} m away from the reference"
+        elif code == ALTITUDE_ERROR:
+            error = altitude_error(time, values, self._reference, self._table)
+            cause = f"{error:.3g} m away from the reference altitude"
+        elif code < ROTOR_SPEED:
+            name = "pqr"[code - BODY_RATE]
+            cause = f"body rate {name} = {state[name]:.3g} rad/s"
+        else:
+            rotor = code - ROTOR_SPEED + 1
+            cause = f"rotor {rotor} at {state[f'rotor_speed_{rotor}']:.3g} rad/s"
+        return End("diverged", time, cause)
 
     def _judge_singularity(self, time: float, state: dict[str, float]) -> End | None:
         for index, (value, cause) in enumerate(self._loop.watched(state, self._setup)):

@@ -19,7 +19,11 @@ Angles2 = Annotated[tuple[Angle, Angle], Field(strict=False)]
 Angles3 = Annotated[tuple[Angle, Angle, Angle], Field(strict=False)]
 Angles4 = Annotated[tuple[Angle, Angle, Angle, Angle], Field(strict=False)]
 Gains2 = Annotated[tuple[float, float], Field(strict=False)]
+Gains4 = Annotated[tuple[float, float, float, float], Field(strict=False)]
+Positive2 = Annotated[tuple[Positive, Positive], Field(strict=False)]
 Positive4 = Annotated[tuple[Positive, Positive, Positive, Positive], Field(strict=False)]
+Limit = Annotated[float, Field(allow_inf_nan=True)]
+Range = Annotated[tuple[Limit, Limit], Field(strict=False)]
 
 
 class Table(BaseModel):

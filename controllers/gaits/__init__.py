@@ -7,18 +7,22 @@ what a scenario or a chapter states, and knows period, amplitude, rate and conti
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import cos, pi, sin
 from typing import Final, NamedTuple
 
 from controllers.gaits.keyframes import NO_KEYFRAMES, keyframe_gait
+from controllers.gaits.penguin import penguin_swing, rotating
 from controllers.gaits.trot import TiltsAndRates, continuous_trot, instant_trot
-from controllers.gaits.two_color import two_color_circle
-from controllers.scalar import scalar
+from controllers.gaits.two_color import RED, two_color_circle
+from controllers.scalar import Quad, scalar
 
 FIXED: Final = 0
 TROT_INSTANT: Final = 1
 TROT_CONTINUOUS: Final = 2
 KEYFRAMES: Final = 3
 TWO_COLOR_CIRCLE: Final = 4
+PENGUIN: Final = 5
+ROTATING: Final = 6
 
 GAIT_TYPES: Final = {
     "fixed": FIXED,
@@ -30,6 +34,9 @@ GAIT_TYPES: Final = {
     "rotary_gallop": KEYFRAMES,
     "two_color": KEYFRAMES,  # a circular path is a TWO_COLOR_CIRCLE
     "waypoints": KEYFRAMES,
+    "penguin_small": PENGUIN,
+    "penguin_large": PENGUIN,
+    "rotating": ROTATING,
 }
 """How a gait is evaluated, by the name a scenario gives it."""
 
@@ -38,11 +45,11 @@ class GaitParameters(NamedTuple):
     """What a gait is made of; each type reads the fields it knows."""
 
     type: float
-    angle_1: float = 0.0  # rad, fixed
+    angle_1: float = 0.0  # rad, fixed; the tilt-car's gaits move the first angle alone
     angle_2: float = 0.0
     angle_3: float = 0.0
     angle_4: float = 0.0
-    amplitude: float = 0.0  # rad, trots
+    amplitude: float = 0.0  # rad, trots and penguins
     period: float = 1.0  # s, all but fixed
     scale: float = 1.0  # all four angles are multiplied by it (ch. 5, Eq. 16: 1/n)
     bias: float = 1.0  # [eta] alpha_3 and alpha_4 are multiplied by it (ch. 6, Eqs. 12-15)
@@ -52,6 +59,7 @@ class GaitParameters(NamedTuple):
     radius: float = 0.0
     color: float = 0.0
     drag_ratio: float = 0.0  # [r] sets the offset of the blue lines
+    rate: float = 0.0  # rad/s, rotating
 
 
 @scalar
@@ -71,6 +79,10 @@ def planned_angles(time: float, gait: GaitParameters, table: Sequence[float]) ->
             gait.color,
             gait.drag_ratio,
         )
+    if gait.type == PENGUIN:
+        return penguin_swing(time, gait.amplitude, gait.period)
+    if gait.type == ROTATING:
+        return rotating(time, gait.angle_1, gait.rate)
     if gait.type == TROT_CONTINUOUS:
         return continuous_trot(time, gait.amplitude, gait.period)
     return instant_trot(time, gait.amplitude, gait.period)
@@ -100,3 +112,18 @@ def tilt_reference(
         back * rate_3,
         back * rate_4,
     )
+
+
+@scalar
+def tilt_acceleration(time: float, gait: GaitParameters) -> Quad:
+    """The second derivatives (rad/s^2) of the planned tilt angles at a time (s).
+
+    Zero for constant gaits and for those made of straight lines, whose rates jump at the corners.
+    """
+    if gait.type != TWO_COLOR_CIRCLE:
+        return 0.0, 0.0, 0.0, 0.0
+    turning = 2.0 * pi / gait.period
+    inward = -gait.scale * gait.radius * turning * turning
+    front_1, front_2 = inward * cos(turning * time), inward * sin(turning * time)
+    slope = gait.bias if gait.color == RED else -gait.bias
+    return front_1, front_2, slope * front_1, slope * front_2

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, replace
-from math import inf, isfinite
+from math import inf, isfinite, pi
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +16,8 @@ import numpy as np
 from controllers.gaits import (
     FIXED,
     KEYFRAMES,
+    PENGUIN,
+    ROTATING,
     TROT_CONTINUOUS,
     TROT_INSTANT,
     TWO_COLOR_CIRCLE,
@@ -59,7 +61,7 @@ class Gait:
     @property
     def is_continuous(self) -> bool:
         """Whether the tilt angles are continuous in time (ch. 6, Definition 1)."""
-        if self.parameters.type == TROT_INSTANT:
+        if self.parameters.type in {TROT_INSTANT, PENGUIN}:
             return self.parameters.amplitude * self.parameters.scale == 0.0
         rows = self._rows()
         if rows is None:
@@ -71,6 +73,8 @@ class Gait:
     @property
     def amplitude(self) -> float:
         """The largest magnitude (rad) of any tilt angle."""
+        if self.parameters.type == ROTATING:
+            return inf
         rows = self._rows()
         if rows is not None:
             return float(np.abs(rows[:, 1:]).max())
@@ -91,6 +95,16 @@ class Gait:
             return float(np.abs(slopes).max())
         eighths = np.arange(8) / 8.0 * self.parameters.period
         return float(np.abs(self.rates(eighths)).max())
+
+    @property
+    def shortest_line(self) -> float:
+        """The shortest time (s) between two corners; infinite without corners, 0 with jumps."""
+        if not self.is_continuous:
+            return 0.0
+        rows = self._rows()
+        if rows is not None:
+            return float(np.diff(rows[:, 0]).min()) * self.parameters.period
+        return 0.5 * self.parameters.period if self.parameters.type == TROT_CONTINUOUS else inf
 
     def angles(self, time: ArrayLike) -> Array:
         """Tilt angles (rad) at times (s) of shape (...), as an array of shape (..., 4)."""
@@ -159,6 +173,19 @@ def continuous_trot(amplitude: float, period: float) -> Gait:
     """The trot at a constant rate between plus and minus the amplitude (rad) (ch. 4, Eq. 34)."""
     parameters = GaitParameters(TROT_CONTINUOUS, amplitude=amplitude, period=_positive(period))
     return Gait("trot_continuous", parameters, source="ch. 4, Sec. 4.3")
+
+
+def penguin(name: str, amplitude: float, period: float) -> Gait:
+    """The tilt-car's swing between minus and plus the amplitude (rad) (ch. 11, Sec. 3)."""
+    parameters = GaitParameters(PENGUIN, amplitude=amplitude, period=_positive(period))
+    return Gait(name, parameters, source="ch. 11, Sec. 3, Figs. 7 and 8")
+
+
+def rotating(start: float, rate: float) -> Gait:
+    """A tilt that turns on at a constant rate (rad/s) from ``start`` (rad) (ch. 10, Eq. 18)."""
+    period = _positive(2.0 * pi / abs(rate)) if rate else 1.0
+    parameters = GaitParameters(ROTATING, angle_1=start, rate=rate, period=period)
+    return Gait("rotating", parameters, source="ch. 10, Eq. (18)")
 
 
 def cat(name: str, amplitude: float, period: float) -> Gait:

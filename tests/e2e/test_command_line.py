@@ -267,22 +267,36 @@ def test_check_on_several_processes_keeps_the_order_of_junit(tmp_path):
     assert names == ["a.toml", "b.toml", "c.toml"]
 
 
+def split_address(address):
+    family, hash_, variant = address.partition("#")
+    return [family, hash_ + variant] if variant else [family]
+
+
 def test_list_shows_every_scenario_with_title_and_source(capsys):
     assert main(["list"]) == 0
-    printed = capsys.readouterr().out
-    assert any(
-        line.startswith(SETPOINT) and "modified decoupler" in line and "Fig. 4 (B1)" in line
-        for line in printed.splitlines()
-    )
+    lines = capsys.readouterr().out.splitlines()
+    family, _, variant = SETPOINT.partition("#")
+    first = next(i for i, line in enumerate(lines) if line.startswith(f"{family}  "))
+    assert "Setpoint with the trot angle fixed (ch. 4, Sec. 6.1, Fig. 4)" in lines[first]
+    member = next(line for line in lines[first:] if line.lstrip().startswith(f"#{variant} "))
+    assert "modified decoupler" in member
+    assert member.endswith(" (Fig. 4 (B1))")
     assert main(["list", "--json"]) == 0
     entries = json.loads(capsys.readouterr().out)
     assert all(entry["title"] and entry["source"] for entry in entries)
+    # A member without a title is told by what it changes; a title is not repeated.
+    trots = [line for line in lines if line.lstrip().startswith("#continuous_t3_modified ")]
+    assert all("type = trot_continuous" in line and "period = 3.0" in line for line in trots)
+    assert len(trots) == 2
+    shown = {line.split()[0] for line in lines}
+    assert all(part in shown for e in entries for part in split_address(e["scenario"]))
 
 
 def test_schema_knows_every_table_and_the_variants(capsys):
     assert main(["schema"]) == 0
     schema = json.loads(capsys.readouterr().out)
     tables = {"vehicle", "simulation", "initial", "controller", "gait", "reference"}
+    tables |= {"model_error"}
     lists = {"disturbance", "expect", "variant"}
     assert tables | lists | {"title", "source"} == set(schema["properties"])
     assert schema["additionalProperties"] is False

@@ -6,6 +6,8 @@ import argparse
 import json
 from typing import Any
 
+from tiltsim.errors import InputError
+
 
 def add_parser(subparsers: Any) -> None:
     """Declare the command."""
@@ -13,30 +15,94 @@ def add_parser(subparsers: Any) -> None:
         "bench",
         help="measure the closed loop against bare MuJoCo",
         description=(
-            "Measure the speed of the closed loop as a share of bare mj_step on the same model, "
-            "flying, in one interleaved run; medians."
+            "Measure the speed of the closed loop, single and in batches, as a share of bare "
+            "mj_step on the same model, flying, in one interleaved run; medians."
         ),
     )
     parser.add_argument("--json", action="store_true", help="machine-readable")
+    instead = parser.add_mutually_exclusive_group()
+    instead.add_argument(
+        "--vehicles",
+        type=int,
+        metavar="N",
+        help="instead fly N whole flights, metrics included, and tell time and memory",
+    )
+    instead.add_argument(
+        "--accuracy",
+        action="store_true",
+        help="instead show RK4's position error against the time step and the speed",
+    )
+    parser.add_argument("--duration", type=float, default=10.0, help="with --vehicles, s")
+    parser.add_argument("--timestep", type=float, default=0.001, help="with --vehicles, s")
+    parser.add_argument(
+        "--integrator",
+        choices=("RK4", "implicitfast", "implicit", "Euler"),
+        default="implicitfast",
+        help="with --vehicles",
+    )
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure and print."""
-    from tiltsim.benchmark import run_benchmark
+    if arguments.vehicles is not None and arguments.vehicles < 1:
+        raise InputError(f"--vehicles {arguments.vehicles}: must be at least 1")
 
-    rows = run_benchmark()
+    from tiltsim.benchmark import bench_accuracy, bench_flights, run_benchmark
+
+    if arguments.vehicles is not None:
+        rows = bench_flights(
+            arguments.vehicles, arguments.duration, arguments.integrator, arguments.timestep
+        )
+    elif arguments.accuracy:
+        rows = bench_accuracy()
+    else:
+        rows = run_benchmark()
     if arguments.json:
         print(json.dumps(rows, indent=2))
         return 0
+    if arguments.vehicles is not None:
+        _print_flights(rows[0])
+    elif arguments.accuracy:
+        _print_accuracy(rows)
+    else:
+        _print_ratios(rows)
+    return 0
+
+
+def _print_ratios(rows: list[dict[str, Any]]) -> None:
     print(
-        f"{'case':<8}{'integrator':<14}{'engine':<9}{'us/step':>9}{'x real time':>13}{'ratio':>8}"
+        f"{'case':<10}{'integrator':<14}{'engine':<9}{'vehicles':>9}{'threads':>9}"
+        f"{'us/step':>9}{'x real time':>13}{'ratio':>8}"
     )
     for row in rows:
         print(
-            f"{row['case']:<8}{row['integrator']:<14}{row['engine']:<9}"
+            f"{row['case']:<10}{row['integrator']:<14}{row['engine']:<9}"
+            f"{row['vehicles']:>9}{row['threads']:>9}"
             f"{1e6 / row['steps_per_second']:>9.2f}{row['realtime_factor']:>13.0f}"
             f"{row['ratio']:>8.3f}"
         )
     print("\nratio: share of the speed of bare mj_step on the same model in the same run; medians")
-    return 0
+    print("empty, state: callbacks that do nothing, or only read the state and write controls")
+
+
+def _print_flights(row: dict[str, Any]) -> None:
+    print(
+        f"{row['vehicles']} flights, {row['completed']} completed, {row['integrator']} at "
+        f"{1e3 * row['timestep']:g} ms on {row['threads']} threads: {row['seconds']:.1f} s, "
+        f"{row['steps_per_second']:.4g} steps/s, {row['realtime_factor']:.0f} x real time, "
+        f"largest memory {row['memory'] / 2**20:.0f} MiB"
+    )
+
+
+def _print_accuracy(rows: list[dict[str, Any]]) -> None:
+    print(f"{'step, ms':>9}{'position error, m':>19}{'x real time':>13}")
+    for row in rows:
+        print(
+            f"{1e3 * row['timestep']:>9g}{row['position_error']:>19.1e}"
+            f"{row['realtime_factor']:>13.0f}"
+        )
+    print(
+        f"\nRK4 against a step of 0.1 ms; {rows[0]['vehicles']} vehicles on "
+        f"{rows[0]['threads']} threads, metrics included"
+    )

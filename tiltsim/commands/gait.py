@@ -180,6 +180,7 @@ def _check_options(arguments: argparse.Namespace) -> None:
 def _choose(arguments: argparse.Namespace) -> _Chosen:
     """The gait and the vehicle that the arguments name."""
     from controllers.gaits import plans
+    from controllers.vehicle import Vehicle
     from tiltsim.errors import InputError
 
     if arguments.scenario is not None:
@@ -189,6 +190,11 @@ def _choose(arguments: argparse.Namespace) -> _Chosen:
 
         scenario = load_scenario(arguments.scenario)
         vehicle = scenario.vehicle.resolve()
+        if not isinstance(vehicle, Vehicle):
+            raise InputError(
+                f"{arguments.scenario}: vehicle.model = {scenario.vehicle.model!r}: has no gait of "
+                "four tilt angles to analyse"
+            )
         gait = replace(scenario.gait.plan(vehicle), source=scenario.source)
         if scenario.gait.bias == 1.0:
             return _Chosen(gait, vehicle, gait.name)

@@ -6,7 +6,7 @@ import argparse
 import json
 from typing import Any
 
-from tiltsim.library import library_entries
+from tiltsim.library import Entry, library_entries, library_families, library_sweeps
 
 
 def add_parser(subparsers: Any) -> None:
@@ -14,20 +14,36 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "list",
         help="list the scenario library",
-        description="List the scenario library with titles and sources in the thesis.",
+        description="List the scenario library with titles and sources in the thesis. A line that "
+        "begins with # is a variant of the file above it: tiltsim run 'FILE#VARIANT'.",
     )
+    parser.add_argument("--sweeps", action="store_true", help="the sweeps alone")
     parser.add_argument("--json", action="store_true", help="machine-readable")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print one line a scenario."""
-    entries = list(library_entries())
+    """Print a line a file, and one a variant below; sweeps at the end."""
     if arguments.json:
-        keys = ("scenario", "title", "source")
+        entries = library_sweeps() if arguments.sweeps else library_entries()
+        keys = ("sweep" if arguments.sweeps else "scenario", "title", "source")
         print(json.dumps([dict(zip(keys, entry)) for entry in entries], indent=2))
         return 0
-    width = max((len(address) for address, _, _ in entries), default=0)
-    for address, title, source in entries:
-        print(f"{address:<{width}}  {title}" + (f" ({source})" if source else ""))
+    if not arguments.sweeps:
+        _print_families()
+        print("\nsweeps, for tiltsim sweep:")
+    for sweep in library_sweeps():
+        print(_line(sweep, sweep.address))
     return 0
+
+
+def _print_families() -> None:
+    for family in library_families():
+        print(_line(family.entry, family.entry.address))
+        width = max((len(member.address) for member in family.members), default=0)
+        for member in family.members:
+            print(_line(member, f"  {member.address:<{width}}"))
+
+
+def _line(entry: Entry, address: str) -> str:
+    return f"{address}  {entry.title}" + (f" ({entry.source})" if entry.source else "")

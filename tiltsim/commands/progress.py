@@ -25,3 +25,29 @@ def progress_bar(total: float, unit: str, *, shown: bool) -> Iterator[Callable[[
             bar.update(value - bar.n)
 
         yield move
+
+
+@contextmanager
+def counting_bar(total: int, unit: str, *, shown: bool) -> Iterator[Callable[[int], None]]:
+    """A progress bar for things that are counted, with their rate and the time left.
+
+    Like `progress_bar`; the first call says what was finished before, which counts for no rate.
+    """
+    if not shown or not sys.stderr.isatty():
+        yield lambda value: None
+        return
+    from tqdm import tqdm
+
+    layout = "{l_bar}{bar}| {n}/{total} " + unit + " [{elapsed}<{remaining}, {rate_fmt}]"
+    with tqdm(total=total, unit=f" {unit}", leave=False, bar_format=layout) as bar:
+        begun = False
+
+        def move(value: int) -> None:
+            nonlocal begun
+            if not begun:
+                bar.initial = bar.n = value
+                bar.refresh()
+                begun = True
+            bar.update(value - bar.n)
+
+        yield move

@@ -12,10 +12,12 @@ from tiltsim.commands.progress import progress_bar
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, FLIGHT_LOST, INTERRUPTED
 
 if TYPE_CHECKING:
+    from concurrent.futures import Future
+
     from tiltsim.expectations import Verdict
     from tiltsim.flight import Flight
     from tiltsim.loop import Floats
-    from tiltsim.rerun_stream import LiveStream
+    from tiltsim.rerun_stream import LiveStream, RecordingFile
     from tiltsim.scenario import Scenario
 
 
@@ -68,19 +70,26 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.rerun is not None:
         prepare_file("--rerun", arguments.rerun)
 
+    from controllers.vehicle import Vehicle
     from tiltsim.analysis import gait_warnings
 
     vehicle = scenario.vehicle.resolve()
-    if not arguments.quiet:
+    if not arguments.quiet and isinstance(vehicle, Vehicle):
         for warning in gait_warnings(scenario.gait.plan(vehicle), vehicle):
             print(f"tiltsim: warning: gait: {warning}", file=sys.stderr)
-    flight = fly(scenario, arguments)
-    if arguments.out is not None:
-        flight.save(arguments.out)
-    if arguments.rerun is not None:
-        from tiltsim.rerun_stream import save_recording
+    with ExitStack() as stack:
+        recording: Future[RecordingFile] | None = None
+        if arguments.rerun is not None:
+            from concurrent.futures import ThreadPoolExecutor
 
-        save_recording([flight], arguments.rerun)
+            # Native code flies without Python's lock, so this costs no time while there is a core.
+            pool = stack.enter_context(ThreadPoolExecutor(1))
+            recording = pool.submit(_recording_of, scenario)
+        flight = fly(scenario, arguments)
+        if arguments.out is not None:
+            flight.save(arguments.out)
+        if recording is not None:
+            recording.result().save([flight], arguments.rerun)
     if flight.end.kind == "interrupted":
         kept = f"; the flight so far is in {arguments.out}" if arguments.out is not None else ""
         print(f"tiltsim: interrupted at t = {flight.end.time:.3f} s{kept}", file=sys.stderr)
@@ -104,6 +113,12 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"tiltsim: {lost(flight)}", file=sys.stderr)
         return FLIGHT_LOST
     return DONE if all(verdict.holds for verdict in verdicts) else EXPECTATION_FAILED
+
+
+def _recording_of(scenario: Scenario) -> RecordingFile:
+    from tiltsim.rerun_stream import RecordingFile
+
+    return RecordingFile([scenario])
 
 
 def fly(scenario: Scenario, arguments: argparse.Namespace) -> Flight:
@@ -168,6 +183,12 @@ def _measured(verdict: Verdict) -> str:
     return "flight under 20 s" if metric.endswith("after_20s") else "no value"
 
 
+def _published(value: float | bool | None) -> str:
+    if value is None:
+        return ""
+    return str(value).lower() if isinstance(value, bool) else f"{value:g}"
+
+
 def expectation_lines(verdicts: list[Verdict]) -> list[str]:
     """A table of expectations: verdict, metric, measured, published, bounds."""
     rows = [("", "expected", "measured", "published", "bounds")]
@@ -178,7 +199,7 @@ def expectation_lines(verdicts: list[Verdict]) -> list[str]:
                 "ok" if verdict.holds else "FAILED",
                 wanted.metric,
                 _measured(verdict),
-                "" if wanted.published is None else f"{wanted.published:g}",
+                _published(wanted.published),
                 verdict.bounds,
             )
         )

@@ -1,4 +1,4 @@
-"""``tiltsim schema``: the JSON Schema of the scenario file, for editors."""
+"""``tiltsim schema``: the JSON Schema of the scenario or the sweep file, for editors."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ def add_parser(subparsers: Any) -> None:
         help="print the JSON Schema of the scenario file",
         description="Print the JSON Schema of the scenario file; editors complete TOML with it.",
     )
+    parser.add_argument("--sweep", action="store_true", help="the schema of the sweep file instead")
     parser.set_defaults(run=run)
 
 
-def run(_arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> int:
     """Print the schema."""
-    from tiltsim.schema import scenario_schema
+    from tiltsim.schema import scenario_schema, sweep_schema
 
-    print(json.dumps(scenario_schema(), indent=2))
+    print(json.dumps(sweep_schema() if arguments.sweep else scenario_schema(), indent=2))
     return 0

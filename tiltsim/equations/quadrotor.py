@@ -7,10 +7,9 @@ come after them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from controllers.quadrotor_mixer import thrust_controls
 from controllers.rotation import rotation_from_euler
 from controllers.scalar import Triple, scalar
 from controllers.vehicle import Vehicle
@@ -75,9 +74,3 @@ def initial_state(scenario: Scenario) -> tuple[float, ...]:
     """The rigid body's states at time zero."""
     initial = scenario.initial
     return (*initial.position, *initial.velocity, *initial.attitude, *initial.angular_velocity)
-
-
-def thrusts_in_force(inputs: Callable[[], Sequence[float]], vehicle: Vehicle) -> Sequence[float]:
-    """What the four rotors do (`controllers.quadrotor_mixer`) under the inputs in force."""
-    thrust, roll_torque, pitch_torque, yaw_torque = inputs()[:4]
-    return thrust_controls(thrust, roll_torque, pitch_torque, yaw_torque, vehicle)

@@ -17,15 +17,14 @@ from tiltsim.attitude_plane import (
     torque_free_directions,
 )
 from tiltsim.figures import style
-from tiltsim.loops import follows_position, law_in_words
+from tiltsim.figures.page import SIZE, add_headings, label, plan_view, widen
+from tiltsim.figures.tilt_car import tilt_car_figure
+from tiltsim.loops import follows_position, loop_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tiltsim.flight import Flight
-
-SIZE: Final = (11.4, 7.6)
-"""Width and height of the page, inches: A4 in landscape less its margins."""
 
 FORBIDDEN: Final = "#F6DDD0"
 INSTANTS: Final = 120
@@ -43,14 +42,15 @@ _ROTOR_LINES: Final[tuple[dict[str, Any], ...]] = (
 
 
 def flight_figure(flight: Flight) -> Figure:
-    """What the vehicle did and how close it came to a singularity, on one page."""
+    """What the vehicle did, on one page, in the panels of its kind."""
+    return _PAGES[loop_of(flight.scenario).kind.name](flight)
+
+
+def rotorcraft_figure(flight: Flight) -> Figure:
+    """What a rotorcraft did and how close it came to a singularity, on one page."""
     with style.paper_style():
         figure = style.new_figure(*SIZE)
-        layout: Any = figure.get_layout_engine()
-        layout.set(w_pad=0.06, h_pad=0.06, rect=(0.0, 0.0, 1.0, 0.925))
-        title, line = _headings(flight)
-        figure.text(0.012, 0.972, title, fontsize=12, fontweight="bold", va="center")
-        figure.text(0.012, 0.941, line, fontsize=9.5, color="#555555", va="center")
+        add_headings(figure, flight)
         halves: Any = figure.subfigures(1, 2, width_ratios=[2.1, 1.0])
         left, right = halves
         panels = (_attitude, _tilt_angles, _altitude, _rotor_speeds, _position_error, _margin)
@@ -61,26 +61,9 @@ def flight_figure(flight: Flight) -> Figure:
         for axes in series[-1]:
             axes.set_xlabel("time (s)")
         above, below = right.subplots(2, 1)
-        _plan_view(above, flight)
+        plan_view(above, flight)
         _roll_pitch_plane(below, flight)
         return figure
-
-
-def _headings(flight: Flight) -> tuple[str, str]:
-    """The title, and a line on what was flown and how it ended."""
-    scenario = flight.scenario
-    end = flight.end
-    if end.kind == "completed":
-        outcome = f"completed after {end.time:g} s"
-    else:
-        outcome = f"{end.kind} at {end.time:.2f} s"
-    parts = (
-        f"{scenario.gait.type.replace('_', ' ')} gait",
-        *law_in_words(scenario),
-        f"{scenario.simulation.plant} plant",
-        outcome,
-    )
-    return scenario.title or scenario.address or "Flight", "  ·  ".join(parts)
 
 
 def _attitude(axes: Any, flight: Flight) -> None:
@@ -89,14 +72,14 @@ def _attitude(axes: Any, flight: Flight) -> None:
         axes.plot(flight["time"], flight[angle], color=color, label=angle)
         axes.plot(flight["time"], flight[f"{angle}_ref"], color=style.INK, ls=":", lw=0.8)
     axes.plot([], [], color=style.INK, ls=":", lw=0.8, label="reference")
-    _label(axes, "Attitude", "rad", columns=4)
+    label(axes, "Attitude", "rad", columns=4)
 
 
 def _altitude(axes: Any, flight: Flight) -> None:
     axes.plot(flight["time"], flight["z"], color=style.BLUE, label="actual")
     axes.plot(flight["time"], flight["z_ref"], color=style.INK, ls=":", lw=1.0, label="reference")
-    _widen(axes, 0.1)
-    _label(axes, "Altitude", "m")
+    widen(axes, 0.1)
+    label(axes, "Altitude", "m")
 
 
 def _position_error(axes: Any, flight: Flight) -> None:
@@ -106,28 +89,28 @@ def _position_error(axes: Any, flight: Flight) -> None:
     for axis in "xyz" if follows else "z":
         error = flight[f"{axis}_ref"] - flight[axis]
         axes.plot(flight["time"], error, color=colors[axis], label=axis)
-    _widen(axes, 0.1)
-    _label(axes, "Position error", "m")
+    widen(axes, 0.1)
+    label(axes, "Position error", "m")
 
 
 def _tilt_angles(axes: Any, flight: Flight) -> None:
     for rotor, line in zip(_ROTORS, _ROTOR_LINES, strict=True):
-        label = f"α{_SUBSCRIPTS[rotor - 1]}"
-        axes.plot(flight["time"], flight[f"alpha_{rotor}"], label=label, **line)
-    _widen(axes, 0.1)
-    _label(axes, "Tilt angles", "rad", columns=4)
+        name = f"α{_SUBSCRIPTS[rotor - 1]}"
+        axes.plot(flight["time"], flight[f"alpha_{rotor}"], label=name, **line)
+    widen(axes, 0.1)
+    label(axes, "Tilt angles", "rad", columns=4)
 
 
 def _rotor_speeds(axes: Any, flight: Flight) -> None:
     for rotor, spin, line in zip(_ROTORS, SPIN, _ROTOR_LINES, strict=True):
         speed = spin * flight[f"rotor_speed_{rotor}"]
         axes.plot(flight["time"], speed, label=f"{rotor}", **line)
-    vehicle = flight.scenario.vehicle
+    vehicle = flight.scenario.rotorcraft
     for limit in (vehicle.min_rotor_speed, vehicle.max_rotor_speed):
         if limit is not None:
             axes.axhline(limit, color=style.RED, ls="--", lw=0.9)
-    _widen(axes, 20.0)
-    _label(axes, "Rotor speeds", "rad/s", name="along the spin", columns=4)
+    widen(axes, 20.0)
+    label(axes, "Rotor speeds", "rad/s", name="along the spin", columns=4)
 
 
 def _margin(axes: Any, flight: Flight) -> None:
@@ -138,33 +121,12 @@ def _margin(axes: Any, flight: Flight) -> None:
     axes.plot(time[closest], margin[closest], "o", color=style.RED, ms=5, clip_on=False, zorder=5)
     style.angle_axis(axes, "y", pi / 2)
     axes.set_ylim(0.0, pi / 2 * 1.04)
-    _label(axes, f"Singularity margin, least {margin[closest]:.2f} rad", "rad")
-
-
-def _plan_view(axes: Any, flight: Flight) -> None:
-    """The path seen from above."""
-    x, y = flight["x"], flight["y"]
-    if follows_position(flight.scenario):
-        reference = flight["x_ref"], flight["y_ref"]
-        if np.ptp(reference[0]) + np.ptp(reference[1]) > 0.0:
-            axes.plot(*reference, color=style.INK, ls=":", lw=1.1, label="reference")
-        else:
-            at = (reference[0][0], reference[1][0])
-            axes.plot(*at, "+", color=style.INK, ms=7, mew=1.4, label="reference")
-    axes.plot(x, y, color=style.BLUE, label="path")
-    axes.plot(x[0], y[0], "o", color=style.INK, mfc="white", ms=5, label="start")
-    axes.plot(x[-1], y[-1], "s", color=style.RED, ms=5, label="end")
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.margins(0.08)
-    axes.set_xlabel("x (m)")
-    axes.set_title("Plan view")
-    axes.set_ylabel("y (m)")
-    axes.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, -0.16), handlelength=1.4)
+    label(axes, f"Singularity margin, least {margin[closest]:.2f} rad", "rad")
 
 
 def _roll_pitch_plane(axes: Any, flight: Flight) -> None:
     """The attitudes flown, those out of reach, and the closest approach to a singular one."""
-    n = torque_free_directions(flight.columns, flight.scenario.vehicle.resolve())
+    n = torque_free_directions(flight.columns, flight.scenario.rotorcraft.resolve())
     margin = flight["singularity_margin"]
     closest = int(np.argmin(np.abs(margin)))
     side = float(np.sign(margin[0])) or 1.0
@@ -208,25 +170,4 @@ def _shade_forbidden(axes: Any, n: np.typing.NDArray[np.float64], side: float) -
     axes.pcolormesh(edges, edges, share, cmap=shades, vmin=0.0, vmax=1.0, rasterized=True)
 
 
-def _label(axes: Any, title: str, unit: str, *, name: str = "", columns: int = 3) -> None:
-    """Title, unit and, above the plot where it hides nothing, the legend."""
-    axes.set_title(title)
-    axes.set_ylabel(f"{name} ({unit})" if name else unit)
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(
-            ncols=columns,
-            loc="lower right",
-            bbox_to_anchor=(1.0, 0.985),
-            borderaxespad=0.0,
-            handlelength=1.4,
-            columnspacing=0.9,
-            handletextpad=0.4,
-        )
-
-
-def _widen(axes: Any, least: float) -> None:
-    """Keep the height of a plot at some size, lest noise fill it."""
-    low, high = axes.get_ylim()
-    if high - low < least:
-        middle = 0.5 * (low + high)
-        axes.set_ylim(middle - 0.5 * least, middle + 0.5 * least)
+_PAGES: Final = {"rotorcraft": rotorcraft_figure, "tilt_car": tilt_car_figure}

@@ -7,8 +7,12 @@ from typing import TYPE_CHECKING, Final
 from tiltsim.loops.actuation import with_actuation
 from tiltsim.loops.air import with_air
 from tiltsim.loops.full_pose import FULL_POSE
+from tiltsim.loops.gait_feedforward import GAIT_FEEDFORWARD
 from tiltsim.loops.quadrotor_attitude_altitude import QUADROTOR_ATTITUDE_ALTITUDE
 from tiltsim.loops.switching import SWITCHING
+from tiltsim.loops.tilt_car_fourth_derivative import FOURTH_DERIVATIVE
+from tiltsim.loops.tilt_car_planned_direction import PLANNED_DIRECTION
+from tiltsim.loops.tilt_car_third_derivative import THIRD_DERIVATIVE
 from tiltsim.loops.tiltrotor import TILTROTOR
 from tiltsim.loops.yaw_position import YAW_POSITION
 
@@ -18,17 +22,21 @@ if TYPE_CHECKING:
 
 LOOPS: Final[dict[str, Loop]] = {
     "attitude_altitude": TILTROTOR,
+    "gait_feedforward": GAIT_FEEDFORWARD,  # the same law with gait_rate_feedforward = true
     "full_pose": FULL_POSE,
     "yaw_position": YAW_POSITION,
     "switching": SWITCHING,
     "quadrotor_attitude_altitude": QUADROTOR_ATTITUDE_ALTITUDE,
+    "tilt_car_third_derivative": THIRD_DERIVATIVE,
+    "tilt_car_fourth_derivative": FOURTH_DERIVATIVE,
+    "tilt_car_planned_direction": PLANNED_DIRECTION,
 }
-"""Loops by the name a scenario gives their law."""
+"""Loops by the name of their law; see `tiltsim.controller_tables.LawTable.loop_name`."""
 
 
 def loop_of(scenario: Scenario) -> Loop:
     """The loop that a scenario flies: its law, within layers for what is not ideal."""
-    loop = LOOPS[scenario.controller.law]
+    loop = LOOPS[scenario.controller.loop_name]
     if scenario.has_real_actuators:
         loop = with_actuation(loop, scenario.simulation.latency_steps)
     return with_air(loop) if scenario.has_air else loop
@@ -45,9 +53,16 @@ def follows_position(scenario: Scenario) -> bool:
     return loop_of(scenario).follows_position(scenario)
 
 
+def gait_in_words(scenario: Scenario) -> list[str]:
+    """The gait of a scenario for titles; nothing where its law flies none."""
+    return [f"{scenario.gait.type} gait"] if loop_of(scenario).flies_gait else []
+
+
 def law_in_words(scenario: Scenario) -> list[str]:
     """The law of a scenario for titles, most telling first."""
     controller = scenario.controller
     words = [f"{controller.law.replace('_', '-')} law"]
+    if getattr(controller, "gait_rate_feedforward", False):
+        words.append("gait rates fed forward")
     decoupler = getattr(controller, "decoupler", "none")  # only laws that lean to steer have one
     return words if decoupler == "none" else [f"{decoupler} decoupler", *words]

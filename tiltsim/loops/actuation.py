@@ -231,6 +231,12 @@ def _delay_line(first: int, steps: int) -> tuple[Callable[..., Any], Callable[..
     return delivered, rates
 
 
+@scalar
+def never_watched(values: Sequence[float], parameters: Any) -> tuple[float, ...]:
+    """In place of a watch, for loops that leave watching to Python."""
+    return (1.0,)
+
+
 @cache
 def with_actuation(loop: Loop, latency_steps: int) -> Loop:
     """A law of the tiltrotor with the layer around it.
@@ -238,7 +244,8 @@ def with_actuation(loop: Loop, latency_steps: int) -> Loop:
     ``latency_steps`` is the number of control steps between a reading and its command taking
     effect.
     """
-    law_controls = loop.controls
+    law_controls, law_observe = loop.controls, loop.observe
+    law_watch = loop.watch or never_watched
     law_act, law_ctrl = loop.sizes.act, loop.sizes.ctrl
     line = law_act + ROTORS  # after the speeds that the motors are told
     under_way = COMMANDS * latency_steps
@@ -299,6 +306,18 @@ def with_actuation(loop: Loop, latency_steps: int) -> Loop:
             *ctrl[first_state:],
         )
 
+    @scalar
+    def observe(
+        qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+    ) -> tuple[float, ...]:
+        return law_observe(qpos, qvel, act[:law_act], ctrl[:law_ctrl])
+
+    @scalar
+    def watch(values: Sequence[float], parameters: Any) -> tuple[float, ...]:
+        return law_watch(values, parameters.law)
+
+    controls.__qualname__ = f"with_actuation.{latency_steps}.{loop.controls.__qualname__}"
+
     def setup(scenario: Scenario, signature: float) -> ControlSetup:
         inner = loop.setup(scenario, loop.signature)
         actuation = _actuation(scenario)
@@ -327,9 +346,8 @@ def with_actuation(loop: Loop, latency_steps: int) -> Loop:
         hold=hold,
         setup=setup,
         initial_activations=initial_activations,
-        observe=lambda qpos, qvel, act, controls: loop.observe(
-            qpos, qvel, act[:law_act], lambda: controls()[:law_ctrl]
-        ),
+        observe=observe,
+        watch=None if loop.watch is None else watch,
         derive=derive,
         watched=lambda sample, setup: loop.watched(sample, inner_setup(setup)),
         extra_actuators=(*loop.extra_actuators, extra),
@@ -343,7 +361,7 @@ def _initial_tilts(scenario: Scenario) -> tuple[float, ...]:
 
 
 def _actuation(scenario: Scenario) -> Actuation:
-    vehicle, simulation, controller = scenario.vehicle, scenario.simulation, scenario.controller
+    vehicle, simulation, controller = scenario.rotorcraft, scenario.simulation, scenario.controller
     low, high = vehicle.min_rotor_speed, vehicle.max_rotor_speed
     allocation = getattr(controller, "allocation", "inversion")
     max_rate, time_constant = vehicle.tilt_servo.max_rate, vehicle.rotor_time_constant

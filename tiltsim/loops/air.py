@@ -35,6 +35,7 @@ from controllers.rotation import rotation_from_quaternion
 from controllers.scalar import Quad, scalar
 from controllers.vehicle import Vehicle
 from tiltsim.loop import ControlSetup, ExtraActuators, Floats, Loop
+from tiltsim.loops.actuation import never_watched
 
 if TYPE_CHECKING:
     from tiltsim.scenario import Scenario
@@ -116,6 +117,7 @@ def air_wrench(
 def with_air(loop: Loop) -> Loop:
     """A loop in air that moves, drags and feels the ground."""
     inner_controls, inner_refresh, inner_hold = loop.controls, loop.refresh, loop.hold
+    inner_observe, inner_watch = loop.observe, loop.watch or never_watched
     first, inner_ctrl = loop.sizes.act, loop.sizes.ctrl
     tilting = loop.model == "tiltrotor"
     tilts_of: Callable[..., Quad] = pod_tilts if tilting else no_tilts
@@ -191,6 +193,22 @@ def with_air(loop: Loop) -> Loop:
         inner = held(time, qpos, qvel, act, ctrl, parameters)
         return (*inner, *air_controls(time, qpos, qvel, act, inner, parameters.surroundings))
 
+    @scalar
+    def observe(
+        qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+    ) -> tuple[float, ...]:
+        seen = inner_observe(qpos, qvel, act[:first], ctrl[:inner_ctrl])
+        return (
+            *seen,
+            *(act[first], act[first + 1], act[first + 2], act[first + 3], act[first + 4]),
+        )
+
+    @scalar
+    def watch(values: Sequence[float], parameters: Any) -> tuple[float, ...]:
+        return inner_watch(values, parameters.law)
+
+    controls.__qualname__ = f"with_air.{loop.controls.__qualname__}"
+
     def setup(scenario: Scenario, signature: float) -> ControlSetup:
         inner = loop.setup(scenario, loop.signature)
         surroundings = _surroundings(scenario)
@@ -222,10 +240,8 @@ def with_air(loop: Loop) -> Loop:
             *loop.initial_activations(scenario, inner_setup(setup)),
             *stationary_states(setup.parameters.surroundings.air.turbulence),
         ),
-        observe=lambda qpos, qvel, act, controls: (
-            *loop.observe(qpos, qvel, act[:first], lambda: controls()[:inner_ctrl]),
-            *act[first : first + DRYDEN_STATES],
-        ),
+        observe=observe,
+        watch=None if loop.watch is None else watch,
         derive=derive,
         watched=lambda sample, setup: loop.watched(sample, inner_setup(setup)),
         extra_actuators=(*loop.extra_actuators, extra),
@@ -255,9 +271,7 @@ def _surroundings(scenario: Scenario) -> Surroundings:
     if table.gust is not None:
         times = table.gust.start, table.gust.rise, table.gust.duration
         gust = Gust(*times, *table.gust.velocity)
-    if table.ground is not None:
-        ground = Ground(table.ground.rotor_radius, table.ground.height)
+    if table.ground_effect is not None:
+        ground = Ground(table.ground_effect.rotor_radius, table.ground_effect.height)
     drag = Drag(*table.drag.linear, *table.drag.area, table.density)
-    return Surroundings(
-        Air(*table.wind, drag, gust, turbulence, ground), scenario.vehicle.resolve()
-    )
+    return Surroundings(Air(*table.wind, drag, gust, turbulence, ground), scenario.true_rotorcraft)

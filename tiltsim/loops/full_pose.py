@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from controllers.full_pose import Parameters, full_pose_inputs
 from controllers.gaits import tilt_reference
 from controllers.references import position_reference
-from controllers.scalar import Triple, scalar
+from controllers.scalar import Quad, Triple, scalar
 from tiltsim.controller_tables import FullPoseController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes
@@ -19,6 +19,7 @@ from tiltsim.loops.tiltrotor import (
     gait_singularity,
     initial_rotor_speeds,
     observe_tiltrotor,
+    rotor_spins,
     rotor_stops,
     rotor_thrust_controls,
     servo_lead,
@@ -56,7 +57,9 @@ def full_pose_controls(
     """
     lead = parameters.servo_lead
     state = tiltrotor_state(qpos, qvel, act)
-    u1, u2, u3, u4, rate_1, rate_2, rate_3, rate_4 = full_pose_inputs(time, state, parameters.law)
+    u1, u2, u3, u4, rate_1, rate_2, rate_3, rate_4 = full_pose_inputs(
+        time, state, parameters.law, table
+    )
     return (
         *(act[4] + lead * rate_1, act[5] + lead * rate_2),
         *(act[6] + lead * rate_3, act[7] + lead * rate_4),
@@ -75,32 +78,47 @@ def refreshed_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[flo
     )
 
 
+@scalar
+def observe_full_pose(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+) -> tuple[float, ...]:
+    """The tiltrotor and the law's own states."""
+    return (*observe_tiltrotor(qpos, qvel, act, ctrl), act[4], act[5], act[6], act[7])
+
+
+@scalar
+def watch_rotor_stops(values: Sequence[float], parameters: ControlParameters) -> Quad:
+    """The rotor speeds along their spin."""
+    return rotor_spins(values)
+
+
 def _initial_tilts(scenario: Scenario) -> tuple[float, ...]:
-    gait = scenario.gait.plan(scenario.vehicle.resolve())
+    gait = scenario.gait.plan(scenario.rotorcraft.resolve())
     return tilt_reference(0.0, gait.parameters, gait.table)[:4]
 
 
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, FullPoseController)
-    vehicle = scenario.vehicle.resolve()
+    vehicle = scenario.rotorcraft.resolve()
+    reference, table = scenario.reference_and_table()
     law = Parameters(
         vehicle,
         controller.resolve_gains(),
-        scenario.reference.parameters,
+        reference,
         controller.resolve_limits(),
         controller.resolve_tilt_weight(vehicle),
         controller.resolve_failure(),
     )
-    lead = servo_lead(scenario.vehicle.tilt_servo)
-    return ControlSetup(ControlParameters(signature, lead, law))
+    lead = servo_lead(scenario.rotorcraft.tilt_servo)
+    return ControlSetup(ControlParameters(signature, lead, law), table)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     law = setup.parameters.law
     reference = law.reference
     time = samples["time"]
-    position = np.array([position_reference(t, reference)[:3] for t in time.tolist()])
+    position = np.array([position_reference(t, reference, setup.table)[:3] for t in time.tolist()])
     attitude = (reference.roll, reference.pitch, reference.yaw)
     columns = [*position.reshape(len(time), 3).T, *(np.full_like(time, a) for a in attitude)]
     told = {f"alpha_ref_{i}": samples[f"tilt_command_{i}"] for i in (1, 2, 3, 4)}
@@ -114,7 +132,7 @@ def equation_inputs(
 ) -> tuple[float, ...]:
     """The law's rotor accelerations and tilt rates on the thesis' equations."""
     tilts = state[22], state[23], state[24], state[25]
-    return full_pose_inputs(time, law_state(state, tilts), parameters.law)
+    return full_pose_inputs(time, law_state(state, tilts), parameters.law, table)
 
 
 @scalar
@@ -136,14 +154,20 @@ def equation_rates(
     )
 
 
-def _observe_equations(
-    _time: float,
+@scalar
+def observe_equations(
+    time: float,
     state: Sequence[float],
-    inputs: Callable[[], Sequence[float]],
-    _setup: ControlSetup,
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
 ) -> tuple[float, ...]:
-    alpha_1, alpha_2, alpha_3, alpha_4 = tilts = state[22:]
-    return (*law_state(state, (alpha_1, alpha_2, alpha_3, alpha_4)), *inputs()[4:], *tilts)
+    """What a sample holds, from the state of ch. 3's equations and the tilt rates in force."""
+    return (
+        *law_state(state, (state[22], state[23], state[24], state[25])),
+        *(inputs[4], inputs[5], inputs[6], inputs[7]),
+        *(state[22], state[23], state[24], state[25]),
+    )
 
 
 FULL_POSE: Final = Loop(
@@ -154,12 +178,10 @@ FULL_POSE: Final = Loop(
     refresh=refreshed_controls,
     setup=_setup,
     initial_activations=lambda s, _setup: (*initial_rotor_speeds(s), *_initial_tilts(s)),
-    observe=lambda qpos, qvel, act, controls: (
-        *observe_tiltrotor(qpos, qvel, act, controls),
-        *act[4:],
-    ),
+    observe=observe_full_pose,
     derive=_derive,
     watched=lambda sample, _setup: rotor_stops(sample),
+    watch=watch_rotor_stops,
     equations=Equations(
         inputs=equation_inputs,
         inputs_size=8,
@@ -168,7 +190,7 @@ FULL_POSE: Final = Loop(
             *initial_state(s, initial_rotor_speeds(s)),
             *_initial_tilts(s),
         ),
-        observe=_observe_equations,
+        observe=observe_equations,
     ),
     law_states=4,
     law_fields=TILT_COMMANDS,

@@ -7,7 +7,7 @@ from the controls and are no states here. The model's four rotor speed states st
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from math import cos, nan
+from math import cos
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -17,9 +17,10 @@ from controllers.quadrotor_singularity import normalized_determinant, published_
 from controllers.references import ReferenceParameters, position_reference
 from controllers.rotation import euler_from_quaternion
 from controllers.scalar import scalar
-from controllers.vehicle import SPIN, Vehicle
+from controllers.vehicle import Vehicle
 from controllers.yaw_position import State
-from tiltsim.equations.quadrotor import initial_state, thrusts_in_force
+from tiltsim.equations.quadrotor import initial_state
+from tiltsim.kinds.rotorcraft import OBSERVED_FIELDS
 from tiltsim.loop import ControlSetup, Equations, Floats, Sizes, Watched
 from tiltsim.loops.tiltrotor import REFERENCE_COLUMNS, TILT_REFERENCE_COLUMNS
 
@@ -73,39 +74,70 @@ def held_extended_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple
 
 def extended_activations(scenario: Scenario, _setup: ControlSetup) -> tuple[float, ...]:
     """The extension starts with the thrust of hover, at rest."""
-    vehicle = scenario.vehicle.resolve()
+    vehicle = scenario.rotorcraft.resolve()
     return 0.0, 0.0, 0.0, 0.0, vehicle.mass * vehicle.gravity, 0.0
 
 
+@scalar
 def observe_quadrotor(
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    controls: Callable[[], Sequence[float]],
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
 ) -> tuple[float, ...]:
-    """The rigid body, no tilt, rotor speeds from the thrusts in force, the law's own states."""
-    body = rigid_body_state(qpos, qvel, 0.0, 0.0)[:12]
-    return _sample(body, controls()[:4], act[4:])
+    """The rigid body, no tilt, rotor speeds from the thrusts in force."""
+    return sample_values(rigid_body_state(qpos, qvel, 0.0, 0.0), ctrl)
 
 
-def _sample(
-    body: Sequence[float], thrusts: Sequence[float], law_states: Sequence[float]
+@scalar
+def sample_values(body: Sequence[float], thrusts: Sequence[float]) -> tuple[float, ...]:
+    """What a sample holds, from the rigid body's twelve states and the thrust controls."""
+    return (
+        *(body[0], body[1], body[2], body[3], body[4], body[5]),
+        *(body[6], body[7], body[8], body[9], body[10], body[11]),
+        *(0.0, 0.0, 0.0, 0.0),
+        *(-speed_along_spin(thrusts[0]), speed_along_spin(thrusts[1])),
+        *(-speed_along_spin(thrusts[2]), speed_along_spin(thrusts[3])),
+        *(0.0, 0.0, 0.0, 0.0),
+    )
+
+
+@scalar
+def observe_equations(
+    state: Sequence[float], inputs: Sequence[float], vehicle: Vehicle
 ) -> tuple[float, ...]:
-    speeds = [s * _speed(thrust) for s, thrust in zip(SPIN, thrusts, strict=True)]
-    return (*body, *(0.0,) * 4, *speeds, *(0.0,) * 4, *law_states)
+    """The same of ch. 2's equations: thrust and torques in force tell the rotor speeds."""
+    return sample_values(
+        state, thrust_controls(inputs[0], inputs[1], inputs[2], inputs[3], vehicle)
+    )
 
 
-def _speed(thrust_control: float) -> float:
-    return speed_along_spin(thrust_control) if thrust_control == thrust_control else nan
+@scalar
+def observe_extended_equations(
+    state: Sequence[float], inputs: Sequence[float], vehicle: Vehicle
+) -> tuple[float, ...]:
+    """As `observe_equations`, followed by the law's own states."""
+    return (*observe_equations(state, inputs, vehicle), state[12], state[13])
+
+
+@scalar
+def observe_extended_quadrotor(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+) -> tuple[float, ...]:
+    """The quadrotor and the law's own states."""
+    return (*observe_quadrotor(qpos, qvel, act, ctrl), act[4], act[5])
+
+
+@scalar
+def level_thrust(values: Sequence[float]) -> float:
+    """The cosine of the thrust axis' tilt, from what `observe_quadrotor` gives."""
+    return cos(values[6]) * cos(values[7])
 
 
 def equations(
     inputs: Callable[..., tuple[float, ...]],
     inputs_size: int,
     rates: Callable[..., tuple[float, ...]],
-    vehicle_of: Callable[[ControlSetup], Vehicle],
+    observe: Callable[..., tuple[float, ...]],
 ) -> Equations:
-    """A law on ch. 2's equations; ``vehicle_of`` finds the vehicle in the law's parameters.
+    """A law on ch. 2's equations; the functions are those of `tiltsim.loop.Equations`.
 
     A law whose inputs go on after thrust and torques has states of its own, which these integrate;
     they start as in MuJoCo.
@@ -116,24 +148,18 @@ def equations(
         extension = extended_activations(scenario, setup)[4:][:law_states]
         return (*initial_state(scenario), *extension)
 
-    def observe(
-        _time: float,
-        state: Sequence[float],
-        inputs_in_force: Callable[[], Sequence[float]],
-        setup: ControlSetup,
-    ) -> tuple[float, ...]:
-        thrusts = thrusts_in_force(inputs_in_force, vehicle_of(setup))
-        return _sample(state[:12], thrusts, state[12:])
-
     return Equations(inputs, inputs_size, rates, initial, observe)
 
 
 def references(
-    samples: Mapping[str, Floats], reference: ReferenceParameters, attitude: Sequence[object]
+    samples: Mapping[str, Floats],
+    reference: ReferenceParameters,
+    table: Sequence[float],
+    attitude: Sequence[object],
 ) -> dict[str, Floats]:
     """Reference columns; ``attitude`` are those of roll, pitch and yaw, arrays or constants."""
     time = samples["time"]
-    position = np.array([position_reference(t, reference)[:3] for t in time.tolist()])
+    position = np.array([position_reference(t, reference, table)[:3] for t in time.tolist()])
     columns = [*position.reshape(len(time), 3).T]
     columns += [np.broadcast_to(np.asarray(angle, dtype=float), time.shape) for angle in attitude]
     tilts = dict.fromkeys(TILT_REFERENCE_COLUMNS, np.zeros_like(time))
@@ -165,7 +191,7 @@ def attitude_watched(sample: Mapping[str, float]) -> Watched:
     """The cosine of the thrust axis' tilt, zero at a roll or pitch of 90 degrees."""
     roll, pitch = sample["roll"], sample["pitch"]
     return Watched(
-        cos(roll) * cos(pitch),
+        level_thrust([sample[name] for name in OBSERVED_FIELDS]),
         "the decoupling matrix became singular: the thrust axis came level, "
         f"at roll = {roll:.3g} rad, pitch = {pitch:.3g} rad",
     )

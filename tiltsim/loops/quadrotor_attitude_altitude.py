@@ -18,6 +18,8 @@ from tiltsim.loop import ControlSetup, Floats, Loop, Sizes
 from tiltsim.loops.quadrotor import (
     attitude_watched,
     equations,
+    level_thrust,
+    observe_equations,
     observe_quadrotor,
     references,
     rigid_body_state,
@@ -64,10 +66,16 @@ def held_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, .
     return ctrl[0], ctrl[1], ctrl[2], ctrl[3], ctrl[4], ctrl[5], ctrl[6], ctrl[7]
 
 
+@scalar
+def watch_attitude(values: Sequence[float], parameters: ControlParameters) -> tuple[float]:
+    """The cosine of the thrust axis' tilt."""
+    return (level_thrust(values),)
+
+
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, QuadrotorAttitudeAltitudeController)
-    vehicle, gains = scenario.vehicle.resolve(), controller.resolve_gains()
+    vehicle, gains = scenario.rotorcraft.resolve(), controller.resolve_gains()
     return ControlSetup(ControlParameters(signature, vehicle, gains, scenario.reference.parameters))
 
 
@@ -75,7 +83,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     reference = setup.parameters.reference
     attitude = (reference.roll, reference.pitch, reference.yaw)
     return {
-        **references(samples, reference, attitude),
+        **references(samples, reference, setup.table, attitude),
         # cos(roll) cos(pitch) of the altitude times 1 / cos(pitch) of the Euler angles
         "determinant": np.cos(samples["roll"]),
         "singularity_margin": upright_margin(samples),
@@ -106,6 +114,18 @@ def equation_rates(
     return equations_of_motion(state, inputs, parameters.vehicle, disturbance)
 
 
+@scalar
+def observe_in_equations(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """What a sample holds, from the state of the thesis' equations."""
+    return observe_equations(state, inputs, parameters.vehicle)
+
+
 QUADROTOR_ATTITUDE_ALTITUDE: Final = Loop(
     model="quadrotor",
     sizes=Sizes(qpos=7, qvel=6, act=4, ctrl=8),
@@ -115,12 +135,14 @@ QUADROTOR_ATTITUDE_ALTITUDE: Final = Loop(
     setup=_setup,
     initial_activations=lambda _scenario, _setup: (0.0, 0.0, 0.0, 0.0),
     observe=observe_quadrotor,
+    observes_controls=True,
     derive=_derive,
     watched=lambda sample, _setup: (attitude_watched(sample),),
+    watch=watch_attitude,
     follows_position=lambda _scenario: False,
     equations=equations(
         *(equation_inputs, 4, equation_rates),
-        vehicle_of=lambda setup: setup.parameters.vehicle,
+        observe=observe_in_equations,
     ),
 )
 """The attitude-altitude law around the quadrotor."""

@@ -23,7 +23,9 @@ from tiltsim.loops.quadrotor import (
     extended_controls,
     extended_singularity,
     held_extended_controls,
-    observe_quadrotor,
+    level_thrust,
+    observe_extended_equations,
+    observe_extended_quadrotor,
     references,
     rigid_body_state,
 )
@@ -51,22 +53,29 @@ def switching_controls(
     """All ten controls: thrusts, idle rotor states, the law's own states."""
     law = parameters.law
     state = rigid_body_state(qpos, qvel, act[4], act[5])
-    return extended_controls(switching_inputs(time, state, law), law.yaw_position.vehicle)
+    return extended_controls(switching_inputs(time, state, law, table), law.yaw_position.vehicle)
+
+
+@scalar
+def watch_attitude(values: Sequence[float], parameters: ControlParameters) -> tuple[float]:
+    """The cosine of the thrust axis' tilt."""
+    return (level_thrust(values),)
 
 
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, SwitchingController)
+    reference, table = scenario.reference_and_table()
     law = Parameters(
         yaw_position.Parameters(
-            scenario.vehicle.resolve(), controller.resolve_gains(), scenario.reference.parameters
+            scenario.rotorcraft.resolve(), controller.resolve_gains(), reference
         ),
         controller.resolve_attitude_gains(),
         Zone(*controller.zone.roll, *controller.zone.pitch),
         EXTENSIONS[controller.extension],
         controller.extension_rate,
     )
-    return ControlSetup(ControlParameters(signature, law))
+    return ControlSetup(ControlParameters(signature, law), table)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -78,7 +87,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     roll = np.where(inside > 0.0, reference.roll, samples["roll"])
     pitch = np.where(inside > 0.0, reference.pitch, samples["pitch"])
     return {
-        **references(samples, reference, (roll, pitch, reference.yaw)),
+        **references(samples, reference, setup.table, (roll, pitch, reference.yaw)),
         **extended_singularity(samples, law.yaw_position.vehicle),
         "attitude_zone": inside,
     }
@@ -94,7 +103,7 @@ def equation_inputs(
     time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
 ) -> tuple[float, ...]:
     """The law on the thesis' equations."""
-    return switching_inputs(time, law_state(state), parameters.law)
+    return switching_inputs(time, law_state(state), parameters.law, table)
 
 
 @scalar
@@ -112,6 +121,18 @@ def equation_rates(
     )
 
 
+@scalar
+def observe_in_equations(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """What a sample holds, from the state of the thesis' equations."""
+    return observe_extended_equations(state, inputs, parameters.law.yaw_position.vehicle)
+
+
 SWITCHING: Final = Loop(
     model="quadrotor",
     sizes=SIZES,
@@ -120,9 +141,11 @@ SWITCHING: Final = Loop(
     refresh=held_extended_controls,
     setup=_setup,
     initial_activations=extended_activations,
-    observe=observe_quadrotor,
+    observe=observe_extended_quadrotor,
+    observes_controls=True,
     derive=_derive,
     watched=_watched,
+    watch=watch_attitude,
     law_states=2,
     law_fields=LAW_FIELDS,
     extra_columns={**EXTENSION_COLUMNS, "attitude_zone": "1"},
@@ -130,7 +153,7 @@ SWITCHING: Final = Loop(
     follows_position=lambda _scenario: False,
     equations=equations(
         *(equation_inputs, 6, equation_rates),
-        vehicle_of=lambda setup: setup.parameters.law.yaw_position.vehicle,
+        observe=observe_in_equations,
     ),
 )
 """Switching between yaw-position and attitude-altitude control of the quadrotor."""

@@ -7,7 +7,7 @@ every engine. It is a pure function of time, `qpos`, `qvel`, `act` and the param
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -24,17 +24,28 @@ from controllers.attitude_altitude import (
 from controllers.decouplers import DECOUPLERS
 from controllers.decoupling_matrix import sines_and_cosines, torque_entries, torque_free_force
 from controllers.gaits import tilt_reference
+from controllers.gaits.trot import TiltsAndRates
 from controllers.references import position_reference
 from controllers.rotation import euler_from_quaternion, world_up_in_body
 from controllers.scalar import Quad, Triple, scalar
 from controllers.singularity import determinant, margin_over_gait
+from controllers.supervisor import Supervisor, gait_share
 from controllers.vehicle import SPIN, Vehicle, drag_ratio
 from tiltsim.controller_tables import AttitudeAltitudeController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
-from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
+from tiltsim.kinds.rotorcraft import OBSERVED_FIELDS
+from tiltsim.loop import (
+    ControlSetup,
+    Equations,
+    Floats,
+    Loop,
+    Sizes,
+    Watched,
+)
+from tiltsim.rows import evaluate_rows
 
 if TYPE_CHECKING:
-    from tiltsim.scenario import Scenario, TiltServoTable
+    from tiltsim.scenario import Scenario, ServoTable
 
 REFERENCE_COLUMNS: Final = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
 TILT_COLUMNS: Final = ("alpha_1", "alpha_2", "alpha_3", "alpha_4")
@@ -47,6 +58,7 @@ class ControlParameters(NamedTuple):
     signature: float  # see `tiltsim.loop.Loop.signature`
     servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
     law: Parameters
+    supervisor: Supervisor = Supervisor()
 
 
 @scalar
@@ -78,6 +90,18 @@ def rotor_thrust_controls(act: Sequence[float]) -> Quad:
 
 
 @scalar
+def servo_commands(planned: TiltsAndRates, share: float, lead: float) -> Quad:
+    """Commands (rad) of the tilt servos for a ``share`` of the planned gait."""
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = planned
+    return (
+        share * (a1 + lead * rate_1),
+        share * (a2 + lead * rate_2),
+        share * (a3 + lead * rate_3),
+        share * (a4 + lead * rate_4),
+    )
+
+
+@scalar
 def tiltrotor_controls(
     time: float,
     qpos: Sequence[float],
@@ -92,12 +116,13 @@ def tiltrotor_controls(
     follows a moving gait and not only a resting one.
     """
     law = parameters.law
-    lead = parameters.servo_lead
-    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, law.gait, table)
+    state = tiltrotor_state(qpos, qvel, act)
+    planned = tilt_reference(time, law.gait, table)
+    share = gait_share(planned, state[6], state[7], parameters.supervisor, drag_ratio(law.vehicle))
     return (
-        *(a1 + lead * rate_1, a2 + lead * rate_2, a3 + lead * rate_3, a4 + lead * rate_4),
+        *servo_commands(planned, share, parameters.servo_lead),
         *rotor_thrust_controls(act),
-        *rotor_accelerations(time, tiltrotor_state(qpos, qvel, act), law),
+        *rotor_accelerations(time, state, law, table),
     )
 
 
@@ -111,7 +136,7 @@ def refreshed_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[flo
     )
 
 
-def servo_lead(servo: TiltServoTable) -> float:
+def servo_lead(servo: ServoTable) -> float:
     """By how much (s) a tilt servo lags behind a command that moves evenly."""
     return 2.0 * servo.damping_ratio / servo.natural_frequency
 
@@ -119,36 +144,36 @@ def servo_lead(servo: TiltServoTable) -> float:
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, AttitudeAltitudeController)
-    vehicle = scenario.vehicle.resolve()
+    vehicle = scenario.rotorcraft.resolve()
     gait = scenario.gait.plan(vehicle)
+    reference, table = scenario.reference_and_table()
     parameters = ControlParameters(
         signature,
-        servo_lead(scenario.vehicle.tilt_servo),
+        servo_lead(scenario.rotorcraft.tilt_servo),
         law=Parameters(
             vehicle=vehicle,
             gains=controller.resolve_gains(),
             gait=gait.parameters,
-            reference=scenario.reference.parameters,
+            reference=reference,
             decoupler=DECOUPLERS[controller.decoupler],
             decoupling=DECOUPLINGS[controller.decoupling],
         ),
+        supervisor=controller.resolve_supervisor(),
     )
-    return ControlSetup(parameters, gait.table)
+    return ControlSetup(parameters, table)
 
 
 def initial_rotor_speeds(scenario: Scenario) -> tuple[float, ...]:
     """The signed rotor speeds (rad/s) at time zero."""
-    return tuple(s * speed for s, speed in zip(SPIN, scenario.initial.rotor_speeds, strict=True))
+    return tuple(s * speed for s, speed in zip(SPIN, scenario.initial.rotor_speeds(4), strict=True))
 
 
+@scalar
 def observe_tiltrotor(
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    _controls: Callable[[], Sequence[float]],
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
 ) -> tuple[float, ...]:
     """Rigid body, tilts, rotor speeds and tilt rates: all of them states of the simulation."""
-    return (*tiltrotor_state(qpos, qvel, act), *qvel[6:])
+    return (*tiltrotor_state(qpos, qvel, act), qvel[6], qvel[7], qvel[8], qvel[9])
 
 
 def gait_singularity(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict[str, Floats]:
@@ -161,20 +186,29 @@ def gait_singularity(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict[st
     }
 
 
-def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    law, table = setup.parameters.law, setup.table
+@scalar
+def references_in_force(
+    time: float, state: State, parameters: ControlParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """`REFERENCE_COLUMNS` and `TILT_REFERENCE_COLUMNS` at a time and state of the law."""
+    law = parameters.law
     ratio = drag_ratio(law.vehicle)
-    states = np.stack([samples[name] for name in STATE_FIELDS], axis=-1).tolist()
-    rows = []
-    for time, state in zip(samples["time"].tolist(), states, strict=True):
-        trig = sines_and_cosines(*state[12:16])
-        torque = torque_entries(trig, ratio)
-        position = position_reference(time, law.reference)[:3]
-        attitude = attitude_reference(time, state, trig, torque, law)[:3]
-        rows.append((*position, *attitude, *tilt_reference(time, law.gait, table)[:4]))
+    trig = sines_and_cosines(state[12], state[13], state[14], state[15])
+    torque = torque_entries(trig, ratio)
+    x, y, z, _, _, _, _, _, _ = position_reference(time, law.reference, table)
+    roll, pitch, yaw, _, _, _ = attitude_reference(time, state, trig, torque, law, table)
+    planned = tilt_reference(time, law.gait, table)
+    share = gait_share(planned, state[6], state[7], parameters.supervisor, ratio)
+    a1, a2, a3, a4 = servo_commands(planned, share, 0.0)
+    return x, y, z, roll, pitch, yaw, a1, a2, a3, a4
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    states = np.stack([samples[name] for name in STATE_FIELDS], axis=-1)
+    rows = evaluate_rows(references_in_force, samples["time"], states, setup)
     names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)
-    values = np.array(rows).reshape(len(rows), len(names))
-    return dict(zip(names, values.T, strict=True)) | gait_singularity(samples, law.vehicle)
+    columns = dict(zip(names, rows.reshape(-1, len(names)).T, strict=True))
+    return columns | gait_singularity(samples, setup.parameters.law.vehicle)
 
 
 def rotor_stops(sample: Mapping[str, float]) -> tuple[Watched, ...]:
@@ -188,21 +222,51 @@ def rotor_stops(sample: Mapping[str, float]) -> tuple[Watched, ...]:
     )
 
 
+@scalar
+def rotor_spins(values: Sequence[float]) -> Quad:
+    """Rotor speeds along their spin, from what `observe_tiltrotor` gives."""
+    return -values[16], values[17], -values[18], values[19]
+
+
+@scalar
+def regularity(values: Sequence[float], vehicle: Vehicle) -> float:
+    """The determinant of the decoupling matrix but for the rotor speeds, of a sample's values."""
+    ratio = drag_ratio(vehicle)
+    trig = sines_and_cosines(values[12], values[13], values[14], values[15])
+    nx, ny, nz = torque_free_force(trig, torque_entries(trig, ratio), ratio)
+    ux, uy, uz = world_up_in_body(values[6], values[7])
+    return nx * ux + ny * uy + nz * uz
+
+
+@scalar
+def watch_tiltrotor(
+    values: Sequence[float], parameters: ControlParameters
+) -> tuple[float, float, float, float, float]:
+    """The determinant of the decoupling matrix, and the rotor speeds where it vanishes with them.
+
+    As published, the factor ``2 |varpi|`` stands in one row alone, and a rotor at rest is harmless.
+    """
+    law = parameters.law
+    matrix = regularity(values, law.vehicle)
+    if law.decoupling == EXACT_DECOUPLING:
+        spin_1, spin_2, spin_3, spin_4 = rotor_spins(values)
+        return matrix, spin_1, spin_2, spin_3, spin_4
+    return matrix, 1.0, 1.0, 1.0, 1.0
+
+
+def singular_matrix(sample: Mapping[str, float], vehicle: Vehicle) -> Watched:
+    """The determinant of the attitude-altitude law at the present tilts and attitude."""
+    angles = ", ".join(f"{sample[name]:.3g}" for name in TILT_COLUMNS)
+    return Watched(
+        regularity([sample[name] for name in OBSERVED_FIELDS], vehicle),
+        f"the decoupling matrix became singular at roll = {sample['roll']:.3g} rad, "
+        f"pitch = {sample['pitch']:.3g} rad, tilt angles ({angles}) rad",
+    )
+
+
 def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Watched, ...]:
     law = setup.parameters.law
-    roll, pitch = sample["roll"], sample["pitch"]
-    tilts = [sample[name] for name in TILT_COLUMNS]
-    ratio = drag_ratio(law.vehicle)
-    trig = sines_and_cosines(*tilts)
-    n = torque_free_force(trig, torque_entries(trig, ratio), ratio)
-    up = world_up_in_body(roll, pitch)
-    angles = ", ".join(f"{tilt:.3g}" for tilt in tilts)
-    matrix = Watched(
-        n[0] * up[0] + n[1] * up[1] + n[2] * up[2],
-        f"the decoupling matrix became singular at roll = {roll:.3g} rad, "
-        f"pitch = {pitch:.3g} rad, tilt angles ({angles}) rad",
-    )
-    # As published, the factor 2 |varpi| stands in one row alone, and a rotor at rest is harmless.
+    matrix = singular_matrix(sample, law.vehicle)
     return (matrix, *rotor_stops(sample)) if law.decoupling == EXACT_DECOUPLING else (matrix,)
 
 
@@ -213,7 +277,7 @@ def equation_inputs(
     """The law's rotor accelerations (rad/s^2) on the thesis' equations."""
     law = parameters.law
     a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, table)
-    return rotor_accelerations(time, law_state(state, (a1, a2, a3, a4)), law)
+    return rotor_accelerations(time, law_state(state, (a1, a2, a3, a4)), law, table)
 
 
 @scalar
@@ -231,14 +295,23 @@ def equation_rates(
     return equations_of_motion(state, (a1, a2, a3, a4), inputs, law.vehicle, disturbance)
 
 
-def _observe_equations(
-    time: float, state: Sequence[float], _inputs: object, setup: ControlSetup
+@scalar
+def observe_equations(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
 ) -> tuple[float, ...]:
-    tilts = tilt_reference(time, setup.parameters.law.gait, setup.table)
-    return (*law_state(state, tilts[:4]), *tilts[4:])
+    """What a sample holds, from the state of ch. 3's equations; the tilts are the gait's."""
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(
+        time, parameters.law.gait, table
+    )
+    return (*law_state(state, (a1, a2, a3, a4)), rate_1, rate_2, rate_3, rate_4)
 
 
-def _follows_position(scenario: Scenario) -> bool:
+def follows_position(scenario: Scenario) -> bool:
+    """Whether a decoupler steers the vehicle to the reference's horizontal position."""
     controller = scenario.controller
     assert isinstance(controller, AttitudeAltitudeController)
     return controller.decoupler != "none"
@@ -255,13 +328,14 @@ TILTROTOR: Final = Loop(
     observe=observe_tiltrotor,
     derive=_derive,
     watched=_watched,
-    follows_position=_follows_position,
+    watch=watch_tiltrotor,
+    follows_position=follows_position,
     equations=Equations(
         inputs=equation_inputs,
         inputs_size=4,
         rates=equation_rates,
         initial=lambda s, _setup: initial_state(s, initial_rotor_speeds(s)),
-        observe=_observe_equations,
+        observe=observe_equations,
     ),
 )
 """The attitude-altitude law around the tiltrotor."""

@@ -20,7 +20,9 @@ from tiltsim.loops.quadrotor import (
     extended_controls,
     extended_singularity,
     held_extended_controls,
-    observe_quadrotor,
+    level_thrust,
+    observe_extended_equations,
+    observe_extended_quadrotor,
     references,
     rigid_body_state,
 )
@@ -48,24 +50,31 @@ def yaw_position_controls(
     """All ten controls: thrusts, idle rotor states, the law's own states."""
     law = parameters.law
     state = rigid_body_state(qpos, qvel, act[4], act[5])
-    return extended_controls(yaw_position_inputs(time, state, law), law.vehicle)
+    return extended_controls(yaw_position_inputs(time, state, law, table), law.vehicle)
 
 
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, YawPositionController)
-    law = Parameters(
-        scenario.vehicle.resolve(), controller.resolve_gains(), scenario.reference.parameters
-    )
-    return ControlSetup(ControlParameters(signature, law))
+    reference, table = scenario.reference_and_table()
+    law = Parameters(scenario.rotorcraft.resolve(), controller.resolve_gains(), reference)
+    return ControlSetup(ControlParameters(signature, law), table)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     law = setup.parameters.law
     # Roll and pitch are no outputs: they are what the position takes.
     attitude = (samples["roll"], samples["pitch"], law.reference.yaw)
-    columns = references(samples, law.reference, attitude)
+    columns = references(samples, law.reference, setup.table, attitude)
     return columns | extended_singularity(samples, law.vehicle)
+
+
+@scalar
+def watch_attitude_and_extension(
+    values: Sequence[float], parameters: ControlParameters
+) -> tuple[float, float]:
+    """The cosine of the thrust axis' tilt and the extension's thrust."""
+    return level_thrust(values), values[24]
 
 
 def extension_watched(sample: Mapping[str, float]) -> Watched:
@@ -79,7 +88,7 @@ def equation_inputs(
     time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
 ) -> tuple[float, ...]:
     """The law on the thesis' equations."""
-    return yaw_position_inputs(time, law_state(state), parameters.law)
+    return yaw_position_inputs(time, law_state(state), parameters.law, table)
 
 
 @scalar
@@ -95,6 +104,18 @@ def equation_rates(
     return extended_equations_of_motion(state, inputs, parameters.law.vehicle, disturbance)
 
 
+@scalar
+def observe_in_equations(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """What a sample holds, from the state of the thesis' equations."""
+    return observe_extended_equations(state, inputs, parameters.law.vehicle)
+
+
 YAW_POSITION: Final = Loop(
     model="quadrotor",
     sizes=SIZES,
@@ -103,15 +124,17 @@ YAW_POSITION: Final = Loop(
     refresh=held_extended_controls,
     setup=_setup,
     initial_activations=extended_activations,
-    observe=observe_quadrotor,
+    observe=observe_extended_quadrotor,
+    observes_controls=True,
     derive=_derive,
     watched=lambda sample, _setup: (attitude_watched(sample), extension_watched(sample)),
+    watch=watch_attitude_and_extension,
     law_states=2,
     law_fields=LAW_FIELDS,
     extra_columns=EXTENSION_COLUMNS,
     equations=equations(
         *(equation_inputs, 6, equation_rates),
-        vehicle_of=lambda setup: setup.parameters.law.vehicle,
+        observe=observe_in_equations,
     ),
 )
 """The yaw-position law around the quadrotor."""

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from tiltsim.rerun_stream import TIMELINE
 from tiltsim.rerun_stream.plane import BOUND
-from tiltsim.rerun_stream.series import PANELS
 
 if TYPE_CHECKING:
     import rerun.blueprint as rrb
 
-EYE: Final = (-2.4, -2.4, 1.9)
-"""Where the camera stands, seen from the vehicle, in radii of it."""
+    from tiltsim.rerun_stream.series import Panel
 
 
 @dataclass(frozen=True)
@@ -25,7 +23,11 @@ class Shown:
     vehicle: str
     camera: str
     floor: str
-    plane: str
+    plane: str  # empty where there is none
+    panels: tuple[Panel, ...]
+    eye: tuple[float, float, float]  # seen from the vehicle, in radii of it
+    up: tuple[float, float, float]
+    overview: tuple[float, float, float] | None  # m, from where the whole reference is seen
     radius: float  # m
     thrust_scale: float  # m/N
     ground: float  # m
@@ -35,9 +37,14 @@ def flight_blueprint(flights: list[Shown], *, live: bool = False) -> rrb.Bluepri
     """Vehicle, trajectory, roll-pitch plane and events on the left, time series on the right."""
     import rerun.blueprint as rrb
 
-    views = rrb.Horizontal(_vehicle_view(flights), _plane_view(flights), column_shares=[5, 4])
-    below = rrb.Horizontal(_trajectory_view(flights), _events_view(), column_shares=[5, 4])
-    left = rrb.Vertical(views, below, row_shares=[11, 8])
+    vehicle, trajectory, events = _vehicle_view(flights), _trajectory_view(flights), _events_view()
+    if flights[0].plane:
+        views = rrb.Horizontal(vehicle, _plane_view(flights), column_shares=[5, 4])
+        below = rrb.Horizontal(trajectory, events, column_shares=[5, 4])
+        left = rrb.Vertical(views, below, row_shares=[11, 8])
+    else:
+        views = rrb.Horizontal(vehicle, trajectory, column_shares=[1, 1])
+        left = rrb.Vertical(views, events, row_shares=[11, 4])
     plots, heights = _plots(flights)
     right = rrb.Vertical(*plots, row_shares=heights)
     return rrb.Blueprint(
@@ -61,9 +68,9 @@ def _vehicle_view(flights: list[Shown]) -> Any:
         contents=[f"{flight.world}/**" for flight in flights],
         name=f"Vehicle (thrust arrows: {100.0 * first.thrust_scale:g} cm per newton)",
         eye_controls=rrb.EyeControls3D(
-            position=[first.radius * part for part in EYE],
+            position=[first.radius * part for part in first.eye],
             look_target=(0.0, 0.0, 0.15 * first.radius),
-            eye_up=(0.0, 0.0, 1.0),
+            eye_up=first.up,
         ),
         line_grid=False,
         overrides=_trails(flights),
@@ -82,8 +89,21 @@ def _trajectory_view(flights: list[Shown]) -> Any:
         origin="world",
         contents=contents,
         name="Trajectory and reference",
+        eye_controls=_from_above(flights[0]),
         line_grid=_grid(flights[0].ground),
         overrides=_trails(flights),
+    )
+
+
+def _from_above(flight: Shown) -> Any:
+    """A camera straight above the reference, for what moves in a plane."""
+    import rerun.blueprint as rrb
+
+    if flight.overview is None:
+        return None
+    x, y, _ = flight.overview
+    return rrb.EyeControls3D(
+        position=flight.overview, look_target=(x, y, 0.0), eye_up=(0.0, 1.0, 0.0)
     )
 
 
@@ -112,11 +132,12 @@ def _events_view() -> Any:
 
 def _plots(flights: list[Shown]) -> tuple[list[Any], list[float]]:
     """The time series and their heights; of several flights what they are compared by."""
+    panels = flights[0].panels
     if len(flights) == 1:
-        whole = [(panel.title, [f"{panel.path}/**"]) for panel in PANELS]
-        return [_plot(*plot) for plot in whole], [panel.height for panel in PANELS]
+        whole = [(panel.title, [f"{panel.path}/**"]) for panel in panels]
+        return [_plot(*plot) for plot in whole], [panel.height for panel in panels]
     plots = []
-    for panel in PANELS:
+    for panel in panels:
         levels = [f"{flights[0].name}/{panel.path}/{level}" for level in panel.levels]
         for series, title in panel.compared:
             lines = [f"{flight.name}/{panel.path}/{series}" for flight in flights]

@@ -68,11 +68,13 @@ def is_infinite_plane(model: mujoco.MjModel, geom: int) -> bool:
 
 
 def ground_height(model: mujoco.MjModel) -> float:
-    """Height (m) of the model's infinite plane; 0 where there is none."""
-    for geom in range(model.ngeom):
-        if is_infinite_plane(model, geom) and model.geom_bodyid[geom] == 0:
-            return float(model.geom_pos[geom, 2])
-    return 0.0
+    """Height (m) of the model's highest infinite plane; 0 where there is none."""
+    heights = [
+        float(model.geom_pos[geom, 2])
+        for geom in range(model.ngeom)
+        if is_infinite_plane(model, geom) and model.geom_bodyid[geom] == 0
+    ]
+    return max(heights, default=0.0)
 
 
 def geom_archetypes(model: mujoco.MjModel, geom: int) -> Iterable[Any]:

@@ -51,7 +51,7 @@ class AttitudePlane:
         self, recording: rr.RecordingStream, scenario: Scenario, root: str, color: Color
     ) -> None:
         self._recording = recording
-        self._vehicle = scenario.vehicle.resolve()
+        self._vehicle = scenario.rotorcraft.resolve()
         self._root = root
         self._color = color
         self._curve_ticks = Ticks(CURVE_INTERVAL)

@@ -9,10 +9,10 @@ import numpy as np
 from tiltsim.events import Event, EventWatch
 from tiltsim.replay import thrust_scale, vehicle_radius, visible_model
 from tiltsim.rerun_stream import palette
-from tiltsim.rerun_stream.plane import AttitudePlane
+from tiltsim.rerun_stream.aspects import aspect_of, comparison_series
 from tiltsim.rerun_stream.rows import send_rows
-from tiltsim.rerun_stream.scene import Scene
-from tiltsim.rerun_stream.series import TimeSeries, comparison_series, measured_series
+from tiltsim.rerun_stream.scene import Scene, reference_path
+from tiltsim.rerun_stream.series import TimeSeries
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from tiltsim.rerun_stream.blueprint import Shown
     from tiltsim.rerun_stream.palette import Color
     from tiltsim.scenario import Scenario
+
+OVERVIEW_HEIGHT = 1.35
+"""How far above a reference the camera must be to see all of it, in lengths of it."""
 
 _LEVEL_COLORS = {"INFO": palette.GREY, "WARN": palette.AMBER, "ERROR": palette.RED}
 
@@ -65,9 +68,12 @@ class FlightRecorder:
         self._model = visible_model(scenario)
         suffix = f"/{part}" if name else ""
         self._scene = Scene(recording, scenario, self._model, f"world{suffix}", color, name)
-        self._plane = AttitudePlane(recording, scenario, f"plane{suffix}", color)
-        series = comparison_series(name, color) if name else measured_series(scenario)
-        self._series = TimeSeries(recording, series, f"{part}/" if name else "")
+        self._aspect = aspect = aspect_of(scenario)
+        self._plane = None
+        if aspect.plane is not None:
+            self._plane = aspect.plane(recording, scenario, f"plane{suffix}", color)
+        series = comparison_series(name, color, scenario) if name else aspect.measured(scenario)
+        self._series = TimeSeries(recording, series, aspect.values, f"{part}/" if name else "")
         self._plane_root, self._scene_root = f"plane{suffix}", f"world{suffix}"
 
     def shown(self) -> Shown:
@@ -81,19 +87,30 @@ class FlightRecorder:
             vehicle=self._scene.vehicle,
             camera=self._scene.camera,
             floor=self._scene.floor,
-            plane=self._plane_root,
+            plane=self._plane_root if self._plane is not None else "",
+            panels=self._aspect.panels(self._scenario),
+            eye=self._aspect.eye,
+            up=self._aspect.up,
+            overview=self._overview() if self._aspect.overview else None,
             radius=vehicle_radius(self._model),
             thrust_scale=thrust_scale(self._model),
             ground=ground_height(self._model),
         )
 
+    def _overview(self) -> tuple[float, float, float]:
+        path = reference_path(self._scenario, self._scenario.simulation.duration)
+        low, high = path.min(axis=0), path.max(axis=0)
+        x, y, _ = (0.5 * (low + high)).tolist()
+        return x, y, float(OVERVIEW_HEIGHT * max(np.ptp(path, axis=0).max(), 1.0))
+
     def begin(self, until: float) -> None:
         """Log all that does not move, for a flight that lasts ``until`` (s) at most."""
         left_out = self._scene.begin(until)
-        self._plane.begin(paints=self._first)
+        if self._plane is not None:
+            self._plane.begin(paints=self._first)
         self._series.begin()
         if self._first:
-            self._series.draw_limits(self._scenario, until)
+            self._series.draw_limits(self._aspect.limits(self._scenario), until)
         self._log_events([self._events.opening()])
         if left_out:
             text = f"not drawn, for Rerun has no such shape: {', '.join(left_out)}"
@@ -102,7 +119,8 @@ class FlightRecorder:
     def append(self, piece: Flight) -> None:
         """Log the rows of a piece of the flight that follows on from the last."""
         self._scene.append(piece)
-        self._plane.append(piece)
+        if self._plane is not None:
+            self._plane.append(piece)
         self._series.append(piece)
         self._log_events(self._events.observe(piece))
 

@@ -24,25 +24,44 @@ UNHURRIED: Final = 3600.0
 """Seconds between flushes by the clock of a recording that is saved in one go."""
 
 
-def save_recording(flights: Sequence[Flight], path: Path) -> None:
-    """Write flights into one recording; the file appears whole or not at all.
+class RecordingFile:
+    """A recording to be saved in one go.
 
-    Equal flights give equal recordings. Raises `InputError` where the file cannot be written.
+    All that does not need the flights is made here, the imports of Rerun first of all, so that it
+    can be done while they are flown.
+
+    Parameters
+    ----------
+    scenarios
+        What the recording will show.
     """
-    import rerun as rr
 
-    # Flushed by rows and bytes alone: a clock would cut the chunks elsewhere in every run.
-    unhurried = rr.ChunkBatcherConfig(flush_tick=UNHURRIED)
-    recording = new_recording([flight.scenario for flight in flights], batching=unhurried)
-    recorders = make_recorders(recording, flights)
-    blueprint = flight_blueprint([recorder.shown() for recorder in recorders])
-    try:
-        with replacing(path) as temporary:
-            recording.save(temporary, default_blueprint=blueprint)
-            write_flights(recorders, flights)
-            recording.disconnect()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+    def __init__(self, scenarios: Sequence[Scenario]) -> None:
+        import rerun as rr
+
+        # Flushed by rows and bytes alone: a clock would cut the chunks elsewhere in every run.
+        unhurried = rr.ChunkBatcherConfig(flush_tick=UNHURRIED)
+        self._recording = new_recording(scenarios, batching=unhurried)
+        self._recorders = make_recorders(self._recording, scenarios)
+        self._blueprint = flight_blueprint([recorder.shown() for recorder in self._recorders])
+
+    def save(self, flights: Sequence[Flight], path: Path) -> None:
+        """Write the flights, one a scenario; the file appears whole or not at all.
+
+        Equal flights give equal recordings. Raises `InputError` where the file cannot be written.
+        """
+        try:
+            with replacing(path) as temporary:
+                self._recording.save(temporary, default_blueprint=self._blueprint)
+                write_flights(self._recorders, flights)
+                self._recording.disconnect()
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def save_recording(flights: Sequence[Flight], path: Path) -> None:
+    """Write flights into one recording; see `RecordingFile.save`."""
+    RecordingFile([flight.scenario for flight in flights]).save(flights, path)
 
 
 def new_recording(
@@ -72,21 +91,21 @@ def new_recording(
 
 
 def make_recorders(
-    recording: rr.RecordingStream, flights: Sequence[Flight]
+    recording: rr.RecordingStream, scenarios: Sequence[Scenario]
 ) -> list[FlightRecorder]:
     """A recorder for each flight; several flights get names and colours of their own."""
-    if len(flights) == 1:
-        return [FlightRecorder(recording, flights[0].scenario)]
-    names = flight_names([flight.scenario for flight in flights])
+    if len(scenarios) == 1:
+        return [FlightRecorder(recording, scenarios[0])]
+    names = flight_names(scenarios)
     return [
         FlightRecorder(
             recording,
-            flight.scenario,
+            scenario,
             name=name,
             color=palette.FLIGHTS[index % len(palette.FLIGHTS)],
             first=index == 0,
         )
-        for index, (flight, name) in enumerate(zip(flights, names, strict=True))
+        for index, (scenario, name) in enumerate(zip(scenarios, names, strict=True))
     ]
 
 

@@ -13,6 +13,7 @@ from tiltsim.replay import (
     first_free_body,
     joint_positions,
     poses_in_parents,
+    reference_positions,
     rotate,
     thrust_scale,
     thrust_sites,
@@ -140,7 +141,7 @@ class Scene:
         self._append_trail(time, position)
         self._append_floor(time, position)
         if self._follows:
-            reference = np.stack([columns[f"{axis}_ref"] for axis in "xyz"], axis=1)
+            reference = reference_positions(columns)
             point = rr.Points3D.columns(positions=reference.astype(np.float32))
             send_rows(self._recording, f"{self.root}/reference/now", time, point)
 
@@ -148,7 +149,10 @@ class Scene:
         self._recording.log(path, *archetypes, static=True)
 
     def _thrust_path(self, site: int) -> str:
-        return f"{self._paths[self._model.site_bodyid[site]]}/thrust"
+        body = self._model.site_bodyid[site]
+        alone = [self._model.site_bodyid[other] for other in self._thrust].count(body) == 1
+        # Several on one body are told apart by their columns, such as thrust_1.
+        return f"{self._paths[body]}/{'thrust' if alone else self._thrust[site]}"
 
     def _begin_thrust(self) -> None:
         import rerun as rr
@@ -165,9 +169,7 @@ class Scene:
         """Log the whole path that the vehicle is to follow."""
         import rerun as rr
 
-        reference = self._scenario.reference.parameters
-        times = np.linspace(0.0, until, REFERENCE_POINTS).tolist()
-        path = np.array([position_reference(time, reference)[:3] for time in times])
+        path = reference_path(self._scenario, until)
         size = 0.08 * vehicle_radius(self._model)
         color = palette.WHITE
         now = rr.Points3D.from_fields(colors=[color], radii=[size])
@@ -211,6 +213,13 @@ class Scene:
         strips = rr.LineStrips3D.columns(strips=stretches.astype(np.float32))
         send_rows(self._recording, f"{self.root}/trail", time[picked], strips)
         self._trail_end = ends[-1]
+
+
+def reference_path(scenario: Scenario, until: float) -> Floats:
+    """Points of the reference from the start to a time (s), shape (N, 3)."""
+    reference, table = scenario.reference.parameters, scenario.reference.table
+    times = np.linspace(0.0, until, REFERENCE_POINTS).tolist()
+    return np.array([position_reference(time, reference, table)[:3] for time in times])
 
 
 def _axis_in_body(model: mujoco.MjModel, site: int) -> Floats:

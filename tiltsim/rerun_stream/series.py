@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -106,7 +107,7 @@ def limit_series(scenario: Scenario) -> list[tuple[Series, float]]:
         ("singularity/threshold", f"threshold {MARGIN_THRESHOLD:g}", MARGIN_THRESHOLD),
         ("singularity/singular", "singular", 0.0),
     ]
-    vehicle = scenario.vehicle
+    vehicle = scenario.rotorcraft
     if vehicle.min_rotor_speed is not None:
         lines.append(("rotor_speeds/min", "lower limit", vehicle.min_rotor_speed))
     if vehicle.max_rotor_speed is not None:
@@ -114,15 +115,6 @@ def limit_series(scenario: Scenario) -> list[tuple[Series, float]]:
     return [
         (Series(path, label, palette.RED if value else palette.GREY, LIMIT_WIDTH), value)
         for path, label, value in lines
-    ]
-
-
-def comparison_series(name: str, color: Color) -> list[Series]:
-    """The series that stand for one flight, in its colour, when several are compared."""
-    return [
-        Series(f"{panel.path}/{series}", name, color)
-        for panel in PANELS
-        for series, _ in panel.compared
     ]
 
 
@@ -154,9 +146,16 @@ def series_values(flight: Flight) -> dict[str, Floats]:
 class TimeSeries:
     """The plotted entities of one flight."""
 
-    def __init__(self, recording: rr.RecordingStream, series: list[Series], prefix: str) -> None:
+    def __init__(
+        self,
+        recording: rr.RecordingStream,
+        series: list[Series],
+        values: Callable[[Flight], dict[str, Floats]],
+        prefix: str,
+    ) -> None:
         self._recording = recording
         self._series = series
+        self._values = values
         self._prefix = prefix
 
     def begin(self) -> None:
@@ -164,11 +163,11 @@ class TimeSeries:
         for series in self._series:
             self._log_style(series)
 
-    def draw_limits(self, scenario: Scenario, until: float) -> None:
-        """Draw the level lines of the plots, from the start to a time (s)."""
+    def draw_limits(self, limits: list[tuple[Series, float]], until: float) -> None:
+        """Draw level lines, given with their values, from the start to a time (s)."""
         import rerun as rr
 
-        for series, value in limit_series(scenario):
+        for series, value in limits:
             self._log_style(series)
             row = rr.Scalars.columns(scalars=[value, value])
             send_rows(self._recording, self._prefix + series.path, np.array([0.0, until]), row)
@@ -177,7 +176,7 @@ class TimeSeries:
         """Log the rows of a piece of the flight."""
         import rerun as rr
 
-        values = series_values(piece)
+        values = self._values(piece)
         for series in self._series:
             row = rr.Scalars.columns(scalars=values[series.path])
             send_rows(self._recording, self._prefix + series.path, piece["time"], row)

@@ -34,8 +34,9 @@ def view_flights(flights: Sequence[Flight], url: str | None = None) -> None:
     from tiltsim.rerun_stream.recording import make_recorders, new_recording, write_flights
 
     require_viewer(url)
-    recording = new_recording([flight.scenario for flight in flights])
-    recorders = make_recorders(recording, flights)
+    scenarios = [flight.scenario for flight in flights]
+    recording = new_recording(scenarios)
+    recorders = make_recorders(recording, scenarios)
     attach_viewer(recording, url, flight_blueprint([recorder.shown() for recorder in recorders]))
     write_flights(recorders, flights)
     recording.disconnect()

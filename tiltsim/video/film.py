@@ -12,20 +12,21 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.references import position_reference
-from tiltsim.attitude_plane import torque_free_directions
 from tiltsim.errors import InputError
 from tiltsim.files import replacing
 from tiltsim.loops import follows_position
 from tiltsim.replay import (
     first_free_body,
     joint_positions,
+    positions,
+    reference_positions,
     thrust_scale,
     thrust_sites,
     vehicle_radius,
     visible_model,
 )
-from tiltsim.video.inset import PlaneInset, lay_over
-from tiltsim.video.offscreen import Canvas, Caption, Image
+from tiltsim.video.aspects import aspect_of
+from tiltsim.video.offscreen import Canvas, Image
 
 if TYPE_CHECKING:
     from tiltsim.flight import Flight
@@ -39,11 +40,6 @@ REFERENCE_COLOR: Final = (0.15, 0.16, 0.18)
 THRUST_COLOR: Final = (0.95, 0.80, 0.10)
 REFERENCE_POINTS: Final = 200
 
-CAMERA_DISTANCE: Final = 7.5  # radii of the vehicle
-CAMERA_AZIMUTH: Final = 130.0  # degrees
-CAMERA_ELEVATION: Final = -24.0  # degrees
-
-INSET_SHARE: Final = 0.32  # of the height
 QUALITY: Final = "21"  # H.264's constant rate factor: 18 is lossless to the eye, 28 coarse
 
 
@@ -110,24 +106,20 @@ class _Stage:
         self._radius = vehicle_radius(model)
         self._arrow_scale = thrust_scale(model)
         self._reference = _reference_path(flight)
-        self._n = torque_free_directions(flight.columns, flight.scenario.vehicle.resolve())
-        self._attitude = np.stack([flight["roll"], flight["pitch"]], axis=1)
-        side = float(np.sign(flight["singularity_margin"][0])) or 1.0
-        self._inset = PlaneInset(round(INSET_SHARE * form.height), side)
-        self._gap = round(0.025 * form.height)
-        self._caption = Caption(
-            "shaded: attitudes out of reach", self._gap, self._inset.size + self._gap
-        )
+        self._targets = reference_positions(flight.columns)
+        self._position = positions(flight.columns)
+        self._aspect = aspect_of(flight, form.height)
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_TRACKING
         self._camera.trackbodyid = self._body
-        self._camera.distance = CAMERA_DISTANCE * self._radius
-        self._camera.azimuth, self._camera.elevation = CAMERA_AZIMUTH, CAMERA_ELEVATION
+        eye = self._aspect.eye
+        self._camera.distance = eye.distance * self._radius
+        self._camera.azimuth, self._camera.elevation = eye.azimuth, eye.elevation
         self.canvas = Canvas(model, form.width, form.height)
 
     def frame(self, sample: int) -> Image:
         """The frame of a sample."""
-        model, data, flight = self._model, self._data, self._flight
+        model, data = self._model, self._data
         data.qpos = self._qpos[sample]
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
@@ -136,24 +128,15 @@ class _Stage:
         self._add_thrusts(sample)
         self._add_reference(sample)
         self._add_trail(sample)
-        margin = float(flight["singularity_margin"][sample])
-        names, values = self._table(sample, margin)
-        image = self.canvas.draw(names, values, self._caption)
-        trail = self._attitude[: sample + 1 : 2]
-        trail = np.concatenate([trail, self._attitude[sample : sample + 1]])
-        image = np.ascontiguousarray(image)
-        lay_over(image, self._inset.paint(self._n[sample], trail, margin), self._gap)
+        names, values = self._table(sample)
+        image = np.ascontiguousarray(self.canvas.draw(names, values, self._aspect.caption))
+        self._aspect.paint(image, sample)
         return image
 
-    def _table(self, sample: int, margin: float) -> tuple[str, str]:
-        flight = self._flight
-        rows = {
-            "time": f"{flight['time'][sample]:.1f} s",
-            "singularity margin": f"{abs(margin):.2f} rad",
-            "roll, pitch": f"{flight['roll'][sample]:+.2f}, {flight['pitch'][sample]:+.2f} rad",
-        }
+    def _table(self, sample: int) -> tuple[str, str]:
+        rows = {"time": f"{self._flight['time'][sample]:.1f} s", **self._aspect.rows(sample)}
         if self._reference is not None:
-            error = [flight[f"{axis}_ref"][sample] - flight[axis][sample] for axis in "xyz"]
+            error = self._targets[sample] - self._position[sample]
             rows["position error"] = f"{np.linalg.norm(error):.2f} m"
         return "\n".join(rows), "\n".join(rows.values())
 
@@ -172,7 +155,7 @@ class _Stage:
         line, color = mujoco.mjtGeom.mjGEOM_CAPSULE, (*REFERENCE_COLOR, 0.6)
         for start, end in zip(self._reference[:-1], self._reference[1:], strict=True):
             self._connect(line, 0.012 * self._radius, start, end, color)
-        place = np.array([self._flight[f"{axis}_ref"][sample] for axis in "xyz"])
+        place = self._targets[sample]
         scene = self.canvas.scene
         if scene.ngeom < scene.maxgeom:
             size = np.full(3, 0.07 * self._radius)
@@ -184,12 +167,12 @@ class _Stage:
             scene.ngeom += 1
 
     def _add_trail(self, sample: int) -> None:
-        time, positions = self._flight["time"], self._qpos[:, :3]
+        time, places = self._flight["time"], self._position
         now = time[sample]
         moments = np.arange(max(0.0, now - TRAIL_TIME), now, TRAIL_INTERVAL)
         # Corners at fixed times, lest the trail crawl from frame to frame.
         corners = np.searchsorted(time, np.ceil(moments / TRAIL_INTERVAL) * TRAIL_INTERVAL)
-        points = positions[np.append(corners[corners < sample], sample)]
+        points = places[np.append(corners[corners < sample], sample)]
         shades = np.linspace(0.15, 0.95, len(points))
         line = mujoco.mjtGeom.mjGEOM_CAPSULE
         for start, end, shade in zip(points[:-1], points[1:], shades, strict=False):
@@ -221,6 +204,7 @@ def _reference_path(flight: Flight) -> Floats | None:
     if not follows_position(flight.scenario):
         return None
     reference = flight.scenario.reference.parameters
+    table = flight.scenario.reference.table
     times = np.linspace(0.0, float(flight["time"][-1]), REFERENCE_POINTS).tolist()
-    path = np.array([position_reference(time, reference)[:3] for time in times])
+    path = np.array([position_reference(time, reference, table)[:3] for time in times])
     return path if np.ptp(path, axis=0).max() > 0.0 else path[:1]

@@ -122,7 +122,8 @@ class Canvas:
         frame = self._frame
         self._write(mujoco.mjtGridPos.mjGRID_TOPLEFT, frame, names, values)
         corner = mujoco.MjrRect(0, caption.up, frame.width - caption.inwards, frame.height)
-        self._write(mujoco.mjtGridPos.mjGRID_BOTTOMRIGHT, corner, caption.text, "")
+        if caption.text:
+            self._write(mujoco.mjtGridPos.mjGRID_BOTTOMRIGHT, corner, caption.text, "")
         image = np.empty((self._frame.height, self._frame.width, 3), dtype=np.uint8)
         mujoco.mjr_readPixels(image, None, self._frame, self._context)
         return np.flipud(image)

@@ -1,0 +1,547 @@
+"""Attitude-altitude linearization that knows how its gait moves: exact, with integral action.
+
+The published law (`controllers.attitude_altitude`) takes the tilt angles as they are and every
+reference of roll and pitch as if it stood still, so it trails behind a moving gait. But the gait is
+planned: its rates are known, and with them the derivatives of all that depends on it. This law
+
+* counts the tilt rates into ``Ma``: torque and force change with the tilt, ``(d tau / d alpha)
+  alpha' w`` and ``(d F / d alpha) alpha' w``;
+* gives roll and pitch the velocity and acceleration with which the exact decoupler's answer moves
+  as the torque-free force ``n(alpha(t))`` turns in the body;
+* follows the position reference up to its snap;
+* differentiates Euler angles exactly, where ch. 3, Eq. (8), takes body rates for their rates, and
+  includes the gyroscopic torque;
+* integrates the position error, so that a constant disturbance leaves no steady error. Where the
+  wanted acceleration is at its limit, the integrators do not wind up.
+
+Each ingredient can be left out, to see what it is worth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import atan2, cos, nan, sin, sqrt
+from typing import Final, NamedTuple
+
+from controllers.attitude_altitude import Gains, State
+from controllers.decouplers import NONE
+from controllers.decoupling_matrix import (
+    body_force,
+    sines_and_cosines,
+    solve_by_pairs,
+    torque_entries,
+    vertical_force_entries,
+)
+from controllers.gains import IntegralGains
+from controllers.gaits import (
+    FIXED,
+    TWO_COLOR_CIRCLE,
+    GaitParameters,
+    tilt_acceleration,
+    tilt_reference,
+)
+from controllers.gaits.keyframes import NO_KEYFRAMES
+from controllers.jets import (
+    Jet,
+    jet_angle,
+    jet_cosine,
+    jet_product,
+    jet_quotient,
+    jet_scaled,
+    jet_sine,
+    jet_square_root,
+    jet_sum,
+)
+from controllers.references import ReferenceParameters, reference_derivatives
+from controllers.rotation import rotation_from_euler
+from controllers.scalar import Quad, Triple, scalar
+from controllers.supervisor import Supervisor, gait_share
+from controllers.vehicle import Vehicle, drag_ratio
+
+
+class Ingredients(NamedTuple):
+    """What the law counts in: 1 or 0 each."""
+
+    gait_rates: float = 1.0  # tilt rates in Ma
+    attitude_rates: float = 1.0  # velocity and acceleration of the roll and pitch references
+    reference_derivatives: float = 1.0  # acceleration, jerk and snap of the position reference
+    euler_rates: float = 1.0  # exact derivatives of the Euler angles, else the body rates
+    gyroscopic_torque: float = 1.0  # omega x I omega
+    integral_action: float = 1.0
+
+
+INGREDIENTS: Final = Ingredients._fields
+"""What can be left out, by the name a scenario gives it."""
+
+
+class Parameters(NamedTuple):
+    """All that the law needs to know besides time and state."""
+
+    vehicle: Vehicle
+    gains: Gains
+    integral: IntegralGains
+    max_acceleration: float  # m/s^2 of the feedback, horizontally; integrators stop there
+    max_angular_acceleration: float  # rad/s^2, each axis, asked of the body
+    anticipation: float  # s before and after a corner of the gait in which the body turns
+    ingredients: Ingredients
+    gait: GaitParameters
+    reference: ReferenceParameters
+    decoupler: float  # NONE or EXACT
+    supervisor: Supervisor = Supervisor()
+
+
+INTEGRAL_FIELDS: Final = ("integral_x", "integral_y", "integral_z")
+"""The law's own states: integrals of the position error, m s, world axes."""
+
+
+# --- how the torque-free force and the attitude move -------------------------------------------
+
+
+@scalar
+def torque_free_force_jet(
+    alpha_1: Jet, alpha_2: Jet, alpha_3: Jet, alpha_4: Jet, drag_ratio: float
+) -> tuple[Jet, Jet, Jet]:
+    """`controllers.decoupling_matrix.torque_free_force` of moving tilt angles.
+
+    Written in the sums and differences of opposite angles, with which the products of ch. 3 reduce
+    to ``n_x = -sin(a2 - a4) A / 2r`` and the like.
+    """
+    sum_13, sum_24 = jet_sum(1.0, alpha_1, 1.0, alpha_3), jet_sum(1.0, alpha_2, 1.0, alpha_4)
+    gap_13, gap_24 = jet_sum(1.0, alpha_1, -1.0, alpha_3), jet_sum(1.0, alpha_2, -1.0, alpha_4)
+    sin_13, cos_13 = jet_sine(sum_13), jet_cosine(sum_13)
+    sin_24, cos_24 = jet_sine(sum_24), jet_cosine(sum_24)
+    r = drag_ratio
+    # Yaw torque of each pair per unit of its inputs without roll or pitch torque, over -2r.
+    yaw_13 = jet_sum(0.5 * (1.0 / r - r), sin_13, -1.0, cos_13)
+    yaw_24 = jet_sum(0.5 * (r - 1.0 / r), sin_24, -1.0, cos_24)
+    lift_13 = jet_sum(1.0, jet_sum(1.0, cos_13, 1.0, jet_cosine(gap_13)), r, sin_13)
+    lift_24 = jet_sum(1.0, jet_sum(1.0, cos_24, 1.0, jet_cosine(gap_24)), -r, sin_24)
+    return (
+        jet_product(jet_scaled(-1.0, jet_sine(gap_24)), yaw_13),
+        jet_product(jet_sine(gap_13), yaw_24),
+        jet_sum(-1.0, jet_product(lift_13, yaw_24), -1.0, jet_product(lift_24, yaw_13)),
+    )
+
+
+@scalar
+def exact_decoupler_jet(
+    ax: Jet, ay: Jet, lift: Jet, yaw: Jet, nx: Jet, ny: Jet, nz: Jet
+) -> tuple[Jet, Jet]:
+    """`controllers.decouplers.exact_decoupler` of moving arguments; ``lift`` is ``g + az``.
+
+    NaN where the torque-free force has neither a side nor a vertical part. Where no roll reaches
+    the wanted direction the nearest one is returned, at rest.
+    """
+    sin_yaw, cos_yaw = jet_sine(yaw), jet_cosine(yaw)
+    dx = jet_sum(1.0, jet_product(ax, cos_yaw), 1.0, jet_product(ay, sin_yaw))
+    dy = jet_sum(1.0, jet_product(ay, cos_yaw), -1.0, jet_product(ax, sin_yaw))
+    side = 1.0 if nz[0] >= 0.0 else -1.0
+    nx, ny, nz = jet_scaled(side, nx), jet_scaled(side, ny), jet_scaled(side, nz)
+    across = jet_sum(1.0, jet_product(ny, ny), 1.0, jet_product(nz, nz))
+    if across[0] == 0.0:
+        return (nan, nan, nan), (nan, nan, nan)
+    wanted = jet_sum(1.0, jet_product(dx, dx), 1.0, jet_product(lift, lift))
+    force = jet_sum(1.0, across, 1.0, jet_product(nx, nx))
+    length = jet_sum(1.0, wanted, 1.0, jet_product(dy, dy))
+    if length[0] == 0.0:
+        return (nan, nan, nan), (nan, nan, nan)
+    # Roll makes  n_y cos(roll) - n_z sin(roll) = d_y |n| / |d|,  the part across the pitch axis.
+    reach = jet_product(dy, jet_square_root(jet_quotient(force, length)))
+    rest = jet_sum(1.0, across, -1.0, jet_product(reach, reach))
+    turned = jet_angle(nz, ny)
+    if rest[0] > 0.0:
+        roll = jet_sum(1.0, jet_angle(jet_square_root(rest), reach), -1.0, turned)
+    else:
+        nearest = atan2(0.0, reach[0])
+        roll = (nearest - turned[0], 0.0, 0.0)
+    forward = jet_sum(1.0, jet_product(ny, jet_sine(roll)), 1.0, jet_product(nz, jet_cosine(roll)))
+    pitch = jet_sum(1.0, jet_angle(dx, lift), -1.0, jet_angle(nx, forward))
+    return roll, pitch
+
+
+# --- how the body moves ------------------------------------------------------------------------
+
+
+@scalar
+def euler_motion(
+    roll: float, pitch: float, omega: Triple, omega_rate: Triple
+) -> tuple[float, float, float, float, float, float]:
+    """First and second derivatives of roll, pitch and yaw from the body rates and their rates.
+
+    Inverts ``omega = M(roll, pitch) eta'`` and ``omega' = M eta'' + M' eta'``. Infinite where the
+    pitch is a right angle.
+    """
+    p, q, r = omega
+    sr, cr, sp, cp = sin(roll), cos(roll), sin(pitch), cos(pitch)
+    yaw_rate = (sr * q + cr * r) / cp
+    pitch_rate = cr * q - sr * r
+    roll_rate = p + sp * yaw_rate
+    # omega' - M' eta'
+    p_rate = omega_rate[0] + cp * pitch_rate * yaw_rate
+    q_rate = omega_rate[1] - (
+        -sr * roll_rate * pitch_rate + (cr * cp * roll_rate - sr * sp * pitch_rate) * yaw_rate
+    )
+    r_rate = omega_rate[2] - (
+        -cr * roll_rate * pitch_rate - (sr * cp * roll_rate + cr * sp * pitch_rate) * yaw_rate
+    )
+    yaw_acceleration = (sr * q_rate + cr * r_rate) / cp
+    return (
+        *(roll_rate, pitch_rate, yaw_rate),
+        *(p_rate + sp * yaw_acceleration, cr * q_rate - sr * r_rate, yaw_acceleration),
+    )
+
+
+@scalar
+def body_jerk(roll: Jet, pitch: Jet, yaw: Jet, jerk: Triple) -> Triple:
+    """Second derivatives of the body rates when roll, pitch and yaw have the given ``jerk``.
+
+    ``p = roll' - yaw' sin(pitch)``, ``q = pitch' cos(roll) + yaw' sin(roll) cos(pitch)``, ``r =
+    -pitch' sin(roll) + yaw' cos(roll) cos(pitch)``, each differentiated twice.
+    """
+    sin_roll, cos_roll = jet_sine(roll), jet_cosine(roll)
+    sin_pitch, cos_pitch = jet_sine(pitch), jet_cosine(pitch)
+    pitch_rate = (pitch[1], pitch[2], jerk[1])
+    yaw_rate = (yaw[1], yaw[2], jerk[2])
+    across = jet_product(yaw_rate, cos_pitch)
+    along = jet_product(yaw_rate, sin_pitch)
+    q = jet_sum(1.0, jet_product(pitch_rate, cos_roll), 1.0, jet_product(across, sin_roll))
+    r = jet_sum(-1.0, jet_product(pitch_rate, sin_roll), 1.0, jet_product(across, cos_roll))
+    return jerk[0] - along[2], q[2], r[2]
+
+
+@scalar
+def cross(a: Triple, b: Triple) -> Triple:
+    """The vector product ``a x b``."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@scalar
+def rotated(rotation: Sequence[float], b: Triple) -> Triple:
+    """A vector of the body in world axes; ``rotation`` holds nine entries, rows first."""
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
+    return (
+        r11 * b[0] + r12 * b[1] + r13 * b[2],
+        r21 * b[0] + r22 * b[1] + r23 * b[2],
+        r31 * b[0] + r32 * b[1] + r33 * b[2],
+    )
+
+
+# --- the law -----------------------------------------------------------------------------------
+
+
+@scalar
+def limited_acceleration(x: Jet, y: Jet, limit: float) -> tuple[Jet, Jet]:
+    """A horizontal acceleration scaled back to ``limit`` (m/s^2) where it is longer."""
+    square = jet_sum(1.0, jet_product(x, x), 1.0, jet_product(y, y))
+    if square[0] <= limit * limit:
+        return x, y
+    share = jet_quotient((limit, 0.0, 0.0), jet_square_root(square))
+    return jet_product(x, share), jet_product(y, share)
+
+
+@scalar
+def integrator_rate(error: float, wanted: float, limit: float) -> float:
+    """Rate of an integrator of ``error``: it stops where it would push a limit further."""
+    if abs(wanted) > limit and error * wanted > 0.0:
+        return 0.0
+    return error
+
+
+@scalar
+def clamped(value: float, limit: float) -> float:
+    """The value nearest to the given one within plus and minus ``limit``."""
+    return min(limit, max(-limit, value))
+
+
+@scalar
+def attitude_jerk(wanted: Jet, now: Jet, k1: float, k2: float, k3: float, limit: float) -> float:
+    """Third-order law (ch. 4, Eq. 26) around a reference that moves, with bounded effort.
+
+    As long as nothing saturates, ``k1 e'' + k2 e' + k3 e``. Read as a cascade (the angle asks for a
+    rate, the rate for an acceleration), the acceleration asked for by the errors is held to
+    ``limit`` and the rate to what it brakes from, so that a large error does not stop a rotor.
+    """
+    rate = clamped(k3 / k2 * (wanted[0] - now[0]), limit * k1 / k2)
+    acceleration = clamped(k2 / k1 * (rate + wanted[1] - now[1]) + wanted[2], limit)
+    return k1 * (acceleration - now[2])
+
+
+@scalar
+def rounded_ramp(x: float, half: float) -> Jet:
+    """The ramp ``max(x, 0)``, smooth within ``half`` of its corner.
+
+    Its second derivative is the kernel ``15/16 (1 - (x/half)^2)^2 / half`` of area one.
+    """
+    if x <= -half:
+        return 0.0, 0.0, 0.0
+    if x >= half:
+        return x, 1.0, 0.0
+    u = x / half
+    square = u * u
+    return (
+        half * (0.5 * u + (15.0 * square - 5.0 * square**2 + square**3 + 5.0) / 32.0),
+        0.5 + u * (15.0 - 10.0 * square + 3.0 * square**2) / 16.0,
+        0.9375 * (1.0 - square) ** 2 / half,
+    )
+
+
+@scalar
+def rounded_corner(
+    start: float, start_rate: float, stop: float, stop_rate: float, half: float
+) -> Jet:
+    """A motion along two straight lines, its corner rounded, in the middle of a window.
+
+    The window lasts ``2 half`` seconds and holds one corner at most; ``start`` and ``stop`` are the
+    values at its ends. The lines tell where the corner is.
+    """
+    middle = start + half * start_rate
+    bend = stop_rate - start_rate
+    if bend == 0.0:
+        return middle, start_rate, 0.0
+    since = (stop - middle - half * start_rate) / bend - half
+    value, first, second = rounded_ramp(clamped(since, half), half)
+    return middle + bend * value, start_rate + bend * first, bend * second
+
+
+@scalar
+def anticipated_tilts(
+    time: float, gait: GaitParameters, table: Sequence[float], half: float
+) -> tuple[Jet, Jet, Jet, Jet]:
+    """The planned tilt angles, for the attitude: their corners rounded, ``half`` seconds each way.
+
+    A gait of straight lines turns about at once, the body cannot. But the corner is known before
+    it comes, so the body starts ``half`` before and ends ``half`` after it; what it misses before
+    makes up for what it misses after, but for second order. Smooth gaits stay as they are, and so
+    do jumps, which have no rates.
+    """
+    if half <= 0.0 or gait.type == FIXED or gait.type == TWO_COLOR_CIRCLE:
+        a1, a2, a3, a4, v1, v2, v3, v4 = tilt_reference(time, gait, table)
+        b1, b2, b3, b4 = tilt_acceleration(time, gait)
+        return (a1, v1, b1), (a2, v2, b2), (a3, v3, b3), (a4, v4, b4)
+    a1, a2, a3, a4, v1, v2, v3, v4 = tilt_reference(time - half, gait, table)
+    b1, b2, b3, b4, w1, w2, w3, w4 = tilt_reference(time + half, gait, table)
+    return (
+        rounded_corner(a1, v1, b1, w1, half),
+        rounded_corner(a2, v2, b2, w2, half),
+        rounded_corner(a3, v3, b3, w3, half),
+        rounded_corner(a4, v4, b4, w4, half),
+    )
+
+
+@scalar
+def planned_force(
+    time: float, roll: float, pitch: float, parameters: Parameters, table: Sequence[float]
+) -> tuple[Jet, Jet, Jet]:
+    """The torque-free force ``n`` of the planned gait, with how it moves (body axes).
+
+    At an attitude where a supervisor lets only a share of the gait pass, of that share.
+    """
+    alpha_1, alpha_2, alpha_3, alpha_4 = anticipated_tilts(
+        time, parameters.gait, table, parameters.anticipation
+    )
+    ratio = drag_ratio(parameters.vehicle)
+    planned = tilt_reference(time, parameters.gait, table)
+    share = gait_share(planned, roll, pitch, parameters.supervisor, ratio)
+    return torque_free_force_jet(
+        jet_scaled(share, alpha_1),
+        jet_scaled(share, alpha_2),
+        jet_scaled(share, alpha_3),
+        jet_scaled(share, alpha_4),
+        ratio,
+    )
+
+
+@scalar
+def tracking_inputs(
+    time: float,
+    state: State,
+    tilt_rates: Quad,
+    integrals: Triple,
+    parameters: Parameters,
+    table: Sequence[float] = NO_KEYFRAMES,
+) -> tuple[float, ...]:
+    """Rotor accelerations, rates of the integrators, and the attitude asked for.
+
+    ``state`` is `controllers.attitude_altitude.STATE_FIELDS`, ``tilt_rates`` (rad/s) are those of
+    its tilt angles, ``integrals`` the `INTEGRAL_FIELDS`. Returns four rotor accelerations
+    (rad/s^2), three rates (m) and the references of roll, pitch and yaw (rad); NaN where the
+    decoupling matrix is singular.
+    """
+    x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r, a1, a2, a3, a4, s1, s2, s3, s4 = state
+    vehicle, gains, ingredients = parameters.vehicle, parameters.gains, parameters.ingredients
+    reference, gravity = parameters.reference, vehicle.gravity
+    ratio = drag_ratio(vehicle)
+    per_force = vehicle.thrust_coefficient / vehicle.mass
+    per_torque = vehicle.arm_length * vehicle.thrust_coefficient
+    ixx, iyy, izz = vehicle.inertia_xx, vehicle.inertia_yy, vehicle.inertia_zz
+    gyroscopic = ingredients.gyroscopic_torque
+
+    # What the rotors do now, and how that changes while the pods turn and the speeds stay.
+    trig = sines_and_cosines(a1, a2, a3, a4)
+    sin_1, cos_1, sin_2, cos_2, sin_3, cos_3, sin_4, cos_4 = trig
+    rate_1, rate_2, rate_3, rate_4 = tilt_rates
+    counted = ingredients.gait_rates
+    rate_1, rate_2 = counted * rate_1, counted * rate_2
+    rate_3, rate_4 = counted * rate_3, counted * rate_4
+    turning = (
+        *(cos_1 * rate_1, -sin_1 * rate_1, cos_2 * rate_2, -sin_2 * rate_2),
+        *(cos_3 * rate_3, -sin_3 * rate_3, cos_4 * rate_4, -sin_4 * rate_4),
+    )
+    w1, w2, w3, w4 = s1 * abs(s1), s2 * abs(s2), s3 * abs(s3), s4 * abs(s4)
+    entries = torque_entries(trig, ratio)
+    x2, x4, y1, y3, z1, z2, z3, z4 = entries
+    dx2, dx4, dy1, dy3, dz1, dz2, dz3, dz4 = torque_entries(turning, ratio)
+    torque = (
+        per_torque * (x2 * w2 + x4 * w4),
+        per_torque * (y1 * w1 + y3 * w3),
+        per_torque * (z1 * w1 + z2 * w2 + z3 * w3 + z4 * w4),
+    )
+    torque_turning = (
+        per_torque * (dx2 * w2 + dx4 * w4),
+        per_torque * (dy1 * w1 + dy3 * w3),
+        per_torque * (dz1 * w1 + dz2 * w2 + dz3 * w3 + dz4 * w4),
+    )
+    fx, fy, fz = body_force(trig, w1, w2, w3, w4)
+    gx, gy, gz = body_force(turning, w1, w2, w3, w4)
+
+    # Newton and Euler: accelerations of the body and of its Euler angles.
+    rotation = rotation_from_euler(roll, pitch, yaw)
+    specific = (per_force * fx, per_force * fy, per_force * fz)
+    ax, ay, lift = rotated(rotation, specific)
+    omega = (p, q, r)
+    cx, cy, cz = cross(omega, (ixx * p, iyy * q, izz * r))
+    omega_rate = (
+        (torque[0] - gyroscopic * cx) / ixx,
+        (torque[1] - gyroscopic * cy) / iyy,
+        (torque[2] - gyroscopic * cz) / izz,
+    )
+    if ingredients.euler_rates == 0.0:
+        roll_now = (roll, p, omega_rate[0])
+        pitch_now = (pitch, q, omega_rate[1])
+        yaw_now = (yaw, r, omega_rate[2])
+    else:
+        d_roll, d_pitch, d_yaw, dd_roll, dd_pitch, dd_yaw = euler_motion(
+            roll, pitch, omega, omega_rate
+        )
+        roll_now, pitch_now = (roll, d_roll, dd_roll), (pitch, d_pitch, dd_pitch)
+        yaw_now = (yaw, d_yaw, dd_yaw)
+
+    # The position reference, and how far from it the vehicle is.
+    motion = reference_derivatives(time, reference, table)
+    known = ingredients.reference_derivatives
+    x_ref, y_ref, z_ref, vx_ref, vy_ref, vz_ref = motion[:6]
+    ax_ref, ay_ref, az_ref = known * motion[6], known * motion[7], known * motion[8]
+    jx_ref, jy_ref, jz_ref = known * motion[9], known * motion[10], known * motion[11]
+    sx_ref, sy_ref, sz_ref = known * motion[12], known * motion[13], known * motion[14]
+    ex, ey, ez = x_ref - x, y_ref - y, z_ref - z
+    evx, evy, evz = vx_ref - vx, vy_ref - vy, vz_ref - vz
+    integrating = ingredients.integral_action
+    of_position = integrating * parameters.integral.position
+    of_altitude = integrating * parameters.integral.altitude
+
+    # Altitude: third order, as ch. 4, Eq. (27), plus the integral.
+    altitude_jerk = (
+        jz_ref
+        + gains.altitude_1 * (az_ref - (lift - gravity))
+        + gains.altitude_2 * evz
+        + gains.altitude_3 * ez
+        + of_altitude * integrals[2]
+    )
+
+    # Position: the horizontal acceleration that takes the vehicle back, and how it changes.
+    limit = parameters.max_acceleration
+    xi_rate = yi_rate = 0.0
+    roll_ref, pitch_ref = (reference.roll, 0.0, 0.0), (reference.pitch, 0.0, 0.0)
+    if parameters.decoupler != NONE:
+        nx, ny, nz = planned_force(time, roll, pitch, parameters, table)
+        # Jerk of the body if its force stays along n: it turns with the body and with the gait.
+        length = jet_square_root(
+            jet_sum(
+                1.0,
+                jet_sum(1.0, jet_product(nx, nx), 1.0, jet_product(ny, ny)),
+                1.0,
+                jet_product(nz, nz),
+            )
+        )
+        size = sqrt(specific[0] ** 2 + specific[1] ** 2 + specific[2] ** 2)
+        if nz[0] < 0.0:
+            size = -size
+        size = size * counted
+        swept = cross(omega, specific)
+        jx, jy, _ = rotated(
+            rotation,
+            (
+                swept[0] + size * jet_quotient(nx, length)[1],
+                swept[1] + size * jet_quotient(ny, length)[1],
+                swept[2] + size * jet_quotient(nz, length)[1],
+            ),
+        )
+        k1, k2 = gains.position_1, gains.position_2
+        back_x = (
+            k1 * evx + k2 * ex + of_position * integrals[0],
+            k1 * (ax_ref - ax) + k2 * evx + of_position * ex,
+            k1 * (jx_ref - jx) + k2 * (ax_ref - ax) + of_position * evx,
+        )
+        back_y = (
+            k1 * evy + k2 * ey + of_position * integrals[1],
+            k1 * (ay_ref - ay) + k2 * evy + of_position * ey,
+            k1 * (jy_ref - jy) + k2 * (ay_ref - ay) + of_position * evy,
+        )
+        xi_rate = integrator_rate(ex, back_x[0], limit)
+        yi_rate = integrator_rate(ey, back_y[0], limit)
+        back_x, back_y = limited_acceleration(back_x, back_y, limit)
+        roll_ref, pitch_ref = exact_decoupler_jet(
+            jet_sum(1.0, (ax_ref, jx_ref, sx_ref), 1.0, back_x),
+            jet_sum(1.0, (ay_ref, jy_ref, sy_ref), 1.0, back_y),
+            (gravity + az_ref, jz_ref, sz_ref),
+            yaw_now,
+            *(nx, ny, nz),
+        )
+        if ingredients.attitude_rates == 0.0:
+            roll_ref, pitch_ref = (roll_ref[0], 0.0, 0.0), (pitch_ref[0], 0.0, 0.0)
+    climb = gains.altitude_2 * evz + gains.altitude_3 * ez + of_altitude * integrals[2]
+    zi_rate = integrator_rate(ez, climb, gains.altitude_1 * limit)
+
+    # Third-order laws on the attitude, as ch. 4, Eq. (26), around references that move.
+    most = parameters.max_angular_acceleration
+    yaw_error = atan2(sin(reference.yaw - yaw), cos(reference.yaw - yaw))
+    roll_jerk = attitude_jerk(roll_ref, roll_now, gains.roll_1, gains.roll_2, gains.roll_3, most)
+    pitch_jerk = attitude_jerk(
+        pitch_ref, pitch_now, gains.pitch_1, gains.pitch_2, gains.pitch_3, most
+    )
+    yaw_ref = (yaw + yaw_error, 0.0, 0.0)
+    yaw_jerk = attitude_jerk(yaw_ref, yaw_now, gains.yaw_1, gains.yaw_2, gains.yaw_3, most)
+    jerk = (roll_jerk, pitch_jerk, yaw_jerk)
+    wanted = (
+        jerk if ingredients.euler_rates == 0.0 else body_jerk(roll_now, pitch_now, yaw_now, jerk)
+    )
+
+    # The torques must change so that omega'' comes out; what turns by itself is taken off.
+    ox, oy, oz = omega_rate
+    mx, my, mz = cross(omega_rate, (ixx * p, iyy * q, izz * r))
+    lx, ly, lz = cross(omega, (ixx * ox, iyy * oy, izz * oz))
+    roll_torque = ixx * wanted[0] + gyroscopic * (mx + lx) - torque_turning[0]
+    pitch_torque = iyy * wanted[1] + gyroscopic * (my + ly) - torque_turning[1]
+    yaw_torque = izz * wanted[2] + gyroscopic * (mz + lz) - torque_turning[2]
+
+    # Likewise the lift: the force turns with the body and with the pods.
+    up_x, up_y, up_z = rotation[6], rotation[7], rotation[8]
+    sweep_x, sweep_y, sweep_z = cross(omega, (fx, fy, fz))
+    swept_lift = up_x * (sweep_x + gx) + up_y * (sweep_y + gy) + up_z * (sweep_z + gz)
+    v1, v2, v3, v4 = solve_by_pairs(
+        entries,
+        vertical_force_entries(trig, up_x, up_y, up_z),
+        roll_torque / per_torque,
+        pitch_torque / per_torque,
+        yaw_torque / per_torque,
+        altitude_jerk / per_force - swept_lift,
+    )
+    if s1 == 0.0 or s2 == 0.0 or s3 == 0.0 or s4 == 0.0:
+        v1 = v2 = v3 = v4 = nan
+    else:
+        v1, v2 = 0.5 * v1 / abs(s1), 0.5 * v2 / abs(s2)
+        v3, v4 = 0.5 * v3 / abs(s3), 0.5 * v4 / abs(s4)
+    return (
+        *(v1, v2, v3, v4, xi_rate, yi_rate, zi_rate),
+        *(roll_ref[0], pitch_ref[0], reference.yaw),
+    )

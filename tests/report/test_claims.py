@@ -1,0 +1,121 @@
+"""What the claims of the registry measure, checked from another side."""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+import pytest
+
+from controllers.singularity import residuals
+from controllers.vehicle import PRESETS
+from tiltsim.library import library_entries
+from tiltsim.loading import load_scenario
+from tiltsim.report.claims import registered_claims
+from tiltsim.report.claims.ch03 import EQ_17, EQ_19
+from tiltsim.report.measures import determinant_coefficients
+from tiltsim.report.model import (
+    AnalysisClaim,
+    FlightClaim,
+    Outcome,
+    judge_value,
+    plain,
+    scenario_claims,
+)
+
+AR_DRONE = PRESETS["ar_drone_2"]
+CLAIMS = registered_claims()
+ANALYSED = [claim for claim in CLAIMS if isinstance(claim, AnalysisClaim)]
+FLOWN = [claim for claim in CLAIMS if isinstance(claim, FlightClaim)]
+
+
+def test_coefficients_multiply_out_to_the_residuals():
+    rng = np.random.default_rng(7)
+    angles = rng.uniform(-np.pi, np.pi, (50, 4))
+    factors = {"s": np.sin(angles), "c": np.cos(angles)}
+    for table, value in zip(
+        determinant_coefficients(AR_DRONE), residuals(angles, AR_DRONE), strict=True
+    ):
+        total = sum(
+            coefficient * np.prod([factors[f][:, i] for i, f in enumerate(name)], axis=0)
+            for name, coefficient in table.items()
+        )
+        np.testing.assert_allclose(total, value, atol=1e-9)
+
+
+def test_chapter_3_prints_two_wrong_terms_of_the_determinant():
+    """Eq. (17): 2.880 stands at scss and sscs, and belongs to sccs and sscc."""
+    computed = determinant_coefficients(AR_DRONE)
+    for part, (printed, exact) in enumerate(zip(EQ_17, computed, strict=True)):
+        wrong = {n for n in exact if abs(exact[n] - printed.get(n, 0.0)) > 1e-3}
+        assert wrong == ({"scss", "sccs", "sscs", "sscc"} if part == 1 else set())
+    assert EQ_17.R is EQ_19
+
+
+def test_one_pair_of_chapter_3_can_switch_without_a_crossing():
+    """Ch. 3, Sec. 5.2: from (1, 1) to (-1, -1) with alpha_1 = -alpha_3 = 1.4, and back."""
+    way = np.linspace(1.0, -1.0, 2001)
+    for alpha_1, crosses in ((1.4, False), (-1.4, False), (0.7, True), (0.0, True)):
+        angles = np.stack([0 * way + alpha_1, way, 0 * way - alpha_1, way], axis=-1)
+        assert bool((residuals(angles, AR_DRONE).R < 0.0).any()) is crosses
+
+
+@pytest.mark.parametrize("claim", ANALYSED, ids=lambda claim: f"{claim.chapter}-{claim.key}"[:80])
+def test_what_is_computed_is_judged_and_explained(claim):
+    outcome = judge_value(claim, plain(claim.measure()))
+    if outcome is Outcome.NOT_REPRODUCED:
+        assert claim.why
+    if claim.wrong:
+        assert outcome is Outcome.WRONG, "it agrees after all"
+
+
+def test_flights_of_claims_are_in_the_library():
+    library = {address for address, _, _ in library_entries()}
+    for claim in CLAIMS:
+        if isinstance(claim, FlightClaim):
+            assert set(claim.flights) <= library, claim.statement
+
+
+def test_every_chapter_has_claims():
+    entries = [load_scenario(address) for address, _, _ in library_entries()]
+    chapters = {claim.chapter for scenario in entries for claim in scenario_claims(scenario)}
+    assert chapters | {claim.chapter for claim in CLAIMS} >= {*range(1, 13)}
+
+
+def test_no_claim_stands_twice():
+    seen = [(claim.source, claim.statement, claim.case) for claim in CLAIMS]
+    assert len(set(seen)) == len(seen)
+
+
+@pytest.mark.parametrize(
+    "claim", FLOWN, ids=lambda claim: f"{claim.chapter}-{claim.statement} {claim.case}"[:99]
+)
+def test_a_comparison_of_flights_can_come_out_either_way(claim):
+    outcomes = set()
+    for seed in range(1000):
+        bad = (0.0, 0.2, 1.0)[seed % 3]
+        flights = {address: RandomMetrics(f"{seed} {address}", bad) for address in claim.flights}
+        outcomes.add(plain(claim.measure(flights)))
+        if len(outcomes) > 1:
+            return
+    pytest.fail(f"always {outcomes}")
+
+
+class RandomMetrics(dict):
+    """A flight with random metrics of all sizes; a share ``bad`` is lost or reverses a rotor."""
+
+    def __init__(self, seed, bad):
+        self.random, self.bad = random.Random(seed), bad
+        super().__init__(diverged=self._is_bad())
+
+    def _is_bad(self):
+        return self.random.random() < self.bad
+
+    def __missing__(self, name):
+        value = 10.0 ** self.random.uniform(-3.0, 1.0)
+        below = name == "min_published_determinant" or (name.startswith("min") and self._is_bad())
+        self[name] = -value if below else value
+        return self[name]
+
+    def get(self, name, default=None):
+        return self[name]

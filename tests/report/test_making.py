@@ -1,0 +1,261 @@
+"""The report end to end, on a tiny library: flights kept, rows judged, page and summary written."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from html.parser import HTMLParser
+
+import pytest
+
+from tiltsim.checking import collect
+from tiltsim.cli import main
+from tiltsim.exit_codes import EXPECTATION_FAILED, INVALID_INPUT
+from tiltsim.report import flying
+from tiltsim.report.content import failure_text, measured_text, published_text
+from tiltsim.report.findings import FINDINGS
+from tiltsim.report.flying import Record, Refusal, flight_key, fly, plan_flights
+from tiltsim.report.making import make_report
+from tiltsim.report.markdown import markdown
+from tiltsim.report.model import Outcome
+from tiltsim.report.page import page
+from tiltsim.report.pictures import AnalysisPicture, Drawing, png
+from tiltsim.report.rows import count
+
+
+def rows_of(report, statement):
+    return [row for row in report.rows if row.claim.statement == statement]
+
+
+def test_every_scenario_is_flown_on_both_plants_or_says_why_not(report, library):
+    assert {key[1] for key in report.flights} == {"thesis", "mujoco"}
+    refusals = {k: v for k, v in report.flights.items() if isinstance(v, Refusal)}
+    assert list(refusals) == [(f"{library}/bounded.toml", "thesis")]
+    assert "rotor limits" in refusals[f"{library}/bounded.toml", "thesis"].reason
+
+
+def test_rows_hold_both_plants_and_their_verdicts(report):
+    level, tilted = rows_of(report, "It stays where it is")
+    assert [plant for plant, _ in level.plants] == ["thesis", "mujoco"]
+    assert level.outcome is Outcome.REPRODUCED
+    assert tilted.outcome is Outcome.IN_KIND
+    for row in (level, tilted):
+        for plant, cell in row.plants:
+            record = report.flights[row.claim.address, plant]
+            assert cell.measured == record.metrics["final_position_error_x"]
+    [flies] = rows_of(report, "It flies | to the end")
+    assert flies.outcome is Outcome.WRONG
+    assert count(report.rows).total() == len(report.rows) == 6
+
+
+def test_a_plant_that_refuses_has_no_cell(report):
+    [row] = rows_of(report, "Rotors are slow")
+    assert row.cell("thesis") is None
+    assert row.cell("mujoco").measured is False
+    assert row.outcome is Outcome.REPRODUCED
+
+
+def test_a_lost_flight_has_no_final_values(report):
+    [lost] = rows_of(report, "The flight is lost")
+    assert lost.outcome is Outcome.REPRODUCED
+    assert re.fullmatch(r"lost at [\d.]+ s", measured_text(lost.claim, lost.cell("mujoco")))
+    [level] = rows_of(report, "It ends level")
+    assert level.cell("thesis").measured is None
+    assert level.outcome is Outcome.NOT_REPRODUCED
+    assert measured_text(level.claim, level.cell("thesis")).startswith("lost at ")
+
+
+def test_bounds_that_do_not_hold_are_named(report, library):
+    texts = [failure_text(failure) for failure in report.failures]
+    assert any(
+        text.startswith(f"{library}/bounded.toml on the mujoco plant: max_rotor_speed = ")
+        and text.endswith("expected <= 1")
+        for text in texts
+    )
+    assert all("hover" not in text for text in texts)
+
+
+def test_values_are_shown_a_digit_finer_than_printed(report):
+    level, tilted = rows_of(report, "It stays where it is")
+    assert published_text(level.claim) == "0 m"
+    assert measured_text(level.claim, level.cell("mujoco")) == "0.0000 m"
+    assert published_text(tilted.claim) == "5 m"
+    assert re.fullmatch(r"−?\d\.\d{3} m", measured_text(tilted.claim, tilted.cell("mujoco")))
+
+
+def test_a_second_report_flies_nothing(library, kept, report, monkeypatch):
+    monkeypatch.setattr(flying, "_fly_one", lambda *_, **__: pytest.fail("flown again"))
+    again = make_report([str(library)], kept, 1)
+    assert again.flights == report.flights
+    assert again.rows == report.rows
+    assert page(again) == page(report)
+
+
+def test_an_interrupted_report_goes_on(library, report, tmp_path, monkeypatch):
+    plans = plan_flights(collect([str(library)]))
+    fly_one, flown = flying._fly_one, []
+
+    def interrupted(task, **how):
+        if len(flown) == 3:
+            raise KeyboardInterrupt
+        flown.append(task)
+        return fly_one(task, **how)
+
+    monkeypatch.setattr(flying, "_fly_one", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        fly(plans, tmp_path, 1)
+    flown.clear()
+    seen = []
+    monkeypatch.setattr(
+        flying, "_fly_one", lambda task, **how: flown.append(task) or fly_one(task, **how)
+    )
+    flights = fly(plans, tmp_path, 1, lambda done, total: seen.append((done, total)))
+    assert len(flown) == 4  # seven flights, three of them kept
+    assert seen[0] == (4, 8)  # and a refusal
+    assert seen[-1] == (8, 8)
+    assert flights == report.flights
+
+
+def test_a_damaged_record_is_flown_again(library, report, tmp_path):
+    plans = plan_flights([f"{library}/lost.toml"])
+    fly(plans, tmp_path, 1)
+    for file in tmp_path.iterdir():
+        file.write_text("{", encoding="utf-8")
+    flights = fly(plans, tmp_path, 1)
+    assert all(isinstance(record, Record) for record in flights.values())
+
+
+def test_a_flights_key_tells_apart_what_its_numbers_depend_on(library):
+    [plan] = plan_flights([f"{library}/lost.toml"])
+    scenario = plan.scenario
+    simulation = scenario.simulation.model_copy(update={"duration": 0.5})
+    keys = {
+        flight_key(scenario),
+        flight_key(plan.plants["thesis"]),
+        flight_key(scenario.model_copy(update={"simulation": simulation})),
+    }
+    assert len(keys) == 3
+    words = scenario.model_copy(update={"title": "another", "source": "ours", "expect": ()})
+    assert flight_key(words) == flight_key(scenario)
+
+
+def test_a_changed_source_means_another_key(library, monkeypatch):
+    [plan] = plan_flights([f"{library}/lost.toml"])
+    before = flight_key(plan.scenario)
+    monkeypatch.setattr(flying, "code_digest", lambda: b"another")
+    assert flight_key(plan.scenario) != before
+
+
+def test_the_digest_covers_the_core_and_spares_the_screens(monkeypatch):
+    seen = []
+    monkeypatch.setattr(flying, "sources_digest", lambda files, *_: seen.extend(files) or b"")
+    flying.code_digest.__wrapped__()
+    names = {file.as_posix() for file in seen}
+    for name in ("tiltsim/metrics.py", "tiltsim/loops/tiltrotor.py", "controllers/vehicle.py"):
+        assert any(path.endswith(name) for path in names), name
+    assert any(path.endswith(".xml") for path in names)
+    assert not any("/report/" in path or "/figures/" in path for path in names)
+
+
+class Page(HTMLParser):
+    """Collects what a browser would fetch, the balance of tags, ids and links."""
+
+    VOID = frozenset({"meta", "img", "br", "link", "input"})
+
+    def __init__(self):
+        super().__init__()
+        self.fetched, self.open, self.ids, self.links = [], [], [], []
+
+    def handle_starttag(self, tag, attributes):
+        values = dict(attributes)
+        self.fetched += [values[key] for key in ("src", "srcset", "data") if key in values]
+        if tag in {"link", "script", "iframe"}:
+            self.fetched.append(tag)
+        if "href" in values:
+            self.links.append(values["href"])
+        if "id" in values:
+            self.ids.append(values["id"])
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+@pytest.fixture(scope="module")
+def full(report):
+    """The report with findings and a drawing, as the whole library has them."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(2.0, 1.0))
+    figure.subplots().plot([0.0, 1.0])
+    picture = AnalysisPicture(4, "line", "A <line>")
+    return dataclasses.replace(report, findings=FINDINGS, drawings=[Drawing(picture, png(figure))])
+
+
+def test_the_page_needs_nothing_else(full):
+    text = page(full)
+    parser = Page()
+    parser.feed(text)
+    parser.close()
+    assert parser.open == []
+    assert parser.fetched
+    assert all(source.startswith("data:image/png;base64,") for source in parser.fetched)
+    assert all(link.startswith("#") for link in parser.links)
+    assert {link[1:] for link in parser.links} <= set(parser.ids)
+    assert len(set(parser.ids)) == len(parser.ids)
+    assert not re.search(r"https?://|@import|url\(", text)
+
+
+def test_the_page_says_what_was_found(full):
+    text = page(full)
+    assert "It does <code>not</code> end &lt;early&gt;." in text
+    assert "A &lt;line&gt;" in text
+    assert text.count("<tbody>") >= len(full.chapters)
+    for finding in FINDINGS:
+        assert f'id="{finding.key}"' in text
+    for outcome in Outcome:
+        assert f">{outcome.value}</span>" in text
+    assert "{" not in re.sub(r"<style>.*?</style>", "", text, flags=re.DOTALL)
+
+
+def test_the_summary_is_stable_and_well_formed(full, library, kept):
+    text = markdown(full)
+    assert text == markdown(dataclasses.replace(full, drawings=[]))
+    again = dataclasses.replace(make_report([str(library)], kept, 1), findings=FINDINGS)
+    assert text == markdown(again)
+    tables = [line for line in text.splitlines() if line.startswith("|")]
+    widths = {len(re.findall(r"(?<!\\)\|", line)) for line in tables}
+    assert widths == {6, 7}  # claims and counts
+    assert "It flies \\| to the end" in text
+    assert str(library) not in text
+    for finding in FINDINGS:
+        assert f"### {finding.title}" in text
+
+
+def test_the_command_writes_both_and_tells_of_bounds(library, tmp_path, capsys):
+    out, summary = tmp_path / "out", tmp_path / "summary.md"
+    words = ["report", f"{library}/bounded.toml", f"{library}/lost.toml", "--jobs", "2"]
+    code = main([*words, "--out", str(out), "--markdown", str(summary)])
+    shown = capsys.readouterr().out
+    assert code == EXPECTATION_FAILED
+    assert "3 claims: 2 reproduced, 1 not reproduced" in shown
+    assert "FAILED  " in shown
+    assert "max_rotor_speed" in shown
+    assert (out / "report.html").read_text(encoding="utf-8").startswith("<!doctype html>")
+    assert summary.read_text(encoding="utf-8").startswith("# Reproduction report\n")
+
+
+def test_mistakes_are_one_clear_line(tmp_path, capsys):
+    bad = tmp_path / "bad.toml"
+    bad.write_text("[simulation]\nduration = -1.0\n", encoding="utf-8")
+    for words in (
+        ["report", str(bad), "--out", str(tmp_path / "out")],
+        ["report", "no_such", "--out", str(tmp_path / "out")],
+        ["report", "--out", str(bad)],
+        ["report", "--markdown", str(tmp_path / "no" / "file.md"), "--out", str(tmp_path / "out")],
+    ):
+        assert main(words) == INVALID_INPUT
+        captured = capsys.readouterr()
+        assert captured.err.startswith("tiltsim: ")
+        assert captured.err.count("\n") == 1

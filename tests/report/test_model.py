@@ -1,0 +1,208 @@
+"""Claims: how printed digits are read and how measured values are judged against them."""
+
+from __future__ import annotations
+
+from math import inf, nan
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tiltsim.errors import InputError
+from tiltsim.loading import parse_scenario
+from tiltsim.report.claims import registered_claims
+from tiltsim.report.model import (
+    AnalysisClaim,
+    Claim,
+    FlightClaim,
+    Outcome,
+    judge_value,
+    scenario_claims,
+    unit_of,
+    worst,
+)
+
+
+def claim(published, **more):
+    return Claim(
+        source="ch. 3, Sec. 4, Eq. (19)", statement="It is so", published=published, **more
+    )
+
+
+@pytest.mark.parametrize(
+    ("printed", "number", "tolerance"),
+    [
+        ("4.000", 4.0, 0.0005),
+        (4.0, 4.0, 0.05),
+        (4, 4.0, 0.05),
+        ("4", 4.0, 0.5),
+        (0.334198, 0.334198, 5e-7),
+        ("-0.1687", -0.1687, 5e-5),
+        ("8.048e-6", 8.048e-6, 5e-10),
+        (0.0, 0.0, 0.05),
+    ],
+)
+def test_digits_set_the_tolerance(printed, number, tolerance):
+    assert claim(printed).numbers() == [(number, pytest.approx(tolerance, rel=1e-12))]
+
+
+@given(st.decimals(min_value=-1000, max_value=1000, places=3), st.floats(-0.49, 0.49))
+def test_what_rounds_to_the_printed_digits_is_reproduced(printed, part):
+    assert judge_value(claim(str(printed)), float(printed) + part * 1e-3) is Outcome.REPRODUCED
+
+
+@given(st.decimals(min_value=-1000, max_value=1000, places=3), st.floats(0.51, 1e6))
+def test_what_rounds_to_other_digits_is_not(printed, part):
+    for value in (float(printed) + part * 1e-3, float(printed) - part * 1e-3):
+        assert judge_value(claim(str(printed)), value) is Outcome.NOT_REPRODUCED
+
+
+@pytest.mark.parametrize(
+    ("more", "measured", "outcome"),
+    [
+        ({}, 3.345, Outcome.REPRODUCED),
+        ({}, 3.36, Outcome.NOT_REPRODUCED),
+        ({}, nan, Outcome.NOT_REPRODUCED),
+        ({}, inf, Outcome.NOT_REPRODUCED),
+        ({}, None, Outcome.NOT_REPRODUCED),
+        ({}, True, Outcome.NOT_REPRODUCED),
+        ({"tolerance": 0.5}, 3.8, Outcome.REPRODUCED),
+        ({"in_kind": (1.0, inf)}, 100.0, Outcome.IN_KIND),
+        ({"in_kind": (1.0, inf)}, 0.9, Outcome.NOT_REPRODUCED),
+        ({"in_kind": (1.0, inf)}, 3.35, Outcome.REPRODUCED),
+        ({"in_kind": (1.0, inf)}, nan, Outcome.NOT_REPRODUCED),
+        ({"wrong": True, "why": "a slip"}, 0.9, Outcome.WRONG),
+        ({"wrong": True, "why": "a slip"}, None, Outcome.WRONG),
+        ({"wrong": True, "why": "a slip"}, 3.35, Outcome.REPRODUCED),
+        ({"why": "a reason"}, 0.9, Outcome.NOT_REPRODUCED),
+    ],
+)
+def test_a_number_is_judged_by_its_digits_then_by_its_kind(more, measured, outcome):
+    assert judge_value(claim(3.35, **more), measured) is outcome
+
+
+@pytest.mark.parametrize("published", [True, False])
+def test_yes_and_no_agree_or_not(published):
+    assert judge_value(claim(published), published) is Outcome.REPRODUCED
+    assert judge_value(claim(published), not published) is Outcome.NOT_REPRODUCED
+    assert judge_value(claim(published), float(published)) is Outcome.NOT_REPRODUCED
+
+
+def test_several_numbers_agree_together():
+    pair = claim(("3.35", "-3.56"))
+    assert judge_value(pair, (3.3456, -3.5597)) is Outcome.REPRODUCED
+    assert judge_value(pair, (3.3456, -3.5499)) is Outcome.NOT_REPRODUCED
+    assert judge_value(pair, (3.3456,)) is Outcome.NOT_REPRODUCED
+    assert judge_value(pair, 3.35) is Outcome.NOT_REPRODUCED
+    near = claim(("1.0", "2.0"), in_kind=(0.0, 3.0))
+    assert judge_value(near, (1.2, 2.2)) is Outcome.IN_KIND
+    assert judge_value(near, (1.2, 3.2)) is Outcome.NOT_REPRODUCED
+
+
+def test_the_worst_verdict_counts():
+    assert worst([Outcome.REPRODUCED, Outcome.WRONG, Outcome.IN_KIND]) is Outcome.WRONG
+    assert worst([Outcome.IN_KIND, Outcome.REPRODUCED]) is Outcome.IN_KIND
+
+
+@pytest.mark.parametrize(
+    ("record", "words"),
+    [
+        ({"source": "Sec. 4"}, "begin with the chapter"),
+        ({"statement": ""}, "needs a statement"),
+        ({"published": "four"}, "not a number"),
+        ({"published": "inf"}, "not a finite number"),
+        ({"published": True, "tolerance": 0.1}, "neither tolerance"),
+        ({"published": True, "in_kind": (0.0, 1.0)}, "neither tolerance"),
+        ({"wrong": True}, "needs why"),
+    ],
+)
+def test_a_claim_that_contradicts_itself_is_refused(record, words):
+    good = {"source": "ch. 3, Eq. (19)", "statement": "It is so", "published": 1.0}
+    with pytest.raises(ValueError, match=words):
+        Claim(**(good | record))
+
+
+def test_the_source_splits_into_chapter_and_section():
+    assert claim(1.0).chapter == 3
+    assert claim(1.0).section == "Sec. 4, Eq. (19)"
+    assert Claim(source="ch. 12, Eq. (4)", statement="It is so", published=1.0).chapter == 12
+
+
+def scenario(expect, source="ch. 4, Sec. 6.1"):
+    document = {"title": "A flight", "source": source, "expect": expect}
+    return parse_scenario(document)
+
+
+def test_an_expectation_with_a_published_value_is_a_claim():
+    bounds = {"metric": "final_roll", "min": 0.1}
+    made = scenario_claims(
+        scenario(
+            [
+                bounds,
+                bounds | {"published": 0.3},
+                bounds | {"published": 0.3, "claim": "It rolls", "in_kind": [0.1, inf]},
+            ]
+        )
+    )
+    assert [c.statement for c in made] == ["Final roll", "It rolls"]
+    assert made[1].case == "A flight"
+    assert made[1].unit == "rad"
+    assert made[1].in_kind == (0.1, inf)
+    assert made[1].measure({"final_roll": 0.2}) == 0.2
+    assert made[1].measure({}) is None
+
+
+def test_a_flight_of_ours_claims_nothing_for_the_thesis():
+    expect = [{"metric": "final_roll", "min": 0.1, "published": 0.3}]
+    assert scenario_claims(scenario(expect, source="ours")) == []
+
+
+def test_yes_about_a_number_means_that_it_lies_within_the_bounds():
+    expect = {"metric": "max_tilt_rate", "min": 20.0, "published": True, "claim": "Tilting is fast"}
+    [made] = scenario_claims(scenario([expect]))
+    assert made.measure({"max_tilt_rate": 30.0}) is True
+    assert made.measure({"max_tilt_rate": 10.0}) is False
+    assert judge_value(made, made.measure({"max_tilt_rate": 10.0})) is Outcome.NOT_REPRODUCED
+
+
+def test_a_flight_published_as_flown_and_lost_here_is_not_reproduced():
+    [made] = scenario_claims(
+        scenario([{"metric": "diverged", "equals": True, "published": False, "claim": "It flies"}])
+    )
+    assert judge_value(made, made.measure({"diverged": True})) is Outcome.NOT_REPRODUCED
+    assert judge_value(made, made.measure({"diverged": False})) is Outcome.REPRODUCED
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"claim": "It rolls"}, "expect.claim"),
+        ({"why": "a reason"}, "expect.why"),
+        ({"published_tolerance": 0.1}, "expect.published_tolerance"),
+        ({"published": True, "in_kind": [0.0, 1.0]}, "expect.in_kind"),
+        ({"published": 0.1, "in_kind": [1.0, 0.0]}, "expect.in_kind"),
+        ({"published": 0.1, "in_kind": [nan, 1.0]}, "expect.in_kind"),
+        ({"published": 0.1, "wrong": True}, "expect.wrong"),
+        ({"published": inf}, r"expect.0.published"),
+        ({"metric": "diverged", "equals": True, "min": None, "published": 1.0}, "expect.published"),
+    ],
+)
+def test_a_claim_without_sense_is_refused_with_its_key(more, words):
+    expect = {"metric": "final_roll", "min": 0.1} | more
+    expect = {key: value for key, value in expect.items() if value is not None}
+    with pytest.raises(InputError, match=words):
+        scenario([expect])
+
+
+def test_units_are_those_of_the_metrics():
+    assert unit_of("final_position_error_x") == "m"
+    assert unit_of("max_rotor_speed") == "rad/s"
+    assert unit_of("duration") == "s"
+    assert unit_of("switches") == unit_of("diverged") == unit_of("saturated_fraction") == ""
+
+
+def test_the_registry_holds_claims_that_can_be_told_apart():
+    claims = registered_claims()
+    assert all(isinstance(c, AnalysisClaim | FlightClaim) for c in claims)
+    keys = [(c.chapter, c.statement, c.case) for c in claims]
+    assert len(set(keys)) == len(keys)

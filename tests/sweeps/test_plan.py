@@ -1,0 +1,200 @@
+"""From a sweep file to points and scenarios."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tiltsim.errors import InputError
+from tiltsim.sweeps.plan import Definition, Plan, load_definition
+
+HEAD = """
+scenario = "ch04_tracking/circle#continuous_t2_modified"
+"""
+PERIODS = """
+[[axis]]
+type = "linspace"
+key = "gait.period"
+start = 1
+stop = 3
+count = 5
+"""
+AMPLITUDES = """
+[[axis]]
+type = "list"
+key = "gait.amplitude"
+values = [0.1, 0.2, 0.3, 0.4, 0.5]
+"""
+MASS = """
+[[axis]]
+type = "uniform"
+key = "vehicle.mass"
+relative = true
+low = 0.9
+high = 1.1
+"""
+
+
+@pytest.fixture
+def plan_of(tmp_path):
+    def make(text, overrides=None):
+        path = tmp_path / "sweep.toml"
+        path.write_text(HEAD + text if "scenario" not in text else text, encoding="utf-8")
+        return Plan(load_definition(path, overrides))
+
+    return make
+
+
+def test_axes_are_crossed_the_last_one_fastest(plan_of):
+    plan = plan_of(AMPLITUDES + PERIODS)
+    points = [plan.point(index) for index in range(len(plan))]
+    assert len(points) == 25
+    assert [p["gait.period"] for p in points[:6]] == [1.0, 1.5, 2.0, 2.5, 3.0, 1.0]
+    assert [p["gait.amplitude"] for p in points[::5]] == [0.1, 0.2, 0.3, 0.4, 0.5]
+    assert sorted(i for n in range(plan.chunks) for i in plan.chunk(n)) == list(range(25))
+
+
+def test_axes_of_a_group_advance_together(plan_of):
+    grouped = [text.rstrip() + '\ngroup = "both"\n' for text in (AMPLITUDES, PERIODS)]
+    plan = plan_of("".join(grouped))
+    assert len(plan) == 5
+    assert plan.point(3) == {"gait.amplitude": 0.4, "gait.period": 2.5}
+
+
+def test_rows_move_several_keys_together(plan_of):
+    rows = '[[axis]]\ntype = "list"\nkeys = ["gait.period", "gait.amplitude"]\n'
+    plan = plan_of(rows + "values = [[1, 0.5], [2.5, 0.25]]")
+    assert [plan.point(i) for i in range(2)] == [
+        {"gait.period": 1.0, "gait.amplitude": 0.5},
+        {"gait.period": 2.5, "gait.amplitude": 0.25},
+    ]
+    assert plan.scenario(plan.point(1)).gait.amplitude == 0.25
+
+
+@pytest.mark.parametrize("method", ["random", "latin_hypercube", "sobol"])
+def test_samples_follow_their_distributions_and_their_seed(plan_of, method):
+    normal = '[[axis]]\ntype = "normal"\nkey = "initial.attitude[1]"\nmean = 0.1\n'
+    normal += "standard_deviation = 0.02\n"
+
+    def sample(seed):
+        text = f'{MASS}{normal}[sample]\nmethod = "{method}"\ncount = 256\nseed = {seed}\n'
+        plan = plan_of(text)
+        points = [plan.point(index) for index in range(len(plan))]
+        return np.array([[p["vehicle.mass"], p["initial.attitude[1]"]] for p in points])
+
+    draws = sample(1)
+    assert draws.shape == (256, 2)
+    assert np.array_equal(draws, sample(1))
+    assert not np.array_equal(draws, sample(2))
+    assert draws[:, 0].min() >= 0.9 * 0.429
+    assert draws[:, 0].max() <= 1.1 * 0.429
+    # Three standard errors of plain random draws; the other methods do better.
+    assert draws[:, 0].mean() == pytest.approx(0.429, abs=3 * 0.429 * 0.2 / 12**0.5 / 16)
+    assert draws[:, 1].mean() == pytest.approx(0.1, abs=3 * 0.02 / 16)
+    assert draws[:, 1].std() == pytest.approx(0.02, rel=0.15)
+    if method == "latin_hypercube":
+        cells = np.floor((draws[:, 0] / 0.429 - 0.9) / 0.2 * 256).astype(int)
+        assert sorted(cells) == list(range(256))
+
+
+def test_relative_values_scale_what_a_preset_gives(plan_of):
+    text = '[[axis]]\ntype = "list"\nrelative = true\nkey = "{key}"\nvalues = [0.9, 1.1]'
+    plan = plan_of(text.format(key="vehicle.inertia[1]"))
+    assert plan.scenario(plan.point(1)).vehicle.resolve().inertia_yy == pytest.approx(1.1 * 2.99e-3)
+    assert plan.scenario(plan.point(1)).vehicle.resolve().inertia_xx == 2.24e-3
+    plan = plan_of(text.format(key="vehicle.inertia"))
+    assert plan.point(0) == {"vehicle.inertia": [0.9 * v for v in (2.24e-3, 2.99e-3, 4.80e-3)]}
+
+
+def test_derived_keys_follow_the_axes(plan_of):
+    text = """
+scenario = "ch03_gaits/stabilization#gait_1"
+[derive]
+gait.angles = ["u * distance", 0.1, "-u * distance", "2 * initial.position[2]"]
+[[axis]]
+type = "list"
+keys = ["u", "initial.position[2]"]
+values = [[-1, 0.05], [1, 0.1]]
+[[axis]]
+type = "linspace"
+key = "distance"
+start = 0.0
+stop = 0.2
+count = 3
+"""
+    plan = plan_of(text)
+    scenario = plan.scenario(plan.point(4))
+    assert scenario.gait.angles == pytest.approx((0.1, 0.1, -0.1, 0.2))
+    assert scenario.initial.position == (0.0, 0.0, 0.1)
+
+
+def test_what_is_set_survives_a_change_of_kind(plan_of):
+    text = '[set]\ngait.amplitude = 0.3\ngait.period = 2.0\n[[axis]]\ntype = "list"\n'
+    text += 'key = "gait.type"\nvalues = ["trot_instant", "walk"]'
+    plan = plan_of(text)
+    gaits = [plan.scenario(plan.point(i)).gait for i in range(2)]
+    assert [(g.type, g.amplitude) for g in gaits] == [("trot_instant", 0.3), ("walk", 0.3)]
+
+
+def test_a_definition_survives_its_file(plan_of):
+    definition = plan_of(AMPLITUDES + PERIODS).definition
+    again = Definition.from_json(definition.to_json())
+    assert again == definition
+    assert again.difference(definition) == ""
+
+
+@pytest.mark.parametrize(
+    ("text", "difference"),
+    [
+        (PERIODS.replace("5", "6"), "axis[0].count was 5 and is 6"),
+        (PERIODS + "[set]\ngait.amplitude = 0.2", "scenario.gait.amplitude was 0.65 and is 0.2"),
+        (PERIODS.replace("period", "amplitude"), 'key was "gait.period" and is "gait.amplitude"'),
+        ('title = "other"\n' + PERIODS, ""),
+    ],
+)
+def test_differences_are_named(plan_of, text, difference):
+    before = plan_of(PERIODS).definition
+    found = before.difference(plan_of(text).definition)
+    assert difference in found
+    assert bool(found) == bool(difference)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", ["needs at least one [[axis]]"]),
+        (PERIODS + "colour = 1", ["axis.0.colour", "unknown key"]),
+        (PERIODS.replace("linspace", "lin"), ["axis.0.type", "list, linspace, uniform, normal"]),
+        (PERIODS.replace("gait.period", "gait.perod"), ["gait.perod", "did you mean period"]),
+        (PERIODS.replace("gait.period", "period"), ["period", "[derive]"]),
+        (PERIODS.replace("start = 1", "start = -1"), ["gait.period = -1", "greater"]),
+        (PERIODS.replace("gait.period", "gait.angles[0]"), ["gait.angles[0]", "no such entry"]),
+        (PERIODS.replace('key = "gait.period"', ""), ["axis.key", "key or keys"]),
+        (PERIODS + PERIODS, ["gait.period", "set twice"]),
+        (PERIODS + "[set]\ngait.period = 1.0", ["set.gait.period", "an axis sets it, too"]),
+        (MASS, ["axis.type", "[sample]"]),
+        (PERIODS + "[sample]\ncount = 3", ["sample.count", "no axis"]),
+        (MASS + '[sample]\nmethod = "sobol"\ncount = 3', ["sample.count", "powers of two"]),
+        (MASS.replace("0.9", "1.2") + "[sample]\ncount = 3", ["axis.low", "below high"]),
+        ('metrics = ["roll"]\n' + PERIODS, ["metrics", "roll", "final_roll"]),
+        ('metrics = ["realtime_factor"]\n' + PERIODS, ["metrics", "realtime_factor"]),
+        (PERIODS + '[derive]\n"gait.amplitude" = "perod"', ["derive.gait.amplitude", "unknown"]),
+        (PERIODS + '[derive]\n"gait.amplitude" = true', ["derive.gait.amplitude", "expression"]),
+        ('scenario = "no/such"\n' + PERIODS, ["scenario", "no/such"]),
+        ('scenario = "ch04_tracking/circle"\n' + PERIODS, ["scenario", "choose a variant"]),
+        (
+            PERIODS.replace("count = 5", 'count = 5\ngroup = "a"')
+            + AMPLITUDES.replace(", 0.5", "").rstrip()
+            + '\ngroup = "a"',
+            ["axis.group", "[5, 4]"],
+        ),
+    ],
+)
+def test_mistakes_are_named_in_one_line(plan_of, text, words):
+    with pytest.raises(InputError) as caught:
+        plan_of(text)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert "sweep.toml" in message
+    for word in words:
+        assert word in message

@@ -1,0 +1,231 @@
+"""Sweeps that are interrupted, continued, shared out: always the same rows."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pyarrow.parquet as pq
+import pytest
+
+from tests.sweeps.files import boundary_sweep, short_sweep
+from tiltsim import batch
+from tiltsim.errors import InputError
+from tiltsim.loading import parse_scenario
+from tiltsim.simulation import simulate
+from tiltsim.sweeps import flying
+from tiltsim.sweeps.folder import open_folder, write_durably
+from tiltsim.sweeps.plan import Plan, load_definition
+from tiltsim.sweeps.running import run_sweep
+
+
+def rows(folder):
+    return pq.read_table(folder / "sweep.parquet").to_pylist()
+
+
+def command(file, folder, *options):
+    arguments = [sys.executable, "-m", "tiltsim", "sweep", str(file), "--out", str(folder)]
+    return [*arguments, "--quiet", *options]
+
+
+def fly_until_killed(arguments, folder, moment):
+    """Start a sweep in a process group of its own and kill all of it at a moment (s)."""
+    process = subprocess.Popen(arguments, start_new_session=True)
+    try:
+        process.wait(moment)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    for file in folder.glob("parts/[0-9]*.parquet"):
+        assert pq.read_table(file, partitioning=None).num_rows > 0  # none is half-written
+    return process.returncode
+
+
+def test_rows_hold_what_was_flown(tmp_path):
+    definition = load_definition(short_sweep(tmp_path / "sweep.toml"))
+    plan = Plan(definition)
+    assert run_sweep(definition, tmp_path / "out") == tmp_path / "out" / "sweep.parquet"
+    table = rows(tmp_path / "out")
+    assert [row["index"] for row in table] == list(range(12))
+    for row in table:
+        point = plan.point(row["index"])
+        assert {key: row[key] for key in point} == point
+        scenario = parse_scenario(json.loads(row["scenario"]))
+        assert scenario.model_dump() == plan.scenario(point).model_dump()
+        assert row["mujoco_version"] == definition.versions["mujoco"]
+        assert row["end"] == "completed"
+    flight = simulate(parse_scenario(json.loads(table[7]["scenario"])))
+    kept = {name: value for name, value in flight.metrics().items() if name != "realtime_factor"}
+    assert {name: table[7][name] for name in kept} == kept
+    assert "realtime_factor" not in table[7]
+
+
+def test_processes_make_the_same_dataset_bit_for_bit(tmp_path):
+    definition = load_definition(short_sweep(tmp_path / "sweep.toml"))
+    one = run_sweep(definition, tmp_path / "one", jobs=1)
+    two = run_sweep(definition, tmp_path / "two", jobs=2)
+    assert one.read_bytes() == two.read_bytes()
+
+
+def test_a_sweep_continues_where_it_stopped(tmp_path, monkeypatch):
+    definition = load_definition(short_sweep(tmp_path / "sweep.toml"))
+    whole = run_sweep(definition, tmp_path / "whole")
+    flown = []
+    original = flying.fly_points
+
+    def fly_points(plan, points, engine):
+        flown.append(list(points))
+        if len(flown) == 3:
+            raise KeyboardInterrupt
+        return original(plan, points, engine)
+
+    monkeypatch.setattr(flying, "fly_points", fly_points)
+    with pytest.raises(KeyboardInterrupt):
+        run_sweep(definition, tmp_path / "parts")
+    leftover = tmp_path / "parts" / "parts" / ".000003.parquet.new"
+    leftover.write_bytes(b"half")
+    reports = []
+    continued = run_sweep(definition, tmp_path / "parts", report=reports.append)
+    assert flown == [[0, 1, 2], [3, 4, 5], [6, 7, 8], [6, 7, 8], [9, 10, 11]]
+    assert reports == [6, 9, 12]
+    assert not leftover.exists()
+    assert continued.read_bytes() == whole.read_bytes()
+    run_sweep(definition, tmp_path / "parts")
+    assert len(flown) == 5  # nothing is flown twice
+
+
+def test_another_definition_is_refused_with_the_difference(tmp_path):
+    run_sweep(load_definition(short_sweep(tmp_path / "sweep.toml", count=2)), tmp_path / "out")
+    other = load_definition(short_sweep(tmp_path / "sweep.toml", count=3))
+    with pytest.raises(InputError, match=r"sample.count was 2 and is 3"):
+        run_sweep(other, tmp_path / "out")
+
+
+def test_other_results_are_not_written_over(tmp_path):
+    definition = load_definition(short_sweep(tmp_path / "sweep.toml"))
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "flight.parquet").touch()
+    with pytest.raises(InputError, match="other results"):
+        run_sweep(definition, tmp_path / "out")
+
+
+def test_two_sweeps_do_not_share_a_folder(tmp_path):
+    definition = load_definition(short_sweep(tmp_path / "sweep.toml"))
+    with (
+        open_folder(tmp_path / "out", Plan(definition)),
+        pytest.raises(InputError, match="another tiltsim sweep"),
+    ):
+        run_sweep(definition, tmp_path / "out")
+
+
+def test_a_file_appears_whole_or_not_at_all(tmp_path, monkeypatch):
+    def no_disk(_descriptor):
+        raise OSError("no disk")
+
+    write_durably(tmp_path / "file", b"before")
+    monkeypatch.setattr(os, "fsync", no_disk)
+    with pytest.raises(OSError, match="no disk"):
+        write_durably(tmp_path / "file", b"after")
+    assert (tmp_path / "file").read_bytes() == b"before"
+
+
+def test_a_bad_flight_becomes_a_row(tmp_path, monkeypatch):
+    original = flying.simulate
+
+    def simulate(scenario):
+        if scenario.initial.attitude[0] > 0.0:
+            raise RuntimeError("no such luck")
+        return original(scenario)
+
+    monkeypatch.setattr(flying, "simulate", simulate)
+    monkeypatch.setattr(batch, "simulate", simulate)
+    run_sweep(load_definition(short_sweep(tmp_path / "sweep.toml")), tmp_path / "out")
+    for row in rows(tmp_path / "out"):
+        bad = row["initial.attitude[0]"] > 0.0
+        assert row["end"] == ("crashed" if bad else "completed")
+        assert row["cause"] == ("RuntimeError: no such luck" if bad else "")
+        assert (row["max_abs_roll"] is None) == bad
+
+
+def test_points_that_make_no_scenario_become_rows(tmp_path):
+    file = short_sweep(tmp_path / "sweep.toml", count=32)
+    text = file.read_text().replace("0.1", "0.2").replace("mean = 0.0", "mean = 2.9")
+    file.write_text(text.replace("seed = 3", "seed = 5"))
+    run_sweep(load_definition(file), tmp_path / "out")
+    ends = {row["end"] for row in rows(tmp_path / "out")}
+    for row in rows(tmp_path / "out"):
+        assert (row["end"] == "invalid") == (abs(row["initial.attitude[0]"]) > 3.141592653589793)
+    assert "invalid" in ends
+
+
+def test_flights_are_kept_where_asked(tmp_path):
+    file = short_sweep(tmp_path / "sweep.toml", count=2)
+    file.write_text("keep_flights = true\n" + file.read_text())
+    run_sweep(load_definition(file), tmp_path / "out")
+    files = sorted((tmp_path / "out" / "flights").iterdir())
+    assert [file.name for file in files] == [f"{index:07d}.parquet" for index in range(4)]
+    table = rows(tmp_path / "out")
+    roll = pq.read_table(files[2])["roll"].to_numpy()
+    assert abs(roll).max() == table[2]["max_abs_roll"]
+
+
+def test_boundaries_are_found_to_their_tolerance(tmp_path):
+    run_sweep(load_definition(boundary_sweep(tmp_path / "sweep.toml")), tmp_path / "out")
+    for row in rows(tmp_path / "out"):
+        assert row["roll"] < 0.2345 < row["roll_beyond"] + 0.002
+        assert 0.0 < row["roll_beyond"] - row["roll"] <= 0.001
+        assert row["flights"] == 4 + 7
+        assert row["max_abs_roll"] <= 0.2345
+        assert row["initial.attitude"] == [row["roll"], 0.0, 2 * row["roll"]]
+
+
+def test_killed_at_random_moments_it_continues_to_the_same_dataset(tmp_path):
+    file = short_sweep(tmp_path / "sweep.toml", count=40, chunk_size=2)
+    whole = run_sweep(load_definition(file), tmp_path / "whole")
+    folder = tmp_path / "killed"
+    for moment in (1.4, 2.4):
+        fly_until_killed(command(file, folder, "--jobs=2"), folder, moment)
+    subprocess.run(command(file, folder, "--jobs=2"), check=True)
+    assert (folder / "sweep.parquet").read_bytes() == whole.read_bytes()
+
+
+@pytest.mark.slow
+def test_two_thousand_flights_killed_twenty_times(tmp_path):
+    file = short_sweep(tmp_path / "sweep.toml", count=1000, chunk_size=20)
+    start = time.perf_counter()
+    whole = run_sweep(load_definition(file), tmp_path / "whole", jobs=2)
+    undisturbed = time.perf_counter() - start
+    moments, folder, kills = random.Random(2000), tmp_path / "killed", 0
+    while kills < 20:
+        # Starting takes a while; what is left is spread over the kills.
+        moment = moments.uniform(0.0, 4.0 + undisturbed / 10.0)
+        if fly_until_killed(command(file, folder, "--jobs=2"), folder, moment) == 0:
+            break
+        kills += 1
+    subprocess.run(command(file, folder, "--jobs=2"), check=True)
+    assert (folder / "sweep.parquet").read_bytes() == whole.read_bytes()
+    assert kills == 20
+
+
+def test_processes_end_with_their_parent(tmp_path):
+    file = short_sweep(tmp_path / "sweep.toml", count=4000, chunk_size=8)
+    process = subprocess.Popen(command(file, tmp_path / "out", "--jobs=2"), start_new_session=True)
+    while not list(tmp_path.glob("out/parts/0*")):
+        time.sleep(0.05)
+    os.kill(process.pid, signal.SIGKILL)  # the parent alone
+    process.wait()
+    deadline = time.monotonic() + 30.0
+    while time.monotonic() < deadline:
+        try:
+            os.killpg(process.pid, 0)
+        except ProcessLookupError:
+            break
+        time.sleep(0.1)
+    else:
+        os.killpg(process.pid, signal.SIGKILL)
+        pytest.fail("processes outlive their parent")

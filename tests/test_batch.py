@@ -1,0 +1,207 @@
+"""One law, three ways: Python, native, and a row of a batch fly the same flight bit for bit."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+import tiltsim
+import tiltsim.rows
+from controllers.gaits import GAIT_TYPES
+from tests.test_laws import GUST, LAWS
+from tiltsim.batch import fly_all
+from tiltsim.loops import LOOPS, control_setup
+from tiltsim.plants import make_plant
+
+TROT = {"amplitude": 0.3, "period": 0.8}
+GAITS = {
+    "fixed": {"angles": [-0.3, 0.2, 0.4, 0.1]},
+    "trot_instant": {**TROT, "period": 0.2},
+    "trot_continuous": TROT,
+    "walk": TROT,
+    "run": TROT,
+    "transverse_gallop": TROT,
+    "rotary_gallop": TROT,
+    "two_color": {"period": 1.0, "centre": [0.2, -0.2], "radius": 0.1},
+    "waypoints": {"period": 0.7, "angles": [[0.1, 0.0, 0.1, 0.0], [0.2, -0.1, 0.2, -0.1]]},
+}
+# Gains that let the law be sampled at a few milliseconds; the published loops are too fast for it.
+EXACT = {"decoupling": "exact", "gains": "exact"}
+UPSIDE_DOWN = {"initial": {"attitude": [np.pi, 0.0, 0.0]}}
+STOPPING_ROTOR = {
+    "controller": EXACT,
+    "initial": {"rotor_speed": [20.0, 300.0, 300.0, 300.0], "angular_velocity": [0, 20, 0]},
+}
+
+
+def scenario(tables, **simulation):
+    simulation = {"duration": 0.43, "engine": "native", **simulation}
+    return tiltsim.parse_scenario({**tables, "simulation": simulation})
+
+
+def without_speed(metrics):
+    return {name: value for name, value in metrics.items() if name != "realtime_factor"}
+
+
+def three_ways(scenarios):
+    """Assert that every scenario flies the same in Python, natively and in a batch of all."""
+    rows = list(fly_all(scenarios, keep_samples=True, threads=2))
+    assert [row.scenario for row in rows] == scenarios
+    for wanted, row in zip(scenarios, rows, strict=True):
+        for engine in ("python", "native"):
+            simulation = wanted.simulation.model_copy(update={"engine": engine})
+            alone = tiltsim.simulate(wanted.model_copy(update={"simulation": simulation}))
+            assert alone.engine == engine
+            np.testing.assert_array_equal(row.flight.samples, alone.samples)
+            assert row.end == alone.end
+            assert without_speed(row.metrics) == without_speed(alone.metrics())
+        assert row.flight.engine == "native"
+    return rows
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+@pytest.mark.parametrize("law", LOOPS)
+def test_every_law_flies_the_same_three_ways_with_continuous_and_held_control(law, plant):
+    tables = {**LAWS[law], "disturbance": GUST}
+    rows = three_ways(
+        [
+            scenario(tables, plant=plant),
+            scenario(tables, plant=plant, control_timestep=0.004),
+            # 0.427 s are no whole number of recording intervals
+            scenario(LAWS[law], plant=plant, control_timestep=0.007, duration=0.427),
+        ]
+    )
+    assert [row.end.kind for row in rows] == ["completed"] * 3
+    assert [len(row.flight) for row in rows] == [44, 44, 44]
+
+
+def test_every_gait_is_here():
+    assert set(GAITS) == set(GAIT_TYPES)
+
+
+def test_every_gait_flies_the_same_three_ways_with_continuous_and_held_control():
+    scenarios = [
+        scenario({"gait": {"type": name, **table}, "controller": EXACT}, control_timestep=held)
+        for name, table in GAITS.items()
+        for held in (0.0, 0.005)
+    ]
+    # Rows have tables of different lengths, though one layout.
+    assert len({len(control_setup(s).table) for s in scenarios}) > 2
+    three_ways(scenarios)
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "implicitfast", "implicit", "Euler"])
+def test_rows_may_differ_in_vehicle_time_step_recording_and_duration(integrator):
+    gait = {"type": "trot_continuous", **TROT}
+    three_ways(
+        [
+            scenario({"gait": gait}, integrator=integrator),
+            scenario({"vehicle": {"mass": 0.5, "gravity": 9.81}}, integrator=integrator),
+            scenario({"disturbance": GUST}, integrator=integrator, timestep=0.0005, duration=0.2),
+            scenario({"gait": gait}, integrator=integrator, record_timestep=0.001, duration=0.05),
+            scenario({}, integrator=integrator, record_timestep=0.3, duration=1.0),
+            scenario({"vehicle": {"tilt_servo": {"max_angle": 0.3}}, "gait": gait}),
+        ]
+    )
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_lost_flights_end_on_the_same_step_with_the_same_cause(plant):
+    rows = three_ways(
+        [
+            scenario(tables, duration=3.0, record_timestep=record, plant=plant)
+            for tables in (UPSIDE_DOWN, STOPPING_ROTOR)
+            for record in (0.001, 0.01, 0.25)
+        ]
+    )
+    ends = [row.end for row in rows]
+    assert ends[0].kind in {"diverged", "singular"}
+    assert ends[3].kind == "singular"
+    assert "came to a stop" in ends[3].cause
+    assert ends[0] == ends[1] == ends[2], "recording must not matter"
+
+
+def test_a_lost_row_is_flown_no_further_and_its_place_is_taken():
+    """Hundreds of flights that would last an hour, were they not lost in the first second."""
+    many = [scenario(UPSIDE_DOWN, duration=3600.0, record_timestep=1.0)] * 60
+    results = list(fly_all(many, threads=2))
+    assert len(results) == 60
+    assert {result.end.time for result in results} == {results[0].end.time}
+    assert results[0].end.time < 1.0
+    assert all(result.flight is None for result in results)
+
+
+def test_more_flights_than_rows_come_in_their_order():
+    wanted = [
+        scenario({"initial": {"position": [0.001 * i, 0.0, 0.0]}}, duration=0.02 + 0.01 * (i % 7))
+        for i in range(150)
+    ]
+    results = list(fly_all(wanted, threads=2, keep_samples=True))
+    assert [result.scenario for result in results] == wanted
+    for i, result in enumerate(results):
+        assert result.flight["x"][0] == 0.001 * i
+        assert result.end.time == pytest.approx(0.02 + 0.01 * (i % 7))
+
+
+def test_all_kinds_of_flights_together():
+    wanted = [
+        scenario({}, engine="python", duration=0.05),
+        scenario({}, plant="thesis", duration=0.05),
+        scenario({}, duration=0.05),
+        scenario(LAWS["yaw_position"], duration=0.05),
+        scenario({}, engine="auto", duration=0.05),
+    ]
+    results = list(fly_all(wanted * 2, keep_samples=True))
+    assert [result.scenario for result in results] == wanted * 2
+    assert results[0].flight.engine == "python"
+    assert results[2].flight.engine == "native"
+    assert mujoco.get_mjcb_control() is None
+
+
+def test_no_flights_give_no_results():
+    assert list(fly_all([])) == []
+
+
+# --- what a loop says natively -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", LOOPS)
+def test_native_watching_sees_what_python_watches(law):
+    """Every watched number is there, and what else is there never ends a flight."""
+    wanted = scenario(LAWS[law], engine="python")
+    plant, loop, setup = make_plant(wanted), LOOPS[law], control_setup(wanted)
+    for _ in range(5):
+        plant.advance(20)
+        values = plant.observe()
+        sample = dict(zip(loop.sample_fields, (plant.time, *values), strict=True))
+        watched = [number.value for number in loop.watched(sample, setup)]
+        numbers = loop.watch(values, setup.parameters)
+        assert list(numbers[: len(watched)]) == watched
+        assert set(numbers[len(watched) :]) <= {1.0}
+
+
+@pytest.mark.parametrize("gait", GAITS)
+@pytest.mark.parametrize("decoupler", ["conventional", "modified", "exact"])
+def test_references_are_the_same_floats_natively(gait, decoupler, monkeypatch):
+    tables = {"gait": {"type": gait, **GAITS[gait]}, "controller": {"decoupler": decoupler}}
+    flight = tiltsim.simulate(scenario(tables, engine="python", duration=0.1))
+    in_python = dict(flight.columns)
+    monkeypatch.setattr(tiltsim.rows, "ROWS_WORTH_COMPILING", 0)
+    del flight.__dict__["columns"]
+    for name, column in flight.columns.items():
+        np.testing.assert_array_equal(column, in_python[name])
+
+
+def test_whether_native_code_is_cached_is_known_by_law_and_plant(monkeypatch, tmp_path):
+    import tiltsim.cache as cache
+    from tiltsim.plants import choose_engine
+
+    monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
+    wanted = scenario({}, engine="auto", duration=20.0)  # 20,000 steps: worth loading only
+    assert choose_engine(wanted) == "python"
+    cache.native_code_was_compiled(LOOPS["full_pose"].native_name("mujoco"))
+    cache.native_code_was_compiled(LOOPS["attitude_altitude"].native_name("thesis"))
+    assert choose_engine(wanted) == "python"
+    cache.native_code_was_compiled(LOOPS["attitude_altitude"].native_name("mujoco"))
+    assert choose_engine(wanted) == "native"

@@ -1,0 +1,84 @@
+"""``tiltsim report``: the thesis' claims beside what is measured, on one page."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+from typing import Any
+
+from tiltsim.commands.check import positive_integer
+from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
+
+
+def add_parser(subparsers: Any) -> None:
+    """Declare the command."""
+    parser = subparsers.add_parser(
+        "report",
+        help="compare the whole library with the published claims, on one page",
+        description=(
+            "Fly scenarios on both plants, judge every published claim, and write one "
+            "self-contained HTML page. Flights are kept: a second report takes seconds, and an "
+            "interrupted one goes on."
+        ),
+        epilog="exit codes: 0 done, 1 a scenario's bounds do not hold, 2 invalid input",
+    )
+    parser.add_argument(
+        "paths",
+        nargs="*",
+        metavar="PATH",
+        help="files, folders or library names; default: the library and all claims",
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("report"),
+        metavar="DIR",
+        help="folder for report.html and what is kept (default: report)",
+    )
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="write a summary, too")
+    parser.add_argument(
+        "--jobs",
+        type=positive_integer,
+        default=os.cpu_count() or 1,
+        metavar="N",
+        help="processes (default: the number of cores)",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Fly, judge, write."""
+    from tiltsim.commands.progress import progress_bar
+    from tiltsim.files import prepare_file, prepare_folder
+    from tiltsim.report.content import failure_text
+    from tiltsim.report.making import make_report
+    from tiltsim.report.markdown import markdown
+    from tiltsim.report.page import page
+    from tiltsim.report.rows import count
+
+    out: Path = arguments.out
+    target = out / "report.html"
+    prepare_folder(out)
+    prepare_file("--out", target)
+    if arguments.markdown is not None:
+        prepare_file("--markdown", arguments.markdown)
+    with progress_bar(1.0, "of all flights", shown=True) as move:
+        report = make_report(
+            arguments.paths, out / "kept", arguments.jobs, lambda done, total: move(done / total)
+        )
+    target.write_text(page(report), encoding="utf-8")
+    if arguments.markdown is not None:
+        arguments.markdown.write_text(markdown(report), encoding="utf-8")
+    counts = count(report.rows)
+    print(
+        f"{len(report.rows)} claims: "
+        + ", ".join(
+            f"{n} {outcome.value}"
+            for outcome, n in sorted(counts.items(), key=lambda item: item[0].rank)
+        )
+    )
+    for failure in report.failures:
+        print(f"FAILED  {failure_text(failure)}")
+    print(f"report written to {target}")
+    return EXPECTATION_FAILED if report.failures else DONE

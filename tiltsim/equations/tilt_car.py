@@ -1,0 +1,39 @@
+"""The tilt-car's equations of motion as ch. 10 prints them (Eqs. 2 and 3)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from controllers.scalar import Triple, scalar
+from controllers.tilt_car.vehicle import TiltCar, acceleration, yaw_share
+
+
+@scalar
+def yaw_of(alpha: float, heading: float, car: TiltCar) -> float:
+    """Yaw (rad) at a tilt angle, ``heading`` at zero tilt; Eq. (2)."""
+    return heading - yaw_share(car) * alpha
+
+
+@scalar
+def equations_of_motion(
+    state: Sequence[float],
+    direction: float,
+    square_1: float,
+    square_2: float,
+    car: TiltCar,
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """Rates of position and velocity, the state's first four numbers; Eq. (3).
+
+    ``direction`` (rad) is that of the thrusts' middle, the squares are the rotor speeds', the
+    disturbance is an acceleration (m/s^2, world).
+    """
+    ax, ay = acceleration(direction, square_1, square_2, car)
+    gust_x, gust_y, _ = disturbance
+    return state[2], state[3], ax + gust_x, ay + gust_y
+
+
+@scalar
+def limited_rate(speed: float, rate: float) -> float:
+    """The rate (rad/s^2) of a rotor that cannot turn backwards, from the rate asked for."""
+    return 0.0 if speed <= 0.0 and rate < 0.0 else rate

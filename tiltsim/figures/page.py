@@ -1,0 +1,89 @@
+"""What the pages of a flight share: size, headings, plan view, labels."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from tiltsim.figures import style
+from tiltsim.loops import follows_position, gait_in_words, law_in_words
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tiltsim.flight import Flight
+
+SIZE: Final = (11.4, 7.6)
+"""Width and height of the page, inches: A4 in landscape less its margins."""
+
+
+def add_headings(figure: Figure, flight: Flight) -> None:
+    """Write the title, and a line on what was flown and how it ended, above the panels."""
+    layout: Any = figure.get_layout_engine()
+    layout.set(w_pad=0.06, h_pad=0.06, rect=(0.0, 0.0, 1.0, 0.925))
+    title, line = _headings(flight)
+    figure.text(0.012, 0.972, title, fontsize=12, fontweight="bold", va="center")
+    figure.text(0.012, 0.941, line, fontsize=9.5, color="#555555", va="center")
+
+
+def _headings(flight: Flight) -> tuple[str, str]:
+    """The title, and a line on what was flown and how it ended."""
+    scenario = flight.scenario
+    end = flight.end
+    if end.kind == "completed":
+        outcome = f"completed after {end.time:g} s"
+    else:
+        outcome = f"{end.kind} at {end.time:.2f} s"
+    parts = (
+        *(words.replace("_", " ") for words in gait_in_words(scenario)),
+        *law_in_words(scenario),
+        f"{scenario.simulation.plant} plant",
+        outcome,
+    )
+    return scenario.title or scenario.address or "Flight", "  ·  ".join(parts)
+
+
+def plan_view(axes: Any, flight: Flight) -> None:
+    """The path seen from above."""
+    x, y = flight["x"], flight["y"]
+    if follows_position(flight.scenario):
+        reference = flight["x_ref"], flight["y_ref"]
+        if np.ptp(reference[0]) + np.ptp(reference[1]) > 0.0:
+            axes.plot(*reference, color=style.INK, ls=":", lw=1.1, label="reference")
+        else:
+            at = (reference[0][0], reference[1][0])
+            axes.plot(*at, "+", color=style.INK, ms=7, mew=1.4, label="reference")
+    axes.plot(x, y, color=style.BLUE, label="path")
+    axes.plot(x[0], y[0], "o", color=style.INK, mfc="white", ms=5, label="start")
+    axes.plot(x[-1], y[-1], "s", color=style.RED, ms=5, label="end")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.08)
+    axes.set_xlabel("x (m)")
+    axes.set_title("Plan view")
+    axes.set_ylabel("y (m)")
+    axes.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, -0.16), handlelength=1.4)
+
+
+def label(axes: Any, title: str, unit: str, *, name: str = "", columns: int = 3) -> None:
+    """Title, unit and, above the plot where it hides nothing, the legend."""
+    axes.set_title(title)
+    axes.set_ylabel(f"{name} ({unit})" if name else unit)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(
+            ncols=columns,
+            loc="lower right",
+            bbox_to_anchor=(1.0, 0.985),
+            borderaxespad=0.0,
+            handlelength=1.4,
+            columnspacing=0.9,
+            handletextpad=0.4,
+        )
+
+
+def widen(axes: Any, least: float) -> None:
+    """Keep the height of a plot at some size, lest noise fill it."""
+    low, high = axes.get_ylim()
+    if high - low < least:
+        middle = 0.5 * (low + high)
+        axes.set_ylim(middle - 0.5 * least, middle + 0.5 * least)

@@ -1,0 +1,106 @@
+"""Tiltrotor and quadrotor: a free body with four rotors, tilted or not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from controllers.attitude_altitude import STATE_FIELDS
+from controllers.gaits import tilt_reference
+from controllers.rotation import quaternion_from_euler
+from controllers.vehicle import SPIN
+from tiltsim.kinds import Floats, Kind
+from tiltsim.limits import rotorcraft_limit_exceeded
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from tiltsim.loop import ExtraActuators
+    from tiltsim.scenario import Scenario, VehicleTable
+
+_FOUR: Final = (1, 2, 3, 4)
+
+OBSERVED_FIELDS: Final = (*STATE_FIELDS, *(f"alpha_rate_{rotor}" for rotor in _FOUR))
+"""What every loop can tell of its rotorcraft: rigid body, tilts, rotor speeds, tilt rates."""
+
+COLUMN_UNITS: Final = {
+    "time": "s",
+    **dict.fromkeys(("x", "y", "z"), "m"),
+    **dict.fromkeys(("vx", "vy", "vz"), "m/s"),
+    **dict.fromkeys(("roll", "pitch", "yaw"), "rad"),
+    **dict.fromkeys(("p", "q", "r"), "rad/s"),
+    **{f"alpha_{i}": "rad" for i in _FOUR},
+    **{f"alpha_ref_{i}": "rad" for i in _FOUR},
+    **{f"alpha_rate_{i}": "rad/s" for i in _FOUR},
+    **{f"rotor_speed_{i}": "rad/s" for i in _FOUR},
+    **{f"thrust_{i}": "N" for i in _FOUR},
+    **dict.fromkeys(("x_ref", "y_ref", "z_ref"), "m"),
+    **dict.fromkeys(("roll_ref", "pitch_ref", "yaw_ref"), "rad"),
+    "singularity_margin": "rad",
+    "determinant": "1",
+}
+
+
+def rotor_thrusts(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str, Floats]:
+    """Thrusts (N) of the four rotors, negative where one turns against its spin."""
+    coefficient = scenario.true_rotorcraft.thrust_coefficient
+    return {
+        f"thrust_{i}": coefficient
+        * sign
+        * columns[f"rotor_speed_{i}"]
+        * np.abs(columns[f"rotor_speed_{i}"])
+        * columns.get(f"thrust_factor_{i}", 1.0)  # of a fault
+        for i, sign in zip(_FOUR, SPIN, strict=True)
+    }
+
+
+def _compile(
+    scenario: Scenario,
+    law_states: int,
+    extra_actuators: tuple[ExtraActuators, ...],
+    userdata_size: int,
+    visuals: bool,
+) -> mujoco.MjModel:
+    from tiltsim.model import Ground, Pod, RotorLimits, TiltServo, compile_model
+
+    vehicle: VehicleTable = scenario.rotorcraft
+    simulation, ground = scenario.simulation, scenario.ground
+    return compile_model(
+        vehicle.model,
+        scenario.true_rotorcraft,
+        timestep=simulation.timestep,
+        integrator=simulation.integrator,
+        userdata_size=userdata_size,
+        tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump(exclude={"max_rate"})),
+        pod=Pod(**vehicle.pod.model_dump()),
+        rotor_limits=RotorLimits(vehicle.min_rotor_speed, vehicle.max_rotor_speed),
+        law_states=law_states,
+        extra_actuators=extra_actuators,
+        ground=None if ground is None else Ground(ground.height, ground.friction),
+        visuals=visuals,
+    )
+
+
+def _initial_motion(scenario: Scenario) -> tuple[Sequence[float], Sequence[float]]:
+    initial, vehicle = scenario.initial, scenario.rotorcraft
+    gait = scenario.gait.plan(vehicle.resolve())
+    tilts = tilt_reference(0.0, gait.parameters, gait.table)[:4]
+    hinges = tilts if vehicle.model == "tiltrotor" else ()
+    return (
+        (*initial.position, *quaternion_from_euler(*initial.attitude), *hinges),
+        (*initial.velocity, *initial.angular_velocity, *(0.0 for _ in hinges)),
+    )
+
+
+ROTORCRAFT: Final = Kind(
+    name="rotorcraft",
+    observed_fields=OBSERVED_FIELDS,
+    columns=COLUMN_UNITS,
+    thrusts=rotor_thrusts,
+    compile=_compile,
+    initial_motion=_initial_motion,
+    limit_exceeded=rotorcraft_limit_exceeded,
+)
+"""Tiltrotor and quadrotor."""

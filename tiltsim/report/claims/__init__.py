@@ -1,0 +1,48 @@
+"""Claims that no single flight shows: computed, or drawn from several flights.
+
+One module a chapter, found by its name; each holds a tuple ``CLAIMS``, in the order of the text::
+
+    from tiltsim.report.model import AnalysisClaim, FlightClaim
+
+    CLAIMS = (
+        AnalysisClaim(
+            source="ch. 6, Sec. 3, Eq. (13)",
+            statement="On blue, alpha_1 + alpha_3 is constant",
+            published="0.334198",           # a string keeps the digits: good to 0.0000005
+            unit="rad",
+            in_kind=(0.33, 0.34),           # the statement holds, the number differs
+            why="The thesis searches with coefficients rounded to four digits.",
+            measure=lambda: 2.0 * delta(AR_DRONE_2),
+        ),
+        FlightClaim(
+            source="ch. 4, Sec. 7.2, Fig. 9",
+            statement="The error grows with the period of the trot",
+            published=True,                 # yes
+            flights=("ch04_tracking/line#instant_t1_modified", ...),
+            measure=grows,                  # sees {address: metrics} of one plant
+        ),
+    )
+
+``measure`` returns a number, a tuple of numbers or a bool, always computed, never a constant.
+Keep it under a second or so: the report computes every claim, in parallel with the flights.
+Import what is heavy (scipy, mujoco) inside of the functions. ``source`` begins with the chapter; a
+statement with several cases is written several times with different ``case``. A flight of a claim
+that is lost has ``diverged`` true in its metrics and may lack others.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tiltsim.report.model import AnalysisClaim, FlightClaim
+
+
+def registered_claims() -> list[AnalysisClaim | FlightClaim]:
+    """All claims of the modules of this package, chapter by chapter."""
+    claims = []
+    for module in sorted(iter_modules(__path__), key=lambda found: found.name):
+        claims += import_module(f"{__name__}.{module.name}").CLAIMS
+    return claims

@@ -1,0 +1,93 @@
+"""Chapter 1: hovering in a gust (Sec. 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import acos, hypot
+from typing import Final
+
+import numpy as np
+
+from controllers.singularity import torque_free_direction
+from controllers.vehicle import PRESETS
+from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+
+_PERFECT: Final = "ch01_gust/hover#perfect_gait"
+_QUADROTOR: Final = "ch01_gust/hover#quadrotor"
+_FLIGHTS: Final = (_PERFECT, "ch01_gust/hover#imperfect_gait", _QUADROTOR)
+_TILTING: Final = ("ch03_gaits/over_actuated#gait_1", "ch03_gaits/over_actuated#gait_1_planned")
+_GUST: Final = 1.0  # m/s^2 along +x
+
+
+def _tilt(metrics: Metrics) -> float:
+    return hypot(*(float(metrics[f"final_{angle}"]) for angle in ("roll", "pitch", "yaw")))
+
+
+def _perfect_is_least(flights: Mapping[str, Metrics]) -> bool:
+    return min(flights, key=lambda address: _tilt(flights[address])) == _PERFECT
+
+
+def _quadrotor_tilts_more(flights: Mapping[str, Metrics]) -> bool:
+    return _tilt(flights[_QUADROTOR]) > _tilt(flights[_PERFECT])
+
+
+def _some_gait_tilts_more_than_the_quadrotor() -> bool:
+    """Statics of the mirrored perfect gait, whose force at level attitude helps the gust."""
+    from controllers.balance import even_load_gait
+
+    vehicle = PRESETS["ar_drone_2"]
+    gait = even_load_gait((-_GUST, 0.0, 0.0), vehicle)
+    wanted = np.array([-_GUST, 0.0, vehicle.gravity]) / hypot(_GUST, vehicle.gravity)
+    lean = acos(float(torque_free_direction(gait, vehicle) @ wanted))
+    return lean > acos(float(wanted[2]))
+
+
+def _planned_gaits_tilt_less(flights: Mapping[str, Metrics]) -> bool:
+    own, planned = (float(flights[address]["max_tilt_rate"]) for address in _TILTING)
+    return planned < 0.01 * own
+
+
+def _map_enlarges_the_attitudes() -> bool:
+    from controllers.published_gaits import robustness_table
+
+    return all(row.claim_holds for row in robustness_table() if row.claim_holds is not None)
+
+
+CLAIMS = (
+    FlightClaim(
+        source="ch. 1, Sec. 2, Figs. 2-4",
+        statement="In a constant gust the perfect gait needs the least attitude of the three",
+        published=True,
+        flights=_FLIGHTS,
+        measure=_perfect_is_least,
+    ),
+    FlightClaim(
+        source="ch. 1, Sec. 2, Fig. 4",
+        statement="A quadrotor leans more than the tiltrotor with the perfect gait",
+        published=True,
+        flights=(_PERFECT, _QUADROTOR),
+        measure=_quadrotor_tilts_more,
+    ),
+    AnalysisClaim(
+        source="ch. 1, Sec. 2, Fig. 3",
+        statement="An imperfect gait may need a larger attitude than the quadrotor",
+        published=True,
+        measure=_some_gait_tilts_more_than_the_quadrotor,
+    ),
+    FlightClaim(
+        source="ch. 1, Abstract of the thesis; Sec. 3, Fig. 5",
+        statement="Planned gaits spare the tilt angles the over-intensive changes that feedback "
+        "linearization of all eight inputs asks for",
+        published=True,
+        flights=_TILTING,
+        measure=_planned_gaits_tilt_less,
+    ),
+    AnalysisClaim(
+        source="ch. 1, Abstract of the thesis",
+        statement="The Two Color Map enlarges the acceptable attitudes of all gaits compared",
+        published=True,
+        wrong=True,
+        why="It does for every red gait and for no blue one, for which no attitude is acceptable.",
+        measure=_map_enlarges_the_attitudes,
+    ),
+)

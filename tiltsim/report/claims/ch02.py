@@ -1,0 +1,192 @@
+"""Chapter 2: yaw-position control of the quadrotor and its alleged singular zone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import comb
+from typing import Final
+
+import numpy as np
+
+from controllers.quadrotor_singularity import (
+    normalized_determinant,
+    published_determinant,
+    published_singular_curve,
+)
+from controllers.singularity import world_up
+from controllers.stability import is_hurwitz
+from controllers.vehicle import PRESETS
+from controllers.yaw_position import GAIN_SETS, euler_rates
+from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+
+_VEHICLE: Final = PRESETS["ar_drone_2_unrounded"]
+_HOVER: Final = _VEHICLE.mass * _VEHICLE.gravity
+_SINGULAR: Final = 1e-9
+_STABLE: Final = "ch02_singular_zone/exact_law#stable_gains"
+_ONE_ENTRY: Final = (
+    "Entry (3,1) of Eq. (43) is printed as 0; its own factors make it -cos²θ (cos φ - sin φ), and "
+    "with it the determinant is -1 everywhere. The exact determinant, -d³ζ² cos φ / "
+    "(I_x I_y I_z m³ cos θ), is zero nowhere within 90 degrees."
+)
+
+
+def _exact_on_published_curve() -> bool:
+    curve = published_singular_curve()
+    return bool(np.abs(normalized_determinant(*curve, _HOVER, _VEHICLE)).min() < _SINGULAR)
+
+
+def _zero_inside() -> bool:
+    angles = np.linspace(-np.pi / 2, np.pi / 2, 301)[1:-1]
+    roll, pitch = np.meshgrid(angles, angles)
+    return bool((normalized_determinant(roll, pitch, _HOVER, _VEHICLE) <= 0.0).any())
+
+
+def _eq_43_as_printed() -> bool:
+    """Whether S is the determinant of the matrix of Eq. (43), with its printed zero."""
+    rng = np.random.default_rng(0)
+    worst = 0.0
+    for phi, theta, psi in rng.uniform(-1.5, 1.5, (200, 3)):
+        (sf, st, sp), (cf, cp) = np.sin([phi, theta, psi]), np.cos([phi, psi])
+        first = cp * st * cf - cp * st * sf + sp * sf + sp * cf
+        second = sp * st * cf - sp * st * sf - cp * sf - cp * cf
+        matrix = [[first, sp * cf, cp], [second, -cp * cf, sp], [0.0, sf, st]]
+        worst = max(worst, abs(np.linalg.det(matrix) - published_determinant(phi, theta)))
+    return bool(worst < 1e-12)
+
+
+def _position_gains_are_stable() -> bool:
+    gains = GAIN_SETS["ch02"]
+    return is_hurwitz((1.0, *gains[:4])) and is_hurwitz((1.0, *gains[4:]))
+
+
+def _attitude_altitude_gains_are_stable() -> bool:
+    from controllers.quadrotor_attitude_altitude import GAIN_SETS as SETS
+
+    gains = SETS["ch02"]
+    return is_hurwitz((1.0, *gains[:2])) and is_hurwitz((1.0, *gains[2:]))
+
+
+def _attitude_altitude_is_singular() -> bool:
+    """The matrix from thrust and torques to (z, roll, pitch, yaw) accelerations, over a grid."""
+    angles = np.linspace(-1.55, 1.55, 63)
+    for roll in angles:
+        for pitch in angles:
+            rates = np.array([euler_rates(roll, pitch, *axis) for axis in np.eye(3)]).T
+            lift = float(world_up(roll, pitch)[2])
+            if abs(lift * np.linalg.det(rates)) < _SINGULAR:
+                return True
+    return False
+
+
+def _signs_of_axes_matter() -> bool:
+    """Whether turning the body axes round changes where S or the exact determinant vanish."""
+    angles = np.linspace(-1.5, 1.5, 61)
+    roll, pitch = np.meshgrid(angles, angles)
+    published = published_determinant(roll, pitch) - published_determinant(roll, -pitch)
+    exact = normalized_determinant(roll, pitch, _HOVER, _VEHICLE)
+    return bool(
+        np.abs(published).max() > _SINGULAR
+        or np.abs(exact - normalized_determinant(-roll, -pitch, _HOVER, _VEHICLE)).max() > _SINGULAR
+    )
+
+
+def _crossing_is_harmful(flights: Mapping[str, Metrics]) -> bool:
+    """Whether the law that crosses S = 0 with stable gains is lost there."""
+    metrics = flights[_STABLE]
+    crossed = metrics["min_published_determinant"] < 0.0 < metrics["max_published_determinant"]
+    return bool(metrics["diverged"]) or not crossed
+
+
+def _lost_with_stable_gains(flights: Mapping[str, Metrics]) -> bool:
+    return bool(flights[_STABLE]["diverged"])
+
+
+CLAIMS = (
+    AnalysisClaim(
+        source="ch. 2, Sec. 3, Eqs. (21), (44)",
+        statement="Yaw-position control has singular attitudes within 90 degrees of roll and pitch",
+        published=True,
+        wrong=True,
+        why=_ONE_ENTRY,
+        measure=_zero_inside,
+    ),
+    AnalysisClaim(
+        source="ch. 2, Sec. 3, Eqs. (43)-(44)",
+        statement="S(θ, φ) is the determinant of the matrix in Eq. (43)",
+        published=True,
+        measure=_eq_43_as_printed,
+    ),
+    AnalysisClaim(
+        source="ch. 2, Sec. 4, Fig. 3",
+        statement="On the curve S(θ, φ) = 0 the decoupling matrix is singular",
+        published=True,
+        wrong=True,
+        why="As above: on the curve the exact determinant is far from zero.",
+        measure=_exact_on_published_curve,
+    ),
+    AnalysisClaim(
+        source="ch. 2, Sec. 4, Fig. 3",
+        statement="At level attitude the determinant is zero (here over its value in hover)",
+        published="0.00",
+        wrong=True,
+        why="As above; level hover is as regular as an attitude can be.",
+        measure=lambda: float(normalized_determinant(0.0, 0.0, _HOVER, _VEHICLE)),
+    ),
+    AnalysisClaim(
+        source="ch. 2, Sec. 5",
+        statement="Attitude-altitude control has singular attitudes within 90 degrees",
+        published=False,
+        measure=_attitude_altitude_is_singular,
+    ),
+    AnalysisClaim(
+        source="ch. 2, App. B, Eqs. (A3)-(A6)",
+        statement="The gains of the yaw-position law stabilize the linearized system",
+        published=True,
+        wrong=True,
+        why="s⁴ + 10s³ + 20s² + 50s + 500 has roots at 1.30 ± 3.26j: Routh's condition fails.",
+        measure=_position_gains_are_stable,
+    ),
+    AnalysisClaim(
+        source="ch. 2, App. B, Eqs. (A8)-(A9)",
+        statement="The gains of the attitude-altitude law stabilize the linearized system",
+        published=True,
+        measure=_attitude_altitude_gains_are_stable,
+    ),
+    AnalysisClaim(
+        source="ch. 2, Sec. 3.2",
+        statement="Without thrust the yaw-position matrix is singular",
+        published=True,
+        measure=lambda: float(normalized_determinant(0.3, 0.2, 0.0, _VEHICLE)) == 0.0,
+    ),
+    FlightClaim(
+        source="ch. 2, Sec. 4",
+        statement="Crossing the curve S = 0 breaks the law",
+        published=True,
+        wrong=True,
+        why="With stable gains the same law flies through it on the way to the circle, and tracks.",
+        flights=(_STABLE,),
+        measure=_crossing_is_harmful,
+    ),
+    FlightClaim(
+        source="ch. 2, Sec. 6",
+        statement="The singular matrix is why the yaw-position law fails",
+        published=True,
+        wrong=True,
+        why="The gains are: Appendix B's are unstable by themselves, and with stable ones the law "
+        "flies from the same start.",
+        flights=(_STABLE,),
+        measure=_lost_with_stable_gains,
+    ),
+    AnalysisClaim(
+        source="ch. 2, Sec. 4",
+        statement="The direction of the body-fixed axes has no influence on the result",
+        published=True,
+        measure=lambda: not _signs_of_axes_matter(),
+    ),
+    AnalysisClaim(
+        source="ch. 2, Sec. 6",
+        statement="Choices of four outputs out of six, and of three",
+        published=("15", "20"),
+        measure=lambda: (float(comb(6, 4)), float(comb(6, 3))),
+    ),
+)

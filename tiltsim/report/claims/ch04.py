@@ -1,0 +1,308 @@
+"""Chapter 4: tracking with the trot, and the two attitude-position decouplers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from itertools import pairwise, product
+from math import hypot
+from typing import Final
+
+import numpy as np
+
+from controllers.decouplers import conventional_decoupler, modified_decoupler
+from controllers.decoupling_matrix import sines_and_cosines, torque_entries, torque_free_force
+from controllers.gains import GAIN_SETS
+from controllers.singularity import residuals
+from controllers.stability import third_order_loop
+from controllers.vehicle import PRESETS, drag_ratio
+from tiltsim.report.measures import every_flight_completed
+from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+
+_VEHICLE: Final = PRESETS["ar_drone_2"]
+_ERROR: Final = "sup_position_error_after_20s"
+_FORMS: Final = {"instant": "instant switch", "continuous": "continuous switch"}
+_REFERENCES: Final = {"line": "line", "circle": "circle"}
+_DECOUPLERS: Final = ("conventional", "modified")
+_PERIODS: Final = (1, 2, 3)
+_SHORT: Final = 0.1
+"""Share of the difference at T = 3 s below which decouplers at T = 1 s do not differ."""
+_GYROSCOPIC: Final = (
+    "In MuJoCo the instant trot with T = 3 s and the conventional decoupler loses the flight: the "
+    "gyroscopic torque of the turning body, which the thesis leaves out, is there."
+)
+
+
+def _address(reference: str, gait: str, decoupler: str) -> str:
+    return f"ch04_tracking/{reference}#{gait}_{decoupler}"
+
+
+def _trot(reference: str, form: str, period: int, decoupler: str) -> str:
+    return _address(reference, f"{form}_t{period}", decoupler)
+
+
+def _trots(reference: str, form: str) -> tuple[str, ...]:
+    return tuple(_trot(reference, form, T, d) for T, d in product(_PERIODS, _DECOUPLERS))
+
+
+def _error(flights: Mapping[str, Metrics], address: str) -> float:
+    return float(flights[address][_ERROR])
+
+
+def _modified_is_better(pair: tuple[str, str], flights: Mapping[str, Metrics]) -> bool:
+    conventional, modified = (_error(flights, address) for address in pair)
+    return modified < conventional
+
+
+def _setpoint_error(metrics: Metrics) -> float:
+    return hypot(*(float(metrics[f"final_position_error_{axis}"]) for axis in "xy"))
+
+
+def _modified_rests_nearer(pair: tuple[str, str], flights: Mapping[str, Metrics]) -> bool:
+    conventional, modified = (_setpoint_error(flights[address]) for address in pair)
+    return modified < conventional
+
+
+def _grows(reference: str, form: str, decoupler: str, flights: Mapping[str, Metrics]) -> bool:
+    errors = [_error(flights, _trot(reference, form, T, decoupler)) for T in _PERIODS]
+    return all(shorter < longer for shorter, longer in pairwise(errors))
+
+
+def _difference(reference: str, form: str, period: int, flights: Mapping[str, Metrics]) -> float:
+    pair = (_error(flights, _trot(reference, form, period, d)) for d in _DECOUPLERS)
+    return float(np.ptp(list(pair)))
+
+
+def _short_periods_do_not_differ(reference: str, form: str, flights: Mapping[str, Metrics]) -> bool:
+    short, long = (_difference(reference, form, period, flights) for period in (1, 3))
+    return short < _SHORT * long
+
+
+def _continuous_is_better(reference: str, decoupler: str, flights: Mapping[str, Metrics]) -> bool:
+    return all(
+        _error(flights, _trot(reference, "continuous", T, decoupler))
+        < _error(flights, _trot(reference, "instant", T, decoupler))
+        for T in _PERIODS
+    )
+
+
+def _no_rotor_stops(flights: Mapping[str, Metrics]) -> bool:
+    return all(float(metrics["min_rotor_speed"]) > 0.0 for metrics in flights.values())
+
+
+def _eq_25_holds() -> bool:
+    rho = np.linspace(-0.65, 0.65, 131)
+    R = residuals(np.stack([-rho, -rho, rho, rho], axis=-1), _VEHICLE).R
+    return bool(np.abs(R - 4.0 * np.cos(rho) ** 2).max() < 1e-9)
+
+
+def _trot_is_regular() -> bool:
+    rho = np.linspace(-0.65, 0.65, 131)
+    R = residuals(np.stack([-rho, -rho, rho, rho], axis=-1), _VEHICLE).R
+    return bool((R > 0.0).all())
+
+
+def _routh_holds(rows: tuple[str, ...]) -> bool:
+    """Eqs. (35)-(38) as printed: no loop gain besides the gains."""
+    gains = GAIN_SETS["ch04"]._asdict()
+    loops = [(row, tuple(gains[f"{row}_{i}"] for i in (1, 2, 3))) for row in rows]
+    return all(third_order_loop(row, triple, 1.0).stable for row, triple in loops)
+
+
+def _position_gains_are_positive() -> bool:
+    gains = GAIN_SETS["ch04"]
+    return gains.position_1 > 0.0 and gains.position_2 > 0.0
+
+
+def _decouplers_agree_without_tilt() -> bool:
+    trig = sines_and_cosines(0.0, 0.0, 0.0, 0.0)
+    ratio = drag_ratio(_VEHICLE)
+    n = torque_free_force(trig, torque_entries(trig, ratio), ratio)
+    wanted = (1.3, -0.7, 0.4, _VEHICLE.gravity)  # m/s^2, m/s^2, rad, m/s^2
+    pair = zip(modified_decoupler(*wanted, n), conventional_decoupler(*wanted), strict=True)
+    return max(abs(modified - conventional) for modified, conventional in pair) < 1e-12
+
+
+def _second_rests_nearer(flights: Mapping[str, Metrics]) -> bool:
+    first, second = (_setpoint_error(metrics) for metrics in flights.values())
+    return second < first
+
+
+_RHOS: Final = {
+    "rho_065": "ρ = 0.65",
+    "rho_0325": "ρ = 0.325",
+    "rho_minus_0325": "ρ = -0.325",
+    "rho_minus_065": "ρ = -0.65",
+}
+_ALL_TROTS: Final = tuple(
+    address for r, form in product(_REFERENCES, _FORMS) for address in _trots(r, form)
+)
+
+
+def _better(
+    source: str, case: str, conventional: str, modified: str, *, setpoint: bool = False
+) -> FlightClaim:
+    pair = (conventional, modified)
+    return FlightClaim(
+        source=source,
+        statement="The modified decoupler reduces the error that remains",
+        case=case,
+        published=True,
+        flights=pair,
+        measure=partial(_modified_rests_nearer if setpoint else _modified_is_better, pair),
+        why="" if "instant_t3" not in conventional else _GYROSCOPIC,
+    )
+
+
+CLAIMS = (
+    AnalysisClaim(
+        source="ch. 4, Sec. 3.3, Eq. (25)",
+        statement="Under the trot the determinant at level attitude is 4 cos² ρ",
+        published=True,
+        measure=_eq_25_holds,
+    ),
+    AnalysisClaim(
+        source="ch. 4, Sec. 3.3, Prop. 3",
+        statement="The trot meets no singularity at level attitude for |ρ| <= 0.65",
+        published=True,
+        measure=_trot_is_regular,
+    ),
+    AnalysisClaim(
+        source="ch. 4, Sec. 5.1, Prop. 4",
+        statement="The gains meet Eqs. (35)-(38), so that attitude and altitude are stable",
+        case="roll and pitch",
+        published=True,
+        wrong=True,
+        why="K_P1 K_P2 = 10 does not exceed K_P3 = 50. The flights are stable all the same: the "
+        "matrix is printed, and used, without the factor 2|ϖ| in its first three rows, which "
+        "multiplies the gains of these loops by about 720.",
+        measure=partial(_routh_holds, ("roll", "pitch")),
+    ),
+    AnalysisClaim(
+        source="ch. 4, Sec. 5.1, Prop. 4",
+        statement="The gains meet Eqs. (35)-(38), so that attitude and altitude are stable",
+        case="yaw",
+        published=True,
+        wrong=True,
+        why="K_P1 K_P2 = 1 does not exceed K_P3 = 1: on the boundary. The missing factor 2|ϖ| "
+        "makes it stable, as above.",
+        measure=partial(_routh_holds, ("yaw",)),
+    ),
+    AnalysisClaim(
+        source="ch. 4, Sec. 5.1, Prop. 4",
+        statement="The gains meet Eqs. (35)-(38), so that attitude and altitude are stable",
+        case="altitude",
+        published=True,
+        measure=partial(_routh_holds, ("altitude",)),
+    ),
+    AnalysisClaim(
+        source="ch. 4, Sec. 5.1, Prop. 5",
+        statement="The gains of the position loop meet Eqs. (39)-(40)",
+        published=True,
+        measure=_position_gains_are_positive,
+    ),
+    *(
+        _better(
+            "ch. 4, Sec. 7.1, Fig. 4",
+            f"setpoint, {title}",
+            f"ch04_tracking/setpoint#{name}_conventional",
+            f"ch04_tracking/setpoint#{name}_modified",
+            setpoint=True,
+        )
+        for name, title in _RHOS.items()
+    ),
+    *(
+        _better(
+            f"ch. 4, Sec. {section}, Fig. {figure}",
+            f"{reference}, fixed, ρ = 0.65",
+            *(_address(reference, "fixed", decoupler) for decoupler in _DECOUPLERS),
+        )
+        for reference, section, figure in (("line", "7.2", 5), ("circle", "7.3", 10))
+    ),
+    *(
+        _better(
+            f"ch. 4, Sec. {section}, Figs. {figures}",
+            f"{reference}, {_FORMS[form]}, T = {period} s",
+            *(_trot(reference, form, period, decoupler) for decoupler in _DECOUPLERS),
+        )
+        for (reference, section, form, figures) in (
+            ("line", "7.2", "instant", "6, 8"),
+            ("line", "7.2", "continuous", "7, 9"),
+            ("circle", "7.3", "instant", "11, 13"),
+            ("circle", "7.3", "continuous", "12, 14"),
+        )
+        for period in (2, 3)
+    ),
+    *(
+        FlightClaim(
+            source=f"ch. 4, Sec. {'7.2, Figs. 8-9' if reference == 'line' else '7.3, Figs. 13-14'}",
+            statement="The error grows with the period of the trot (T = 1, 2, 3 s)",
+            case=f"{reference}, {_FORMS[form]}, {decoupler}",
+            published=True,
+            flights=tuple(_trot(reference, form, T, decoupler) for T in _PERIODS),
+            measure=partial(_grows, reference, form, decoupler),
+            why=_GYROSCOPIC if (form, decoupler) == ("instant", "conventional") else "",
+        )
+        for reference, form, decoupler in product(_REFERENCES, _FORMS, _DECOUPLERS)
+    ),
+    *(
+        FlightClaim(
+            source=f"ch. 4, Sec. {'7.2, Figs. 8-9' if reference == 'line' else '7.3, Figs. 13-14'}",
+            statement="At the short period the decouplers hardly differ "
+            "(T = 1 s: by less than a tenth of the difference at T = 3 s)",
+            case=f"{reference}, {_FORMS[form]}",
+            published=True,
+            flights=_trots(reference, form),
+            measure=partial(_short_periods_do_not_differ, reference, form),
+            why=_GYROSCOPIC if form == "instant" else "",
+        )
+        for reference, form in product(_REFERENCES, _FORMS)
+    ),
+    *(
+        FlightClaim(
+            source=f"ch. 4, Sec. {'7.2, Figs. 8-9' if reference == 'line' else '7.3, Figs. 13-14'}",
+            statement="The continuous trot tracks better than the instant one, period by period",
+            case=f"{reference}, {decoupler}",
+            published=True,
+            flights=tuple(_trot(reference, f, T, decoupler) for f in _FORMS for T in _PERIODS),
+            measure=partial(_continuous_is_better, reference, decoupler),
+            why=_GYROSCOPIC if decoupler == "conventional" else "",
+        )
+        for reference, decoupler in product(_REFERENCES, _DECOUPLERS)
+    ),
+    FlightClaim(
+        source="ch. 4, Sec. 8",
+        statement="The trot tracks line and circle, with either decoupler and every period",
+        published=True,
+        flights=_ALL_TROTS,
+        measure=every_flight_completed,
+        why=_GYROSCOPIC,
+    ),
+    FlightClaim(
+        source="ch. 4, Sec. 5.1",
+        statement="No rotor reaches the limit of zero speed",
+        published=True,
+        flights=_ALL_TROTS,
+        measure=_no_rotor_stops,
+    ),
+    AnalysisClaim(
+        source="ch. 4, Sec. 3.2, Remark 2",
+        statement="Without tilt the modified decoupler is the conventional one",
+        published=True,
+        measure=_decouplers_agree_without_tilt,
+    ),
+    *(
+        FlightClaim(
+            source="ch. 4, Sec. 8",
+            statement="Without leaving out terms of higher order the error falls further",
+            case=f"setpoint, {title}",
+            published=True,
+            flights=(
+                f"ch04_tracking/setpoint#{name}_modified",
+                f"beyond/setpoint_exact_decoupler#{name}",
+            ),
+            measure=_second_rests_nearer,
+        )
+        for name, title in _RHOS.items()
+    ),
+)

@@ -1,0 +1,73 @@
+"""Chapter 7: robust gaits in a tracking experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Final
+
+from controllers.published_gaits import PUBLISHED_GAITS, robustness
+from tiltsim.report.claims.ch06 import RANK
+from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+
+_SHAPES: Final = "The figures are lost: place and colour as described, size ours. "
+_CIRCLE: Final = "ch07_robust_gaits/circle#"
+_GAITS: Final = {f"ch07_gait_{i}": f"Gait {i}" for i in (1, 2, 3)}
+
+
+def _holds(key: str) -> bool:
+    return bool(robustness(PUBLISHED_GAITS[key]).claim_holds)
+
+
+def _is_sensitive(key: str) -> bool:
+    """Whether less than 0.2 rad of roll or pitch make the biased twin singular."""
+    margin = robustness(PUBLISHED_GAITS[key]).margin_biased
+    return margin is not None and margin < 0.2
+
+
+def _some_gait_tracks(flights: Mapping[str, Metrics]) -> bool:
+    return any(
+        not metrics["diverged"] and float(metrics["sup_position_error_after_20s"]) < 0.1
+        for metrics in flights.values()
+    )
+
+
+def _no_rotor_stops(flights: Mapping[str, Metrics]) -> bool:
+    return all(float(metrics["min_rotor_speed"]) > 0.0 for metrics in flights.values())
+
+
+CLAIMS = (
+    *(
+        AnalysisClaim(
+            source=f"ch. 7, Sec. 3.2, Fig. {figure}",
+            statement="The gait is more robust than its biased twin",
+            case=name,
+            published=True,
+            wrong=key == "ch07_gait_1",
+            why=RANK if key == "ch07_gait_1" else "",
+            measure=partial(_holds, key),
+        )
+        for (key, name), figure in zip(_GAITS.items(), (5, 6, 7), strict=True)
+    ),
+    AnalysisClaim(
+        source="ch. 7, Sec. 3.2, Fig. 6",
+        statement="The biased Gait 2 is very sensitive to the attitude (margin below 0.2 rad)",
+        published=True,
+        why=_SHAPES + "The biased twin keeps 1.45 rad.",
+        measure=partial(_is_sensitive, "ch07_gait_2"),
+    ),
+    FlightClaim(
+        source="ch. 7, Sec. 4.2, Figs. 10-11",
+        statement="A gait on the map tracks the circle with little error (0.1 m)",
+        published=True,
+        flights=tuple(_CIRCLE + name for name in ("gait_1_blue", "gait_2", "gait_3")),
+        measure=_some_gait_tracks,
+    ),
+    FlightClaim(
+        source="ch. 7, Sec. 5, Fig. 9",
+        statement="No rotor reaches zero speed while tracking; flown: the red gaits, which track",
+        published=True,
+        flights=tuple(_CIRCLE + name for name in ("gait_2", "gait_3")),
+        measure=_no_rotor_stops,
+    ),
+)

@@ -1,0 +1,246 @@
+"""Chapter 9: torques, thrusts and accelerations under rotor limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from controllers.attainable import (
+    AttainableSet,
+    attainable_accelerations,
+    attainable_torque_thrust,
+    published_speed_limits,
+)
+from controllers.published_gaits import PUBLISHED_GAITS, PublishedGait
+from controllers.singularity import rank
+from controllers.vehicle import PRESETS
+from tiltsim.report.claims.ch03 import EQ_19
+from tiltsim.report.claims.ch06 import RANK
+from tiltsim.report.measures import determinant_coefficients
+from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+
+_VEHICLE: Final = PRESETS["ar_drone_2"]
+_LIMITS: Final = published_speed_limits(_VEHICLE)
+_RED: Final = (1, 2, 3, 4)
+_BLUE: Final = (5, 6, 7, 8)
+_LESS: Final = (
+    "With rotors from 305.27 to 394.10 rad/s, F_Z = 4.2 N and no yaw torque, the side forces of a "
+    "red gait are those of opposite rotors that differ, and these have little room left."
+)
+
+
+def _gait(number: int) -> PublishedGait:
+    return PUBLISHED_GAITS[f"ch09_gait_{number}"]
+
+
+def _angles(number: int, *, exact: bool = False) -> list[float]:
+    published = _gait(number)
+    gait = (published.exact or published.gait) if exact else published.gait
+    return [float(angle) for angle in gait.angles(np.array([0.0]))[0]]
+
+
+def _torques(number: int, thrust: float | None = None, *, exact: bool = False) -> AttainableSet:
+    angles = _angles(number, exact=exact)
+    return attainable_torque_thrust(angles, _VEHICLE, _LIMITS, vertical_thrust=thrust)
+
+
+def _has_solution(number: int) -> bool:
+    return not _torques(number).is_empty
+
+
+def _can_carry_the_weight(number: int) -> bool:
+    return not _torques(number, 4.2).is_empty
+
+
+def _is_coupled(number: int) -> bool:
+    """Whether for one thrust in the middle the torques on the exact lines are on a line."""
+    thrusts = _torques(number, exact=True)
+    middle = 0.5 * float(thrusts.lower[2] + thrusts.upper[2])
+    return _torques(number, middle, exact=True).dimension <= 1
+
+
+def _has_full_rank(number: int) -> bool:
+    return bool(rank(_angles(number, exact=True), _VEHICLE) == 3)
+
+
+def _acceleration(number: int) -> tuple[float, ...]:
+    reached = attainable_accelerations(_angles(number), _VEHICLE, _LIMITS)
+    return (*reached.lower.tolist(), *reached.upper.tolist())
+
+
+def _is_rectangle(number: int) -> bool:
+    corners = attainable_accelerations(_angles(number), _VEHICLE, _LIMITS).vertices
+    spans = [np.unique(np.round(axis, 9)) for axis in corners.T]
+    return len(corners) == 4 and all(len(span) == 2 for span in spans)
+
+
+def _gaits_2_and_3_are_alike() -> bool:
+    return bool(np.allclose(_acceleration(2), _acceleration(3), rtol=1e-6))
+
+
+def _thrusts() -> tuple[float, ...]:
+    speeds = np.array(_LIMITS)
+    return tuple((4.0 * _VEHICLE.thrust_coefficient * speeds**2).tolist())
+
+
+def _eq_8_holds() -> bool:
+    computed = determinant_coefficients(_VEHICLE).R
+    return all(abs(computed[name] - EQ_19.get(name, 0.0)) < 1e-3 for name in computed)
+
+
+def _faster_is_worse(flights: Mapping[str, Metrics]) -> bool:
+    errors = [
+        np.inf if metrics["diverged"] else float(metrics["sup_position_error_after_20s"])
+        for metrics in flights.values()
+    ]
+    return all(slower < faster for slower, faster in pairwise(errors))
+
+
+def _first_four_repeat(flights: Mapping[str, Metrics]) -> bool:
+    return not any(metrics["diverged"] for metrics in flights.values())
+
+
+def _spread(address: str, flights: Mapping[str, Metrics]) -> float:
+    """Largest over smallest distance from the centre."""
+    metrics = flights[address]
+    most, least = (float(metrics[f"{which}_orbit_radius_after_20s"]) for which in ("max", "min"))
+    return most / least
+
+
+def _circle(name: str) -> str:
+    return f"ch09_input_limits/circle#omega_{name}"
+
+
+CLAIMS = (
+    AnalysisClaim(
+        source="ch. 9, Sec. 2, Eq. (8)",
+        statement="Eq. (8), term by term, is R on red",
+        published=True,
+        measure=_eq_8_holds,
+    ),
+    AnalysisClaim(
+        source="ch. 9, Sec. 3.1",
+        statement="Thrust of four untilted rotors at the speed limits, 305.27 and 394.10 rad/s",
+        published=("3.00", "5.00"),
+        unit="N",
+        measure=_thrusts,
+    ),
+    *(
+        AnalysisClaim(
+            source="ch. 9, Sec. 3.2",
+            statement="Without yaw torque the rotor limits leave a solution",
+            case=f"Gait {number}",
+            published=number not in (1, 4),
+            measure=partial(_has_solution, number),
+        )
+        for number in (*_RED, *_BLUE)
+    ),
+    *(
+        AnalysisClaim(
+            source="ch. 9, Sec. 3.3",
+            statement="The gaits with solutions can carry 4.2 N, the weight",
+            case=f"Gait {number}",
+            published=True,
+            why="Tilted by 0.834 rad two of its rotors lift too little: 3.87 N at most."
+            if number == 6
+            else "",
+            measure=partial(_can_carry_the_weight, number),
+        )
+        for number in (2, 3, *_BLUE)
+    ),
+    *(
+        AnalysisClaim(
+            source=f"ch. 9, Sec. 3.2, Fig. {number if number in _RED else number - 1}",
+            statement="For a given thrust the torques about x and y are linearly coupled",
+            case=f"Gait {number}",
+            published=number in _BLUE,
+            measure=partial(_is_coupled, number),
+        )
+        for number in (2, 3, *_BLUE)
+    ),
+    *(
+        AnalysisClaim(
+            source="ch. 9, Sec. 5",
+            statement="The coupling is no singularity: τ has full rank",
+            case=f"Gait {number}",
+            published=True,
+            wrong=True,
+            why=RANK,
+            measure=partial(_has_full_rank, number),
+        )
+        for number in _BLUE
+    ),
+    *(
+        AnalysisClaim(
+            source=f"ch. 9, Sec. 3.3, Fig. {figure}",
+            statement="Accelerations reached in body axes: least and greatest, along x and y",
+            case=f"Gait {number}",
+            published=("-2", "-2", "2", "2"),
+            unit="m/s^2",
+            why=_LESS + " The published range is not reproduced from the stated conditions.",
+            measure=partial(_acceleration, number),
+        )
+        for number, figure in ((2, 8), (3, 9))
+    ),
+    *(
+        AnalysisClaim(
+            source="ch. 9, Sec. 5",
+            statement="The region of accelerations is a rectangle",
+            case=f"Gait {number}",
+            published=True,
+            measure=partial(_is_rectangle, number),
+        )
+        for number in (2, 3)
+    ),
+    AnalysisClaim(
+        source="ch. 9, Sec. 3.3",
+        statement="Gaits 2 and 3 reach similar accelerations",
+        published=True,
+        measure=_gaits_2_and_3_are_alike,
+    ),
+    AnalysisClaim(
+        source="ch. 9, Sec. 4.1",
+        statement="Centripetal accelerations of the four circles",
+        published=("0.05", "1.25", "5", "11.25"),
+        unit="m/s^2",
+        measure=lambda: tuple(5.0 * omega**2 for omega in (0.1, 0.5, 1.0, 1.5)),
+    ),
+    FlightClaim(
+        source="ch. 9, Sec. 4.2, Fig. 10",
+        statement="All four references end in periodic trajectories: none of them is lost",
+        published=True,
+        flights=tuple(map(_circle, ("01", "05", "10", "15"))),
+        measure=_first_four_repeat,
+    ),
+    FlightClaim(
+        source="ch. 9, Sec. 5",
+        statement="The faster the circle, the larger the error; the fastest is lost",
+        published=True,
+        flights=tuple(map(_circle, ("01", "05", "10", "15", "20"))),
+        measure=_faster_is_worse,
+    ),
+    *(
+        FlightClaim(
+            source="ch. 9, Sec. 4.2, Fig. 10",
+            statement="Roundness of the orbit, largest over smallest radius",
+            case=f"{omega} rad/s",
+            published="1.00",
+            in_kind=(1.0, 1.15),
+            why="A circle at 0.5 rad/s, a tenth off round at 1.0 rad/s." if omega == "1.0" else "",
+            flights=(_circle(name),),
+            measure=partial(_spread, _circle(name)),
+        )
+        for omega, name in (("0.1", "01"), ("0.5", "05"), ("1.0", "10"))
+    ),
+    FlightClaim(
+        source="ch. 9, Sec. 4.2, Fig. 10",
+        statement="At 1.5 rad/s the orbit is an ellipse (radii a fifth apart and more)",
+        published=True,
+        flights=(_circle("15"),),
+        measure=lambda flights: _spread(_circle("15"), flights) > 1.2,
+    ),
+)

@@ -1,0 +1,200 @@
+"""Chapter 10: the tilt-car, and the state drift of its over-actuated control."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from math import cos, inf, sin
+from typing import Final
+
+import numpy as np
+
+from controllers.tilt_car.state_drift import drift_rate, orbit
+from controllers.tilt_car.third_derivative import input_columns
+from controllers.tilt_car.vehicle import THESIS_CAR, turn_share, yaw_share
+from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+
+_THIRD: Final = "ch10_state_drift/third_derivative#"
+_PLANNED: Final = "ch10_state_drift/planned_direction"
+_FAILURE: Final = "ch10_state_drift/fourth_derivative#failure"
+_RADIUS, _OMEGA = 10.0, 1.0  # m, rad/s
+
+
+def _thrusts_can_be_inverted() -> bool:
+    """Whether J_theta, times any rotation, is regular (Eqs. 4-6)."""
+    theta, thrust = THESIS_CAR.half_angle, THESIS_CAR.thrust_coefficient
+    matrix = np.diag([cos(theta), sin(theta)]) @ (thrust * np.array([[1.0, 1.0], [1.0, -1.0]]))
+    return bool(abs(np.linalg.det(matrix)) > 1e-9)
+
+
+def _rank(speed_1: float, speed_2: float, *, tilting: bool) -> int:
+    columns = np.array(input_columns(speed_1, speed_2, THESIS_CAR)).reshape(3, 2).T
+    return int(np.linalg.matrix_rank(columns if tilting else columns[:, :2]))
+
+
+def _full_rank_needs_both(*, tilting: bool) -> bool:
+    """Whether the rank is full where both rotors turn, and only there."""
+    both = _rank(200.0, 150.0, tilting=tilting) == 2
+    one = _rank(200.0, 0.0, tilting=tilting) == 2 or _rank(0.0, 200.0, tilting=tilting) == 2
+    return both and not one
+
+
+def _full_rank_unless_both_rest() -> bool:
+    """Eq. (28): rank 2 of the two columns of the rotors when they are not both at rest."""
+    return _rank(200.0, 0.0, tilting=False) == 2 and _rank(0.0, 200.0, tilting=False) == 2
+
+
+def _thrust_points_to_the_centre() -> bool:
+    """Eq. (18), alpha = t / (1 - I_T / I_B): the thrusts turn with the circle, 1 rad/s."""
+    tilt_rate = 1.0 / turn_share(THESIS_CAR)
+    yaw_rate = -yaw_share(THESIS_CAR) * tilt_rate
+    return abs(tilt_rate + yaw_rate - _OMEGA) < 1e-12
+
+
+def _drift_has_a_cause() -> bool:
+    """Whether the minimum-norm law moves the lean while position and error rest."""
+    return drift_rate(0.0, orbit(_RADIUS, _OMEGA), THESIS_CAR) > 0.0
+
+
+def _small(address: str, metric: str, bound: float, flights: Mapping[str, Metrics]) -> bool:
+    return abs(float(flights[address].get(metric, inf))) < bound
+
+
+def _both_small(flights: Mapping[str, Metrics]) -> bool:
+    address = _THIRD + "ten_seconds"
+    return all(_small(address, f"final_position_error_{axis}", 0.01, flights) for axis in "xy")
+
+
+def _inputs_part(flights: Mapping[str, Metrics]) -> bool:
+    """Whether the inputs are ten times as far apart after 2000 s as after 10 s."""
+    early, late = (
+        abs(float(flights[_THIRD + name]["final_input_split"]))
+        for name in ("ten_seconds", "two_thousand_seconds")
+    )
+    return late > 10.0 * early
+
+
+def _fails_after_a_rotor_stops(flights: Mapping[str, Metrics]) -> bool:
+    metrics = flights[_FAILURE]
+    error = float(metrics.get("sup_position_error_after_20s", inf))
+    return metrics["min_rotor_speed"] == 0.0 and error > 0.2
+
+
+def _saturates(flights: Mapping[str, Metrics]) -> bool:
+    return float(flights[_PLANNED]["saturated_fraction"]) > 0.0
+
+
+CLAIMS = (
+    AnalysisClaim(
+        source="ch. 10, Sec. 2, Eq. (2)",
+        statement="Bottom disc over top disc: ψ over α, with I_T = 0.001 and I_B = 0.002",
+        published="-0.5",
+        measure=lambda: -yaw_share(THESIS_CAR),
+    ),
+    AnalysisClaim(
+        source="ch. 10, Sec. 2, Eq. (2)",
+        statement="Bottom disc over top disc: ψ over α, with I_T = 0.001 and I_B = 0.002",
+        case="I_B read as the bottom disc's own inertia, as the text says",
+        published="-0.5",
+        wrong=True,
+        why="α is the top disc's angle on the bottom one, so that I_T (ψ' + α') + I_bottom ψ' = 0: "
+        "-1/3. Eq. (2) holds where I_B is the inertia of the whole car.",
+        measure=lambda: -yaw_share(THESIS_CAR._replace(bottom_inertia=0.002)),
+    ),
+    AnalysisClaim(
+        source="ch. 10, Sec. 2, Eq. (6)",
+        statement="The matrix from squared speeds to acceleration can be inverted",
+        published=True,
+        measure=_thrusts_can_be_inverted,
+    ),
+    AnalysisClaim(
+        source="ch. 10, Sec. 3.1, Eqs. (10)-(12)",
+        statement="Rank 2 if and only if both rotors turn",
+        case="columns of the rotors, Δ1",
+        published=True,
+        measure=partial(_full_rank_needs_both, tilting=False),
+    ),
+    AnalysisClaim(
+        source="ch. 10, Sec. 3.1, Eqs. (10)-(12)",
+        statement="Rank 2 if and only if both rotors turn",
+        case="with the column of the tilt, [Δ1 | Δ2]",
+        published=True,
+        wrong=True,
+        why="With one rotor at rest the tilt turns the other one's thrust: still rank 2.",
+        measure=partial(_full_rank_needs_both, tilting=True),
+    ),
+    AnalysisClaim(
+        source="ch. 10, Sec. 6.1, Eq. (28)",
+        statement="The columns of the rotors have rank 2 unless both rotors are at rest",
+        published=True,
+        wrong=True,
+        why="One rotor at rest leaves one column: rank 1. Both must turn.",
+        measure=_full_rank_unless_both_rest,
+    ),
+    FlightClaim(
+        source="ch. 10, Sec. 4.1, Figs. 7-8",
+        statement="The third-derivative law brings the error to zero within ten seconds (0.01 m)",
+        published=True,
+        flights=(_THIRD + "ten_seconds",),
+        measure=_both_small,
+    ),
+    FlightClaim(
+        source="ch. 10, Sec. 4.1, Figs. 12-13",
+        statement="The error stays at zero for 2000 s (0.01 m after 20 s)",
+        published=True,
+        flights=(_THIRD + "two_thousand_seconds",),
+        measure=partial(
+            _small, _THIRD + "two_thousand_seconds", "sup_position_error_after_20s", 0.01
+        ),
+    ),
+    FlightClaim(
+        source="ch. 10, Sec. 4.1, Figs. 9, 14",
+        statement="State drift: the inputs part after the error is gone",
+        published=True,
+        flights=(_THIRD + "ten_seconds", _THIRD + "two_thousand_seconds"),
+        measure=_inputs_part,
+    ),
+    AnalysisClaim(
+        source="ch. 10, Sec. 6.2",
+        statement="The cause of the drift from one equilibrium to another can be given",
+        published=False,
+        wrong=True,
+        why="It can: the minimum-norm distribution is not integrable, and the lean advances by a "
+        "holonomy, β' = Ω / (1 + κ² W(β)) on a circle.",
+        measure=_drift_has_a_cause,
+    ),
+    FlightClaim(
+        source="ch. 10, Sec. 5, Figs. 20-21",
+        statement="With the tilt planned the error vanishes, too (0.01 m at 10 s)",
+        published=True,
+        flights=(_PLANNED,),
+        measure=partial(_small, _PLANNED, "final_position_error_x", 0.01),
+    ),
+    FlightClaim(
+        source="ch. 10, Sec. 5, Fig. 22",
+        statement="With the tilt planned the inputs become identical: no state drift",
+        published=True,
+        flights=(_PLANNED,),
+        measure=partial(_small, _PLANNED, "final_input_split", 1.0),
+    ),
+    FlightClaim(
+        source="ch. 10, Sec. 5, Fig. 23",
+        statement="With the tilt planned the inputs saturate for a while",
+        published=True,
+        flights=(_PLANNED,),
+        measure=_saturates,
+    ),
+    AnalysisClaim(
+        source="ch. 10, Sec. 5, Eq. (18)",
+        statement="α = t / (1 - I_T / I_B) keeps the thrusts pointed at the centre",
+        published=True,
+        measure=_thrust_points_to_the_centre,
+    ),
+    FlightClaim(
+        source="ch. 10, Sec. 6.1, Figs. 24-25",
+        statement="The fourth-derivative law drifts until a rotor stops, and then loses the circle",
+        published=True,
+        flights=(_FAILURE,),
+        measure=_fails_after_a_rotor_stops,
+    ),
+)

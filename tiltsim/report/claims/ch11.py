@@ -1,0 +1,245 @@
+"""Chapter 11: the penguin swing, its saturation, and the bound on the Lyapunov candidate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from math import exp, pi
+from typing import Final
+
+import numpy as np
+
+from controllers.tilt_car.penguin_cycle import (
+    LyapunovBound,
+    State,
+    Swing,
+    half_period,
+    limit_cycle,
+    lyapunov,
+    lyapunov_bound,
+    lyapunov_gain,
+    multipliers,
+)
+from controllers.tilt_car.planned_direction import GAIN_SETS
+from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+
+_GAINS: Final = GAIN_SETS["ch11"]
+_SWING: Final = Swing(half_angle=pi / 6, half_period=1.0, gains=_GAINS)
+_SMALL: Final = "ch11_penguin/straight_line#small"
+_LARGE: Final = "ch11_penguin/straight_line#large"
+_SERVO: Final = (
+    "In MuJoCo the tilt servo needs some 20 ms for a swing of 4.2 rad, in which the thrusts point "
+    "elsewhere: e_x reaches 13 mm. In the thesis' equations the thrusts jump, and e_x stays 0."
+)
+
+
+def _can_push_straight_ahead(swing: float) -> bool:
+    """Whether the reference's direction lies between the thrusts, pi/6 from their middle."""
+    return abs(swing) <= _SWING.half_angle
+
+
+@cache
+def _zone() -> tuple[State, ...]:
+    """States of Eq. (39): beyond the switching line, both components positive."""
+    grid = np.linspace(0.0, 3.0, 31).tolist()
+    return tuple((e, rate) for e in grid for rate in grid if _SWING.both_push((e, rate)))
+
+
+def _for_all(holds: Callable[[State], bool]) -> bool:
+    return all(holds(state) for state in _zone())
+
+
+def _comes_back_mirrored(state: State) -> bool:
+    """Lemma 7: half a period leads into the zone of Eq. (45)."""
+    error, rate = half_period(_SWING, state).end
+    return error <= 0.0 and rate <= 0.0 and _SWING.both_push((-error, -rate))
+
+
+def _switches_within(state: State) -> bool:
+    """Lemma 5: 0 < t_1 < 1 s."""
+    return 0.0 < half_period(_SWING, state).free_time < 1.0
+
+
+def _greatest_at_the_ends(state: State) -> bool:
+    """Proposition 6, along the motion in steps of 10 ms."""
+    half = half_period(_SWING, state)
+    between = _SWING.free(half.free_time, state)
+    times = np.linspace(0.0, _SWING.half_period, 101)
+    path = [
+        _SWING.free(t, state) if t <= half.free_time else _SWING.pushed(t - half.free_time, between)
+        for t in times.tolist()
+    ]
+    ends = max(lyapunov(_SWING, state), lyapunov(_SWING, half.end))
+    return max(lyapunov(_SWING, at) for at in path) <= ends + 1e-12
+
+
+def _eq_42_holds(state: State) -> bool:
+    """The printed solution with both rotors pushing, after 0.3 s."""
+    error, rate = state
+    slow, fast = exp(-0.9), exp(-1.8)
+    printed = (
+        (2.0 * error + rate / 3.0) * slow + (-error - rate / 3.0) * fast,
+        (-6.0 * error - rate) * slow + (6.0 * error + 2.0 * rate) * fast,
+    )
+    solved = _SWING.free(0.3, state)
+    return all(abs(a - b) < 1e-9 for a, b in zip(printed, solved, strict=True))
+
+
+def _first_half_period() -> bool:
+    """Remark 8: from rest one rotor alone pushes for half a period, mirrored, into the zone."""
+    error, rate = _SWING.pushed(_SWING.half_period, (0.0, 0.0))
+    return _SWING.both_push((-error, -rate))
+
+
+def _switch_line() -> float:
+    """K_Y1 e_y' + K_Y2 e_y at which a rotor stops (Prop. 4)."""
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (
+            (low, middle) if _SWING.both_push((middle / _GAINS.y_position, 0.0)) else (middle, high)
+        )
+    return high
+
+
+def _is_asymptotically_stable() -> bool:
+    """Whether errors die out: whether the limit cycle is the origin."""
+    return max(map(abs, limit_cycle(_SWING))) < 1e-9
+
+
+@cache
+def _bound() -> LyapunovBound:
+    return lyapunov_bound(_SWING, points=33)
+
+
+def _cycle_attracts() -> bool:
+    return bool(np.abs(multipliers(_SWING, limit_cycle(_SWING))).max() < 1.0)
+
+
+def _errors_stay_below(flights: Mapping[str, Metrics]) -> bool:
+    return all(float(flights[_SMALL][f"max_abs_error_{axis}"]) < 0.1 for axis in "xy")
+
+
+def _saturates_now_and_then(flights: Mapping[str, Metrics]) -> bool:
+    return 0.0 < float(flights[_LARGE]["saturated_fraction"]) < 1.0
+
+
+def _is_bounded(flights: Mapping[str, Metrics]) -> bool:
+    return float(flights[_LARGE]["max_lyapunov"]) <= _bound().published
+
+
+CLAIMS = (
+    AnalysisClaim(
+        source="ch. 11, Sec. 3, Figs. 5-8",
+        statement="The thrusts can keep the acceleration along y at zero",
+        case="small swing, π/8",
+        published=True,
+        measure=lambda: _can_push_straight_ahead(pi / 8),
+    ),
+    AnalysisClaim(
+        source="ch. 11, Sec. 3, Figs. 5-8",
+        statement="The thrusts can keep the acceleration along y at zero",
+        case="large swing, π/3",
+        published=False,
+        measure=lambda: _can_push_straight_ahead(pi / 3),
+    ),
+    FlightClaim(
+        source="ch. 11, Sec. 4.4",
+        statement="With the small swing the errors stay below 0.1 m",
+        published=True,
+        flights=(_SMALL,),
+        measure=_errors_stay_below,
+    ),
+    FlightClaim(
+        source="ch. 11, Sec. 4.4, Fig. 10",
+        statement="With the small swing no input saturates (share of samples)",
+        published="0.00",
+        flights=(_SMALL,),
+        measure=lambda flights: float(flights[_SMALL]["saturated_fraction"]),
+    ),
+    FlightClaim(
+        source="ch. 11, Sec. 6, Prop. 3; Sec. 7, Fig. 24",
+        statement="With the large swing the error along x is zero all the time",
+        published="0.000",
+        unit="m",
+        in_kind=(0.0, 0.02),
+        why=_SERVO,
+        flights=(_LARGE,),
+        measure=lambda flights: float(flights[_LARGE]["max_abs_error_x"]),
+    ),
+    AnalysisClaim(
+        source="ch. 11, Sec. 6, Prop. 4",
+        statement="K_Y1 e_y' + K_Y2 e_y where a rotor stops: 1/√3",
+        published="0.57735",
+        unit="m/s^2",
+        measure=_switch_line,
+    ),
+    AnalysisClaim(
+        source="ch. 11, Sec. 6, Lemma 5, Eq. (42)",
+        statement="The printed solution with both rotors pushing is right",
+        published=True,
+        measure=lambda: _for_all(_eq_42_holds),
+    ),
+    AnalysisClaim(
+        source="ch. 11, Sec. 6, Lemmas 5 and 6",
+        statement="From the zone of Eq. (39) a rotor stops within 0 < t < 1 s",
+        published=True,
+        measure=lambda: _for_all(_switches_within),
+    ),
+    AnalysisClaim(
+        source="ch. 11, Sec. 6, Lemmas 7 and 8, Prop. 5",
+        statement="Half a period leads from the zone into its mirror image",
+        published=True,
+        measure=lambda: _for_all(_comes_back_mirrored),
+    ),
+    AnalysisClaim(
+        source="ch. 11, Sec. 6, Remark 8",
+        statement="The first half period, from rest, ends in the zone",
+        published=True,
+        measure=_first_half_period,
+    ),
+    AnalysisClaim(
+        source="ch. 11, Sec. 6, Prop. 6",
+        statement="In between, the Lyapunov candidate does not exceed its values at half periods",
+        published=True,
+        measure=lambda: _for_all(_greatest_at_the_ends),
+    ),
+    AnalysisClaim(
+        source="ch. 11, Sec. 6, Remark 10, Eq. (71)",
+        statement="The candidate grows by at most 3/4 over half a period",
+        published="0.75",
+        measure=lambda: _bound().largest_gain,
+    ),
+    AnalysisClaim(
+        source="ch. 11, Sec. 6, Remark 10",
+        statement="It grows nowhere in the zone by more",
+        published=True,
+        measure=lambda: _for_all(lambda state: lyapunov_gain(_SWING, state) <= 0.75 + 1e-12),
+    ),
+    AnalysisClaim(
+        source="ch. 11, Sec. 6, Remark 9; Sec. 7",
+        statement="With the large swing the error along y goes to zero",
+        published=False,
+        measure=_is_asymptotically_stable,
+    ),
+    AnalysisClaim(
+        source="ch. 11, Secs. 6-7, Prop. 2, Figs. 24, 31",
+        statement="The error along y stays bounded: the oscillation is stable",
+        published=True,
+        measure=_cycle_attracts,
+    ),
+    FlightClaim(
+        source="ch. 11, Sec. 7, Figs. 25-26",
+        statement="With the large swing inputs saturate from time to time, not always",
+        published=True,
+        flights=(_LARGE,),
+        measure=_saturates_now_and_then,
+    ),
+    FlightClaim(
+        source="ch. 11, Sec. 8, Prop. 7, Eq. (77)",
+        statement="The candidate stays below L_critical + 3/4 (here 2.56 m²/s²)",
+        published=True,
+        flights=(_LARGE,),
+        measure=_is_bounded,
+    ),
+)

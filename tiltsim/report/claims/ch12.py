@@ -1,0 +1,177 @@
+"""Chapter 12: the Two Color Map of another vehicle."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Final
+
+import numpy as np
+
+from controllers.singularity import residuals
+from controllers.two_color_map import curve_l, delta, grid_roots, point_p, region, root_counts
+from controllers.vehicle import PRESETS
+from tiltsim.report.claims.ch08 import DIGITS
+from tiltsim.report.measures import determinant_coefficients
+from tiltsim.report.model import AnalysisClaim
+
+_VEHICLE: Final = PRESETS["luukkonen"]
+_FORMER: Final = PRESETS["ar_drone_2"]
+_P: Final = point_p(_VEHICLE)
+SCALE: Final = 1.025
+"""Ch. 12 prints the determinant times this constant."""
+
+EQ_8: Final = {
+    **{"cccc": 4.100},
+    **{"cccs": 5.680, "ccsc": -5.680, "cscc": 5.680, "sccc": -5.680},
+    **{"ccss": 0.9954, "cssc": 0.9954, "sccs": 0.9954, "sscc": 0.9954},
+    **{"cscs": -2.050, "scsc": -2.050},
+    **{"csss": -0.1743, "scss": 0.1743, "sscs": -0.1743, "sssc": 0.1743},
+}
+EQ_6: Final = {
+    **{"ccsc": 1.025, "sccc": -1.025, "csss": -1.025, "sscs": 1.025},
+    **{"ccss": 2.927, "cssc": 2.927, "sccs": -2.927, "sscc": -2.927},
+}
+EQ_7: Final = {
+    **{"cccs": 1.025, "cscc": -1.025, "scss": -1.025, "sssc": 1.025},
+    **{"ccss": -2.927, "cssc": 2.927, "sccs": -2.927, "sscc": 2.927},
+}
+
+
+def _terms_hold(part: str, printed: dict[str, float]) -> bool:
+    computed = getattr(determinant_coefficients(_VEHICLE), part)
+    return all(abs(SCALE * computed[name] - printed.get(name, 0.0)) < 1e-3 for name in computed)
+
+
+def _coefficient(part: str, name: str) -> float:
+    return SCALE * abs(float(getattr(determinant_coefficients(_VEHICLE), part)[name]))
+
+
+def _coefficients_differ_greatly() -> bool:
+    """Whether any coefficient differs by a tenth or more, up to the common factor."""
+    for own, former in zip(
+        determinant_coefficients(_VEHICLE), determinant_coefficients(_FORMER), strict=True
+    ):
+        for name, value in former.items():
+            if abs(own[name] - value) > 0.1 * abs(value) + 1e-9:
+                return True
+    return False
+
+
+def _maps_are_alike() -> bool:
+    """The same counts of roots, P within 0.01 rad and L within 0.02 rad."""
+    own, former = (root_counts(grid_roots(vehicle)) for vehicle in (_VEHICLE, _FORMER))
+    axis = np.linspace(-1.0, 1.0, 41)
+    apart = np.abs(curve_l(axis, _VEHICLE) - curve_l(axis, _FORMER)).max()
+    return bool(
+        np.array_equal(own, former) and abs(_P[0] - point_p(_FORMER)[0]) < 0.01 and apart < 0.02
+    )
+
+
+def _only_three_parameters_count() -> bool:
+    """Whether mass, inertia and gravity leave the determinant's coefficients alone."""
+    other = _VEHICLE._replace(mass=1.0, inertia_xx=0.1, inertia_zz=0.2, gravity=3.7)
+    angles = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 4))
+    same = zip(residuals(angles, _VEHICLE), residuals(angles, other), strict=True)
+    return all(np.array_equal(own, changed) for own, changed in same)
+
+
+def _two_vehicles_can_share_a_map() -> bool:
+    """Whether other L, K_f and K_m with the same ratio make the same map."""
+    twin = _VEHICLE._replace(
+        arm_length=2.0 * _VEHICLE.arm_length,
+        thrust_coefficient=3.0 * _VEHICLE.thrust_coefficient,
+        drag_coefficient=6.0 * _VEHICLE.drag_coefficient,
+    )
+    angles = np.random.default_rng(1).uniform(-1.0, 1.0, (50, 4))
+    same = zip(residuals(angles, _VEHICLE), residuals(angles, twin), strict=True)
+    return all(np.allclose(own, changed, rtol=1e-9, atol=1e-12) for own, changed in same)
+
+
+CLAIMS = (
+    *(
+        AnalysisClaim(
+            source="ch. 12, Eq. (4)",
+            statement="Coefficients of the determinant, times 1.025",
+            case=f"{part}, {name}",
+            published=printed,
+            measure=partial(_coefficient, part, name),
+        )
+        for printed, part, name in (
+            ("4.100", "R", "cccc"),
+            ("5.680", "R", "cccs"),
+            ("0.9954", "R", "ccss"),
+            ("2.050", "R", "cscs"),
+            ("0.1743", "R", "csss"),
+            ("1.025", "R_phi", "ccsc"),
+            ("2.927", "R_phi", "ccss"),
+        )
+    ),
+    *(
+        AnalysisClaim(
+            source=f"ch. 12, {equations}",
+            statement=f"{name} is printed right, term by term",
+            published=True,
+            measure=partial(_terms_hold, part, printed),
+        )
+        for equations, name, part, printed in (
+            ("Eqs. (4), (6)", "R_φ", "R_phi", EQ_6),
+            ("Eqs. (4), (7)", "R_θ", "R_theta", EQ_7),
+            ("Eqs. (4), (8), (10)", "R", "R", EQ_8),
+        )
+    ),
+    AnalysisClaim(
+        source="ch. 12",
+        statement="The coefficients differ greatly from those of ch. 3",
+        published=True,
+        wrong=True,
+        why="Up to the common factor 1.025 they are those of ch. 3 within 1 %: K_m / (L K_f) is "
+        "0.1700 in place of 0.1687.",
+        measure=_coefficients_differ_greatly,
+    ),
+    AnalysisClaim(
+        source="ch. 12",
+        statement="L, K_f and K_m are the only parameters that the map depends on",
+        published=True,
+        measure=_only_three_parameters_count,
+    ),
+    AnalysisClaim(
+        source="ch. 12",
+        statement="Every set of L, K_f and K_m has a map of its own",
+        published=True,
+        wrong=True,
+        why="The map depends on the ratio K_m / (L K_f) alone.",
+        measure=lambda: not _two_vehicles_can_share_a_map(),
+    ),
+    AnalysisClaim(
+        source="ch. 12, Fig. 1",
+        statement="The map is much like that of ch. 8",
+        published=True,
+        measure=_maps_are_alike,
+    ),
+    AnalysisClaim(
+        source="ch. 12, Fig. 1",
+        statement="The colours meet at P = (p, -p) with p",
+        published="0.168421",
+        unit="rad",
+        in_kind=(0.1684, 0.1685),
+        why=DIGITS,
+        measure=lambda: _P[0],
+    ),
+    AnalysisClaim(
+        source="ch. 12, Fig. 1",
+        statement="P lies below L, in S_D",
+        published=True,
+        wrong=True,
+        why="As in ch. 8: P lies on L exactly.",
+        measure=lambda: region(*_P, _VEHICLE) == "S_D",
+    ),
+    AnalysisClaim(
+        source="ch. 12, Eq. (12)",
+        statement="On blue α₁ + α₃ = -(α₂ + α₄) is",
+        published="0.336842",
+        unit="rad",
+        in_kind=(0.3368, 0.3369),
+        why=DIGITS,
+        measure=lambda: 2.0 * delta(_VEHICLE),
+    ),
+)

@@ -1,0 +1,200 @@
+"""What page and summary both say: the report's parts, in words and numbers as text."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from decimal import Decimal
+from itertools import groupby
+from math import floor, isfinite, log10
+from typing import TYPE_CHECKING, Final
+
+from tiltsim.report.findings import FINDINGS, Finding
+from tiltsim.report.model import Claim, ExpectationClaim, Outcome
+from tiltsim.report.pictures import Drawing
+from tiltsim.report.rows import Cell, Failure, Row
+
+if TYPE_CHECKING:
+    from tiltsim.report.flying import Flights, Plan
+
+TITLE: Final = "Reproduction report"
+SUBJECT: Final = (
+    "Every claim with a number or a yes or no in the doctoral thesis “Advanced Feedback "
+    "Linearization Control for Tiltrotor UAVs: Gait Plan, Controller Design, and Stability "
+    "Analysis” by Zhe Shen, beside what tiltsim measures."
+)
+CHAPTERS: Final = {
+    1: "Hovering in a gust",
+    2: "Yaw-position control of the quadrotor",
+    3: "Fixed gaits and the decoupling matrix",
+    4: "Tracking with the trot",
+    5: "Gaits after the cat",
+    6: "The Two Color Map",
+    7: "Tracking with robust gaits",
+    8: "The generalized map",
+    9: "Rotor limits",
+    10: "State drift of a tilt-car",
+    11: "Saturation of a tilt-car",
+    12: "The map of another vehicle",
+}
+MEANINGS: Final = {
+    Outcome.REPRODUCED: "measured within the printed digits, or the same yes or no",
+    Outcome.IN_KIND: "the statement holds, the number differs",
+    Outcome.NOT_REPRODUCED: "it does not come out; the reason is given",
+    Outcome.WRONG: "refuted by proof or by the thesis' own equations",
+}
+METHOD: Final = (
+    "Two plants fly every scenario with the same control law. The thesis plant integrates the "
+    "printed equations, which have no gyroscopic torque, with a fixed-step third-order method. "
+    "MuJoCo integrates a multibody model with a fourth-order method. Claims that need no flight "
+    "are computed. A claim takes the worse of its two verdicts, so that one that fails on either "
+    "plant counts as failed.",
+    "A number is reproduced if it rounds to the printed digits, unless the claim names another "
+    "tolerance. Nothing measured is stored: all values and verdicts are computed anew from the "
+    "scenario library, and kept only for as long as sources and versions stay the same.",
+)
+
+
+@dataclass(frozen=True)
+class Report:
+    """All that a page or summary shows."""
+
+    plans: list[Plan]
+    flights: Flights
+    rows: list[Row]
+    failures: list[Failure]
+    drawings: list[Drawing]
+    findings: tuple[Finding, ...] = FINDINGS
+
+    @property
+    def chapters(self) -> list[int]:
+        """Chapters with rows, in order."""
+        return sorted({row.claim.chapter for row in self.rows})
+
+    def chapter_groups(self, chapter: int) -> list[Group]:
+        """The rows of a chapter by claim, cases together, in order of their first appearance."""
+        rows = [row for row in self.rows if row.claim.chapter == chapter]
+        order = list(dict.fromkeys(row.claim.statement for row in rows))
+        rows.sort(key=lambda row: order.index(row.claim.statement))
+        return [Group(s, list(group)) for s, group in groupby(rows, lambda r: r.claim.statement)]
+
+
+@dataclass(frozen=True)
+class Group:
+    """Claims that share a statement."""
+
+    statement: str
+    rows: list[Row]
+
+    @property
+    def sources(self) -> str:
+        """Where the claims stand, without the chapter and what tells the cases apart."""
+        panels = (re.sub(r" \([A-Z]\d*\)$", "", row.claim.section) for row in self.rows)
+        texts, last = [], ""
+        for place in dict.fromkeys(panels):
+            section, comma, rest = place.partition(", ")
+            texts.append(rest if comma and section == last else place)
+            last = section
+        return "; ".join(texts)
+
+    @property
+    def shared_why(self) -> str:
+        """The reason, where all that fails here fails for the same one."""
+        reasons = [reason for row in self.rows if (reason := why_of(row))]
+        return reasons[0] if len(reasons) > 1 and len(set(reasons)) == 1 else ""
+
+
+def why_of(row: Row) -> str:
+    """The reason of a row that is not simply reproduced."""
+    return "" if row.outcome is Outcome.REPRODUCED else row.claim.why
+
+
+def published_text(claim: Claim) -> str:
+    """The published value: yes, no, or the number with its printed digits."""
+    value = claim.published
+    if isinstance(value, bool):
+        return _yes_or_no(value, claim)
+    several = value if isinstance(value, tuple) else (value,)
+    shown = [one if isinstance(one, str) else f"{one:g}" for one in several]
+    text = _sign(shown[0]) if len(shown) == 1 else f"({', '.join(map(_sign, shown))})"
+    return f"{text} {claim.unit}".rstrip()
+
+
+def measured_text(claim: Claim, cell: Cell) -> str:
+    """The measured value, one digit finer than the published one, or why there is none."""
+    value = cell.measured
+    if value is None:
+        return cell.note or "no value"
+    if isinstance(value, bool):
+        text = _yes_or_no(value, claim)
+        return f"{text} at {cell.note.removeprefix('lost at ')}" if text == "lost" else text
+    numbers = value if isinstance(value, tuple) else (value,)
+    shown = [_measured_number(one, claim) for one in numbers]
+    text = shown[0] if len(shown) == 1 else f"({', '.join(shown)})"
+    return f"{text} {claim.unit}".rstrip()
+
+
+def _yes_or_no(value: bool, claim: Claim) -> str:
+    if isinstance(claim, ExpectationClaim) and claim.expectation.metric == "diverged":
+        return "lost" if value else "flown"
+    return "yes" if value else "no"
+
+
+def _measured_number(value: float, claim: Claim) -> str:
+    if not isfinite(value):
+        return str(value)
+    if isinstance(claim.published, bool):
+        return _sign(f"{value:.4g}")
+    if value == int(value) and _decimals(claim) == 0:
+        return _sign(f"{value:.0f}")  # a count
+    finest = floor(-log10(_tolerance(claim)) + 1e-9)
+    decimals = max(max(_decimals(claim), finest) + 1, 0)
+    text = f"{value:.{decimals}f}"
+    if len(text) > 12:
+        text = f"{value:.4g}"
+    return _sign(text)
+
+
+def _decimals(claim: Claim) -> int:
+    published = claim.published if isinstance(claim.published, tuple) else (claim.published,)
+    texts = [one if isinstance(one, str) else f"{one:g}" for one in published]
+    return max(-int(Decimal(text).as_tuple().exponent) for text in texts)
+
+
+def _tolerance(claim: Claim) -> float:
+    return max(min(tolerance for _, tolerance in claim.numbers()), 1e-12)
+
+
+def _sign(text: str) -> str:
+    """A number with a proper minus sign, and none before zero."""
+    bare = text.lstrip("-")
+    negative = text.startswith("-") and float(text) != 0.0
+    return f"−{bare}" if negative else bare
+
+
+def failure_text(failure: Failure) -> str:
+    """One line on a bound that does not hold."""
+    verdict = failure.verdict
+    measured = verdict.measured
+    shown = "no value" if measured is None else f"{measured:.6g}"
+    if isinstance(measured, bool):
+        shown = str(measured).lower()
+    return (
+        f"{failure.address} on the {failure.plant} plant: {verdict.expectation.metric} = {shown}, "
+        f"expected {verdict.bounds}"
+    )
+
+
+def flown_text(report: Report) -> str:
+    """One sentence on how much was flown."""
+    records = [plan for plan in report.plans if all(map(_flies, plan.plants.values()))]
+    both = len(records)
+    rest = len(report.plans) - both
+    text = f"{len(report.plans)} scenarios, {both} of them on both plants"
+    return text if rest else f"{both} scenarios, each on both plants"
+
+
+def _flies(scenario: object) -> bool:
+    from tiltsim.scenario import Scenario
+
+    return isinstance(scenario, Scenario)

@@ -1,0 +1,96 @@
+"""The report as Markdown for the repository: stable, without figures or machine facts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from tiltsim.report.content import (
+    CHAPTERS,
+    MEANINGS,
+    METHOD,
+    SUBJECT,
+    TITLE,
+    Group,
+    Report,
+    flown_text,
+    measured_text,
+    published_text,
+    why_of,
+)
+from tiltsim.report.flying import PLANTS
+from tiltsim.report.model import Outcome
+from tiltsim.report.rows import Row, count
+
+
+def markdown(report: Report) -> str:
+    """The whole report; equal results give equal text."""
+    return "\n".join(_lines(report)).rstrip() + "\n"
+
+
+def _lines(report: Report) -> Iterator[str]:
+    yield f"# {TITLE}"
+    yield from ("", SUBJECT, "")
+    yield "Written by `tiltsim report --markdown FILE`, whose HTML page has figures, too."
+    yield ""
+    for paragraph in METHOD:
+        yield from (paragraph, "")
+    yield from _summary(report)
+    if report.findings:
+        yield from ("", "## What we found", "")
+        for finding in report.findings:
+            yield f"### {finding.title}"
+            yield from ("", f"*{finding.chapters}*", "")
+            for paragraph in finding.paragraphs:
+                yield from (paragraph, "")
+            yield from ("```sh", finding.command, "```", "")
+    for chapter in report.chapters:
+        yield from ("", f"## Chapter {chapter}. {CHAPTERS.get(chapter, '')}", "")
+        yield "| Claim | Published | Thesis plant | MuJoCo | Verdict |"
+        yield "| --- | ---: | ---: | ---: | --- |"
+        for group in report.chapter_groups(chapter):
+            yield from _group(group)
+
+
+def _summary(report: Report) -> Iterator[str]:
+    yield "| Chapter | " + " | ".join(outcome.value for outcome in Outcome) + " | claims |"
+    yield "| --- |" + " ---: |" * (len(Outcome) + 1)
+    for chapter in report.chapters:
+        rows = [row for row in report.rows if row.claim.chapter == chapter]
+        yield _counts(f"{chapter}. {CHAPTERS.get(chapter, '')}", rows)
+    yield _counts("all", report.rows)
+    yield ""
+    yield from (f"- **{outcome.value}**: {meaning}" for outcome, meaning in MEANINGS.items())
+    yield ""
+    yield f"Flown: {flown_text(report)}."
+
+
+def _counts(name: str, rows: list[Row]) -> str:
+    counts = count(rows)
+    cells = [str(counts[outcome] or "") for outcome in Outcome]
+    return f"| {name} | {' | '.join(cells)} | {len(rows)} |"
+
+
+def _group(group: Group) -> Iterator[str]:
+    single = len(group.rows) == 1
+    if not single:
+        note = f"<br>{group.shared_why}" if group.shared_why else ""
+        yield _cells([f"**{group.statement}** ({group.sources}){note}", "", "", "", ""])
+    for row in group.rows:
+        claim = row.claim
+        head = f"**{claim.statement}** ({claim.section})" if single else claim.case
+        verdict = row.outcome.value
+        if why_of(row) and not group.shared_why:
+            verdict += f": {why_of(row)}"
+        yield _cells([head, published_text(claim), *_measured(row), verdict])
+
+
+def _measured(row: Row) -> list[str]:
+    if row.analysis is not None:
+        text = measured_text(row.claim, row.analysis)
+        return [f"{text} (computed)", ""]
+    cells = [row.cell(plant) for plant in PLANTS]
+    return ["" if cell is None else measured_text(row.claim, cell) for cell in cells]
+
+
+def _cells(cells: list[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"

@@ -1,0 +1,100 @@
+"""Reading a sweep's results back, finished or not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tiltsim.errors import InputError
+from tiltsim.messages import show
+from tiltsim.sweeps.expressions import evaluate
+from tiltsim.sweeps.folder import DATASET, DEFINITION, read_definition
+from tiltsim.sweeps.plan import Plan
+
+Column = npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
+class SweepResults:
+    """The rows of a sweep by column, and the sweep they belong to.
+
+    Attributes
+    ----------
+    plan
+        The sweep.
+    columns
+        Each of shape (rows,), in the order of the points: floats (NaN where there is no value),
+        objects for text and lists. Entries of lists have columns of their own, ``key[0]``.
+    """
+
+    plan: Plan
+    columns: Mapping[str, Column]
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return len(self.columns["index"])
+
+    def values(self, expression: str) -> Column:
+        """A column, or arithmetic on columns row by row. Raises InputError where it is neither."""
+        if expression in self.columns:
+            return self.columns[expression]
+        numbers = {k: v.tolist() for k, v in self.columns.items() if v.dtype == np.float64}
+        try:
+            return np.array(
+                [
+                    evaluate(expression, {key: column[row] for key, column in numbers.items()})
+                    for row in range(len(self))
+                ]
+            )
+        except ValueError as error:
+            address = self.plan.definition.address
+            raise InputError(f"{address}: plot: {show(expression)}: {error}") from None
+
+
+def is_sweep_folder(path: Path) -> bool:
+    """Whether a folder holds a sweep's results."""
+    return (path / DEFINITION).is_file()
+
+
+def load_results(folder: Path) -> SweepResults:
+    """Read what a sweep's folder holds, the finished chunks of an unfinished sweep included.
+
+    Raises `InputError` where there is nothing yet, or it cannot be read.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    plan = Plan(read_definition(folder / DEFINITION))
+    finished = folder / DATASET
+    files = [finished] if finished.exists() else sorted(folder.glob("parts/[0-9]*.parquet"))
+    if not files:
+        raise InputError(f"{folder}: no chunk of this sweep is finished yet")
+    try:
+        names = [name for name in pq.read_schema(files[0]).names if name != "scenario"]
+        tables = [pq.read_table(file, columns=names, partitioning=None) for file in files]
+    except (OSError, pa.ArrowException) as error:
+        reason = str(error).partition("\n")[0]
+        raise InputError(f"{folder}: not a readable Parquet file: {reason}") from error
+    table = pa.concat_tables(tables)
+    columns: dict[str, Column] = {}
+    for name in table.column_names:
+        values = table[name].to_pylist()
+        columns[name] = _column(values)
+        if pa.types.is_list(table.schema.field(name).type):
+            for entry in range(max((len(value) for value in values if value), default=0)):
+                entries = [value[entry] if value else None for value in values]
+                columns[f"{name}[{entry}]"] = _column(entries)
+    return SweepResults(plan, columns)
+
+
+def _column(values: list[Any]) -> Column:
+    if all(value is None or isinstance(value, int | float) for value in values):
+        return np.array([np.nan if value is None else float(value) for value in values])
+    column = np.empty(len(values), dtype=object)
+    column[:] = values
+    return column

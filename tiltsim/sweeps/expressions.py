@@ -1,0 +1,111 @@
+"""Arithmetic in sweep files: a few operators and functions over named numbers, nothing else."""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+from collections.abc import Callable, Iterator, Mapping
+from functools import lru_cache
+from typing import Any, Final, TypeGuard
+
+_BINARY: Final[dict[type[ast.operator], Callable[[Any, Any], Any]]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+}
+_UNARY: Final[dict[type[ast.unaryop], Callable[[Any], Any]]] = {
+    ast.UAdd: operator.pos,
+    ast.USub: operator.neg,
+}
+FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
+    "abs": abs,
+    "atan": math.atan,
+    "cos": math.cos,
+    "max": max,
+    "min": min,
+    "sin": math.sin,
+    "sqrt": math.sqrt,
+    "tan": math.tan,
+}
+CONSTANTS: Final = {"pi": math.pi}
+
+
+def evaluate(expression: str, values: Mapping[str, Any]) -> float:
+    """The value of an expression over named numbers.
+
+    Parameters
+    ----------
+    expression
+        ``+ - * / **``, parentheses, numbers, `FUNCTIONS`, pi, and names: those of ``values``,
+        dots and positions included, as in ``2 * gait.period``.
+    values
+        Numbers by name.
+
+    Raises
+    ------
+    ValueError
+        In a few words: what cannot be read, or has no value.
+    """
+    try:
+        return float(_value(_parse(expression), values))
+    except (ArithmeticError, TypeError) as error:
+        raise ValueError(f"has no value: {error}") from None
+
+
+def names(expression: str) -> set[str]:
+    """The names that an expression reads. Raises ValueError where it cannot be read."""
+    return set(_names(_parse(expression)))
+
+
+@lru_cache(maxsize=1024)
+def _parse(expression: str) -> ast.expr:
+    try:
+        return ast.parse(expression.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ValueError("is no arithmetic expression") from None
+
+
+def _is_name(node: ast.expr) -> bool:
+    return isinstance(node, ast.Name | ast.Attribute | ast.Subscript)
+
+
+def _names(node: ast.expr) -> Iterator[str]:
+    if _is_name(node):
+        name = ast.unparse(node)
+        if name not in CONSTANTS:
+            yield name
+    elif isinstance(node, ast.Call):
+        for argument in node.args:
+            yield from _names(argument)
+    else:
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.expr):
+                yield from _names(child)
+
+
+def _is_number(value: object) -> TypeGuard[int | float]:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
+    if isinstance(node, ast.Constant) and _is_number(node.value):
+        return float(node.value)
+    if _is_name(node):
+        name = ast.unparse(node)
+        known = {**CONSTANTS, **values}
+        if name not in known:
+            raise ValueError(f"{name} is unknown; known: {', '.join(sorted(known))}")
+        return known[name]
+    if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
+        return _BINARY[type(node.op)](_value(node.left, values), _value(node.right, values))
+    if isinstance(node, ast.UnaryOp) and type(node.op) in _UNARY:
+        return _UNARY[type(node.op)](_value(node.operand, values))
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
+        function = FUNCTIONS.get(node.func.id)
+        if function is not None:
+            return function(*(_value(argument, values) for argument in node.args))
+        raise ValueError(f"{node.func.id}() is unknown; known: {', '.join(FUNCTIONS)}")
+    raise ValueError(f"{ast.unparse(node)} is not allowed: arithmetic alone is")

@@ -1,0 +1,438 @@
+"""From a sweep file to scenarios: which points there are, in which order, and what each one sets.
+
+Everything follows from the `Definition`, so that processes and machines that share it agree on
+every point.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.metadata import version
+from math import prod
+from pathlib import Path
+from typing import Any, Final, cast
+
+import numpy as np
+from pydantic import ValidationError
+
+from tiltsim.errors import InputError
+from tiltsim.files import without_none
+from tiltsim.library import find_scenario_file, library_name, read_toml
+from tiltsim.loading import apply_overrides, key_steps, load_scenario, parse_scenario
+from tiltsim.loop import Floats
+from tiltsim.messages import one_line, show
+from tiltsim.metrics import METRICS, WALL_CLOCK_METRICS
+from tiltsim.scenario import Scenario, VehicleTable
+from tiltsim.sweeps.expressions import evaluate, names
+from tiltsim.sweeps.tables import (
+    LinspaceAxis,
+    ListAxis,
+    NormalAxis,
+    Sweep,
+    UniformAxis,
+    dotted,
+)
+
+MAX_POINTS: Final = 10_000_000
+LARGEST_CHUNK: Final = 32
+"""Points of a chunk unless the file says otherwise: few enough to lose little when killed."""
+
+VERSIONS: Final = ("tiltsim", "mujoco", "numpy", "scipy")
+RESERVED: Final = ("index", "end", "end_time", "cause", "scenario", "flights")
+"""Columns of every dataset, besides metrics and versions."""
+
+COSMETIC: Final = ("title", "source", "plot")
+"""Keys of a sweep file that change no flight."""
+
+
+@dataclass(frozen=True)
+class Definition:
+    """All that decides the rows of a sweep, in plain dicts and lists.
+
+    Attributes
+    ----------
+    address
+        How the sweep is called on the command line.
+    sweep
+        The validated file.
+    base
+        The base scenario with every default written out.
+    versions
+        Of the packages whose arithmetic the rows depend on.
+    """
+
+    address: str
+    sweep: dict[str, Any]
+    base: dict[str, Any]
+    versions: dict[str, str]
+
+    def to_json(self) -> str:
+        """The definition as text, for a file."""
+        return json.dumps(vars(self), indent=2) + "\n"
+
+    @staticmethod
+    def from_json(text: str) -> Definition:
+        """The inverse of `to_json`. Raises ValueError or TypeError where the text is another."""
+        return Definition(**json.loads(text))
+
+    def difference(self, other: Definition) -> str:
+        """The first thing in which another definition would give other rows, else empty."""
+        ours, theirs = _flat(self._decisive()), _flat(other._decisive())
+        for key in [*ours, *theirs]:
+            before, now = ours.get(key), theirs.get(key)
+            if before != now:
+                return f"{key} was {show(before)} and is {show(now)}"
+        return ""
+
+    def _decisive(self) -> dict[str, Any]:
+        sweep = {key: value for key, value in self.sweep.items() if key not in COSMETIC}
+        base = {key: value for key, value in self.base.items() if key not in COSMETIC}
+        sweep.pop("scenario")  # what it names is in the base
+        return {**sweep, "scenario": base, "versions": self.versions}
+
+
+def _flat(value: Any, key: str = "") -> dict[str, Any]:
+    """Nested tables and lists as one table with dotted keys."""
+    if isinstance(value, dict):
+        parts = [(f"{key}.{name}" if key else name, item) for name, item in value.items()]
+    elif isinstance(value, list) and any(isinstance(item, dict | list) for item in value):
+        parts = [(f"{key}[{position}]", item) for position, item in enumerate(value)]
+    else:
+        return {key: value}
+    return {name: leaf for part, item in parts for name, leaf in _flat(item, part).items()}
+
+
+def load_definition(path: str | Path, overrides: dict[str, Any] | None = None) -> Definition:
+    """Read a sweep file.
+
+    Parameters
+    ----------
+    path
+        A TOML file or the name of a sweep in the library.
+    overrides
+        Values by dotted key of the scenario, on top of the file's ``[set]``.
+
+    Raises
+    ------
+    InputError
+        In one line: the file, the key, the value and what is allowed. The base scenario and every
+        value of every axis are tried.
+    """
+    file = find_scenario_file(path)
+    address = library_name(file)
+    document = read_toml(file)
+    fixed = document.setdefault("set", {})
+    if overrides and isinstance(fixed, dict):
+        document["set"] = dotted(fixed) | overrides
+    if "scenario" not in document and not {"axis", "bisect"} & document.keys():
+        raise InputError(f"{address}: a scenario, not a sweep: it has no [[axis]]; use tiltsim run")
+    try:
+        sweep = Sweep.model_validate(document)
+    except ValidationError as error:
+        raise InputError(f"{address}: {one_line(error, document, Sweep)}") from None
+    base = _base(sweep, file.parent, address)
+    definition = Definition(
+        address,
+        json.loads(sweep.model_dump_json(exclude_none=True)),
+        json.loads(json.dumps(base)),
+        {name: version(name) for name in VERSIONS},
+    )
+    Plan(definition).check()
+    return definition
+
+
+def _base(sweep: Sweep, folder: Path, address: str) -> dict[str, Any]:
+    """The base scenario with ``[set]`` and all defaults, without its expectations."""
+    if isinstance(sweep.scenario, str):
+        name, _, variant = sweep.scenario.partition("#")
+        beside = (folder / name) if name else folder
+        path = str(beside) if beside.is_file() else name
+        try:
+            scenario = load_scenario(path + (f"#{variant}" if variant else ""), sweep.set or None)
+        except InputError as error:
+            raise InputError(f"{address}: scenario: {error}") from None
+    else:
+        document = deepcopy(sweep.scenario)
+        apply_overrides(document, sweep.set, f"{address}: scenario")
+        scenario = parse_scenario(document, f"{address}: scenario")
+    base: dict[str, Any] = without_none(scenario.model_dump(mode="json"))
+    del base["expect"]
+    return base
+
+
+class Plan:
+    """The points of a sweep.
+
+    Points are numbered: the axes' groups in the order of the file, the last one fastest, and for
+    each combination all samples. A chunk is a range of points.
+    """
+
+    def __init__(self, definition: Definition) -> None:
+        self.definition = definition
+        self.sweep = Sweep.model_validate(definition.sweep)
+        self.base = definition.base
+        self._groups = self._make_groups()
+        drawn = [a for a in self.sweep.axis if isinstance(a, UniformAxis | NormalAxis)]
+        self._drawn: list[UniformAxis | NormalAxis] = drawn
+        samples = self.sweep.sample.count if self.sweep.sample is not None else 1
+        self._lengths = [*(len(group) for group in self._groups), samples]
+        if len(self) > MAX_POINTS:
+            raise self._mistake("axis", len(self), f"more than {MAX_POINTS} points")
+
+    def __len__(self) -> int:
+        """Number of points."""
+        return prod(self._lengths)
+
+    @property
+    def chunk_size(self) -> int:
+        """Points of a chunk."""
+        if self.sweep.chunk_size is not None:
+            return self.sweep.chunk_size
+        return max(1, min(LARGEST_CHUNK, len(self) // 64))
+
+    @property
+    def chunks(self) -> int:
+        """Number of chunks."""
+        return -(-len(self) // self.chunk_size)
+
+    def chunk(self, number: int) -> range:
+        """The points of a chunk."""
+        first = number * self.chunk_size
+        return range(first, min(first + self.chunk_size, len(self)))
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        """The metrics to keep."""
+        everything = tuple(name for name in METRICS if name not in WALL_CLOCK_METRICS)
+        return self.sweep.metrics if self.sweep.metrics is not None else everything
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """The columns that axes and derived keys have in the results."""
+        keys = [key for axis in self.sweep.axis for key in axis.targets]
+        if self.sweep.bisect is not None:
+            keys += [self.sweep.bisect.key, f"{self.sweep.bisect.key}_beyond"]
+        return (*keys, *self.sweep.derive)
+
+    def point(self, index: int) -> dict[str, Any]:
+        """What the axes set at a point, by key."""
+        values: dict[str, Any] = {}
+        remaining, positions = index, []
+        for length in reversed(self._lengths):
+            remaining, position = divmod(remaining, length)
+            positions.append(position)
+        sample, *grid = positions
+        for group, position in zip(self._groups, reversed(grid), strict=True):
+            values |= group[position]
+        for axis, draw in zip(self._drawn, self._draws[sample] if self._drawn else ()):
+            values |= self._absolute(axis.relative, dict.fromkeys(axis.targets, float(draw)))
+        return values
+
+    def derived(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """What ``[derive]`` makes of the axes' values. Raises InputError where it makes nothing."""
+        return {key: self._evaluate(key, rule, values) for key, rule in self.sweep.derive.items()}
+
+    def stop(self, values: Mapping[str, Any]) -> float:
+        """Where the bisected key stops at a point."""
+        assert self.sweep.bisect is not None
+        return float(self._evaluate("bisect.stop", self.sweep.bisect.stop, values))
+
+    def document(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """The scenario's document where the axes have the given values."""
+        document = deepcopy(self.base)
+        overrides = {**self.sweep.set, **values, **self.derived(values)}
+        overrides = {key: value for key, value in overrides.items() if "." in key}
+        for key in overrides:
+            if "[" in key:
+                self._write_out(document, key.partition("[")[0])
+        apply_overrides(document, overrides, self.definition.address)
+        return document
+
+    def scenario(self, values: Mapping[str, Any]) -> Scenario:
+        """The scenario where the axes have the given values. Raises InputError if it is none."""
+        return parse_scenario(self.document(values), self.definition.address)
+
+    def check(self) -> list[Scenario]:
+        """Try every value of every axis, with the others at their first.
+
+        Returns the scenarios. Raises `InputError` where one is invalid.
+        """
+        self._check_names()
+        first = self.point(0)
+        points = [first]
+        for position, length in enumerate(self._lengths[:-1]):
+            stride = prod(self._lengths[position + 1 :])
+            points += [self.point(step * stride) for step in range(1, length)]
+        for values in points:
+            kinds = [type(value) for value in first.values()]
+            wrong = [key for key, kind in zip(values, kinds) if type(values[key]) is not kind]
+            if wrong:
+                values_ = [first[wrong[0]], values[wrong[0]]]
+                raise self._mistake("axis.values", values_, f"{wrong[0]} changes its type")
+        bisect = self.sweep.bisect
+        start = {} if bisect is None else {bisect.key: bisect.start}
+        for values in points:
+            if bisect is not None:
+                self.stop(values)
+        return [self.scenario(values | start) for values in points]
+
+    def _check_names(self) -> None:
+        sweep = self.sweep
+        rules = [*sweep.derive.values(), *([sweep.bisect.stop] if sweep.bisect else [])]
+        rules += [sweep.plot.x, sweep.plot.y, sweep.plot.lines, sweep.plot.panels]
+        read = {name for rule in rules for name in _names_in(rule)}
+        targets = [key for axis in sweep.axis for key in axis.targets]
+        targets += [sweep.bisect.key] if sweep.bisect is not None else []
+        taken = {*RESERVED, *METRICS, *(f"{name}_version" for name in VERSIONS)}
+        for key in (*targets, *sweep.derive):
+            if key in taken:
+                raise self._mistake("axis.key", key, "is a column of every result; rename it")
+        for key in targets:
+            if "." not in key and key not in read:
+                raise self._mistake(
+                    "axis.key",
+                    key,
+                    "a name without a dot must be used in [derive] or [plot]; keys of the "
+                    "scenario have one, as gait.period",
+                )
+        for key in sweep.derive:
+            if "." not in key:
+                raise self._mistake("derive", key, "must be a key of the scenario, as gait.angles")
+
+    def _make_groups(self) -> list[list[dict[str, Any]]]:
+        members: dict[str, list[list[dict[str, Any]]]] = {}
+        for number, axis in enumerate(self.sweep.axis):
+            if isinstance(axis, ListAxis | LinspaceAxis):
+                columns = [_of_one_type(column) for column in zip(*axis.rows())]
+                rows = [
+                    self._absolute(axis.relative, dict(zip(axis.targets, row, strict=True)))
+                    for row in zip(*columns)
+                ]
+                # No group can be called by a number.
+                members.setdefault(axis.group or f"{number}", []).append(rows)
+        groups = []
+        for name, axes in members.items():
+            lengths = [len(rows) for rows in axes]
+            if len(set(lengths)) > 1:
+                raise self._mistake("axis.group", name, f"its axes have {lengths} values")
+            groups.append(
+                [
+                    {key: value for part in parts for key, value in part.items()}
+                    for parts in zip(*axes)
+                ]
+            )
+        return groups
+
+    @cached_property
+    def _draws(self) -> Floats:
+        """Values of the drawn axes, shape (samples, axes)."""
+        sample = self.sweep.sample
+        assert sample is not None
+        unit = _unit_points(sample.method, sample.count, len(self._drawn), sample.seed)
+        columns = []
+        for axis, column in zip(self._drawn, unit.T, strict=True):
+            if isinstance(axis, UniformAxis):
+                columns.append(axis.low + (axis.high - axis.low) * column)
+            else:
+                from scipy.special import ndtri
+
+                inside = np.clip(column, 2.0**-54, 1.0 - 2.0**-53)
+                columns.append(axis.mean + axis.standard_deviation * ndtri(inside))
+        return cast(Floats, np.stack(columns, axis=-1))
+
+    @cached_property
+    def _known(self) -> dict[str, Any]:
+        """The base with the vehicle's numbers written out, for what is relative to them."""
+        scenario = parse_scenario(self.base)
+        if not isinstance(scenario.vehicle, VehicleTable):
+            return self.base
+        vehicle = scenario.vehicle.resolve()._asdict()
+        inertia = [vehicle.pop(f"inertia_{axis}") for axis in ("xx", "yy", "zz")]
+        numbers = {**vehicle, "inertia": inertia}
+        return {**self.base, "vehicle": {**numbers, **self.base["vehicle"]}}
+
+    def _absolute(self, relative: bool, values: dict[str, Any]) -> dict[str, Any]:
+        if not relative:
+            return values
+        return {key: self._scaled(key, value) for key, value in values.items()}
+
+    def _scaled(self, key: str, factor: Any) -> Any:
+        base = self._look_up(key)
+        if _is_number(factor) and _is_number(base):
+            return float(base * factor)
+        if _is_number(factor) and isinstance(base, list) and all(map(_is_number, base)):
+            return [float(value * factor) for value in base]
+        raise self._mistake("axis.relative", True, f"{key} = {show(base)} in the base scenario")
+
+    def _look_up(self, key: str) -> Any:
+        value: Any = self._known
+        for step in key_steps(key):
+            inside = isinstance(value, dict) and step in value
+            listed = isinstance(value, list) and isinstance(step, int) and step < len(value)
+            if not (inside or listed):
+                return None
+            value = value[step]
+        return value
+
+    def _write_out(self, document: dict[str, Any], key: str) -> None:
+        """Put a list that follows from a preset into the document, to change an entry of it."""
+        table: Any = document
+        *path, last = key_steps(key)
+        for step in path:
+            table = table.get(step) if isinstance(table, dict) else None
+        if isinstance(table, dict) and last not in table:
+            value = self._look_up(key)
+            if isinstance(value, list):
+                table[last] = list(value)
+
+    def _evaluate(self, key: str, rule: Any, values: Mapping[str, Any]) -> Any:
+        if isinstance(rule, list | tuple):
+            return [self._evaluate(key, entry, values) for entry in rule]
+        if isinstance(rule, str):
+            try:
+                return evaluate(rule, values)
+            except ValueError as error:
+                raise self._mistake(f"derive.{key}", rule, str(error)) from None
+        if _is_number(rule):
+            return float(rule)
+        raise self._mistake(f"derive.{key}", rule, "must be an expression or a list of them")
+
+    def _mistake(self, key: str, value: object, allowed: str) -> InputError:
+        return InputError(f"{self.definition.address}: {key} = {show(value)}: {allowed}")
+
+
+def _unit_points(method: str, count: int, dimensions: int, seed: int) -> Floats:
+    """Points in the unit cube, shape (count, dimensions)."""
+    generator = np.random.default_rng(seed)
+    if method == "random":
+        return generator.random((count, dimensions))
+    from scipy.stats import qmc
+
+    if method == "latin_hypercube":
+        points = qmc.LatinHypercube(dimensions, seed=generator).random(count)
+    else:
+        points = qmc.Sobol(dimensions, seed=generator).random_base2(count.bit_length() - 1)
+    return np.asarray(points, dtype=np.float64)
+
+
+def _of_one_type(values: Sequence[Any]) -> Sequence[Any]:
+    """Numbers with whole ones among them as floats throughout; other values as they are."""
+    mixed = all(map(_is_number, values)) and any(isinstance(value, float) for value in values)
+    return [float(value) for value in values] if mixed else values
+
+
+def _names_in(rule: Any) -> set[str]:
+    if isinstance(rule, list | tuple):
+        return {name for entry in rule for name in _names_in(entry)}
+    try:
+        return names(rule) if isinstance(rule, str) else set()
+    except ValueError:
+        return set()  # evaluating it will say what is wrong
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -1,0 +1,163 @@
+"""Running a sweep: chunks to this process, to several, or to a cluster, until all are finished."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+from typing import Final
+
+from tiltsim.checking import shared_engine
+from tiltsim.engine import EngineName
+from tiltsim.errors import InputError
+from tiltsim.scenario import Scenario
+from tiltsim.sweeps.flying import Part, fly_numbered_chunk
+from tiltsim.sweeps.folder import open_folder
+from tiltsim.sweeps.plan import Definition, Plan
+
+MAX_DEATHS: Final = 3
+"""So many times in a row may processes die before a single chunk gets finished."""
+
+Report = Callable[[int], None]
+
+
+def run_sweep(
+    definition: Definition,
+    out: Path,
+    *,
+    jobs: int = 1,
+    cluster: str | None = None,
+    report: Report = lambda rows: None,
+) -> Path:
+    """Fly what is not yet finished of a sweep.
+
+    Parameters
+    ----------
+    definition
+        The sweep, from `tiltsim.sweeps.plan.load_definition`.
+    out
+        Its folder; see `tiltsim.sweeps.folder`.
+    jobs
+        Processes on this machine.
+    cluster
+        Address of a Dask scheduler whose workers fly instead.
+    report
+        Called with the number of rows that are finished, at first and after every chunk.
+
+    Returns
+    -------
+    pathlib.Path
+        The finished dataset. It is the same however often the sweep was killed and continued, and
+        wherever it was flown.
+
+    Raises
+    ------
+    InputError
+        As `open_folder`, or if the cluster cannot be used or processes keep dying.
+    """
+    plan = Plan(definition)
+    with open_folder(out, plan) as folder:
+        done = folder.finished()
+        rows = sum(len(plan.chunk(number)) for number in done)
+        report(rows)
+        todo = [number for number in range(plan.chunks) if number not in done]
+        if todo:
+            for part in _fly(plan, todo, jobs, cluster):
+                folder.keep(part)
+                rows += part.rows
+                report(rows)
+        if todo or not folder.dataset.exists():
+            folder.join()
+        return folder.dataset
+
+
+def _fly(plan: Plan, numbers: list[int], jobs: int, cluster: str | None) -> Iterator[Part]:
+    definition = plan.definition.to_json()
+    examples = plan.check()
+    points = sum(len(plan.chunk(number)) for number in numbers)
+    steps = points * max(example.simulation.steps for example in examples)
+    if cluster is not None:
+        from tiltsim.sweeps.cluster import fly_on_cluster
+
+        return fly_on_cluster(definition, numbers, cluster, worthwhile_engine(steps))
+    engine = shared_engine(examples, steps)
+    if jobs == 1 or len(numbers) == 1:
+        return (fly_numbered_chunk(definition, number, engine) for number in numbers)
+    return fly_on_processes(definition, numbers, jobs, engine)
+
+
+def worthwhile_engine(steps: int) -> EngineName | None:
+    """The engine for flights of ``steps`` in all, without compiling anything here."""
+    examples: Sequence[Scenario] = ()
+    return shared_engine(examples, steps)
+
+
+def fly_on_processes(
+    definition: str, numbers: list[int], jobs: int, engine: EngineName | None
+) -> Iterator[Part]:
+    """Fly chunks on several processes, yielding each when it is finished.
+
+    A process that dies is replaced, and its chunk flown again. Raises InputError where that does
+    not help.
+    """
+    waiting, deaths = list(reversed(numbers)), 0
+    while waiting:
+        lost: list[int] = []
+        for part in _one_pool(definition, waiting, lost, jobs, engine):
+            deaths = 0
+            yield part
+        if lost:
+            deaths += 1
+            if deaths == MAX_DEATHS:
+                raise InputError(
+                    f"--jobs {jobs}: processes keep dying while they fly chunk {min(lost)}; is "
+                    "there too little memory? What is finished is kept"
+                )
+            waiting += sorted(lost, reverse=True)
+
+
+def _one_pool(
+    definition: str, waiting: list[int], lost: list[int], jobs: int, engine: EngineName | None
+) -> Iterator[Part]:
+    """Fly what waits until all is flown or a process dies; then name what is lost."""
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(
+        min(jobs, len(waiting)), mp_context=context, initializer=_begin_process
+    )
+    flying: dict[Future[Part], int] = {}
+    try:
+        while waiting or flying:
+            # Two a process: one in flight, one next. More would only wait in memory.
+            while waiting and len(flying) < 2 * jobs:
+                number = waiting.pop()
+                flying[pool.submit(fly_numbered_chunk, definition, number, engine)] = number
+            for future in wait(flying, return_when=FIRST_COMPLETED).done:
+                part = future.result()
+                del flying[future]
+                yield part
+    except BrokenProcessPool:
+        lost += flying.values()
+    except (KeyboardInterrupt, GeneratorExit):
+        for process in multiprocessing.active_children():
+            process.terminate()
+        raise
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _begin_process() -> None:
+    """Leave interrupts to the parent, and end when it ends, even if it is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: multiprocessing.process.BaseProcess) -> None:
+    parent.join()
+    os._exit(1)

@@ -1,0 +1,48 @@
+"""Stability boundaries: where, walking along a line, a condition first fails."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from math import ceil, copysign
+from typing import NamedTuple
+
+
+class Boundary(NamedTuple):
+    """The last value found at which the condition holds, and the first one at which it does not.
+
+    ``holds`` is None where it fails at the start, ``fails`` where it holds up to the end.
+    """
+
+    holds: float | None
+    fails: float | None
+
+
+def boundary(
+    start: float, stop: float, step: float, tolerance: float
+) -> Generator[float, bool, Boundary]:
+    """Search a boundary; yields values, takes whether the condition holds there.
+
+    The value walks from ``start`` to ``stop`` (either way) by ``step``, the last step shorter where
+    need be, as ch. 3, Eq. (26), asks: all values before the boundary hold. From the first failure
+    on, the bracket is halved until it is at most ``tolerance`` wide.
+    """
+    length = abs(stop - start)
+    last = start
+    holding: float | None = None
+    for number in range(ceil(length / step - 1e-9) + 1):
+        # Decimal steps stay decimal: 0.3, not 0.30000000000000004.
+        last = round(start + copysign(min(number * step, length), stop - start), 12)
+        if not (yield last):
+            break
+        holding = last
+    else:
+        return Boundary(holding, None)
+    if holding is None:
+        return Boundary(None, last)
+    while abs(last - holding) > tolerance * (1.0 + 1e-9):
+        middle = 0.5 * (holding + last)
+        if (yield middle):
+            holding = middle
+        else:
+            last = middle
+    return Boundary(holding, last)

@@ -1,0 +1,230 @@
+"""The sweep file: every table with its keys, checked like a scenario's."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from tiltsim.messages import InvalidValueError
+from tiltsim.metrics import METRICS, WALL_CLOCK_METRICS
+from tiltsim.scenario import Expectation
+from tiltsim.tables import Positive, Table
+
+Keys = Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
+Count = Annotated[int, Field(ge=1, le=10_000_000)]
+
+
+class AxisTable(Table):
+    """What every axis has: one key, or several that move together."""
+
+    key: str | None = Field(
+        None,
+        description="a key of the scenario such as gait.period or gait.angles[0], or a name "
+        "without a dot for use in [derive]",
+    )
+    keys: Keys | None = Field(None, description="several keys that move together, in place of key")
+    relative: bool = Field(False, description="the values multiply the base scenario's own")
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """The keys that the axis sets."""
+        return self.keys or ((self.key,) if self.key else ())
+
+    @property
+    def name(self) -> str:
+        """What messages call the axis."""
+        return ", ".join(self.targets)
+
+    @model_validator(mode="after")
+    def _check_keys(self) -> Self:
+        if (self.key is None) == (self.keys is None):
+            raise InvalidValueError("axis.key", self.key, "give either key or keys")
+        if self.relative and not all("." in key for key in self.targets):
+            raise InvalidValueError("axis.relative", True, "only keys of the scenario have a base")
+        return self
+
+
+class ListAxis(AxisTable):
+    """Values written out; for several keys, a row of values each."""
+
+    type: Literal["list"]
+    values: Annotated[tuple[Any, ...], Field(strict=False, min_length=1)]
+    group: str | None = Field(None, description="axes of one group advance together, not crossed")
+
+    @model_validator(mode="after")
+    def _check_rows(self) -> Self:
+        for row in self.values if self.keys else ():
+            if not isinstance(row, list | tuple) or len(row) != len(self.keys or ()):
+                raise InvalidValueError(
+                    "axis.values", row, f"needs one value each for {self.name}, as a list"
+                )
+        return self
+
+    def rows(self) -> list[tuple[Any, ...]]:
+        """The values of all keys, point by point."""
+        return [tuple(value) if self.keys else (value,) for value in self.values]
+
+
+class LinspaceAxis(AxisTable):
+    """Evenly spaced values, both ends included; several keys get the same value."""
+
+    type: Literal["linspace"]
+    start: float
+    stop: float
+    count: Annotated[int, Field(ge=2, le=10_000_000)]
+    group: str | None = Field(None, description="axes of one group advance together, not crossed")
+
+    def rows(self) -> list[tuple[Any, ...]]:
+        """The values of all keys, point by point."""
+        last = self.count - 1
+        # Weighed from both ends, so that both come out exactly.
+        values = [
+            (self.start * (last - step) + self.stop * step) / last for step in range(self.count)
+        ]
+        return [(value,) * len(self.targets) for value in values]
+
+
+class UniformAxis(AxisTable):
+    """A number drawn evenly from a range; several keys get the same draw."""
+
+    type: Literal["uniform"]
+    low: float
+    high: float
+
+    @model_validator(mode="after")
+    def _check_range(self) -> Self:
+        if self.low >= self.high:
+            raise InvalidValueError("axis.low", self.low, f"must be below high = {self.high}")
+        return self
+
+
+class NormalAxis(AxisTable):
+    """A number drawn from a normal distribution; several keys get the same draw."""
+
+    type: Literal["normal"]
+    mean: float
+    standard_deviation: Positive
+
+
+Axis = Annotated[
+    ListAxis | LinspaceAxis | UniformAxis | NormalAxis,
+    Field(discriminator="type"),
+]
+
+
+class SampleTable(Table):
+    """How the uniform and normal axes are drawn, all of them together."""
+
+    method: Literal["random", "latin_hypercube", "sobol"] = "random"
+    count: Count
+    seed: Annotated[int, Field(ge=0)] = 0
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.method == "sobol" and self.count & (self.count - 1):
+            raise InvalidValueError(
+                "sample.count", self.count, "Sobol's sequence is even for powers of two alone"
+            )
+        return self
+
+
+class BisectTable(Table):
+    """A search for the first value at which a condition no longer holds.
+
+    The key walks from start to stop by step, until the condition fails; bisection then closes in
+    on the boundary.
+    """
+
+    key: str
+    start: float
+    stop: float | str = Field(description="a number, or an expression over the axes' names")
+    step: Positive
+    tolerance: Positive = Field(description="at most this far apart when the search ends")
+    holds: Annotated[tuple[Expectation, ...], Field(strict=False, min_length=1)] = Field(
+        description="bounds on metrics, as in [[expect]]; a lost flight holds none"
+    )
+
+
+class PlotTable(Table):
+    """How ``tiltsim plot`` draws the sweep; by default it looks at the axes."""
+
+    kind: Literal["lines", "map", "quantiles", "boundary", "plane"] | None = None
+    x: str | None = Field(None, description="a column, or an expression over columns")
+    y: str | None = Field(None, description="likewise, for map and plane")
+    metrics: Annotated[tuple[str, ...], Field(strict=False)] = ()
+    lines: str | None = Field(None, description="a column whose values get a line each")
+    panels: str | None = Field(None, description="a column whose values get a panel each")
+
+
+def dotted(tables: dict[str, Any], head: str = "") -> dict[str, Any]:
+    """Tables within tables as one table of dotted keys."""
+    flat: dict[str, Any] = {}
+    for key, value in tables.items():
+        if isinstance(value, dict):
+            flat |= dotted(value, f"{head}{key}.")
+        else:
+            flat[head + key] = value
+    return flat
+
+
+class Sweep(Table):
+    """One sweep, fully specified."""
+
+    title: str = ""
+    source: str = ""
+    scenario: str | dict[str, Any] = Field(
+        description="the base: a file or an address of the library, or a scenario's tables"
+    )
+    set: dict[str, Any] = Field({}, description="values by dotted key, the same for all flights")
+    axis: Annotated[tuple[Axis, ...], Field(strict=False)] = ()
+    sample: SampleTable | None = None
+    derive: dict[str, Any] = Field(
+        {}, description="keys that follow from the axes: expressions, or lists of expressions"
+    )
+    bisect: BisectTable | None = None
+    metrics: Annotated[tuple[str, ...], Field(strict=False)] | None = Field(
+        None, description="the metrics to keep; default: all"
+    )
+    keep_flights: bool = Field(False, description="keep every flight.parquet, too")
+    chunk_size: Count | None = Field(
+        None, description="points that are flown, and become safe on disk, together"
+    )
+    plot: PlotTable = PlotTable()
+
+    @field_validator("set", "derive", mode="before")
+    @classmethod
+    def _dotted(cls, value: Any) -> Any:
+        # TOML reads simulation.duration = 1 as a table in a table.
+        return dotted(value) if isinstance(value, dict) else value
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for metric in self.metrics or ():
+            if metric in WALL_CLOCK_METRICS or metric not in METRICS:
+                allowed = ", ".join(name for name in METRICS if name not in WALL_CLOCK_METRICS)
+                raise InvalidValueError("metrics", metric, f"choose {allowed}")
+        for metric in self.plot.metrics:
+            if metric not in (METRICS if self.metrics is None else self.metrics):
+                raise InvalidValueError("plot.metrics", metric, "is not among the metrics kept")
+        if not self.axis and self.bisect is None:
+            raise InvalidValueError("axis", [], "a sweep needs at least one [[axis]] or a [bisect]")
+        drawn = [a for a in self.axis if isinstance(a, UniformAxis | NormalAxis)]
+        if drawn and self.sample is None:
+            raise InvalidValueError(
+                "axis.type", drawn[0].type, "needs a [sample] table with its count and seed"
+            )
+        if self.sample is not None and not drawn:
+            raise InvalidValueError(
+                "sample.count", self.sample.count, "no axis is of type uniform or normal"
+            )
+        targets = [key for axis in self.axis for key in axis.targets]
+        targets += [self.bisect.key] if self.bisect is not None else []
+        targets += [*self.derive]
+        twice = next((key for key in targets if targets.count(key) > 1), None)
+        if twice is not None:
+            raise InvalidValueError("axis.key", twice, "set twice")
+        fixed = next((key for key in targets if key in self.set), None)
+        if fixed is not None:
+            raise InvalidValueError(f"set.{fixed}", self.set[fixed], "an axis sets it, too")
+        return self
