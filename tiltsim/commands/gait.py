@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from controllers.gaits.plans import Gait
     from controllers.vehicle import Vehicle
 
-FIGURES: Final = ("roll_pitch", "comparison", "margin", "attainable", "determinant")
+FIGURES: Final = ("roll_pitch", "comparison", "margin", "attainable", "determinant", "faults")
 CASES: Final = ("equal", "half", "negative", "negative_half")
 
 
@@ -100,7 +100,8 @@ def add_parser(subparsers: Any) -> None:
         help=(
             "what to draw: roll_pitch (default); comparison, two roll-pitch diagrams, with and "
             "without bias; margin over a period; attainable torques, thrusts and accelerations "
-            "(ch. 9); determinant surfaces and zero curves (ch. 3), which need no gait"
+            "(ch. 9); determinant surfaces and zero curves (ch. 3), which need no gait; faults, the "
+            "rotor speeds that hover needs after one, whatever the gait"
         ),
     )
     parser.add_argument(
@@ -220,7 +221,7 @@ def _choose(arguments: argparse.Namespace) -> _Chosen:
 def _draw(arguments: argparse.Namespace, chosen: _Chosen) -> Figure:
     """The figure of a gait that the arguments name."""
     from tiltsim.errors import InputError
-    from tiltsim.figures import attainable, gait
+    from tiltsim.figures import attainable, faults, gait
 
     compared = [(chosen.title, chosen.gait)]
     if chosen.twin is not None:
@@ -228,6 +229,8 @@ def _draw(arguments: argparse.Namespace, chosen: _Chosen) -> Figure:
     kind = arguments.figure or "roll_pitch"
     if kind == "comparison" and len(compared) == 1:
         raise InputError(f"--figure comparison: {chosen.gait.name} has no bias to compare with")
+    if kind == "faults":
+        return faults.fault_figure(chosen.vehicle)
     if kind == "attainable":
         if not chosen.gait.is_constant:
             raise InputError(f"--figure attainable: {chosen.gait.name} moves; give fixed angles")
