@@ -100,7 +100,7 @@ def add_parser(subparsers: Any) -> None:
         help=(
             "what to draw: roll_pitch (default); comparison, two roll-pitch diagrams, with and "
             "without bias; margin over a period; attainable torques, thrusts and accelerations "
-            "(ch. 9); determinant surfaces and zero curves (ch. 3), which need no gait; faults, the "
+            "(ch. 9); determinant surfaces and zero curves (ch. 3), which need no gait; faults: "
             "rotor speeds that hover needs after one, whatever the gait"
         ),
     )

@@ -33,8 +33,14 @@ def _draw_stuck(axes: Axes, vehicle: Vehicle) -> None:
     axes.plot(angles, [least_hover_speed(vehicle, stuck=(1, angle)) for angle in angles.tolist()])
     whole = vehicle.hover_rotor_speed
     axes.axhline(whole, color=GREY, linewidth=0.8)
-    note = {"fontsize": 8, "xytext": (3, 2), "textcoords": "offset points"}
-    axes.annotate(f"whole vehicle, {whole:.0f}", (-pi / 2, whole), color=GREY, **note)
+    axes.annotate(
+        f"whole vehicle, {whole:.0f}",
+        (-pi / 2, whole),
+        xytext=(3, 2),
+        textcoords="offset points",
+        color=GREY,
+        fontsize=8,
+    )
     limit = 2.0 * atan(drag_ratio(vehicle))
     axes.axvline(limit, color=AMBER, linestyle="--", linewidth=1.0)
     axes.text(
