@@ -18,6 +18,16 @@ FREE = {
     "controller": {"decoupler": "none"},
     "reference": {"type": "attitude_altitude", "roll": 0.1, "altitude": 0.2},
 }
+TILT_CAR = {
+    "title": "A penguin's swing",
+    "vehicle": {"model": "tilt_car"},
+    "controller": {"law": "tilt_car_planned_direction"},
+    "gait": {"type": "penguin_large"},
+    "reference": {"type": "line", "velocity": [0.0, 0.0, 0.0], "acceleration": [1.0, 0.0, 0.0]},
+}
+OTHER_KINDS = {"tilt_car": TILT_CAR}
+"""Flights of what is no rotorcraft."""
+
 RECIPES = {
     "fixed": FIXED,
     "trot": TROT,
@@ -28,8 +38,8 @@ RECIPES = {
 
 @cache
 def flight(name):
-    """A flight by its name in `RECIPES`; do not change it."""
-    scenario = tiltsim.parse_scenario(BASE | RECIPES[name], f"tests/{name}")
+    """A flight by its name in `RECIPES` or `OTHER_KINDS`; do not change it."""
+    scenario = tiltsim.parse_scenario(BASE | (RECIPES | OTHER_KINDS)[name], f"tests/{name}")
     return tiltsim.simulate(scenario)
 
 

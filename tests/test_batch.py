@@ -26,6 +26,18 @@ GAITS = {
     "two_color": {"period": 1.0, "centre": [0.2, -0.2], "radius": 0.1},
     "waypoints": {"period": 0.7, "angles": [[0.1, 0.0, 0.1, 0.0], [0.2, -0.1, 0.2, -0.1]]},
 }
+CARS = {
+    name: {
+        "vehicle": {"model": "tilt_car"},
+        "controller": {"law": name},
+        "initial": {"position": [0.1, -0.1, 0.0]},
+    }
+    for name in LOOPS
+    if name.startswith("tilt_car")
+}
+CARS["tilt_car_planned_direction"]["gait"] = {"type": "penguin_small", "period": 1.0}
+ALL_LAWS = {name: {**tables, "disturbance": GUST} for name, tables in LAWS.items()} | CARS
+
 # Gains that let the law be sampled at a few milliseconds; the published loops are too fast for it.
 EXACT = {"decoupling": "exact", "gains": "exact"}
 UPSIDE_DOWN = {"initial": {"attitude": [np.pi, 0.0, 0.0]}}
@@ -63,17 +75,19 @@ def three_ways(scenarios):
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
 @pytest.mark.parametrize("law", LOOPS)
 def test_every_law_flies_the_same_three_ways_with_continuous_and_held_control(law, plant):
-    tables = {**LAWS[law], "disturbance": GUST}
+    tables = ALL_LAWS[law]
     rows = three_ways(
         [
             scenario(tables, plant=plant),
             scenario(tables, plant=plant, control_timestep=0.004),
             # 0.427 s are no whole number of recording intervals
-            scenario(LAWS[law], plant=plant, control_timestep=0.007, duration=0.427),
+            scenario(tables, plant=plant, control_timestep=0.007, duration=0.427),
         ]
     )
-    assert [row.end.kind for row in rows] == ["completed"] * 3
-    assert [len(row.flight) for row in rows] == [44, 44, 44]
+    assert all(len(row.flight) > 1 for row in rows)
+    if law in LAWS:  # the car's rotors come to rest early on this way
+        assert [row.end.kind for row in rows] == ["completed"] * 3
+        assert [len(row.flight) for row in rows] == [44, 44, 44]
 
 
 def test_every_gait_is_here():
@@ -169,7 +183,7 @@ def test_no_flights_give_no_results():
 @pytest.mark.parametrize("law", LOOPS)
 def test_native_watching_sees_what_python_watches(law):
     """Every watched number is there, and what else is there never ends a flight."""
-    wanted = scenario(LAWS[law], engine="python")
+    wanted = scenario(ALL_LAWS[law], engine="python")
     plant, loop, setup = make_plant(wanted), LOOPS[law], control_setup(wanted)
     for _ in range(5):
         plant.advance(20)

@@ -35,6 +35,7 @@ def test_a_flight_at_rest_on_its_setpoint_has_these_metrics():
         "sup_position_error_after_20s": 0.0,
         "least_position_error_after_20s": 0.0,
         **{"final_roll": 0.0, "final_pitch": 0.0, "final_yaw": 0.0},
+        "final_attitude_error": 0.0,
         **{"max_abs_roll": 0.0, "max_abs_pitch": 0.0},
         **{"min_rotor_speed": 360.0, "max_rotor_speed": 360.0, "max_tilt_rate": 0.0},
         **{"altitude_overshoot": 0.0, "altitude_settling_time": 0.0},
@@ -292,3 +293,15 @@ def test_reference_columns_hold_what_the_law_aimed_at():
     expected = np.where(TIMES % 2.0 <= 1.0, 0.3, -0.3)
     np.testing.assert_array_equal(flight["alpha_ref_4"], expected)
     np.testing.assert_array_equal(flight["alpha_ref_1"], -expected)
+
+
+def test_the_final_attitude_error_is_the_largest_of_the_last_second():
+    ends = TIMES >= 29.0
+    pitch = np.where(ends, 0.0, 0.4)  # what is over does not count
+    roll = np.where(TIMES == 29.25, -0.03, 0.01)
+    assert fly(roll=roll, pitch=pitch).metrics()["final_attitude_error"] == pytest.approx(0.03)
+
+
+def test_a_whole_turn_of_yaw_is_no_error():
+    metrics = fly(yaw=np.full(len(TIMES), 2.0 * pi + 0.02)).metrics()
+    assert metrics["final_attitude_error"] == pytest.approx(0.02)

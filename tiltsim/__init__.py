@@ -14,6 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tiltsim.controller import Command, Observation
     from tiltsim.errors import InputError, TiltsimError
     from tiltsim.files import load_flight
     from tiltsim.flight import End, Flight
@@ -22,9 +23,11 @@ if TYPE_CHECKING:
     from tiltsim.simulation import simulate
 
 _HOMES = {
+    "Command": "controller",
     "End": "flight",
     "Flight": "flight",
     "InputError": "errors",
+    "Observation": "controller",
     "Scenario": "scenario",
     "TiltsimError": "errors",
     "load_flight": "files",
@@ -34,9 +37,11 @@ _HOMES = {
 }
 
 __all__ = [
+    "Command",
     "End",
     "Flight",
     "InputError",
+    "Observation",
     "Scenario",
     "TiltsimError",
     "load_flight",

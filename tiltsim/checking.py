@@ -105,7 +105,9 @@ def _number(value: float | bool | None) -> str:
 
 
 def with_engine(scenario: Scenario, engine: EngineName) -> Scenario:
-    """The scenario with its engine chosen."""
+    """The scenario with its engine chosen; a user's own controller stays in Python."""
+    if scenario.controller.law == "python":
+        return scenario
     simulation = scenario.simulation.model_copy(update={"engine": engine})
     return scenario.model_copy(update={"simulation": simulation})
 
@@ -122,7 +124,8 @@ def check_all(
     scenarios down that it was working on, and they are reported as crashed. An interrupt from the
     keyboard ends all processes at once.
     """
-    engine = _engine_for(addresses, overrides)
+    scenarios = _valid(addresses, overrides)
+    engine = shared_engine(list(scenarios.values()))
     if jobs == 1 or len(addresses) == 1:
         results = []
         for address in addresses:
@@ -131,7 +134,10 @@ def check_all(
         return results
     by_address: dict[str, CheckResult] = {}
     work = partial(check_one, overrides=overrides, engine=engine)
-    for address, future in in_processes(work, addresses, jobs):
+    # The longest first, so that no process ends up alone with one of them.
+    steps = {address: scenario.simulation.steps for address, scenario in scenarios.items()}
+    by_length = sorted(addresses, key=lambda address: -steps.get(address, 0))
+    for address, future in in_processes(work, by_length, jobs):
         by_address[address] = _result(address, future)
         report(by_address[address])
     return [by_address[address] for address in addresses]
@@ -144,14 +150,14 @@ def _result(address: str, future: Future[CheckResult]) -> CheckResult:
     return future.result()
 
 
-def _engine_for(addresses: list[str], overrides: Mapping[str, Any]) -> EngineName | None:
-    scenarios = []
+def _valid(addresses: list[str], overrides: Mapping[str, Any]) -> dict[str, Scenario]:
+    scenarios = {}
     for address in addresses:
         try:
-            scenarios.append(load_scenario(address, overrides))
+            scenarios[address] = load_scenario(address, overrides)
         except InputError:
             continue  # it is reported when its turn comes
-    return shared_engine(scenarios)
+    return scenarios
 
 
 def shared_engine(scenarios: Sequence[Scenario], steps: int | None = None) -> EngineName | None:
@@ -167,7 +173,7 @@ def shared_engine(scenarios: Sequence[Scenario], steps: int | None = None) -> En
     ready: set[tuple[object, str]] = set()
     for scenario in scenarios:
         kind = (loop_of(scenario), scenario.simulation.plant)
-        if kind not in ready:
+        if kind not in ready and scenario.controller.law != "python":
             make_plant(with_engine(scenario, "native")).advance(1)
             ready.add(kind)
     return "native"

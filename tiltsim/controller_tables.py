@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from math import inf, pi
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
@@ -31,6 +32,9 @@ from tiltsim.messages import InvalidValueError
 from tiltsim.tables import Gains2, Gains4, NonNegative, Positive, Table, Vector3
 
 DEFAULT_LAW: Final = "attitude_altitude"
+
+ANY_ROTORCRAFT: Final = "tiltrotor or quadrotor"
+"""The vehicle of a law that flies either."""
 
 ReferenceKind = Literal["position", "attitude_altitude", "pose"]
 """What a law can follow: position and yaw, attitude and altitude, or position and attitude."""
@@ -457,6 +461,37 @@ def _attitude_loops(gains: quadrotor_attitude_altitude.Gains) -> list[Loop]:
     return [linear_loop("altitude", gains[:2]), linear_loop("attitude", gains[2:])]
 
 
+# --- a user's own ------------------------------------------------------------------------------
+
+
+class PythonController(LawTable):
+    """A user's own controller in Python; see `tiltsim.controller`."""
+
+    vehicle_model = ANY_ROTORCRAFT
+    reference_kinds = ("position", "pose", "attitude_altitude")
+
+    law: Literal["python"]
+    function: str = Field(
+        description="FILE.py:NAME of a function or class; the file is looked for beside the "
+        "scenario's"
+    )
+
+    @property
+    def file(self) -> Path | None:
+        """The file; None for a controller that was given in Python."""
+        path, _, _ = self.function.rpartition(":")
+        return Path(path) if path.endswith(".py") else None
+
+    @property
+    def attribute(self) -> str:
+        """The name within the file."""
+        return self.function.rpartition(":")[2]
+
+    def closed_loops(self, vehicle: Vehicle) -> list[Loop]:
+        """See `LawTable.closed_loops`: none is known."""
+        return []
+
+
 # --- tilt-car ----------------------------------------------------------------------------------
 
 
@@ -566,6 +601,7 @@ Controller = Annotated[
     | Annotated[YawPositionController, Tag("yaw_position")]
     | Annotated[SwitchingController, Tag("switching")]
     | Annotated[QuadrotorAttitudeAltitudeController, Tag("quadrotor_attitude_altitude")]
+    | Annotated[PythonController, Tag("python")]
     | Annotated[ThirdDerivativeController, Tag("tilt_car_third_derivative")]
     | Annotated[FourthDerivativeController, Tag("tilt_car_fourth_derivative")]
     | Annotated[PlannedDirectionController, Tag("tilt_car_planned_direction")],

@@ -55,8 +55,28 @@ def save_flight(flight: Flight, folder: Path) -> None:
         pq.write_table(flight.to_arrow(), path, compression="zstd")
     with replacing(folder / "metrics.json") as path:
         path.write_text(metrics_json(flight.metrics()), encoding="utf-8")
+    scenario = with_controller_copied(flight.scenario, folder)
     with replacing(folder / "scenario.toml") as path:
-        path.write_text(scenario_toml(flight.scenario), encoding="utf-8")
+        path.write_text(scenario_toml(scenario), encoding="utf-8")
+
+
+def with_controller_copied(scenario: Scenario, folder: Path) -> Scenario:
+    """Copy the file of a user's controller into a folder; the scenario that names the copy.
+
+    A user's file changes more often than any other. A scenario that names no such file stays as it
+    is.
+    """
+    from tiltsim.controller_tables import PythonController
+
+    table = scenario.controller
+    if not isinstance(table, PythonController) or table.file is None or not table.file.is_file():
+        return scenario
+    copy = folder / table.file.name
+    if not (copy.exists() and copy.samefile(table.file)):
+        with replacing(copy) as path:
+            path.write_bytes(table.file.read_bytes())
+    named = table.model_copy(update={"function": f"{copy.name}:{table.attribute}"})
+    return scenario.model_copy(update={"controller": named})
 
 
 def load_flight(path: str | Path) -> Flight:

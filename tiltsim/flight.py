@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 SAMPLE_FIELDS: Final = ("time", *OBSERVED_FIELDS)
 """What a recorded sample of any rotorcraft begins with; a law's own states follow."""
 
-EndKind = Literal["completed", "diverged", "singular", "interrupted"]
+EndKind = Literal["completed", "diverged", "singular", "interrupted", "failed"]
+"""A flight fails where a user's own controller does."""
 
 
 @dataclass(frozen=True)

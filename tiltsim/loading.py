@@ -18,6 +18,9 @@ from tiltsim.scenario import Scenario, Variant
 KIND_KEYS: Final = {"type": None, "law": DEFAULT_LAW}
 """Keys that decide which others a table may have, with their defaults."""
 
+FILE_KEYS: Final = (("controller", "function", ".py:"), ("vehicle", "mjcf", ""))
+"""Keys that name files: table, key, and what a name of a file has in it."""
+
 
 def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Scenario:
     """Read a scenario.
@@ -46,8 +49,19 @@ def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) 
     elif names and not overrides:
         raise InputError(f"{address}: choose a variant with #: {', '.join(names)}")
     document.pop("variant", None)
+    _anchor_files(document, file.parent)
     apply_overrides(document, overrides or {}, address)
+    _anchor_files(document, Path())
     return parse_scenario(document, address)
+
+
+def _anchor_files(document: Mapping[str, Any], folder: Path) -> None:
+    """Write out where the files lie that a scenario names: those without a folder in this one."""
+    for table, key, mark in FILE_KEYS:
+        keys = document.get(table)
+        name = keys.get(key) if isinstance(keys, dict) else None
+        if isinstance(keys, dict) and isinstance(name, str) and mark in name:
+            keys[key] = str((folder / name).absolute())
 
 
 def apply_overrides(document: dict[str, Any], overrides: Mapping[str, Any], address: str) -> None:

@@ -151,7 +151,7 @@ class Loop:
     follows_position
         Whether a scenario has the law follow the reference's horizontal position.
     equations
-        The same law on the thesis' own equations.
+        The same law on the thesis' own equations; None where it flies on MuJoCo alone.
     kind
         What holds for all loops around such a vehicle.
     flies_gait
@@ -168,7 +168,7 @@ class Loop:
     observe: Callable[..., tuple[float, ...]]
     derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
     watched: Callable[[Mapping[str, float], ControlSetup], tuple[Watched, ...]]
-    equations: Equations
+    equations: Equations | None = None
     watch: Callable[..., tuple[float, ...]] | None = None
     observes_controls: bool = False
     law_states: int = 0

@@ -132,7 +132,8 @@ def _tags(schema: Any, location: tuple[Any, ...]) -> tuple[str, list[str]]:
     tables = [option.model_fields for option in _options(schema) if hasattr(option, "model_fields")]
     keys = {_tag_key(fields) for fields in tables} - {""}
     tag = keys.pop()
-    return tag, [value for fields in tables for value in get_args(fields[tag].annotation)]
+    values = [value for fields in tables for value in get_args(fields[tag].annotation)]
+    return tag, list(dict.fromkeys(values))
 
 
 def _tag_key(fields: Mapping[str, Any]) -> str:

@@ -45,7 +45,7 @@ METRICS: Final = {
     "min_singularity_margin": "smallest rotation left to a singular attitude, negative beyond, rad",
     "min_decoupling_condition": "smallest over largest singular value of [tau/(L Kf); r3 F/Kf]",
     "saturated_fraction": "share of samples with a rotor at its speed limit",
-    "diverged": "true where the flight ended early, by divergence or a singular matrix",
+    "diverged": "true where the flight was lost: divergence, singular matrix, failed controller",
     "duration": "time flown, s",
     "realtime_factor": "time flown over wall time of the integration",
 }
@@ -120,7 +120,7 @@ def _rotorcraft_metrics(flight: Flight) -> dict[str, float | bool]:
     metrics["min_singularity_margin"] = float(columns["singularity_margin"].min())
     metrics["min_decoupling_condition"] = _min_decoupling_condition(flight)
     metrics["saturated_fraction"] = _saturated_fraction(flight, spins)
-    metrics["diverged"] = flight.end.kind in {"diverged", "singular"}
+    metrics["diverged"] = flight.end.kind in {"diverged", "singular", "failed"}
     metrics["duration"] = float(time[-1])
     metrics["realtime_factor"] = float(time[-1] / max(flight.wall_time, 1e-9))
     return metrics

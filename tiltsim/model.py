@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import mujoco
 
     from tiltsim.loop import ExtraActuators
+    from tiltsim.own_vehicle import OwnVehicle
 
 MODELS: Final = ("tiltrotor", "quadrotor")
 INTEGRATORS: Final = ("Euler", "RK4", "implicit", "implicitfast")
@@ -182,6 +183,7 @@ def compile_model(
     extra_actuators: tuple[ExtraActuators, ...] = (),
     ground: Ground | None = None,
     visuals: bool = True,
+    own: OwnVehicle | None = None,
 ) -> mujoco.MjModel:
     """Compile the MuJoCo model of a vehicle.
 
@@ -216,6 +218,9 @@ def compile_model(
     visuals : bool, default=True
         Whether the vehicle has geoms. They do not touch the physics, but positioning them takes
         about a sixth of a step.
+    own : OwnVehicle, optional
+        A user's own file in place of the shipped one, with its own arms and pods; its geoms may
+        have mass and always stay.
 
     Returns
     -------
@@ -243,11 +248,11 @@ def compile_model(
         *(tilt_servo, pod, rotor_limits, law_states, extra_actuators, ground),
     )
     likeness = (model, vehicle.arm_length, *description, visuals)
-    if likeness in _compiled:
+    if own is None and likeness in _compiled:
         return _with_parameters(*_compiled[likeness], vehicle, pod)
-    whole, bare = _compose(model, vehicle, *description)
-    compiled = mujoco.MjModel.from_xml_string(whole if visuals else bare)
-    if model != "tiltrotor" or tilt_servo.max_angle is None:
+    whole, bare, assets = _compose(model, vehicle, *description, own)
+    compiled = mujoco.MjModel.from_xml_string(whole if visuals else bare, assets)
+    if own is None and (model != "tiltrotor" or tilt_servo.max_angle is None):
         if len(_compiled) >= LIKENESSES:
             _compiled.clear()
         _compiled[likeness] = copy(compiled), mujoco.MjData(compiled)
@@ -304,13 +309,14 @@ def _compose(
     law_states: int,
     extra_actuators: tuple[ExtraActuators, ...],
     ground: Ground | None,
-) -> tuple[str, str]:
-    """The vehicle's complete MJCF, and the same without what is only drawn.
+    own: OwnVehicle | None,
+) -> tuple[str, str, dict[str, bytes]]:
+    """The vehicle's complete MJCF, the same without what is only drawn, and the files they name.
 
     The arguments are `compile_model`'s, found valid. A flight is flown on the one and shown on the
     other, so both are made at once.
     """
-    root = parse_mjcf(shipped_folder("mjcf") / f"{model}.xml")
+    root = parse_mjcf(shipped_folder("mjcf") / f"{model}.xml" if own is None else Path(own.path))
     tilting = model == "tiltrotor"
     stops = tilting and tilt_servo.max_angle is not None
 
@@ -321,13 +327,20 @@ def _compose(
     root.option.flag.constraint = "disable" if ground is None and not stops else "enable"
     root.size.nuserdata = userdata_size
 
-    _scale_lengths(root, vehicle.arm_length)
-    _set_inertia(root, vehicle, pod if tilting else None)
+    if own is None:
+        _scale_lengths(root, vehicle.arm_length)
+        _set_inertia(root, vehicle, pod if tilting else None)
+    else:
+        own.set_inertia(root, vehicle)
     _set_rotors(root, vehicle, rotor_limits)
-    if tilting:
+    if tilting and own is None:
         _set_servos(root, tilt_servo, pod)
-    _set_keyframe(root.keyframe.key["hover"], vehicle.hover_rotor_speed)
-    _set_keyframe(root.keyframe.key["start"], START_SPEED)
+    elif tilting and own is not None:
+        own.set_servos(root, tilt_servo)
+    for name, speed in (("hover", vehicle.hover_rotor_speed), ("start", START_SPEED)):
+        key = root.find("key", name)
+        if key is not None:
+            _set_keyframe(key, speed)
     add_law_states(root, law_states)
     for index, extra in enumerate(extra_actuators, start=1):
         _add_states(root, f"layer_{index}_state", extra.states)
@@ -337,10 +350,12 @@ def _compose(
     if ground is not None:
         _set_ground(root, ground)
     whole = str(root.to_xml_string())
+    if own is not None:
+        return whole, whole, dict(root.get_assets())
     for geom in root.find("body", "vehicle").find_all("geom"):
         if ground is None or not geom.name.endswith("collision"):
             geom.remove()
-    return whole, str(root.to_xml_string())
+    return whole, str(root.to_xml_string()), {}
 
 
 def parse_mjcf(path: Path) -> Any:

@@ -373,6 +373,7 @@ def compile_stepper(loop: Loop) -> tuple[Any, Any]:
     is over. Neither holds Python's lock.
     """
     _register_scalar_functions()
+    assert loop.equations is not None
     inputs, observe = loop.equations.inputs, loop.equations.observe
     watch = loop.watch or watch_nothing
     limit_exceeded = loop.kind.limit_exceeded

@@ -63,13 +63,25 @@ class Plant(Protocol):
         """What the physics engine has found wrong so far, in a few words; else empty."""
 
 
-def make_plant(scenario: Scenario) -> Plant:
-    """The plant that a scenario asks for, at its initial state."""
+def make_plant(scenario: Scenario, controller: Any = None) -> Plant:
+    """The plant that a scenario asks for, at its initial state.
+
+    ``controller`` is a user's own, for scenarios whose law is ``python``.
+    """
+    if scenario.controller.law == "python":
+        from tiltsim.commanded_plant import ControlledPlant
+
+        return ControlledPlant(scenario, controller)
     return ThesisPlant(scenario) if scenario.simulation.plant == "thesis" else MujocoPlant(scenario)
 
 
 def choose_engine(scenario: Scenario) -> EngineName:
-    """The engine a scenario asks for; ``auto`` weighs the flight's length against start-up."""
+    """The engine a scenario asks for; ``auto`` weighs the flight's length against start-up.
+
+    A user's own controller is Python, whatever is asked for.
+    """
+    if scenario.controller.law == "python":
+        return "python"
     if scenario.simulation.engine != "auto":
         return scenario.simulation.engine
     return "native" if worth_native([scenario]) else "python"
@@ -278,6 +290,7 @@ class ThesisPlant:
     def __init__(self, scenario: Scenario) -> None:
         simulation = scenario.simulation
         loop, setup = loop_of(scenario), control_setup(scenario)
+        assert loop.equations is not None  # scenarios that ask for others are refused
         self._loop, self._equations, self._setup = loop, loop.equations, setup
         self._reference, _ = scenario.reference_and_table()
         self._follows_position = loop.follows_position(scenario)

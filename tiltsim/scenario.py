@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from functools import lru_cache
 from math import pi
-from typing import Annotated, Any, Final, Literal, Self, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, get_args
 
 import numpy as np
 from pydantic import ConfigDict, Discriminator, Field, PrivateAttr, Tag, model_validator
@@ -20,7 +20,13 @@ from controllers.stability import Loop
 from controllers.tilt_car.vehicle import THESIS_CAR, TiltCar
 from controllers.vehicle import PRESETS, Vehicle
 from controllers.waypoints import minimum_snap_table
-from tiltsim.controller_tables import AttitudeAltitudeController, Controller, ReferenceKind
+from tiltsim.controller_tables import (
+    ANY_ROTORCRAFT,
+    AttitudeAltitudeController,
+    Controller,
+    LawTable,
+    ReferenceKind,
+)
 from tiltsim.gait_tables import FixedGait, Gait
 from tiltsim.messages import InvalidValueError
 from tiltsim.metrics import BOOLEAN_METRICS, METRICS
@@ -36,6 +42,9 @@ from tiltsim.tables import (
     Table,
     Vector3,
 )
+
+if TYPE_CHECKING:
+    from tiltsim.own_vehicle import OwnVehicle
 
 MAX_STEPS: Final = 100_000_000
 """Physics steps of a flight, more than a day at one millisecond."""
@@ -98,6 +107,11 @@ class VehicleTable(Table):
 
     model: Literal["tiltrotor", "quadrotor"] = "tiltrotor"
     preset: Literal["ar_drone_2", "ar_drone_2_unrounded", "luukkonen"] = "ar_drone_2"
+    mjcf: str | None = Field(
+        None,
+        description="a file with the vehicle, beside the scenario's, in place of the shipped one; "
+        "it has the parameters that are not given here, and the preset none",
+    )
     mass: Positive | None = Field(None, description="kg, pods included")
     inertia: Annotated[tuple[Positive, Positive, Positive], Field(strict=False)] | None = Field(
         None, description="principal moments about the centre of mass, kg m^2, pods included"
@@ -115,7 +129,7 @@ class VehicleTable(Table):
     pod: PodTable = PodTable()
 
     def resolve(self) -> Vehicle:
-        """The physical parameters: the preset with the given keys in place of its own."""
+        """The physical parameters: the preset's or the file's, but for the keys given."""
         given = {
             key: getattr(self, key)
             for key in ("mass", "arm_length", "thrust_coefficient", "drag_coefficient", "gravity")
@@ -125,10 +139,36 @@ class VehicleTable(Table):
                 zip(("inertia_xx", "inertia_yy", "inertia_zz"), self.inertia, strict=True)
             )
         known = {key: value for key, value in given.items() if value is not None}
-        return PRESETS[self.preset]._replace(**known)
+        own = self.own
+        base = PRESETS[self.preset] if own is None else own.vehicle
+        return base._replace(**known)
+
+    @property
+    def own(self) -> OwnVehicle | None:
+        """The user's own file as measured; None for the shipped vehicles."""
+        if self.mjcf is None:
+            return None
+        from tiltsim.own_vehicle import read_own_vehicle
+
+        try:
+            return read_own_vehicle(self.mjcf, self.model)
+        except ValueError as error:
+            raise InvalidValueError("vehicle.mjcf", self.mjcf, str(error)) from None
+
+    def _check_own(self) -> None:
+        for key, value, default in (
+            ("arm_length", self.arm_length, None),
+            ("pod", self.pod.model_dump(), PodTable().model_dump()),
+        ):
+            if value != default:
+                raise InvalidValueError(
+                    f"vehicle.{key}", value, "vehicle.mjcf has its own; leave it out"
+                )
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        if self.mjcf is not None:
+            self._check_own()
         a, b, c = sorted(self.resolve()[1:4])
         if a + b < c:
             raise InvalidValueError(
@@ -859,7 +899,7 @@ class Scenario(Table):
 
     def _check_law(self) -> None:
         law, model = self.controller.law, self.vehicle.model
-        if self.controller.vehicle_model != model:
+        if not _flies(self.controller, model):
             raise InvalidValueError(
                 "controller.law",
                 law,
@@ -874,18 +914,26 @@ class Scenario(Table):
             )
         if model == "tilt_car":
             self._check_plane()
+        elif law == "python":
+            self._check_own_law()
+        else:
+            self._check_layout()
         if model != "quadrotor":
             return
         vehicle = self.rotorcraft
-        for key, value, default in (
+        of_tilts = [
             ("gait.type", self.gait.type, "fixed"),
             ("gait", self.gait.model_dump(), FixedGait().model_dump()),
             ("vehicle.tilt_servo", vehicle.tilt_servo.model_dump(), TiltServoTable().model_dump()),
             ("vehicle.pod", vehicle.pod.model_dump(), PodTable().model_dump()),
+        ]
+        of_rotors = [
             ("vehicle.min_rotor_speed", vehicle.min_rotor_speed, None),
             ("vehicle.max_rotor_speed", vehicle.max_rotor_speed, None),
             ("initial.rotor_speed", self.initial.rotor_speed, InitialTable().rotor_speed),
-        ):
+        ]
+        # Commands from outside reach rotors with a speed, limits and all.
+        for key, value, default in of_tilts if law == "python" else [*of_tilts, *of_rotors]:
             if value != default:
                 raise InvalidValueError(
                     key,
@@ -895,10 +943,13 @@ class Scenario(Table):
                 )
 
     def _check_actuators(self) -> None:
-        car = not isinstance(self.vehicle, VehicleTable)
-        if self.has_air and car:
+        if self.has_air and not isinstance(self.vehicle, VehicleTable):
             raise InvalidValueError(
                 "vehicle.model", self.vehicle.model, "has no air around it; leave air out"
+            )
+        if self.has_air and self.controller.law == "python":
+            raise InvalidValueError(
+                "controller.law", "python", "a controller of your own flies without air"
             )
         if self.has_air and self.simulation.plant == "thesis":
             raise InvalidValueError(
@@ -907,10 +958,10 @@ class Scenario(Table):
         for key, value, ideal in self._real_actuators():
             if value == ideal:
                 continue
-            if self.vehicle.model != "tiltrotor":
-                raise InvalidValueError(
-                    key, value, f"the {self.vehicle.model} flies without; leave it out"
-                )
+            if self.vehicle.model != "tiltrotor" or self.controller.law == "python":
+                own = self.controller.law == "python"
+                whose = "a controller of your own" if own else f"the {self.vehicle.model}"
+                raise InvalidValueError(key, value, f"{whose} flies without; leave it out")
             if self.simulation.plant == "thesis":
                 raise InvalidValueError(
                     "simulation.plant", "thesis", f"the thesis' equations know no {key}; use mujoco"
@@ -936,6 +987,23 @@ class Scenario(Table):
                 "nothing limits the rotors; give vehicle.min_rotor_speed or max_rotor_speed",
             )
 
+    def _check_layout(self) -> None:
+        own = self.rotorcraft.own
+        if own is not None and own.misfit:
+            raise InvalidValueError(
+                "vehicle.mjcf",
+                self.rotorcraft.mjcf,
+                f"{own.misfit}; the {self.controller.law} law is for four equal arms at right "
+                "angles, a controller of your own flies any",
+            )
+
+    def _check_own_law(self) -> None:
+        for key, asked, flown in (("plant", "thesis", "mujoco"), ("engine", "native", "python")):
+            if getattr(self.simulation, key) == asked:
+                raise InvalidValueError(
+                    f"simulation.{key}", asked, f"a controller of your own flies on {flown} alone"
+                )
+
     def _check_model_error(self) -> None:
         error = self.model_error
         if error == ModelErrorTable():
@@ -947,6 +1015,10 @@ class Scenario(Table):
             )
             raise InvalidValueError(
                 key, value, "takes no [model_error]; use a rotorcraft on the mujoco plant"
+            )
+        if error.arm_length != 1.0 and self.rotorcraft.mjcf is not None:
+            raise InvalidValueError(
+                "model_error.arm_length", error.arm_length, "vehicle.mjcf has its own arms"
             )
         a, b, c = sorted(self.true_rotorcraft[1:4])
         if a + b < c:
@@ -965,7 +1037,7 @@ class Scenario(Table):
             "initial.attitude": (initial.attitude, slice(0, 2)),
             "initial.angular_velocity": (initial.angular_velocity, slice(0, 2)),
         }
-        for name in ("position", "velocity", "acceleration"):
+        for name in ("position", "velocity", "acceleration", "amplitude"):
             vector = getattr(reference, name, None)
             if vector is not None:
                 vectors[f"reference.{name}"] = (vector, slice(2, 3))
@@ -1173,9 +1245,12 @@ class Scenario(Table):
 def _laws_of(model: str) -> list[str]:
     union = get_args(get_args(Controller)[0])
     tables = [get_args(option)[0] for option in union]
-    return [
-        get_args(t.model_fields["law"].annotation)[0] for t in tables if t.vehicle_model == model
-    ]
+    return [get_args(t.model_fields["law"].annotation)[0] for t in tables if _flies(t, model)]
+
+
+def _flies(law: LawTable | type[LawTable], model: str) -> bool:
+    either = law.vehicle_model == ANY_ROTORCRAFT and model in {"tiltrotor", "quadrotor"}
+    return either or law.vehicle_model == model
 
 
 class Variant(Table):

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from tiltsim.controller import Controller, ControllerError, with_controller
 from tiltsim.flight import End, Flight
 from tiltsim.limits import (
     ALTITUDE_ERROR,
@@ -34,7 +35,12 @@ LARGEST_CHUNK: Final = 100_000
 Observer = Callable[[Floats], None]
 
 
-def simulate(scenario: Scenario, observer: Observer | None = None) -> Flight:
+def simulate(
+    scenario: Scenario,
+    observer: Observer | None = None,
+    *,
+    controller: Controller | type | None = None,
+) -> Flight:
     """Fly a scenario from start to end.
 
     Parameters
@@ -43,16 +49,23 @@ def simulate(scenario: Scenario, observer: Observer | None = None) -> Flight:
         What to fly; see `tiltsim.load_scenario`.
     observer
         Called with every sample (floats in the order of `Loop.sample_fields`) as it is recorded.
+    controller
+        A controller of your own in place of the scenario's law: a function from
+        `tiltsim.Observation` to `tiltsim.Command`, an object with ``__call__`` and, if it has a
+        memory, ``reset(scenario)``, or a class of such objects.
 
     Returns
     -------
     Flight
         All samples up to the end. A flight that diverges or meets a singular decoupling matrix
         is a result, not an error: its log is complete up to there, and ``flight.end`` names the
-        cause and, to one physics step, the time. So is a flight interrupted from the keyboard.
+        cause and, to one physics step, the time. So is a flight interrupted from the keyboard, or
+        by a controller of your own that raises or returns what is no command.
     """
+    if controller is not None:
+        scenario = with_controller(scenario, controller)
     simulation = scenario.simulation
-    plant = make_plant(scenario)
+    plant = make_plant(scenario, controller)
     watch = Watch(scenario)
     samples: list[Floats] = []
 
@@ -79,6 +92,11 @@ def simulate(scenario: Scenario, observer: Observer | None = None) -> Flight:
                 chunk = max(1, min(int(count * pace), 2 * count, LARGEST_CHUNK))
     except KeyboardInterrupt:
         end = End("interrupted", float(samples[-1][0]), "interrupted from the keyboard")
+    except ControllerError as error:
+        sample = _sample(plant)
+        end = watch.judge(plant, sample) or End("failed", plant.time, str(error))
+        if sample[0] > samples[-1][0] and np.isfinite(sample).all():
+            keep(sample)
     wall_time = perf_counter() - start
     if end is None:
         end = End("completed", plant.time)

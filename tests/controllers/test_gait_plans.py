@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import inf, pi
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -32,6 +34,10 @@ GAITS: dict[str, Gait] = {
     ),
     "red_circle": plans.two_color_circle((0.5, -0.5), 0.3, "red", 1.5, AR_DRONE),
     "blue_circle": plans.two_color_circle((0.1, -0.2), 0.4, "blue", 1.5, AR_DRONE),
+}
+GAITS |= {
+    "penguin_small": plans.penguin("penguin_small", pi / 4, 2.0),
+    "penguin_large": plans.penguin("penguin_large", 2 * pi / 3, 2.0),
 }
 GAITS |= {
     "walk_third": GAITS["walk"].scaled(3),
@@ -230,4 +236,24 @@ def test_native_code_needs_no_table_for_gaits_without_keyframes(native) -> None:
 
 
 def test_every_type_name_has_a_gait() -> None:
-    assert set(GAIT_TYPES) - {"two_color"} <= set(GAITS)
+    assert set(GAIT_TYPES) - {"two_color", "rotating"} <= set(GAITS)
+
+
+def test_a_penguin_swings_to_minus_first_and_moves_one_angle() -> None:
+    gait = GAITS["penguin_large"]
+    angles = gait.angles([0.0, 0.99, 1.0, 1.99, 2.0])
+    np.testing.assert_array_equal(angles[:, 0], np.array([-1, -1, 1, 1, -1]) * 2 * pi / 3)
+    np.testing.assert_array_equal(angles[:, 1:], 0.0)
+    assert not gait.is_continuous
+    assert gait.amplitude == 2 * pi / 3
+    assert gait.max_rate == inf
+
+
+def test_a_rotating_gait_turns_for_ever() -> None:
+    gait = plans.rotating(0.2, -2.0)
+    np.testing.assert_allclose(gait.angles([0.0, 1.0, 100.0])[:, 0], [0.2, -1.8, -199.8])
+    np.testing.assert_array_equal(gait.rates(0.7), [-2.0, 0, 0, 0])
+    assert gait.period == pi
+    assert gait.amplitude == inf
+    assert gait.max_rate == 2.0
+    assert gait.is_continuous

@@ -29,7 +29,7 @@ lyapunov_bound = cache(lyapunov_bound)
 
 
 def integrated(swing, start, time):
-    """The error along y in the half period that has the thrusts at plus Lambda, by an ODE solver."""
+    """The error along y with the thrusts at plus Lambda, by an ODE solver."""
     side = sqrt(1.0 / 3.0)
     gains = swing.gains
 

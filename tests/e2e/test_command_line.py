@@ -324,13 +324,30 @@ def test_bench_prints_ratios_for_every_engine_and_integrator():
     rows = json.loads(done.stdout)
     keys = {"case", "engine", "integrator", "vehicles", "threads", "steps_per_second", "ratio"}
     assert all(keys | {"realtime_factor"} == set(row) for row in rows)
-    cases = {(row["integrator"], row["engine"]) for row in rows}
+    cases = {(row["case"], row["engine"]) for row in rows}
     assert cases == {
-        (integrator, engine)
-        for integrator in ("RK4", "implicitfast", "Euler")
-        for engine in ("bare", "python", "native")
+        *(("single", name) for name in ("bare", "empty", "state", "python", "native")),
+        *(("recorded", "native"), ("batch", "bare"), ("batch", "native")),
     }
+    for case in cases:
+        integrators = {r["integrator"] for r in rows if (r["case"], r["engine"]) == case}
+        assert integrators == {"RK4", "implicitfast", "Euler"}
     assert all(row["ratio"] == 1.0 for row in rows if row["engine"] == "bare")
+
+
+def test_bench_of_many_flights_tells_time_and_memory():
+    done = tiltsim("bench", "--vehicles", "3", "--duration", "0.05", "--json")
+    assert done.returncode == 0, done.stderr
+    (row,) = json.loads(done.stdout)
+    assert (row["case"], row["vehicles"], row["completed"]) == ("flights", 3, 3)
+    assert row["steps_per_second"] == pytest.approx(3 * 50 / row["seconds"])
+    assert row["realtime_factor"] == pytest.approx(3 * 0.05 / row["seconds"])
+    assert 1e7 < row["memory"] < 2**30
+
+
+def test_bench_of_no_flights_is_a_mistake(capsys):
+    assert main(["bench", "--vehicles", "0"]) == 2
+    assert capsys.readouterr().err == "tiltsim: --vehicles 0: must be at least 1\n"
 
 
 def test_library_scenarios_are_shipped_beside_the_package():

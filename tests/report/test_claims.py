@@ -112,7 +112,10 @@ class RandomMetrics(dict):
         return self.random.random() < self.bad
 
     def __missing__(self, name):
-        value = 10.0 ** self.random.uniform(-3.0, 1.0)
+        # A rotor may rest and nothing saturate; what else is exactly zero says little.
+        can_be_zero = name in {"min_rotor_speed", "saturated_fraction"}
+        zero = can_be_zero and self._is_bad()
+        value = 0.0 if zero else 10.0 ** self.random.uniform(-3.0, 1.0)
         below = name == "min_published_determinant" or (name.startswith("min") and self._is_bad())
         self[name] = -value if below else value
         return self[name]

@@ -196,20 +196,23 @@ def test_killed_at_random_moments_it_continues_to_the_same_dataset(tmp_path):
 
 @pytest.mark.slow
 def test_two_thousand_flights_killed_twenty_times(tmp_path):
+    tiny = short_sweep(tmp_path / "tiny.toml", count=2, chunk_size=1)
+    start = time.perf_counter()
+    subprocess.run(command(tiny, tmp_path / "tiny", "--jobs=2"), check=True)
+    startup = time.perf_counter() - start
     file = short_sweep(tmp_path / "sweep.toml", count=1000, chunk_size=20)
     start = time.perf_counter()
     whole = run_sweep(load_definition(file), tmp_path / "whole", jobs=2)
-    undisturbed = time.perf_counter() - start
-    moments, folder, kills = random.Random(2000), tmp_path / "killed", 0
-    while kills < 20:
-        # Starting takes a while; what is left is spread over the kills.
-        moment = moments.uniform(0.0, 4.0 + undisturbed / 10.0)
-        if fly_until_killed(command(file, folder, "--jobs=2"), folder, moment) == 0:
-            break
-        kills += 1
+    share = (time.perf_counter() - start) / 20
+    moments, folder, progress = random.Random(2000), tmp_path / "killed", []
+    for _ in range(20):
+        moment = moments.uniform(0.5 * startup, startup + share)
+        assert fly_until_killed(command(file, folder, "--jobs=2"), folder, moment) != 0
+        progress.append(len(list(folder.glob("parts/[0-9]*.parquet"))))
+    assert progress == sorted(progress)  # nothing finished is lost
+    assert progress[-1] > 0
     subprocess.run(command(file, folder, "--jobs=2"), check=True)
     assert (folder / "sweep.parquet").read_bytes() == whole.read_bytes()
-    assert kills == 20
 
 
 def test_processes_end_with_their_parent(tmp_path):

@@ -35,6 +35,12 @@ def add_parser(subparsers: Any) -> None:
         "(a family without #VARIANT flies its base if --set is given)",
     )
     parser.add_argument(
+        "--controller",
+        metavar="FILE.py:NAME",
+        help="fly a controller of your own, a function or class of a Python file; short for --set "
+        "controller.law=python and controller.function",
+    )
+    parser.add_argument(
         "--out", type=Path, metavar="DIR", help="write metrics.json, flight.parquet, scenario.toml"
     )
     parser.add_argument(
@@ -64,6 +70,8 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.loading import load_scenario, parse_override
 
     overrides = dict(parse_override(text) for text in arguments.overrides)
+    if arguments.controller is not None:
+        overrides |= {"controller.law": "python", "controller.function": arguments.controller}
     scenario = load_scenario(arguments.scenario, overrides)
     if arguments.out is not None:
         prepare_folder(arguments.out)
@@ -79,17 +87,19 @@ def run(arguments: argparse.Namespace) -> int:
             print(f"tiltsim: warning: gait: {warning}", file=sys.stderr)
     with ExitStack() as stack:
         recording: Future[RecordingFile] | None = None
-        if arguments.rerun is not None:
+        if arguments.rerun is not None and flies_natively(scenario):
             from concurrent.futures import ThreadPoolExecutor
 
             # Native code flies without Python's lock, so this costs no time while there is a core.
+            # Under a Python callback MuJoCo could not compile the recording's model meanwhile.
             pool = stack.enter_context(ThreadPoolExecutor(1))
             recording = pool.submit(_recording_of, scenario)
         flight = fly(scenario, arguments)
         if arguments.out is not None:
             flight.save(arguments.out)
-        if recording is not None:
-            recording.result().save([flight], arguments.rerun)
+        if arguments.rerun is not None:
+            file = _recording_of(scenario) if recording is None else recording.result()
+            file.save([flight], arguments.rerun)
     if flight.end.kind == "interrupted":
         kept = f"; the flight so far is in {arguments.out}" if arguments.out is not None else ""
         print(f"tiltsim: interrupted at t = {flight.end.time:.3f} s{kept}", file=sys.stderr)
@@ -113,6 +123,13 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"tiltsim: {lost(flight)}", file=sys.stderr)
         return FLIGHT_LOST
     return DONE if all(verdict.holds for verdict in verdicts) else EXPECTATION_FAILED
+
+
+def flies_natively(scenario: Scenario) -> bool:
+    """Whether a scenario's flight runs in compiled code."""
+    from tiltsim.plants import choose_engine
+
+    return choose_engine(scenario) == "native"
 
 
 def _recording_of(scenario: Scenario) -> RecordingFile:

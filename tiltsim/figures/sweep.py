@@ -114,6 +114,12 @@ def _varies(column: Column) -> bool:
     return known.size > 0 and float(np.ptp(known)) > 0.0
 
 
+def _is_wide(values: Column) -> bool:
+    """Whether values are all above zero and range over more than a decade or two."""
+    known = values[~np.isnan(values)]
+    return bool(known.size) and 0.0 < 50.0 * float(known.min()) < float(known.max())
+
+
 def _completed(results: SweepResults) -> Column:
     return np.array(results.columns["end"] == "completed")
 
@@ -226,8 +232,7 @@ def _map_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
         values = np.where(completed, results.columns[metric], np.nan)
         known = values[~np.isnan(values)]
         low, high = (known.min(), known.max()) if known.size else (0.0, 1.0)
-        wide = low > 0.0 and high > 50.0 * low
-        norm = LogNorm(low, high) if wide else Normalize(low, high)
+        norm = LogNorm(low, high) if _is_wide(values) else Normalize(low, high)
         for axes, (title, mask) in zip(row, columns):
             xs, ys = np.unique(abscissa[mask]), np.unique(ordinate[mask])
             cells = np.full((len(ys), len(xs)), np.nan)
@@ -275,12 +280,21 @@ def _quantiles_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure
     _legend(above.axes[0], lines)
     for axes, key in zip(np.atleast_1d(below.subplots(1, len(drawn), sharey=True)), drawn):
         for number, (_, group) in enumerate(groups):
-            flown = group & completed
+            color, flown, fallen = CYCLE[number % MAX_LINES], group & completed, group & ~completed
             axes.plot(
                 *(results.columns[key][flown], results.columns[metrics[0]][flown], "o"),
-                **{"ms": 2.5, "alpha": 0.7, "mew": 0, "color": CYCLE[number % MAX_LINES]},
+                **{"ms": 2.5, "alpha": 0.7, "mew": 0, "color": color},
+            )
+            axes.plot(
+                *(results.columns[key][fallen], np.full(fallen.sum(), 1.03 + 0.04 * number), "x"),
+                **{"ms": 3.0, "color": color, "clip_on": False, "mew": 0.8},
+                transform=axes.get_xaxis_transform(),
             )
         axes.set_xlabel(_label(key))
+        if _is_wide(results.columns[metrics[0]][completed]):
+            axes.set_yscale("log")
+    if not completed.all():
+        below.axes[0].set_title("× lost", pad=10.0 + 6.0 * len(groups))
     below.axes[0].set_ylabel(_label(metrics[0]))
     return figure
 

@@ -73,7 +73,7 @@ def _direction(axes: Any, flight: Flight) -> None:
         time[shown], wanted, color=style.INK, lw=1.1, ls=(0, (4, 2)), label="acceleration wanted"
     )
     axes.set_xlim(begin, time[-1])
-    label(axes, "Direction of the thrusts, and of the acceleration wanted", "rad")
+    label(axes, "Direction of the thrusts", "rad")
 
 
 def _lean(axes: Any, flight: Flight) -> None:

@@ -80,6 +80,7 @@ def _compile(
         extra_actuators=extra_actuators,
         ground=None if ground is None else Ground(ground.height, ground.friction),
         visuals=visuals,
+        own=vehicle.own,
     )
 
 

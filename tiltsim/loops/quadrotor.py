@@ -79,14 +79,6 @@ def extended_activations(scenario: Scenario, _setup: ControlSetup) -> tuple[floa
 
 
 @scalar
-def observe_quadrotor(
-    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
-) -> tuple[float, ...]:
-    """The rigid body, no tilt, rotor speeds from the thrusts in force."""
-    return sample_values(rigid_body_state(qpos, qvel, 0.0, 0.0), ctrl)
-
-
-@scalar
 def sample_values(body: Sequence[float], thrusts: Sequence[float]) -> tuple[float, ...]:
     """What a sample holds, from the rigid body's twelve states and the thrust controls."""
     return (
@@ -97,6 +89,14 @@ def sample_values(body: Sequence[float], thrusts: Sequence[float]) -> tuple[floa
         *(-speed_along_spin(thrusts[2]), speed_along_spin(thrusts[3])),
         *(0.0, 0.0, 0.0, 0.0),
     )
+
+
+@scalar
+def observe_quadrotor(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+) -> tuple[float, ...]:
+    """The rigid body, no tilt, rotor speeds from the thrusts in force."""
+    return sample_values(rigid_body_state(qpos, qvel, 0.0, 0.0), ctrl)
 
 
 @scalar

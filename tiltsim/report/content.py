@@ -103,6 +103,14 @@ class Group:
         reasons = [reason for row in self.rows if (reason := why_of(row))]
         return reasons[0] if len(reasons) > 1 and len(set(reasons)) == 1 else ""
 
+    def case(self, row: Row) -> str:
+        """What tells a row from the others; flights of the same title by their files, too."""
+        alike = [other for other in self.rows if other.claim.case == row.claim.case]
+        if len(alike) < 2 or not isinstance(row.claim, ExpectationClaim):
+            return row.claim.case
+        file = row.claim.address.partition("#")[0].rpartition("/")[2]
+        return f"{row.claim.case} ({file.removesuffix('.toml').replace('_', ' ')})"
+
 
 def why_of(row: Row) -> str:
     """The reason of a row that is not simply reproduced."""
@@ -145,7 +153,7 @@ def _measured_number(value: float, claim: Claim) -> str:
         return str(value)
     if isinstance(claim.published, bool):
         return _sign(f"{value:.4g}")
-    if value == int(value) and _decimals(claim) == 0:
+    if not claim.unit and value == int(value) and _decimals(claim) == 0:
         return _sign(f"{value:.0f}")  # a count
     finest = floor(-log10(_tolerance(claim)) + 1e-9)
     decimals = max(max(_decimals(claim), finest) + 1, 0)

@@ -23,6 +23,7 @@ from tiltsim.errors import InputError
 from tiltsim.files import replacing
 from tiltsim.library import shipped_folder
 from tiltsim.loading import load_scenario
+from tiltsim.metrics import WALL_CLOCK_METRICS
 from tiltsim.parallel import in_processes
 from tiltsim.report.claims import registered_claims
 from tiltsim.report.model import AnalysisClaim, Value, plain
@@ -37,12 +38,9 @@ PLANTS: Final[tuple[Plant, ...]] = ("thesis", "mujoco")
 
 _SCREENS: Final = (
     *("__main__.py", "cli.py", "commands"),
-    *("figures", "report", "rerun_stream", "video"),
+    *("figures", "report", "rerun_stream", "sweeps", "video"),
 )
 """Modules of tiltsim that no measured number depends on."""
-
-_MACHINE: Final = frozenset({"realtime_factor"})
-"""Metrics of the computer, not of the flight."""
 
 _OF_THE_WHOLE: Final = ("final_", "sup_", "altitude_settling_time")
 """First letters of metrics that only a flight to its end has."""
@@ -245,7 +243,7 @@ def make_record(address: str, plant: Plant, flight: Flight) -> Record:
     metrics = {
         name: value
         for name, value in flight.metrics().items()
-        if name not in _MACHINE and not (lost and name.startswith(_OF_THE_WHOLE))
+        if name not in WALL_CLOCK_METRICS and not (lost and name.startswith(_OF_THE_WHOLE))
     }
     return Record(address, plant, metrics, flight.end.kind, flight.end.time, flight.end.cause)
 

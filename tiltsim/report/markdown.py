@@ -77,7 +77,7 @@ def _group(group: Group) -> Iterator[str]:
         yield _cells([f"**{group.statement}** ({group.sources}){note}", "", "", "", ""])
     for row in group.rows:
         claim = row.claim
-        head = f"**{claim.statement}** ({claim.section})" if single else claim.case
+        head = f"**{claim.statement}** ({claim.section})" if single else group.case(row)
         verdict = row.outcome.value
         if why_of(row) and not group.shared_why:
             verdict += f": {why_of(row)}"

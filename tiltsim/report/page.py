@@ -174,7 +174,7 @@ def _group(group: Group) -> Iterator[str]:
             f'<span class="section">{escape(group.sources)}</span>{why}</div></th></tr>'
         )
     for row in group.rows:
-        head = _prose(row.claim.case)
+        head = _prose(group.case(row))
         if single:
             section = f'<span class="section">{escape(row.claim.section)}</span>'
             head = f"{_prose(group.statement)} {section}"

@@ -116,7 +116,7 @@ def _expectation_cell(claim: ExpectationClaim, record: Record) -> Cell:
 
 
 def _ending(record: Record) -> str:
-    return f"lost at {record.end_time:.3g} s" if record.lost else ""
+    return f"lost at {f'{record.end_time:#.3g}'.rstrip('.')} s" if record.lost else ""
 
 
 def _flight_row(claim: FlightClaim, flights: Flights) -> Row:

@@ -29,6 +29,7 @@ from tiltsim.metrics import METRICS, WALL_CLOCK_METRICS
 from tiltsim.scenario import Scenario, VehicleTable
 from tiltsim.sweeps.expressions import evaluate, names
 from tiltsim.sweeps.tables import (
+    AxisTable,
     LinspaceAxis,
     ListAxis,
     NormalAxis,
@@ -354,6 +355,10 @@ class Plan:
         inertia = [vehicle.pop(f"inertia_{axis}") for axis in ("xx", "yy", "zz")]
         numbers = {**vehicle, "inertia": inertia}
         return {**self.base, "vehicle": {**numbers, **self.base["vehicle"]}}
+
+    def place(self, axis: AxisTable, values: Sequence[Any]) -> dict[str, Any]:
+        """What an axis sets, by key, where it takes one value for each of its targets."""
+        return self._absolute(axis.relative, dict(zip(axis.targets, values, strict=True)))
 
     def _absolute(self, relative: bool, values: dict[str, Any]) -> dict[str, Any]:
         if not relative:

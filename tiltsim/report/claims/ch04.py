@@ -284,6 +284,7 @@ CLAIMS = (
         published=True,
         flights=_ALL_TROTS,
         measure=_no_rotor_stops,
+        why="In MuJoCo a rotor of the flight that is lost (see above) reverses.",
     ),
     AnalysisClaim(
         source="ch. 4, Sec. 3.2, Remark 2",

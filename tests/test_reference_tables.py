@@ -1,0 +1,61 @@
+"""Waypoints in the table behind the parameters, beside the keyframes of a gait."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tiltsim
+from tiltsim.errors import InputError
+
+WAYPOINTS = {
+    "type": "waypoints",
+    "positions": [[0, 0, 0], [0.2, 0.1, 0.1], [0.1, 0.3, 0.2]],
+    "times": [0.0, 0.3, 0.8],
+}
+CASES = {
+    "keyframes": {
+        "gait": {"type": "walk", "amplitude": 0.3, "period": 1.0},
+        "reference": WAYPOINTS,
+    },
+    "trot": {
+        "gait": {"type": "trot_continuous", "amplitude": 0.3, "period": 1.0},
+        "reference": {**WAYPOINTS, "acceleration_feedforward": True},
+    },
+    "quadrotor": {
+        "vehicle": {"model": "quadrotor", "preset": "ar_drone_2_unrounded"},
+        "controller": {"law": "yaw_position"},
+        "reference": WAYPOINTS,
+    },
+}
+
+
+def fly(case, **simulation):
+    document = {**CASES[case], "simulation": {"duration": 0.5, **simulation}}
+    return tiltsim.simulate(tiltsim.parse_scenario(document))
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_engines_fly_the_same_waypoints(case, plant):
+    python, native = (fly(case, plant=plant, engine=engine) for engine in ("python", "native"))
+    np.testing.assert_array_equal(python.samples, native.samples)
+    at_second = np.argmin(np.abs(python["time"] - 0.3))
+    for axis, wanted in zip("xyz", WAYPOINTS["positions"][1]):
+        assert python[f"{axis}_ref"][at_second] == pytest.approx(wanted, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("reference", "message"),
+    [
+        ({**WAYPOINTS, "times": [0.0, 0.3]}, "3 waypoints but 2 times"),
+        ({**WAYPOINTS, "times": [0.0, 0.3, 0.2]}, "must start at 0 and increase"),
+        ({"type": "lissajous", "amplitude": [1, 1, 1]}, "reference.angular_frequency"),
+        ({"type": "figure_eight", "length": 0.0, "width": 1.0, "angular_frequency": 1.0}, "length"),
+    ],
+)
+def test_mistakes_are_one_line(reference, message):
+    with pytest.raises(InputError) as caught:
+        tiltsim.parse_scenario({"reference": reference})
+    assert message in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1

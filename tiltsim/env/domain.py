@@ -1,0 +1,82 @@
+"""Domain randomisation: every episode flies a scenario drawn along the axes of a sweep."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from tiltsim.errors import InputError
+from tiltsim.files import without_none
+from tiltsim.messages import one_line
+from tiltsim.sweeps.plan import Definition, Plan, load_definition
+from tiltsim.sweeps.tables import NormalAxis, Sweep, UniformAxis
+
+if TYPE_CHECKING:
+    from tiltsim.scenario import Scenario
+    from tiltsim.sweeps.tables import Axis
+
+
+class Domain:
+    """Scenarios around a base: values drawn along axes, independently for every episode.
+
+    ``uniform`` and ``normal`` axes are drawn from their distributions, those with values of their
+    own (``list``, ``linspace``) from these, each as likely as the next.
+    """
+
+    def __init__(self, scenario: Scenario, axes: Sequence[Mapping[str, Any]]) -> None:
+        """Raises `InputError`, as a sweep would, where an axis is invalid."""
+        drawn = any(axis.get("type") in {"uniform", "normal"} for axis in axes)
+        document = {
+            "scenario": "base",
+            "axis": [dict(axis) for axis in axes],
+            **({"sample": {"count": 1}} if drawn else {}),
+        }
+        try:
+            sweep = Sweep.model_validate(document)
+        except ValidationError as error:
+            raise InputError(f"domain: {one_line(error, document, Sweep)}") from None
+        base = without_none(scenario.model_dump(mode="json"))
+        base.pop("expect", None)
+        self._plan = _plan(sweep, base)
+
+    @classmethod
+    def of_sweep(cls, path: str | Path) -> tuple[Domain, Scenario]:
+        """The domain of a sweep file, and its base scenario.
+
+        Raises `InputError` where the file is no sweep along axes.
+        """
+        definition = load_definition(path)
+        sweep = Sweep.model_validate(definition.sweep)
+        if sweep.bisect is not None:
+            raise InputError(f"{definition.address}: bisect: a search is nothing to draw from")
+        domain = cls.__new__(cls)
+        domain._plan = Plan(definition)
+        return domain, domain._plan.scenario(domain._plan.point(0))
+
+    def draw(self, generator: np.random.Generator) -> Scenario:
+        """A scenario of the domain. Raises `InputError` where what was drawn cannot be flown."""
+        values: dict[str, Any] = {}
+        for axis in self._plan.sweep.axis:
+            values |= self._plan.place(axis, _row(axis, generator))
+        return self._plan.scenario(values)
+
+
+def _plan(sweep: Sweep, base: dict[str, Any]) -> Plan:
+    tables = json.loads(sweep.model_dump_json(exclude_none=True))
+    return Plan(Definition("domain", tables, json.loads(json.dumps(base)), {}))
+
+
+def _row(axis: Axis, generator: np.random.Generator) -> Sequence[Any]:
+    """One value for each key of an axis; keys that move together get the same draw."""
+    if isinstance(axis, UniformAxis):
+        return [float(generator.uniform(axis.low, axis.high))] * len(axis.targets)
+    if isinstance(axis, NormalAxis):
+        drawn = generator.normal(axis.mean, axis.standard_deviation)
+        return [float(drawn)] * len(axis.targets)
+    rows = axis.rows()
+    return rows[int(generator.integers(len(rows)))]

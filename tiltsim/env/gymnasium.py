@@ -1,0 +1,83 @@
+"""`tiltsim.env.TiltrotorEnv` as a Gymnasium environment; needs the extra ``tiltsim[rl]``.
+
+Importing this module registers ``tiltsim/Tiltrotor-v0``, so that ``gymnasium.make`` finds it; its
+keyword arguments are those of `TiltrotorEnv`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Final
+
+import numpy as np
+
+from tiltsim.env.environment import TiltrotorEnv
+from tiltsim.loop import Floats
+
+try:
+    import gymnasium
+    from gymnasium import spaces
+except ModuleNotFoundError:
+    raise ModuleNotFoundError(
+        "tiltsim.env.gymnasium needs Gymnasium, which is not installed: pip install 'tiltsim[rl]'"
+    ) from None
+
+ID: Final = "tiltsim/Tiltrotor-v0"
+
+
+class GymnasiumEnv(gymnasium.Env):  # type: ignore[misc]
+    """A `TiltrotorEnv` under Gymnasium's interface.
+
+    Actions are scaled to -1 .. 1, each entry between the bounds of `TiltrotorEnv.action_spec`, so
+    that zeros are the middle: for the default scenario, hover. Observations are the same flat dict;
+    ``gymnasium.wrappers.FlattenObservation`` makes one vector of it. A lost flight terminates the
+    episode, the end of the scenario truncates it.
+
+    Parameters
+    ----------
+    env
+        The environment to adapt; default: one made from the other arguments.
+    **arguments
+        Those of `TiltrotorEnv`.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+
+    def __init__(self, env: TiltrotorEnv | None = None, **arguments: Any) -> None:
+        self.env = TiltrotorEnv(**arguments) if env is None else env
+        self.render_mode = None
+        spec = self.env.action_spec()
+        self._middle = 0.5 * (spec.maximum + spec.minimum)
+        self._half = 0.5 * (spec.maximum - spec.minimum)
+        self.action_space = spaces.Box(-1.0, 1.0, spec.shape, np.float32)
+        self.observation_space = spaces.Dict(
+            {name: _box(entry) for name, entry in self.env.observation_spec().items()}
+        )
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Floats], dict[str, Any]]:
+        """Begin an episode; a seed starts the draws anew. There are no options."""
+        super().reset(seed=seed)
+        self.env.reseed(self.np_random)
+        return dict(self.env.reset().observation), {}
+
+    def step(self, action: Floats) -> tuple[dict[str, Floats], float, bool, bool, dict[str, Any]]:
+        """Hold an action for one control step; ``info["cause"]`` tells why a flight was lost."""
+        if self.env.end is not None:
+            raise RuntimeError("the episode has ended: call reset()")
+        told = self._middle + self._half * np.asarray(action, dtype=np.float64)
+        step = self.env.step(told)
+        lost = bool(step.last() and step.discount == 0.0)
+        info: dict[str, Any] = (
+            {"cause": self.env.end.cause} if lost and self.env.end is not None else {}
+        )
+        return dict(step.observation), float(step.reward), lost, step.last() and not lost, info
+
+
+def _box(entry: Any) -> spaces.Box:
+    low, high = (np.broadcast_to(bound, entry.shape) for bound in (entry.minimum, entry.maximum))
+    return spaces.Box(low, high, dtype=np.float64)
+
+
+if ID not in gymnasium.registry:
+    gymnasium.register(ID, entry_point="tiltsim.env.gymnasium:GymnasiumEnv")

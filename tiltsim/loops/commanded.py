@@ -1,0 +1,179 @@
+"""Vehicles that do what they are told from outside: by a user's controller, or an environment.
+
+The commands stand in MuJoCo's controls and stay there until the next. Both vehicles have the speeds
+of their rotors as states here, so that they can be told speeds, thrusts or accelerations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from controllers.gaits import GaitParameters, tilt_reference
+from controllers.references import ReferenceParameters
+from controllers.scalar import scalar
+from controllers.vehicle import Vehicle
+from tiltsim.loop import ControlSetup, Floats, Loop, Sizes
+from tiltsim.loops.full_pose import TILT_COMMANDS
+from tiltsim.loops.quadrotor import references, rigid_body_state, upright_margin
+from tiltsim.loops.tiltrotor import (
+    TILT_REFERENCE_COLUMNS,
+    gait_singularity,
+    initial_rotor_speeds,
+    observe_tiltrotor,
+    refreshed_controls,
+    rotor_thrust_controls,
+    servo_lead,
+)
+
+if TYPE_CHECKING:
+    from tiltsim.scenario import Scenario
+
+
+class ControlParameters(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float  # see `tiltsim.loop.Loop.signature`
+    servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
+    vehicle: Vehicle
+    gait: GaitParameters
+    reference: ReferenceParameters
+
+
+@scalar
+def planned_servo_commands(
+    time: float, lead: float, gait: GaitParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """What the tilt servos are told to follow the planned gait, their lag allowed for."""
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, gait, table)
+    return a1 + lead * rate_1, a2 + lead * rate_2, a3 + lead * rate_3, a4 + lead * rate_4
+
+
+@scalar
+def resting_tiltrotor_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All twelve controls as long as nothing is commanded: the planned gait at constant speeds."""
+    return (
+        *planned_servo_commands(time, parameters.servo_lead, parameters.gait, table),
+        *rotor_thrust_controls(act),
+        *(0.0, 0.0, 0.0, 0.0),
+    )
+
+
+@scalar
+def resting_quadrotor_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All eight controls as long as nothing is commanded: constant speeds."""
+    return (*rotor_thrust_controls(act), 0.0, 0.0, 0.0, 0.0)
+
+
+@scalar
+def refreshed_quadrotor_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
+    """Held controls with the thrusts that belong to the present rotor speeds."""
+    return (*rotor_thrust_controls(act), ctrl[4], ctrl[5], ctrl[6], ctrl[7])
+
+
+def _setup(scenario: Scenario, signature: float) -> ControlSetup:
+    vehicle = scenario.rotorcraft.resolve()
+    gait = scenario.gait.plan(vehicle)
+    reference, table = scenario.reference_and_table()
+    lead = servo_lead(scenario.rotorcraft.tilt_servo)
+    parameters = ControlParameters(signature, lead, vehicle, gait.parameters, reference)
+    return ControlSetup(parameters, table)
+
+
+@scalar
+def observe_commanded_quadrotor(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+) -> tuple[float, ...]:
+    """The rigid body, no tilt, the rotor speeds, which are states here, no tilt rates."""
+    return (
+        *rigid_body_state(qpos, qvel, 0.0, 0.0)[:12],
+        *(0.0, 0.0, 0.0, 0.0, act[0], act[1], act[2], act[3], 0.0, 0.0, 0.0, 0.0),
+    )
+
+
+@scalar
+def observe_commanded_tiltrotor(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+) -> tuple[float, ...]:
+    """As of any tiltrotor, and what its servos are told."""
+    return (*observe_tiltrotor(qpos, qvel, act, ctrl), ctrl[0], ctrl[1], ctrl[2], ctrl[3])
+
+
+def _references(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    reference = setup.parameters.reference
+    return references(
+        samples, reference, setup.table, (reference.roll, reference.pitch, reference.yaw)
+    )
+
+
+def _derive_tiltrotor(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    told = zip(TILT_REFERENCE_COLUMNS, TILT_COMMANDS, strict=True)
+    return {
+        **_references(samples, setup),
+        **{column: samples[name] for column, name in told},
+        **gait_singularity(samples, setup.parameters.vehicle),
+    }
+
+
+def _derive_quadrotor(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    return {
+        **_references(samples, setup),
+        "determinant": np.cos(samples["roll"]),  # of the attitude-altitude law
+        "singularity_margin": upright_margin(samples),
+    }
+
+
+def _follows_position(scenario: Scenario) -> bool:
+    return scenario.reference.kind != "attitude_altitude"
+
+
+TILTROTOR: Final = Loop(
+    model="tiltrotor",
+    sizes=Sizes(qpos=11, qvel=10, act=4, ctrl=12),
+    parameters=ControlParameters,
+    controls=resting_tiltrotor_controls,
+    refresh=refreshed_controls,
+    setup=_setup,
+    initial_activations=lambda scenario, _setup: initial_rotor_speeds(scenario),
+    observe=observe_commanded_tiltrotor,
+    derive=_derive_tiltrotor,
+    watched=lambda _sample, _setup: (),
+    law_fields=TILT_COMMANDS,
+    extra_columns=dict.fromkeys(TILT_COMMANDS, "rad"),
+    follows_position=_follows_position,
+)
+"""The tiltrotor under commands; what its servos are told is part of a sample."""
+
+QUADROTOR: Final = Loop(
+    model="quadrotor",
+    sizes=Sizes(qpos=7, qvel=6, act=4, ctrl=8),
+    parameters=ControlParameters,
+    controls=resting_quadrotor_controls,
+    refresh=refreshed_quadrotor_controls,
+    setup=_setup,
+    initial_activations=lambda scenario, _setup: initial_rotor_speeds(scenario),
+    observe=observe_commanded_quadrotor,
+    derive=_derive_quadrotor,
+    watched=lambda _sample, _setup: (),
+    follows_position=_follows_position,
+)
+"""The quadrotor under commands."""
+
+COMMANDED: Final[dict[str, Loop]] = {"tiltrotor": TILTROTOR, "quadrotor": QUADROTOR}
+"""Loops under commands, by the vehicle's model."""
