@@ -52,6 +52,13 @@ class Limits(NamedTuple):
     max_tilt_angle: float = inf  # rad
 
 
+class Failure(NamedTuple):
+    """A rotor that the law has learnt to be lost: it counts on the other three from then on."""
+
+    rotor: float = 0.0  # 1 to 4, 0 for none
+    known_from: float = inf  # s
+
+
 class Parameters(NamedTuple):
     """All that the law needs to know besides time and state."""
 
@@ -60,6 +67,7 @@ class Parameters(NamedTuple):
     reference: ReferenceParameters
     limits: Limits
     tilt_weight: float  # (rad/s)^2/rad: the norm is that of (w', tilt_weight alpha')
+    failure: Failure = Failure()
 
 
 GAIN_SETS: Final = {
@@ -210,6 +218,22 @@ def pose_rows(trig: Octet, torque: Octet, w: Quad) -> Sextet:
 
 
 @scalar
+def without_columns(row: Octet, health: Quad) -> Octet:
+    """A row of `pose_rows` with both columns of every rotor times its health, 0 or 1."""
+    h1, h2, h3, h4 = health
+    return (
+        h1 * row[0],
+        h2 * row[1],
+        h3 * row[2],
+        h4 * row[3],
+        h1 * row[4],
+        h2 * row[5],
+        h3 * row[6],
+        h4 * row[7],
+    )
+
+
+@scalar
 def limited_tilt_rate(rate: float, angle: float, limits: Limits) -> float:
     """A tilt rate (rad/s) within its limit, zero if it would lead on beyond the angle's limit."""
     if abs(angle) >= limits.max_tilt_angle and rate * angle > 0.0:
@@ -237,6 +261,14 @@ def full_pose_inputs(
     x2, x4, y1, y3, z1, z2, z3, z4 = torque
     w1, w2 = speed_1 * abs(speed_1), speed_2 * abs(speed_2)
     w3, w4 = speed_3 * abs(speed_3), speed_4 * abs(speed_4)
+    lost = parameters.failure.rotor if time >= parameters.failure.known_from else 0.0
+    health = (
+        0.0 if lost == 1.0 else 1.0,
+        0.0 if lost == 2.0 else 1.0,
+        0.0 if lost == 3.0 else 1.0,
+        0.0 if lost == 4.0 else 1.0,
+    )
+    w1, w2, w3, w4 = health[0] * w1, health[1] * w2, health[2] * w3, health[3] * w4
 
     # Second derivatives from the model, ch. 3, Eqs. (1) and (4).
     rotation = rotation_from_euler(roll, pitch, yaw)
@@ -279,6 +311,16 @@ def full_pose_inputs(
     # Columns of weighted tilt rates are those of tilt rates over the weight.
     weight = parameters.tilt_weight
     rows = pose_rows(trig, torque, (w1 / weight, w2 / weight, w3 / weight, w4 / weight))
+    if lost != 0.0:
+        a1, a2, a3, a4, a5, a6 = rows
+        rows = (
+            without_columns(a1, health),
+            without_columns(a2, health),
+            without_columns(a3, health),
+            without_columns(a4, health),
+            without_columns(a5, health),
+            without_columns(a6, health),
+        )
     u1, u2, u3, u4, turn_1, turn_2, turn_3, turn_4 = least_norm_inputs(rows, wanted)
 
     # w' = 2 |varpi| varpi'.

@@ -8,7 +8,7 @@ head of MuJoCo's ``userdata``, so the parameters of a flight are part of its sta
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
 
@@ -43,6 +43,12 @@ def slotted(record: Any) -> Any:
     for name, value in zip(fields, record):
         setattr(view, name, slotted(value))
     return view
+
+
+def make_record_type(name: str, **fields: type) -> Any:
+    """A record type with these fields, for records that wrap others known only at run time."""
+    made: Any = NamedTuple(name, list(fields.items()))  # type: ignore[misc]
+    return made
 
 
 def _take(record_type: Any, values: Iterator[float]) -> Any:

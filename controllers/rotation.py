@@ -58,3 +58,19 @@ def rotation_from_euler(roll: float, pitch: float, yaw: float) -> tuple[float, .
         sr * cp,
         cr * cp,
     )
+
+
+@scalar
+def rotation_from_quaternion(w: float, x: float, y: float, z: float) -> tuple[float, ...]:
+    """The nine entries, rows first, of the body-to-world rotation of a unit quaternion."""
+    return (
+        1.0 - 2.0 * (y * y + z * z),
+        2.0 * (x * y - w * z),
+        2.0 * (x * z + w * y),
+        2.0 * (x * y + w * z),
+        1.0 - 2.0 * (x * x + z * z),
+        2.0 * (y * z - w * x),
+        2.0 * (x * z - w * y),
+        2.0 * (y * z + w * x),
+        1.0 - 2.0 * (x * x + y * y),
+    )

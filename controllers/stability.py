@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from controllers.attitude_altitude import PUBLISHED_DECOUPLING
 
 if TYPE_CHECKING:
@@ -99,6 +101,30 @@ def closed_loops(gains: Gains, vehicle: Vehicle, decoupling: float) -> list[Loop
     stable = is_hurwitz(position)
     condition = "" if stable else f"position gains {list(position[1:])} must both be positive"
     return [*third_order, Loop("position", position, stable, condition)]
+
+
+def longest_lag(gains: Sequence[float]) -> float:
+    """The time constant (s) of a lag in the input at which a third-order loop turns unstable.
+
+    ``s^3 (T s + 1) + K1 s^2 + K2 s + K3`` is Hurwitz, by Routh, while
+    ``T < (K1 K2 - K3) / K2^2``. ``gains`` are K1, K2 and K3.
+    """
+    k1, k2, k3 = gains
+    return (k1 * k2 - k3) / (k2 * k2)
+
+
+def delay_margin(gains: Sequence[float]) -> float:
+    """The delay (s) of the input at which a third-order loop turns unstable.
+
+    The open loop ``(K1 s^2 + K2 s + K3) / s^3`` has gain one at a single frequency; the delay uses
+    up the phase margin there. A command held for a period delays by half of it.
+    """
+    k1, k2, k3 = gains
+    squares = np.roots([1.0, -k1 * k1, 2.0 * k1 * k3 - k2 * k2, -k3 * k3])
+    crossing = float(np.sqrt(max(squares[np.abs(squares.imag) < 1e-9 * np.abs(squares)].real)))
+    s = 1j * crossing
+    phase = np.angle((k1 * s * s + k2 * s + k3) / s**3)
+    return float((np.pi + phase) % (2.0 * np.pi)) / crossing
 
 
 def feedforward_loops(gains: Gains, integral: IntegralGains) -> list[Loop]:

@@ -11,6 +11,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from controllers import two_color_map
+from controllers.fault_tolerance import (
+    ROTORS,
+    fixed_tilt_hover,
+    fixed_tilt_imbalance,
+    hover_on_three,
+    least_hover_speed,
+)
 from controllers.published_gaits import DETERMINANT_CASES, TRIANGLE
 from controllers.singularity import (
     determinant,
@@ -29,6 +36,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from controllers.gaits.plans import Gait
+    from controllers.scalar import Quad
     from controllers.two_color_planner import Path
     from controllers.vehicle import Vehicle
 
@@ -131,6 +139,41 @@ def gait_warnings(gait: Gait, vehicle: Vehicle, samples: int = 201) -> list[str]
             "singular on the way"
         )
     return warnings
+
+
+def fault_report(tilts: Quad, vehicle: Vehicle, opposite_speed: float) -> dict[str, Any]:
+    """What a vehicle survives hovering (``tiltsim gait --faults``).
+
+    For the loss of each rotor: by how much (rad) the given tilts miss a hover on the rotors that
+    are left, and the hover on three rotors with free tilts, the opposite one at a speed (rad/s).
+    ``least_speed`` is the top speed that the rotors must reach after a loss with tilts free.
+    """
+    losses = []
+    for lost in ROTORS:
+        free = hover_on_three(lost, vehicle, opposite_speed=opposite_speed)
+        factors = [0.0 if rotor == lost else 1.0 for rotor in ROTORS]
+        losses.append(
+            {
+                "rotor": lost,
+                "fixed_tilts_miss": fixed_tilt_imbalance(tilts, lost, vehicle),
+                "hovers_with_fixed_tilts": fixed_tilt_hover(tilts, vehicle, lost=lost) is not None,
+                "least_speed": least_hover_speed(
+                    vehicle, factors=(factors[0], factors[1], factors[2], factors[3])
+                ),
+                "free_tilts": {
+                    "angles": list(free.tilts),
+                    "rotor_speeds": list(free.rotor_speeds),
+                    "roll": free.roll,
+                    "pitch": free.pitch,
+                    "authority": free.authority,
+                },
+            }
+        )
+    return {
+        "hover_speed": vehicle.hover_rotor_speed,
+        "opposite_speed": opposite_speed,
+        "rotor_loss": losses,
+    }
 
 
 def map_report(vehicle: Vehicle, path: Path | None = None) -> dict[str, Any]:

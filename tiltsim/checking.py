@@ -16,6 +16,7 @@ from tiltsim.errors import InputError
 from tiltsim.expectations import Verdict, judge
 from tiltsim.library import library_name, read_toml, scenario_files, shipped_folder
 from tiltsim.loading import load_scenario, variant_names
+from tiltsim.loops import loop_of
 from tiltsim.parallel import in_processes
 from tiltsim.plants import STEPS_WORTH_COMPILING, make_plant
 from tiltsim.scenario import Scenario
@@ -169,9 +170,9 @@ def shared_engine(scenarios: Sequence[Scenario], steps: int | None = None) -> En
         steps = sum(scenario.simulation.steps for scenario in scenarios)
     if steps < STEPS_WORTH_COMPILING:
         return None
-    ready: set[tuple[str, str]] = set()
+    ready: set[tuple[object, str]] = set()
     for scenario in scenarios:
-        kind = (scenario.controller.law, scenario.simulation.plant)
+        kind = (loop_of(scenario), scenario.simulation.plant)
         if kind not in ready and scenario.controller.law != "python":
             make_plant(with_engine(scenario, "native")).advance(1)
             ready.add(kind)

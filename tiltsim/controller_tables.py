@@ -160,6 +160,12 @@ class AttitudeAltitudeController(LawTable):
         | Annotated[PolePlacementTable, Tag("poles")],
         Discriminator(_attitude_altitude_gain_kind),
     ] = "ch04"
+    allocation: Literal["inversion", "prioritized"] = Field(
+        "inversion", description="within rotor limits: each for itself, or attitude first"
+    )
+    allocation_horizon: Positive = Field(
+        0.02, description="s for which prioritized allocation keeps within the limits"
+    )
     supervisor: SupervisorTable | None = Field(
         None, description="scales the gait down before its decoupling matrix becomes singular"
     )
@@ -275,6 +281,10 @@ class FullPoseController(LawTable):
         "even",
         description="of tilt rates in the norm: by the force they move, or number for number",
     )
+    failed_rotor: Annotated[int, Field(ge=1, le=4)] | None = Field(
+        None, description="a rotor that the law knows to be lost and does not count on"
+    )
+    failure_known_from: NonNegative = Field(0.0, description="s, since when failed_rotor is known")
     max_tilt_rate: Positive | None = Field(None, description="rad/s, held by the law")
     max_tilt_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
         None, description="rad, held by the law"
@@ -291,6 +301,12 @@ class FullPoseController(LawTable):
         if self.tilt_weight == "published":
             return full_pose.PUBLISHED_TILT_WEIGHT
         return full_pose.even_tilt_weight(vehicle)
+
+    def resolve_failure(self) -> full_pose.Failure:
+        """What the law knows of a lost rotor."""
+        if self.failed_rotor is None:
+            return full_pose.Failure()
+        return full_pose.Failure(float(self.failed_rotor), self.failure_known_from)
 
     def resolve_limits(self) -> full_pose.Limits:
         """The limits that the law holds, infinite where there are none."""

@@ -65,6 +65,15 @@ class PythonEngine:
                 # Where floats raise (sin of infinity), native code has NaN; MuJoCo reports both.
                 ctrl[:] = nan
 
+        def between_samples() -> tuple[float, ...]:
+            if loop.hold is None:
+                return refresh(ctrl.tolist(), act.tolist())
+            try:
+                state = data.time, qpos.tolist(), qvel.tolist(), act.tolist()
+                return loop.hold(*state, ctrl.tolist(), parameters)
+            except (ArithmeticError, ValueError):
+                return (nan,) * len(ctrl)
+
         def hold(model: mujoco.MjModel, called: mujoco.MjData) -> None:
             if called is not data:
                 return
@@ -72,7 +81,7 @@ class PythonEngine:
             if evaluations == 0.0:
                 sample(model, called)
             else:
-                write_controls(ctrl, 0, *refresh(ctrl.tolist(), act.tolist()))
+                write_controls(ctrl, 0, *between_samples())
             header[EVALUATIONS] = evaluations + 1.0 if evaluations + 1.0 < period else 0.0
 
         self._callback = hold if header[CONTROL_PERIOD] > 0.0 else sample

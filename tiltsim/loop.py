@@ -47,6 +47,14 @@ class Sizes(NamedTuple):
     ctrl: int
 
 
+class ExtraActuators(NamedTuple):
+    """Actuators that a layer around a law appends to the vehicle's, in this order."""
+
+    states: int = 0  # integrators that act on nothing: ctrl is the rate of an activation
+    memories: int = 0  # act on nothing and have no state: a held ctrl is all there is
+    wrench: bool = False  # force (N) and torque (N m) on the body, six, in body axes
+
+
 class ControlSetup(NamedTuple):
     """What the control step of one flight reads besides the state."""
 
@@ -112,6 +120,9 @@ class Loop:
         Scalar function ``(time, qpos, qvel, act, parameters, table) -> ctrl``: the whole step.
     refresh
         Scalar function ``(ctrl, act) -> ctrl``: what moves between the samples of a held law.
+    hold
+        Scalar function ``(time, qpos, qvel, act, ctrl, parameters) -> ctrl`` in place of
+        ``refresh``, where more than the activations decides what moves between samples.
     setup
         ``(scenario, signature) -> ControlSetup``.
     initial_activations
@@ -131,6 +142,8 @@ class Loop:
         Whether ``observe`` reads the controls in force.
     law_states
         Number of activations that are states of the law.
+    extra_actuators
+        What layers around the law append to the model's actuators, the innermost first.
     law_fields
         Fields of a sample beyond those of the vehicle's kind.
     extra_columns
@@ -159,9 +172,11 @@ class Loop:
     watch: Callable[..., tuple[float, ...]] | None = None
     observes_controls: bool = False
     law_states: int = 0
+    extra_actuators: tuple[ExtraActuators, ...] = ()
     law_fields: tuple[str, ...] = ()
     extra_columns: Mapping[str, str] = field(default_factory=dict)
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
+    hold: Callable[..., tuple[float, ...]] | None = None
     kind: Kind = ROTORCRAFT
     flies_gait: bool = True
 

@@ -20,6 +20,7 @@ from tiltsim.library import shipped_folder
 if TYPE_CHECKING:
     import mujoco
 
+    from tiltsim.loop import ExtraActuators
     from tiltsim.own_vehicle import OwnVehicle
 
 MODELS: Final = ("tiltrotor", "quadrotor")
@@ -179,6 +180,7 @@ def compile_model(
     pod: Pod = Pod(),
     rotor_limits: RotorLimits = RotorLimits(),
     law_states: int = 0,
+    extra_actuators: tuple[ExtraActuators, ...] = (),
     ground: Ground | None = None,
     visuals: bool = True,
     own: OwnVehicle | None = None,
@@ -209,6 +211,8 @@ def compile_model(
     law_states : int, default=0
         Number of states of a control law of its own: integrators ``law_1``, ``law_2``, ... after
         all other actuators, which act on nothing; ctrl is the state's rate.
+    extra_actuators : tuple, optional
+        What layers around the law append after these; see `tiltsim.loop.ExtraActuators`.
     ground : Ground, optional
         Ground to take off from and land on; without it there are no contacts to look for.
     visuals : bool, default=True
@@ -241,11 +245,11 @@ def compile_model(
 
     description = (
         *(timestep, integrator, userdata_size),
-        *(tilt_servo, pod, rotor_limits, law_states, ground),
+        *(tilt_servo, pod, rotor_limits, law_states, extra_actuators, ground),
     )
     likeness = (model, vehicle.arm_length, *description, visuals)
     if own is None and likeness in _compiled:
-        return _with_parameters(*_compiled[likeness], vehicle, pod, law_states)
+        return _with_parameters(*_compiled[likeness], vehicle, pod)
     whole, bare, assets = _compose(model, vehicle, *description, own)
     compiled = mujoco.MjModel.from_xml_string(whole if visuals else bare, assets)
     if own is None and (model != "tiltrotor" or tilt_servo.max_angle is None):
@@ -267,7 +271,7 @@ compiler computes.
 
 
 def _with_parameters(
-    compiled: mujoco.MjModel, data: mujoco.MjData, vehicle: Vehicle, pod: Pod, law_states: int
+    compiled: mujoco.MjModel, data: mujoco.MjData, vehicle: Vehicle, pod: Pod
 ) -> mujoco.MjModel:
     """A copy of a model with another vehicle's mass, inertia, coefficients and gravity.
 
@@ -286,7 +290,7 @@ def _with_parameters(
     model.opt.gravity[:] = (0.0, 0.0, -vehicle.gravity)
     hover, speed = model.key("hover").id, vehicle.hover_rotor_speed
     model.key_act[hover, :4] = [spin * speed for spin in SPIN]
-    thrusts = model.nu - law_states - 8
+    thrusts = model.actuator("thrust_1").id
     model.key_ctrl[hover, thrusts : thrusts + 4] = speed**2
     mujoco.mj_setConst(model, data)
     return model
@@ -303,6 +307,7 @@ def _compose(
     pod: Pod,
     rotor_limits: RotorLimits,
     law_states: int,
+    extra_actuators: tuple[ExtraActuators, ...],
     ground: Ground | None,
     own: OwnVehicle | None,
 ) -> tuple[str, str, dict[str, bytes]]:
@@ -337,6 +342,11 @@ def _compose(
         if key is not None:
             _set_keyframe(key, speed)
     add_law_states(root, law_states)
+    for index, extra in enumerate(extra_actuators, start=1):
+        _add_states(root, f"layer_{index}_state", extra.states)
+        _add_memories(root, f"layer_{index}_memory", extra.memories)
+        if extra.wrench:
+            _add_wrench(root, f"layer_{index}")
     if ground is not None:
         _set_ground(root, ground)
     whole = str(root.to_xml_string())
@@ -450,16 +460,49 @@ def _set_keyframe(key: Any, rotor_speed: float) -> None:
 
 
 def add_law_states(root: Any, count: int) -> None:
+    """Append the states of a law: integrators that act on nothing."""
+    _add_states(root, "law", count)
+
+
+def _add_states(root: Any, name: str, count: int) -> None:
     """Append integrators that act on nothing; in the keyframes they rest at zero."""
     for index in range(1, count + 1):
         root.actuator.add(
             "general",
-            name=f"law_{index}",
+            name=f"{name}_{index}",
             site="imu",
             dyntype="integrator",
             gainprm=[0.0],
             gear=(0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
         )
+    _extend_keyframes(root, act=count, ctrl=count)
+
+
+def _add_memories(root: Any, name: str, count: int) -> None:
+    """Append actuators without gain, whose controls remember what a held law has said."""
+    for index in range(1, count + 1):
+        root.actuator.add(
+            "general",
+            name=f"{name}_{index}",
+            site="imu",
+            gainprm=[0.0],
+            gear=(0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
+        )
+    _extend_keyframes(root, ctrl=count)
+
+
+def _add_wrench(root: Any, name: str) -> None:
+    """Append a force and a torque on the body at its centre, in body axes."""
+    for index, axis in enumerate(
+        ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z")
+    ):
+        gear = [0.0] * 6
+        gear[index] = 1.0
+        root.actuator.add("general", name=f"{name}_{axis}", site="imu", gear=gear)
+    _extend_keyframes(root, ctrl=6)
+
+
+def _extend_keyframes(root: Any, act: int = 0, ctrl: int = 0) -> None:
     for key in root.keyframe.key:
-        key.act = [*key.act, *[0.0] * count]
-        key.ctrl = [*key.ctrl, *[0.0] * count]
+        key.act = [*key.act, *[0.0] * act]
+        key.ctrl = [*key.ctrl, *[0.0] * ctrl]

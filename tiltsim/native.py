@@ -61,7 +61,7 @@ USERDATA: Final = int(_State.mjSTATE_USERDATA)
 CAPACITY: Final = 2048
 """Floats in the callback's buffer: a flight's time, state, parameters and table must fit."""
 
-SCRATCH: Final = 64
+SCRATCH: Final = 256
 """Floats beyond them, for controls."""
 
 # Division by zero gives infinity or NaN, as in C; MuJoCo then reports a bad control.
@@ -291,6 +291,13 @@ def compile_callbacks(loop: Loop) -> Callbacks:
     _register_scalar_functions()
     controls, refresh, signature = loop.controls, loop.refresh, loop.signature
     observe, watch = loop.observe, loop.watch or watch_nothing
+
+    @register_jitable(error_model="numpy")
+    def only_refresh(time, qpos, qvel, act, ctrl, parameters):  # type: ignore[no-untyped-def]
+        return refresh(ctrl, act)
+
+    hold = loop.hold or only_refresh
+
     limit_exceeded = loop.kind.limit_exceeded
     nq, nv, na, nu = loop.sizes
     qpos, qvel, act, header = 1, 1 + nq, 1 + nq + nv, 1 + nq + nv + na
@@ -317,7 +324,8 @@ def compile_callbacks(loop: Loop) -> Callbacks:
             )
         else:
             _get_state(model, data, address + 8 * CAPACITY, CONTROLS)
-            values = refresh(to_fixed_tuple(scratch[0:nu], nu), activations)
+            held = to_fixed_tuple(scratch[0:nu], nu)
+            values = hold(buffer[0], positions, velocities, activations, held, parameters)
         for index in range(nu):
             scratch[index] = values[index]
         if buffer[period] != 0.0:

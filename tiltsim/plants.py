@@ -275,7 +275,9 @@ def build_model(
     """
     loop = loop_of(scenario)
     try:
-        model = loop.kind.compile(scenario, loop.law_states, userdata_size, visuals)
+        model = loop.kind.compile(
+            scenario, loop.law_states, loop.extra_actuators, userdata_size, visuals
+        )
     except ValueError as error:
         raise InputError(f"{scenario.address or 'scenario'}: vehicle: {error}") from error
     model.opt.gravity += disturbing_acceleration(scenario)

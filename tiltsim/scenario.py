@@ -33,6 +33,7 @@ from tiltsim.metrics import BOOLEAN_METRICS, METRICS
 from tiltsim.tables import (
     Angle,
     Angles3,
+    Coordinate,
     NonNegative,
     Positive,
     Positive2,
@@ -60,6 +61,9 @@ MAX_HELD_STEP: Final = 2.0
 MAX_SERVO_STEP: Final = 2.6
 """Largest product of timestep and servo pole; RK4 turns unstable at 2.78."""
 
+MAX_LATENCY_STEPS: Final = 20
+"""Control samples on their way at once; each is eight states of the simulation."""
+
 # --- [vehicle] ---------------------------------------------------------------------------------
 
 
@@ -78,6 +82,7 @@ class ServoTable(Table):
 class TiltServoTable(ServoTable):
     """The servos that tilt the pods."""
 
+    max_rate: Positive | None = Field(None, description="rad/s")
     max_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
         None, description="rad; the gait must stay within"
     )
@@ -117,6 +122,9 @@ class VehicleTable(Table):
     gravity: Positive | None = Field(None, description="m/s^2")
     min_rotor_speed: Positive | None = Field(None, description="rad/s, absolute value")
     max_rotor_speed: Positive | None = Field(None, description="rad/s, absolute value")
+    rotor_time_constant: Positive | None = Field(
+        None, description="s, of the lag between the speed a rotor is told and its own"
+    )
     tilt_servo: TiltServoTable = TiltServoTable()
     pod: PodTable = PodTable()
 
@@ -261,6 +269,9 @@ class SimulationTable(Table):
     control_timestep: NonNegative = Field(
         0.0, description="s; 0 evaluates the law at every integrator stage, else sample and hold"
     )
+    control_latency: NonNegative = Field(
+        0.0, description="s from a reading to its command; a multiple of control_timestep"
+    )
     record_timestep: Positive | None = Field(
         None, description="s between recorded samples; default: the multiple of timestep near 0.01"
     )
@@ -278,6 +289,11 @@ class SimulationTable(Table):
     def control_steps(self) -> int:
         """Physics steps between control samples; 0 where control is continuous."""
         return round(self.control_timestep / self.timestep)
+
+    @property
+    def latency_steps(self) -> int:
+        """Control samples between a reading and its command; 0 where there is no latency."""
+        return round(self.control_latency / self.control_timestep) if self.control_latency else 0
 
     @property
     def record_steps(self) -> int:
@@ -304,7 +320,26 @@ class SimulationTable(Table):
                 raise InvalidValueError(
                     f"simulation.{key}", value, f"must be a multiple of timestep = {self.timestep}"
                 )
+        self._check_latency()
         return self
+
+    def _check_latency(self) -> None:
+        latency, period = self.control_latency, self.control_timestep
+        if latency == 0.0:
+            return
+        if period == 0.0:
+            raise InvalidValueError(
+                "simulation.control_latency",
+                latency,
+                "needs a control_timestep, of which it is a multiple",
+            )
+        steps = latency / period
+        if abs(steps - round(steps)) > 1e-6 * steps or not 1 <= round(steps) <= MAX_LATENCY_STEPS:
+            raise InvalidValueError(
+                "simulation.control_latency",
+                latency,
+                f"must be 1 to {MAX_LATENCY_STEPS} times control_timestep = {period}",
+            )
 
 
 class InitialTable(Table):
@@ -563,6 +598,141 @@ class Disturbance(Table):
     value: Vector3 = Field(description="m/s^2, world; acts on all that has mass, as gravity does")
 
 
+# --- [sensors] and [[fault]] -------------------------------------------------------------------
+
+
+class SensorTable(Table):
+    """What the law is told of its vehicle's motion; the truth by default.
+
+    Every reading has its own zero-mean normal error of the given standard deviation on each axis,
+    drawn from ``simulation.seed``, and stands until the next. Tilts and rotor speeds are known.
+    """
+
+    position_noise: NonNegative = Field(0.0, description="m")
+    position_bias: Vector3 = Field((0.0, 0.0, 0.0), description="m, world")
+    velocity_noise: NonNegative = Field(0.0, description="m/s")
+    velocity_bias: Vector3 = Field((0.0, 0.0, 0.0), description="m/s, world")
+    attitude_noise: NonNegative = Field(0.0, description="rad, about each body axis")
+    attitude_bias: Vector3 = Field((0.0, 0.0, 0.0), description="rad, about the body axes")
+    body_rates_noise: NonNegative = Field(0.0, description="rad/s")
+    body_rates_bias: Vector3 = Field((0.0, 0.0, 0.0), description="rad/s, body")
+    sample_time: Positive | None = Field(
+        None, description="s between readings; default: control_timestep, 0.01 if continuous"
+    )
+
+    @property
+    def are_imperfect(self) -> bool:
+        """Whether any reading differs from the truth."""
+        return self.model_copy(update={"sample_time": None}) != SensorTable()
+
+
+Rotor = Annotated[int, Field(ge=1, le=4)]
+
+
+class RotorLoss(Table):
+    """A rotor that makes neither thrust nor torque any more; its motor turns on."""
+
+    type: Literal["rotor_loss"]
+    rotor: Rotor
+    time: NonNegative = Field(description="s")
+
+
+class PartialThrust(Table):
+    """A rotor that makes only part of its thrust and drag torque."""
+
+    type: Literal["partial_thrust"]
+    rotor: Rotor
+    time: NonNegative = Field(description="s")
+    factor: Annotated[float, Field(ge=0.0, le=2.0)] = Field(description="what is left, 1 for all")
+
+
+class StuckServo(Table):
+    """A tilt servo that holds one angle whatever it is told."""
+
+    type: Literal["stuck_servo"]
+    rotor: Rotor
+    time: NonNegative = Field(description="s")
+    angle: Angle | None = Field(None, description="rad; default: what the gait plans at the time")
+
+
+Fault = Annotated[RotorLoss | PartialThrust | StuckServo, Field(discriminator="type")]
+
+# --- [air] -------------------------------------------------------------------------------------
+
+NonNegative3 = Annotated[tuple[NonNegative, NonNegative, NonNegative], Field(strict=False)]
+
+
+class DragTable(Table):
+    """The force against the motion through the air, along each body axis."""
+
+    linear: NonNegative3 = Field((0.0, 0.0, 0.0), description="N s/m")
+    area: NonNegative3 = Field(
+        (0.0, 0.0, 0.0), description="m^2, drag coefficient times the area seen along the axis"
+    )
+
+
+class GustTable(Table):
+    """A discrete gust, one minus cosine (MIL-F-8785C)."""
+
+    velocity: Vector3 = Field(description="m/s, world, at its peak")
+    start: NonNegative = Field(0.0, description="s")
+    rise: Positive = Field(description="s, up to the peak and down again")
+    duration: NonNegative = Field(0.0, description="s, from start to end; 0: it stays")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if 0.0 < self.duration < 2.0 * self.rise:
+            raise InvalidValueError(
+                "air.gust.duration",
+                self.duration,
+                f"must be 0 or at least twice rise = {self.rise}",
+            )
+        return self
+
+
+class TurbulenceTable(Table):
+    """Dryden turbulence, low-altitude model (MIL-F-8785C), drawn from ``simulation.seed``."""
+
+    wind_at_6m: Positive = Field(description="m/s, mean wind 20 ft above the ground")
+    height: Annotated[float, Field(ge=3.048, le=304.8)] = Field(
+        10.0, description="m above the ground, for intensity and scale"
+    )
+    sample_time: Positive = Field(0.01, description="s for which a draw of the noise stands")
+
+
+class GroundEffectTable(Table):
+    """Ground effect on each rotor (Cheeseman and Bennett)."""
+
+    rotor_radius: Positive = Field(0.1, description="m")
+    height: Coordinate = Field(description="m, z of the ground in the world")
+
+
+class AirTable(Table):
+    """The air around the vehicle; none by default."""
+
+    density: Positive = Field(1.225, description="kg/m^3")
+    wind: Vector3 = Field((0.0, 0.0, 0.0), description="m/s, world: where the air goes")
+    drag: DragTable = DragTable()
+    gust: GustTable | None = None
+    turbulence: TurbulenceTable | None = None
+    ground_effect: GroundEffectTable | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if any(self.drag.linear) or any(self.drag.area):
+            return self
+        for key, moves in (
+            ("wind", any(self.wind)),
+            ("gust", self.gust),
+            ("turbulence", self.turbulence),
+        ):
+            if moves:
+                raise InvalidValueError(
+                    f"air.{key}", getattr(self, key), "acts through drag; give air.drag"
+                )
+        return self
+
+
 # --- [[expect]] --------------------------------------------------------------------------------
 
 
@@ -651,6 +821,9 @@ class Scenario(Table):
     reference: Reference = SetpointReference()
     ground: GroundTable | None = None
     disturbance: Annotated[tuple[Disturbance, ...], Field(strict=False)] = ()
+    air: AirTable = AirTable()
+    sensors: SensorTable = SensorTable()
+    fault: Annotated[tuple[Fault, ...], Field(strict=False)] = ()
     expect: Annotated[tuple[Expectation, ...], Field(strict=False)] = ()
 
     _address: str = PrivateAttr("")
@@ -659,6 +832,33 @@ class Scenario(Table):
     def address(self) -> str:
         """How the scenario is called on the command line; empty when it was built in Python."""
         return self._address
+
+    @property
+    def has_real_actuators(self) -> bool:
+        """Whether anything between law and vehicle is less than ideal; see `_real_actuators`."""
+        return any(value != ideal for _, value, ideal in self._real_actuators())
+
+    @property
+    def has_air(self) -> bool:
+        """Whether the air does anything to the vehicle."""
+        return self.air != AirTable()
+
+    def _real_actuators(self) -> list[tuple[str, object, object]]:
+        """What `tiltsim.loops.actuation` is for: key, value and what the ideal would be."""
+        controller = self.controller
+        servo = getattr(self.vehicle, "tilt_servo", None)
+        return [
+            (
+                "vehicle.rotor_time_constant",
+                getattr(self.vehicle, "rotor_time_constant", None),
+                None,
+            ),
+            ("vehicle.tilt_servo.max_rate", getattr(servo, "max_rate", None), None),
+            ("simulation.control_latency", self.simulation.control_latency, 0.0),
+            ("sensors", self.sensors.are_imperfect, False),
+            ("fault", [fault.type for fault in self.fault], []),
+            ("controller.allocation", getattr(controller, "allocation", "inversion"), "inversion"),
+        ]
 
     @property
     def rotorcraft(self) -> VehicleTable:
@@ -682,6 +882,7 @@ class Scenario(Table):
     @model_validator(mode="after")
     def _check(self) -> Self:
         self._check_law()
+        self._check_actuators()
         self._check_model_error()
         self._check_gait()
         self._check_reference()
@@ -740,6 +941,51 @@ class Scenario(Table):
                     "the quadrotor has no use for it: its rotors do not tilt, and "
                     "make the thrust that its law asks for at once",
                 )
+
+    def _check_actuators(self) -> None:
+        if self.has_air and not isinstance(self.vehicle, VehicleTable):
+            raise InvalidValueError(
+                "vehicle.model", self.vehicle.model, "has no air around it; leave air out"
+            )
+        if self.has_air and self.controller.law == "python":
+            raise InvalidValueError(
+                "controller.law", "python", "a controller of your own flies without air"
+            )
+        if self.has_air and self.simulation.plant == "thesis":
+            raise InvalidValueError(
+                "simulation.plant", "thesis", "the thesis' equations know no air; use mujoco"
+            )
+        for key, value, ideal in self._real_actuators():
+            if value == ideal:
+                continue
+            if self.vehicle.model != "tiltrotor" or self.controller.law == "python":
+                own = self.controller.law == "python"
+                whose = "a controller of your own" if own else f"the {self.vehicle.model}"
+                raise InvalidValueError(key, value, f"{whose} flies without; leave it out")
+            if self.simulation.plant == "thesis":
+                raise InvalidValueError(
+                    "simulation.plant", "thesis", f"the thesis' equations know no {key}; use mujoco"
+                )
+        kinds = [(f.rotor, f.type == "stuck_servo") for f in self.fault]
+        for fault, kind in zip(self.fault, kinds, strict=True):
+            if kinds.count(kind) > 1:
+                raise InvalidValueError(
+                    "fault.rotor",
+                    fault.rotor,
+                    f"has more than one {'stuck servo' if kind[1] else 'loss of thrust'}",
+                )
+        controller = self.controller
+        prioritized = getattr(controller, "allocation", "inversion") == "prioritized"
+        if (
+            prioritized
+            and self.rotorcraft.min_rotor_speed is None
+            and self.rotorcraft.max_rotor_speed is None
+        ):
+            raise InvalidValueError(
+                "controller.allocation",
+                "prioritized",
+                "nothing limits the rotors; give vehicle.min_rotor_speed or max_rotor_speed",
+            )
 
     def _check_layout(self) -> None:
         own = self.rotorcraft.own

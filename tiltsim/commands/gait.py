@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from controllers.gaits.plans import Gait
     from controllers.vehicle import Vehicle
 
-FIGURES: Final = ("roll_pitch", "comparison", "margin", "attainable", "determinant")
+FIGURES: Final = ("roll_pitch", "comparison", "margin", "attainable", "determinant", "faults")
 CASES: Final = ("equal", "half", "negative", "negative_half")
 
 
@@ -36,6 +36,9 @@ class _Chosen:
     twin: Gait | None = None
     twin_title: str = ""
 
+
+OPPOSITE_SHARE: Final = 0.7
+"""Speed of the rotor opposite a lost one, over that of hover, in the report on faults."""
 
 CURVES: Final = {
     "graph": "one pitch for each roll",
@@ -84,6 +87,9 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--roll", metavar="RAD", help="attitude to analyse, default level")
     parser.add_argument("--pitch", metavar="RAD")
+    parser.add_argument(
+        "--faults", action="store_true", help="also which losses of a rotor the vehicle hovers with"
+    )
     parser.add_argument("--json", action="store_true", help="machine-readable")
     parser.add_argument(
         "--plot", type=Path, metavar="FILE", help="draw a figure: FILE.png, .svg or .pdf"
@@ -94,7 +100,8 @@ def add_parser(subparsers: Any) -> None:
         help=(
             "what to draw: roll_pitch (default); comparison, two roll-pitch diagrams, with and "
             "without bias; margin over a period; attainable torques, thrusts and accelerations "
-            "(ch. 9); determinant surfaces and zero curves (ch. 3), which need no gait"
+            "(ch. 9); determinant surfaces and zero curves (ch. 3), which need no gait; faults: "
+            "rotor speeds that hover needs after one, whatever the gait"
         ),
     )
     parser.add_argument(
@@ -122,13 +129,17 @@ def run(arguments: argparse.Namespace) -> int:
     roll = None if arguments.roll is None else parse_angle("--roll", arguments.roll)
     pitch = None if arguments.pitch is None else parse_angle("--pitch", arguments.pitch)
 
-    from tiltsim.analysis import gait_report
+    from tiltsim.analysis import fault_report, gait_report
 
     if arguments.plot is not None:
         from tiltsim.figures.style import save
 
         save(_draw(arguments, chosen), arguments.plot)
     report = gait_report(chosen.gait, chosen.vehicle, roll=roll, pitch=pitch)
+    if arguments.faults:
+        a1, a2, a3, a4 = chosen.gait.angles(0.0).tolist()
+        opposite_speed = OPPOSITE_SHARE * chosen.vehicle.hover_rotor_speed
+        report["faults"] = fault_report((a1, a2, a3, a4), chosen.vehicle, opposite_speed)
     _print(arguments, report, _summary)
     return 0
 
@@ -210,7 +221,7 @@ def _choose(arguments: argparse.Namespace) -> _Chosen:
 def _draw(arguments: argparse.Namespace, chosen: _Chosen) -> Figure:
     """The figure of a gait that the arguments name."""
     from tiltsim.errors import InputError
-    from tiltsim.figures import attainable, gait
+    from tiltsim.figures import attainable, faults, gait
 
     compared = [(chosen.title, chosen.gait)]
     if chosen.twin is not None:
@@ -218,6 +229,8 @@ def _draw(arguments: argparse.Namespace, chosen: _Chosen) -> Figure:
     kind = arguments.figure or "roll_pitch"
     if kind == "comparison" and len(compared) == 1:
         raise InputError(f"--figure comparison: {chosen.gait.name} has no bias to compare with")
+    if kind == "faults":
+        return faults.fault_figure(chosen.vehicle)
     if kind == "attainable":
         if not chosen.gait.is_constant:
             raise InputError(f"--figure attainable: {chosen.gait.name} moves; give fixed angles")
@@ -338,4 +351,19 @@ def _summary(report: dict[str, Any]) -> str:
             ("least rank", str(report["min_rank"])),
             ("least margin", f"{number(report['min_singularity_margin'])} rad over the period"),
         ]
+    if "faults" in report:
+        for loss in report["faults"]["rotor_loss"]:
+            free = loss["free_tilts"]
+            fixed = (
+                "these tilts hover, without control"
+                if loss["hovers_with_fixed_tilts"]
+                else f"these tilts miss a hover by {number(loss['fixed_tilts_miss'])} rad"
+            )
+            rows.append(
+                (
+                    f"without rotor {loss['rotor']}",
+                    f"{fixed}; free tilts hover from {loss['least_speed']:.4g} rad/s on, as at "
+                    f"{numbers(free['angles'])} rad",
+                )
+            )
     return "\n".join([*aligned(rows), *(f"warning: {text}" for text in report["warnings"])])

@@ -12,6 +12,7 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     import mujoco
 
+    from tiltsim.loop import ExtraActuators
     from tiltsim.scenario import Scenario
 
 Floats = npt.NDArray[np.float64]
@@ -32,8 +33,8 @@ class Kind:
     thrusts
         ``(columns so far, scenario) -> columns``: the rotors' thrusts, N.
     compile
-        ``(scenario, law_states, userdata_size, visuals) -> model``. Raises `ValueError` where
-        MuJoCo cannot build it.
+        ``(scenario, law_states, extra_actuators, userdata_size, visuals) -> model``. Raises
+        `ValueError` where MuJoCo cannot build it.
     initial_motion
         ``(scenario) -> qpos, qvel`` at time zero.
     limit_exceeded
@@ -45,7 +46,7 @@ class Kind:
     observed_fields: tuple[str, ...]
     columns: Mapping[str, str]
     thrusts: Callable[[Mapping[str, Floats], Scenario], dict[str, Floats]]
-    compile: Callable[[Scenario, int, int, bool], mujoco.MjModel]
+    compile: Callable[[Scenario, int, tuple[ExtraActuators, ...], int, bool], mujoco.MjModel]
     initial_motion: Callable[[Scenario], tuple[Sequence[float], Sequence[float]]]
     limit_exceeded: Callable[..., int]
 

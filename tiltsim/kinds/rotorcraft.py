@@ -17,6 +17,7 @@ from tiltsim.limits import rotorcraft_limit_exceeded
 if TYPE_CHECKING:
     import mujoco
 
+    from tiltsim.loop import ExtraActuators
     from tiltsim.scenario import Scenario, VehicleTable
 
 _FOUR: Final = (1, 2, 3, 4)
@@ -50,12 +51,17 @@ def rotor_thrusts(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str
         * sign
         * columns[f"rotor_speed_{i}"]
         * np.abs(columns[f"rotor_speed_{i}"])
+        * columns.get(f"thrust_factor_{i}", 1.0)  # of a fault
         for i, sign in zip(_FOUR, SPIN, strict=True)
     }
 
 
 def _compile(
-    scenario: Scenario, law_states: int, userdata_size: int, visuals: bool
+    scenario: Scenario,
+    law_states: int,
+    extra_actuators: tuple[ExtraActuators, ...],
+    userdata_size: int,
+    visuals: bool,
 ) -> mujoco.MjModel:
     from tiltsim.model import Ground, Pod, RotorLimits, TiltServo, compile_model
 
@@ -67,10 +73,11 @@ def _compile(
         timestep=simulation.timestep,
         integrator=simulation.integrator,
         userdata_size=userdata_size,
-        tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump()),
+        tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump(exclude={"max_rate"})),
         pod=Pod(**vehicle.pod.model_dump()),
         rotor_limits=RotorLimits(vehicle.min_rotor_speed, vehicle.max_rotor_speed),
         law_states=law_states,
+        extra_actuators=extra_actuators,
         ground=None if ground is None else Ground(ground.height, ground.friction),
         visuals=visuals,
         own=vehicle.own,

@@ -13,6 +13,7 @@ from tiltsim.limits import tilt_car_limit_exceeded
 if TYPE_CHECKING:
     import mujoco
 
+    from tiltsim.loop import ExtraActuators
     from tiltsim.scenario import Scenario
 
 ROTORS: Final = (1, 2)
@@ -53,12 +54,18 @@ def _thrusts(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str, Flo
 
 
 def _compile(
-    scenario: Scenario, law_states: int, userdata_size: int, visuals: bool
+    scenario: Scenario,
+    law_states: int,
+    extra_actuators: tuple[ExtraActuators, ...],
+    userdata_size: int,
+    visuals: bool,
 ) -> mujoco.MjModel:
     from tiltsim.model import TiltServo
     from tiltsim.tilt_car_model import compile_tilt_car
 
     car, simulation = scenario.tilt_car, scenario.simulation
+    if extra_actuators:
+        raise ValueError("the tilt-car takes no actuators beyond its own")
     return compile_tilt_car(
         car.resolve(),
         timestep=simulation.timestep,

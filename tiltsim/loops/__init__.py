@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from tiltsim.loops.actuation import with_actuation
+from tiltsim.loops.air import with_air
 from tiltsim.loops.commanded import COMMANDED
 from tiltsim.loops.full_pose import FULL_POSE
 from tiltsim.loops.gait_feedforward import GAIT_FEEDFORWARD
@@ -34,10 +36,13 @@ LOOPS: Final[dict[str, Loop]] = {
 
 
 def loop_of(scenario: Scenario) -> Loop:
-    """The loop that a scenario flies."""
+    """The loop that a scenario flies: its law, within layers for what is not ideal."""
     if scenario.controller.law == "python":
         return COMMANDED[scenario.vehicle.model]
-    return LOOPS[scenario.controller.loop_name]
+    loop = LOOPS[scenario.controller.loop_name]
+    if scenario.has_real_actuators:
+        loop = with_actuation(loop, scenario.simulation.latency_steps)
+    return with_air(loop) if scenario.has_air else loop
 
 
 def control_setup(scenario: Scenario) -> ControlSetup:

@@ -108,6 +108,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
         reference,
         controller.resolve_limits(),
         controller.resolve_tilt_weight(vehicle),
+        controller.resolve_failure(),
     )
     lead = servo_lead(scenario.rotorcraft.tilt_servo)
     return ControlSetup(ControlParameters(signature, lead, law), table)
