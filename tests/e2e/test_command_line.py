@@ -288,7 +288,7 @@ def test_list_shows_every_scenario_with_title_and_source(capsys):
     trots = [line for line in lines if line.lstrip().startswith("#continuous_t3_modified ")]
     assert all("type = trot_continuous" in line and "period = 3.0" in line for line in trots)
     assert len(trots) == 2
-    shown = {line.split()[0] for line in lines}
+    shown = {line.split()[0] for line in lines if line}
     assert all(part in shown for e in entries for part in split_address(e["scenario"]))
 
 
@@ -296,8 +296,8 @@ def test_schema_knows_every_table_and_the_variants(capsys):
     assert main(["schema"]) == 0
     schema = json.loads(capsys.readouterr().out)
     tables = {"vehicle", "simulation", "initial", "controller", "gait", "reference"}
-    tables |= {"model_error"}
-    lists = {"disturbance", "expect", "variant"}
+    tables |= {"air", "ground", "model_error", "sensors"}
+    lists = {"disturbance", "expect", "fault", "variant"}
     assert tables | lists | {"title", "source"} == set(schema["properties"])
     assert schema["additionalProperties"] is False
 
