@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.rotation import quaternion_from_euler
+from tiltsim.loop import HEADER_SIZE
 from tiltsim.loops import control_setup
 from tiltsim.plants import build_model
 
@@ -39,7 +40,7 @@ class Poses(NamedTuple):
 def visible_model(scenario: Scenario) -> mujoco.MjModel:
     """The compiled model of a scenario's vehicle with everything that is drawn."""
     # The same arguments as for the flight: what they compose is then at hand.
-    userdata_size = len(control_setup(scenario).userdata)
+    userdata_size = HEADER_SIZE + len(control_setup(scenario).userdata)
     return build_model(scenario, userdata_size=userdata_size, visuals=True)
 
 

@@ -6,13 +6,14 @@ import argparse
 import sys
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from tiltsim.commands.progress import progress_bar
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, FLIGHT_LOST, INTERRUPTED
 
 if TYPE_CHECKING:
-    from concurrent.futures import Future
+    from collections.abc import Callable
+    from concurrent.futures import Future, ThreadPoolExecutor
 
     from tiltsim.expectations import Verdict
     from tiltsim.flight import Flight
@@ -85,21 +86,14 @@ def run(arguments: argparse.Namespace) -> int:
     if not arguments.quiet and isinstance(vehicle, Vehicle):
         for warning in gait_warnings(scenario.gait.plan(vehicle), vehicle):
             print(f"tiltsim: warning: gait: {warning}", file=sys.stderr)
-    with ExitStack() as stack:
-        recording: Future[RecordingFile] | None = None
-        if arguments.rerun is not None and flies_natively(scenario):
-            from concurrent.futures import ThreadPoolExecutor
-
-            # Native code flies without Python's lock, so this costs no time while there is a core.
-            # Under a Python callback MuJoCo could not compile the recording's model meanwhile.
-            pool = stack.enter_context(ThreadPoolExecutor(1))
-            recording = pool.submit(_recording_of, scenario)
+    if arguments.rerun is None:
         flight = fly(scenario, arguments)
-        if arguments.out is not None:
-            flight.save(arguments.out)
-        if arguments.rerun is not None:
-            file = _recording_of(scenario) if recording is None else recording.result()
-            file.save([flight], arguments.rerun)
+        _save(flight, arguments)
+    else:
+        with _RecordingAhead(scenario) as recording:
+            flight = fly(scenario, arguments, recording.begin)
+            _save(flight, arguments)
+            recording.file().save([flight], arguments.rerun)
     if flight.end.kind == "interrupted":
         kept = f"; the flight so far is in {arguments.out}" if arguments.out is not None else ""
         print(f"tiltsim: interrupted at t = {flight.end.time:.3f} s{kept}", file=sys.stderr)
@@ -125,11 +119,39 @@ def run(arguments: argparse.Namespace) -> int:
     return DONE if all(verdict.holds for verdict in verdicts) else EXPECTATION_FAILED
 
 
-def flies_natively(scenario: Scenario) -> bool:
-    """Whether a scenario's flight runs in compiled code."""
-    from tiltsim.plants import choose_engine
+class _RecordingAhead:
+    """A recording that is made ready while its flight goes on.
 
-    return choose_engine(scenario) == "native"
+    Native code flies without Python's lock, so this costs no time while there is a core. Under a
+    Python callback MuJoCo could not compile the recording's model meanwhile.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
+        self._pool: ThreadPoolExecutor | None = None
+        self._file: Future[RecordingFile] | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        if self._pool is not None:
+            self._pool.shutdown()
+
+    def begin(self) -> None:
+        """The flight begins."""
+        from tiltsim.plants import choose_engine
+
+        scenario = self._scenario
+        if scenario.controller.law != "python" and choose_engine(scenario) == "native":
+            from concurrent.futures import ThreadPoolExecutor
+
+            self._pool = ThreadPoolExecutor(1)
+            self._file = self._pool.submit(_recording_of, scenario)
+
+    def file(self) -> RecordingFile:
+        """The recording, ready for the flight."""
+        return _recording_of(self._scenario) if self._file is None else self._file.result()
 
 
 def _recording_of(scenario: Scenario) -> RecordingFile:
@@ -138,8 +160,17 @@ def _recording_of(scenario: Scenario) -> RecordingFile:
     return RecordingFile([scenario])
 
 
-def fly(scenario: Scenario, arguments: argparse.Namespace) -> Flight:
-    """Simulate, with a progress bar and, if asked, a live view."""
+def _save(flight: Flight, arguments: argparse.Namespace) -> None:
+    if arguments.out is not None:
+        flight.save(arguments.out)
+
+
+def fly(
+    scenario: Scenario,
+    arguments: argparse.Namespace,
+    begin: Callable[[], None] | None = None,
+) -> Flight:
+    """Simulate, with a progress bar and, if asked, a live view; ``begin`` is called at lift-off."""
     from tiltsim.simulation import simulate
 
     with ExitStack() as stack:
@@ -152,6 +183,10 @@ def fly(scenario: Scenario, arguments: argparse.Namespace) -> Flight:
         advance_to = stack.enter_context(bar)
 
         def observe(sample: Floats) -> None:
+            nonlocal begin
+            if begin is not None:
+                begin()
+                begin = None
             advance_to(float(sample[0]))
             if live is not None:
                 live(sample)
