@@ -210,7 +210,8 @@ def test_a_flight_in_pieces_is_recorded_like_a_whole_one(tmp_path):
         recording = new_recording([this.scenario])
         recording.save(path)
         recorder = FlightRecorder(recording, this.scenario)
-        recorder.begin(this.end.time)
+        recorder.begin()
+        recorder.draw_references(this.end.time)
         for at in range(0, len(this), size):
             recorder.append(replace(this, samples=this.samples[at : at + size]))
         recorder.finish(this.end)
@@ -376,7 +377,10 @@ class Wall:
         self.error = error
         self.samples = 0
 
-    def begin(self, _until):
+    def begin(self):
+        pass
+
+    def draw_references(self, _until):
         pass
 
     def append(self, piece):

@@ -86,7 +86,8 @@ class LiveStream:
 
     def _send_all(self) -> None:
         try:
-            self._recorder.begin(self._scenario.simulation.duration)
+            self._recorder.begin()
+            self._recorder.draw_references(self._scenario.simulation.duration)
             while not self._over.wait(SEND_INTERVAL):
                 self._send_waiting()
             self._send_waiting()

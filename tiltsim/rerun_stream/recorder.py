@@ -31,7 +31,8 @@ _LEVEL_COLORS = {"INFO": palette.GREY, "WARN": palette.AMBER, "ERROR": palette.R
 class FlightRecorder:
     """Writes one flight into a recording.
 
-    Call `begin` once, `append` with pieces of the flight in order, and `finish`.
+    Call `begin` and `draw_references` once, `append` with pieces of the flight in order, and
+    `finish`.
 
     Parameters
     ----------
@@ -103,18 +104,22 @@ class FlightRecorder:
         x, y, _ = (0.5 * (low + high)).tolist()
         return x, y, float(OVERVIEW_HEIGHT * max(np.ptp(path, axis=0).max(), 1.0))
 
-    def begin(self, until: float) -> None:
-        """Log all that does not move, for a flight that lasts ``until`` (s) at most."""
-        left_out = self._scene.begin(until)
+    def begin(self) -> None:
+        """Log all that does not move."""
+        left_out = self._scene.begin()
         if self._plane is not None:
             self._plane.begin(paints=self._first)
         self._series.begin()
-        if self._first:
-            self._series.draw_limits(self._aspect.limits(self._scenario), until)
         self._log_events([self._events.opening()])
         if left_out:
             text = f"not drawn, for Rerun has no such shape: {', '.join(left_out)}"
             self._log_events([Event(0.0, "WARN", text)])
+
+    def draw_references(self, until: float) -> None:
+        """Log the reference's path and the limits for a flight that ends by ``until`` (s)."""
+        self._scene.draw_reference(until)
+        if self._first:
+            self._series.draw_limits(self._aspect.limits(self._scenario), until)
 
     def append(self, piece: Flight) -> None:
         """Log the rows of a piece of the flight that follows on from the last."""

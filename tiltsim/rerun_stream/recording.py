@@ -43,6 +43,8 @@ class RecordingFile:
         unhurried = rr.ChunkBatcherConfig(flush_tick=UNHURRIED)
         self._recording = new_recording(scenarios, batching=unhurried)
         self._recorders = make_recorders(self._recording, scenarios)
+        for recorder in self._recorders:
+            recorder.begin()
         self._blueprint = flight_blueprint([recorder.shown() for recorder in self._recorders])
 
     def save(self, flights: Sequence[Flight], path: Path) -> None:
@@ -110,10 +112,10 @@ def make_recorders(
 
 
 def write_flights(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> None:
-    """Write whole flights."""
+    """Write whole flights with recorders that have begun."""
     until = max(float(flight["time"][-1]) for flight in flights)
     for recorder, flight in zip(recorders, flights, strict=True):
-        recorder.begin(until)
+        recorder.draw_references(until)
         recorder.append(flight)
         recorder.finish(flight.end)
 

@@ -80,8 +80,8 @@ class Scene:
         """The entity of the ground's grid, of which a piece goes with the vehicle."""
         return f"{self.root}/floor"
 
-    def begin(self, until: float) -> list[str]:
-        """Log all that does not move, for a flight that lasts ``until`` (s) at most.
+    def begin(self) -> list[str]:
+        """Log all that does not move.
 
         Returns the names of geoms that could not be drawn.
         """
@@ -112,8 +112,6 @@ class Scene:
                 show_labels=True,
             )
             self._log(f"{self.camera}/name", label)
-        if self._follows:
-            self._begin_reference(until)
         return left_out
 
     def append(self, piece: Flight) -> None:
@@ -165,10 +163,12 @@ class Scene:
             )
             self._log(self._thrust_path(site), arrow)
 
-    def _begin_reference(self, until: float) -> None:
-        """Log the whole path that the vehicle is to follow."""
+    def draw_reference(self, until: float) -> None:
+        """Log the whole path that the vehicle is to follow until a time (s), if it follows one."""
         import rerun as rr
 
+        if not self._follows:
+            return
         path = reference_path(self._scenario, until)
         size = 0.08 * vehicle_radius(self._model)
         color = palette.WHITE

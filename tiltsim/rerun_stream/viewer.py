@@ -38,6 +38,8 @@ def view_flights(flights: Sequence[Flight], url: str | None = None) -> None:
     recording = new_recording(scenarios)
     recorders = make_recorders(recording, scenarios)
     attach_viewer(recording, url, flight_blueprint([recorder.shown() for recorder in recorders]))
+    for recorder in recorders:
+        recorder.begin()
     write_flights(recorders, flights)
     recording.disconnect()
 
