@@ -6,8 +6,9 @@ from math import inf, nan, nextafter
 
 import pytest
 
+from tiltsim.expectation_table import Expectation
 from tiltsim.expectations import Verdict, judge
-from tiltsim.scenario import Expectation, Scenario
+from tiltsim.scenario import Scenario
 
 
 def expects(**bounds):

@@ -8,7 +8,8 @@ from math import isnan
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tiltsim.scenario import Expectation, Scenario
+    from tiltsim.expectation_table import Expectation
+    from tiltsim.scenario import Scenario
 
 
 @dataclass(frozen=True)

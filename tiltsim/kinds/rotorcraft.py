@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     import mujoco
 
     from tiltsim.loop import ExtraActuators
-    from tiltsim.scenario import Scenario, VehicleTable
+    from tiltsim.scenario import Scenario
+    from tiltsim.vehicle_tables import VehicleTable
 
 _FOUR: Final = (1, 2, 3, 4)
 

@@ -45,7 +45,8 @@ from tiltsim.loop import (
 from tiltsim.rows import evaluate_rows
 
 if TYPE_CHECKING:
-    from tiltsim.scenario import Scenario, ServoTable
+    from tiltsim.scenario import Scenario
+    from tiltsim.vehicle_tables import ServoTable
 
 REFERENCE_COLUMNS: Final = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
 TILT_COLUMNS: Final = ("alpha_1", "alpha_2", "alpha_3", "alpha_4")

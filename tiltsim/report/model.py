@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 from tiltsim.metrics import BOOLEAN_METRICS, METRICS
 
 if TYPE_CHECKING:
-    from tiltsim.scenario import Expectation, Scenario
+    from tiltsim.expectation_table import Expectation
+    from tiltsim.scenario import Scenario
 
 Value: TypeAlias = "float | bool | tuple[float, ...]"
 """A measured value: a number, yes or no, or several numbers."""

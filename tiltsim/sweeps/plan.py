@@ -26,7 +26,7 @@ from tiltsim.loading import apply_overrides, key_steps, load_scenario, parse_sce
 from tiltsim.loop import Floats
 from tiltsim.messages import one_line, show
 from tiltsim.metrics import METRICS, WALL_CLOCK_METRICS
-from tiltsim.scenario import Scenario, VehicleTable
+from tiltsim.scenario import Scenario
 from tiltsim.sweeps.expressions import evaluate, names
 from tiltsim.sweeps.tables import (
     AxisTable,
@@ -37,6 +37,7 @@ from tiltsim.sweeps.tables import (
     UniformAxis,
     dotted,
 )
+from tiltsim.vehicle_tables import VehicleTable
 
 MAX_POINTS: Final = 10_000_000
 LARGEST_CHUNK: Final = 32

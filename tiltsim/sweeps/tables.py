@@ -6,9 +6,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from tiltsim.expectation_table import Expectation
 from tiltsim.messages import InvalidValueError
 from tiltsim.metrics import METRICS, WALL_CLOCK_METRICS
-from tiltsim.scenario import Expectation
 from tiltsim.tables import Positive, Table
 
 Keys = Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
