@@ -8,8 +8,21 @@ import platform
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from typing import Final
 
 import controllers
+
+SCREENS: Final = frozenset(
+    ("__main__.py", "cli.py", "commands", "figures", "report", "rerun_stream", "sweeps", "video")
+)
+"""Modules of tiltsim that no flight depends on."""
+
+
+def core_sources() -> list[Path]:
+    """The sources that a flight depends on."""
+    package = Path(__file__).parent
+    own = (p for p in package.rglob("*.py") if p.relative_to(package).parts[0] not in SCREENS)
+    return sorted([*Path(controllers.__file__).parent.rglob("*.py"), *own])
 
 
 @cache
@@ -17,9 +30,8 @@ def native_code_folder() -> Path:
     """The folder for code compiled from exactly these sources with exactly these versions."""
     versions = [version(name) for name in ("numba", "llvmlite", "numpy", "mujoco")]
     digest = hashlib.sha256(repr([*versions, platform.platform()]).encode())
-    for package in (Path(controllers.__file__).parent, Path(__file__).parent):
-        for source in sorted(package.rglob("*.py")):
-            digest.update(source.read_bytes())
+    for source in core_sources():
+        digest.update(source.read_bytes())
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(base) / "tiltsim" / digest.hexdigest()[:16]
 

@@ -17,7 +17,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 
-import controllers
+from tiltsim.cache import core_sources
 from tiltsim.checking import shared_engine, with_engine
 from tiltsim.errors import InputError
 from tiltsim.files import replacing
@@ -35,12 +35,6 @@ if TYPE_CHECKING:
 
 Plant = Literal["thesis", "mujoco"]
 PLANTS: Final[tuple[Plant, ...]] = ("thesis", "mujoco")
-
-_SCREENS: Final = (
-    *("__main__.py", "cli.py", "commands"),
-    *("figures", "report", "rerun_stream", "sweeps", "video"),
-)
-"""Modules of tiltsim that no measured number depends on."""
 
 _OF_THE_WHOLE: Final = ("final_", "sup_", "altitude_settling_time")
 """First letters of metrics that only a flight to its end has."""
@@ -274,12 +268,7 @@ def flight_key(scenario: Scenario) -> str:
 def code_digest() -> bytes:
     """Digest of the sources of core and models, and of the versions of what computes."""
     versions = [version(name) for name in ("tiltsim", "mujoco", "numpy", "numba")]
-    package = Path(__file__).parent.parent
-    sources = [
-        *Path(controllers.__file__).parent.rglob("*.py"),
-        *(p for p in package.rglob("*.py") if p.relative_to(package).parts[0] not in _SCREENS),
-        *shipped_folder("mjcf").rglob("*.xml"),
-    ]
+    sources = [*core_sources(), *shipped_folder("mjcf").rglob("*.xml")]
     return sources_digest(sources, *versions)
 
 
