@@ -33,9 +33,18 @@ def command(file, folder, *options):
     return [*arguments, "--quiet", *options]
 
 
-def fly_until_killed(arguments, folder, moment):
-    """Start a sweep in a process group of its own and kill all of it at a moment (s)."""
+def parts_in(folder):
+    return len(list(folder.glob("parts/[0-9]*.parquet")))
+
+
+def fly_until_killed(arguments, folder, moment, parts=0):
+    """Start a sweep in a process group of its own and kill all of it.
+
+    The moment (s) counts from when the folder holds so many parts.
+    """
     process = subprocess.Popen(arguments, start_new_session=True)
+    while process.poll() is None and parts_in(folder) < parts:
+        time.sleep(0.01)
     try:
         process.wait(moment)
     except subprocess.TimeoutExpired:
@@ -196,19 +205,13 @@ def test_killed_at_random_moments_it_continues_to_the_same_dataset(tmp_path):
 
 @pytest.mark.slow
 def test_two_thousand_flights_killed_twenty_times(tmp_path):
-    tiny = short_sweep(tmp_path / "tiny.toml", count=2, chunk_size=1)
-    start = time.perf_counter()
-    subprocess.run(command(tiny, tmp_path / "tiny", "--jobs=2"), check=True)
-    startup = time.perf_counter() - start
     file = short_sweep(tmp_path / "sweep.toml", count=1000, chunk_size=20)
-    start = time.perf_counter()
     whole = run_sweep(load_definition(file), tmp_path / "whole", jobs=2)
-    share = (time.perf_counter() - start) / 20
-    moments, folder, progress = random.Random(2000), tmp_path / "killed", []
-    for _ in range(20):
-        moment = moments.uniform(0.5 * startup, startup + share)
-        assert fly_until_killed(command(file, folder, "--jobs=2"), folder, moment) != 0
-        progress.append(len(list(folder.glob("parts/[0-9]*.parquet"))))
+    chance, folder, progress = random.Random(2000), tmp_path / "killed", []
+    for parts in sorted(chance.sample(range(85), 20)):
+        moment = chance.uniform(0.0, 0.3)
+        assert fly_until_killed(command(file, folder, "--jobs=2"), folder, moment, parts) != 0
+        progress.append(parts_in(folder))
     assert progress == sorted(progress)  # nothing finished is lost
     assert progress[-1] > 0
     subprocess.run(command(file, folder, "--jobs=2"), check=True)
