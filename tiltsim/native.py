@@ -403,8 +403,9 @@ def evaluate_natively(
     function: Callable[..., tuple[float, ...]], time: Floats, states: Floats, setup: ControlSetup
 ) -> Floats:
     """See `tiltsim.rows.evaluate_rows`, which takes at least one row to here."""
-    head = record_size(type(setup.parameters))
-    parameters = setup.userdata[:head].view(record_dtype(type(setup.parameters)))[0]
+    record: Any = type(setup.parameters)
+    head = record_size(record)
+    parameters = setup.userdata[:head].view(record_dtype(record))[0]
     time, states = np.ascontiguousarray(time), np.ascontiguousarray(states)
     table = np.array(setup.table)
     values: Floats = _compile_rows(function)(time, states, parameters, table)
