@@ -112,7 +112,7 @@ def _fly_window(
     keep_samples: bool,
 ) -> Iterator[FlightResult]:
     """Fly scenarios group by group, and put the results back into their order."""
-    groups: dict[str, list[int]] = {}
+    groups: dict[object, list[int]] = {}
     for index, scenario in enumerate(scenarios):
         groups.setdefault(_way_to_fly(scenario, native), []).append(index)
     done: dict[int, FlightResult] = {}
@@ -140,16 +140,31 @@ def _fly_window(
                 following += 1
 
 
-def _way_to_fly(scenario: Scenario, native: bool) -> str:
-    """``alone``, on the ``thesis`` plant in threads, or the law of the batch to fly in."""
+def _way_to_fly(scenario: Scenario, native: bool) -> object:
+    """``alone``, on the ``thesis`` plant in threads, or what flights of one batch share."""
     simulation, loop = scenario.simulation, loop_of(scenario)
     wanted = simulation.engine == "native" or (simulation.engine == "auto" and native)
     if not wanted or loop.watch is None:
         return "alone"
     if simulation.plant == "thesis":
         return "thesis"
-    # A stop of the tilt servos is a constraint, which gives a state more numbers.
-    return f"{scenario.controller.law} {scenario.vehicle.tilt_servo.stops}"
+    # Stops of the tilt servos and ground are constraints, which give MuJoCo's data more numbers; a
+    # user's own file may have any bodies.
+    vehicle, grounded = scenario.vehicle, scenario.ground is not None
+    return loop, vehicle.tilt_servo.stops, grounded, getattr(vehicle, "mjcf", None)
+
+
+_FLOWN_IN_ANY_MODEL: Final = {
+    *("title", "source", "simulation", "initial", "gait", "reference", "sensors", "fault"),
+    "expect",
+}
+"""Tables of a scenario that are parameters or initial state of a flight, or no part of it."""
+
+
+def _likeness(scenario: Scenario) -> str:
+    """The same for scenarios that fly in the same model."""
+    tables = [value for name, value in scenario if name not in _FLOWN_IN_ANY_MODEL]
+    return repr((tables, scenario.simulation.timestep, scenario.simulation.integrator))
 
 
 def _in_order(
@@ -290,8 +305,7 @@ class _BatchFlight:
         index, scenario = self._waiting.popleft()
         simulation = scenario.simulation.model_copy(update={"engine": "native"})
         native = scenario.model_copy(update={"simulation": simulation})
-        vehicle, disturbances = scenario.vehicle, scenario.disturbance
-        key = repr((vehicle, disturbances, simulation.timestep, simulation.integrator))
+        key = _likeness(scenario)
         model = self._models.get(key)
         if model is None:
             if len(self._models) > 2 * self._size:
