@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import tiltsim
+import tiltsim.plants
 import tiltsim.rows
 from controllers.gaits import GAIT_TYPES
 from tests.test_laws import GUST, LAWS
@@ -216,6 +217,17 @@ def test_all_kinds_of_flights_together():
     assert results[0].flight.engine == "python"
     assert results[2].flight.engine == "native"
     assert mujoco.get_mjcb_control() is None
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_many_short_flights_are_worth_the_native_engine(plant, monkeypatch):
+    wanted = [scenario({}, engine="auto", plant=plant, duration=0.05)] * 6
+    monkeypatch.setattr(tiltsim.plants, "STEPS_WORTH_LOADING", 300)
+    monkeypatch.setattr(tiltsim.plants, "STEPS_WORTH_COMPILING", 300)
+    results = list(fly_all(wanted, keep_samples=True))
+    assert {result.flight.engine for result in results} == {"native"}
+    assert [result.scenario for result in results] == wanted
+    assert next(fly_all(wanted[:1], keep_samples=True)).flight.engine == "python"
 
 
 def test_no_flights_give_no_results():
