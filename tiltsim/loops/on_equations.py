@@ -101,6 +101,8 @@ def on_equations(loop: Loop) -> Loop:
         table: Sequence[float],
         disturbance: Triple,
     ) -> tuple[float, ...]:
+        # A stage may have carried a rotor past its limit by what one step adds.
+        state = motion_settled(state, parameters.layer)
         ctrl = controls_in_force(time, state, inputs, parameters)
         return (
             *motion_rates(state, ctrl, wrench(ctrl), parameters.layer, disturbance),
