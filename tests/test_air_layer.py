@@ -165,8 +165,3 @@ def test_mistakes_are_refused_in_words(name):
     air, words = MISTAKES[name]
     with pytest.raises(InputError, match=words):
         scenario(air)
-
-
-def test_the_thesis_plant_has_no_air():
-    with pytest.raises(InputError, match=r"simulation.plant.*air"):
-        scenario(STORM, {"plant": "thesis"})

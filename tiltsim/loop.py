@@ -94,8 +94,8 @@ class Equations:
         Scalar function ``(time, state, inputs, parameters, table) -> values`` of the loop's
         `sample_fields` after the time; ``inputs`` are those in force.
     settled
-        Scalar function ``(state, parameters) -> state`` at the end of each step: what stops at a
-        limit has got no further. None where nothing stops.
+        Scalar function ``(state, parameters) -> state`` for the end of each step: what has run
+        past a limit is put back. None where there is none.
     """
 
     inputs: Callable[..., tuple[float, ...]]

@@ -68,7 +68,7 @@ class Driven(NamedTuple):
         [Sequence[float], Sequence[float], Wrench, Mechanics, Triple], tuple[float, ...]
     ]
     """Time derivative of the motion: state, controls, wrench, mechanics, disturbance (m/s^2)."""
-    settled: Callable[[list[float], Mechanics], list[float]]  # see `tiltsim.loop.Equations`
+    settled: Callable[[Sequence[float], Mechanics], list[float]]  # see `tiltsim.loop.Equations`
     initial: Callable[[Scenario], tuple[float, ...]]  # motion
 
 
@@ -144,7 +144,7 @@ def tiltrotor_rates(
 
 
 @scalar
-def settled_tiltrotor(state: list[float], mechanics: Mechanics) -> list[float]:
+def settled_tiltrotor(state: Sequence[float], mechanics: Mechanics) -> list[float]:
     """Rotors within their limits, pods not beyond their stops."""
     low, high, stop = mechanics.min_speed, mechanics.max_speed, mechanics.max_tilt
     settled = list(state)
@@ -214,9 +214,9 @@ def quadrotor_rates(
 
 
 @scalar
-def settled_quadrotor(state: list[float], mechanics: Mechanics) -> list[float]:
+def settled_quadrotor(state: Sequence[float], mechanics: Mechanics) -> list[float]:
     """As it is: its rotors make any thrust."""
-    return state
+    return list(state)
 
 
 DRIVEN: Final[dict[str, Driven]] = {
