@@ -96,7 +96,8 @@ class Pod:
 class RotorLimits:
     """Limits on a rotor's speed, held by MuJoCo at the end of each step.
 
-    Within a step the stages of RK4 may see speeds beyond a limit by what one step adds.
+    Within a step the stages of RK4 may see speeds beyond a limit by what one step adds. The thrust
+    stays within the limits there, too.
 
     Attributes
     ----------
@@ -104,10 +105,13 @@ class RotorLimits:
         Smallest ``|varpi|``, rad/s: the rotor cannot reverse. None lets it stop and reverse.
     max_speed : float or None
         Largest ``|varpi|``, rad/s, in either sense where the rotor may reverse. None is unlimited.
+    thrust_factors : tuple of float
+        The least and the greatest factor on the thrust that the flight brings: faults.
     """
 
     min_speed: float | None = None
     max_speed: float | None = None
+    thrust_factors: tuple[float, float] = (1.0, 1.0)
 
     def speed_range(self, spin: float) -> tuple[float, float] | None:
         """The range (rad/s) of the signed speed of a rotor with this spin; None if unlimited."""
@@ -116,6 +120,16 @@ class RotorLimits:
         upper = inf if self.max_speed is None else self.max_speed
         lower = -upper if self.min_speed is None else self.min_speed
         return (lower, upper) if spin > 0.0 else (-upper, -lower)
+
+    @property
+    def thrust_range(self) -> tuple[float, float] | None:
+        """The range ((rad/s)^2) of the controls of the thrusts; None if unlimited."""
+        along_spin = self.speed_range(1.0)
+        if along_spin is None:
+            return None
+        lower, upper = along_spin
+        least, greatest = self.thrust_factors
+        return lower * abs(lower) * (least if lower > 0.0 else greatest), greatest * upper * upper
 
 
 @dataclass(frozen=True)
@@ -359,6 +373,7 @@ def _set_rotors(root: Any, vehicle: Vehicle, limits: RotorLimits) -> None:
         speed_range = limits.speed_range(spin)
         if speed_range is not None:
             root.find("actuator", f"rotor_speed_{i}").actrange = speed_range
+            root.find("actuator", f"thrust_{i}").ctrlrange = limits.thrust_range
 
 
 def _thrust_gear(vehicle: Vehicle, spin: float) -> tuple[float, ...]:
