@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from time import perf_counter
@@ -21,12 +21,13 @@ import numpy as np
 
 from tiltsim.engine import control_callback
 from tiltsim.flight import End, Flight
-from tiltsim.loop import RECORDER, Floats
+from tiltsim.loop import RECORDER, Floats, Loop
 from tiltsim.loops import control_setup, loop_of
 from tiltsim.plants import (
     MujocoPlant,
     flight_model,
     quiet_warnings,
+    what_decides_the_model,
     worth_native,
 )
 from tiltsim.simulation import Watch, fly_chunk, simulate
@@ -42,6 +43,9 @@ MEMORY: Final = 256 * 2**20
 
 CALL_TIME: Final = 0.25
 """How long (s) a batch flies before Python looks at the rows and at the keyboard."""
+
+Way = str | tuple[Loop, Hashable]
+"""How flights are flown: those of one loop, and with models of one layout, share a batch."""
 
 WINDOW: Final = 512
 """How many scenarios are looked at together to find those that share a batch."""
@@ -112,7 +116,7 @@ def _fly_window(
     keep_samples: bool,
 ) -> Iterator[FlightResult]:
     """Fly scenarios group by group, and put the results back into their order."""
-    groups: dict[str, list[int]] = {}
+    groups: dict[Way, list[int]] = {}
     for index, scenario in enumerate(scenarios):
         groups.setdefault(_way_to_fly(scenario, native), []).append(index)
     done: dict[int, FlightResult] = {}
@@ -140,16 +144,18 @@ def _fly_window(
                 following += 1
 
 
-def _way_to_fly(scenario: Scenario, native: bool) -> str:
-    """``alone``, on the ``thesis`` plant in threads, or the law of the batch to fly in."""
+def _way_to_fly(scenario: Scenario, native: bool) -> Way:
+    """``alone``, on the ``thesis`` plant in threads, or what the rows of a batch have in common."""
     simulation, loop = scenario.simulation, loop_of(scenario)
     wanted = simulation.engine == "native" or (simulation.engine == "auto" and native)
-    if not wanted or loop.watch is None:
+    if not wanted or loop.watch is None or scenario.controller.law == "python":
         return "alone"
     if simulation.plant == "thesis":
         return "thesis"
-    # A stop of the tilt servos is a constraint, which gives a state more numbers.
-    return f"{scenario.controller.law} {scenario.vehicle.tilt_servo.stops}"
+    # A stop of the tilt servos is a constraint, which gives a state more numbers, and ground gives
+    # the model more shapes; a law with a layer around it has states and controls of its own.
+    file = getattr(scenario.vehicle, "mjcf", None)
+    return loop, (scenario.vehicle.tilt_servo.stops, scenario.ground is not None, file)
 
 
 def _in_order(
@@ -290,8 +296,7 @@ class _BatchFlight:
         index, scenario = self._waiting.popleft()
         simulation = scenario.simulation.model_copy(update={"engine": "native"})
         native = scenario.model_copy(update={"simulation": simulation})
-        vehicle, disturbances = scenario.vehicle, scenario.disturbance
-        key = repr((vehicle, disturbances, simulation.timestep, simulation.integrator))
+        key = what_decides_the_model(scenario)
         model = self._models.get(key)
         if model is None:
             if len(self._models) > 2 * self._size:

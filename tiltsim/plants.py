@@ -235,6 +235,13 @@ def flight_model(scenario: Scenario, parameters: int) -> mujoco.MjModel:
     return model
 
 
+def what_decides_the_model(scenario: Scenario) -> str:
+    """Equal for scenarios of one loop that `flight_model` builds equal models for."""
+    simulation = scenario.simulation
+    tables = scenario.vehicle, scenario.model_error, scenario.ground, scenario.disturbance
+    return repr((*tables, simulation.timestep, simulation.integrator))
+
+
 def evaluations_per_step(model: mujoco.MjModel) -> int:
     """How often MuJoCo's integrator asks for controls in a step."""
     return 4 if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else 1

@@ -20,7 +20,7 @@ from tiltsim.figures.style import (
 )
 from tiltsim.metrics import METRICS
 from tiltsim.sweeps.dataset import Column, SweepResults
-from tiltsim.sweeps.tables import ListAxis, NormalAxis, UniformAxis
+from tiltsim.sweeps.tables import GridAxis, NormalAxis, SampledAxis, UniformAxis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -84,7 +84,7 @@ def _kind(results: SweepResults) -> str:
 
 def _drawn(results: SweepResults) -> list[str]:
     axes = results.plan.sweep.axis
-    return [a.targets[0] for a in axes if isinstance(a, UniformAxis | NormalAxis)]
+    return [a.targets[0] for a in axes if isinstance(a, SampledAxis)]
 
 
 def _numeric_axes(results: SweepResults) -> list[str]:
@@ -93,7 +93,7 @@ def _numeric_axes(results: SweepResults) -> list[str]:
 
 
 def _text_axes(results: SweepResults) -> list[str]:
-    keys = [a.targets[0] for a in results.plan.sweep.axis if isinstance(a, ListAxis)]
+    keys = [a.targets[0] for a in results.plan.sweep.axis if isinstance(a, GridAxis)]
     return [key for key in keys if results.columns[key].dtype != np.float64]
 
 
