@@ -112,6 +112,7 @@ class SeedAxis(AxisTable):
 
     type: Literal["seed"]
     start: Annotated[int, Field(ge=0)] = Field(0, description="the first sample's")
+    relative: Literal[False] = False
 
 
 class CasesAxis(AxisTable):
@@ -120,6 +121,7 @@ class CasesAxis(AxisTable):
     type: Literal["cases"]
     key: str = Field(description="a name without a dot: the column that tells which case it is")
     keys: None = None
+    relative: Literal[False] = False
     cases: Annotated[dict[str, dict[str, Any]], Field(min_length=1)] = Field(
         description="tables of the scenario by the name of the case"
     )
