@@ -55,7 +55,7 @@ VERSIONS: Final = ("tiltsim", "mujoco", "numpy", "scipy")
 RESERVED: Final = ("index", "end", "end_time", "cause", "scenario", "flights")
 """Columns of every dataset, besides metrics and versions."""
 
-COSMETIC: Final = ("title", "source", "plot")
+COSMETIC: Final = ("title", "source", "without", "plot")
 """Keys of a sweep file that change no flight."""
 
 
