@@ -199,6 +199,9 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
             axes.set_title(title)
             axes.set_ylabel(_label(metric))
             axes.set_xlabel(_label(x))
+    for axis in results.plan.sweep.plot.log:
+        for axes in grid.flat:
+            getattr(axes, f"set_{axis}scale")("log")
     _share_limits(grid)
     if not completed.all():
         grid[0][0].plot([], [], "x", color=GREY, ms=4, label="lost")
