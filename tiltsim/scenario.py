@@ -470,6 +470,7 @@ class Scenario(Table):
                 "thesis",
                 "its tilt angles follow the gait whatever controller.supervisor says; use mujoco",
             )
+        controller.resolve_supervisor(self.rotorcraft.resolve())
         decoupler = controller.decoupler
         free = kind == "attitude_altitude"
         if free and decoupler != "none":

@@ -86,8 +86,9 @@ def _determinant(axes: Any, flight: Flight) -> Any:
     supervisor = getattr(flight.scenario.controller, "supervisor", None)
     if supervisor is not None:
         axes.axhline(supervisor.min_determinant, color=style.GREY, ls="--", lw=0.9)
-    axes.set_ylim(0.0, 5.0)
-    return np.clip(flight["determinant"], 0.0, 5.0)
+    line = np.maximum(flight["determinant"], 0.0)
+    axes.set_ylim(0.0, max(axes.get_ylim()[1], 4.0, 1.05 * float(line.max())))
+    return line
 
 
 def _supervision(axes: Any, flight: Flight) -> Any:

@@ -127,8 +127,10 @@ def _margin(axes: Any, flight: Flight) -> None:
             *(time, 0.0, 1.0),
             where=acts,
             transform=axes.get_xaxis_transform(),
-            **{"color": style.PALE, "lw": 0.0, "zorder": 0.5, "label": "supervisor acts"},
+            **{"color": style.PALE, "lw": 0.0, "zorder": 0.5},
         )
+        words = "shaded: supervisor acts"
+        axes.text(0.99, 0.03, words, transform=axes.transAxes, ha="right", fontsize=8)
     axes.plot(time, margin, color=style.BLUE)
     axes.plot(time[closest], margin[closest], "o", color=style.RED, ms=5, clip_on=False, zorder=5)
     style.angle_axis(axes, "y", pi / 2)

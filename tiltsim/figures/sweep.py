@@ -37,6 +37,12 @@ _KEY_UNITS: Final = {
     "initial.position": "m",
     "simulation.duration": "s",
     "vehicle.mass": "kg",
+    "vehicle.rotor_time_constant": "s",
+    "vehicle.tilt_servo.natural_frequency": "rad/s",
+    "vehicle.tilt_servo.max_rate": "rad/s",
+    "simulation.control_timestep": "s",
+    "simulation.control_latency": "s",
+    "sensors.attitude_noise": "rad",
 }
 
 
@@ -181,7 +187,8 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
     x, lines, panels = _columns_for(results)
     everything = np.ones(len(results), dtype=bool)
     columns = list(_groups(results, panels, everything))
-    figure, grid = _panel_grid(len(metrics), len(columns), 4.2, 2.7)
+    alone = len(columns) == 1
+    figure, grid = _panel_grid(len(metrics), len(columns), *((5.6, 3.0) if alone else (4.2, 2.7)))
     abscissa, completed = results.values(x), _completed(results)
     for row, metric in zip(grid, metrics):
         for axes, (title, mask) in zip(row, columns):
