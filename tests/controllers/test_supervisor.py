@@ -274,8 +274,9 @@ def test_the_way_to_red_is_no_faster_than_asked():
     share = flight["supervision"]
     gap = np.array([-0.8, 0.1, 0.9, -0.2]) - means
     np.testing.assert_allclose(told, means + np.outer(1.0 - share, gap), atol=1e-12)
-    assert 0.2 < share[-1] < 0.5
-    assert (np.diff(determinant(told, 0.0, 0.0, VEHICLE)) >= 0.0).all()
+    assert (np.diff(share) >= 0.0).all()
+    assert (np.diff(flight["determinant"][1:]) >= 0.0).all()
+    assert 2.35 < flight["determinant"][-1] < 2.4  # ever slower, as there is less to gain
 
 
 @pytest.mark.parametrize(
