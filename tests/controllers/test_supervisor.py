@@ -282,7 +282,6 @@ def test_the_way_to_red_is_no_faster_than_asked():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"simulation.plant": "thesis"}, "its tilt angles follow the gait whatever"),
         ({"controller.supervisor.min_margin": 1.6}, "controller.supervisor.min_margin = 1.6"),
         ({"controller.supervisor.horizon": 1.0}, "strategy = hold or return_to_red"),
         ({"controller.supervisor.clearance": 0.2}, "strategy = return_to_red"),

@@ -27,6 +27,7 @@ from tiltsim.loops.tiltrotor import (
     gait_singularity,
     initial_rotor_speeds,
     observe_tiltrotor,
+    refreshed_controls,
     regularity,
     rotor_spins,
     rotor_stops,
@@ -112,22 +113,6 @@ def supervised_controls(
         *rotor_thrust_controls(act),
         *(u1, u2, u3, u4, x_rate, y_rate, z_rate, governor[1], governor[2]),
     )
-
-
-@scalar
-def refreshed_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
-    """Held controls with the thrusts that belong to the present rotor speeds."""
-    return (
-        *(ctrl[0], ctrl[1], ctrl[2], ctrl[3]),
-        *rotor_thrust_controls(act),
-        *(ctrl[8], ctrl[9], ctrl[10], ctrl[11], ctrl[12], ctrl[13], ctrl[14]),
-    )
-
-
-@scalar
-def refreshed_supervised_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
-    """Held controls with the thrusts that belong to the present rotor speeds."""
-    return (*refreshed_controls(ctrl, act), ctrl[15], ctrl[16])
 
 
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
@@ -300,7 +285,6 @@ SUPERVISED_GAIT_FEEDFORWARD: Final = replace(
     GAIT_FEEDFORWARD,
     sizes=GAIT_FEEDFORWARD.sizes._replace(act=9, ctrl=17),
     controls=supervised_controls,
-    refresh=refreshed_supervised_controls,
     initial_activations=lambda s, _setup: (*initial_rotor_speeds(s), *(0.0,) * 5),
     observe=observe_supervised,
     equations=None,

@@ -189,18 +189,8 @@ def supervised_controls(
 
 @scalar
 def refreshed_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
-    """Held controls with the thrusts that belong to the present rotor speeds."""
-    return (
-        *(ctrl[0], ctrl[1], ctrl[2], ctrl[3]),
-        *rotor_thrust_controls(act),
-        *(ctrl[8], ctrl[9], ctrl[10], ctrl[11]),
-    )
-
-
-@scalar
-def refreshed_supervised_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
-    """Held controls with the thrusts that belong to the present rotor speeds."""
-    return (*refreshed_controls(ctrl, act), ctrl[12], ctrl[13])
+    """Held controls, however many, with the thrusts that belong to the present rotor speeds."""
+    return (*ctrl[:4], *rotor_thrust_controls(act), *ctrl[8:])
 
 
 def servo_lead(servo: ServoTable) -> float:
@@ -447,7 +437,6 @@ SUPERVISED_TILTROTOR: Final = replace(
     TILTROTOR,
     sizes=TILTROTOR.sizes._replace(act=6, ctrl=14),
     controls=supervised_controls,
-    refresh=refreshed_supervised_controls,
     initial_activations=lambda scenario, _setup: (*initial_rotor_speeds(scenario), 0.0, 0.0),
     observe=observe_supervised,
     derive=_derive_supervised,
