@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-import numpy as np
-
 from controllers.attitude_altitude import STATE_FIELDS
 from controllers.decouplers import DECOUPLERS
 from controllers.gait_feedforward import INTEGRAL_FIELDS, Parameters, tracking_inputs
@@ -19,12 +17,11 @@ from tiltsim.controller_tables import AttitudeAltitudeController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
 from tiltsim.loops.tiltrotor import (
-    REFERENCE_COLUMNS,
-    TILT_REFERENCE_COLUMNS,
     follows_position,
     gait_singularity,
     initial_rotor_speeds,
     observe_tiltrotor,
+    reference_columns,
     refreshed_controls,
     regularity,
     rotor_spins,
@@ -105,21 +102,35 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     return ControlSetup(ControlParameters(signature, lead, law), table)
 
 
+@scalar
+def references_in_force(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """Columns of references at a time: the state is the law's, tilt rates and integrals behind."""
+    law = parameters.law
+    x, y, z, _, _, _, _, _, _ = position_reference(time, law.reference, table)
+    _, _, _, _, _, _, _, roll, pitch, yaw = tracking_inputs(
+        time,
+        (
+            *(state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7]),
+            *(state[8], state[9], state[10], state[11], state[12], state[13], state[14]),
+            *(state[15], state[16], state[17], state[18], state[19]),
+        ),
+        (state[20], state[21], state[22], state[23]),
+        (state[24], state[25], state[26]),
+        law,
+        table,
+    )
+    planned = tilt_reference(time, law.gait, table)
+    share = gait_share(planned, state[6], state[7], law.supervisor, drag_ratio(law.vehicle))
+    a1, a2, a3, a4 = servo_commands(planned, share, 0.0)
+    return x, y, z, roll, pitch, yaw, a1, a2, a3, a4
+
+
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    law, table = setup.parameters.law, setup.table
     fields = (*STATE_FIELDS, *TILT_RATE_COLUMNS, *INTEGRAL_FIELDS)
-    values = np.stack([samples[name] for name in fields], axis=-1).tolist()
-    ratio = drag_ratio(law.vehicle)
-    rows = []
-    for time, value in zip(samples["time"].tolist(), values, strict=True):
-        position = position_reference(time, law.reference, table)[:3]
-        attitude = tracking_inputs(time, value[:20], value[20:24], value[24:], law, table)[7:]
-        planned = tilt_reference(time, law.gait, table)
-        share = gait_share(planned, value[6], value[7], law.supervisor, ratio)
-        rows.append((*position, *attitude, *servo_commands(planned, share, 0.0)))
-    names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)
-    columns = np.array(rows).reshape(len(rows), len(names))
-    return dict(zip(names, columns.T, strict=True)) | gait_singularity(samples, law.vehicle)
+    columns = reference_columns(references_in_force, fields, samples, setup)
+    return columns | gait_singularity(samples, setup.parameters.law.vehicle)
 
 
 @scalar

@@ -7,7 +7,7 @@ every engine. It is a pure function of time, `qpos`, `qvel`, `act` and the param
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -200,11 +200,21 @@ def references_in_force(
     return x, y, z, roll, pitch, yaw, a1, a2, a3, a4
 
 
-def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    states = np.stack([samples[name] for name in STATE_FIELDS], axis=-1)
-    rows = evaluate_rows(references_in_force, samples["time"], states, setup)
+def reference_columns(
+    in_force: Callable[..., tuple[float, ...]],
+    fields: Sequence[str],
+    samples: Mapping[str, Floats],
+    setup: ControlSetup,
+) -> dict[str, Floats]:
+    """The columns that a function such as `references_in_force` tells of samples' ``fields``."""
+    states = np.stack([samples[name] for name in fields], axis=-1)
     names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)
-    columns = dict(zip(names, rows.reshape(-1, len(names)).T, strict=True))
+    rows = evaluate_rows(in_force, len(names), samples["time"], states, setup)
+    return dict(zip(names, rows.T, strict=True))
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    columns = reference_columns(references_in_force, STATE_FIELDS, samples, setup)
     return columns | gait_singularity(samples, setup.parameters.law.vehicle)
 
 
