@@ -279,10 +279,6 @@ MISTAKES = {
         {"simulation": {"control_timestep": 0.004, "control_latency": 0.006}},
         "control_latency.*must be 1 to 20 times control_timestep",
     ),
-    "thesis plant": (
-        {"simulation": {"plant": "thesis"}, "vehicle": {"rotor_time_constant": 0.01}},
-        "simulation.plant.*rotor_time_constant",
-    ),
     "nothing to allocate": (
         {"controller": {"allocation": "prioritized"}},
         "allocation.*nothing limits the rotors",

@@ -310,7 +310,7 @@ class ThesisPlant:
             self._advance, self._record = compile_stepper(loop)
             self._law = native_record(loop, setup.userdata)
         else:
-            self._advance = thesis_plant.make_stepper(self._equations.inputs, self._equations.rates)
+            self._advance = thesis_plant.stepper_of(self._equations)
             self._law = slotted(setup.parameters), setup.table
 
     @property

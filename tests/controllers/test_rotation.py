@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from controllers.rotation import (
     euler_from_quaternion,
     quaternion_from_euler,
+    quaternion_from_rotation,
     rotation_from_euler,
     shortest_turn,
     world_up_in_body,
@@ -120,6 +121,15 @@ def test_the_conjugate_is_the_inverse(q):
     there = matrix(euler_from_quaternion(w, x, y, z))
     back = matrix(euler_from_quaternion(w, -x, -y, -z))
     np.testing.assert_allclose(there @ back, np.eye(3), rtol=0, atol=1e-12)
+
+
+@quick
+@given(quaternions)
+def test_a_rotation_gives_its_quaternion_back(q):
+    found = np.array(quaternion_from_rotation(tuple(matrix_of_quaternion(q).ravel())))
+    np.testing.assert_allclose(found * np.sign(found @ q), q, atol=1e-12)
+    longer = quaternion_from_rotation(tuple(1.001 * matrix_of_quaternion(q).ravel()))
+    assert np.linalg.norm(longer) == pytest.approx(1.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
