@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from tests.test_actuation import EVERYTHING
 from tests.test_air_layer import STORM
 from tests.test_laws import GUST, LAWS
 from tiltsim.batch import fly_all
+from tiltsim.flight import End
 from tiltsim.library import shipped_folder
 from tiltsim.loading import merge
 from tiltsim.loops import LOOPS, control_setup, loop_of
@@ -421,6 +424,35 @@ def test_references_are_the_same_floats_natively(gait, decoupler, monkeypatch):
     del flight.__dict__["columns"]
     for name, column in flight.columns.items():
         np.testing.assert_array_equal(column, in_python[name])
+
+
+def test_references_of_the_law_with_gait_rates_are_the_same_floats_natively(monkeypatch):
+    flight = tiltsim.simulate(scenario(LAWS["gait_feedforward"], engine="python", duration=0.1))
+    in_python = dict(flight.columns)
+    monkeypatch.setattr(tiltsim.rows, "ROWS_WORTH_COMPILING", 0)
+    del flight.__dict__["columns"]
+    for name, column in flight.columns.items():
+        np.testing.assert_array_equal(column, in_python[name])
+
+
+def test_columns_beside_a_state_out_of_all_bounds_raise_nothing():
+    """A flight may be lost between two samples by a hundred orders of magnitude."""
+    flight = tiltsim.simulate(scenario(LAWS["gait_feedforward"], engine="python", duration=0.05))
+    samples = flight.samples.copy()
+    samples[-1, 3:] = 1e200  # squares overflow
+    lost = replace(flight, samples=samples, end=End("diverged", 0.05, "test"))
+    columns = lost.columns
+    assert np.isfinite([columns[name][:-1] for name in ("roll_ref", "alpha_ref_1")]).all()
+    assert lost.metrics()["diverged"] is True
+
+
+def test_a_row_without_a_result_is_no_number():
+    setup = control_setup(scenario({}))
+    rows = tiltsim.rows.evaluate_rows(
+        lambda time, state, _parameters, _table: (state[0], time / state[0]),
+        *(2, np.array([1.0, 2.0]), np.array([[0.0], [4.0]]), setup),
+    )
+    np.testing.assert_array_equal(rows, [[np.nan, np.nan], [4.0, 0.5]])
 
 
 def test_whether_native_code_is_cached_is_known_by_law_and_plant(monkeypatch, tmp_path):
