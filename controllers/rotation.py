@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import asin, atan2, cos, sin, sqrt
+from math import asin, atan2, cos, floor, pi, sin, sqrt
 
 from controllers.scalar import Quad, Triple, scalar
 
@@ -32,6 +32,17 @@ def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> Quad:
         cr * sp * cy + sr * cp * sy,
         cr * cp * sy - sr * sp * cy,
     )
+
+
+@scalar
+def shortest_turn(angle: float) -> float:
+    """The angle (rad) within half a revolution either way that turns to the same direction.
+
+    For differences of yaw: a quaternion tells yaw between -pi and pi, a vehicle may cross there.
+    """
+    if abs(angle) > pi:
+        return angle - 2.0 * pi * floor(angle / (2.0 * pi) + 0.5)
+    return angle
 
 
 @scalar

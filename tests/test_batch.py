@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 import tiltsim
+import tiltsim.plants
 import tiltsim.rows
 from controllers.gaits import GAIT_TYPES
 from tests.test_laws import GUST, LAWS
 from tiltsim.batch import fly_all
+from tiltsim.library import shipped_folder
 from tiltsim.loops import LOOPS, control_setup
 from tiltsim.plants import make_plant
 
@@ -120,6 +122,50 @@ def test_rows_may_differ_in_vehicle_time_step_recording_and_duration(integrator)
     )
 
 
+WINDING_UP = {
+    "vehicle": {"model": "tilt_car"},
+    "initial": {"rotor_speed": [3.0, 60.0]},  # where it shall stay: both rotors slow down
+}
+FALLING = {"initial": {"position": [0.0, 0.0, 0.1], "rotor_speed": 200.0}, "controller": EXACT}
+LAGGING = {"vehicle": {"rotor_time_constant": 0.004}, "controller": EXACT}
+BREEZE = {"air": {"wind": [1.0, 0.0, 0.0], "drag": {"linear": [0.1, 0.1, 0.1]}}}
+LIKE_BUT_FOR = {
+    "the model's error": [
+        {"initial": {"attitude": [0.2, -0.1, 0.1]}, "model_error": error}
+        for error in ({}, {"mass": 1.1}, {"inertia": [1.2, 1.2, 1.2]})
+    ],
+    "anti-windup": [
+        {**WINDING_UP, "controller": {"law": "tilt_car_fourth_derivative", "anti_windup": held}}
+        for held in (False, True)
+    ],
+    "ground": [FALLING, {**FALLING, "ground": {}}, {**FALLING, "ground": {"height": 0.02}}],
+    "gait rates": [{}, LAWS["gait_feedforward"]],
+    "layers": [{}, LAGGING, BREEZE, {**LAGGING, **BREEZE, "model_error": {"mass": 1.1}}],
+}
+
+
+@pytest.mark.parametrize("what", LIKE_BUT_FOR)
+def test_flights_that_differ_in_one_thing_do_not_share_what_depends_on_it(what):
+    rows = three_ways([scenario(tables) for tables in LIKE_BUT_FOR[what]])
+    assert len({row.flight.samples[:, 1:4].tobytes() for row in rows}) == len(rows), (
+        "they must not fly alike by themselves"
+    )
+
+
+def test_user_files_with_other_bodies_fly_in_batches_of_their_own(tmp_path):
+    shipped = (shipped_folder("mjcf") / "tiltrotor.xml").read_text(encoding="utf-8")
+    scene = (shipped_folder("mjcf") / "scene.xml").read_text(encoding="utf-8")
+    (tmp_path / "scene.xml").write_text(scene, encoding="utf-8")
+    payload = '<body pos="0 0 -0.05"><geom size="0.01" mass="0.05" contype="0"/></body>'
+    files = {
+        "bare.xml": shipped,
+        "loaded.xml": shipped.replace('<site name="imu"/>', payload + '<site name="imu"/>'),
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    three_ways([scenario({"vehicle": {"mjcf": str(tmp_path / name)}}) for name in files])
+
+
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
 def test_lost_flights_end_on_the_same_step_with_the_same_cause(plant):
     rows = three_ways(
@@ -171,6 +217,17 @@ def test_all_kinds_of_flights_together():
     assert results[0].flight.engine == "python"
     assert results[2].flight.engine == "native"
     assert mujoco.get_mjcb_control() is None
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_many_short_flights_are_worth_the_native_engine(plant, monkeypatch):
+    wanted = [scenario({}, engine="auto", plant=plant, duration=0.05)] * 6
+    monkeypatch.setattr(tiltsim.plants, "STEPS_WORTH_LOADING", 300)
+    monkeypatch.setattr(tiltsim.plants, "STEPS_WORTH_COMPILING", 300)
+    results = list(fly_all(wanted, keep_samples=True))
+    assert {result.flight.engine for result in results} == {"native"}
+    assert [result.scenario for result in results] == wanted
+    assert next(fly_all(wanted[:1], keep_samples=True)).flight.engine == "python"
 
 
 def test_no_flights_give_no_results():

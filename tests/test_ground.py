@@ -59,7 +59,7 @@ def test_without_ground_nothing_touches():
     model = compile_model("tiltrotor", VEHICLE, visuals=False)
     assert model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT
     assert model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-    assert model.ngeom == 1  # the ground that is drawn
+    assert model.ngeom == 0
 
 
 def test_engines_take_off_alike():

@@ -336,15 +336,16 @@ class ThesisPlant:
 
     def advance(self, steps: int) -> None:
         """See `Plant.advance`."""
-        native = self.engine == "native"
-        state = np.array(self._state) if native else self._state
+        state: Any = np.array(self._state) if self.engine == "native" else self._state
         try:
             state, self._held = self._advance(
                 *(self._step_index, state, self._held, self._timestep, steps),
                 *(self._control_steps, *self._law, self._disturbance),
             )
-            self._state = list(state)
+            self._state = list(map(float, state))  # numpy's own floats would warn of infinity
         except (ArithmeticError, ValueError):
+            # Where floats raise, native code has NaN.
+            self._state = [nan] * len(self._state)
             self._fault = "the control law left the range of floating-point numbers"
         self._step_index += steps
 
@@ -370,7 +371,7 @@ class ThesisPlant:
             *(self._step_index, np.array(self._state), self._held, self._timestep, steps),
             *(self._control_steps, *self._law, self._disturbance),
         )
-        self._state = list(state)
+        self._state = state.tolist()
         native_code_was_compiled(self._loop.native_name("thesis"))
         self._step_index += samples * steps
         return None if recorder.lost else recorder.samples

@@ -14,6 +14,7 @@ from controllers.rotation import (
     quaternion_from_euler,
     quaternion_from_rotation,
     rotation_from_euler,
+    shortest_turn,
     world_up_in_body,
 )
 
@@ -138,3 +139,12 @@ def test_rounding_at_vertical_pitch_does_not_leave_the_domain(sign):
     assert pitch == sign * pi / 2
     assert isfinite(roll)
     assert isfinite(yaw)
+
+
+@quick
+@given(st.floats(-1e3, 1e3))
+def test_the_shortest_turn_leads_to_the_same_direction(angle):
+    turn = shortest_turn(angle)
+    assert abs(turn) <= pi + 1e-12
+    assert (cos(turn), sin(turn)) == pytest.approx((cos(angle), sin(angle)), abs=1e-12)
+    assert abs(angle) > pi or turn == angle
