@@ -178,6 +178,11 @@ class Scenario(Table):
 
     title: str = ""
     source: str = ""
+    without: str = Field(
+        "",
+        description="address of the same flight without what this one shows, #NAME in the same "
+        "file: tiltsim report sets them side by side",
+    )
     vehicle: VehicleUnion = VehicleTable()
     model_error: ModelErrorTable = ModelErrorTable()
     simulation: SimulationTable = SimulationTable()
