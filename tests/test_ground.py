@@ -75,7 +75,7 @@ def test_engines_take_off_alike():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"simulation.plant": "thesis"}, "the thesis' equations know no ground"),
+        ({"simulation.plant": "thesis"}, "its equations know no contact with ground"),
         ({"initial.position": [0.0, 0.0, -0.1]}, "below ground.height = 0.0"),
         ({"ground.friction": 0.0}, "ground.friction = 0.0"),
     ],

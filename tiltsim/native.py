@@ -42,7 +42,7 @@ from tiltsim.loop import (
     Loop,
 )
 from tiltsim.mjdata_layout import mjdata_layout
-from tiltsim.thesis_plant import make_stepper
+from tiltsim.thesis_plant import stepper_of
 
 # Division by zero gives infinity or NaN, as in C; MuJoCo then reports a bad control.
 _OPTIONS: Final = {"error_model": "numpy", "cache": native_code_can_be_kept()}
@@ -245,16 +245,9 @@ def compile_callbacks(loop: Loop) -> Callbacks:
     The cache knows the callback by the values it closes over, so these must pickle to the same
     bytes in every process: module-level functions, numbers and dtypes do.
     """
-    _register_scalar_functions()
-    controls, refresh, signature = loop.controls, loop.refresh, loop.signature
+    controls, hold, signature = loop.controls, loop.held, loop.signature
     observe, watch = loop.observe, loop.watch or watch_nothing
-
-    @register_jitable(error_model="numpy")
-    def only_refresh(time, qpos, qvel, act, ctrl, parameters):  # type: ignore[no-untyped-def]
-        return refresh(ctrl, act)
-
-    hold = loop.hold or only_refresh
-
+    _register_scalar_functions()
     limit_exceeded = loop.kind.limit_exceeded
     nq, nv, na, nu = loop.sizes
     at = mjdata_layout()
@@ -320,7 +313,7 @@ def compile_stepper(loop: Loop) -> tuple[Any, Any]:
     """Compile the thesis plant's solver for a loop, or load it from the cache on disk.
 
     Returns ``(advance, record)``. The first takes and returns what
-    `tiltsim.thesis_plant.make_stepper` says, but for the state, which is an array. The second takes
+    `tiltsim.thesis_plant.stepper_of` says, but for the state, which is an array. The second takes
     in front of that the address of a `Recorder` and a number of samples; it stops where recording
     is over. Neither holds Python's lock.
     """
@@ -329,7 +322,7 @@ def compile_stepper(loop: Loop) -> tuple[Any, Any]:
     inputs, observe = loop.equations.inputs, loop.equations.observe
     watch = loop.watch or watch_nothing
     limit_exceeded = loop.kind.limit_exceeded
-    stepper = register_jitable(error_model="numpy")(make_stepper(inputs, loop.equations.rates))
+    stepper = register_jitable(error_model="numpy")(stepper_of(loop.equations))
 
     @njit(nogil=True, **_OPTIONS)
     def advance(  # type: ignore[no-untyped-def]
@@ -403,8 +396,9 @@ def evaluate_natively(
     function: Callable[..., tuple[float, ...]], time: Floats, states: Floats, setup: ControlSetup
 ) -> Floats:
     """See `tiltsim.rows.evaluate_rows`, which takes at least one row to here."""
-    head = record_size(type(setup.parameters))
-    parameters = setup.userdata[:head].view(record_dtype(type(setup.parameters)))[0]
+    record: Any = type(setup.parameters)
+    head = record_size(record)
+    parameters = setup.userdata[:head].view(record_dtype(record))[0]
     time, states = np.ascontiguousarray(time), np.ascontiguousarray(states)
     table = np.array(setup.table)
     values: Floats = _compile_rows(function)(time, states, parameters, table)
