@@ -28,6 +28,7 @@ from tiltsim.plants import (
     flight_model,
     make_plant,
     quiet_warnings,
+    what_decides_the_model,
     worth_native,
 )
 from tiltsim.simulation import Watch, fly_chunk, simulate
@@ -113,7 +114,7 @@ def _fly_window(
     keep_samples: bool,
 ) -> Iterator[FlightResult]:
     """Fly scenarios group by group, and put the results back into their order."""
-    groups: dict[Way, list[int]] = {}
+    groups: dict[object, list[int]] = {}
     for index, scenario in enumerate(scenarios):
         groups.setdefault(_way_to_fly(scenario, native), []).append(index)
     done: dict[int, FlightResult] = {}
@@ -143,7 +144,7 @@ def _fly_window(
                 following += 1
 
 
-def _way_to_fly(scenario: Scenario, native: bool) -> Way:
+def _way_to_fly(scenario: Scenario, native: bool) -> object:
     """``alone``, on the ``thesis`` plant in threads, or what the rows of a batch have in common."""
     simulation, loop = scenario.simulation, loop_of(scenario)
     wanted = simulation.engine == "native" or (simulation.engine == "auto" and native)
@@ -154,7 +155,7 @@ def _way_to_fly(scenario: Scenario, native: bool) -> Way:
     # A stop of the tilt servos is a constraint, which gives a state more numbers, and ground gives
     # the model more shapes; a law with a layer around it has states and controls of its own.
     file = getattr(scenario.vehicle, "mjcf", None)
-    return loop, (scenario.vehicle.tilt_servo.stops, scenario.ground is not None, file)
+    return loop, scenario.vehicle.tilt_servo.stops, scenario.ground is not None, file
 
 
 def _natively(scenario: Scenario) -> Scenario:
