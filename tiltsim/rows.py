@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tiltsim.interrupts import interrupts_kept
+
 if TYPE_CHECKING:
     from tiltsim.loop import ControlSetup, Floats
 
@@ -27,7 +29,8 @@ def evaluate_rows(
     if evaluated >= ROWS_WORTH_COMPILING:
         from tiltsim.native import evaluate_natively
 
-        return evaluate_natively(function, time, states, setup)
+        with interrupts_kept():
+            return evaluate_natively(function, time, states, setup)
     parameters, table = setup.parameters, setup.table
     rows = [function(t, s, parameters, table) for t, s in zip(time.tolist(), states.tolist())]
     return np.array(rows)
