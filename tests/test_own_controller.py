@@ -336,7 +336,7 @@ def raises(seen):
     return 1.0 / (0.0 if seen.time > 0.0349 else 1.0) and STILL
 
 
-class UnspeakableError(Exception):
+class MuteError(Exception):
     def __str__(self):
         raise ValueError
 
@@ -345,7 +345,7 @@ class UnspeakableError(Exception):
 
 def raises_unspeakably(seen):
     if seen.time > 0.0349:
-        raise UnspeakableError
+        raise MuteError
     return STILL
 
 
@@ -379,9 +379,9 @@ def returning(value):
             ["tilt_angles[3] = inf"],
         ),
         (returning(Command(thrusts=[10**400] * 4)), ["; 4 numbers are wanted"]),
-        (returning(UnspeakableError()), ["returned a UnspeakableError; a tiltsim.Command is wanted"]),
+        (returning(MuteError()), ["returned a MuteError; a tiltsim.Command is wanted"]),
         (leaves, ["leaves raised SystemExit: 5"]),
-        (raises_unspeakably, ["raises_unspeakably raised UnspeakableError (test_own_controller.py"]),
+        (raises_unspeakably, ["raises_unspeakably raised MuteError (test_own_controller.py"]),
     ],
 )
 def test_a_failing_controller_ends_the_flight_with_one_line_and_a_log(law, words):
