@@ -64,6 +64,8 @@ def collect(paths: Iterable[str]) -> list[str]:
 
 
 def _find(name: str) -> Path:
+    if not name:
+        raise InputError("no scenario named; see tiltsim list")
     library = shipped_folder("scenarios")
     for place in (Path(name), library / name, library / f"{name}.toml"):
         if place.exists():

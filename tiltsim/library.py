@@ -57,7 +57,9 @@ def scenario_files(path: Path) -> list[Path]:
     """All scenario files under a folder, sorted, sweeps left out; a file stands for itself."""
     if not path.is_dir():
         return [path]
-    return sorted(file for file in path.rglob("*.toml") if not is_sweep(file))
+    # What is no ordinary file is none of ours, but a broken link is told of.
+    files = (file for file in path.rglob("*.toml") if file.is_file() or file.is_symlink())
+    return sorted(file for file in files if not is_sweep(file))
 
 
 def is_sweep(file: Path) -> bool:

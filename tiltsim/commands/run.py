@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.out is not None:
         prepare_folder(arguments.out)
     if arguments.rerun is not None:
-        prepare_file("--rerun", arguments.rerun)
+        prepare_file("--rerun", arguments.rerun, (".rrd",))
 
     from controllers.vehicle import Vehicle
     from tiltsim.analysis import gait_warnings

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.errors import InputError
+from tiltsim.files import replacing
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -27,7 +28,7 @@ PALE: Final = "#E4EEF3"
 CYCLE: Final = (BLUE, RED, GREEN, PURPLE, AMBER, SKY, INK)
 SEQUENTIAL: Final = "cividis"
 
-FORMATS: Final = ("pdf", "png", "svg")
+FORMATS: Final = (".png", ".svg", ".pdf")
 """File formats of a figure, by the ending of the file."""
 
 _SETTINGS: Final = {
@@ -89,39 +90,21 @@ def angle_axis(axes: Axes, axis: str, limit: float) -> None:
     set_limits(-limit, limit)
 
 
-def check_target(path: Path) -> None:
-    """Refuse a file that `save` could not write, before any work is done for it.
-
-    Raises
-    ------
-    InputError
-        If the format is unknown, or the file or its folder is missing or closed.
-    """
-    ending = path.suffix.lstrip(".").lower()
-    if ending not in FORMATS:
-        raise InputError(f"--plot {path}: unknown format {ending!r}; choose {', '.join(FORMATS)}")
-    if path.is_dir():
-        raise InputError(f"--plot {path}: is a folder")
-    if not path.absolute().parent.is_dir():
-        raise InputError(f"--plot {path}: its folder does not exist")
-    if not os.access(path if path.exists() else path.absolute().parent, os.W_OK):
-        raise InputError(f"--plot {path}: cannot be written: permission denied")
-
-
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure; the ending of ``path`` chooses the format.
+    """Write a figure whole or not at all; the ending of ``path`` chooses the format.
 
-    Equal figures give equal files: no date is written.
+    Equal figures give equal files: no date is written. Callers have asked
+    `tiltsim.files.prepare_file` whether the file can be written.
 
     Raises
     ------
     InputError
-        As `check_target`, or if writing fails.
+        If writing fails.
     """
-    check_target(path)
+    ending = path.suffix.lower()
     undated = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
     try:
-        with paper_style():
-            figure.savefig(path, metadata=undated.get(path.suffix.lower()))
+        with paper_style(), replacing(path) as temporary:
+            figure.savefig(temporary, format=ending[1:], metadata=undated.get(ending))
     except OSError as error:
-        raise InputError(f"--plot {path}: cannot be written: {error.strerror}") from error
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from error
