@@ -100,7 +100,9 @@ def library_entries() -> Iterator[Entry]:
         variants = document.get("variant", [])
         for variant in variants or [{}]:
             address = f"{name}#{variant['name']}" if "name" in variant else name
-            title = variant.get("title", document.get("title", ""))
+            title = document.get("title", "")
+            if variant:
+                title = variant.get("title") or f"{title}: {_differences(document, variant)}"
             yield Entry(address, title, variant.get("source", document.get("source", "")))
 
 

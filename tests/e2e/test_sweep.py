@@ -171,7 +171,7 @@ def test_plot_draws_distributions(tmp_path):
     out = swept(short_sweep(tmp_path / "sweep.toml", count=8), tmp_path / "out")
     figure = sweep_figure(load_results(out), ("max_abs_roll", "max_abs_pitch"))
     curve = figure.subfigs[0].axes[0].lines[0]
-    assert list(curve.get_ydata()) == [step / 8 for step in range(1, 9)]
+    assert list(curve.get_ydata()) == [step / 8 for step in range(9)]
     assert list(curve.get_xdata()) == sorted(curve.get_xdata())
 
 

@@ -24,9 +24,24 @@ PURPLE: Final = "#CC79A7"
 SKY: Final = "#56B4E9"
 INK: Final = "#222222"
 GREY: Final = "#8A8A8A"
-PALE: Final = "#E4EEF3"
+PALE: Final = "#D6E6EF"
 CYCLE: Final = (BLUE, RED, GREEN, PURPLE, AMBER, SKY, INK)
+DASHES: Final[tuple[Any, ...]] = (
+    *("-", (0, (6, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2))),
+    *((0, (3, 1)), (0, (10, 3)), (0, (3, 1, 1, 1, 1, 1))),
+)
+MARKERS: Final = "os^DvPX"
+"""Dashes and markers that go with the colours of `CYCLE`, for prints without colour."""
 SEQUENTIAL: Final = "cividis"
+
+# Equal angles and speeds would hide each other: later lines are thinner and broken.
+ROTOR_LINES: Final[tuple[dict[str, Any], ...]] = (
+    {"color": AMBER, "ls": "-", "lw": 3.0},
+    {"color": BLUE, "ls": "-", "lw": 1.8},
+    {"color": INK, "ls": (0, (4, 2)), "lw": 1.2},
+    {"color": SKY, "ls": (0, (1, 1.2)), "lw": 1.6},
+)
+"""How the lines of rotors 1 to 4 are drawn in one panel, in this order."""
 
 FORMATS: Final = (".png", ".svg", ".pdf")
 """File formats of a figure, by the ending of the file."""
@@ -88,6 +103,11 @@ def angle_axis(axes: Axes, axis: str, limit: float) -> None:
     set_ticks([step * pi / 4 for step in steps], [labels[step] for step in steps])
     set_limits: Any = getattr(axes, f"set_{axis}lim")
     set_limits(-limit, limit)
+
+
+def time_axis(axes: Axes, end: float) -> None:
+    """Limits from zero to the end of a flight (s), which may have ended where it began."""
+    axes.set_xlim(0.0, end if end > 0.0 else 1.0)
 
 
 def save(figure: Figure, path: Path) -> None:
