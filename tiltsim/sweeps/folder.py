@@ -64,6 +64,18 @@ class SweepFolder:
         """Numbers of the chunks that are safe on disk."""
         return {int(file.stem) for file in self._parts.glob("[0-9]*.parquet")}
 
+    @property
+    def is_joined(self) -> bool:
+        """Whether the dataset is there and whole."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        try:
+            pq.read_schema(self.dataset)
+        except (OSError, pa.ArrowException):
+            return False
+        return True
+
     def keep(self, part: Part) -> None:
         """Make a finished chunk safe: when this returns, no crash can lose it."""
         for index, flight in part.flights.items():
@@ -131,7 +143,9 @@ def read_definition(file: Path) -> Definition:
     """The definition that a folder was made for. Raises InputError where it cannot be read."""
     try:
         return Definition.from_json(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError, TypeError) as error:
+    except TypeError:
+        raise InputError(f"{file}: not the definition of a sweep: keys are missing") from None
+    except (OSError, ValueError) as error:
         raise InputError(f"{file}: not the definition of a sweep: {error}") from None
 
 
