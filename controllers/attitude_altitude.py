@@ -32,7 +32,7 @@ from controllers.decoupling_matrix import (
 from controllers.gaits import GaitParameters
 from controllers.gaits.keyframes import NO_KEYFRAMES
 from controllers.references import ReferenceParameters, position_reference
-from controllers.rotation import world_up_in_body
+from controllers.rotation import shortest_turn, world_up_in_body
 from controllers.scalar import Quad, scalar
 from controllers.vehicle import Vehicle, drag_ratio
 
@@ -175,7 +175,8 @@ def rotor_accelerations(
     pitch_jerk = (
         gains.pitch_3 * (pitch_ref - pitch) - gains.pitch_2 * q - gains.pitch_1 * pitch_acceleration
     )
-    yaw_jerk = gains.yaw_3 * (yaw_ref - yaw) - gains.yaw_2 * r - gains.yaw_1 * yaw_acceleration
+    yaw_error = shortest_turn(yaw_ref - yaw)
+    yaw_jerk = gains.yaw_3 * yaw_error - gains.yaw_2 * r - gains.yaw_1 * yaw_acceleration
     altitude_jerk = (
         gains.altitude_3 * (z_ref - z)
         + gains.altitude_2 * (vz_ref - vz)

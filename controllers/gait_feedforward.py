@@ -53,7 +53,7 @@ from controllers.jets import (
     jet_sum,
 )
 from controllers.references import ReferenceParameters, reference_derivatives
-from controllers.rotation import rotation_from_euler
+from controllers.rotation import rotation_from_euler, shortest_turn
 from controllers.scalar import Quad, Triple, scalar
 from controllers.supervisor import Supervisor, gait_share
 from controllers.vehicle import Vehicle, drag_ratio
@@ -504,7 +504,7 @@ def tracking_inputs(
 
     # Third-order laws on the attitude, as ch. 4, Eq. (26), around references that move.
     most = parameters.max_angular_acceleration
-    yaw_error = atan2(sin(reference.yaw - yaw), cos(reference.yaw - yaw))
+    yaw_error = shortest_turn(reference.yaw - yaw)
     roll_jerk = attitude_jerk(roll_ref, roll_now, gains.roll_1, gains.roll_2, gains.roll_3, most)
     pitch_jerk = attitude_jerk(
         pitch_ref, pitch_now, gains.pitch_1, gains.pitch_2, gains.pitch_3, most

@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 
 from controllers.gaits.keyframes import NO_KEYFRAMES
 from controllers.references import ReferenceParameters, position_reference
+from controllers.rotation import shortest_turn
 from controllers.scalar import Quad, scalar
 from controllers.vehicle import Vehicle
 from controllers.yaw_position import State, euler_rates, gyroscopic_acceleration
@@ -62,7 +63,7 @@ def attitude_altitude_inputs(
     k1, k2 = gains.attitude_1, gains.attitude_2
     roll_acceleration = k2 * (reference.roll - roll) - k1 * roll_rate
     pitch_acceleration = k2 * (reference.pitch - pitch) - k1 * pitch_rate
-    yaw_acceleration = k2 * (reference.yaw - yaw) - k1 * yaw_rate
+    yaw_acceleration = k2 * shortest_turn(reference.yaw - yaw) - k1 * yaw_rate
     forward = cos_pitch * yaw_acceleration - sin_pitch * pitch_rate * yaw_rate
     p_rate = roll_acceleration - sin_pitch * yaw_acceleration - cos_pitch * pitch_rate * yaw_rate
     q_rate = cos_roll * pitch_acceleration + sin_roll * forward + roll_rate * r

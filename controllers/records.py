@@ -8,6 +8,7 @@ head of MuJoCo's ``userdata``, so the parameters of a flight are part of its sta
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from functools import cache
 from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
@@ -52,18 +53,27 @@ def make_record_type(name: str, **fields: type) -> Any:
 
 
 def _take(record_type: Any, values: Iterator[float]) -> Any:
-    fields = get_type_hints(record_type).values()
     return record_type(
-        *(_take(kind, values) if _is_record(kind) else next(values) for kind in fields)
+        *(
+            _take(kind, values) if _is_record(kind) else next(values)
+            for kind in _fields(record_type).values()
+        )
     )
 
 
+@cache
+def _fields(record_type: type[tuple[Any, ...]]) -> dict[str, Any]:
+    """Types by name; to ask for them takes longer than many a flight's metrics."""
+    return get_type_hints(record_type)
+
+
+@cache
 def record_dtype(record_type: type[tuple[Any, ...]]) -> np.dtype[np.void]:
     """The structured dtype (all float64, no padding) with the record's field names."""
     return np.dtype(
         [
             (name, record_dtype(kind) if _is_record(kind) else np.float64)
-            for name, kind in get_type_hints(record_type).items()
+            for name, kind in _fields(record_type).items()
         ]
     )
 

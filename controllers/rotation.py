@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import asin, atan2, cos, sin
+from math import asin, atan2, cos, floor, pi, sin, sqrt
 
 from controllers.scalar import Quad, Triple, scalar
 
@@ -32,6 +32,17 @@ def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> Quad:
         cr * sp * cy + sr * cp * sy,
         cr * cp * sy - sr * sp * cy,
     )
+
+
+@scalar
+def shortest_turn(angle: float) -> float:
+    """The angle (rad) within half a revolution either way that turns to the same direction.
+
+    For differences of yaw: a quaternion tells yaw between -pi and pi, a vehicle may cross there.
+    """
+    if abs(angle) > pi:
+        return angle - 2.0 * pi * floor(angle / (2.0 * pi) + 0.5)
+    return angle
 
 
 @scalar
@@ -74,3 +85,23 @@ def rotation_from_quaternion(w: float, x: float, y: float, z: float) -> tuple[fl
         2.0 * (y * z + w * x),
         1.0 - 2.0 * (x * x + y * y),
     )
+
+
+@scalar
+def quaternion_from_rotation(rotation: tuple[float, ...]) -> Quad:
+    """A unit quaternion (scalar first) of a body-to-world rotation, nine entries, rows first.
+
+    Twice the products of its largest component with all four stand in the rotation; which one is
+    the largest shows on the diagonal. What rounding has added to the rotation's length is left out.
+    """
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
+    if r11 + r22 + r33 >= max(r11, r22, r33):
+        w, x, y, z = 1.0 + r11 + r22 + r33, r32 - r23, r13 - r31, r21 - r12
+    elif r11 >= r22 and r11 >= r33:
+        w, x, y, z = r32 - r23, 1.0 + r11 - r22 - r33, r12 + r21, r13 + r31
+    elif r22 >= r33:
+        w, x, y, z = r13 - r31, r12 + r21, 1.0 - r11 + r22 - r33, r23 + r32
+    else:
+        w, x, y, z = r21 - r12, r13 + r31, r23 + r32, 1.0 - r11 - r22 + r33
+    scale = 1.0 / sqrt(w * w + x * x + y * y + z * z)
+    return scale * w, scale * x, scale * y, scale * z

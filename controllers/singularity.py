@@ -137,11 +137,25 @@ def torque_free_direction(angles: ArrayLike, vehicle: Vehicle) -> Array:
     force = np.stack(torque_free_force(trig, torque, ratio), axis=-1)
     length = np.linalg.norm(force, axis=-1, keepdims=True)
     inputs = np.linalg.norm(np.stack(torque_free_inputs(torque), axis=-1), axis=-1)
-    full_rank = rank(angles, vehicle) == 3
+    full_rank = _has_full_rank(np.asarray(angles, float), torque, inputs, vehicle)
     pushes = 2.0 * ratio * length[..., 0] > RANK_TOLERANCE * inputs
     with np.errstate(invalid="ignore", divide="ignore"):
         direction = force / length * np.where(force[..., 2:] < 0.0, -1.0, 1.0)
     return np.where((full_rank & pushes)[..., np.newaxis], direction, np.nan)
+
+
+def _has_full_rank(angles: Array, torque: Any, inputs: Array, vehicle: Vehicle) -> Any:
+    """``rank(angles, vehicle) == 3``, by singular values only where a bound does not tell.
+
+    The torque-free inputs are the 3 x 3 minors of ``tau``, so that their norm is the product of its
+    three singular values and, divided by the third power of its Frobenius norm, no more than the
+    smallest over the largest.
+    """
+    frobenius = np.linalg.norm(np.stack(torque, axis=-1), axis=-1)
+    full = np.asarray(inputs > 2.0 * RANK_TOLERANCE * frobenius**3)
+    if not full.all():
+        full[~full] = rank(angles[~full], vehicle) == 3
+    return full
 
 
 def singularity_margin(

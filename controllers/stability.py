@@ -114,17 +114,21 @@ def longest_lag(gains: Sequence[float]) -> float:
 
 
 def delay_margin(gains: Sequence[float]) -> float:
-    """The delay (s) of the input at which a third-order loop turns unstable.
+    """The delay (s) of the input at which a third-order loop turns unstable, 0 if it is already.
 
-    The open loop ``(K1 s^2 + K2 s + K3) / s^3`` has gain one at a single frequency; the delay uses
-    up the phase margin there. A command held for a period delays by half of it.
+    Where the open loop ``(K1 s^2 + K2 s + K3) / s^3`` has gain one, at up to three frequencies, a
+    delay uses up the phase margin; the least delay counts. A command held for a period delays by
+    half of it.
     """
     k1, k2, k3 = gains
+    if not is_hurwitz((1.0, k1, k2, k3)):
+        return 0.0
     squares = np.roots([1.0, -k1 * k1, 2.0 * k1 * k3 - k2 * k2, -k3 * k3])
-    crossing = float(np.sqrt(max(squares[np.abs(squares.imag) < 1e-9 * np.abs(squares)].real)))
-    s = 1j * crossing
-    phase = np.angle((k1 * s * s + k2 * s + k3) / s**3)
-    return float((np.pi + phase) % (2.0 * np.pi)) / crossing
+    real = squares[np.abs(squares.imag) < 1e-9 * np.abs(squares)].real
+    crossings = np.sqrt(real[real > 0.0])
+    s = 1j * crossings
+    phases = np.angle((k1 * s * s + k2 * s + k3) / s**3)
+    return float((((np.pi + phases) % (2.0 * np.pi)) / crossings).min())
 
 
 def feedforward_loops(gains: Gains, integral: IntegralGains) -> list[Loop]:

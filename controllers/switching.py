@@ -19,7 +19,7 @@ import controllers.quadrotor_attitude_altitude as attitude_altitude
 import controllers.yaw_position as yaw_position
 from controllers.gaits.keyframes import NO_KEYFRAMES
 from controllers.quadrotor_attitude_altitude import attitude_altitude_inputs
-from controllers.references import position_reference
+from controllers.references import reference_derivatives
 from controllers.scalar import scalar
 from controllers.yaw_position import Inputs, State, euler_rates, yaw_position_inputs
 
@@ -76,9 +76,8 @@ def flown_thrust_rate(
     """Rate (N/s) of the thrust that the attitude-altitude law makes, ``thrust`` in N."""
     vz, roll, pitch = state[5], state[6], state[7]
     vehicle, gains = parameters.yaw_position.vehicle, parameters.attitude_altitude
-    _, _, _, _, _, vz_ref, _, _, az_ref = position_reference(
-        time, parameters.yaw_position.reference, table
-    )
+    reference = reference_derivatives(time, parameters.yaw_position.reference, table)
+    vz_ref, az_ref = reference[5], reference[8]
     upright = cos(roll) * cos(pitch)
     if upright == 0.0:
         return nan

@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 
 from controllers.gaits.keyframes import NO_KEYFRAMES
 from controllers.references import ReferenceParameters, reference_derivatives
-from controllers.rotation import rotation_from_euler
+from controllers.rotation import rotation_from_euler, shortest_turn
 from controllers.scalar import Quad, Triple, scalar
 from controllers.vehicle import Vehicle
 from controllers.z_down import attitude_turned_over, state_turned_over, turned_over
@@ -211,7 +211,7 @@ def wanted_derivatives(
         sx_ref + k1 * (jx_ref - jx) + k2 * (ax_ref - ax) + k3 * (vx_ref - vx) + k4 * (x_ref - x),
         sy_ref + k1 * (jy_ref - jy) + k2 * (ay_ref - ay) + k3 * (vy_ref - vy) + k4 * (y_ref - y),
         sz_ref + k1 * (jz_ref - jz) + k2 * (az_ref - az) + k3 * (vz_ref - vz) + k4 * (z_ref - z),
-        gains.yaw_2 * (yaw_ref - yaw) - gains.yaw_1 * yaw_rate,
+        gains.yaw_2 * shortest_turn(yaw_ref - yaw) - gains.yaw_1 * yaw_rate,
     )
 
 

@@ -112,7 +112,7 @@ def test_a_falling_body_feels_drag_alone():
 def test_turbulence_is_logged_as_it_blows():
     flight = fly(STORM)
     states = np.stack([flight[f"dryden_{i}"] for i in range(1, 6)], axis=-1)
-    turbulence = loop_of(flight.scenario).setup(flight.scenario, 0.0).parameters.surroundings.air
+    turbulence = loop_of(flight.scenario).setup(flight.scenario, 0.0).parameters.layer.air
     x, y, z = dryden_velocity(tuple(states[0]), turbulence.turbulence)
     start = [flight[name][0] for name in ("air_vx", "air_vy", "air_vz")]
     np.testing.assert_allclose(start, [4.0 + x, 1.0 + y, z])
@@ -165,8 +165,3 @@ def test_mistakes_are_refused_in_words(name):
     air, words = MISTAKES[name]
     with pytest.raises(InputError, match=words):
         scenario(air)
-
-
-def test_the_thesis_plant_has_no_air():
-    with pytest.raises(InputError, match=r"simulation.plant.*air"):
-        scenario(STORM, {"plant": "thesis"})

@@ -7,12 +7,17 @@ import numpy as np
 import pytest
 
 import tiltsim
+import tiltsim.plants
 import tiltsim.rows
 from controllers.gaits import GAIT_TYPES
+from tests.test_actuation import EVERYTHING
+from tests.test_air_layer import STORM
 from tests.test_laws import GUST, LAWS
 from tiltsim.batch import fly_all
-from tiltsim.loops import LOOPS, control_setup
-from tiltsim.plants import make_plant
+from tiltsim.library import shipped_folder
+from tiltsim.loading import merge
+from tiltsim.loops import LOOPS, control_setup, loop_of
+from tiltsim.plants import flight_model, make_plant, what_decides_the_model
 
 TROT = {"amplitude": 0.3, "period": 0.8}
 GAITS = {
@@ -120,6 +125,50 @@ def test_rows_may_differ_in_vehicle_time_step_recording_and_duration(integrator)
     )
 
 
+WINDING_UP = {
+    "vehicle": {"model": "tilt_car"},
+    "initial": {"rotor_speed": [3.0, 60.0]},  # where it shall stay: both rotors slow down
+}
+FALLING = {"initial": {"position": [0.0, 0.0, 0.1], "rotor_speed": 200.0}, "controller": EXACT}
+LAGGING = {"vehicle": {"rotor_time_constant": 0.004}, "controller": EXACT}
+BREEZE = {"air": {"wind": [1.0, 0.0, 0.0], "drag": {"linear": [0.1, 0.1, 0.1]}}}
+LIKE_BUT_FOR = {
+    "the model's error": [
+        {"initial": {"attitude": [0.2, -0.1, 0.1]}, "model_error": error}
+        for error in ({}, {"mass": 1.1}, {"inertia": [1.2, 1.2, 1.2]})
+    ],
+    "anti-windup": [
+        {**WINDING_UP, "controller": {"law": "tilt_car_fourth_derivative", "anti_windup": held}}
+        for held in (False, True)
+    ],
+    "ground": [FALLING, {**FALLING, "ground": {}}, {**FALLING, "ground": {"height": 0.02}}],
+    "gait rates": [{}, LAWS["gait_feedforward"]],
+    "layers": [{}, LAGGING, BREEZE, {**LAGGING, **BREEZE, "model_error": {"mass": 1.1}}],
+}
+
+
+@pytest.mark.parametrize("what", LIKE_BUT_FOR)
+def test_flights_that_differ_in_one_thing_do_not_share_what_depends_on_it(what):
+    rows = three_ways([scenario(tables) for tables in LIKE_BUT_FOR[what]])
+    assert len({row.flight.samples[:, 1:4].tobytes() for row in rows}) == len(rows), (
+        "they must not fly alike by themselves"
+    )
+
+
+def test_user_files_with_other_bodies_fly_in_batches_of_their_own(tmp_path):
+    shipped = (shipped_folder("mjcf") / "tiltrotor.xml").read_text(encoding="utf-8")
+    scene = (shipped_folder("mjcf") / "scene.xml").read_text(encoding="utf-8")
+    (tmp_path / "scene.xml").write_text(scene, encoding="utf-8")
+    payload = '<body pos="0 0 -0.05"><geom size="0.01" mass="0.05" contype="0"/></body>'
+    files = {
+        "bare.xml": shipped,
+        "loaded.xml": shipped.replace('<site name="imu"/>', payload + '<site name="imu"/>'),
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    three_ways([scenario({"vehicle": {"mjcf": str(tmp_path / name)}}) for name in files])
+
+
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
 def test_lost_flights_end_on_the_same_step_with_the_same_cause(plant):
     rows = three_ways(
@@ -144,6 +193,162 @@ def test_a_lost_row_is_flown_no_further_and_its_place_is_taken():
     assert {result.end.time for result in results} == {results[0].end.time}
     assert results[0].end.time < 1.0
     assert all(result.flight is None for result in results)
+
+
+# --- layers around the laws ---------------------------------------------------------------------
+
+LAYERED = {
+    "initial": {"rotor_speed": 361.0, "attitude": [0.05, -0.03, 0.02]},
+    "controller": {**EXACT, "decoupler": "exact"},
+    "gait": {"type": "trot_continuous", **TROT},
+}
+LATE = {"control_timestep": 0.004, "control_latency": 0.008}
+NOISY = {"sensors": {"attitude_noise": 0.01, "velocity_noise": 0.02, "position_bias": [0.1, 0, 0]}}
+STORMY = {"air": STORM}
+HEAVY = {"model_error": {"mass": 1.07, "inertia": [1.1, 0.9, 1.0], "thrust_coefficient": 0.95}}
+FED_FORWARD = {"controller": {"gait_rate_feedforward": True, "gains": {
+    "attitude": {"bandwidth": 25.0},
+    "altitude": {"bandwidth": 10.0, "integral": 0.5},
+    "position": {"bandwidth": 1.5, "integral": 0.5},
+}}}  # fmt: skip
+
+
+def layered(*changes, seed=1, **simulation):
+    tables = LAYERED
+    for change in changes:
+        tables = merge(tables, change)
+    return scenario(tables, timestep=0.002, duration=0.3, seed=seed, **simulation)
+
+
+def test_rows_with_and_without_layers_fly_the_same_three_ways():
+    rows = three_ways(
+        [
+            layered(),
+            layered(NOISY),
+            layered(NOISY, seed=2),
+            layered(STORMY),
+            layered(STORMY, {"air": {"wind": [-2.0, 0.0, 0.5]}}, seed=3),
+            layered(STORMY, NOISY, HEAVY, seed=4),
+            layered(EVERYTHING),
+            layered(EVERYTHING, **LATE),
+            layered(STORMY, EVERYTHING, seed=5, **LATE),
+            layered({"vehicle": {"rotor_time_constant": 0.03, "tilt_servo": {"max_angle": 0.4}}}),
+            layered(),
+        ]
+    )
+    assert len({id(loop_of(row.scenario)) for row in rows}) == 6
+    paths = [row.flight.samples[:, 1:4].tolist() for row in rows]
+    assert paths[0] == paths[-1]
+    assert all(a != b for i, a in enumerate(paths[:-1]) for b in paths[:i])
+
+
+def test_layers_around_the_law_that_knows_its_gait_fly_the_same_three_ways():
+    rows = three_ways(
+        [
+            layered(FED_FORWARD),
+            layered(),  # the same law by name, and another loop
+            layered(FED_FORWARD, STORMY, NOISY, HEAVY),
+            layered(FED_FORWARD, STORMY, NOISY, HEAVY, seed=2),
+        ]
+    )
+    assert all(row.end.kind == "completed" for row in rows)
+
+
+def test_air_around_quadrotors_flies_the_same_three_ways():
+    quadrotor = LAWS["yaw_position"]
+    three_ways(
+        [
+            scenario(quadrotor, duration=0.2),
+            scenario({**quadrotor, **STORMY}, duration=0.2, seed=1),
+            scenario({**quadrotor, **STORMY}, duration=0.2, seed=2, control_timestep=0.004),
+            scenario({**quadrotor, **STORMY, **HEAVY}, duration=0.2, seed=2),
+        ]
+    )
+
+
+def test_every_row_flies_a_model_of_its_own():
+    """What the law knows nothing of: the true vehicle, and ground to touch."""
+    down = {"initial": {"velocity": [0.0, 0.0, -1.0]}}
+    rows = three_ways(
+        [
+            layered(),
+            layered(HEAVY),
+            layered({"model_error": {"mass": 0.9}}),
+            layered(down),
+            layered(down, {"ground": {"height": -0.1}}),
+            layered(down, {"ground": {"height": -0.15, "friction": 0.4}}),
+        ]
+    )
+    heights = [float(row.flight["z"].min()) for row in rows]
+    assert len(set(heights)) == len(rows)
+    assert heights[3] < heights[5] < heights[4], "ground holds up"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        HEAVY,
+        GUST,
+        {"ground": {"height": -1.0}},
+        {"ground": {"height": -1.0, "friction": 0.4}},
+        {"vehicle": {"mass": 0.5}},
+        {"vehicle": {"max_rotor_speed": 500.0}},
+        {"simulation": {"timestep": 0.001}},
+        {"simulation": {"integrator": "Euler"}},
+        {"initial": {"position": [1.0, 0.0, 0.0]}},
+        {"simulation": {"seed": 3}},
+        {"gait": {"period": 0.9}},
+    ],
+    ids=str,
+)
+def test_what_decides_the_model_tells_models_apart(change):
+    """Rows share a model exactly where MuJoCo would compile the same one."""
+    change = {"disturbance": change} if change is GUST else change
+    tables = {**LAYERED, "simulation": {"timestep": 0.002, "duration": 0.3}}
+    plain, changed = map(tiltsim.parse_scenario, (tables, merge(tables, change)))
+    models = [saved_model(flight_model(wanted, 40)) for wanted in (plain, changed)]
+    same_key = what_decides_the_model(plain) == what_decides_the_model(changed)
+    assert same_key == (models[0] == models[1])
+
+
+def saved_model(model):
+    """A compiled model as bytes."""
+    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return buffer.tobytes()
+
+
+def test_own_controllers_are_flown_one_by_one_among_others(tmp_path):
+    file = tmp_path / "hover.py"
+    file.write_text(
+        "import numpy as np\nimport tiltsim\n\n\n"
+        "def law(seen):\n"
+        "    weight = seen.vehicle.mass * seen.vehicle.gravity\n"
+        "    return tiltsim.Command(thrusts=np.full(4, weight / 4))\n",
+        encoding="utf-8",
+    )
+    own = {"controller": {"law": "python", "function": f"{file}:law"}}
+    wanted = [
+        scenario(
+            {**own, "model_error": {"mass": mass}}, engine="auto", timestep=0.002, duration=0.1
+        )
+        for mass in (0.9, 1.0, 1.1)
+    ]
+    # A sweep tells all scenarios alike to fly natively, those that cannot included.
+    told = wanted[2].simulation.model_copy(update={"engine": "native"})
+    wanted[2] = wanted[2].model_copy(update={"simulation": told})
+    wanted.insert(1, scenario({}, duration=0.1))
+    results = list(fly_all(wanted, keep_samples=True))
+    assert [result.scenario for result in results] == wanted
+    assert [result.flight.engine for result in results] == ["python", "native", "python", "python"]
+    light, _, right, heavy = (float(result.flight["z"][-1]) for result in results)
+    # The law lifts the nominal weight: z = (1 / factor - 1) g t^2 / 2.
+    assert light == pytest.approx((1 / 0.9 - 1) * 9.8 * 0.1**2 / 2, rel=1e-3)
+    assert right == pytest.approx(0.0, abs=1e-9)
+    assert heavy == pytest.approx((1 / 1.1 - 1) * 9.8 * 0.1**2 / 2, rel=1e-3)
+
+
+# --- rows that come and go ----------------------------------------------------------------------
 
 
 def test_more_flights_than_rows_come_in_their_order():
@@ -171,6 +376,17 @@ def test_all_kinds_of_flights_together():
     assert results[0].flight.engine == "python"
     assert results[2].flight.engine == "native"
     assert mujoco.get_mjcb_control() is None
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_many_short_flights_are_worth_the_native_engine(plant, monkeypatch):
+    wanted = [scenario({}, engine="auto", plant=plant, duration=0.05)] * 6
+    monkeypatch.setattr(tiltsim.plants, "STEPS_WORTH_LOADING", 300)
+    monkeypatch.setattr(tiltsim.plants, "STEPS_WORTH_COMPILING", 300)
+    results = list(fly_all(wanted, keep_samples=True))
+    assert {result.flight.engine for result in results} == {"native"}
+    assert [result.scenario for result in results] == wanted
+    assert next(fly_all(wanted[:1], keep_samples=True)).flight.engine == "python"
 
 
 def test_no_flights_give_no_results():

@@ -319,7 +319,10 @@ def test_the_drawn_mass_is_the_one_that_flies():
     ("axis", "words"),
     [
         ({"key": "vehicle.mass", "type": "uniform", "low": 2.0, "high": 1.0}, "must be below high"),
-        ({"key": "vehicle.mass", "type": "gaussian"}, "choose list, linspace, uniform, normal"),
+        (
+            {"key": "vehicle.mass", "type": "gaussian"},
+            "choose list, linspace, cases, uniform",
+        ),
         ({"type": "uniform", "low": 1.0, "high": 2.0}, "give either key or keys"),
     ],
 )

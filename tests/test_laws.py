@@ -410,6 +410,26 @@ def test_a_new_law_on_the_command_line_empties_its_table():
 # --- law states --------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("law", [law for law in LAWS if not law.startswith("tilt_car")])
+@pytest.mark.parametrize(("start", "end"), [(-3.11, 3.13), (3.11, -3.13)])
+def test_yaw_takes_the_short_way_past_half_a_revolution(law, start, end):
+    """It takes 0.04 rad there and not a full turn, and then does not spin on for ever."""
+    reference = {"type": "setpoint", "yaw": end}
+    if law == "quadrotor_attitude_altitude":
+        reference["type"] = "attitude_altitude"
+    flight = fly(
+        law,
+        {"plant": "thesis", "engine": "python", "timestep": 0.002, "duration": 3.0},
+        initial={"attitude": [0.0, 0.0, start]},
+        reference=reference,
+        gait={"type": "fixed"},
+    )
+    yaw = np.unwrap(flight["yaw"])
+    assert flight.end.kind == "completed"
+    assert np.abs(yaw - start).max() < 0.08
+    assert yaw[-1] - start == pytest.approx(-0.0432 if start < 0.0 else 0.0432, abs=0.02)
+
+
 @pytest.mark.parametrize("model", ["tiltrotor", "quadrotor"])
 def test_law_states_integrate_their_controls_and_act_on_nothing(model):
     compiled = compile_model(model, PRESETS["ar_drone_2"], law_states=2, visuals=False)

@@ -47,6 +47,12 @@ def test_a_flight_at_rest_on_its_setpoint_has_these_metrics():
     }
 
 
+def test_a_final_yaw_of_half_a_revolution_is_not_the_mean_of_both_its_signs():
+    yaw = np.where(np.arange(TIMES.size) % 2, 3.14, -3.14)
+    metrics = fly(yaw=yaw).metrics()
+    assert abs(metrics["final_yaw"]) == pytest.approx(pi, abs=2e-3)
+
+
 def test_all_metrics_are_declared_and_in_this_order():
     metrics = fly().metrics()
     of_the_quadrotor = {"max_published_determinant", "min_published_determinant"}

@@ -14,7 +14,9 @@ from scipy.integrate import solve_ivp
 
 from controllers.vehicle import PRESETS, SPIN, Vehicle
 from tests.thesis import force_matrix, torque_matrix
+from tiltsim.errors import InputError
 from tiltsim.library import shipped_folder
+from tiltsim.loading import parse_scenario
 from tiltsim.model import Pod, RotorLimits, TiltServo, compile_model
 
 AR_DRONE = PRESETS["ar_drone_2"]
@@ -375,6 +377,25 @@ def test_speed_range_has_the_sign_of_the_spin(limits, counterclockwise, clockwis
         np.testing.assert_array_equal(model.actuator("rotor_speed_2").actrange, counterclockwise)
 
 
+@pytest.mark.parametrize(
+    ("limits", "controls"),
+    [
+        (RotorLimits(), None),
+        (RotorLimits(min_speed=0.0), (0.0, inf)),
+        (RotorLimits(max_speed=400.0), (-16e4, 16e4)),
+        (RotorLimits(300.0, 400.0), (9e4, 16e4)),
+        (RotorLimits(300.0, 400.0, (0.0, 1.5)), (0.0, 24e4)),
+    ],
+)
+def test_thrust_keeps_to_the_limits_of_the_speed(limits, controls):
+    assert limits.thrust_range == controls
+    model = compiled("tiltrotor", AR_DRONE, rotor_limits=limits)
+    for actuator in map(model.actuator, ("thrust_1", "thrust_2")):
+        assert actuator.ctrllimited[0] == (controls is not None)
+        if controls is not None:
+            np.testing.assert_array_equal(actuator.ctrlrange, controls)
+
+
 # ----------------------------------------------------------------------------------- options
 
 
@@ -406,9 +427,9 @@ def test_flight_without_visuals_is_the_same_flight():
         mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
         data.ctrl[:4] = [0.3, -0.2, 0.1, 0.4]
         mujoco.mj_step(model, data, 500)
-        ends.append((data.qpos.tolist(), data.qvel.tolist(), data.sensordata.tolist()))
+        ends.append((data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()))
     assert ends[0] == ends[1]
-    assert model.ngeom == 1, "the ground stays"
+    assert (model.ngeom, model.ncam, model.nlight, model.nsensor) == (0, 0, 0, 0)
 
 
 def test_models_compiled_alike_are_independent():
@@ -430,19 +451,34 @@ def test_models_compiled_alike_are_independent():
             "arm_length = inf",
         ),
         (lambda: compile_model("quadrotor", AR_DRONE._replace(inertia_zz=6e-3)), "0.006"),
-        (lambda: TiltServo(natural_frequency=-3.0), "natural_frequency = -3.0"),
-        (lambda: TiltServo(damping_ratio=float("nan")), "damping_ratio = nan"),
-        (lambda: TiltServo(max_angle=0.0), "max_angle = 0.0"),
-        (lambda: Pod(mass=0.0), "pod.mass = 0.0"),
-        (lambda: Pod(inertia=1e-16), "pod.inertia = 1e-16"),
-        (lambda: RotorLimits(min_speed=-5.0), "min_rotor_speed = -5.0"),
-        (lambda: RotorLimits(max_speed=0.0), "max_rotor_speed = 0.0"),
-        (lambda: RotorLimits(400.0, 300.0), "min_rotor_speed = 400.0.*300.0"),
     ],
 )
 def test_bad_arguments_are_refused_by_name_and_value(build, message):
     with pytest.raises(ValueError, match=message):
         build()
+
+
+@pytest.mark.parametrize(
+    ("tables", "message"),
+    [
+        ({"vehicle": {"tilt_servo": {"natural_frequency": -3.0}}}, "natural_frequency = -3.0"),
+        ({"vehicle": {"tilt_servo": {"damping_ratio": 0.0}}}, "damping_ratio = 0.0"),
+        ({"vehicle": {"tilt_servo": {"max_angle": 0.0}}}, "max_angle = 0.0"),
+        ({"vehicle": {"pod": {"mass": 0.0}}}, "pod.mass = 0.0"),
+        ({"vehicle": {"pod": {"inertia": 1e-16}}}, "pod.inertia = 1e-16"),
+        ({"vehicle": {"min_rotor_speed": -5.0}}, "min_rotor_speed = -5.0"),
+        ({"vehicle": {"max_rotor_speed": 0.0}}, "max_rotor_speed = 0.0"),
+        (
+            {"vehicle": {"min_rotor_speed": 400.0, "max_rotor_speed": 300.0}},
+            "min_rotor_speed = 400.0.*300.0",
+        ),
+        ({"ground": {"friction": 0.0}}, "ground.friction = 0.0"),
+        ({"ground": {"height": inf}}, "ground.height = Infinity"),
+    ],
+)
+def test_a_scenario_refuses_what_no_model_is_made_of(tables, message):
+    with pytest.raises(InputError, match=message):
+        parse_scenario(tables)
 
 
 # --- models made of compiled ones --------------------------------------------------------------

@@ -66,7 +66,15 @@ def test_no_error_is_no_difference():
         ({"mass": 0.0}, {}, "model_error.mass = 0.0"),
         ({"gravity": 1.0}, {}, "model_error.gravity = 1.0: unknown key"),
         ({"inertia": [1.0, 1.0, 3.0]}, {}, "model_error.inertia = [1.0, 1.0, 3.0]: no body"),
-        ({"mass": 1.1}, {"simulation": {"plant": "thesis"}}, 'simulation.plant = "thesis"'),
+        (
+            {"mass": 1.1},
+            {
+                "vehicle": {"model": "tilt_car"},
+                "controller": {"law": "tilt_car_third_derivative"},
+                "reference": {"type": "setpoint"},
+            },
+            'vehicle.model = "tilt_car"',
+        ),
     ],
 )
 def test_impossible_errors_are_refused(error, tables, words):

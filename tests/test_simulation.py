@@ -252,6 +252,17 @@ def test_upside_down_start_is_lost_with_cause_time_and_complete_log(plant, engin
     assert flight.metrics()["diverged"] is True
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+def test_states_that_grow_to_infinity_raise_no_warnings_and_leave_one_log(engine):
+    """Flown on to the end of the recording interval before the very step is looked for."""
+    tables = tiltsim.load_scenario("ch09_input_limits/circle#omega_20").model_dump()
+    simulation = {"plant": "thesis", "engine": engine, "timestep": 0.002, "duration": 8.0}
+    flight = tiltsim.simulate(tiltsim.parse_scenario({**tables, "simulation": simulation}))
+    assert flight.end.kind == "diverged"
+    assert flight.samples[-1, 0] == flight.end.time < 8.0
+    assert np.isfinite(flight.samples).all()
+
+
 def test_end_time_is_found_to_one_physics_step():
     """The loss falls between two recorded samples; its time must not depend on the recording."""
     ends = []

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final
 
@@ -21,12 +21,14 @@ import numpy as np
 
 from tiltsim.engine import control_callback
 from tiltsim.flight import End, Flight
-from tiltsim.loop import RECORDER, Floats
+from tiltsim.loop import RECORDER, Floats, Loop
 from tiltsim.loops import control_setup, loop_of
 from tiltsim.plants import (
     MujocoPlant,
     flight_model,
+    make_plant,
     quiet_warnings,
+    what_decides_the_model,
     worth_native,
 )
 from tiltsim.simulation import Watch, fly_chunk, simulate
@@ -42,6 +44,9 @@ MEMORY: Final = 256 * 2**20
 
 CALL_TIME: Final = 0.25
 """How long (s) a batch flies before Python looks at the rows and at the keyboard."""
+
+Way = str | tuple[Loop, Hashable]
+"""How flights are flown: those of one loop, and with models of one layout, share a batch."""
 
 WINDOW: Final = 512
 """How many scenarios are looked at together to find those that share a batch."""
@@ -112,7 +117,7 @@ def _fly_window(
     keep_samples: bool,
 ) -> Iterator[FlightResult]:
     """Fly scenarios group by group, and put the results back into their order."""
-    groups: dict[str, list[int]] = {}
+    groups: dict[Way, list[int]] = {}
     for index, scenario in enumerate(scenarios):
         groups.setdefault(_way_to_fly(scenario, native), []).append(index)
     done: dict[int, FlightResult] = {}
@@ -130,7 +135,9 @@ def _fly_window(
         if way == "alone":
             flown = ((index, result(simulate(s))) for index, s in enumerate(chosen))
         elif way == "thesis":
-            flown = enumerate(_in_order(lambda s: result(simulate(s)), chosen, threads, pool))
+            for one_of_each in {loop_of(s): s for s in chosen}.values():
+                make_plant(_natively(one_of_each))  # prepares native code before threads do
+            flown = enumerate(_in_order(lambda s: result(_fly_natively(s)), chosen, threads, pool))
         else:
             flown = _BatchFlight(chosen, threads, pool, result).results()
         for place, outcome in flown:
@@ -140,16 +147,29 @@ def _fly_window(
                 following += 1
 
 
-def _way_to_fly(scenario: Scenario, native: bool) -> str:
-    """``alone``, on the ``thesis`` plant in threads, or the law of the batch to fly in."""
+def _way_to_fly(scenario: Scenario, native: bool) -> Way:
+    """``alone``, on the ``thesis`` plant in threads, or what the rows of a batch have in common."""
     simulation, loop = scenario.simulation, loop_of(scenario)
     wanted = simulation.engine == "native" or (simulation.engine == "auto" and native)
-    if not wanted or loop.watch is None:
+    if not wanted or loop.watch is None or scenario.controller.law == "python":
         return "alone"
     if simulation.plant == "thesis":
         return "thesis"
-    # A stop of the tilt servos is a constraint, which gives a state more numbers.
-    return f"{scenario.controller.law} {scenario.vehicle.tilt_servo.stops}"
+    # A stop of the tilt servos is a constraint, which gives a state more numbers, and ground gives
+    # the model more shapes; a law with a layer around it has states and controls of its own.
+    file = getattr(scenario.vehicle, "mjcf", None)
+    return loop, (scenario.vehicle.tilt_servo.stops, scenario.ground is not None, file)
+
+
+def _natively(scenario: Scenario) -> Scenario:
+    """The same scenario, on the native engine."""
+    simulation = scenario.simulation.model_copy(update={"engine": "native"})
+    return scenario.model_copy(update={"simulation": simulation})
+
+
+def _fly_natively(scenario: Scenario) -> Flight:
+    """A flight of its own that many others make worth the native engine."""
+    return replace(simulate(_natively(scenario)), scenario=scenario)
 
 
 def _in_order(
@@ -288,10 +308,7 @@ class _BatchFlight:
 
     def _take_next(self) -> _Row:
         index, scenario = self._waiting.popleft()
-        simulation = scenario.simulation.model_copy(update={"engine": "native"})
-        native = scenario.model_copy(update={"simulation": simulation})
-        vehicle, disturbances = scenario.vehicle, scenario.disturbance
-        key = repr((vehicle, disturbances, simulation.timestep, simulation.integrator))
+        native, key = _natively(scenario), what_decides_the_model(scenario)
         model = self._models.get(key)
         if model is None:
             if len(self._models) > 2 * self._size:

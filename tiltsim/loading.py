@@ -49,13 +49,13 @@ def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) 
     elif names and not overrides:
         raise InputError(f"{address}: choose a variant with #: {', '.join(names)}")
     document.pop("variant", None)
-    _anchor_files(document, file.parent)
+    anchor_files(document, file.parent)
     apply_overrides(document, overrides or {}, address)
-    _anchor_files(document, Path())
+    anchor_files(document, Path())
     return parse_scenario(document, address)
 
 
-def _anchor_files(document: Mapping[str, Any], folder: Path) -> None:
+def anchor_files(document: Mapping[str, Any], folder: Path) -> None:
     """Write out where the files lie that a scenario names: those without a folder in this one."""
     for table, key, mark in FILE_KEYS:
         keys = document.get(table)
@@ -111,14 +111,14 @@ def _select_variant(file: Path, document: dict[str, Any], name: str) -> dict[str
     chosen = dict(document["variant"][names.index(name)])
     del chosen["name"]
     expectations = [base.pop("expect", []), chosen.pop("expect", [])]
-    merged = _merge(base, chosen)
+    merged = merge(base, chosen)
     # Whatever is no list goes on as it is and is refused with its own name.
     wrong = [value for value in expectations if not isinstance(value, list)]
     merged["expect"] = wrong[0] if wrong else [*expectations[0], *expectations[1]]
     return merged
 
 
-def _merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+def merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Base with changes on top, table by table; a table of another kind replaces the whole."""
     merged = dict(base)
     for key, value in changes.items():
@@ -128,7 +128,7 @@ def _merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any
                 tag in value and value[tag] != old.get(tag, default)
                 for tag, default in KIND_KEYS.items()
             )
-            merged[key] = value if other_kind else _merge(old, value)
+            merged[key] = value if other_kind else merge(old, value)
         else:
             merged[key] = value
     return merged

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.records import flatten, record_dtype, record_size
+from controllers.scalar import scalar
 from tiltsim.kinds import Kind
 from tiltsim.kinds.rotorcraft import ROTORCRAFT
 
@@ -92,6 +93,9 @@ class Equations:
     observe
         Scalar function ``(time, state, inputs, parameters, table) -> values`` of the loop's
         `sample_fields` after the time; ``inputs`` are those in force.
+    settled
+        Scalar function ``(state, parameters) -> state`` for the end of each step: what has run
+        past a limit is put back. None where there is none.
     """
 
     inputs: Callable[..., tuple[float, ...]]
@@ -99,6 +103,7 @@ class Equations:
     rates: Callable[..., tuple[float, ...]]
     initial: Callable[[Scenario, ControlSetup], Sequence[float]]
     observe: Callable[..., tuple[float, ...]]
+    settled: Callable[..., list[float]] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +156,8 @@ class Loop:
     follows_position
         Whether a scenario has the law follow the reference's horizontal position.
     equations
-        The same law on the thesis' own equations; None where it flies on MuJoCo alone.
+        The same law on the thesis' own equations; None where it flies on MuJoCo alone, or, with a
+        layer around it, by `tiltsim.loops.on_equations`.
     kind
         What holds for all loops around such a vehicle.
     flies_gait
@@ -186,9 +192,32 @@ class Loop:
         layout = (self.model, self.sizes, record_dtype(self.parameters))
         return float(zlib.crc32(repr(layout).encode()))
 
+    @cached_property
+    def held(self) -> Callable[..., tuple[float, ...]]:
+        """``hold``, or ``refresh`` in its form."""
+        if self.hold is not None:
+            return self.hold
+        refresh = self.refresh
+
+        @scalar
+        def only_refresh(
+            time: float,
+            qpos: Sequence[float],
+            qvel: Sequence[float],
+            act: Sequence[float],
+            ctrl: Sequence[float],
+            parameters: Any,
+        ) -> tuple[float, ...]:
+            return refresh(ctrl, act)
+
+        return only_refresh
+
     def native_name(self, plant: str) -> str:
         """Name of the loop's compiled code on a plant, as a file's name."""
-        return f"{plant}.{self.controls.__module__}.{self.controls.__qualname__}"
+        step = self.controls
+        if plant == "thesis" and self.equations is not None:
+            step = self.equations.inputs
+        return f"{plant}.{step.__module__}.{step.__qualname__}"
 
     @cached_property
     def record_size(self) -> int:

@@ -92,7 +92,8 @@ def _rotorcraft_metrics(flight: Flight) -> dict[str, float | bool]:
             metrics["max_orbit_radius_after_20s"] = float(orbit.max())
             metrics["min_orbit_radius_after_20s"] = float(orbit.min())
     for angle in ("roll", "pitch", "yaw"):
-        metrics[f"final_{angle}"] = final(columns[angle])
+        # Near half a revolution samples of one direction have both signs.
+        metrics[f"final_{angle}"] = float(np.mean(np.unwrap(columns[angle][last_second])))
     metrics["final_attitude_error"] = max(
         float(np.abs(_wrapped(columns[f"{angle}_ref"] - columns[angle])[last_second]).max())
         for angle in ("roll", "pitch", "yaw")

@@ -1,27 +1,23 @@
 """The native engine: the scalar control step compiled as MuJoCo's control callback.
 
-Numba compiles the registered scalar functions from their own source. The callback touches
-MuJoCo's state only through the public ``mj_getState`` and ``mj_setState``, so nothing depends on
-the layout of MuJoCo's structs. It records samples, too, so that a flight of any length runs
-without returning to Python and without holding its lock. Compiled code is kept on disk, keyed by
-the sources and versions it was made from, and loads in a fraction of the time that compiling takes.
+Numba compiles the registered scalar functions from their own source. The callback reads MuJoCo's
+state where it lies (`tiltsim.mjdata_layout`). It records samples, too, so that a flight of any
+length runs without returning to Python and without holding its lock. Compiled code is kept on disk,
+keyed by the sources and versions it was made from, and loads in a fraction of the time that
+compiling takes.
 """
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable, Sequence
 from functools import cache
 from math import copysign, isfinite, nan
-from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-import llvmlite.binding
 import mujoco
 import numba
 import numba.core.config
 import numpy as np
-from llvmlite import ir
 from numba import carray, cfunc, njit, types
 from numba.extending import intrinsic, register_jitable
 from numba.np.unsafe.ndarray import to_fixed_tuple
@@ -45,59 +41,12 @@ from tiltsim.loop import (
     Floats,
     Loop,
 )
-from tiltsim.thesis_plant import make_stepper
-
-_State = mujoco.mjtState
-INPUTS: Final = int(
-    _State.mjSTATE_TIME
-    | _State.mjSTATE_QPOS
-    | _State.mjSTATE_QVEL
-    | _State.mjSTATE_ACT
-    | _State.mjSTATE_USERDATA
-)
-CONTROLS: Final = int(_State.mjSTATE_CTRL)
-USERDATA: Final = int(_State.mjSTATE_USERDATA)
-
-CAPACITY: Final = 2048
-"""Floats in the callback's buffer: a flight's time, state, parameters and table must fit."""
-
-SCRATCH: Final = 256
-"""Floats beyond them, for controls."""
+from tiltsim.mjdata_layout import mjdata_layout
+from tiltsim.thesis_plant import stepper_of
 
 # Division by zero gives infinity or NaN, as in C; MuJoCo then reports a bad control.
 _OPTIONS: Final = {"error_model": "numpy", "cache": native_code_can_be_kept()}
 numba.core.config.CACHE_DIR = str(native_code_folder())
-
-
-def _external(name: str, signature: Any) -> Any:
-    """A C function of MuJoCo, from the library that the mujoco package has loaded."""
-    folder = Path(mujoco.__file__).parent
-    library = next(
-        path
-        for pattern in ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll")
-        for path in sorted(folder.glob(pattern))
-    )
-    address = ctypes.cast(getattr(ctypes.CDLL(str(library)), name), ctypes.c_void_p).value
-    llvmlite.binding.add_symbol(f"tiltsim_{name}", address)
-    return types.ExternalFunction(f"tiltsim_{name}", signature)
-
-
-# Pointers travel as integers of their size; the state signature is a C int.
-_state_size = _external("mj_stateSize", types.int32(types.intp, types.int32))
-_get_state = _external("mj_getState", types.void(types.intp, types.intp, types.intp, types.int32))
-_set_state = _external("mj_setState", types.void(types.intp, types.intp, types.intp, types.int32))
-
-
-@intrinsic
-def _stack_buffer(_typing: Any) -> Any:
-    """Address of `CAPACITY` and `SCRATCH` floats on the callback's own stack."""
-
-    def generate(context: Any, builder: Any, signature: Any, _arguments: Any) -> Any:
-        with builder.goto_entry_block():
-            buffer = builder.alloca(ir.DoubleType(), CAPACITY + SCRATCH)
-        return builder.ptrtoint(buffer, context.get_value_type(signature.return_type))
-
-    return types.intp(), generate
 
 
 def _cast(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -116,14 +65,22 @@ def _bytes_at(_typing: Any, address: Any) -> Any:
     return types.voidptr(address), _cast
 
 
+@intrinsic
+def _addresses_at(_typing: Any, address: Any) -> Any:
+    """An address as a pointer to addresses."""
+    return types.CPointer(types.intp)(address), _cast
+
+
+@intrinsic
+def _integers_at(_typing: Any, address: Any) -> Any:
+    """An address as a pointer to C integers."""
+    return types.CPointer(types.int32)(address), _cast
+
+
 @register_jitable(error_model="numpy")
-def _read_inputs(model, data, address, head, signed, signature):  # type: ignore[no-untyped-def]
-    """Fill the buffer with the state of a flight; its size, or 0 where the model is not ours."""
-    size = _state_size(model, INPUTS)
-    if size < head or size > CAPACITY:
-        return 0
-    _get_state(model, data, address, INPUTS)
-    return size if carray(_floats_at(address), (CAPACITY,))[signed] == signature else 0
+def _array(place, size):  # type: ignore[no-untyped-def]
+    """The array of floats whose address lies at a place in mjData."""
+    return carray(_floats_at(_addresses_at(place)[0]), (size,))
 
 
 class RecorderHead(NamedTuple):
@@ -288,60 +245,50 @@ def compile_callbacks(loop: Loop) -> Callbacks:
     The cache knows the callback by the values it closes over, so these must pickle to the same
     bytes in every process: module-level functions, numbers and dtypes do.
     """
-    _register_scalar_functions()
-    controls, refresh, signature = loop.controls, loop.refresh, loop.signature
+    controls, hold, signature = loop.controls, loop.held, loop.signature
     observe, watch = loop.observe, loop.watch or watch_nothing
-
-    @register_jitable(error_model="numpy")
-    def only_refresh(time, qpos, qvel, act, ctrl, parameters):  # type: ignore[no-untyped-def]
-        return refresh(ctrl, act)
-
-    hold = loop.hold or only_refresh
-
+    _register_scalar_functions()
     limit_exceeded = loop.kind.limit_exceeded
     nq, nv, na, nu = loop.sizes
-    qpos, qvel, act, header = 1, 1 + nq, 1 + nq + nv, 1 + nq + nv + na
-    period, evaluated, recording = header + CONTROL_PERIOD, header + EVALUATIONS, header + RECORDER
-    userdata = header + HEADER_SIZE
-    head = userdata + loop.record_size
+    at = mjdata_layout()
+    head = HEADER_SIZE + loop.record_size
     layout = record_dtype(loop.parameters)
 
     @cfunc(types.void(types.intp, types.intp), **_OPTIONS)
     def control(model, data):  # type: ignore[no-untyped-def]
-        address = _stack_buffer()
-        size = _read_inputs(model, data, address, head, userdata, signature)
-        if size == 0:
+        size = _integers_at(model + at.model_userdata_size)[0]
+        if size < head:
+            return  # some other model of this process is being stepped
+        userdata = _array(data + at.userdata, size)
+        if userdata[HEADER_SIZE] != signature:
             return
-        buffer = carray(_floats_at(address), (CAPACITY,))
-        scratch = carray(_floats_at(address + 8 * CAPACITY), (SCRATCH,))
-        positions = to_fixed_tuple(buffer[qpos:qvel], nq)
-        velocities = to_fixed_tuple(buffer[qvel:act], nv)
-        activations = to_fixed_tuple(buffer[act:header], na)
-        parameters = carray(_bytes_at(address + 8 * userdata), (1,), layout)[0]
-        if buffer[evaluated] == 0.0:
-            values = controls(
-                buffer[0], positions, velocities, activations, parameters, buffer[head:size]
-            )
+        time = _floats_at(data + at.time)[0]
+        positions = to_fixed_tuple(_array(data + at.qpos, nq), nq)
+        velocities = to_fixed_tuple(_array(data + at.qvel, nv), nv)
+        activations = to_fixed_tuple(_array(data + at.act, na), na)
+        ctrl = _array(data + at.ctrl, nu)
+        record = _addresses_at(data + at.userdata)[0] + 8 * HEADER_SIZE
+        parameters = carray(_bytes_at(record), (1,), layout)[0]
+        table = userdata[head:]
+        if userdata[EVALUATIONS] == 0.0:
+            values = controls(time, positions, velocities, activations, parameters, table)
         else:
-            _get_state(model, data, address + 8 * CAPACITY, CONTROLS)
-            held = to_fixed_tuple(scratch[0:nu], nu)
-            values = hold(buffer[0], positions, velocities, activations, held, parameters)
+            held = to_fixed_tuple(ctrl, nu)
+            values = hold(time, positions, velocities, activations, held, parameters)
         for index in range(nu):
-            scratch[index] = values[index]
-        if buffer[period] != 0.0:
-            count = buffer[evaluated] + 1.0
-            buffer[evaluated] = count if count < buffer[period] else 0.0
-            _set_state(model, data, address + 8 * header, USERDATA)
-        if buffer[recording] != 0.0:
-            recorder = int(buffer[recording])
+            ctrl[index] = values[index]
+        if userdata[CONTROL_PERIOD] != 0.0:
+            count = userdata[EVALUATIONS] + 1.0
+            userdata[EVALUATIONS] = count if count < userdata[CONTROL_PERIOD] else 0.0
+        if userdata[RECORDER] != 0.0:
+            recorder = int(userdata[RECORDER])
             if _sample_is_due(recorder):
                 seen = observe(positions, velocities, activations, values)
-                watched, table = watch(seen, parameters), buffer[head:size]
-                _record(recorder, buffer[0], seen, watched, limit_exceeded, table)
+                watched = watch(seen, parameters)
+                _record(recorder, time, seen, watched, limit_exceeded, table)
             if _recording_is_over(recorder):
                 for index in range(nu):
-                    scratch[index] = nan
-        _set_state(model, data, address + 8 * CAPACITY, CONTROLS)
+                    ctrl[index] = nan
 
     native_code_was_compiled(loop.native_name("mujoco"))
     return Callbacks(control)
@@ -354,8 +301,6 @@ class NativeEngine:
 
     def __init__(self, loop: Loop, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         check_model(loop, model, data)
-        if loop.sizes.ctrl > SCRATCH:
-            raise ValueError(f"{loop.model}: {loop.sizes.ctrl} controls, at most {SCRATCH}")
         self._callbacks = compile_callbacks(loop)
 
     def callback(self) -> Any:
@@ -368,7 +313,7 @@ def compile_stepper(loop: Loop) -> tuple[Any, Any]:
     """Compile the thesis plant's solver for a loop, or load it from the cache on disk.
 
     Returns ``(advance, record)``. The first takes and returns what
-    `tiltsim.thesis_plant.make_stepper` says, but for the state, which is an array. The second takes
+    `tiltsim.thesis_plant.stepper_of` says, but for the state, which is an array. The second takes
     in front of that the address of a `Recorder` and a number of samples; it stops where recording
     is over. Neither holds Python's lock.
     """
@@ -377,7 +322,7 @@ def compile_stepper(loop: Loop) -> tuple[Any, Any]:
     inputs, observe = loop.equations.inputs, loop.equations.observe
     watch = loop.watch or watch_nothing
     limit_exceeded = loop.kind.limit_exceeded
-    stepper = register_jitable(error_model="numpy")(make_stepper(inputs, loop.equations.rates))
+    stepper = register_jitable(error_model="numpy")(stepper_of(loop.equations))
 
     @njit(nogil=True, **_OPTIONS)
     def advance(  # type: ignore[no-untyped-def]
@@ -451,8 +396,9 @@ def evaluate_natively(
     function: Callable[..., tuple[float, ...]], time: Floats, states: Floats, setup: ControlSetup
 ) -> Floats:
     """See `tiltsim.rows.evaluate_rows`, which takes at least one row to here."""
-    head = record_size(type(setup.parameters))
-    parameters = setup.userdata[:head].view(record_dtype(type(setup.parameters)))[0]
+    record: Any = type(setup.parameters)
+    head = record_size(record)
+    parameters = setup.userdata[:head].view(record_dtype(record))[0]
     time, states = np.ascontiguousarray(time), np.ascontiguousarray(states)
     table = np.array(setup.table)
     values: Floats = _compile_rows(function)(time, states, parameters, table)
@@ -460,20 +406,22 @@ def evaluate_natively(
 
 
 @cache
-def compile_floor() -> tuple[Any, Any]:
-    """Callbacks for measurements: one that does nothing, one that reads state, writes controls."""
+def compile_empty() -> Any:
+    """A callback that does nothing, for measurements."""
 
     @cfunc(types.void(types.intp, types.intp), **_OPTIONS)
     def empty(model, data):  # type: ignore[no-untyped-def]
         pass
 
-    @cfunc(types.void(types.intp, types.intp), **_OPTIONS)
-    def state(model, data):  # type: ignore[no-untyped-def]
-        address = _stack_buffer()
-        if _state_size(model, INPUTS) > CAPACITY:
-            return
-        _get_state(model, data, address, CONTROLS)
-        _set_state(model, data, address, CONTROLS)
-        _get_state(model, data, address, INPUTS)
+    return empty
 
-    return empty, state
+
+@cache
+def compile_stopped_clock() -> Any:
+    """A clock for MuJoCo's timers that stands still."""
+
+    @cfunc(types.float64(), **_OPTIONS)
+    def clock():  # type: ignore[no-untyped-def]
+        return 0.0
+
+    return clock

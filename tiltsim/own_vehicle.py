@@ -255,12 +255,10 @@ def _check_actuators(compiled: mujoco.MjModel, model: str) -> None:
     gears = []
     for i, spin in zip(ROTORS, SPIN, strict=True):
         rotor = compiled.site(f"rotor_{i}").id
-        for name in (f"thrust_{i}", f"rotor_speed_{i}"):
-            actuator = compiled.actuator(name)
-            site = actuator.trntype[0] == mujoco.mjtTrn.mjTRN_SITE
-            if not (site and actuator.trnid[0] == rotor):
-                raise ValueError(f"actuator {name!r} must act on the site 'rotor_{i}'")
         thrust = compiled.actuator(f"thrust_{i}")
+        site = thrust.trntype[0] == mujoco.mjtTrn.mjTRN_SITE
+        if not (site and thrust.trnid[0] == rotor):
+            raise ValueError(f"actuator 'thrust_{i}' must act on the site 'rotor_{i}'")
         force, torque = float(thrust.gear[2]), float(thrust.gear[5])
         plain = not np.any(thrust.gear[[0, 1, 3, 4]]) and thrust.gainprm[0] == 1.0
         if not plain or force <= 0.0 or spin * torque >= 0.0 or thrust.actadr[0] >= 0:

@@ -238,6 +238,19 @@ def flight_model(scenario: Scenario, parameters: int) -> mujoco.MjModel:
     return model
 
 
+_FLOWN_IN_ANY_MODEL: Final = frozenset(
+    ("title", "source", "simulation", "initial", "gait", "reference", "sensors", "expect")
+)
+"""Tables of a scenario that are parameters or initial state of a flight, or no part of it."""
+
+
+def what_decides_the_model(scenario: Scenario) -> str:
+    """Equal only for scenarios that `flight_model` builds equal models for, if one loop flies."""
+    simulation = scenario.simulation
+    tables = [value for name, value in scenario if name not in _FLOWN_IN_ANY_MODEL]
+    return repr((tables, simulation.timestep, simulation.integrator))
+
+
 def evaluations_per_step(model: mujoco.MjModel) -> int:
     """How often MuJoCo's integrator asks for controls in a step."""
     return 4 if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else 1
@@ -313,7 +326,7 @@ class ThesisPlant:
             self._advance, self._record = compile_stepper(loop)
             self._law = native_record(loop, setup.userdata)
         else:
-            self._advance = thesis_plant.make_stepper(self._equations.inputs, self._equations.rates)
+            self._advance = thesis_plant.stepper_of(self._equations)
             self._law = slotted(setup.parameters), setup.table
 
     @property
@@ -339,15 +352,16 @@ class ThesisPlant:
 
     def advance(self, steps: int) -> None:
         """See `Plant.advance`."""
-        native = self.engine == "native"
-        state = np.array(self._state) if native else self._state
+        state: Any = np.array(self._state) if self.engine == "native" else self._state
         try:
             state, self._held = self._advance(
                 *(self._step_index, state, self._held, self._timestep, steps),
                 *(self._control_steps, *self._law, self._disturbance),
             )
-            self._state = list(state)
+            self._state = list(map(float, state))  # numpy's own floats would warn of infinity
         except (ArithmeticError, ValueError):
+            # Where floats raise, native code has NaN.
+            self._state = [nan] * len(self._state)
             self._fault = "the control law left the range of floating-point numbers"
         self._step_index += steps
 
@@ -373,7 +387,7 @@ class ThesisPlant:
             *(self._step_index, np.array(self._state), self._held, self._timestep, steps),
             *(self._control_steps, *self._law, self._disturbance),
         )
-        self._state = list(state)
+        self._state = state.tolist()
         native_code_was_compiled(self._loop.native_name("thesis"))
         self._step_index += samples * steps
         return None if recorder.lost else recorder.samples

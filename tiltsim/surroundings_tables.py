@@ -7,14 +7,15 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from tiltsim.messages import InvalidValueError
+from tiltsim.model import Ground
 from tiltsim.tables import Angle, Coordinate, NonNegative, Positive, Table, Vector3
 
 
 class GroundTable(Table):
     """Ground to take off from and land on; without the table nothing touches."""
 
-    height: float = Field(0.0, description="m, world")
-    friction: Positive = Field(0.8, description="coefficient of sliding friction")
+    height: float = Field(Ground.height, description="m, world")
+    friction: Positive = Field(Ground.friction, description="coefficient of sliding friction")
 
 
 class Disturbance(Table):

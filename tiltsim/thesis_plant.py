@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from controllers.scalar import Triple, scalar
+from tiltsim.loop import Equations
 
 Stepper = Callable[..., tuple[list[float], tuple[float, ...]]]
 
@@ -20,16 +21,21 @@ def stage(state: Sequence[float], step: float, rates: Sequence[float]) -> list[f
     return [value + step * rate for value, rate in zip(state, rates)]
 
 
-def make_stepper(
-    inputs: Callable[..., tuple[float, ...]], rates: Callable[..., tuple[float, ...]]
-) -> Stepper:
-    """The solver around a loop's `tiltsim.loop.Equations`, as scalar code.
+@scalar
+def as_it_is(state: list[float], parameters: Any) -> list[float]:
+    """For equations in which nothing stops."""
+    return state
+
+
+def stepper_of(equations: Equations) -> Stepper:
+    """The solver around a loop's equations, as scalar code.
 
     The stepper integrates ``steps`` fixed steps with ode3, the third-order method of Bogacki and
     Shampine. ``control_steps`` is the number of steps for which the law's output is held, 0 to
     evaluate it at every stage. It returns the new state and the inputs held since the last control
     sample; the caller counts the steps.
     """
+    inputs, rates, settled = equations.inputs, equations.rates, equations.settled or as_it_is
 
     def advance(
         step_index: int,
@@ -62,6 +68,7 @@ def make_stepper(
                 value + timestep * (2.0 / 9.0 * a + 1.0 / 3.0 * b + 4.0 / 9.0 * c)
                 for value, a, b, c in zip(state, k1, k2, k3)
             ]
+            state = settled(state, parameters)
         return state, held
 
     return advance

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from controllers.tilt_car.vehicle import TiltCar
 from tiltsim.library import shipped_folder
-from tiltsim.model import INTEGRATORS, TiltServo, add_law_states, parse_mjcf
+from tiltsim.model import INTEGRATORS, TiltServo, add_law_states, parse_mjcf, strip
 
 if TYPE_CHECKING:
     import mujoco
@@ -49,7 +49,7 @@ def compile_tilt_car(
     rotor_floor : bool, default=True
         Whether the rotor speeds, states of the simulation, stop at zero.
     visuals : bool, default=True
-        Whether the car has geoms. They do not touch the physics.
+        Whether there is anything to see or to measure; see `tiltsim.model.compile_model`.
 
     Returns
     -------
@@ -106,8 +106,7 @@ def _compose(
     start.ctrl = [0.0, START_SPEED**2, START_SPEED**2, 0.0, 0.0]
     add_law_states(root, law_states)
     whole = str(root.to_xml_string())
-    for geom in root.find("body", "vehicle").find_all("geom"):
-        geom.remove()
+    strip(root, contacts=False)
     return whole, str(root.to_xml_string())
 
 

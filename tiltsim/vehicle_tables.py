@@ -10,6 +10,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from controllers.tilt_car.vehicle import THESIS_CAR, TiltCar
 from controllers.vehicle import PRESETS, Vehicle
 from tiltsim.messages import InvalidValueError
+from tiltsim.model import Pod, TiltServo
 from tiltsim.tables import NotTiny, Positive, Table
 
 if TYPE_CHECKING:
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
 class ServoTable(Table):
     """A position servo: second order, ideal but for what is given here."""
 
-    natural_frequency: Positive = Field(300.0, description="rad/s")
-    damping_ratio: Positive = 1.0
+    natural_frequency: Positive = Field(TiltServo.natural_frequency, description="rad/s")
+    damping_ratio: Positive = TiltServo.damping_ratio
 
     @property
     def stops(self) -> bool:
@@ -45,9 +46,10 @@ class TiltServoTable(ServoTable):
 class PodTable(Table):
     """Mass properties of one rotor pod; nearly massless by default, as in the thesis."""
 
-    mass: Annotated[float, Field(ge=1e-14)] = Field(1e-9, description="kg")
+    # MuJoCo refuses moving bodies a decade below.
+    mass: Annotated[float, Field(ge=1e-14)] = Field(Pod.mass, description="kg")
     inertia: Annotated[float, Field(ge=1e-14)] = Field(
-        1e-13, description="kg m^2, about each axis of the pod"
+        Pod.inertia, description="kg m^2, about each axis of the pod"
     )
 
 

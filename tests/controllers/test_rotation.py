@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 from controllers.rotation import (
     euler_from_quaternion,
     quaternion_from_euler,
+    quaternion_from_rotation,
     rotation_from_euler,
+    shortest_turn,
     world_up_in_body,
 )
 
@@ -121,6 +123,15 @@ def test_the_conjugate_is_the_inverse(q):
     np.testing.assert_allclose(there @ back, np.eye(3), rtol=0, atol=1e-12)
 
 
+@quick
+@given(quaternions)
+def test_a_rotation_gives_its_quaternion_back(q):
+    found = np.array(quaternion_from_rotation(tuple(matrix_of_quaternion(q).ravel())))
+    np.testing.assert_allclose(found * np.sign(found @ q), q, atol=1e-12)
+    longer = quaternion_from_rotation(tuple(1.001 * matrix_of_quaternion(q).ravel()))
+    assert np.linalg.norm(longer) == pytest.approx(1.0, abs=1e-12)
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_rounding_at_vertical_pitch_does_not_leave_the_domain(sign):
     half = 0.5**0.5 * (1 + 1e-12)
@@ -128,3 +139,12 @@ def test_rounding_at_vertical_pitch_does_not_leave_the_domain(sign):
     assert pitch == sign * pi / 2
     assert isfinite(roll)
     assert isfinite(yaw)
+
+
+@quick
+@given(st.floats(-1e3, 1e3))
+def test_the_shortest_turn_leads_to_the_same_direction(angle):
+    turn = shortest_turn(angle)
+    assert abs(turn) <= pi + 1e-12
+    assert (cos(turn), sin(turn)) == pytest.approx((cos(angle), sin(angle)), abs=1e-12)
+    assert abs(angle) > pi or turn == angle

@@ -10,7 +10,7 @@ import sympy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controllers.decoupling_matrix import torque_entries, torque_free_force
+from controllers.decoupling_matrix import torque_entries, torque_free_force, torque_free_inputs
 from controllers.singularity import (
     decoupling_matrix,
     determinant,
@@ -21,6 +21,7 @@ from controllers.singularity import (
     residuals,
     singular_values,
     singularity_margin,
+    tilt_trigonometry,
     torque_free_direction,
     torque_matrix,
     world_up,
@@ -89,6 +90,14 @@ def test_torque_and_force_matrices_are_the_published_ones() -> None:
     force = [[0, s[1], 0, -s[3]], [s[0], 0, -s[2], 0], [-c[0], c[1], -c[2], c[3]]]
     np.testing.assert_allclose(torque_matrix(angles, AR_DRONE) * arm, torque, rtol=1e-14)
     np.testing.assert_allclose(force_matrix(angles), force, rtol=1e-14)
+
+
+@given(gaits)
+def test_torque_free_inputs_are_the_minors_of_tau(angles) -> None:
+    """Their norm is the product of the singular values, which spares looking for these."""
+    inputs = torque_free_inputs(torque_entries(tilt_trigonometry(angles), drag_ratio(AR_DRONE)))
+    product = singular_values(angles, AR_DRONE).prod()
+    assert np.linalg.norm(inputs) == pytest.approx(product, rel=1e-9, abs=1e-14)
 
 
 @given(angles=gaits, roll=st.floats(-0.7, 0.7), pitch=st.floats(-0.7, 0.7))

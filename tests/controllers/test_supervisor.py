@@ -81,7 +81,6 @@ def test_engines_fly_the_same_supervised_flight_and_show_what_passed():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"simulation.plant": "thesis"}, "its tilt angles follow the gait whatever"),
         ({"controller.supervisor.min_margin": 1.6}, "controller.supervisor.min_margin = 1.6"),
     ],
 )

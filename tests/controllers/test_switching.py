@@ -128,9 +128,17 @@ def test_each_law_flies_in_its_zone(extension):
             assert inputs == yaw_position.yaw_position_inputs(1.0, state, position)
 
 
-def test_the_flown_thrust_rate_is_the_thrusts_derivative():
+RISING_AND_FALLING = ReferenceParameters(
+    REFERENCE_TYPES["lissajous"], amplitude_z=0.5, frequency_z=2.0, phase_z=1.0
+)
+
+
+@pytest.mark.parametrize("reference", [None, RISING_AND_FALLING])
+def test_the_flown_thrust_rate_is_the_thrusts_derivative(reference):
     random = np.random.default_rng(3)
     law = parameters("bumpless")
+    if reference is not None:
+        law = law._replace(yaw_position=law.yaw_position._replace(reference=reference))
     for _ in range(CASES):
         state = random_state(random)
 

@@ -7,8 +7,10 @@ import json
 import pyarrow.parquet as pq
 import pytest
 
+import tiltsim
 from tests.sweeps.files import boundary_sweep, short_sweep
 from tiltsim.cli import main
+from tiltsim.figures.distributions import wilson_interval
 from tiltsim.figures.sweep import sweep_figure
 from tiltsim.library import library_sweeps, scenario_files, shipped_folder
 from tiltsim.sweeps.dataset import load_results
@@ -170,9 +172,130 @@ def test_plot_draws_lines_and_says_what_was_lost(grid, tmp_path):
 def test_plot_draws_distributions(tmp_path):
     out = swept(short_sweep(tmp_path / "sweep.toml", count=8), tmp_path / "out")
     figure = sweep_figure(load_results(out), ("max_abs_roll", "max_abs_pitch"))
-    curve = figure.subfigs[0].axes[0].lines[0]
-    assert list(curve.get_ydata()) == [step / 8 for step in range(9)]
+    curve = figure.subfigs[0].axes[1].lines[0]
+    assert list(curve.get_ydata()) == [step / 8 for step in range(1, 9)]
     assert list(curve.get_xdata()) == sorted(curve.get_xdata())
+
+
+def test_lost_flights_are_the_worst_of_a_distribution(tmp_path):
+    """Upside down nobody flies: errors end below all flights, margins begin above none."""
+    file = short_sweep(tmp_path / "sweep.toml", count=40)
+    text = file.read_text(encoding="utf-8").replace("deviation = 0.1", "deviation = 1.0")
+    file.write_text(text.replace("duration = 0.01", "duration = 0.5"), encoding="utf-8")
+    results = load_results(swept(file, tmp_path / "out"))
+    metrics = ("max_abs_pitch", "min_singularity_margin")
+    figure = sweep_figure(results, metrics)
+    shares, errors, margins = figure.subfigs[0].axes
+    completed = results.columns["end"] == "completed"
+    kept = results.columns["controller.decoupler"] == "conventional"
+    share = completed[kept].mean()
+    assert 0.2 < share < 0.9
+    assert shares.patches[0].get_width() == pytest.approx(share)
+    assert errors.lines[0].get_ydata()[-1] == pytest.approx(share)
+    assert margins.lines[0].get_ydata()[0] == pytest.approx(1.0 - share + 1.0 / 40.0)
+    assert margins.lines[0].get_ydata()[-1] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("successes", "trials", "low", "high"),
+    # Newcombe, "Two-sided confidence intervals for the single proportion", 1998, Table I.
+    [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611)],
+)
+def test_intervals_of_shares_are_wilsons(successes, trials, low, high):
+    assert wilson_interval(successes, trials) == pytest.approx((low, high), abs=1e-4)
+
+
+LAYERS = """
+metrics = ["max_abs_roll", "min_rotor_speed"]
+[scenario.simulation]
+duration = 0.3
+timestep = 0.004
+[scenario.controller]
+decoupling = "exact"
+decoupler = "exact"
+gains = "exact"
+[scenario.initial]
+rotor_speed = 361.0
+[scenario.air]
+drag = { linear = [0.2, 0.2, 0.1] }
+[derive]
+air.wind = ["wind", 0, 0]
+[[axis]]
+type = "list"
+key = "wind"
+values = [0.0, 5.0]
+[[axis]]
+type = "list"
+key = "sensors.attitude_noise"
+values = [0.0, 0.02]
+[[axis]]
+type = "list"
+key = "vehicle.mass"
+values = [0.4, 0.5]
+[[axis]]
+type = "seed"
+key = "simulation.seed"
+[sample]
+count = 2
+"""
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_axes_of_layers_fly_as_their_rows_say(tmp_path, engine):
+    """Wind, noise, mass and seed: in batches as alone, the layers coming and going by row."""
+    file = tmp_path / "sweep.toml"
+    file.write_text(LAYERS, encoding="utf-8")
+    out = tmp_path / "out"
+    options = ["--jobs", "1", "--quiet", "--set", f"simulation.engine={engine}"]
+    assert main(["sweep", str(file), "--out", str(out), *options]) == 0
+    rows = pq.read_table(out / "sweep.parquet").to_pylist()
+    assert len(rows) == 16
+    assert {row["end"] for row in rows} == {"completed"}
+    for row in rows:
+        alone = tiltsim.simulate(tiltsim.parse_scenario(json.loads(row["scenario"]))).metrics()
+        assert {name: row[name] for name in ("max_abs_roll", "min_rotor_speed")} == {
+            name: alone[name] for name in ("max_abs_roll", "min_rotor_speed")
+        }
+    found = [(row["max_abs_roll"], row["min_rotor_speed"]) for row in rows]
+    # Without noise the seed makes no difference, and everything else does.
+    assert len(set(found)) == 12
+
+
+def test_a_controller_of_ones_own_is_one_case_among_laws(tmp_path):
+    (tmp_path / "mine.py").write_text(
+        "import numpy as np\nimport tiltsim\n\n\n"
+        "def law(seen):\n    return tiltsim.Command(thrusts=np.full(4, 1.2))\n",
+        encoding="utf-8",
+    )
+    (tmp_path / "sweep.toml").write_text(
+        """
+[scenario.simulation]
+duration = 0.1
+timestep = 0.002
+[[axis]]
+type = "uniform"
+key = "model_error.mass"
+low = 0.9
+high = 1.1
+[[axis]]
+type = "cases"
+key = "law"
+[axis.cases.mine]
+controller = { law = "python", function = "mine.py:law" }
+[axis.cases.exact]
+controller = { decoupling = "exact", decoupler = "exact", gains = "exact" }
+[sample]
+count = 2
+""",
+        encoding="utf-8",
+    )
+    rows = pq.read_table(swept(tmp_path / "sweep.toml", tmp_path / "out") / "sweep.parquet")
+    assert rows["law"].to_pylist() == ["mine", "mine", "exact", "exact"]
+    assert set(rows["end"].to_pylist()) == {"completed"}
+    laws = [json.loads(text)["controller"]["law"] for text in rows["scenario"].to_pylist()]
+    assert laws == ["python", "python", "attitude_altitude", "attitude_altitude"]
+    masses = rows["model_error.mass"].to_pylist()
+    assert masses[:2] == masses[2:]
 
 
 def test_plot_draws_boundaries(tmp_path):

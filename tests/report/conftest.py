@@ -80,15 +80,15 @@ published = 0.0
 """
 
 BOUNDED = """
-title = "A bound that the thesis plant does not know"
+title = "Ground, which the thesis plant does not know"
 source = "ch. 9, Sec. 3"
 
 [simulation]
 duration = 0.2
 timestep = 0.002
 
-[vehicle]
-max_rotor_speed = 394.1
+[ground]
+height = -1.0
 
 [controller]
 law = "attitude_altitude"

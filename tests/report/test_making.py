@@ -31,7 +31,7 @@ def test_every_scenario_is_flown_on_both_plants_or_says_why_not(report, library)
     assert {key[1] for key in report.flights} == {"thesis", "mujoco"}
     refusals = {k: v for k, v in report.flights.items() if isinstance(v, Refusal)}
     assert list(refusals) == [(f"{library}/bounded.toml", "thesis")]
-    assert "rotor limits" in refusals[f"{library}/bounded.toml", "thesis"].reason
+    assert "no contact with ground" in refusals[f"{library}/bounded.toml", "thesis"].reason
 
 
 def test_rows_hold_both_plants_and_their_verdicts(report):

@@ -145,6 +145,59 @@ def test_what_is_set_survives_a_change_of_kind(plan_of):
     assert [(g.type, g.amplitude) for g in gaits] == [("trot_instant", 0.3), ("walk", 0.3)]
 
 
+CASES = """
+[[axis]]
+type = "cases"
+key = "stack"
+[axis.cases.published]
+controller = { decoupling = "published", decoupler = "modified", gains = "ch04" }
+[axis.cases.poles]
+controller.decoupling = "exact"
+controller.decoupler = "exact"
+controller.gains = { attitude = { bandwidth = 20.0 }, altitude = { bandwidth = 8.0 } }
+[axis.cases.walk]
+gait = { type = "walk", amplitude = 0.1, period = 2.0 }
+"""
+SEED = '[[axis]]\ntype = "seed"\nkey = "simulation.seed"\nstart = 7\n'
+
+
+def test_cases_lay_their_tables_over_the_base(plan_of):
+    plan = plan_of(CASES.replace(", period = 2.0", "") + PERIODS)
+    assert [plan.point(i)["stack"] for i in (0, 5, 10)] == ["published", "poles", "walk"]
+    published, poles, walk = (plan.scenario(plan.point(i)) for i in (1, 6, 11))
+    assert (published.controller.decoupling, published.controller.gains) == ("published", "ch04")
+    assert poles.controller.decoupler == "exact"
+    assert poles.controller.gains.attitude.bandwidth == 20.0
+    assert walk.gait.type == "walk"
+    assert walk.controller == plan_of(PERIODS).scenario({}).controller
+    assert {s.gait.period for s in (published, poles, walk)} == {1.5}, "axes have the last word"
+
+
+def test_seeds_number_the_samples_and_every_case_flies_the_same_draws(plan_of):
+    plan = plan_of(f"{CASES}{MASS}{SEED}[sample]\ncount = 4\n")
+    points = [plan.point(index) for index in range(len(plan))]
+    assert [p["simulation.seed"] for p in points] == [7, 8, 9, 10] * 3
+    draws = [{k: v for k, v in p.items() if k != "stack"} for p in points]
+    assert draws[:4] == draws[4:8] == draws[8:]
+    assert plan.scenario(points[6]).simulation.seed == 9
+
+
+def test_seeds_alone_are_a_random_set(plan_of):
+    plan = plan_of(f"{SEED}[sample]\ncount = 3\n")
+    assert [plan.point(index) for index in range(3)] == [{"simulation.seed": i} for i in (7, 8, 9)]
+
+
+def test_files_of_an_inline_scenario_lie_beside_the_sweep(plan_of, tmp_path, monkeypatch):
+    (tmp_path / "mine.py").write_text("def law(seen): ...\n", encoding="utf-8")
+    monkeypatch.chdir("/")
+    own = 'controller = { law = "python", function = "mine.py:law" }\n'
+    inline = f"[scenario.simulation]\nduration = 0.01\n{SEED}[sample]\ncount = 1\n"
+    case = f'[[axis]]\ntype = "cases"\nkey = "law"\n[axis.cases.mine]\n{own}'
+    for text in (f"scenario.{own}{inline}", inline + case):
+        plan = plan_of(text)
+        assert plan.scenario(plan.point(0)).controller.file == tmp_path / "mine.py"
+
+
 def test_a_definition_survives_its_file(plan_of):
     definition = plan_of(AMPLITUDES + PERIODS).definition
     again = Definition.from_json(definition.to_json())
@@ -193,7 +246,13 @@ def test_huge_axes_are_refused_or_tried_in_a_few_places(plan_of, count):
     [
         ("", ["needs at least one [[axis]]"]),
         (PERIODS + "colour = 1", ["axis.0.colour", "unknown key"]),
-        (PERIODS.replace("linspace", "lin"), ["axis.0.type", "list, linspace, uniform, normal"]),
+        (PERIODS.replace("linspace", "lin"), ["axis.0.type", "list, linspace, cases, uniform"]),
+        (SEED, ["axis.type", "seed", "[sample]"]),
+        (SEED + "relative = true\n[sample]\ncount = 1", ["axis.0.relative"]),
+        (CASES.replace('"stack"', '"gait.stack"'), ["gait.stack", "without a dot"]),
+        (CASES.replace("decoupler =", "decuopler ="), ["decuopler", "did you mean decoupler"]),
+        (CASES + PERIODS.replace("period", "amplitude"), ["axis.cases.walk.gait.amplitude = 0.1"]),
+        (CASES + "[set]\ncontroller.decoupling = 'exact'", ["published.controller.decoupling"]),
         (PERIODS.replace("gait.period", "gait.perod"), ["gait.perod", "did you mean period"]),
         (PERIODS.replace("gait.period", "period"), ["period", "[derive]"]),
         (PERIODS.replace("start = 1", "start = -1"), ["gait.period = -1", "greater"]),

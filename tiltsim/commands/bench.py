@@ -83,7 +83,7 @@ def _print_ratios(rows: list[dict[str, Any]]) -> None:
             f"{row['ratio']:>8.3f}"
         )
     print("\nratio: share of the speed of bare mj_step on the same model in the same run; medians")
-    print("empty, state: callbacks that do nothing, or only read the state and write controls")
+    print("empty: a native callback that does nothing; native callbacks stop MuJoCo's timers")
 
 
 def _print_flights(row: dict[str, Any]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from pydantic import ValidationError
@@ -14,23 +14,26 @@ from tiltsim.errors import InputError
 from tiltsim.files import without_none
 from tiltsim.messages import one_line
 from tiltsim.sweeps.plan import Definition, Plan, load_definition
-from tiltsim.sweeps.tables import NormalAxis, Sweep, UniformAxis
+from tiltsim.sweeps.tables import NormalAxis, SeedAxis, Sweep, UniformAxis
 
 if TYPE_CHECKING:
     from tiltsim.scenario import Scenario
     from tiltsim.sweeps.tables import Axis
+
+LARGEST_SEED: Final = 2**31
 
 
 class Domain:
     """Scenarios around a base: values drawn along axes, independently for every episode.
 
     ``uniform`` and ``normal`` axes are drawn from their distributions, those with values of their
-    own (``list``, ``linspace``) from these, each as likely as the next.
+    own (``list``, ``linspace``, ``cases``) from these, each as likely as the next; a ``seed`` is
+    any.
     """
 
     def __init__(self, scenario: Scenario, axes: Sequence[Mapping[str, Any]]) -> None:
         """Raises `InputError`, as a sweep would, where an axis is invalid."""
-        drawn = any(axis.get("type") in {"uniform", "normal"} for axis in axes)
+        drawn = any(axis.get("type") in {"uniform", "normal", "seed"} for axis in axes)
         document = {
             "scenario": "base",
             "axis": [dict(axis) for axis in axes],
@@ -78,5 +81,7 @@ def _row(axis: Axis, generator: np.random.Generator) -> Sequence[Any]:
     if isinstance(axis, NormalAxis):
         drawn = generator.normal(axis.mean, axis.standard_deviation)
         return [float(drawn)] * len(axis.targets)
+    if isinstance(axis, SeedAxis):
+        return [int(generator.integers(LARGEST_SEED))] * len(axis.targets)
     rows = axis.rows()
     return rows[int(generator.integers(len(rows)))]

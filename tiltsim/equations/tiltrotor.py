@@ -33,27 +33,42 @@ def law_state(state: Sequence[float], tilts: Quad) -> State:
 
 
 @scalar
-def equations_of_motion(
-    state: Sequence[float], tilts: Quad, inputs: Quad, vehicle: Vehicle, disturbance: Triple
+def rigid_body(
+    state: Sequence[float],
+    tilts: Quad,
+    squares: Quad,
+    vehicle: Vehicle,
+    push: Triple,
+    turn: Triple,
 ) -> tuple[float, ...]:
-    """Time derivative of the state under the given rotor accelerations (rad/s^2).
+    """Time derivative of position, velocity, rotation and body rates, the state's first eighteen.
 
-    ``disturbance`` is an acceleration (m/s^2, world) that the law does not know of.
+    Parameters
+    ----------
+    state
+        Eighteen numbers, and whatever follows.
+    tilts
+        rad.
+    squares
+        ``varpi |varpi|`` of the rotors, (rad/s)^2.
+    vehicle
+        What flies.
+    push, turn
+        What acts besides weight and rotors: an acceleration (m/s^2, world) and an angular one
+        (rad/s^2, body).
     """
     r11, r12, r13, r21, r22, r23 = state[6], state[7], state[8], state[9], state[10], state[11]
     r31, r32, r33, p, q, r = state[12], state[13], state[14], state[15], state[16], state[17]
-    s1, s2, s3, s4 = state[18], state[19], state[20], state[21]
-    u1, u2, u3, u4 = inputs
+    w1, w2, w3, w4 = squares
     trig = sines_and_cosines(tilts[0], tilts[1], tilts[2], tilts[3])
-    w1, w2, w3, w4 = s1 * abs(s1), s2 * abs(s2), s3 * abs(s3), s4 * abs(s4)
 
-    # Eq. (1): force in body axes, turned to the world, weight and disturbance.
-    gust_x, gust_y, gust_z = disturbance
+    # Eq. (1): force in body axes, turned to the world, weight and what else pushes.
+    push_x, push_y, push_z = push
     fx, fy, fz = body_force(trig, w1, w2, w3, w4)
     per_force = vehicle.thrust_coefficient / vehicle.mass
-    ax = per_force * (r11 * fx + r12 * fy + r13 * fz) + gust_x
-    ay = per_force * (r21 * fx + r22 * fy + r23 * fz) + gust_y
-    az = per_force * (r31 * fx + r32 * fy + r33 * fz) - vehicle.gravity + gust_z
+    ax = per_force * (r11 * fx + r12 * fy + r13 * fz) + push_x
+    ay = per_force * (r21 * fx + r22 * fy + r23 * fz) + push_y
+    az = per_force * (r31 * fx + r32 * fy + r33 * fz) - vehicle.gravity + push_z
 
     # Eq. (4): torque alone, no gyroscopic term.
     x2, x4, y1, y3, z1, z2, z3, z4 = torque_entries(trig, drag_ratio(vehicle))
@@ -67,8 +82,23 @@ def equations_of_motion(
         *(r12 * r - r13 * q, r13 * p - r11 * r, r11 * q - r12 * p),  # Eq. (7): R' = R omega^
         *(r22 * r - r23 * q, r23 * p - r21 * r, r21 * q - r22 * p),
         *(r32 * r - r33 * q, r33 * p - r31 * r, r31 * q - r32 * p),
-        *(p_rate, q_rate, r_rate, u1, u2, u3, u4),
+        *(p_rate + turn[0], q_rate + turn[1], r_rate + turn[2]),
     )
+
+
+@scalar
+def equations_of_motion(
+    state: Sequence[float], tilts: Quad, inputs: Quad, vehicle: Vehicle, disturbance: Triple
+) -> tuple[float, ...]:
+    """Time derivative of the state under the given rotor accelerations (rad/s^2).
+
+    ``disturbance`` is an acceleration (m/s^2, world) that the law does not know of.
+    """
+    s1, s2, s3, s4 = state[18], state[19], state[20], state[21]
+    squares = s1 * abs(s1), s2 * abs(s2), s3 * abs(s3), s4 * abs(s4)
+    u1, u2, u3, u4 = inputs
+    body = rigid_body(state, tilts, squares, vehicle, disturbance, (0.0, 0.0, 0.0))
+    return (*body, u1, u2, u3, u4)
 
 
 def initial_state(scenario: Scenario, rotor_speeds: Sequence[float]) -> tuple[float, ...]:

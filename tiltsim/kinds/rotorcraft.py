@@ -57,6 +57,16 @@ def rotor_thrusts(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str
     }
 
 
+def _thrust_factors(scenario: Scenario) -> tuple[float, float]:
+    factors = [1.0]
+    for fault in scenario.fault:
+        if fault.type == "rotor_loss":
+            factors.append(0.0)
+        elif fault.type == "partial_thrust":
+            factors.append(fault.factor)
+    return min(factors), max(factors)
+
+
 def _compile(
     scenario: Scenario,
     law_states: int,
@@ -76,7 +86,9 @@ def _compile(
         userdata_size=userdata_size,
         tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump(exclude={"max_rate"})),
         pod=Pod(**vehicle.pod.model_dump()),
-        rotor_limits=RotorLimits(vehicle.min_rotor_speed, vehicle.max_rotor_speed),
+        rotor_limits=RotorLimits(
+            vehicle.min_rotor_speed, vehicle.max_rotor_speed, _thrust_factors(scenario)
+        ),
         law_states=law_states,
         extra_actuators=extra_actuators,
         ground=None if ground is None else Ground(ground.height, ground.friction),

@@ -9,6 +9,7 @@ from tiltsim.loops.air import with_air
 from tiltsim.loops.commanded import COMMANDED
 from tiltsim.loops.full_pose import FULL_POSE
 from tiltsim.loops.gait_feedforward import GAIT_FEEDFORWARD
+from tiltsim.loops.on_equations import on_equations
 from tiltsim.loops.quadrotor_attitude_altitude import QUADROTOR_ATTITUDE_ALTITUDE
 from tiltsim.loops.switching import SWITCHING
 from tiltsim.loops.tilt_car_fourth_derivative import FOURTH_DERIVATIVE
@@ -42,7 +43,10 @@ def loop_of(scenario: Scenario) -> Loop:
     loop = LOOPS[scenario.controller.loop_name]
     if scenario.has_real_actuators:
         loop = with_actuation(loop, scenario.simulation.latency_steps)
-    return with_air(loop) if scenario.has_air else loop
+    if scenario.has_air:
+        loop = with_air(loop)
+    by_controls = scenario.simulation.plant == "thesis" and not scenario.does_as_told
+    return on_equations(loop) if by_controls else loop
 
 
 def control_setup(scenario: Scenario) -> ControlSetup:

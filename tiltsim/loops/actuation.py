@@ -34,11 +34,11 @@ from controllers.actuators import (
 )
 from controllers.allocation import allocated
 from controllers.gaits import tilt_reference
-from controllers.records import make_record_type
 from controllers.rotation import euler_from_quaternion
 from controllers.scalar import scalar
 from controllers.vehicle import Vehicle
 from tiltsim.loop import ControlSetup, ExtraActuators, Floats, Loop
+from tiltsim.loops.layer import around
 from tiltsim.loops.tiltrotor import rotor_thrust_controls, servo_lead
 
 if TYPE_CHECKING:
@@ -231,12 +231,6 @@ def _delay_line(first: int, steps: int) -> tuple[Callable[..., Any], Callable[..
     return delivered, rates
 
 
-@scalar
-def never_watched(values: Sequence[float], parameters: Any) -> tuple[float, ...]:
-    """In place of a watch, for loops that leave watching to Python."""
-    return (1.0,)
-
-
 @cache
 def with_actuation(loop: Loop, latency_steps: int) -> Loop:
     """A law of the tiltrotor with the layer around it.
@@ -244,8 +238,8 @@ def with_actuation(loop: Loop, latency_steps: int) -> Loop:
     ``latency_steps`` is the number of control steps between a reading and its command taking
     effect.
     """
+    layered = around(loop, Actuation, _actuation)
     law_controls, law_observe = loop.controls, loop.observe
-    law_watch = loop.watch or never_watched
     law_act, law_ctrl = loop.sizes.act, loop.sizes.ctrl
     line = law_act + ROTORS  # after the speeds that the motors are told
     under_way = COMMANDS * latency_steps
@@ -254,9 +248,6 @@ def with_actuation(loop: Loop, latency_steps: int) -> Loop:
     extra = ExtraActuators(states=ROTORS + under_way, memories=COMMANDS)
     sizes = loop.sizes._replace(
         act=law_act + extra.states, ctrl=law_ctrl + extra.states + extra.memories
-    )
-    parameters_type = make_record_type(
-        "ActuationParameters", signature=float, actuation=Actuation, law=loop.parameters
     )
     delivered, line_rates = _delay_line(line, latency_steps)
 
@@ -269,7 +260,7 @@ def with_actuation(loop: Loop, latency_steps: int) -> Loop:
         parameters: Any,
         table: Sequence[float],
     ) -> tuple[float, ...]:
-        actuation = parameters.actuation
+        actuation = parameters.layer
         seen_qpos = measured_position(time, qpos, actuation.sensors)
         seen_qvel = measured_velocity(time, qvel, actuation.sensors)
         asked = law_controls(time, seen_qpos, seen_qvel, act, parameters.law, table)
@@ -297,7 +288,7 @@ def with_actuation(loop: Loop, latency_steps: int) -> Loop:
         ctrl: Sequence[float],
         parameters: Any,
     ) -> tuple[float, ...]:
-        actuation = parameters.actuation
+        actuation = parameters.layer
         commands = first_eight(ctrl[memory:])
         return (
             *servo_controls(time, qpos, commands, actuation),
@@ -312,44 +303,28 @@ def with_actuation(loop: Loop, latency_steps: int) -> Loop:
     ) -> tuple[float, ...]:
         return law_observe(qpos, qvel, act[:law_act], ctrl[:law_ctrl])
 
-    @scalar
-    def watch(values: Sequence[float], parameters: Any) -> tuple[float, ...]:
-        return law_watch(values, parameters.law)
-
     controls.__qualname__ = f"with_actuation.{latency_steps}.{loop.controls.__qualname__}"
 
-    def setup(scenario: Scenario, signature: float) -> ControlSetup:
-        inner = loop.setup(scenario, loop.signature)
-        actuation = _actuation(scenario)
-        return ControlSetup(parameters_type(signature, actuation, inner.parameters), inner.table)
-
-    def inner_setup(setup: ControlSetup) -> ControlSetup:
-        return ControlSetup(setup.parameters.law, setup.table)
-
     def initial_activations(scenario: Scenario, setup: ControlSetup) -> Sequence[float]:
-        law_states = loop.initial_activations(scenario, inner_setup(setup))
+        law_states = layered.initial_activations(scenario, setup)
         waiting = (*_initial_tilts(scenario), 0.0, 0.0, 0.0, 0.0) * latency_steps
         return (*law_states, *law_states[:ROTORS], *waiting)
 
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-        columns = loop.derive(samples, inner_setup(setup))
-        for rotor, fault in enumerate(setup.parameters.actuation.faults, start=1):
+        columns = layered.derive(samples, setup)
+        for rotor, fault in enumerate(setup.parameters.layer.faults, start=1):
             factors = [thrust_factor(time, fault) for time in samples["time"].tolist()]
             columns[f"thrust_factor_{rotor}"] = np.array(factors)
         return columns
 
     return replace(
-        loop,
+        layered,
         sizes=sizes,
-        parameters=parameters_type,
         controls=controls,
         hold=hold,
-        setup=setup,
         initial_activations=initial_activations,
         observe=observe,
-        watch=None if loop.watch is None else watch,
         derive=derive,
-        watched=lambda sample, setup: loop.watched(sample, inner_setup(setup)),
         extra_actuators=(*loop.extra_actuators, extra),
         extra_columns={**loop.extra_columns, **dict.fromkeys(THRUST_FACTORS, "1")},
     )

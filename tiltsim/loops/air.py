@@ -30,12 +30,11 @@ from controllers.air import (
     stationary_states,
 )
 from controllers.decoupling_matrix import sines_and_cosines
-from controllers.records import make_record_type
 from controllers.rotation import rotation_from_quaternion
 from controllers.scalar import Quad, scalar
 from controllers.vehicle import Vehicle
 from tiltsim.loop import ControlSetup, ExtraActuators, Floats, Loop
-from tiltsim.loops.actuation import never_watched
+from tiltsim.loops.layer import around
 
 if TYPE_CHECKING:
     from tiltsim.scenario import Scenario
@@ -116,17 +115,14 @@ def air_wrench(
 @cache
 def with_air(loop: Loop) -> Loop:
     """A loop in air that moves, drags and feels the ground."""
-    inner_controls, inner_refresh, inner_hold = loop.controls, loop.refresh, loop.hold
-    inner_observe, inner_watch = loop.observe, loop.watch or never_watched
+    layered = around(loop, Surroundings, _surroundings)
+    inner_controls, inner_hold, inner_observe = loop.controls, loop.held, loop.observe
     first, inner_ctrl = loop.sizes.act, loop.sizes.ctrl
     tilting = loop.model == "tiltrotor"
     tilts_of: Callable[..., Quad] = pod_tilts if tilting else no_tilts
     thrust = 4 if tilting else 0  # the first of the thrust actuators
     extra = ExtraActuators(states=DRYDEN_STATES, wrench=True)
     sizes = loop.sizes._replace(act=first + DRYDEN_STATES, ctrl=inner_ctrl + DRYDEN_STATES + WRENCH)
-    parameters_type = make_record_type(
-        "AirParameters", signature=float, surroundings=Surroundings, law=loop.parameters
-    )
 
     @scalar
     def air_controls(
@@ -154,32 +150,7 @@ def with_air(loop: Loop) -> Loop:
         table: Sequence[float],
     ) -> tuple[float, ...]:
         inner = inner_controls(time, qpos, qvel, act, parameters.law, table)
-        return (*inner, *air_controls(time, qpos, qvel, act, inner, parameters.surroundings))
-
-    if inner_hold is None:
-
-        @scalar
-        def held(
-            time: float,
-            qpos: Sequence[float],
-            qvel: Sequence[float],
-            act: Sequence[float],
-            ctrl: Sequence[float],
-            parameters: Any,
-        ) -> tuple[float, ...]:
-            return inner_refresh(ctrl, act)
-    else:
-
-        @scalar
-        def held(
-            time: float,
-            qpos: Sequence[float],
-            qvel: Sequence[float],
-            act: Sequence[float],
-            ctrl: Sequence[float],
-            parameters: Any,
-        ) -> tuple[float, ...]:
-            return inner_hold(time, qpos, qvel, act, ctrl[:inner_ctrl], parameters.law)
+        return (*inner, *air_controls(time, qpos, qvel, act, inner, parameters.layer))
 
     @scalar
     def hold(
@@ -190,8 +161,8 @@ def with_air(loop: Loop) -> Loop:
         ctrl: Sequence[float],
         parameters: Any,
     ) -> tuple[float, ...]:
-        inner = held(time, qpos, qvel, act, ctrl, parameters)
-        return (*inner, *air_controls(time, qpos, qvel, act, inner, parameters.surroundings))
+        inner = inner_hold(time, qpos, qvel, act, ctrl[:inner_ctrl], parameters.law)
+        return (*inner, *air_controls(time, qpos, qvel, act, inner, parameters.layer))
 
     @scalar
     def observe(
@@ -203,23 +174,15 @@ def with_air(loop: Loop) -> Loop:
             *(act[first], act[first + 1], act[first + 2], act[first + 3], act[first + 4]),
         )
 
-    @scalar
-    def watch(values: Sequence[float], parameters: Any) -> tuple[float, ...]:
-        return inner_watch(values, parameters.law)
-
     controls.__qualname__ = f"with_air.{loop.controls.__qualname__}"
 
-    def setup(scenario: Scenario, signature: float) -> ControlSetup:
-        inner = loop.setup(scenario, loop.signature)
-        surroundings = _surroundings(scenario)
-        return ControlSetup(parameters_type(signature, surroundings, inner.parameters), inner.table)
-
-    def inner_setup(setup: ControlSetup) -> ControlSetup:
-        return ControlSetup(setup.parameters.law, setup.table)
+    def initial_activations(scenario: Scenario, setup: ControlSetup) -> Sequence[float]:
+        turbulence = setup.parameters.layer.air.turbulence
+        return (*layered.initial_activations(scenario, setup), *stationary_states(turbulence))
 
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-        columns = loop.derive(samples, inner_setup(setup))
-        air = setup.parameters.surroundings.air
+        columns = layered.derive(samples, setup)
+        air = setup.parameters.layer.air
         states = np.stack([samples[name] for name in DRYDEN_FIELDS], axis=-1)
         velocity = np.array(
             [
@@ -230,20 +193,13 @@ def with_air(loop: Loop) -> Loop:
         return columns | dict(zip(AIR_COLUMNS, velocity.T, strict=True))
 
     return replace(
-        loop,
+        layered,
         sizes=sizes,
-        parameters=parameters_type,
         controls=controls,
         hold=hold,
-        setup=setup,
-        initial_activations=lambda scenario, setup: (
-            *loop.initial_activations(scenario, inner_setup(setup)),
-            *stationary_states(setup.parameters.surroundings.air.turbulence),
-        ),
+        initial_activations=initial_activations,
         observe=observe,
-        watch=None if loop.watch is None else watch,
         derive=derive,
-        watched=lambda sample, setup: loop.watched(sample, inner_setup(setup)),
         extra_actuators=(*loop.extra_actuators, extra),
         law_fields=(*loop.law_fields, *DRYDEN_FIELDS),
         extra_columns={

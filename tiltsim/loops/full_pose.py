@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-import numpy as np
-
 from controllers.full_pose import Parameters, full_pose_inputs
 from controllers.gaits import tilt_reference
-from controllers.references import position_reference
 from controllers.scalar import Quad, Triple, scalar
 from tiltsim.controller_tables import FullPoseController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes
+from tiltsim.loops.quadrotor import references
 from tiltsim.loops.tiltrotor import (
-    REFERENCE_COLUMNS,
     gait_singularity,
     initial_rotor_speeds,
     observe_tiltrotor,
+    refreshed_controls,
     rotor_spins,
     rotor_stops,
     rotor_thrust_controls,
@@ -69,16 +67,6 @@ def full_pose_controls(
 
 
 @scalar
-def refreshed_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
-    """Held controls with the thrusts that belong to the present rotor speeds."""
-    return (
-        *(ctrl[0], ctrl[1], ctrl[2], ctrl[3]),
-        *rotor_thrust_controls(act),
-        *(ctrl[8], ctrl[9], ctrl[10], ctrl[11], ctrl[12], ctrl[13], ctrl[14], ctrl[15]),
-    )
-
-
-@scalar
 def observe_full_pose(
     qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
 ) -> tuple[float, ...]:
@@ -116,14 +104,13 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     law = setup.parameters.law
-    reference = law.reference
-    time = samples["time"]
-    position = np.array([position_reference(t, reference, setup.table)[:3] for t in time.tolist()])
-    attitude = (reference.roll, reference.pitch, reference.yaw)
-    columns = [*position.reshape(len(time), 3).T, *(np.full_like(time, a) for a in attitude)]
-    told = {f"alpha_ref_{i}": samples[f"tilt_command_{i}"] for i in (1, 2, 3, 4)}
-    singularity = gait_singularity(samples, law.vehicle)
-    return dict(zip(REFERENCE_COLUMNS, columns, strict=True)) | told | singularity
+    wanted = law.reference
+    attitude = (wanted.roll, wanted.pitch, wanted.yaw)
+    return {
+        **references(samples, wanted, setup.table, attitude),
+        **{f"alpha_ref_{i}": samples[f"tilt_command_{i}"] for i in (1, 2, 3, 4)},
+        **gait_singularity(samples, law.vehicle),
+    }
 
 
 @scalar

@@ -25,6 +25,7 @@ from tiltsim.loops.tiltrotor import (
     gait_singularity,
     initial_rotor_speeds,
     observe_tiltrotor,
+    refreshed_controls,
     regularity,
     rotor_spins,
     rotor_stops,
@@ -75,16 +76,6 @@ def gait_feedforward_controls(
         *servo_commands(planned, share, parameters.servo_lead),
         *rotor_thrust_controls(act),
         *(u1, u2, u3, u4, x_rate, y_rate, z_rate),
-    )
-
-
-@scalar
-def refreshed_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
-    """Held controls with the thrusts that belong to the present rotor speeds."""
-    return (
-        *(ctrl[0], ctrl[1], ctrl[2], ctrl[3]),
-        *rotor_thrust_controls(act),
-        *(ctrl[8], ctrl[9], ctrl[10], ctrl[11], ctrl[12], ctrl[13], ctrl[14]),
     )
 
 

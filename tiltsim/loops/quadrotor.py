@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from math import cos
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from controllers.vehicle import Vehicle
 from controllers.yaw_position import State
 from tiltsim.equations.quadrotor import initial_state
 from tiltsim.kinds.rotorcraft import OBSERVED_FIELDS
-from tiltsim.loop import ControlSetup, Equations, Floats, Sizes, Watched
+from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
 from tiltsim.loops.tiltrotor import REFERENCE_COLUMNS, TILT_REFERENCE_COLUMNS
 
 if TYPE_CHECKING:
@@ -149,6 +149,49 @@ def equations(
         return (*initial_state(scenario), *extension)
 
     return Equations(inputs, inputs_size, rates, initial, observe)
+
+
+@scalar
+def watch_attitude(values: Sequence[float], parameters: object) -> tuple[float]:
+    """What `attitude_watched` watches, from what `observe_quadrotor` gives."""
+    return (level_thrust(values),)
+
+
+def extended_loop(
+    parameters: type[tuple[Any, ...]],
+    controls: Callable[..., tuple[float, ...]],
+    on_equations: Equations,
+    *,
+    setup: Callable[[Scenario, float], ControlSetup],
+    derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]],
+    watched: Callable[[Mapping[str, float], ControlSetup], tuple[Watched, ...]],
+    watch: Callable[..., tuple[float, ...]],
+    own_columns: Mapping[str, str] | None = None,
+    follows_position: bool = True,
+) -> Loop:
+    """A loop around a law that integrates its thrust twice; the rest as `tiltsim.loop.Loop` says.
+
+    ``own_columns`` are those beyond the `EXTENSION_COLUMNS`, with their units.
+    """
+    return Loop(
+        model="quadrotor",
+        sizes=SIZES,
+        parameters=parameters,
+        controls=controls,
+        refresh=held_extended_controls,
+        setup=setup,
+        initial_activations=extended_activations,
+        observe=observe_extended_quadrotor,
+        observes_controls=True,
+        derive=derive,
+        watched=watched,
+        watch=watch,
+        law_states=2,
+        law_fields=LAW_FIELDS,
+        extra_columns={**EXTENSION_COLUMNS, **(own_columns or {})},
+        follows_position=lambda _scenario: follows_position,
+        equations=on_equations,
+    )
 
 
 def references(

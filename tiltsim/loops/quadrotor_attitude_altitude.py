@@ -18,12 +18,12 @@ from tiltsim.loop import ControlSetup, Floats, Loop, Sizes
 from tiltsim.loops.quadrotor import (
     attitude_watched,
     equations,
-    level_thrust,
     observe_equations,
     observe_quadrotor,
     references,
     rigid_body_state,
     upright_margin,
+    watch_attitude,
 )
 
 if TYPE_CHECKING:
@@ -64,12 +64,6 @@ def attitude_altitude_controls(
 def held_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
     """Controls as they were sampled."""
     return ctrl[0], ctrl[1], ctrl[2], ctrl[3], ctrl[4], ctrl[5], ctrl[6], ctrl[7]
-
-
-@scalar
-def watch_attitude(values: Sequence[float], parameters: ControlParameters) -> tuple[float]:
-    """The cosine of the thrust axis' tilt."""
-    return (level_thrust(values),)
 
 
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
@@ -140,9 +134,6 @@ QUADROTOR_ATTITUDE_ALTITUDE: Final = Loop(
     watched=lambda sample, _setup: (attitude_watched(sample),),
     watch=watch_attitude,
     follows_position=lambda _scenario: False,
-    equations=equations(
-        *(equation_inputs, 4, equation_rates),
-        observe=observe_in_equations,
-    ),
+    equations=equations(equation_inputs, 4, equation_rates, observe_in_equations),
 )
 """The attitude-altitude law around the quadrotor."""

@@ -12,22 +12,17 @@ from controllers.scalar import Triple, scalar
 from controllers.switching import EXTENSIONS, Parameters, Zone, in_attitude_zone, switching_inputs
 from tiltsim.controller_tables import SwitchingController
 from tiltsim.equations.quadrotor import extended_equations_of_motion, law_state
-from tiltsim.loop import ControlSetup, Floats, Loop, Watched
+from tiltsim.loop import ControlSetup, Floats, Watched
 from tiltsim.loops.quadrotor import (
-    EXTENSION_COLUMNS,
-    LAW_FIELDS,
-    SIZES,
     attitude_watched,
     equations,
-    extended_activations,
     extended_controls,
+    extended_loop,
     extended_singularity,
-    held_extended_controls,
-    level_thrust,
     observe_extended_equations,
-    observe_extended_quadrotor,
     references,
     rigid_body_state,
+    watch_attitude,
 )
 
 if TYPE_CHECKING:
@@ -54,12 +49,6 @@ def switching_controls(
     law = parameters.law
     state = rigid_body_state(qpos, qvel, act[4], act[5])
     return extended_controls(switching_inputs(time, state, law, table), law.yaw_position.vehicle)
-
-
-@scalar
-def watch_attitude(values: Sequence[float], parameters: ControlParameters) -> tuple[float]:
-    """The cosine of the thrust axis' tilt."""
-    return (level_thrust(values),)
 
 
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
@@ -133,27 +122,16 @@ def observe_in_equations(
     return observe_extended_equations(state, inputs, parameters.law.yaw_position.vehicle)
 
 
-SWITCHING: Final = Loop(
-    model="quadrotor",
-    sizes=SIZES,
-    parameters=ControlParameters,
-    controls=switching_controls,
-    refresh=held_extended_controls,
+SWITCHING: Final = extended_loop(
+    ControlParameters,
+    switching_controls,
+    equations(equation_inputs, 6, equation_rates, observe_in_equations),
     setup=_setup,
-    initial_activations=extended_activations,
-    observe=observe_extended_quadrotor,
-    observes_controls=True,
     derive=_derive,
     watched=_watched,
     watch=watch_attitude,
-    law_states=2,
-    law_fields=LAW_FIELDS,
-    extra_columns={**EXTENSION_COLUMNS, "attitude_zone": "1"},
+    own_columns={"attitude_zone": "1"},
     # In the zone, where the law is meant to end up, the position is free.
-    follows_position=lambda _scenario: False,
-    equations=equations(
-        *(equation_inputs, 6, equation_rates),
-        observe=observe_in_equations,
-    ),
+    follows_position=False,
 )
 """Switching between yaw-position and attitude-altitude control of the quadrotor."""

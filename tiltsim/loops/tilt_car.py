@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from controllers.references import ReferenceParameters, reference_derivatives
 from controllers.scalar import Pair, scalar
 from controllers.tilt_car.vehicle import TiltCar
-from tiltsim.loop import Floats, Watched
+from tiltsim.kinds.tilt_car import TILT_CAR, initial_tilt
+from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
+from tiltsim.loops.tiltrotor import servo_lead
 
 if TYPE_CHECKING:
     from tiltsim.scenario import Scenario
@@ -83,12 +85,84 @@ def squares_of_speeds(values: Sequence[float], parameters: object) -> tuple[floa
     return (values[8] * values[8] + values[9] * values[9],)
 
 
-def initial_rotor_speeds(scenario: Scenario) -> tuple[float, float]:
-    """The rotor speeds (rad/s) at time zero."""
+def initial_motion(scenario: Scenario) -> tuple[float, float, float, float]:
+    """Position (m) and velocity (m/s) on the plane at time zero."""
+    x, y, _ = scenario.initial.position
+    vx, vy, _ = scenario.initial.velocity
+    return x, y, vx, vy
+
+
+def car_setup(
+    parameters: Callable[..., Any], scenario: Scenario, signature: float, **own: Any
+) -> ControlSetup:
+    """What every loop around the car begins with, and its ``own`` fields by name."""
+    lead = servo_lead(scenario.tilt_car.tilt_servo)
+    heading = float(scenario.initial.attitude[2])
+    return ControlSetup(parameters(signature, servo_lead=lead, heading=heading, **own))
+
+
+def integrating_loop(
+    parameters: type[tuple[Any, ...]],
+    controls: Callable[..., tuple[float, ...]],
+    refresh: Callable[..., tuple[float, ...]],
+    observe: Callable[..., tuple[float, ...]],
+    *,
+    setup: Callable[[Scenario, float], ControlSetup],
+    law_states: int,
+    law_fields: tuple[str, ...],
+    own_columns: Mapping[str, str] | None = None,
+    equations: tuple[Callable[..., tuple[float, ...]], ...],
+) -> Loop:
+    """A loop whose law integrates both rotor speeds and the tilt angle that the servo is told.
+
+    The angle is the first of its ``law_states``, which start at zero but for it. ``equations`` are
+    the functions of inputs, rates and what to observe of `tiltsim.loop.Equations`; their state is
+    position, velocity, tilt angle, rotor speeds and the further law states. The rest is as
+    `tiltsim.loop.Loop` says.
+    """
+    further = (0.0,) * (law_states - 1)
+    inputs, rates, observe_equations = equations
+    return Loop(
+        model="tilt_car",
+        sizes=Sizes(qpos=4, qvel=4, act=2 + law_states, ctrl=5 + law_states),
+        parameters=parameters,
+        controls=controls,
+        refresh=refresh,
+        setup=setup,
+        initial_activations=lambda s, _setup: (
+            *_initial_rotor_speeds(s),
+            *(initial_tilt(s)[0], *further),
+        ),
+        observe=observe,
+        derive=_derive,
+        watched=lambda sample, _setup: rotors_at_rest(sample),
+        watch=squares_of_speeds,
+        equations=Equations(
+            inputs=inputs,
+            inputs_size=3,
+            rates=rates,
+            initial=lambda s, _setup: (
+                *initial_motion(s),
+                initial_tilt(s)[0],
+                *_initial_rotor_speeds(s),
+                *further,
+            ),
+            observe=observe_equations,
+        ),
+        law_states=law_states,
+        law_fields=law_fields,
+        extra_columns=own_columns or {},
+        kind=TILT_CAR,
+        flies_gait=False,
+    )
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    law = setup.parameters.law
+    reference = reference_columns(samples, law.reference)
+    return derived_columns(samples, reference, (reference[6], reference[7]), law.car)
+
+
+def _initial_rotor_speeds(scenario: Scenario) -> tuple[float, float]:
     speed_1, speed_2 = scenario.initial.rotor_speeds(2)
     return speed_1, speed_2
-
-
-def initial_heading(scenario: Scenario) -> float:
-    """Yaw (rad) at zero tilt."""
-    return float(scenario.initial.attitude[2])

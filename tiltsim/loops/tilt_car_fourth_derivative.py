@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from controllers.scalar import Triple, scalar
@@ -13,20 +13,14 @@ from controllers.tilt_car.fourth_derivative import (
 )
 from tiltsim.controller_tables import FourthDerivativeController
 from tiltsim.equations.tilt_car import equations_of_motion, limited_rate, yaw_of
-from tiltsim.kinds.tilt_car import TILT_CAR, initial_tilt
-from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes
+from tiltsim.loop import ControlSetup
 from tiltsim.loops.tilt_car import (
+    car_setup,
     car_state,
-    derived_columns,
-    initial_heading,
-    initial_rotor_speeds,
-    reference_columns,
-    rotors_at_rest,
+    integrating_loop,
     running_speed,
     speed_squares,
-    squares_of_speeds,
 )
-from tiltsim.loops.tiltrotor import servo_lead
 
 if TYPE_CHECKING:
     from tiltsim.scenario import Scenario
@@ -148,16 +142,14 @@ def fourth_derivative_equation_rates(
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, FourthDerivativeController)
-    vehicle = scenario.tilt_car
     law = Parameters(
-        vehicle.resolve(),
+        scenario.tilt_car.resolve(),
         controller.resolve_gains(),
         scenario.reference.parameters,
         DECOUPLINGS[controller.decoupling],
         float(controller.anti_windup),
     )
-    lead = servo_lead(vehicle.tilt_servo)
-    return ControlSetup(ControlParameters(signature, lead, initial_heading(scenario), law))
+    return car_setup(ControlParameters, scenario, signature, law=law)
 
 
 @scalar
@@ -190,48 +182,23 @@ def observe_fourth_derivative_equations(
     )
 
 
-def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    law = setup.parameters.law
-    reference = reference_columns(samples, law.reference)
-    return derived_columns(samples, reference, (reference[6], reference[7]), law.car)
-
-
-FOURTH_DERIVATIVE: Final = Loop(
-    model="tilt_car",
-    sizes=Sizes(qpos=4, qvel=4, act=6, ctrl=9),
-    parameters=ControlParameters,
-    controls=fourth_derivative_controls,
-    refresh=refreshed_fourth_derivative_controls,
+FOURTH_DERIVATIVE: Final = integrating_loop(
+    ControlParameters,
+    fourth_derivative_controls,
+    refreshed_fourth_derivative_controls,
+    observe_fourth_derivative,
     setup=_setup,
-    initial_activations=lambda s, _setup: (
-        *initial_rotor_speeds(s),
-        *(initial_tilt(s)[0], 0.0, 0.0, 0.0),
-    ),
-    observe=observe_fourth_derivative,
-    derive=_derive,
-    watched=lambda sample, _setup: rotors_at_rest(sample),
-    watch=squares_of_speeds,
-    equations=Equations(
-        inputs=fourth_derivative_equation_inputs,
-        inputs_size=3,
-        rates=fourth_derivative_equation_rates,
-        initial=lambda s, _setup: (
-            *s.initial.position[:2],
-            *s.initial.velocity[:2],
-            initial_tilt(s)[0],
-            *initial_rotor_speeds(s),
-            *(0.0, 0.0, 0.0),
-        ),
-        observe=observe_fourth_derivative_equations,
-    ),
     law_states=4,
     law_fields=("alpha_ref", "alpha_ref_rate", *ACCELERATIONS, *SPEEDS),
-    extra_columns={
+    own_columns={
         "alpha_ref_rate": "rad/s",
         **dict.fromkeys(ACCELERATIONS, "rad/s^2"),
         **dict.fromkeys(SPEEDS, "rad/s"),
     },
-    kind=TILT_CAR,
-    flies_gait=False,
+    equations=(
+        fourth_derivative_equation_inputs,
+        fourth_derivative_equation_rates,
+        observe_fourth_derivative_equations,
+    ),
 )
 """Fourth-derivative feedback linearization around the tilt-car."""

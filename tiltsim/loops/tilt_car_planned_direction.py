@@ -23,12 +23,12 @@ from tiltsim.kinds.tilt_car import ROTORS, TILT_CAR
 from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes
 from tiltsim.loops.tilt_car import (
     CarState,
+    car_setup,
     car_state,
     derived_columns,
-    initial_heading,
+    initial_motion,
     reference_columns,
 )
-from tiltsim.loops.tiltrotor import servo_lead
 
 if TYPE_CHECKING:
     from tiltsim.scenario import Scenario
@@ -109,11 +109,10 @@ def planned_direction_equation_rates(
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, PlannedDirectionController)
-    vehicle = scenario.tilt_car
-    gait = scenario.gait.plan(vehicle.resolve())
-    law = Parameters(vehicle.resolve(), controller.resolve_gains(), scenario.reference.parameters)
-    lead, heading = servo_lead(vehicle.tilt_servo), initial_heading(scenario)
-    return ControlSetup(ControlParameters(signature, lead, heading, gait.parameters, law))
+    car = scenario.tilt_car.resolve()
+    gait = scenario.gait.plan(car).parameters
+    law = Parameters(car, controller.resolve_gains(), scenario.reference.parameters)
+    return car_setup(ControlParameters, scenario, signature, gait=gait, law=law)
 
 
 @scalar
@@ -197,7 +196,7 @@ PLANNED_DIRECTION: Final = Loop(
         inputs=planned_direction_equation_inputs,
         inputs_size=2,
         rates=planned_direction_equation_rates,
-        initial=lambda s, _setup: (*s.initial.position[:2], *s.initial.velocity[:2]),
+        initial=lambda s, _setup: initial_motion(s),
         observe=observe_planned_direction_equations,
     ),
     extra_columns={

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from controllers.scalar import Triple, scalar
 from controllers.tilt_car.third_derivative import Parameters, third_derivative_inputs
 from tiltsim.controller_tables import ThirdDerivativeController
 from tiltsim.equations.tilt_car import equations_of_motion, limited_rate, yaw_of
-from tiltsim.kinds.tilt_car import TILT_CAR, initial_tilt
-from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes
+from tiltsim.loop import ControlSetup
 from tiltsim.loops.tilt_car import (
     CarState,
+    car_setup,
     car_state,
-    derived_columns,
-    initial_heading,
-    initial_rotor_speeds,
-    reference_columns,
-    rotors_at_rest,
+    integrating_loop,
     running_speed,
     speed_squares,
-    squares_of_speeds,
 )
-from tiltsim.loops.tiltrotor import servo_lead
 
 if TYPE_CHECKING:
     from tiltsim.scenario import Scenario
@@ -111,15 +105,13 @@ def third_derivative_equation_rates(
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, ThirdDerivativeController)
-    vehicle = scenario.tilt_car
     law = Parameters(
-        vehicle.resolve(),
+        scenario.tilt_car.resolve(),
         controller.resolve_gains(),
         scenario.reference.parameters,
         controller.restoring_rate,
     )
-    lead = servo_lead(vehicle.tilt_servo)
-    return ControlSetup(ControlParameters(signature, lead, initial_heading(scenario), law))
+    return car_setup(ControlParameters, scenario, signature, law=law)
 
 
 @scalar
@@ -146,39 +138,18 @@ def observe_third_derivative_equations(
     return x, y, vx, vy, yaw, r, alpha, tilt_rate, speed_1, speed_2, alpha
 
 
-def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    law = setup.parameters.law
-    reference = reference_columns(samples, law.reference)
-    return derived_columns(samples, reference, (reference[6], reference[7]), law.car)
-
-
-THIRD_DERIVATIVE: Final = Loop(
-    model="tilt_car",
-    sizes=Sizes(qpos=4, qvel=4, act=3, ctrl=6),
-    parameters=ControlParameters,
-    controls=third_derivative_controls,
-    refresh=refreshed_third_derivative_controls,
+THIRD_DERIVATIVE: Final = integrating_loop(
+    ControlParameters,
+    third_derivative_controls,
+    refreshed_third_derivative_controls,
+    observe_third_derivative,
     setup=_setup,
-    initial_activations=lambda s, _setup: (*initial_rotor_speeds(s), initial_tilt(s)[0]),
-    observe=observe_third_derivative,
-    derive=_derive,
-    watched=lambda sample, _setup: rotors_at_rest(sample),
-    watch=squares_of_speeds,
-    equations=Equations(
-        inputs=third_derivative_equation_inputs,
-        inputs_size=3,
-        rates=third_derivative_equation_rates,
-        initial=lambda s, _setup: (
-            *s.initial.position[:2],
-            *s.initial.velocity[:2],
-            initial_tilt(s)[0],
-            *initial_rotor_speeds(s),
-        ),
-        observe=observe_third_derivative_equations,
-    ),
     law_states=1,
     law_fields=("alpha_ref",),
-    kind=TILT_CAR,
-    flies_gait=False,
+    equations=(
+        third_derivative_equation_inputs,
+        third_derivative_equation_rates,
+        observe_third_derivative_equations,
+    ),
 )
 """Third-derivative feedback linearization around the tilt-car."""

@@ -129,12 +129,8 @@ def tiltrotor_controls(
 
 @scalar
 def refreshed_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
-    """Held controls with the thrusts that belong to the present rotor speeds."""
-    return (
-        *(ctrl[0], ctrl[1], ctrl[2], ctrl[3]),
-        *rotor_thrust_controls(act),
-        *(ctrl[8], ctrl[9], ctrl[10], ctrl[11]),
-    )
+    """Held controls, however many, with the thrusts that belong to the present rotor speeds."""
+    return (*ctrl[:4], *rotor_thrust_controls(act), *ctrl[8:])
 
 
 def servo_lead(servo: ServoTable) -> float:

@@ -9,20 +9,15 @@ from controllers.scalar import Triple, scalar
 from controllers.yaw_position import Parameters, yaw_position_inputs
 from tiltsim.controller_tables import YawPositionController
 from tiltsim.equations.quadrotor import extended_equations_of_motion, law_state
-from tiltsim.loop import ControlSetup, Floats, Loop, Watched
+from tiltsim.loop import ControlSetup, Floats, Watched
 from tiltsim.loops.quadrotor import (
-    EXTENSION_COLUMNS,
-    LAW_FIELDS,
-    SIZES,
     attitude_watched,
     equations,
-    extended_activations,
     extended_controls,
+    extended_loop,
     extended_singularity,
-    held_extended_controls,
     level_thrust,
     observe_extended_equations,
-    observe_extended_quadrotor,
     references,
     rigid_body_state,
 )
@@ -116,25 +111,13 @@ def observe_in_equations(
     return observe_extended_equations(state, inputs, parameters.law.vehicle)
 
 
-YAW_POSITION: Final = Loop(
-    model="quadrotor",
-    sizes=SIZES,
-    parameters=ControlParameters,
-    controls=yaw_position_controls,
-    refresh=held_extended_controls,
+YAW_POSITION: Final = extended_loop(
+    ControlParameters,
+    yaw_position_controls,
+    equations(equation_inputs, 6, equation_rates, observe_in_equations),
     setup=_setup,
-    initial_activations=extended_activations,
-    observe=observe_extended_quadrotor,
-    observes_controls=True,
     derive=_derive,
     watched=lambda sample, _setup: (attitude_watched(sample), extension_watched(sample)),
     watch=watch_attitude_and_extension,
-    law_states=2,
-    law_fields=LAW_FIELDS,
-    extra_columns=EXTENSION_COLUMNS,
-    equations=equations(
-        *(equation_inputs, 6, equation_rates),
-        observe=observe_in_equations,
-    ),
 )
 """The yaw-position law around the quadrotor."""

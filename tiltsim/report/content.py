@@ -9,6 +9,7 @@ from itertools import groupby
 from math import floor, isfinite, log10
 from typing import TYPE_CHECKING, Final
 
+from tiltsim.report.comparisons import Comparison
 from tiltsim.report.findings import FINDINGS, Finding
 from tiltsim.report.model import Claim, ExpectationClaim, Outcome
 from tiltsim.report.pictures import Drawing
@@ -64,6 +65,7 @@ class Report:
     rows: list[Row]
     failures: list[Failure]
     drawings: list[Drawing]
+    comparisons: list[Comparison]
     findings: tuple[Finding, ...] = FINDINGS
 
     @property

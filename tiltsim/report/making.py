@@ -7,6 +7,7 @@ from pathlib import Path
 
 from tiltsim.checking import collect
 from tiltsim.library import shipped_folder
+from tiltsim.report.comparisons import compare
 from tiltsim.report.content import Report
 from tiltsim.report.findings import FINDINGS
 from tiltsim.report.flying import analyse, fly, plan_flights
@@ -49,6 +50,7 @@ def make_report(
         flights=flights,
         rows=rows,
         failures=failures(plans, flights),
+        comparisons=compare(plans, flights),
         drawings=draw_all(plans, flights, folder, jobs, whole=whole),
         findings=FINDINGS if whole else (),
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from tiltsim.report import comparisons
 from tiltsim.report.content import (
     CHAPTERS,
     MEANINGS,
@@ -49,6 +50,19 @@ def _lines(report: Report) -> Iterator[str]:
         yield "| --- | ---: | ---: | ---: | --- |"
         for group in report.chapter_groups(chapter):
             yield from _group(group)
+    if report.comparisons:
+        yield from ("", f"## {comparisons.TITLE}", "", comparisons.EXPLANATION, "")
+        yield "| Flight | Quantity | Thesis plant | MuJoCo |"
+        yield "| --- | --- | ---: | ---: |"
+        for file, members in comparisons.families(report.comparisons):
+            yield _cells([f"**{file}** ({members[0].source})", "", "", ""])
+            yield from map(_comparison, members)
+
+
+def _comparison(one: comparisons.Comparison) -> str:
+    beside = f" (beside `{one.without}`)" if one.without else ""
+    shown = [one.plants.get(plant, "") for plant in PLANTS]
+    return _cells([one.title + beside, comparisons.quantity(one), *shown])
 
 
 def _summary(report: Report) -> Iterator[str]:

@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from itertools import product
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise, product
+from math import hypot
+from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
+from controllers.gains import GAIN_SETS
+from controllers.published_gaits import PUBLISHED_GAITS, robustness
 from controllers.singularity import residuals
+from controllers.stability import third_order_loop
 from tiltsim.report.model import Metrics
 
 if TYPE_CHECKING:
     from controllers.vehicle import Vehicle
+
+
+PRINTED: Final = 1e-3
+"""What the coefficients of the determinant are printed to."""
+
+Quantity: TypeAlias = "str | Callable[[Metrics], float]"
+"""A metric by name, or a number made of several."""
 
 
 class Coefficients(NamedTuple):
@@ -41,9 +52,53 @@ def worst_coefficient(printed: Coefficients, vehicle: Vehicle) -> float:
     )
 
 
+def terms_hold(part: str, printed: Mapping[str, float], vehicle: Vehicle) -> bool:
+    """A measure: every printed term of a part of the determinant is right, and none is missing."""
+    computed = getattr(determinant_coefficients(vehicle), part)
+    return all(abs(computed[name] - printed.get(name, 0.0)) < PRINTED for name in computed)
+
+
+def is_more_robust(key: str) -> bool:
+    """A measure: what the thesis says of a published gait's robustness holds."""
+    return bool(robustness(PUBLISHED_GAITS[key]).claim_holds)
+
+
+def routh_holds(rows: Sequence[str]) -> bool:
+    """A measure: ch. 4's gains meet Routh's condition as printed, without any other loop gain."""
+    gains = GAIN_SETS["ch04"]._asdict()
+    triples = [tuple(gains[f"{row}_{i}"] for i in (1, 2, 3)) for row in rows]
+    return all(third_order_loop("", triple, 1.0).stable for triple in triples)
+
+
+def tracking_error(metrics: Metrics) -> float:
+    """Largest horizontal error from 20 s on, m."""
+    return float(metrics["sup_position_error_after_20s"])
+
+
+def resting_error(metrics: Metrics) -> float:
+    """Horizontal error at the end, m."""
+    return hypot(*(float(metrics[f"final_position_error_{axis}"]) for axis in "xy"))
+
+
+def grows(value: Quantity, flights: Mapping[str, Metrics]) -> bool:
+    """A measure: a metric grows from each flight of the claim to the next."""
+    of = (lambda metrics: float(metrics[value])) if isinstance(value, str) else value
+    return all(first < second for first, second in pairwise(map(of, flights.values())))
+
+
+def falls(value: Quantity, flights: Mapping[str, Metrics]) -> bool:
+    """A measure: a metric falls from each flight of the claim to the next."""
+    return grows(value, dict(reversed(list(flights.items()))))
+
+
 def metric_of(address: str, metric: str) -> Callable[[Mapping[str, Metrics]], float]:
     """A measure: one metric of one flight."""
     return lambda flights: float(flights[address][metric])
+
+
+def no_rotor_stops(flights: Mapping[str, Metrics]) -> bool:
+    """A measure: in no flight did a rotor come to rest."""
+    return all(float(metrics["min_rotor_speed"]) > 0.0 for metrics in flights.values())
 
 
 def every_flight_completed(flights: Mapping[str, Metrics]) -> bool:

@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
+from tiltsim.report import comparisons
 from tiltsim.report.content import (
     CHAPTERS,
     MEANINGS,
@@ -60,6 +61,7 @@ def page(report: Report) -> str:
             *_alarm(report),
             *_findings(report.findings),
             *(line for chapter in report.chapters for line in _chapter(report, chapter)),
+            *_beyond(report.comparisons),
             "</main>",
             f"<footer>tiltsim {version('tiltsim')}, MuJoCo {version('mujoco')}. "
             f"{escape(flown_text(report))}.</footer>",
@@ -81,6 +83,8 @@ def _header(report: Report) -> Iterator[str]:
     for chapter in report.chapters:
         title = f"{chapter} {CHAPTERS.get(chapter, '')}"
         yield f'<li><a href="#chapter-{chapter}">{escape(title)}</a></li>'
+    if report.comparisons:
+        yield f'<li><a href="#beyond">{escape(comparisons.TITLE)}</a></li>'
     yield "</ol></nav>"
     yield "</header>"
 
@@ -162,6 +166,32 @@ def _chapter(report: Report, chapter: int) -> Iterator[str]:
         yield from map(_figure, drawings)
         yield "</div>"
     yield "</section>"
+
+
+def _beyond(rows: list[comparisons.Comparison]) -> Iterator[str]:
+    if not rows:
+        return
+    yield f'<section id="beyond"><h2>{escape(comparisons.TITLE)}</h2>'
+    yield f"<p>{_prose(comparisons.EXPLANATION)}</p>"
+    yield '<div class="scroll" tabindex="0"><table class="claims"><thead><tr><th>Flight</th>'
+    yield '<th>Quantity</th><th class="n">Thesis plant</th><th class="n">MuJoCo</th></tr></thead>'
+    for file, members in comparisons.families(rows):
+        yield (
+            f'<tbody><tr class="group"><th colspan="4" scope="rowgroup"><div>{escape(file)} '
+            f'<span class="section">{escape(members[0].source)}</span></div></th></tr>'
+        )
+        for one in members:
+            beside = f'<span class="section">beside {escape(one.without)}</span>'
+            cells = "".join(
+                f'<td class="n">{escape(one.plants.get(plant, "–"))}</td>' for plant in PLANTS
+            )
+            yield (
+                f'<tr class="case"><th class="what" scope="row">{_prose(one.title)} '
+                f"{beside if one.without else ''}</th>"
+                f"<td>{escape(comparisons.quantity(one))}</td>{cells}</tr>"
+            )
+        yield "</tbody>"
+    yield "</table></div></section>"
 
 
 def _group(group: Group) -> Iterator[str]:

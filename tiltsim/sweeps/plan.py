@@ -22,7 +22,14 @@ from pydantic import ValidationError
 from tiltsim.errors import InputError
 from tiltsim.files import without_none
 from tiltsim.library import find_scenario_file, library_name, read_toml
-from tiltsim.loading import apply_overrides, key_steps, load_scenario, parse_scenario
+from tiltsim.loading import (
+    anchor_files,
+    apply_overrides,
+    key_steps,
+    load_scenario,
+    merge,
+    parse_scenario,
+)
 from tiltsim.loop import Floats
 from tiltsim.messages import one_line, show
 from tiltsim.metrics import METRICS, WALL_CLOCK_METRICS
@@ -31,9 +38,10 @@ from tiltsim.sweeps.expressions import evaluate, names
 from tiltsim.sweeps.tables import (
     AxisTable,
     BisectTable,
-    LinspaceAxis,
-    ListAxis,
+    CasesAxis,
+    GridAxis,
     NormalAxis,
+    SeedAxis,
     Sweep,
     UniformAxis,
     dotted,
@@ -52,7 +60,7 @@ VERSIONS: Final = ("tiltsim", "mujoco", "numpy", "scipy")
 RESERVED: Final = ("index", "end", "end_time", "cause", "scenario", "flights")
 """Columns of every dataset, besides metrics and versions."""
 
-COSMETIC: Final = ("title", "source", "plot")
+COSMETIC: Final = ("title", "source", "without", "plot")
 """Keys of a sweep file that change no flight."""
 
 
@@ -155,6 +163,9 @@ def load_definition(path: str | Path, overrides: dict[str, Any] | None = None) -
         sweep = Sweep.model_validate(document)
     except ValidationError as error:
         raise InputError(f"{address}: {one_line(error, document, Sweep)}") from None
+    for axis in sweep.axis:
+        for tables in axis.cases.values() if isinstance(axis, CasesAxis) else ():
+            anchor_files(tables, file.parent)
     base = _base(sweep, file.parent, address)
     definition = Definition(
         address,
@@ -178,6 +189,7 @@ def _base(sweep: Sweep, folder: Path, address: str) -> dict[str, Any]:
             raise InputError(f"{address}: scenario: {error}") from None
     else:
         document = deepcopy(sweep.scenario)
+        anchor_files(document, folder)
         apply_overrides(document, sweep.set, f"{address}: scenario")
         scenario = parse_scenario(document, f"{address}: scenario")
     base: dict[str, Any] = without_none(scenario.model_dump(mode="json"))
@@ -198,8 +210,10 @@ class Plan:
         self.base = definition.base
         self._check_count()
         self._groups = self._make_groups()
-        drawn = [a for a in self.sweep.axis if isinstance(a, UniformAxis | NormalAxis)]
-        self._drawn: list[UniformAxis | NormalAxis] = drawn
+        axes = self.sweep.axis
+        self._drawn = [axis for axis in axes if isinstance(axis, UniformAxis | NormalAxis)]
+        self._seeds = [axis for axis in axes if isinstance(axis, SeedAxis)]
+        self._cases = [axis for axis in axes if isinstance(axis, CasesAxis)]
         samples = self.sweep.sample.count if self.sweep.sample is not None else 1
         self._lengths = [*(len(group) for group in self._groups), samples]
 
@@ -250,6 +264,8 @@ class Plan:
             values |= group[position]
         for axis, draw in zip(self._drawn, self._draws[sample] if self._drawn else ()):
             values |= self._absolute(axis.relative, dict.fromkeys(axis.targets, float(draw)))
+        for seed in self._seeds:
+            values |= dict.fromkeys(seed.targets, seed.start + sample)
         return values
 
     def derived(self, values: Mapping[str, Any]) -> dict[str, Any]:
@@ -265,6 +281,8 @@ class Plan:
     def document(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The scenario's document where the axes have the given values."""
         document = deepcopy(self.base)
+        for axis in self._cases:
+            document = merge(document, deepcopy(axis.cases[values[axis.key]]))
         overrides = {**self.sweep.set, **values, **self.derived(values)}
         overrides = {key: value for key, value in overrides.items() if "." in key}
         for key in overrides:
@@ -290,8 +308,8 @@ class Plan:
         for position, length in enumerate(self._lengths[:-1]):
             stride = prod(self._lengths[position + 1 :])
             count = min(length, VALUES_TRIED)
-            steps = [position * (length - 1) // max(1, count - 1) for position in range(1, count)]
-            points += [self.point(step * stride) for step in steps]
+            places = [place * (length - 1) // max(1, count - 1) for place in range(1, count)]
+            points += [self.point(place * stride) for place in places]
         for values in points:
             kinds = [type(value) for value in first.values()]
             wrong = [key for key, kind in zip(values, kinds) if type(values[key]) is not kind]
@@ -323,8 +341,9 @@ class Plan:
         for key in (*targets, *sweep.derive):
             if key in taken:
                 raise self._mistake("axis.key", key, "is a column of every result; rename it")
+        named = {axis.key for axis in self._cases}
         for key in targets:
-            if "." not in key and key not in read:
+            if "." not in key and key not in read | named:
                 raise self._mistake(
                     "axis.key",
                     key,
@@ -341,7 +360,7 @@ class Plan:
         points = 1 if sample is None else sample.count
         groups: set[str] = set()
         for axis in self.sweep.axis:
-            if isinstance(axis, ListAxis | LinspaceAxis) and axis.group not in groups:
+            if isinstance(axis, GridAxis) and axis.group not in groups:
                 points *= axis.length
                 groups |= {axis.group} if axis.group else set()
         if points > MAX_POINTS:
@@ -350,7 +369,7 @@ class Plan:
     def _make_groups(self) -> list[list[dict[str, Any]]]:
         members: dict[str, list[list[dict[str, Any]]]] = {}
         for number, axis in enumerate(self.sweep.axis):
-            if isinstance(axis, ListAxis | LinspaceAxis):
+            if isinstance(axis, GridAxis):
                 columns = [_of_one_type(column) for column in zip(*axis.rows())]
                 rows = [
                     self._absolute(axis.relative, dict(zip(axis.targets, row, strict=True)))

@@ -117,8 +117,50 @@ class NormalAxis(AxisTable):
     standard_deviation: Positive
 
 
+class SeedAxis(AxisTable):
+    """A whole number of each sample's own, for ``simulation.seed``: equal in all other axes."""
+
+    type: Literal["seed"]
+    start: Annotated[int, Field(ge=0)] = Field(0, description="the first sample's")
+    relative: Literal[False] = False
+
+
+class CasesAxis(AxisTable):
+    """Named sets of tables, laid over the base as a ``[[variant]]`` lays its own."""
+
+    type: Literal["cases"]
+    key: str = Field(description="a name without a dot: the column that tells which case it is")
+    keys: None = None
+    relative: Literal[False] = False
+    cases: Annotated[dict[str, dict[str, Any]], Field(min_length=1)] = Field(
+        description="tables of the scenario by the name of the case"
+    )
+    group: str | None = Field(None, description="axes of one group advance together, not crossed")
+
+    @model_validator(mode="after")
+    def _check_name(self) -> Self:
+        if "." in self.key:
+            raise InvalidValueError("axis.key", self.key, "cases have a name without a dot")
+        return self
+
+    @property
+    def length(self) -> int:
+        """Number of cases."""
+        return len(self.cases)
+
+    def rows(self) -> list[tuple[Any, ...]]:
+        """The names of the cases."""
+        return [(name,) for name in self.cases]
+
+
+SampledAxis = UniformAxis | NormalAxis | SeedAxis
+"""What has a value of its own in every sample."""
+
+GridAxis = ListAxis | LinspaceAxis | CasesAxis
+"""What has rows of values, crossed with the other axes or advancing with its group."""
+
 Axis = Annotated[
-    ListAxis | LinspaceAxis | UniformAxis | NormalAxis,
+    ListAxis | LinspaceAxis | CasesAxis | UniformAxis | NormalAxis | SeedAxis,
     Field(discriminator="type"),
 ]
 
@@ -219,14 +261,14 @@ class Sweep(Table):
                 raise InvalidValueError("plot.metrics", metric, "is not among the metrics kept")
         if not self.axis and self.bisect is None:
             raise InvalidValueError("axis", [], "a sweep needs at least one [[axis]] or a [bisect]")
-        drawn = [a for a in self.axis if isinstance(a, UniformAxis | NormalAxis)]
+        drawn = [a for a in self.axis if isinstance(a, SampledAxis)]
         if drawn and self.sample is None:
             raise InvalidValueError(
                 "axis.type", drawn[0].type, "needs a [sample] table with its count and seed"
             )
         if self.sample is not None and not drawn:
             raise InvalidValueError(
-                "sample.count", self.sample.count, "no axis is of type uniform or normal"
+                "sample.count", self.sample.count, "no axis is of type uniform, normal or seed"
             )
         targets = [key for axis in self.axis for key in axis.targets]
         targets += [self.bisect.key] if self.bisect is not None else []
@@ -237,4 +279,15 @@ class Sweep(Table):
         fixed = next((key for key in targets if key in self.set), None)
         if fixed is not None:
             raise InvalidValueError(f"set.{fixed}", self.set[fixed], "an axis sets it, too")
+        for axis in self.axis:
+            if isinstance(axis, CasesAxis):
+                self._check_cases(axis, [key for key in (*targets, *self.set) if "." in key])
         return self
+
+    def _check_cases(self, axis: CasesAxis, taken: list[str]) -> None:
+        for name, tables in axis.cases.items():
+            for key, value in dotted(tables).items():
+                if any(key == other or key.startswith(f"{other}.") for other in taken):
+                    raise InvalidValueError(
+                        f"axis.cases.{name}.{key}", value, "set by another axis or by set, too"
+                    )

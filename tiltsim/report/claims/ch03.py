@@ -11,7 +11,14 @@ import numpy as np
 from controllers.published_gaits import DETERMINANT_CASES, TRIANGLE
 from controllers.singularity import decoupling_matrix, determinant, residuals
 from controllers.vehicle import PRESETS
-from tiltsim.report.measures import Coefficients, determinant_coefficients, worst_coefficient
+from tiltsim.report.measures import (
+    PRINTED,
+    Coefficients,
+    determinant_coefficients,
+    grows,
+    terms_hold,
+    worst_coefficient,
+)
 from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
@@ -54,15 +61,6 @@ def _coefficient_claim(printed: str, case: str, part: int, product: str) -> Anal
     )
 
 
-def _eq_17_holds() -> bool:
-    return worst_coefficient(EQ_17, _VEHICLE) < 1e-3
-
-
-def _eq_19_holds() -> bool:
-    computed = determinant_coefficients(_VEHICLE).R
-    return all(abs(computed[name] - EQ_19.get(name, 0.0)) < 1e-3 for name in computed)
-
-
 def _triangle_is_regular(case: str) -> bool:
     """Whether R keeps one sign on the triangle U, V, M for all five pairs of a case."""
     share = np.linspace(0.0, 1.0, 151)
@@ -92,16 +90,6 @@ def _untilted_is_regular() -> bool:
     angles = np.linspace(-1.55, 1.55, 101)
     roll, pitch = np.meshgrid(angles, angles)
     return bool((determinant(np.zeros(4), roll, pitch, _VEHICLE) > 0.0).all())
-
-
-def _faster(gait: str, flights: Mapping[str, Metrics]) -> bool:
-    own, planned = (flights[address] for address in _pair(gait))
-    return own["altitude_settling_time"] < planned["altitude_settling_time"]
-
-
-def _overshoots_less(gait: str, flights: Mapping[str, Metrics]) -> bool:
-    own, planned = (flights[address] for address in _pair(gait))
-    return own["altitude_overshoot"] < planned["altitude_overshoot"]
 
 
 def _pair(gait: str) -> tuple[str, str]:
@@ -183,13 +171,13 @@ CLAIMS = (
         wrong=True,
         why="Two slips of the pen: -2.880 s1 s2 c3 s4 sin φ cos θ stands for s1 s2 c3 c4, as ch. 5 "
         "and 6 have it, and -2.880 s1 c2 s3 s4 sin φ cos θ for s1 c2 c3 s4.",
-        measure=_eq_17_holds,
+        measure=lambda: worst_coefficient(EQ_17, _VEHICLE) < PRINTED,
     ),
     AnalysisClaim(
         source="ch. 3, Sec. 4, Eq. (19)",
         statement="Eq. (19), term by term, is the determinant at level attitude",
         published=True,
-        measure=_eq_19_holds,
+        measure=partial(terms_hold, "R", EQ_19, _VEHICLE),
     ),
     *(
         AnalysisClaim(
@@ -226,7 +214,7 @@ CLAIMS = (
             case=title,
             published=True,
             flights=_pair(gait),
-            measure=partial(_faster, gait),
+            measure=partial(grows, "altitude_settling_time"),
         )
         for gait, title in _GAITS.items()
     ),
@@ -237,7 +225,7 @@ CLAIMS = (
             case=title,
             published=True,
             flights=_pair(gait),
-            measure=partial(_overshoots_less, gait),
+            measure=partial(grows, "altitude_overshoot"),
         )
         for gait, title in _GAITS.items()
     ),

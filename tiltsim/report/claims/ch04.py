@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from itertools import pairwise, product
-from math import hypot
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -14,13 +13,19 @@ from controllers.decouplers import conventional_decoupler, modified_decoupler
 from controllers.decoupling_matrix import sines_and_cosines, torque_entries, torque_free_force
 from controllers.gains import GAIN_SETS
 from controllers.singularity import residuals
-from controllers.stability import third_order_loop
 from controllers.vehicle import PRESETS, drag_ratio
-from tiltsim.report.measures import every_flight_completed
+from tiltsim.report.measures import (
+    every_flight_completed,
+    falls,
+    grows,
+    no_rotor_stops,
+    resting_error,
+    routh_holds,
+    tracking_error,
+)
 from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
-_ERROR: Final = "sup_position_error_after_20s"
 _FORMS: Final = {"instant": "instant switch", "continuous": "continuous switch"}
 _REFERENCES: Final = {"line": "line", "circle": "circle"}
 _DECOUPLERS: Final = ("conventional", "modified")
@@ -45,31 +50,8 @@ def _trots(reference: str, form: str) -> tuple[str, ...]:
     return tuple(_trot(reference, form, T, d) for T, d in product(_PERIODS, _DECOUPLERS))
 
 
-def _error(flights: Mapping[str, Metrics], address: str) -> float:
-    return float(flights[address][_ERROR])
-
-
-def _modified_is_better(pair: tuple[str, str], flights: Mapping[str, Metrics]) -> bool:
-    conventional, modified = (_error(flights, address) for address in pair)
-    return modified < conventional
-
-
-def _setpoint_error(metrics: Metrics) -> float:
-    return hypot(*(float(metrics[f"final_position_error_{axis}"]) for axis in "xy"))
-
-
-def _modified_rests_nearer(pair: tuple[str, str], flights: Mapping[str, Metrics]) -> bool:
-    conventional, modified = (_setpoint_error(flights[address]) for address in pair)
-    return modified < conventional
-
-
-def _grows(reference: str, form: str, decoupler: str, flights: Mapping[str, Metrics]) -> bool:
-    errors = [_error(flights, _trot(reference, form, T, decoupler)) for T in _PERIODS]
-    return all(shorter < longer for shorter, longer in pairwise(errors))
-
-
 def _difference(reference: str, form: str, period: int, flights: Mapping[str, Metrics]) -> float:
-    pair = (_error(flights, _trot(reference, form, period, d)) for d in _DECOUPLERS)
+    pair = (tracking_error(flights[_trot(reference, form, period, d)]) for d in _DECOUPLERS)
     return float(np.ptp(list(pair)))
 
 
@@ -80,14 +62,10 @@ def _short_periods_do_not_differ(reference: str, form: str, flights: Mapping[str
 
 def _continuous_is_better(reference: str, decoupler: str, flights: Mapping[str, Metrics]) -> bool:
     return all(
-        _error(flights, _trot(reference, "continuous", T, decoupler))
-        < _error(flights, _trot(reference, "instant", T, decoupler))
+        tracking_error(flights[_trot(reference, "continuous", T, decoupler)])
+        < tracking_error(flights[_trot(reference, "instant", T, decoupler)])
         for T in _PERIODS
     )
-
-
-def _no_rotor_stops(flights: Mapping[str, Metrics]) -> bool:
-    return all(float(metrics["min_rotor_speed"]) > 0.0 for metrics in flights.values())
 
 
 def _eq_25_holds() -> bool:
@@ -100,13 +78,6 @@ def _trot_is_regular() -> bool:
     rho = np.linspace(-0.65, 0.65, 131)
     R = residuals(np.stack([-rho, -rho, rho, rho], axis=-1), _VEHICLE).R
     return bool((R > 0.0).all())
-
-
-def _routh_holds(rows: tuple[str, ...]) -> bool:
-    """Eqs. (35)-(38) as printed: no loop gain besides the gains."""
-    gains = GAIN_SETS["ch04"]._asdict()
-    loops = [(row, tuple(gains[f"{row}_{i}"] for i in (1, 2, 3))) for row in rows]
-    return all(third_order_loop(row, triple, 1.0).stable for row, triple in loops)
 
 
 def _position_gains_are_positive() -> bool:
@@ -123,11 +94,6 @@ def _decouplers_agree_without_tilt() -> bool:
     return max(abs(modified - conventional) for modified, conventional in pair) < 1e-12
 
 
-def _second_rests_nearer(flights: Mapping[str, Metrics]) -> bool:
-    first, second = (_setpoint_error(metrics) for metrics in flights.values())
-    return second < first
-
-
 _RHOS: Final = {
     "rho_065": "ρ = 0.65",
     "rho_0325": "ρ = 0.325",
@@ -142,14 +108,13 @@ _ALL_TROTS: Final = tuple(
 def _better(
     source: str, case: str, conventional: str, modified: str, *, setpoint: bool = False
 ) -> FlightClaim:
-    pair = (conventional, modified)
     return FlightClaim(
         source=source,
         statement="The modified decoupler reduces the error that remains",
         case=case,
         published=True,
-        flights=pair,
-        measure=partial(_modified_rests_nearer if setpoint else _modified_is_better, pair),
+        flights=(conventional, modified),
+        measure=partial(falls, resting_error if setpoint else tracking_error),
         why="" if "instant_t3" not in conventional else _GYROSCOPIC,
     )
 
@@ -176,7 +141,7 @@ CLAIMS = (
         why="K_P1 K_P2 = 10 does not exceed K_P3 = 50. The flights are stable all the same: the "
         "matrix is printed, and used, without the factor 2|ϖ| in its first three rows, which "
         "multiplies the gains of these loops by about 720.",
-        measure=partial(_routh_holds, ("roll", "pitch")),
+        measure=partial(routh_holds, ("roll", "pitch")),
     ),
     AnalysisClaim(
         source="ch. 4, Sec. 5.1, Prop. 4",
@@ -186,14 +151,14 @@ CLAIMS = (
         wrong=True,
         why="K_P1 K_P2 = 1 does not exceed K_P3 = 1: on the boundary. The missing factor 2|ϖ| "
         "makes it stable, as above.",
-        measure=partial(_routh_holds, ("yaw",)),
+        measure=partial(routh_holds, ("yaw",)),
     ),
     AnalysisClaim(
         source="ch. 4, Sec. 5.1, Prop. 4",
         statement="The gains meet Eqs. (35)-(38), so that attitude and altitude are stable",
         case="altitude",
         published=True,
-        measure=partial(_routh_holds, ("altitude",)),
+        measure=partial(routh_holds, ("altitude",)),
     ),
     AnalysisClaim(
         source="ch. 4, Sec. 5.1, Prop. 5",
@@ -240,7 +205,7 @@ CLAIMS = (
             case=f"{reference}, {_FORMS[form]}, {decoupler}",
             published=True,
             flights=tuple(_trot(reference, form, T, decoupler) for T in _PERIODS),
-            measure=partial(_grows, reference, form, decoupler),
+            measure=partial(grows, tracking_error),
             why=_GYROSCOPIC if (form, decoupler) == ("instant", "conventional") else "",
         )
         for reference, form, decoupler in product(_REFERENCES, _FORMS, _DECOUPLERS)
@@ -283,7 +248,7 @@ CLAIMS = (
         statement="No rotor reaches the limit of zero speed",
         published=True,
         flights=_ALL_TROTS,
-        measure=_no_rotor_stops,
+        measure=no_rotor_stops,
         why="In MuJoCo a rotor of the flight that is lost (see above) reverses.",
     ),
     AnalysisClaim(
@@ -302,7 +267,7 @@ CLAIMS = (
                 f"ch04_tracking/setpoint#{name}_modified",
                 f"beyond/setpoint_exact_decoupler#{name}",
             ),
-            measure=_second_rests_nearer,
+            measure=partial(falls, resting_error),
         )
         for name, title in _RHOS.items()
     ),

@@ -15,7 +15,7 @@ from controllers.two_color_map import Root, delta, grid_roots, root_classes, roo
 from controllers.two_color_planner import check_path, rectangle
 from controllers.vehicle import PRESETS
 from tiltsim.report.claims.ch03 import EQ_17, EQ_19
-from tiltsim.report.measures import determinant_coefficients
+from tiltsim.report.measures import is_more_robust, terms_hold
 from tiltsim.report.model import AnalysisClaim
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
@@ -40,11 +40,6 @@ RANK: Final = (
     "The printed angles have a margin by their rounding alone; the smallest singular value of τ "
     "is 1e-4 of the largest."
 )
-
-
-def _terms_hold(part: str, printed: dict[str, float]) -> bool:
-    computed = getattr(determinant_coefficients(_VEHICLE), part)
-    return all(abs(computed[name] - printed.get(name, 0.0)) < 1e-3 for name in computed)
 
 
 @cache
@@ -115,10 +110,6 @@ def _robustness(key: str) -> Robustness:
     return robustness(PUBLISHED_GAITS[key])
 
 
-def _holds(key: str) -> bool:
-    return bool(_robustness(key).claim_holds)
-
-
 def _nearly_all(key: str) -> bool:
     return _robustness(key).margin > _NEAR_RIGHT_ANGLE
 
@@ -169,14 +160,14 @@ CLAIMS = (
         published=True,
         wrong=True,
         why="-2.880 s1 c2 s3 s4 sin φ cos θ stands for s1 c2 c3 s4, as Eq. (4) has it.",
-        measure=partial(_terms_hold, "R_phi", EQ_1_ROLL),
+        measure=partial(terms_hold, "R_phi", EQ_1_ROLL, _VEHICLE),
     ),
     *(
         AnalysisClaim(
             source=f"ch. 6, Sec. {section}",
             statement=f"{name} is printed right, term by term",
             published=True,
-            measure=partial(_terms_hold, part, printed),
+            measure=partial(terms_hold, part, printed, _VEHICLE),
         )
         for section, name, part, printed in (
             ("2, Eq. (2)", "R at level attitude", "R", EQ_19),
@@ -302,7 +293,7 @@ CLAIMS = (
             published=True,
             wrong=key in _BLUE,
             why=RANK if key in _BLUE else "",
-            measure=partial(_holds, key),
+            measure=partial(is_more_robust, key),
         )
         for key, name in _GAITS.items()
     ),

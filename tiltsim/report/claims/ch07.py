@@ -8,15 +8,12 @@ from typing import Final
 
 from controllers.published_gaits import PUBLISHED_GAITS, robustness
 from tiltsim.report.claims.ch06 import RANK
+from tiltsim.report.measures import is_more_robust, no_rotor_stops, tracking_error
 from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
 
 _SHAPES: Final = "The figures are lost: place and colour as described, size ours. "
 _CIRCLE: Final = "ch07_robust_gaits/circle#"
 _GAITS: Final = {f"ch07_gait_{i}": f"Gait {i}" for i in (1, 2, 3)}
-
-
-def _holds(key: str) -> bool:
-    return bool(robustness(PUBLISHED_GAITS[key]).claim_holds)
 
 
 def _is_sensitive(key: str) -> bool:
@@ -27,13 +24,8 @@ def _is_sensitive(key: str) -> bool:
 
 def _some_gait_tracks(flights: Mapping[str, Metrics]) -> bool:
     return any(
-        not metrics["diverged"] and float(metrics["sup_position_error_after_20s"]) < 0.1
-        for metrics in flights.values()
+        not metrics["diverged"] and tracking_error(metrics) < 0.1 for metrics in flights.values()
     )
-
-
-def _no_rotor_stops(flights: Mapping[str, Metrics]) -> bool:
-    return all(float(metrics["min_rotor_speed"]) > 0.0 for metrics in flights.values())
 
 
 CLAIMS = (
@@ -45,7 +37,7 @@ CLAIMS = (
             published=True,
             wrong=key == "ch07_gait_1",
             why=RANK if key == "ch07_gait_1" else "",
-            measure=partial(_holds, key),
+            measure=partial(is_more_robust, key),
         )
         for (key, name), figure in zip(_GAITS.items(), (5, 6, 7), strict=True)
     ),
@@ -68,6 +60,6 @@ CLAIMS = (
         statement="No rotor reaches zero speed while tracking; flown: the red gaits, which track",
         published=True,
         flights=tuple(_CIRCLE + name for name in ("gait_2", "gait_3")),
-        measure=_no_rotor_stops,
+        measure=no_rotor_stops,
     ),
 )

@@ -15,7 +15,7 @@ from controllers.two_color_planner import Circle, Leg, Path, Polyline, check_pat
 from controllers.vehicle import PRESETS, drag_ratio
 from tiltsim.report.claims.ch03 import EQ_19
 from tiltsim.report.claims.ch06 import RANK
-from tiltsim.report.measures import determinant_coefficients
+from tiltsim.report.measures import is_more_robust, terms_hold
 from tiltsim.report.model import AnalysisClaim
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
@@ -34,8 +34,7 @@ DIGITS: Final = (
 
 def _eq_7_holds() -> bool:
     """Whether Eq. (7), R with α₃ = α₁ and α₄ = α₂, has the printed coefficients."""
-    computed = determinant_coefficients(_VEHICLE).R
-    if any(abs(computed[name] - EQ_19.get(name, 0.0)) > 1e-3 for name in computed):
+    if not terms_hold("R", EQ_19, _VEHICLE):
         return False
     first, second = np.meshgrid(np.linspace(-1.0, 1.0, 21), np.linspace(-1.0, 1.0, 21))
     angles = np.stack([first, second, first, second], axis=-1)
@@ -85,10 +84,6 @@ def _regular(name: str) -> bool:
     """Whether R keeps its sign and never vanishes on the accepted path."""
     row = robustness(PUBLISHED_GAITS[f"ch08_{name.lower().replace(' ', '_')}"])
     return row.margin_exact > 1e-6
-
-
-def _holds(key: str) -> bool:
-    return bool(robustness(PUBLISHED_GAITS[key]).claim_holds)
 
 
 def _no_unacceptable_attitude() -> bool:
@@ -201,14 +196,14 @@ CLAIMS = (
         published=True,
         wrong=True,
         why=_AT_P + RANK,
-        measure=partial(_holds, "ch08_gait_1"),
+        measure=partial(is_more_robust, "ch08_gait_1"),
     ),
     AnalysisClaim(
         source="ch. 8, Sec. 4.2, Fig. 12",
         statement="The gait is more robust than its biased twin",
         case="Gait 2",
         published=True,
-        measure=partial(_holds, "ch08_gait_2"),
+        measure=partial(is_more_robust, "ch08_gait_2"),
     ),
     AnalysisClaim(
         source="ch. 8, Sec. 4.2, Fig. 12",

@@ -20,7 +20,7 @@ from controllers.singularity import rank
 from controllers.vehicle import PRESETS
 from tiltsim.report.claims.ch03 import EQ_19
 from tiltsim.report.claims.ch06 import RANK
-from tiltsim.report.measures import determinant_coefficients
+from tiltsim.report.measures import terms_hold, tracking_error
 from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
@@ -87,15 +87,9 @@ def _thrusts() -> tuple[float, ...]:
     return tuple((4.0 * _VEHICLE.thrust_coefficient * speeds**2).tolist())
 
 
-def _eq_8_holds() -> bool:
-    computed = determinant_coefficients(_VEHICLE).R
-    return all(abs(computed[name] - EQ_19.get(name, 0.0)) < 1e-3 for name in computed)
-
-
 def _faster_is_worse(flights: Mapping[str, Metrics]) -> bool:
     errors = [
-        np.inf if metrics["diverged"] else float(metrics["sup_position_error_after_20s"])
-        for metrics in flights.values()
+        np.inf if metrics["diverged"] else tracking_error(metrics) for metrics in flights.values()
     ]
     return all(slower < faster for slower, faster in pairwise(errors))
 
@@ -120,7 +114,7 @@ CLAIMS = (
         source="ch. 9, Sec. 2, Eq. (8)",
         statement="Eq. (8), term by term, is R on red",
         published=True,
-        measure=_eq_8_holds,
+        measure=partial(terms_hold, "R", EQ_19, _VEHICLE),
     ),
     AnalysisClaim(
         source="ch. 9, Sec. 3.1",

@@ -1,0 +1,104 @@
+"""Flights beyond the thesis, each beside the same flight without what it shows."""
+
+from __future__ import annotations
+
+import pytest
+
+from tiltsim.library import library_entries
+from tiltsim.loading import load_scenario
+from tiltsim.report.comparisons import other_address
+from tiltsim.report.making import make_report
+from tiltsim.report.markdown import markdown
+from tiltsim.report.page import page
+
+PUSHED = """
+title = "Pushed"
+source = "beyond the thesis: pushes"
+without = "#calm"
+
+[simulation]
+duration = 0.4
+timestep = 0.002
+
+[[variant]]
+name = "calm"
+title = "Nobody pushes"
+
+[[variant.expect]]
+metric = "final_position_error_x"
+max = 1.0
+
+[[variant]]
+name = "pushed"
+title = "A push <from> the | left"
+disturbance = [{ type = "acceleration", value = [1.0, 0.0, 0.0] }]
+
+[[variant.expect]]
+metric = "final_position_error_x"
+max = 1.0
+
+[[variant.expect]]
+metric = "diverged"
+equals = false
+
+[[variant]]
+name = "thrown"
+title = "Thrown"
+initial = { attitude = [3.0, 0.0, 0.0] }
+
+[[variant.expect]]
+metric = "final_position_error_x"
+max = 1.0
+
+[[variant]]
+name = "alone"
+title = "Beside a flight that is not flown"
+without = "ch04_tracking/setpoint#rho_0_modified"
+
+[[variant.expect]]
+metric = "max_rotor_speed"
+max = 1000.0
+"""
+
+
+@pytest.fixture(scope="module")
+def pushed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pushed")
+    (folder / "pushed.toml").write_text(PUSHED, encoding="utf-8")
+    return make_report([str(folder)], folder / "kept", 1)
+
+
+def test_values_stand_beside_those_without(pushed):
+    calm, push = (
+        pushed.flights[f"{pushed.comparisons[0].file}#{name}", "mujoco"].metrics
+        for name in ("calm", "pushed")
+    )
+    error, end, thrown, alone = pushed.comparisons
+    both = [f"{m['final_position_error_x']:.3g}".replace("-", "−") for m in (calm, push)]
+    assert error.plants["mujoco"] == " → ".join(both)
+    assert both[0] != both[1]
+    assert end.plants == {"thesis": "flown → flown", "mujoco": "flown → flown"}
+    assert thrown.plants["mujoco"].startswith(f"{both[0]} → lost at ")
+    assert "→" not in alone.plants["mujoco"]
+    assert not pushed.rows, "claims of the thesis there are none"
+
+
+def test_page_and_summary_have_them(pushed):
+    text, html = markdown(pushed), page(pushed)
+    assert "## Beyond the thesis" in text
+    assert "A push <from> the \\| left (beside `" in text
+    assert '<section id="beyond">' in html
+    assert "A push &lt;from&gt; the | left" in html
+
+
+def test_the_library_sets_flights_beside_flights_of_the_library():
+    addresses = {address for address, _, _ in library_entries()}
+    pairs = {a: other_address(a, load_scenario(a).without) for a in addresses}
+    named = {without for without in pairs.values() if without}
+    assert len(named) > 10
+    assert named <= addresses
+
+
+def test_a_report_of_the_thesis_alone_has_none(report):
+    assert report.comparisons == []
+    assert "Beyond" not in markdown(report)

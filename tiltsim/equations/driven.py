@@ -1,0 +1,242 @@
+"""The vehicles on the thesis' equations, driven as MuJoCo drives them: by the controls of a model.
+
+The thesis' vehicles do as they are told: pods stand at the gait's angles, rotors take any speed.
+With a layer around the law (`tiltsim.loops.layer`) they do not, and what the layer says, it says as
+controls and activations of the MuJoCo model. Here these controls act on the thesis' rigid body, on
+pods without mass that follow the equation of their servo, and on rotors with limits. Nothing of
+MuJoCo is in it but the order of the controls, so that its flights can be checked against these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import inf
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from controllers.gaits import tilt_reference
+from controllers.rotation import (
+    quaternion_from_euler,
+    quaternion_from_rotation,
+    rotation_from_euler,
+)
+from controllers.scalar import Quad, Triple, scalar
+from controllers.vehicle import Vehicle
+from tiltsim.equations import quadrotor
+from tiltsim.equations.tiltrotor import rigid_body
+
+if TYPE_CHECKING:
+    from tiltsim.scenario import Scenario
+
+Wrench = tuple[float, float, float, float, float, float]
+"""Force (N) and torque (N m) on the body, body axes."""
+
+
+class Mechanics(NamedTuple):
+    """What the controls drive."""
+
+    vehicle: Vehicle  # that flies, not the one that the law knows
+    servo_frequency: float  # rad/s, natural
+    servo_damping: float  # ratio
+    max_tilt: float  # rad, where the servos stop
+    min_speed: float  # rad/s, along a rotor's spin
+    max_speed: float
+
+
+def mechanics(scenario: Scenario) -> Mechanics:
+    """The mechanics of a scenario's rotorcraft."""
+    vehicle = scenario.rotorcraft
+    servo = vehicle.tilt_servo
+    max_speed = inf if vehicle.max_rotor_speed is None else vehicle.max_rotor_speed
+    return Mechanics(
+        scenario.true_rotorcraft,
+        servo.natural_frequency,
+        servo.damping_ratio,
+        max_tilt=inf if servo.max_angle is None else servo.max_angle,
+        min_speed=-max_speed if vehicle.min_rotor_speed is None else vehicle.min_rotor_speed,
+        max_speed=max_speed,
+    )
+
+
+class Driven(NamedTuple):
+    """A vehicle whose state is that of its motion, followed by MuJoCo's activations."""
+
+    motion: int  # how many numbers come before the activations
+    rotor_states: int  # which of the controls is the first that an activation integrates
+    qpos: Callable[[Sequence[float]], tuple[float, ...]]  # of the state, as MuJoCo has them
+    qvel: Callable[[Sequence[float]], tuple[float, ...]]
+    rates: Callable[
+        [Sequence[float], Sequence[float], Wrench, Mechanics, Triple], tuple[float, ...]
+    ]
+    """Time derivative of the motion: state, controls, wrench, mechanics, disturbance (m/s^2)."""
+    settled: Callable[[Sequence[float], Mechanics], list[float]]  # see `tiltsim.loop.Equations`
+    initial: Callable[[Scenario], tuple[float, ...]]  # motion
+
+
+# --- tiltrotor ---------------------------------------------------------------------------------
+# Eighteen numbers of the rigid body as in `tiltsim.equations.tiltrotor`, tilts, tilt rates.
+
+
+@scalar
+def tiltrotor_qpos(state: Sequence[float]) -> tuple[float, ...]:
+    """Position, quaternion and tilts."""
+    qw, qx, qy, qz = quaternion_from_rotation(
+        (
+            *(state[6], state[7], state[8], state[9], state[10], state[11]),
+            *(state[12], state[13], state[14]),
+        )
+    )
+    return (
+        *(state[0], state[1], state[2], qw, qx, qy, qz),
+        *(state[18], state[19], state[20], state[21]),
+    )
+
+
+@scalar
+def tiltrotor_qvel(state: Sequence[float]) -> tuple[float, ...]:
+    """Velocity, body rates and tilt rates."""
+    return (
+        *(state[3], state[4], state[5], state[15], state[16], state[17]),
+        *(state[22], state[23], state[24], state[25]),
+    )
+
+
+@scalar
+def servo_acceleration(told: float, angle: float, rate: float, mechanics: Mechanics) -> float:
+    """``omega^2 (told - alpha) - 2 zeta omega alpha'`` (rad/s^2) of a pod without mass."""
+    omega, limit = mechanics.servo_frequency, mechanics.max_tilt
+    told = min(limit, max(-limit, told))
+    return omega * omega * (told - angle) - 2.0 * mechanics.servo_damping * omega * rate
+
+
+@scalar
+def tiltrotor_rates(
+    state: Sequence[float],
+    ctrl: Sequence[float],
+    wrench: Wrench,
+    mechanics: Mechanics,
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """Chapter 3's rigid body under thrusts, servos and a wrench."""
+    vehicle = mechanics.vehicle
+    force_x, force_y, force_z, torque_x, torque_y, torque_z = wrench
+    tilts: Quad = (state[18], state[19], state[20], state[21])
+    gust_x, gust_y, gust_z = disturbance
+    push = (
+        gust_x + (state[6] * force_x + state[7] * force_y + state[8] * force_z) / vehicle.mass,
+        gust_y + (state[9] * force_x + state[10] * force_y + state[11] * force_z) / vehicle.mass,
+        gust_z + (state[12] * force_x + state[13] * force_y + state[14] * force_z) / vehicle.mass,
+    )
+    turn = (
+        torque_x / vehicle.inertia_xx,
+        torque_y / vehicle.inertia_yy,
+        torque_z / vehicle.inertia_zz,
+    )
+    # The controls are s varpi |varpi| with s = (-1, 1, -1, 1), the equations' are without s.
+    squares = (-ctrl[4], ctrl[5], -ctrl[6], ctrl[7])
+    return (
+        *rigid_body(state, tilts, squares, vehicle, push, turn),
+        *(state[22], state[23], state[24], state[25]),
+        servo_acceleration(ctrl[0], state[18], state[22], mechanics),
+        servo_acceleration(ctrl[1], state[19], state[23], mechanics),
+        servo_acceleration(ctrl[2], state[20], state[24], mechanics),
+        servo_acceleration(ctrl[3], state[21], state[25], mechanics),
+    )
+
+
+@scalar
+def settled_tiltrotor(state: Sequence[float], mechanics: Mechanics) -> list[float]:
+    """Rotors within their limits, pods not beyond their stops."""
+    low, high, stop = mechanics.min_speed, mechanics.max_speed, mechanics.max_tilt
+    settled = list(state)
+    for rotor in range(4):
+        spin = -1.0 if rotor % 2 == 0 else 1.0
+        settled[26 + rotor] = spin * min(high, max(low, spin * state[26 + rotor]))
+        tilt, rate = state[18 + rotor], state[22 + rotor]
+        if abs(tilt) > stop:
+            settled[18 + rotor] = stop if tilt > 0.0 else -stop
+            settled[22 + rotor] = 0.0 if tilt * rate > 0.0 else rate
+    return settled
+
+
+def initial_tiltrotor(scenario: Scenario) -> tuple[float, ...]:
+    """The motion at time zero; pods at rest at the gait's angles."""
+    initial = scenario.initial
+    gait = scenario.gait.plan(scenario.rotorcraft.resolve())
+    tilts = tilt_reference(0.0, gait.parameters, gait.table)[:4]
+    motion = (*initial.position, *initial.velocity)
+    rotation = rotation_from_euler(*initial.attitude)
+    return (*motion, *rotation, *initial.angular_velocity, *tilts, 0.0, 0.0, 0.0, 0.0)
+
+
+# --- quadrotor ---------------------------------------------------------------------------------
+# Twelve numbers of the rigid body as in `tiltsim.equations.quadrotor`.
+
+
+@scalar
+def quadrotor_qpos(state: Sequence[float]) -> tuple[float, ...]:
+    """Position and quaternion."""
+    qw, qx, qy, qz = quaternion_from_euler(state[6], state[7], state[8])
+    return state[0], state[1], state[2], qw, qx, qy, qz
+
+
+@scalar
+def quadrotor_qvel(state: Sequence[float]) -> tuple[float, ...]:
+    """Velocity and body rates."""
+    return state[3], state[4], state[5], state[9], state[10], state[11]
+
+
+@scalar
+def quadrotor_rates(
+    state: Sequence[float],
+    ctrl: Sequence[float],
+    wrench: Wrench,
+    mechanics: Mechanics,
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """Chapter 2's rigid body under thrusts and a wrench."""
+    vehicle = mechanics.vehicle
+    force_x, force_y, force_z, torque_x, torque_y, torque_z = wrench
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_from_euler(state[6], state[7], state[8])
+    gust_x, gust_y, gust_z = disturbance
+    push = (
+        gust_x + (r11 * force_x + r12 * force_y + r13 * force_z) / vehicle.mass,
+        gust_y + (r21 * force_x + r22 * force_y + r23 * force_z) / vehicle.mass,
+        gust_z + (r31 * force_x + r32 * force_y + r33 * force_z) / vehicle.mass,
+    )
+    lever = vehicle.arm_length * vehicle.thrust_coefficient
+    inputs = (
+        vehicle.thrust_coefficient * (ctrl[0] + ctrl[1] + ctrl[2] + ctrl[3]),
+        lever * (ctrl[1] - ctrl[3]) + torque_x,
+        lever * (ctrl[2] - ctrl[0]) + torque_y,
+        vehicle.drag_coefficient * (ctrl[0] - ctrl[1] + ctrl[2] - ctrl[3]) + torque_z,
+    )
+    return quadrotor.equations_of_motion(state, inputs, vehicle, push)
+
+
+@scalar
+def settled_quadrotor(state: Sequence[float], mechanics: Mechanics) -> list[float]:
+    """As it is: its rotors make any thrust."""
+    return list(state)
+
+
+DRIVEN: Final[dict[str, Driven]] = {
+    "tiltrotor": Driven(
+        motion=26,
+        rotor_states=8,
+        qpos=tiltrotor_qpos,
+        qvel=tiltrotor_qvel,
+        rates=tiltrotor_rates,
+        settled=settled_tiltrotor,
+        initial=initial_tiltrotor,
+    ),
+    "quadrotor": Driven(
+        motion=12,
+        rotor_states=4,
+        qpos=quadrotor_qpos,
+        qvel=quadrotor_qvel,
+        rates=quadrotor_rates,
+        settled=settled_quadrotor,
+        initial=quadrotor.initial_state,
+    ),
+}
+"""By the vehicle's model."""
