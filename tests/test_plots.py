@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import matplotlib
 import numpy as np
 import pytest
 
-from tests.flights import RECIPES, flight, saved
+import tiltsim
+from tests.flights import BASE, RECIPES, flight, saved
 from tiltsim.cli import main
 from tiltsim.figures.flight import flight_figure
+from tiltsim.flight import SAMPLE_FIELDS, End
 
 SIGNATURES = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
 PANELS = {
     *("Attitude", "Altitude", "Position error", "Tilt angles", "Rotor speeds", "Plan view"),
-    "Attitudes flown; shaded: out of reach",
 }
+PLANES = {f"Attitudes flown; {words} of reach" for words in ("shaded: out", "none is out")}
 
 
 def axes_by_title(figure):
@@ -27,6 +31,7 @@ def test_every_flight_can_be_drawn(name):
     figure.canvas.draw()
     titles = set(axes_by_title(figure))
     assert titles >= PANELS
+    assert titles & PLANES
     assert any(title.startswith("Singularity margin, least") for title in titles)
 
 
@@ -100,3 +105,36 @@ def test_a_bad_target_is_one_line_and_exit_code_2(out, words, tmp_path, capsys):
     assert main(["plot", str(folder), "--out", str(tmp_path / out)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert words in line
+
+
+def test_the_blow_up_of_a_lost_flight_does_not_flatten_what_came_before():
+    whole = flight("fixed")
+    samples = whole.samples.copy()
+    columns = [i for i, name in enumerate(SAMPLE_FIELDS) if name.startswith("rotor_speed")]
+    samples[-1, columns] *= 1e6
+    ends = {
+        "completed": End("completed", 1.2),
+        "diverged": End("diverged", 1.2, "rotor 1 at 3e+08 rad/s"),
+    }
+    spans = {}
+    for kind, end in ends.items():
+        panels = axes_by_title(flight_figure(replace(whole, samples=samples, end=end)))
+        low, high = panels["Rotor speeds"].get_ylim()
+        spans[kind] = high - low
+        words = [text.get_text() for text in panels["Rotor speeds"].texts]
+        assert words == (["ends off scale"] if kind == "diverged" else [])
+    assert spans["completed"] > 1e8
+    assert spans["diverged"] < 1e3
+
+
+def test_a_flight_of_one_sample_is_drawn_without_a_warning(recwarn):
+    whole = flight("fixed")
+    flight_figure(replace(whole, samples=whole.samples[:1].copy()))
+    assert not recwarn.list
+
+
+def test_a_red_gait_puts_no_attitude_out_of_reach():
+    red = BASE | {"gait": {"type": "fixed", "angles": [-0.3, 0.3, -0.3, 0.3]}}
+    panels = axes_by_title(flight_figure(tiltsim.simulate(tiltsim.parse_scenario(red))))
+    plane = panels["Attitudes flown; none is out of reach"]
+    assert [len(line.get_xdata()) > 1 for line in plane.lines].count(True) == 1  # what was flown

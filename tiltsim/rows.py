@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tiltsim.interrupts import interrupts_kept
+
 if TYPE_CHECKING:
     from tiltsim.loop import ControlSetup, Floats
 
@@ -34,7 +36,8 @@ def evaluate_rows(
     if evaluated >= ROWS_WORTH_COMPILING and len(time):
         from tiltsim.native import evaluate_natively
 
-        return evaluate_natively(function, time, states, setup)
+        with interrupts_kept():
+            return evaluate_natively(function, time, states, setup)
     parameters, table = setup.parameters, setup.table
     rows = np.full((len(time), width), nan)
     for row, t, state in zip(rows, time.tolist(), states.tolist()):
