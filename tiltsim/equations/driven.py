@@ -21,7 +21,7 @@ from controllers.rotation import (
 )
 from controllers.scalar import Quad, Triple, scalar
 from controllers.vehicle import Vehicle
-from tiltsim.equations import quadrotor
+from tiltsim.equations.quadrotor import equations_of_motion, initial_state
 from tiltsim.equations.tiltrotor import rigid_body
 
 if TYPE_CHECKING:
@@ -218,7 +218,7 @@ def quadrotor_rates(
         lever * (ctrl[2] - ctrl[0]) + torque_y,
         vehicle.drag_coefficient * (ctrl[0] - ctrl[1] + ctrl[2] - ctrl[3]) + torque_z,
     )
-    return quadrotor.equations_of_motion(state, inputs, vehicle, push)
+    return equations_of_motion(state, inputs, vehicle, push)
 
 
 @scalar
@@ -244,7 +244,7 @@ DRIVEN: Final[dict[str, Driven]] = {
         qvel=quadrotor_qvel,
         rates=quadrotor_rates,
         settled=settled_quadrotor,
-        initial=quadrotor.initial_state,
+        initial=initial_state,
     ),
 }
 """By the vehicle's model."""
