@@ -262,6 +262,12 @@ MISTAKES = {
         "vehicle.min_rotor_speed = 400.0",
         "below max_rotor_speed = 200.0",
     ),
+    "half a circle beside a rectangle": (
+        '[gait]\ntype = "two_color"\nperiod = 1.0\nrectangle = [[0.2, 0.8], [-0.8, -0.2]]\n'
+        "radius = 0.3",
+        'gait.type = "two_color"',
+        "give one of rectangle",
+    ),
     "start beyond the rotor limit": (
         "[vehicle]\nmax_rotor_speed = 200.0",
         "initial.rotor_speed = 300.0",

@@ -74,15 +74,16 @@ class TrotGait(GaitTable):
 
 
 class CatGait(GaitTable):
-    """The cat gaits of ch. 5, with keyframes from published footfall timing."""
+    """The cat gaits of ch. 5, reconstructed from published footfalls and what ch. 5 reports."""
 
     type: Literal["walk", "run", "transverse_gallop", "rotary_gallop"]
-    amplitude: Angle = Field(description="rad")
+    amplitude: Angle = Field(description="of a leg about its lean, rad")
+    lean: Angle = Field(0.0, description="mean angle of the legs, forward, rad")
     period: Period = Field(description="T, s")
 
     def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         """See `GaitTable.unscaled`."""
-        return plans.cat(self.type, self.amplitude, self.period)
+        return plans.cat(self.type, self.amplitude, self.period, self.lean)
 
     @property
     def size(self) -> tuple[str, object]:
@@ -141,8 +142,9 @@ class TwoColorGait(GaitTable):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        circle = self.centre is not None and self.radius is not None
-        if (self.rectangle is not None) + circle + bool(self.path) != 1:
+        circle = (self.centre is not None) + (self.radius is not None)
+        given = (self.rectangle is not None, circle > 0, bool(self.path))
+        if sum(given) != 1 or circle == 1:
             raise InvalidValueError(
                 "gait.type", "two_color", "give one of rectangle, centre with radius, and path"
             )

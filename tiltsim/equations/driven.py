@@ -57,6 +57,14 @@ def mechanics(scenario: Scenario) -> Mechanics:
     )
 
 
+@scalar
+def clipped(value: float, low: float, high: float) -> float:
+    """The nearest number between two bounds; what is no number stays none."""
+    if value < low:
+        return low
+    return high if value > high else value
+
+
 class Driven(NamedTuple):
     """A vehicle whose state is that of its motion, followed by MuJoCo's activations."""
 
@@ -104,7 +112,7 @@ def tiltrotor_qvel(state: Sequence[float]) -> tuple[float, ...]:
 def servo_acceleration(told: float, angle: float, rate: float, mechanics: Mechanics) -> float:
     """``omega^2 (told - alpha) - 2 zeta omega alpha'`` (rad/s^2) of a pod without mass."""
     omega, limit = mechanics.servo_frequency, mechanics.max_tilt
-    told = min(limit, max(-limit, told))
+    told = clipped(told, -limit, limit)
     return omega * omega * (told - angle) - 2.0 * mechanics.servo_damping * omega * rate
 
 
@@ -150,7 +158,7 @@ def settled_tiltrotor(state: Sequence[float], mechanics: Mechanics) -> list[floa
     settled = list(state)
     for rotor in range(4):
         spin = -1.0 if rotor % 2 == 0 else 1.0
-        settled[26 + rotor] = spin * min(high, max(low, spin * state[26 + rotor]))
+        settled[26 + rotor] = spin * clipped(spin * state[26 + rotor], low, high)
         tilt, rate = state[18 + rotor], state[22 + rotor]
         if abs(tilt) > stop:
             settled[18 + rotor] = stop if tilt > 0.0 else -stop

@@ -51,6 +51,7 @@ def distributions_figure(results: SweepResults, metrics: tuple[str, ...]) -> Fig
             _draw_curve(axes, results, metric, group, CYCLE[number % len(CYCLE)])
         if is_wide(results.columns[metric][are_completed(results)]):
             axes.set_xscale("log")
+        axes.margins(x=0.1)  # room for the numbers
         axes.set_ylim(0.0, 1.03)
         axes.set_xlabel(label_of(metric))
         axes.set_ylabel("share of flights at or below")
