@@ -214,7 +214,7 @@ MISTAKES = {
     "unknown set of gains": (
         '[controller]\ngains = "ch05"',
         'controller.gains = "ch05"',
-        "ch03, ch04 or exact",
+        "ch03, ch04, exact or feedforward",
     ),
     "number for gains": ("[controller]\ngains = 3", "controller.gains = 3", "must be a table"),
     "ch. 4's gains under the exact matrix": (

@@ -11,6 +11,7 @@ import pytest
 import tiltsim
 from tests.flights import BASE, RECIPES, flight, saved
 from tiltsim.cli import main
+from tiltsim.figures.comparison import comparison_figure
 from tiltsim.figures.flight import flight_figure
 from tiltsim.flight import SAMPLE_FIELDS, End
 
@@ -138,3 +139,71 @@ def test_a_red_gait_puts_no_attitude_out_of_reach():
     panels = axes_by_title(flight_figure(tiltsim.simulate(tiltsim.parse_scenario(red))))
     plane = panels["Attitudes flown; none is out of reach"]
     assert [len(line.get_xdata()) > 1 for line in plane.lines].count(True) == 1  # what was flown
+
+
+# --- supervised flights, and several on one page -------------------------------------------------
+
+
+def supervised():
+    return flight("supervised")
+
+
+def test_the_margin_shows_its_threshold_and_when_the_supervisor_acts():
+    this = supervised()
+    assert 0.0 < this["supervision"].max() <= 1.0
+    panels = axes_by_title(flight_figure(this))
+    (title,) = [title for title in panels if title.startswith("Singularity margin")]
+    axes = panels[title]
+    levels = {line.get_ydata()[0] for line in axes.lines if len(set(line.get_ydata())) == 1}
+    assert 0.9 in levels
+    assert "shaded: supervisor acts" in {text.get_text() for text in axes.texts}
+    plain = next(
+        v for k, v in axes_by_title(flight_figure(flight("trot"))).items() if "margin" in k
+    )
+    assert "shaded: supervisor acts" not in {text.get_text() for text in plain.texts}
+
+
+def test_flights_are_compared_by_margin_determinant_and_error():
+    flights = [flight("jumps"), supervised()]
+    figure = comparison_figure(flights)
+    figure.canvas.draw()
+    panels = axes_by_title(figure)
+    assert list(panels) == [
+        "Singularity margin",
+        "Determinant, 4 for a level untilted vehicle",
+        "What the supervisor takes away",
+        "Distance from the reference",
+    ]
+    for axes, column in zip(
+        panels.values(), ("singularity_margin", "determinant", "supervision"), strict=False
+    ):
+        drawn = [line.get_ydata() for line in axes.lines if len(line.get_ydata()) > 2]
+        columns = [this.columns[column] for this in flights if column in this.columns]
+        for line, wanted in zip(drawn, columns, strict=True):
+            np.testing.assert_array_equal(line, np.maximum(wanted, 0.0))
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "tests/jumps",
+        "tests/supervised",
+    ]
+
+
+def test_a_lost_flight_says_so_in_a_comparison():
+    lost = replace(flight("jumps"), end=End("singular", 0.7, "why"))
+    (legend,) = comparison_figure([lost, supervised()]).legends
+    assert legend.get_texts()[0].get_text() == "tests/jumps, lost at 0.70 s"
+
+
+def test_the_command_compares_several_flights(tmp_path, capsys):
+    folders = [str(saved(name, tmp_path)) for name in ("jumps", "supervised")]
+    file = tmp_path / "both.svg"
+    assert main(["plot", *folders, "--out", str(file)]) == 0
+    assert "supervised" in file.read_text(encoding="utf-8")
+    assert capsys.readouterr().out == f"figure written to {file}\n"
+
+
+def test_a_vehicle_without_a_margin_is_not_compared(tmp_path, capsys):
+    folders = [str(saved(name, tmp_path)) for name in ("tilt_car", "jumps")]
+    assert main(["plot", *folders]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "the tilt_car has no margin to compare" in line

@@ -63,6 +63,17 @@ def test_axes_are_crossed_the_last_one_fastest(plan_of):
     assert sorted(i for n in range(plan.chunks) for i in plan.chunk(n)) == list(range(25))
 
 
+def test_a_table_is_no_value_of_an_axis(plan_of):
+    axis = """
+[[axis]]
+type = "list"
+key = "controller.gains"
+values = [{ attitude = { bandwidth = 20.0 }, altitude = { bandwidth = 8.0 } }]
+"""
+    with pytest.raises(InputError, match=r"controller\.gains is a table; vary its keys one by one"):
+        plan_of(axis).check()
+
+
 def test_axes_of_a_group_advance_together(plan_of):
     grouped = [text.rstrip() + '\ngroup = "both"\n' for text in (AMPLITUDES, PERIODS)]
     plan = plan_of("".join(grouped))
