@@ -1,8 +1,10 @@
 """Forces of the air: drag, wind, discrete gusts, turbulence and ground effect.
 
-Sources: MIL-F-8785C, "Flying qualities of piloted airplanes" (1980), Sec. 3.7 (gusts and the Dryden
-spectra); Cheeseman and Bennett, "The effect of the ground on a helicopter rotor in forward flight",
-ARC R&M 3021 (1955). Air velocities are in world axes, z up.
+Sources: MIL-F-8785C, "Flying qualities of piloted airplanes" (5 November 1980), for gusts and the
+Dryden spectra; Cheeseman and Bennett, "The effect of the ground on a helicopter rotor in forward
+flight", ARC R&M 3021 (September 1955, published 1957). The formulas were checked against others who
+implement them; paragraphs and equations are not cited, as neither print was at hand. Air velocities
+are in world axes, z up.
 """
 
 from __future__ import annotations
@@ -56,7 +58,7 @@ def drag_force(velocity: Triple, drag: Drag) -> Triple:
 
 
 class Gust(NamedTuple):
-    """A discrete gust (MIL-F-8785C, Sec. 3.7.2.3), given by its rise time instead of its length."""
+    """A discrete gust (MIL-F-8785C), given by its rise time instead of its length."""
 
     start: float = 0.0  # s
     rise: float = 1.0  # s, d_m over the speed of flight
@@ -110,7 +112,7 @@ def low_altitude_turbulence(
     sample_time: float = 0.01,
     seed: float = 0.0,
 ) -> Turbulence:
-    """The low-altitude model (MIL-F-8785C, Sec. 3.7.3.2 and Figs. 10, 11), 10 to 1000 ft.
+    """The low-altitude model (MIL-F-8785C), 10 to 1000 ft.
 
     ``L_w = h``, ``L_u = L_v = h / (0.177 + 0.000823 h)^1.2``, ``sigma_w = 0.1 W_20`` and
     ``sigma_u = sigma_v = sigma_w / (0.177 + 0.000823 h)^0.4``, ``h`` in feet.
@@ -227,7 +229,7 @@ class Ground(NamedTuple):
 def ground_effect(above: float, rotor_radius: float) -> float:
     """Thrust of a rotor near the ground over its thrust far away, at equal power.
 
-    ``1 / (1 - (R / 4 h)^2)`` (Cheeseman and Bennett, Eq. 7, at rest) with the rotor's height ``h``
+    ``1 / (1 - (R / 4 h)^2)`` (Cheeseman and Bennett, at rest) with the rotor's height ``h``
     above the ground, m. Derived for single, level rotors from a source and its image, and good
     above half a radius; below, the value at half a radius, 4/3, stands.
     """

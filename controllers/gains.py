@@ -83,5 +83,7 @@ GAIN_SETS: Final = {
     # for the exact decoupling matrix, under which the two sets above fail Proposition 4: attitude
     # poles at -20 and -10 +- 10j, altitude poles well damped near -1 to -14
     "exact": gains_from_rows([[40] * 3, [600] * 3, [4000] * 3], [10, 15, 10], [1, 1]),
+    # for gait-rate feed-forward: attitude poles at -25, yaw's and the altitude's at -10, -1.5
+    "feedforward": gains_from_poles(Poles(25.0), Poles(10.0), Poles(10.0), Poles(1.5))[0],
 }
-"""Named gain sets; `exact` is ours, the others are published."""
+"""Named gain sets; `exact` and `feedforward` are ours, the others are published."""

@@ -55,7 +55,7 @@ from controllers.jets import (
 from controllers.references import ReferenceParameters, reference_derivatives
 from controllers.rotation import rotation_from_euler, shortest_turn
 from controllers.scalar import Quad, Triple, scalar
-from controllers.supervisor import Supervisor, gait_share
+from controllers.supervisor import AT_REST, Supervisor, gait_share, gait_time, supervised_tilts
 from controllers.vehicle import Vehicle, drag_ratio
 
 
@@ -330,25 +330,27 @@ def anticipated_tilts(
 
 @scalar
 def planned_force(
-    time: float, roll: float, pitch: float, parameters: Parameters, table: Sequence[float]
+    time: float,
+    roll: float,
+    pitch: float,
+    governor: Triple,
+    parameters: Parameters,
+    table: Sequence[float],
 ) -> tuple[Jet, Jet, Jet]:
-    """The torque-free force ``n`` of the planned gait, with how it moves (body axes).
+    """The torque-free force ``n`` of the gait as it is commanded, with how it moves (body axes).
 
-    At an attitude where a supervisor lets only a share of the gait pass, of that share.
+    That is the planned gait, or what a supervisor makes of it; ``governor`` is the supervisor's
+    state with its rate and acceleration.
     """
-    alpha_1, alpha_2, alpha_3, alpha_4 = anticipated_tilts(
-        time, parameters.gait, table, parameters.anticipation
-    )
+    gait, supervisor = parameters.gait, parameters.supervisor
     ratio = drag_ratio(parameters.vehicle)
-    planned = tilt_reference(time, parameters.gait, table)
-    share = gait_share(planned, roll, pitch, parameters.supervisor, ratio)
-    return torque_free_force_jet(
-        jet_scaled(share, alpha_1),
-        jet_scaled(share, alpha_2),
-        jet_scaled(share, alpha_3),
-        jet_scaled(share, alpha_4),
-        ratio,
+    clock = gait_time(time, governor, supervisor)
+    share = gait_share(tilt_reference(clock, gait, table), roll, pitch, supervisor, ratio)
+    alpha_1, alpha_2, alpha_3, alpha_4 = supervised_tilts(
+        anticipated_tilts(clock, gait, table, parameters.anticipation),
+        *(share, governor, supervisor, ratio),
     )
+    return torque_free_force_jet(alpha_1, alpha_2, alpha_3, alpha_4, ratio)
 
 
 @scalar
@@ -359,11 +361,13 @@ def tracking_inputs(
     integrals: Triple,
     parameters: Parameters,
     table: Sequence[float] = NO_KEYFRAMES,
+    governor: Triple = AT_REST,
 ) -> tuple[float, ...]:
     """Rotor accelerations, rates of the integrators, and the attitude asked for.
 
     ``state`` is `controllers.attitude_altitude.STATE_FIELDS`, ``tilt_rates`` (rad/s) are those of
-    its tilt angles, ``integrals`` the `INTEGRAL_FIELDS`. Returns four rotor accelerations
+    its tilt angles, ``integrals`` the `INTEGRAL_FIELDS`, ``governor`` the supervisor's state with
+    its rate and acceleration. Returns four rotor accelerations
     (rad/s^2), three rates (m) and the references of roll, pitch and yaw (rad); NaN where the
     decoupling matrix is singular.
     """
@@ -453,7 +457,7 @@ def tracking_inputs(
     xi_rate = yi_rate = 0.0
     roll_ref, pitch_ref = (reference.roll, 0.0, 0.0), (reference.pitch, 0.0, 0.0)
     if parameters.decoupler != NONE:
-        nx, ny, nz = planned_force(time, roll, pitch, parameters, table)
+        nx, ny, nz = planned_force(time, roll, pitch, governor, parameters, table)
         # Jerk of the body if its force stays along n: it turns with the body and with the gait.
         length = jet_square_root(
             jet_sum(

@@ -142,16 +142,17 @@ def test_published_gaits_by_name(capsys) -> None:
 SCENARIOS = {
     "fixed": ('type = "fixed"\nangles = [-0.65, -0.65, 0.65, 0.65]', None),
     "trot": ('type = "trot_continuous"\namplitude = 0.65\nperiod = 2.0', 1.0776),
-    "walk": ('type = "walk"\namplitude = 1.0\nperiod = 3.0', -0.5349),
-    "walk_third": ('type = "walk"\namplitude = 1.0\nperiod = 1.0\nscale = 0.3333333', 1.4134),
-    "run": ('type = "run"\namplitude = 1.0\nperiod = 1.0', 0.7412),
+    "walk": ('type = "walk"\namplitude = 1.25\nlean = 1.055\nperiod = 3.0', -0.8746),
+    "walk_third": ('type = "walk"\namplitude = 1.0\nperiod = 1.0\nscale = 0.3333333', 1.4389),
+    "run": ('type = "run"\namplitude = 1.0\nperiod = 1.0', 0.5905),
+    "run_leaning": ('type = "run"\namplitude = 0.5\nlean = 0.5\nperiod = 1.0', 0.8167),
     "transverse": (
-        'type = "transverse_gallop"\namplitude = 1.0\nperiod = 1.0\nscale = 0.3333333',
-        -1.5365,
+        'type = "transverse_gallop"\namplitude = 0.4\nlean = 1.3\nperiod = 1.0\nscale = 0.3333333',
+        1.2292,
     ),
     "rotary": (
-        'type = "rotary_gallop"\namplitude = 1.0\nperiod = 2.0\nscale = 0.1666667',
-        1.5325,
+        'type = "rotary_gallop"\namplitude = 0.4\nlean = 1.3\nperiod = 2.0\nscale = 0.3333333',
+        1.2187,
     ),
     "red": (
         'type = "two_color"\nperiod = 1.0\nrectangle = [[0.2, 0.8], [-0.8, -0.2]]',

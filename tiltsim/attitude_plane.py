@@ -20,6 +20,7 @@ from controllers.singularity import torque_free_direction, world_up
 
 if TYPE_CHECKING:
     from controllers.vehicle import Vehicle
+    from tiltsim.scenario import Scenario
 
 Floats = npt.NDArray[np.float64]
 
@@ -29,8 +30,17 @@ HALF_WIDTH: Final = pi / 2
 MARGIN_THRESHOLD: Final = 0.2
 """Singularity margin (rad) below which a flight is called close to singular."""
 
+ACTS: Final = 0.01
+"""From this share on of what it can do a supervisor counts as acting."""
+
 _TINY: Final = 1e-12
 """Below this a component of the unit vector ``n`` counts as zero."""
+
+
+def margin_threshold(scenario: Scenario) -> float:
+    """The margin (rad) not to be missed: a supervisor's, else `MARGIN_THRESHOLD`."""
+    supervisor = getattr(scenario.controller, "supervisor", None)
+    return supervisor.min_margin if supervisor is not None else MARGIN_THRESHOLD
 
 
 def torque_free_directions(columns: Mapping[str, Floats], vehicle: Vehicle) -> Floats:

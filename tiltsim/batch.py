@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -21,13 +21,14 @@ import numpy as np
 
 from tiltsim.engine import control_callback
 from tiltsim.flight import End, Flight
-from tiltsim.loop import RECORDER, Floats
+from tiltsim.loop import RECORDER, Floats, Loop
 from tiltsim.loops import control_setup, loop_of
 from tiltsim.plants import (
     MujocoPlant,
     flight_model,
     make_plant,
     quiet_warnings,
+    what_decides_the_model,
     worth_native,
 )
 from tiltsim.simulation import Watch, fly_chunk, simulate
@@ -43,6 +44,9 @@ MEMORY: Final = 256 * 2**20
 
 CALL_TIME: Final = 0.25
 """How long (s) a batch flies before Python looks at the rows and at the keyboard."""
+
+Way = str | tuple[Loop, Hashable]
+"""How flights are flown: those of one loop, and with models of one layout, share a batch."""
 
 WINDOW: Final = 512
 """How many scenarios are looked at together to find those that share a batch."""
@@ -113,7 +117,7 @@ def _fly_window(
     keep_samples: bool,
 ) -> Iterator[FlightResult]:
     """Fly scenarios group by group, and put the results back into their order."""
-    groups: dict[object, list[int]] = {}
+    groups: dict[Way, list[int]] = {}
     for index, scenario in enumerate(scenarios):
         groups.setdefault(_way_to_fly(scenario, native), []).append(index)
     done: dict[int, FlightResult] = {}
@@ -143,31 +147,18 @@ def _fly_window(
                 following += 1
 
 
-def _way_to_fly(scenario: Scenario, native: bool) -> object:
-    """``alone``, on the ``thesis`` plant in threads, or what flights of one batch share."""
+def _way_to_fly(scenario: Scenario, native: bool) -> Way:
+    """``alone``, on the ``thesis`` plant in threads, or what the rows of a batch have in common."""
     simulation, loop = scenario.simulation, loop_of(scenario)
     wanted = simulation.engine == "native" or (simulation.engine == "auto" and native)
     if not wanted or loop.watch is None or scenario.controller.law == "python":
         return "alone"
     if simulation.plant == "thesis":
         return "thesis"
-    # Stops of the tilt servos and ground are constraints, which give MuJoCo's data more numbers; a
-    # user's own file may have any bodies.
-    vehicle, grounded = scenario.vehicle, scenario.ground is not None
-    return loop, vehicle.tilt_servo.stops, grounded, getattr(vehicle, "mjcf", None)
-
-
-_FLOWN_IN_ANY_MODEL: Final = {
-    *("title", "source", "without", "simulation", "initial", "gait", "reference", "sensors"),
-    *("fault", "expect"),
-}
-"""Tables of a scenario that are parameters or initial state of a flight, or no part of it."""
-
-
-def _likeness(scenario: Scenario) -> str:
-    """The same for scenarios that fly in the same model."""
-    tables = [value for name, value in scenario if name not in _FLOWN_IN_ANY_MODEL]
-    return repr((tables, scenario.simulation.timestep, scenario.simulation.integrator))
+    # A stop of the tilt servos is a constraint, which gives a state more numbers, and ground gives
+    # the model more shapes; a law with a layer around it has states and controls of its own.
+    file = getattr(scenario.vehicle, "mjcf", None)
+    return loop, (scenario.vehicle.tilt_servo.stops, scenario.ground is not None, file)
 
 
 def _natively(scenario: Scenario) -> Scenario:
@@ -317,7 +308,7 @@ class _BatchFlight:
 
     def _take_next(self) -> _Row:
         index, scenario = self._waiting.popleft()
-        native, key = _natively(scenario), _likeness(scenario)
+        native, key = _natively(scenario), what_decides_the_model(scenario)
         model = self._models.get(key)
         if model is None:
             if len(self._models) > 2 * self._size:

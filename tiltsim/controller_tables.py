@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from math import inf, pi
+from math import atan, inf, pi
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
@@ -24,10 +24,11 @@ from controllers.gains import (
     gains_from_rows,
 )
 from controllers.gait_feedforward import Ingredients
+from controllers.red_gait import determinant_at_clearance
 from controllers.stability import Loop, closed_loops, feedforward_loops, linear_loop
-from controllers.supervisor import Supervisor
+from controllers.supervisor import STRATEGIES, Supervisor
 from controllers.switching import PUBLISHED_ZONE
-from controllers.vehicle import Vehicle
+from controllers.vehicle import Vehicle, drag_ratio
 from tiltsim.messages import InvalidValueError
 from tiltsim.tables import Gains2, Gains4, NonNegative, Positive, Table, Vector3
 
@@ -137,12 +138,71 @@ Ingredient = Literal[
 class SupervisorTable(Table):
     """Keeps a gait away from singular matrices; see `controllers.supervisor`."""
 
+    strategy: Literal["scale", "hold", "return_to_red"] = Field(
+        "scale", description="shrink the gait, stop its clock, or go to the nearest red gait"
+    )
     min_margin: Annotated[float, Field(ge=0.0, lt=pi / 2)] = Field(
         0.2, description="singularity margin to keep, rad; 0: none"
     )
     min_determinant: Annotated[float, Field(ge=0.0, lt=4.0)] = Field(
         0.5, description="determinant to keep, 4 for a level untilted vehicle; 0: none"
     )
+    horizon: Annotated[float, Field(gt=0.0, le=10.0)] = Field(
+        0.5, description="s of the gait to look ahead; needs hold or return_to_red"
+    )
+    max_tilt_rate: Positive = Field(
+        1.0, description="rad/s on the way to red and back, the gait's own rate aside; likewise"
+    )
+    clearance: Annotated[float, Field(gt=0.0, lt=pi / 4)] = Field(
+        0.1,
+        description="rad to keep on red from where rotors stop, next to the curve L, below "
+        "atan(r); needs return_to_red",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        needs = {
+            "horizon": ("hold", "return_to_red"),
+            "max_tilt_rate": ("return_to_red",),
+            "clearance": ("return_to_red",),
+        }
+        for key, strategies in needs.items():
+            value = getattr(self, key)
+            if self.strategy not in strategies and value != type(self).model_fields[key].default:
+                raise InvalidValueError(
+                    f"controller.supervisor.{key}",
+                    value,
+                    f"needs controller.supervisor.strategy = {' or '.join(strategies)}",
+                )
+        return self
+
+    def resolve(self, vehicle: Vehicle) -> Supervisor:
+        """The numbers of the law.
+
+        Raises `InvalidValueError` where red gaits at the clearance have too small a determinant,
+        or not even the untilted vehicle keeps it.
+        """
+        if self.strategy == "return_to_red":
+            ratio = drag_ratio(vehicle)
+            delta, reached = atan(ratio), determinant_at_clearance(self.clearance, ratio)
+            mistake = ""
+            if self.clearance >= delta:
+                mistake = f"must be below {delta:.4g}, which the untilted vehicle keeps"
+            elif reached < self.min_determinant:
+                mistake = (
+                    f"so near to L the determinant is {reached:.3g}, below min_determinant = "
+                    f"{self.min_determinant:g}; keep further away"
+                )
+            if mistake:
+                raise InvalidValueError("controller.supervisor.clearance", self.clearance, mistake)
+        return Supervisor(
+            self.min_margin,
+            self.min_determinant,
+            STRATEGIES[self.strategy],
+            self.horizon,
+            self.max_tilt_rate,
+            self.clearance,
+        )
 
 
 class AttitudeAltitudeController(LawTable):
@@ -155,7 +215,7 @@ class AttitudeAltitudeController(LawTable):
     decoupling: Literal["published", "exact"] = "published"
     decoupler: Literal["none", "conventional", "modified", "exact"] = "modified"
     gains: Annotated[
-        Annotated[Literal["ch03", "ch04", "exact"], Tag("named")]
+        Annotated[Literal["ch03", "ch04", "exact", "feedforward"], Tag("named")]
         | Annotated[GainTable, Tag("table")]
         | Annotated[PolePlacementTable, Tag("poles")],
         Discriminator(_attitude_altitude_gain_kind),
@@ -167,7 +227,7 @@ class AttitudeAltitudeController(LawTable):
         0.02, description="s for which prioritized allocation keeps within the limits"
     )
     supervisor: SupervisorTable | None = Field(
-        None, description="scales the gait down before its decoupling matrix becomes singular"
+        None, description="acts on the gait before its decoupling matrix becomes singular"
     )
     gait_rate_feedforward: bool = Field(
         False, description="count the gait's rates in: the exact law with integral action"
@@ -232,10 +292,9 @@ class AttitudeAltitudeController(LawTable):
             return self.gains.resolve()[1]
         return IntegralGains()
 
-    def resolve_supervisor(self) -> Supervisor:
-        """The supervisor's thresholds, zero without one."""
-        table = self.supervisor
-        return Supervisor(table.min_margin, table.min_determinant) if table else Supervisor()
+    def resolve_supervisor(self, vehicle: Vehicle) -> Supervisor:
+        """The numbers of the supervisor, thresholds of zero without one."""
+        return self.supervisor.resolve(vehicle) if self.supervisor else Supervisor()
 
     def resolve_ingredients(self, *, gyroscopic_torque: bool) -> Ingredients:
         """What the law counts in, on a plant with or without gyroscopic torque."""

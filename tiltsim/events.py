@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 
 from controllers.vehicle import SPIN
-from tiltsim.attitude_plane import MARGIN_THRESHOLD
+from tiltsim.attitude_plane import ACTS, margin_threshold
 from tiltsim.loops import law_in_words, loop_of
+from tiltsim.loops.supervised import SUPERVISION
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -22,6 +23,13 @@ Level = Literal["INFO", "WARN", "ERROR"]
 
 QUIET_TIME: Final = 0.5
 """A condition that returns within this time (s) has not been away: chatter is one event."""
+
+
+_SUPERVISION_IN_WORDS: Final = {
+    "scale": "supervisor scales the gait",
+    "hold": "supervisor holds the gait",
+    "return_to_red": "supervisor takes the gait towards red",
+}
 
 
 @dataclass(frozen=True)
@@ -95,8 +103,12 @@ class EventWatch:
         self, piece: Flight
     ) -> Iterator[tuple[str, npt.NDArray[np.float64], npt.NDArray[np.bool_]]]:
         time = piece["time"]
-        near = np.abs(piece["singularity_margin"]) < MARGIN_THRESHOLD
-        yield f"singularity margin below {MARGIN_THRESHOLD:g} rad", time, near
+        threshold = margin_threshold(self._scenario)
+        near = np.abs(piece["singularity_margin"]) < threshold
+        yield f"singularity margin below {threshold:g} rad", time, near
+        if SUPERVISION in piece.columns:
+            supervisor = getattr(self._scenario.controller, "supervisor")  # noqa: B009
+            yield _SUPERVISION_IN_WORDS[supervisor.strategy], time, piece[SUPERVISION] > ACTS
         if "attitude_zone" in piece.columns:
             inside = piece["attitude_zone"] > 0.5
             yield "switched to attitude and altitude", time, inside

@@ -74,15 +74,16 @@ class TrotGait(GaitTable):
 
 
 class CatGait(GaitTable):
-    """The cat gaits of ch. 5, with keyframes from published footfall timing."""
+    """The cat gaits of ch. 5, reconstructed from published footfalls and what ch. 5 reports."""
 
     type: Literal["walk", "run", "transverse_gallop", "rotary_gallop"]
-    amplitude: Angle = Field(description="rad")
+    amplitude: Angle = Field(description="of a leg about its lean, rad")
+    lean: Angle = Field(0.0, description="mean angle of the legs, forward, rad")
     period: Period = Field(description="T, s")
 
     def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         """See `GaitTable.unscaled`."""
-        return plans.cat(self.type, self.amplitude, self.period)
+        return plans.cat(self.type, self.amplitude, self.period, self.lean)
 
     @property
     def size(self) -> tuple[str, object]:

@@ -235,6 +235,22 @@ def flight_model(scenario: Scenario, parameters: int) -> mujoco.MjModel:
     return model
 
 
+_FLOWN_IN_ANY_MODEL: Final = frozenset(
+    {
+        *("title", "source", "without", "simulation", "initial", "gait", "reference", "sensors"),
+        "expect",
+    }
+)
+"""Tables of a scenario that are parameters or initial state of a flight, or no part of it."""
+
+
+def what_decides_the_model(scenario: Scenario) -> str:
+    """Equal only for scenarios that `flight_model` builds equal models for, if one loop flies."""
+    simulation = scenario.simulation
+    tables = [value for name, value in scenario if name not in _FLOWN_IN_ANY_MODEL]
+    return repr((tables, simulation.timestep, simulation.integrator))
+
+
 def evaluations_per_step(model: mujoco.MjModel) -> int:
     """How often MuJoCo's integrator asks for controls in a step."""
     return 4 if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else 1

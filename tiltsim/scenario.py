@@ -483,6 +483,7 @@ class Scenario(Table):
             )
         if not isinstance(controller, AttitudeAltitudeController):
             return
+        controller.resolve_supervisor(self.rotorcraft.resolve())
         decoupler = controller.decoupler
         free = kind == "attitude_altitude"
         if free and decoupler != "none":

@@ -1,49 +1,85 @@
 """Gaits after the cat: walk, run, transverse gallop, rotary gallop (ch. 5).
 
-The figures that hold ch. 5's keyframes are lost, so these gaits are rebuilt from published
-footfall timing, and numbers flown with them are ours, not the thesis'. A pod is a leg: it sweeps
-from ``+amplitude`` at touchdown to ``-amplitude`` at lift-off during stance, at a constant rate,
-and back during swing. Each gait is then four touchdown phases and one duty factor (the share of
-the stride that a foot is on the ground). The continuous trot of ch. 4, Eq. (34), is exactly such a
-gait, with duty factor 1/2 and the diagonal pairs half a stride apart; it fixes which pods are
-diagonal: 1 with 2, 3 with 4. We take pods 1, 2, 3, 4 for left fore, right hind, right fore, left
-hind.
+The figures that hold ch. 5's keyframes are lost. These gaits are a reconstruction: the order of the
+feet from published footfalls, and a timing and a swing chosen so that what is left of ch. 5 holds
+(`SWINGS`). Many others would do as well, so numbers flown with them are ours, not the thesis'.
 
-Sources of the timing:
+A pod is a leg. The references of ch. 4 and 5 head for +X and +Y alike, so the pods of the +X, +Y,
+-X and -Y arms (1 to 4) are the right fore, left fore, left hind and right hind leg. Legs that are
+``f`` forward of the vertical tilt the pods so that their thrust points forward, which is ``alpha =
+(-f, f, f, -f)`` by the signs of ch. 3's ``F(alpha)``. During stance a leg goes from ``lean +
+amplitude`` at touchdown to ``lean - amplitude`` at lift-off, at a constant rate, and then swings
+back. Each gait is four touchdown phases, one duty factor (the share of the stride that a foot is on
+the ground), and a swing. The continuous trot of ch. 4, Eq. (34), is exactly such a gait, with duty
+factor 1/2, no lean, and the diagonal pairs half a stride apart.
 
-* Symmetrical gaits. Cats walk in lateral sequence (left hind, left fore, right hind, right fore)
-  with even intervals; a duty factor above one half is a walk, below it a run: M. Hildebrand,
-  "Analysis of tetrapod gaits: general considerations and symmetrical gaits", in Neural Control of
-  Locomotion (1976). Ch. 5 asks the same of its run: symmetrical, and not the trot.
+Sources of the order and the rules:
+
+* Symmetrical gaits. The feet of a pair fall evenly; cats walk in lateral sequence (left hind, left
+  fore, right hind, right fore), with the fore foot a quarter of a stride behind the hind foot of
+  its side, and half a stride in the trot; a duty factor above one half is a walk, below it a run:
+  M. Hildebrand, "Analysis of tetrapod gaits: general considerations and symmetrical gaits", in
+  Neural Control of Locomotion (1976).
 * Gallops. The second foot of a pair lands shortly after the first, the fore pair half a stride
   after the hind pair; the leading feet of both pairs are on one side in the transverse gallop, on
   opposite sides in the rotary gallop: R. McN. Alexander, "The gaits of bipedal and quadrupedal
   animals", Int. J. Robotics Research 3 (1984); C. M. Biancardi and A. E. Minetti, "Biomechanical
   determinants of transverse and rotary gallop in cursorial mammals", J. Exp. Biol. 215 (2012).
 
-From these come the order of the feet and the rules above; phases and duty factors are round numbers
-within them.
+Within these rules the numbers are chosen: the walk's long stance and the run's late fore feet keep
+all rotors turning their way (ch. 5, Sec. 2), see `SWINGS` for the rest.
 """
 
 from __future__ import annotations
 
 from typing import Final, NamedTuple
 
+FORWARD: Final = (-1.0, 1.0, 1.0, -1.0)
+"""Sign with which the tilt angle of each pod tips its thrust forward, towards +X and +Y."""
+
 
 class Footfall(NamedTuple):
     """Timing of one stride, as shares of the period."""
 
-    touchdown: tuple[float, float, float, float]  # of pods 1 to 4
+    touchdown: tuple[float, float, float, float]  # of pods 1 to 4: RF, LF, LH, RH
     duty_factor: float
 
 
 FOOTFALLS: Final = {
-    "walk": Footfall((0.25, 0.50, 0.75, 0.00), duty_factor=0.65),
-    "run": Footfall((0.25, 0.50, 0.75, 0.00), duty_factor=0.40),
-    "transverse_gallop": Footfall((0.50, 0.10, 0.60, 0.00), duty_factor=0.30),
-    "rotary_gallop": Footfall((0.60, 0.10, 0.50, 0.00), duty_factor=0.30),
+    "walk": Footfall((0.75, 0.25, 0.00, 0.50), duty_factor=0.95),
+    "run": Footfall((0.875, 0.375, 0.00, 0.50), duty_factor=0.45),
+    "transverse_gallop": Footfall((0.60, 0.50, 0.00, 0.10), duty_factor=0.30),
+    "rotary_gallop": Footfall((0.50, 0.60, 0.00, 0.10), duty_factor=0.30),
 }
 """Cat gaits by the name a scenario gives them."""
+
+
+class Swing(NamedTuple):
+    """How far the legs swing, rad, before any scale."""
+
+    lean: float  # forward, mean of touchdown and lift-off
+    amplitude: float
+
+
+SWINGS: Final = {
+    "walk": Swing(lean=1.055, amplitude=1.25),
+    "run": Swing(lean=0.5, amplitude=0.5),
+    "transverse_gallop": Swing(lean=1.3, amplitude=0.4),
+    "rotary_gallop": Swing(lean=1.3, amplitude=0.4),
+}
+"""The swings with which ch. 5's statements hold, under the timing of `FOOTFALLS`.
+
+* A conventional decoupler that leaves 2.47 m at T = 1 s, hardly less or more at other periods,
+  needs a mean side force: 2.47 m times the position gain is an acceleration of 0.25 g. Legs that
+  swing evenly about the vertical have next to none. It sets the walk's lean, and the 0.19 m that
+  the modified decoupler leaves set its amplitude.
+* Walk and gallops meet a singular matrix unscaled, and are the further from one the smaller they
+  are, at 1/2 and at 1/3. The determinant falls with the lean of the hind legs over the fore legs,
+  ``R = 4 + (1/r - 2 r) (f_1 + f_2 - f_3 - f_4)`` to first order: it bounds all amplitudes, and the
+  gallops', whose fore and hind pairs are half a stride apart, most.
+* The run flies unscaled; its errors are the largest, the walk's the least, those of the gallops
+  alike.
+"""
 
 
 def leg_angle(phase: float, touchdown: float, duty_factor: float) -> float:
@@ -54,14 +90,20 @@ def leg_angle(phase: float, touchdown: float, duty_factor: float) -> float:
     return -1.0 + 2.0 * (since - duty_factor) / (1.0 - duty_factor)
 
 
-def cat_keyframes(footfall: Footfall, amplitude: float) -> list[tuple[float, ...]]:
+def cat_keyframes(
+    footfall: Footfall, amplitude: float, lean: float = 0.0
+) -> list[tuple[float, ...]]:
     """Rows ``(phase, alpha_1, ..., alpha_4)`` (rad) at every touchdown and lift-off."""
     duty = footfall.duty_factor
     events = {0.0}
     for touchdown in footfall.touchdown:
         # Rounded, so that one event reached in two ways is one keyframe.
         events |= {round(touchdown % 1.0, 12), round((touchdown + duty) % 1.0, 12)}
+    legs = tuple(zip(FORWARD, footfall.touchdown, strict=True))
     return [
-        (phase, *(amplitude * leg_angle(phase, start, duty) for start in footfall.touchdown))
+        (
+            phase,
+            *(sign * (lean + amplitude * leg_angle(phase, start, duty)) for sign, start in legs),
+        )
         for phase in (*sorted(events), 1.0)
     ]

@@ -188,14 +188,16 @@ def rotating(start: float, rate: float) -> Gait:
     return Gait("rotating", parameters, source="ch. 10, Eq. (18)")
 
 
-def cat(name: str, amplitude: float, period: float) -> Gait:
-    """A cat gait by its name in `FOOTFALLS`, amplitude (rad) and period (s) (ch. 5, Sec. 3.2)."""
+def cat(name: str, amplitude: float, period: float, lean: float = 0.0) -> Gait:
+    """A cat gait by its name in `FOOTFALLS` (ch. 5, Sec. 3.2).
+
+    Its legs swing by ``amplitude`` (rad) to either side of ``lean`` (rad, forward) in ``period``
+    (s); `controllers.gaits.cat.SWINGS` has what ch. 5 was flown with, as far as we can tell.
+    """
     if name not in FOOTFALLS:
         raise ValueError(f"{name!r} is no cat gait; choose {', '.join(FOOTFALLS)}")
-    rows = cat_keyframes(FOOTFALLS[name], amplitude)
-    return keyframes(
-        rows, period, name=name, source="ch. 5, Sec. 3.2; keyframes from published footfalls"
-    )
+    rows = cat_keyframes(FOOTFALLS[name], amplitude, lean)
+    return keyframes(rows, period, name=name, source="ch. 5, Sec. 3.2; keyframes reconstructed")
 
 
 def waypoints(

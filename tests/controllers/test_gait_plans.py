@@ -10,12 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controllers.gaits import GAIT_TYPES, GaitParameters, plans, tilt_reference
-from controllers.gaits.cat import FOOTFALLS, Footfall, cat_keyframes
+from controllers.gaits.cat import FOOTFALLS, FORWARD, SWINGS, Footfall, cat_keyframes
 from controllers.gaits.plans import Gait
 from controllers.gaits.trot import continuous_trot as scalar_trot
 from controllers.gaits.two_color import BLUE, RED, colored_angles
+from controllers.published_gaits import smallest_margin
 from controllers.records import flatten, record_dtype
 from controllers.scalar import scalar_functions
+from controllers.singularity import residuals
 from controllers.vehicle import PRESETS, drag_ratio
 
 AR_DRONE = PRESETS["ar_drone_2"]
@@ -25,7 +27,7 @@ GAITS: dict[str, Gait] = {
     "fixed": plans.fixed([-0.65, -0.65, 0.65, 0.65]),
     "trot_instant": plans.instant_trot(0.65, 2.0),
     "trot_continuous": plans.continuous_trot(0.65, 3.0),
-    **{name: plans.cat(name, 0.65, 1.0) for name in FOOTFALLS},
+    **{name: plans.cat(name, 0.65, 1.0, lean=0.1) for name in FOOTFALLS},
     "waypoints": plans.waypoints(
         [[0.1, 0.2, 0.3, 0.4], [0.5, -0.2, 0.1, 0.0], [-0.3, 0.0, 0.2, -0.6]], 1.7
     ),
@@ -101,7 +103,7 @@ def test_sample_times_hit_every_keyframe() -> None:
 
 @given(time=st.floats(-20, 20), amplitude=st.floats(0, 1.5), period=st.floats(0.1, 10))
 def test_the_trot_is_a_cat_gait_of_duty_factor_one_half(time, amplitude, period) -> None:
-    footfall = Footfall((0.5, 0.5, 0.0, 0.0), duty_factor=0.5)
+    footfall = Footfall((0.0, 0.5, 0.0, 0.5), duty_factor=0.5)  # the diagonals in turn
     trot = plans.keyframes(cat_keyframes(footfall, amplitude), period)
     expected = scalar_trot(time, amplitude, period)[:4]
     np.testing.assert_allclose(trot.angles(time), expected, atol=1e-9)
@@ -110,18 +112,45 @@ def test_the_trot_is_a_cat_gait_of_duty_factor_one_half(time, amplitude, period)
 @pytest.mark.parametrize("name", FOOTFALLS)
 def test_cat_gaits_keep_their_footfalls(name) -> None:
     footfall = FOOTFALLS[name]
-    gait = plans.cat(name, 0.4, 2.0)
+    gait = plans.cat(name, 0.4, 2.0, lean=0.3)
     touchdown = np.array(footfall.touchdown) * 2.0
-    np.testing.assert_allclose(np.diag(gait.angles(touchdown)), 0.4, atol=1e-12)
+    np.testing.assert_allclose(FORWARD * np.diag(gait.angles(touchdown)), 0.7, atol=1e-12)
     lift_off = touchdown + footfall.duty_factor * 2.0
-    np.testing.assert_allclose(np.diag(gait.angles(lift_off)), -0.4, atol=1e-12)
+    np.testing.assert_allclose(FORWARD * np.diag(gait.angles(lift_off)), -0.1, atol=1e-12)
     time = np.linspace(0.0, 2.0, 4000, endpoint=False) + 1e-6
-    np.testing.assert_allclose((gait.rates(time) < 0).mean(axis=0), footfall.duty_factor, atol=2e-3)
+    backward = FORWARD * gait.rates(time) < 0
+    np.testing.assert_allclose(backward.mean(axis=0), footfall.duty_factor, atol=2e-3)
+
+
+def test_legs_that_lean_forward_push_forward() -> None:
+    """Towards +X and +Y alike, as the references of ch. 4 and 5 go, and without any torque."""
+    angles = 0.2 * np.array(FORWARD)
+    R, R_phi, R_theta = residuals(angles, AR_DRONE)
+    assert -R_theta / R == pytest.approx(0.5 * np.tan(0.2))
+    assert R_phi / R == pytest.approx(0.5 * np.tan(0.2))
+
+
+def test_the_determinant_falls_as_the_hind_legs_lean_over_the_fore_legs() -> None:
+    r = drag_ratio(AR_DRONE)
+    for pod, side in enumerate((1.0, 1.0, -1.0, -1.0)):  # right and left fore, left and right hind
+        angles = np.zeros(4)
+        angles[pod] = 1e-6 * FORWARD[pod]
+        slope = (residuals(angles, AR_DRONE)[0] - 4.0) / 1e-6
+        assert slope == pytest.approx(side * (1.0 / r - 2.0 * r), rel=1e-4)
+
+
+@pytest.mark.parametrize("name", SWINGS)
+def test_scaling_reconstructed_gaits_leads_away_from_singular_matrices(name) -> None:
+    """Ch. 5, Sec. 4: all but the run are singular unscaled, and gain from 1/2 and from 1/3."""
+    gait = plans.cat(name, SWINGS[name].amplitude, 1.0, SWINGS[name].lean)
+    whole, half, third = (smallest_margin(gait.scaled(n), AR_DRONE) for n in (1, 2, 3))
+    assert (whole > 0.0) == (name == "run")
+    assert max(0.0, whole) < half < third
 
 
 def test_footfall_orders_are_those_of_the_sources() -> None:
-    """Pods 1 to 4 are left fore, right hind, right fore, left hind."""
-    feet = ("LF", "RH", "RF", "LH")
+    """Pods 1 to 4, around the body, are right fore, left fore, left hind, right hind."""
+    feet = ("RF", "LF", "LH", "RH")
 
     def order(name: str) -> list[str]:
         touchdown = FOOTFALLS[name].touchdown

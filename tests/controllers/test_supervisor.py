@@ -8,15 +8,37 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import tiltsim
-from controllers.singularity import determinant, margin_over_gait
-from controllers.supervisor import Supervisor, allowed_scale, gait_share
+from controllers.decouplers import exact_decoupler
+from controllers.gaits import tilt_reference
+from controllers.gaits.plans import instant_trot as trot_instant
+from controllers.gaits.plans import waypoints
+from controllers.singularity import (
+    determinant,
+    margin_over_gait,
+    torque_free_direction,
+    world_up,
+)
+from controllers.supervisor import (
+    BAND,
+    LAG,
+    STRATEGIES,
+    Supervisor,
+    allowed_scale,
+    gait_share,
+    governed,
+    room,
+    supervised_tilts,
+)
 from controllers.vehicle import PRESETS, drag_ratio
+from tiltsim.batch import fly_all
 from tiltsim.errors import InputError
+from tiltsim.plants import make_plant
 
 VEHICLE = PRESETS["ar_drone_2"]
 RATIO = drag_ratio(VEHICLE)
 WATCH = Supervisor(min_margin=0.3, min_determinant=1.0)
 SCENARIO = "beyond/supervisor#supervised"
+RED = {"controller.supervisor.strategy": "return_to_red"}
 
 angles = st.tuples(*[st.floats(-1.5, 1.5)] * 4)
 leans = st.floats(-0.5, 0.5)
@@ -78,10 +100,194 @@ def test_engines_fly_the_same_supervised_flight_and_show_what_passed():
     assert np.abs(told - np.stack([python[f"alpha_{i}"] for i in (1, 2, 3, 4)], -1)).max() < 0.01
 
 
+# --- hold and return to red ----------------------------------------------------------------------
+
+JUMPS = trot_instant(0.8, 2.0).parameters  # at 1 s the torque-free force turns by more than pi/2
+WITH_STATES = ("hold", "return_to_red")
+PLAN = ((0.3, 0.2, 0.1), (-0.4, 0.5, -0.3), (0.6, -0.1, 0.2), (0.2, 0.3, 0.4))
+
+
+def watch(strategy, **changes):
+    settings = Supervisor(0.3, 0.5, STRATEGIES[strategy], 0.5, 2.0, 0.1)
+    return settings._replace(**changes)
+
+
+def asked(time, roll, pitch, state, rate, supervisor, gait=JUMPS):
+    return governed(time, roll, pitch, state, rate, gait, (), supervisor, RATIO)[2]
+
+
+@given(angles, leans, leans)
+def test_room_is_what_is_left_above_the_thresholds(tilts, roll, pitch):
+    supervisor = watch("hold")
+    margin = margin_over_gait(np.array([tilts]), VEHICLE, roll, pitch)[0]
+    value = determinant(np.array(tilts), roll, pitch, VEHICLE)
+    left = room(tilts, tuple(world_up(roll, pitch)), supervisor, RATIO)
+    assert (left >= 0.0) == (value >= 0.5 and np.sign(value) * abs(margin) >= 0.3)
+    assert room((0.0,) * 4, (0.0, 0.0, 1.0), supervisor, RATIO) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("strategy", WITH_STATES)
+def test_supervised_tilts_move_as_their_rates_say(strategy):
+    """Against differences along a motion of plan and supervisor that is given in closed form."""
+    supervisor = watch(strategy)
+
+    def planned(time):
+        return tuple((a + v * time + b * time**2 / 2, v + b * time, b) for a, v, b in PLAN)
+
+    def tilts(time):
+        governor = (0.2 + 0.3 * time + 0.25 * time**2, 0.3 + 0.5 * time, 0.5)
+        clock = time - governor[0] if strategy == "hold" else time
+        return np.array(supervised_tilts(planned(clock), 1.0, governor, supervisor, RATIO))
+
+    step = 1e-4
+    before, now, after = tilts(-step), tilts(0.0), tilts(step)
+    np.testing.assert_allclose(now[:, 1], (after - before)[:, 0] / (2 * step), atol=1e-7)
+    np.testing.assert_allclose(now[:, 2], (after - before)[:, 1] / (2 * step), atol=1e-7)
+
+
+@pytest.mark.parametrize("strategy", WITH_STATES)
+def test_a_supervisor_with_room_to_spare_rests(strategy):
+    assert asked(0.1, 0.0, 0.0, 0.0, 0.0, watch(strategy)) == 0.0
+
+
+@pytest.mark.parametrize("strategy", WITH_STATES)
+def test_it_acts_as_soon_as_the_jump_comes_into_sight(strategy):
+    """In hover before the jump of the trot at 1 s, with the attitude that its tilts need."""
+    n = torque_free_direction(tilt_reference(0.65, JUMPS)[:4], VEHICLE)
+    roll, pitch = exact_decoupler(0.0, 0.0, 0.0, 0.0, 9.8, tuple(n))
+    supervisor = watch(strategy, horizon=0.4, min_margin=0.5)
+    assert asked(0.55, roll, pitch, 0.0, 0.0, supervisor) == 0.0
+    assert asked(0.65, roll, pitch, 0.0, 0.0, supervisor) > 1.0
+    for rate in (0.0, 0.5):
+        wanted = asked(0.65, roll, pitch, 0.0, rate, supervisor) * LAG + rate
+        if strategy == "hold":
+            assert wanted == pytest.approx(1.0)  # the clock is to stand
+        else:
+            assert wanted == pytest.approx(2.0 / 0.8)  # the farthest tilt moves at max_tilt_rate
+
+
+def test_the_clock_slows_down_within_the_band():
+    """A gait towards L, at the instant whose last glance has half the band left."""
+    gait = waypoints([(-0.3, 0.3, -0.3, 0.3), (0.4, -0.2, 0.4, -0.2)], 4.0)
+    supervisor = watch("hold", min_determinant=2.0)
+    state = asked_rates = None
+    for time in np.arange(0.0, 2.0, 1e-3):
+        acceleration = governed(
+            time, 0.0, 0.0, 0.0, 0.0, gait.parameters, gait.table, supervisor, RATIO
+        )[2]
+        ahead = tilt_reference(time + 0.5, gait.parameters, gait.table)[:4]
+        left = room(ahead, (0.0, 0.0, 1.0), supervisor, RATIO)
+        state, asked_rates = left, acceleration * LAG
+        assert asked_rates == pytest.approx(min(1.0, max(0.0, 1.0 - left / BAND)), abs=1e-9)
+        if left < 0.0:
+            break
+    assert state < 0.0
+    assert asked_rates == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("strategy", WITH_STATES)
+def test_a_flight_with_room_is_the_unsupervised_one_bit_for_bit(strategy):
+    tables = tiltrotor(gait={"type": "trot_continuous", "amplitude": 0.3, "period": 1.0})
+    plain = tiltsim.simulate(tiltsim.parse_scenario(tables))
+    tables["controller"] = {**tables["controller"], "supervisor": {"strategy": strategy}}
+    watched = tiltsim.simulate(tiltsim.parse_scenario(tables))
+    assert not watched["supervision"].any()
+    np.testing.assert_array_equal(watched.samples[:, : plain.samples.shape[1]], plain.samples)
+
+
+def tiltrotor(**tables):
+    simulation = {"duration": 1.3, "timestep": 0.002, "engine": "python"}
+    return {"simulation": simulation, "controller": {}, **tables}
+
+
+FEEDFORWARD = {
+    "decoupling": "exact",
+    "decoupler": "exact",
+    "gait_rate_feedforward": True,
+    "gains": "feedforward",
+}
+EXACT = {"decoupling": "exact", "gains": "exact"}
+
+
+@pytest.mark.parametrize("strategy", WITH_STATES)
+@pytest.mark.parametrize("law", [{}, FEEDFORWARD])
+def test_engines_batches_and_restarts_agree(law, strategy):
+    supervisor = {"strategy": strategy, "min_margin": 0.8}
+    tables = tiltrotor(
+        gait={"type": "trot_instant", "amplitude": 0.7, "period": 0.8},
+        controller={**law, "supervisor": supervisor},
+    )
+    wanted = tiltsim.parse_scenario(tables)
+    python = tiltsim.simulate(wanted)
+    assert python["supervision"].max() > 0.2
+    native = {**tables, "simulation": {**tables["simulation"], "engine": "native"}}
+    compiled = tiltsim.parse_scenario(native)
+    np.testing.assert_array_equal(tiltsim.simulate(compiled).samples, python.samples)
+    (row,) = fly_all([compiled], keep_samples=True)
+    np.testing.assert_array_equal(row.flight.samples, python.samples)
+
+    straight = make_plant(wanted)
+    straight.advance(300)
+    saved = straight.state
+    straight.advance(60)
+    restarted = make_plant(wanted)
+    restarted.state = saved
+    restarted.advance(60)
+    np.testing.assert_array_equal(restarted.state, straight.state)
+
+
+@pytest.mark.parametrize("strategy", WITH_STATES)
+def test_it_flies_sampled_and_through_real_actuators(strategy):
+    supervisor = {"strategy": strategy, "min_margin": 0.8}
+    simulation = {"duration": 1.3, "timestep": 0.002, "control_timestep": 0.004}
+    tables = tiltrotor(
+        gait={"type": "trot_instant", "amplitude": 0.7, "period": 0.8},
+        controller={**EXACT, "supervisor": supervisor},
+        vehicle={"rotor_time_constant": 0.02, "tilt_servo": {"max_rate": 30.0}},
+    )
+    tables["simulation"] |= simulation
+    flight = tiltsim.simulate(tiltsim.parse_scenario(tables))
+    assert flight.end.kind == "completed"
+    assert flight["supervision"].max() > 0.2
+    told = flight["alpha_ref_1"]
+    assert np.isfinite(told).all()
+    assert "thrust_factor_1" in flight.columns
+
+
+def test_the_way_to_red_is_no_faster_than_asked():
+    """A planned gait that rests and is not allowed: the tilts set out for red."""
+    tables = tiltrotor(
+        gait={"type": "fixed", "angles": [-0.8, 0.1, 0.9, -0.2]},
+        controller={
+            "supervisor": {
+                "strategy": "return_to_red",
+                "min_determinant": 2.4,
+                "max_tilt_rate": 0.2,
+            }
+        },
+    )
+    flight = tiltsim.simulate(tiltsim.parse_scenario(tables))
+    assert flight.end.kind == "completed"
+    assert flight.metrics()["max_tilt_rate"] == pytest.approx(0.2, abs=0.002)
+    means = np.array([0.05, -0.05] * 2)
+    told = np.stack([flight[f"alpha_ref_{rotor}"] for rotor in (1, 2, 3, 4)], axis=-1)
+    share = flight["supervision"]
+    gap = np.array([-0.8, 0.1, 0.9, -0.2]) - means
+    np.testing.assert_allclose(told, means + np.outer(1.0 - share, gap), atol=1e-12)
+    assert (np.diff(share) >= 0.0).all()
+    assert (np.diff(flight["determinant"][1:]) >= 0.0).all()
+    assert 2.35 < flight["determinant"][-1] < 2.4  # ever slower, as there is less to gain
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
         ({"controller.supervisor.min_margin": 1.6}, "controller.supervisor.min_margin = 1.6"),
+        ({"controller.supervisor.horizon": 1.0}, "strategy = hold or return_to_red"),
+        ({"controller.supervisor.clearance": 0.2}, "strategy = return_to_red"),
+        ({**RED, "controller.supervisor.clearance": 0.2}, "must be below 0.1671"),
+        ({**RED, "controller.supervisor.clearance": 0.07}, "below min_determinant = 2"),
+        ({"controller.supervisor.strategy": "stop"}, "scale, hold or return_to_red"),
     ],
 )
 def test_mistakes_are_one_line(changes, message):

@@ -7,6 +7,7 @@ import random
 import numpy as np
 import pytest
 
+from controllers.gaits.cat import SWINGS
 from controllers.singularity import residuals
 from controllers.vehicle import PRESETS
 from tiltsim.library import library_entries
@@ -74,6 +75,14 @@ def test_flights_of_claims_are_in_the_library():
     for claim in CLAIMS:
         if isinstance(claim, FlightClaim):
             assert set(claim.flights) <= library, claim.statement
+
+
+def test_chapter_5_is_flown_with_the_swings_that_are_judged():
+    flown = [load_scenario(address) for address, _, _ in library_entries() if "ch05" in address]
+    assert {scenario.gait.type for scenario in flown} == set(SWINGS)
+    for scenario in flown:
+        gait = scenario.gait
+        assert (gait.lean, gait.amplitude) == SWINGS[gait.type], scenario.address
 
 
 def test_every_chapter_has_claims():

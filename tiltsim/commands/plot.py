@@ -1,4 +1,4 @@
-"""``tiltsim plot``: the figure of a flight or of a sweep."""
+"""``tiltsim plot``: the figure of a flight, of several, or of a sweep."""
 
 from __future__ import annotations
 
@@ -16,18 +16,21 @@ def add_parser(subparsers: Any) -> None:
     """Declare the command."""
     parser = subparsers.add_parser(
         "plot",
-        help="draw a flight or a sweep as a figure",
+        help="draw a flight, several, or a sweep as a figure",
         description=(
             "Draw a flight on one page: attitude, altitude, position error, tilt angles, rotor "
-            "speeds, singularity margin, path over the ground, roll-pitch plane. Or draw a sweep: "
-            "lines, maps, distributions or boundaries, as its axes or its [plot] table have it."
+            "speeds, singularity margin, path over the ground, roll-pitch plane. Several flights: "
+            "margin, determinant and position error of each over time. Or draw a sweep: lines, "
+            "maps, distributions or boundaries, as its axes or its [plot] table have it."
         ),
     )
     parser.add_argument(
-        "flight",
+        "flights",
         type=Path,
+        nargs="+",
         metavar="FLIGHT",
-        help="a folder of results, a flight.parquet, or the folder of a sweep",
+        help="a folder of results, a flight.parquet, or the folder of a sweep; several flights are "
+        "compared",
     )
     parser.add_argument(
         "--metric",
@@ -41,7 +44,8 @@ def add_parser(subparsers: Any) -> None:
         "--out",
         type=Path,
         metavar="FILE",
-        help="PNG, SVG or PDF by its ending (default: flight.png or sweep.png beside the data)",
+        help="PNG, SVG or PDF by its ending (default: flight.png, flights.png or sweep.png beside "
+        "the first of the data)",
     )
     parser.set_defaults(run=run)
 
@@ -51,12 +55,19 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.errors import InputError
     from tiltsim.sweeps.dataset import is_sweep_folder
 
-    sweep = is_sweep_folder(arguments.flight)
-    if arguments.metrics and not sweep:
-        raise InputError(f"--metric {arguments.metrics[0]}: {arguments.flight} holds no sweep")
-    folder = arguments.flight if arguments.flight.is_dir() else arguments.flight.parent
-    out = arguments.out or folder / ("sweep.png" if sweep else "flight.png")
-    figure = _sweep_figure(arguments, out) if sweep else _flight_figure(arguments, out)
+    first, *others = arguments.flights
+    sweep = next((path for path in arguments.flights if is_sweep_folder(path)), None)
+    if sweep is not None and others:
+        raise InputError(f"{sweep}: a sweep is drawn alone; leave the other paths out")
+    if arguments.metrics and sweep is None:
+        raise InputError(f"--metric {arguments.metrics[0]}: {first} holds no sweep")
+    folder = first if first.is_dir() else first.parent
+    name = "flights.png" if others else "flight.png"
+    out = arguments.out or folder / (name if sweep is None else "sweep.png")
+    if sweep is not None:
+        figure = _sweep_figure(sweep, arguments.metrics, out)
+    else:
+        figure = _flights_figure(arguments.flights, out)
 
     from tiltsim.figures.style import save
 
@@ -65,24 +76,28 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _flight_figure(arguments: argparse.Namespace, out: Path) -> Figure:
+def _flights_figure(paths: list[Path], out: Path) -> Figure:
     from tiltsim.files import load_flight
 
-    flight = load_flight(arguments.flight)
+    flights = [load_flight(path) for path in paths]
     _check(out)
+    if len(flights) > 1:
+        from tiltsim.figures.comparison import comparison_figure
+
+        return comparison_figure(flights)
     from tiltsim.figures.flight import flight_figure
 
-    return flight_figure(flight)
+    return flight_figure(flights[0])
 
 
-def _sweep_figure(arguments: argparse.Namespace, out: Path) -> Figure:
+def _sweep_figure(folder: Path, metrics: list[str], out: Path) -> Figure:
     from tiltsim.sweeps.dataset import load_results
 
-    results = load_results(arguments.flight)
+    results = load_results(folder)
     _check(out)
     from tiltsim.figures.sweep import sweep_figure
 
-    return sweep_figure(results, tuple(arguments.metrics))
+    return sweep_figure(results, tuple(metrics))
 
 
 def _check(out: Path) -> None:

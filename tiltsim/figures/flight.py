@@ -9,9 +9,10 @@ import numpy as np
 
 from controllers.vehicle import SPIN
 from tiltsim.attitude_plane import (
+    ACTS,
     HALF_WIDTH,
-    MARGIN_THRESHOLD,
     forbidden_pitch,
+    margin_threshold,
     nearest_singular,
     singular_curves,
     torque_free_directions,
@@ -20,6 +21,7 @@ from tiltsim.figures import style
 from tiltsim.figures.page import SIZE, add_headings, label, plan_view, widen
 from tiltsim.figures.tilt_car import tilt_car_figure
 from tiltsim.loops import follows_position, loop_of
+from tiltsim.loops.supervised import SUPERVISION
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -116,7 +118,19 @@ def _rotor_speeds(axes: Any, flight: Flight) -> None:
 def _margin(axes: Any, flight: Flight) -> None:
     time, margin = flight["time"], np.abs(flight["singularity_margin"])
     closest = int(np.argmin(margin))
-    axes.fill_between(time, 0.0, MARGIN_THRESHOLD, color=FORBIDDEN, lw=0.0)
+    threshold = margin_threshold(flight.scenario)
+    axes.fill_between(time, 0.0, threshold, color=FORBIDDEN, lw=0.0)
+    if SUPERVISION in flight.columns:
+        acts = flight[SUPERVISION] > ACTS
+        axes.axhline(threshold, color=style.RED, ls="--", lw=0.9)
+        axes.fill_between(
+            *(time, 0.0, 1.0),
+            where=acts,
+            transform=axes.get_xaxis_transform(),
+            **{"color": style.PALE, "lw": 0.0, "zorder": 0.5},
+        )
+        words = "shaded: supervisor acts"
+        axes.text(0.99, 0.03, words, transform=axes.transAxes, ha="right", fontsize=8)
     axes.plot(time, margin, color=style.BLUE)
     axes.plot(time[closest], margin[closest], "o", color=style.RED, ms=5, clip_on=False, zorder=5)
     style.angle_axis(axes, "y", pi / 2)

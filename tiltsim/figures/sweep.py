@@ -131,7 +131,8 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
     x, lines, panels = _columns_for(results)
     everything = np.ones(len(results), dtype=bool)
     columns = list(groups_of(results, panels, everything))
-    figure, grid = _panel_grid(len(metrics), len(columns), 4.2, 2.7)
+    alone = len(columns) == 1
+    figure, grid = _panel_grid(len(metrics), len(columns), *((5.6, 3.0) if alone else (4.2, 2.7)))
     abscissa, completed = results.values(x), are_completed(results)
     for row, metric in zip(grid, metrics):
         for axes, (title, mask) in zip(row, columns):
@@ -149,6 +150,9 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
             axes.set_title(title)
             axes.set_ylabel(label_of(metric))
             axes.set_xlabel(label_of(x))
+    for axis in results.plan.sweep.plot.log:
+        for axes in grid.flat:
+            getattr(axes, f"set_{axis}scale")("log")
     _share_limits(grid)
     if not completed.all():
         grid[0][0].plot([], [], "x", color=GREY, ms=4, label="lost")

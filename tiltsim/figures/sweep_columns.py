@@ -22,7 +22,13 @@ _KEY_UNITS: Final = {
     "initial.attitude": "rad",
     "initial.position": "m",
     "simulation.duration": "s",
+    "simulation.control_timestep": "s",
+    "simulation.control_latency": "s",
+    "sensors.attitude_noise": "rad",
     "vehicle.mass": "kg",
+    "vehicle.rotor_time_constant": "s",
+    "vehicle.tilt_servo.natural_frequency": "rad/s",
+    "vehicle.tilt_servo.max_rate": "rad/s",
     "wind": "m/s",
     "wind_direction": "rad",
 }

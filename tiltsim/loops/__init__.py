@@ -11,6 +11,7 @@ from tiltsim.loops.full_pose import FULL_POSE
 from tiltsim.loops.gait_feedforward import GAIT_FEEDFORWARD
 from tiltsim.loops.on_equations import on_equations
 from tiltsim.loops.quadrotor_attitude_altitude import QUADROTOR_ATTITUDE_ALTITUDE
+from tiltsim.loops.supervised import with_supervisor
 from tiltsim.loops.switching import SWITCHING
 from tiltsim.loops.tilt_car_fourth_derivative import FOURTH_DERIVATIVE
 from tiltsim.loops.tilt_car_planned_direction import PLANNED_DIRECTION
@@ -41,6 +42,9 @@ def loop_of(scenario: Scenario) -> Loop:
     if scenario.controller.law == "python":
         return COMMANDED[scenario.vehicle.model]
     loop = LOOPS[scenario.controller.loop_name]
+    supervisor = getattr(scenario.controller, "supervisor", None)
+    if supervisor is not None:
+        loop = with_supervisor(loop, supervisor.strategy)
     if scenario.has_real_actuators:
         loop = with_actuation(loop, scenario.simulation.latency_steps)
     if scenario.has_air:

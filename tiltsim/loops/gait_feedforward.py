@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -13,13 +14,14 @@ from controllers.gait_feedforward import INTEGRAL_FIELDS, Parameters, tracking_i
 from controllers.gaits import tilt_reference
 from controllers.references import position_reference
 from controllers.scalar import Triple, scalar
-from controllers.supervisor import gait_share
+from controllers.supervisor import gait_share, governed
 from controllers.vehicle import drag_ratio
 from tiltsim.controller_tables import AttitudeAltitudeController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
 from tiltsim.loops.tiltrotor import (
     REFERENCE_COLUMNS,
+    SUPERVISOR_FIELDS,
     TILT_REFERENCE_COLUMNS,
     follows_position,
     gait_singularity,
@@ -33,6 +35,7 @@ from tiltsim.loops.tiltrotor import (
     servo_commands,
     servo_lead,
     singular_matrix,
+    supervised_commands,
     tiltrotor_state,
 )
 
@@ -79,6 +82,39 @@ def gait_feedforward_controls(
     )
 
 
+@scalar
+def supervised_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """The fifteen controls under a supervisor with states, and the rates of its two states."""
+    law = parameters.law
+    state = tiltrotor_state(qpos, qvel, act)
+    ratio = drag_ratio(law.vehicle)
+    governor = governed(
+        time, state[6], state[7], act[7], act[8], law.gait, table, law.supervisor, ratio
+    )
+    u1, u2, u3, u4, x_rate, y_rate, z_rate, _roll, _pitch, _yaw = tracking_inputs(
+        time,
+        state,
+        (qvel[6], qvel[7], qvel[8], qvel[9]),
+        (act[4], act[5], act[6]),
+        law,
+        table,
+        governor,
+    )
+    lead = parameters.servo_lead
+    return (
+        *supervised_commands(time, governor, law.gait, table, law.supervisor, ratio, lead),
+        *rotor_thrust_controls(act),
+        *(u1, u2, u3, u4, x_rate, y_rate, z_rate, governor[1], governor[2]),
+    )
+
+
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, AttitudeAltitudeController)
@@ -99,7 +135,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
         gait=gait.parameters,
         reference=reference,
         decoupler=DECOUPLERS[controller.decoupler],
-        supervisor=controller.resolve_supervisor(),
+        supervisor=controller.resolve_supervisor(vehicle),
     )
     lead = servo_lead(scenario.rotorcraft.tilt_servo)
     return ControlSetup(ControlParameters(signature, lead, law), table)
@@ -109,14 +145,26 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     law, table = setup.parameters.law, setup.table
     fields = (*STATE_FIELDS, *TILT_RATE_COLUMNS, *INTEGRAL_FIELDS)
     values = np.stack([samples[name] for name in fields], axis=-1).tolist()
+    resting = np.zeros((len(values), 2))
+    states = [samples[name] for name in SUPERVISOR_FIELDS if name in samples]
+    governors = (np.stack(states, axis=-1) if states else resting).tolist()
     ratio = drag_ratio(law.vehicle)
     rows = []
-    for time, value in zip(samples["time"].tolist(), values, strict=True):
+    for time, value, (held, rate) in zip(samples["time"].tolist(), values, governors, strict=True):
+        governor = held, rate, 0.0
         position = position_reference(time, law.reference, table)[:3]
-        attitude = tracking_inputs(time, value[:20], value[20:24], value[24:], law, table)[7:]
-        planned = tilt_reference(time, law.gait, table)
-        share = gait_share(planned, value[6], value[7], law.supervisor, ratio)
-        rows.append((*position, *attitude, *servo_commands(planned, share, 0.0)))
+        attitude = tracking_inputs(
+            time, value[:20], value[20:24], value[24:], law, table, governor
+        )[7:]
+        if states:
+            told = supervised_commands(
+                time, governor, law.gait, table, law.supervisor, ratio, lead=0.0
+            )
+        else:
+            planned = tilt_reference(time, law.gait, table)
+            share = gait_share(planned, value[6], value[7], law.supervisor, ratio)
+            told = servo_commands(planned, share, 0.0)
+        rows.append((*position, *attitude, *told))
     names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)
     columns = np.array(rows).reshape(len(rows), len(names))
     return dict(zip(names, columns.T, strict=True)) | gait_singularity(samples, law.vehicle)
@@ -223,3 +271,24 @@ GAIT_FEEDFORWARD: Final = Loop(
     follows_position=follows_position,
 )
 """The attitude-altitude law with gait-rate feed-forward around the tiltrotor."""
+
+
+@scalar
+def observe_supervised(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+) -> tuple[float, ...]:
+    """The tiltrotor, the law's own states and the supervisor's."""
+    return (*observe_gait_feedforward(qpos, qvel, act, ctrl), act[7], act[8])
+
+
+SUPERVISED_GAIT_FEEDFORWARD: Final = replace(
+    GAIT_FEEDFORWARD,
+    sizes=GAIT_FEEDFORWARD.sizes._replace(act=9, ctrl=17),
+    controls=supervised_controls,
+    initial_activations=lambda s, _setup: (*initial_rotor_speeds(s), *(0.0,) * 5),
+    observe=observe_supervised,
+    equations=None,
+    law_states=5,
+    law_fields=(*INTEGRAL_FIELDS, *SUPERVISOR_FIELDS),
+)
+"""The same law under a supervisor that holds the gait or returns to red."""

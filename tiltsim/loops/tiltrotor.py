@@ -7,7 +7,8 @@ every engine. It is a pure function of time, `qpos`, `qvel`, `act` and the param
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -23,13 +24,20 @@ from controllers.attitude_altitude import (
 )
 from controllers.decouplers import DECOUPLERS
 from controllers.decoupling_matrix import sines_and_cosines, torque_entries, torque_free_force
-from controllers.gaits import tilt_reference
+from controllers.gaits import GaitParameters, tilt_reference
 from controllers.gaits.trot import TiltsAndRates
 from controllers.references import position_reference
 from controllers.rotation import euler_from_quaternion, world_up_in_body
 from controllers.scalar import Quad, Triple, scalar
 from controllers.singularity import determinant, margin_over_gait
-from controllers.supervisor import Supervisor, gait_share
+from controllers.supervisor import (
+    Supervisor,
+    gait_share,
+    gait_time,
+    governed,
+    planned_tilts,
+    supervised_tilts,
+)
 from controllers.vehicle import SPIN, Vehicle, drag_ratio
 from tiltsim.controller_tables import AttitudeAltitudeController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
@@ -51,6 +59,8 @@ if TYPE_CHECKING:
 REFERENCE_COLUMNS: Final = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
 TILT_COLUMNS: Final = ("alpha_1", "alpha_2", "alpha_3", "alpha_4")
 TILT_REFERENCE_COLUMNS: Final = tuple(f"alpha_ref_{rotor}" for rotor in (1, 2, 3, 4))
+SUPERVISOR_FIELDS: Final = ("supervisor_state", "supervisor_rate")
+"""States of a supervisor that has any: see `controllers.supervisor`."""
 
 
 class ControlParameters(NamedTuple):
@@ -128,6 +138,56 @@ def tiltrotor_controls(
 
 
 @scalar
+def supervised_commands(
+    time: float,
+    governor: Triple,
+    gait: GaitParameters,
+    table: Sequence[float],
+    supervisor: Supervisor,
+    ratio: float,
+    lead: float,
+) -> Quad:
+    """Commands (rad) of the tilt servos under a supervisor with states (`controllers.supervisor`).
+
+    ``governor`` is its state with rate and acceleration, ``ratio`` the vehicle's drag ratio.
+    """
+    clock = gait_time(time, governor, supervisor)
+    planned = planned_tilts(clock, gait, table)
+    a1, a2, a3, a4 = supervised_tilts(planned, 1.0, governor, supervisor, ratio)
+    return (
+        a1[0] + lead * a1[1],
+        a2[0] + lead * a2[1],
+        a3[0] + lead * a3[1],
+        a4[0] + lead * a4[1],
+    )
+
+
+@scalar
+def supervised_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """The twelve controls under a supervisor with states, and the rates of its two states."""
+    law, supervisor = parameters.law, parameters.supervisor
+    state = tiltrotor_state(qpos, qvel, act)
+    ratio = drag_ratio(law.vehicle)
+    governor = governed(
+        time, state[6], state[7], act[4], act[5], law.gait, table, supervisor, ratio
+    )
+    lead = parameters.servo_lead
+    return (
+        *supervised_commands(time, governor, law.gait, table, supervisor, ratio, lead),
+        *rotor_thrust_controls(act),
+        *rotor_accelerations(time, state, law, table),
+        *(governor[1], governor[2]),
+    )
+
+
+@scalar
 def refreshed_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
     """Held controls, however many, with the thrusts that belong to the present rotor speeds."""
     return (*ctrl[:4], *rotor_thrust_controls(act), *ctrl[8:])
@@ -155,7 +215,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
             decoupler=DECOUPLERS[controller.decoupler],
             decoupling=DECOUPLINGS[controller.decoupling],
         ),
-        supervisor=controller.resolve_supervisor(),
+        supervisor=controller.resolve_supervisor(vehicle),
     )
     return ControlSetup(parameters, table)
 
@@ -200,9 +260,36 @@ def references_in_force(
     return x, y, z, roll, pitch, yaw, a1, a2, a3, a4
 
 
+@scalar
+def supervised_references(
+    time: float, state: State, parameters: ControlParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """As `references_in_force`, under a supervisor whose two states follow the law's ``state``."""
+    law, supervisor = parameters.law, parameters.supervisor
+    x, y, z, roll, pitch, yaw, _, _, _, _ = references_in_force(time, state, parameters, table)
+    governor = (state[20], state[21], 0.0)
+    ratio = drag_ratio(law.vehicle)
+    a1, a2, a3, a4 = supervised_commands(time, governor, law.gait, table, supervisor, ratio, 0.0)
+    return x, y, z, roll, pitch, yaw, a1, a2, a3, a4
+
+
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    states = np.stack([samples[name] for name in STATE_FIELDS], axis=-1)
-    rows = evaluate_rows(references_in_force, samples["time"], states, setup)
+    return _references(samples, setup, STATE_FIELDS, references_in_force)
+
+
+def _derive_supervised(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    fields = (*STATE_FIELDS, *SUPERVISOR_FIELDS)
+    return _references(samples, setup, fields, supervised_references)
+
+
+def _references(
+    samples: Mapping[str, Floats],
+    setup: ControlSetup,
+    fields: Sequence[str],
+    references: Callable[..., tuple[float, ...]],
+) -> dict[str, Floats]:
+    states = np.stack([samples[name] for name in fields], axis=-1)
+    rows = evaluate_rows(references, samples["time"], states, setup)
     names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)
     columns = dict(zip(names, rows.reshape(-1, len(names)).T, strict=True))
     return columns | gait_singularity(samples, setup.parameters.law.vehicle)
@@ -336,3 +423,25 @@ TILTROTOR: Final = Loop(
     ),
 )
 """The attitude-altitude law around the tiltrotor."""
+
+
+@scalar
+def observe_supervised(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+) -> tuple[float, ...]:
+    """The tiltrotor and the supervisor's states."""
+    return (*observe_tiltrotor(qpos, qvel, act, ctrl), act[4], act[5])
+
+
+SUPERVISED_TILTROTOR: Final = replace(
+    TILTROTOR,
+    sizes=TILTROTOR.sizes._replace(act=6, ctrl=14),
+    controls=supervised_controls,
+    initial_activations=lambda scenario, _setup: (*initial_rotor_speeds(scenario), 0.0, 0.0),
+    observe=observe_supervised,
+    derive=_derive_supervised,
+    equations=None,
+    law_states=2,
+    law_fields=SUPERVISOR_FIELDS,
+)
+"""The same law under a supervisor that holds the gait or returns to red."""

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from controllers.vehicle import SPIN
-from tiltsim.attitude_plane import MARGIN_THRESHOLD
-from tiltsim.loops import follows_position
+from tiltsim.attitude_plane import margin_threshold
+from tiltsim.loops import follows_position, loop_of
+from tiltsim.loops.supervised import SUPERVISION
 from tiltsim.rerun_stream import palette
 from tiltsim.rerun_stream.rows import Floats, send_rows
 
@@ -96,6 +97,9 @@ def measured_series(scenario: Scenario) -> list[Series]:
         series.append(Series(path, label, reference, REFERENCE_WIDTH))
         series.append(Series(f"rotor_speeds/rotor_{rotor}", f"rotor {rotor}", color, width))
     series.append(Series("singularity/margin", "margin", palette.AMBER, 2.5))
+    if SUPERVISION in loop_of(scenario).extra_columns:
+        label = "supervisor, 0 to 1"
+        series.append(Series(f"singularity/{SUPERVISION}", label, palette.SKY, MEASURED_WIDTH))
     for axis in error_axes(scenario):
         series.append(Series(f"position_error/{axis}", axis, _AXIS_COLORS[axis]))
     return series
@@ -103,8 +107,9 @@ def measured_series(scenario: Scenario) -> list[Series]:
 
 def limit_series(scenario: Scenario) -> list[tuple[Series, float]]:
     """Level lines, with their values: rotor speed limits, singularity and its threshold."""
+    threshold = margin_threshold(scenario)
     lines = [
-        ("singularity/threshold", f"threshold {MARGIN_THRESHOLD:g}", MARGIN_THRESHOLD),
+        ("singularity/threshold", f"threshold {threshold:g}", threshold),
         ("singularity/singular", "singular", 0.0),
     ]
     vehicle = scenario.rotorcraft
@@ -134,6 +139,8 @@ def series_values(flight: Flight) -> dict[str, Floats]:
             values[f"tilt_angles/{name}"] = columns[name]
         values[f"rotor_speeds/rotor_{rotor}"] = spin * columns[f"rotor_speed_{rotor}"]
     values["singularity/margin"] = columns["singularity_margin"]
+    if SUPERVISION in columns:
+        values[f"singularity/{SUPERVISION}"] = columns[SUPERVISION]
     axes = error_axes(flight.scenario)
     errors = [columns[f"{axis}_ref"] - columns[axis] for axis in axes]
     values |= {f"position_error/{axis}": error for axis, error in zip(axes, errors, strict=True)}

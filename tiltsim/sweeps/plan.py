@@ -288,6 +288,10 @@ class Plan:
             stride = prod(self._lengths[position + 1 :])
             points += [self.point(step * stride) for step in range(1, length)]
         for values in points:
+            tables = [key for key, value in values.items() if isinstance(value, dict)]
+            if tables:
+                allowed = f"{tables[0]} is a table; vary its keys one by one"
+                raise self._mistake("axis.values", values[tables[0]], allowed)
             kinds = [type(value) for value in first.values()]
             wrong = [key for key, kind in zip(values, kinds) if type(values[key]) is not kind]
             if wrong:

@@ -192,6 +192,9 @@ class PlotTable(Table):
     metrics: Annotated[tuple[str, ...], Field(strict=False)] = ()
     lines: str | None = Field(None, description="a column whose values get a line each")
     panels: str | None = Field(None, description="a column whose values get a panel each")
+    log: Annotated[tuple[Literal["x", "y"], ...], Field(strict=False)] = Field(
+        (), description="axes of lines with a logarithmic scale"
+    )
 
 
 def dotted(tables: dict[str, Any], head: str = "") -> dict[str, Any]:

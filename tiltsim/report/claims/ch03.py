@@ -252,6 +252,7 @@ CLAIMS = (
         statement="A rotor at rest makes the decoupling matrix singular",
         case="as printed, in the fourth row alone",
         published=True,
+        wrong=True,
         why="As printed the column of the resting rotor keeps its torques: regular. It is the "
         "exact matrix, without the slip, for which the statement holds.",
         measure=partial(_rest_is_singular, exact=False),

@@ -45,7 +45,9 @@ CLAIMS = (
         source="ch. 7, Sec. 3.2, Fig. 6",
         statement="The biased Gait 2 is very sensitive to the attitude (margin below 0.2 rad)",
         published=True,
-        why=_SHAPES + "The biased twin keeps 1.45 rad.",
+        why=_SHAPES
+        + "The biased twin keeps 1.45 rad. It keeps the less the larger the rectangle: 0.25 "
+        "rad with a corner at (-1.40, 1.40) rad, beyond which the red gait itself is singular.",
         measure=partial(_is_sensitive, "ch07_gait_2"),
     ),
     FlightClaim(

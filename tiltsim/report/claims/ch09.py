@@ -139,7 +139,9 @@ CLAIMS = (
             statement="The gaits with solutions can carry 4.2 N, the weight",
             case=f"Gait {number}",
             published=True,
-            why="Tilted by 0.834 rad two of its rotors lift too little: 3.87 N at most."
+            wrong=number == 6,
+            why="Under Eq. (11) a rotor makes 1.25 N at most; two tilted by 0.5 rad and two by "
+            "0.834 rad lift 3.87 N."
             if number == 6
             else "",
             measure=partial(_can_carry_the_weight, number),
@@ -175,7 +177,10 @@ CLAIMS = (
             case=f"Gait {number}",
             published=("-2", "-2", "2", "2"),
             unit="m/s^2",
-            why=_LESS + " The published range is not reproduced from the stated conditions.",
+            wrong=True,
+            why=_LESS + " To lift 4.2 N, tilted by 0.5 rad, the four make 4.79 N of the 5 N that "
+            "Eq. (11) allows: opposite ones differ by 0.21 N at most, which is 0.24 m/s^2 "
+            "sideways, and half of it without yaw torque.",
             measure=partial(_acceleration, number),
         )
         for number, figure in ((2, 8), (3, 9))
