@@ -12,7 +12,7 @@ from controllers.gait_feedforward import INTEGRAL_FIELDS, Parameters, tracking_i
 from controllers.gaits import tilt_reference
 from controllers.references import position_reference
 from controllers.scalar import Triple, scalar
-from controllers.supervisor import AT_REST, gait_share, governed
+from controllers.supervisor import gait_share, governed
 from controllers.vehicle import drag_ratio
 from tiltsim.controller_tables import AttitudeAltitudeController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
@@ -174,7 +174,7 @@ def references_in_force(
     planned = tilt_reference(time, law.gait, table)
     share = gait_share(planned, state[6], state[7], law.supervisor, drag_ratio(law.vehicle))
     return (
-        *references_under(time, state, AT_REST, parameters, table),
+        *references_under(time, state, (0.0, 0.0, 0.0), parameters, table),
         *servo_commands(planned, share, 0.0),
     )
 
