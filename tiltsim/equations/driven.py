@@ -76,7 +76,7 @@ class Driven(NamedTuple):
         [Sequence[float], Sequence[float], Wrench, Mechanics, Triple], tuple[float, ...]
     ]
     """Time derivative of the motion: state, controls, wrench, mechanics, disturbance (m/s^2)."""
-    settled: Callable[[Sequence[float], Mechanics], list[float]]  # see `tiltsim.loop.Equations`
+    settled: Callable[[list[float], Mechanics], list[float]]  # see `tiltsim.loop.Equations`
     initial: Callable[[Scenario], tuple[float, ...]]  # motion
 
 
@@ -152,10 +152,10 @@ def tiltrotor_rates(
 
 
 @scalar
-def settled_tiltrotor(state: Sequence[float], mechanics: Mechanics) -> list[float]:
+def settled_tiltrotor(state: list[float], mechanics: Mechanics) -> list[float]:
     """Rotors within their limits, pods not beyond their stops."""
     low, high, stop = mechanics.min_speed, mechanics.max_speed, mechanics.max_tilt
-    settled = list(state)
+    settled = state[:]
     for rotor in range(4):
         spin = -1.0 if rotor % 2 == 0 else 1.0
         settled[26 + rotor] = spin * clipped(spin * state[26 + rotor], low, high)
@@ -222,9 +222,9 @@ def quadrotor_rates(
 
 
 @scalar
-def settled_quadrotor(state: Sequence[float], mechanics: Mechanics) -> list[float]:
+def settled_quadrotor(state: list[float], mechanics: Mechanics) -> list[float]:
     """As it is: its rotors make any thrust."""
-    return list(state)
+    return state
 
 
 DRIVEN: Final[dict[str, Driven]] = {

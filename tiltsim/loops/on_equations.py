@@ -95,7 +95,7 @@ def on_equations(loop: Loop) -> Loop:
     @scalar
     def equation_rates(
         time: float,
-        state: Sequence[float],
+        state: list[float],
         inputs: Sequence[float],
         parameters: Any,
         table: Sequence[float],
