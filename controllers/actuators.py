@@ -7,7 +7,7 @@ integrator stage and restarted anywhere.
 from __future__ import annotations
 
 from math import floor, inf, sqrt
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from controllers.noise import normal
 from controllers.scalar import Quad, scalar
@@ -112,9 +112,6 @@ class Faults(NamedTuple):
     rotor_2: RotorFault = RotorFault()
     rotor_3: RotorFault = RotorFault()
     rotor_4: RotorFault = RotorFault()
-
-
-NO_FAULTS: Final = Faults()
 
 
 @scalar

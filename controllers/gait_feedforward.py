@@ -467,7 +467,8 @@ def tracking_inputs(
                 jet_product(nz, nz),
             )
         )
-        size = sqrt(specific[0] ** 2 + specific[1] ** 2 + specific[2] ** 2)
+        push_x, push_y, push_z = specific
+        size = sqrt(push_x * push_x + push_y * push_y + push_z * push_z)
         if nz[0] < 0.0:
             size = -size
         size = size * counted

@@ -89,6 +89,11 @@ class PathReport:
         """Whether a published theorem calls the path robust."""
         return self.theorem is not None
 
+    @property
+    def sound(self) -> bool:
+        """Whether a published theorem accepts the path, and it is nowhere singular."""
+        return self.accepted and not self.warnings
+
 
 class PathRefusedError(ValueError):
     """A path that neither published theorem accepts; the message gives the reasons."""
@@ -222,7 +227,10 @@ def _pieces(path: Path) -> list[_Piece]:
     if isinstance(path, Circle):
         plans.color_code(path.color)
         if not (all(map(isfinite, (*path.centre, path.radius))) and path.radius > 0.0):
-            raise ValueError(f"circle at {path.centre}, radius {path.radius}: must be finite")
+            raise ValueError(
+                f"circle at {path.centre}, radius {path.radius}: the radius must be positive, all "
+                "finite"
+            )
 
         def around(share: Array) -> Array:
             turn = 2.0 * pi * share[:, np.newaxis]

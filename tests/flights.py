@@ -25,6 +25,8 @@ TILT_CAR = {
     "gait": {"type": "penguin_large"},
     "reference": {"type": "line", "velocity": [0.0, 0.0, 0.0], "acceleration": [1.0, 0.0, 0.0]},
 }
+JUMPS = {"gait": {"type": "trot_instant", "amplitude": 0.65, "period": 0.8}}
+SUPERVISED = {"controller": {"supervisor": {"strategy": "return_to_red", "min_margin": 0.9}}}
 OTHER_KINDS = {"tilt_car": TILT_CAR}
 """Flights of what is no rotorcraft."""
 
@@ -33,6 +35,8 @@ RECIPES = {
     "trot": TROT,
     "limited": FIXED | LIMITED,
     "free": FREE,
+    "jumps": JUMPS,
+    "supervised": JUMPS | SUPERVISED,
 }
 
 

@@ -17,6 +17,7 @@ from controllers.published_gaits import DETERMINANT_CASES, PATHS, PUBLISHED_GAIT
 from controllers.singularity import residuals
 from controllers.two_color_planner import Circle
 from controllers.vehicle import PRESETS
+from tiltsim import files
 from tiltsim.analysis import gait_report, map_report, vehicle_name
 from tiltsim.commands import gait as gait_command
 from tiltsim.commands import map as map_command
@@ -259,11 +260,11 @@ def test_overrides_alone_change_the_default_vehicle(capsys) -> None:
     ("text", "message"),
     [
         ("arm=0.3", "'arm' is no parameter; choose mass, inertia_xx, "),
-        ("luukkonen,arm_length=0", "arm_length = 0: must be a positive finite number"),
-        ("arm_length=-1", "must be a positive finite number"),
-        ("arm_length=nan", "must be a positive finite number"),
-        ("arm_length=inf", "must be a positive finite number"),
-        ("arm_length=", "must be a positive finite number"),
+        ("luukkonen,arm_length=0", "arm_length = 0: must be a number from 1e-12 to 1e+09"),
+        ("arm_length=-1", "must be a number from 1e-12 to 1e+09"),
+        ("arm_length=nan", "must be a number from 1e-12 to 1e+09"),
+        ("arm_length=inf", "must be a number from 1e-12 to 1e+09"),
+        ("arm_length=", "must be a number from 1e-12 to 1e+09"),
         ("mass=1,mass=2", "mass is given twice"),
         ("luukkonen,ar_drone_2", "'ar_drone_2': write KEY=VALUE after the preset"),
         (
@@ -304,7 +305,7 @@ def test_vehicles_are_named_or_listed() -> None:
         (["--published", "ch06_gait_9"], "choose ch03_gait_1, "),
         ([], "give one of SCENARIO"),
         (["some", "--angles", "0,0,0,0"], "give one of SCENARIO"),
-        (["--angles", "0,0,0,0", "--plot", "figure.xyz"], "unknown format 'xyz'"),
+        (["--angles", "0,0,0,0", "--plot", "figure.xyz"], "unknown format '.xyz'"),
         (["--list", "--published", "ch06_gait_3"], "takes no other option than --json"),
         (["--angles", "0,0,0,0", "--figure", "margin"], "needs --plot FILE"),
         (["--angles", "0,0,0,0", "--case", "half"], "goes with --figure determinant"),
@@ -339,7 +340,7 @@ def test_vehicles_are_named_or_listed() -> None:
             ],
             "needs LEAST,GREATEST",
         ),
-        (["--angles", "0,0,0,0", "--plot", "figure"], "unknown format ''; choose pdf, png, svg"),
+        (["--angles", "0,0,0,0", "--plot", "figure"], "unknown format ''; choose .png, .svg, .pdf"),
         (["--angles", "0,0,0,0", "--plot", "/no/such/folder/f.png"], "folder does not exist"),
     ],
 )
@@ -381,12 +382,21 @@ def test_a_refused_path_is_refused_with_the_place(capsys) -> None:
 
 def test_accepted_paths(capsys) -> None:
     legs = "map --leg red P 0.7,-0.25 0.25,-0.7 P --leg blue P -0.3,0.2 -0.5,-0.3 P"
-    assert run(*legs.split()) == 0
+    assert run(*legs.split()) == 1  # for it is singular all the same
     output = capsys.readouterr().out
     assert "accepted by the generalized theorem" in output
-    assert "warning: color switch at P" in output
+    assert "path: singular: color switch at P" in output
+    assert "path: singular: blue: tau has rank 2" in output
     report = run_json(capsys, "map", "--circle", "red", "0.5,-0.5", "0.3")
     assert report["path"]["theorem"] == "generalized"
+    assert report["path"]["sound"] is True
+
+
+def test_blue_is_accepted_as_published_but_not_sound(capsys) -> None:
+    assert run("map", "--circle", "blue", "0.3,-0.5", "0.2", "--json") == 1
+    verdict = json.loads(capsys.readouterr().out)["path"]
+    assert verdict["accepted"] is True
+    assert verdict["sound"] is False
 
 
 @pytest.mark.parametrize(
@@ -396,9 +406,10 @@ def test_accepted_paths(capsys) -> None:
         ("--leg red", "needs two finite points"),
         ("--leg red 0,0 30,40", "more than half a turn"),
         ("--leg red 0,0 1", "needs 2 angles"),
-        ("--circle red 0,0 -1", "radius -1"),
+        ("--circle red 0,0 -1", "radius -1.0: the radius must be positive"),
+        ("--circle red 0,0 x", "must be a number, in rad"),
         ("--circle red 0,0 0.2 --leg red 0,0 1,1", "either --leg or --circle"),
-        ("--plot map.xyz", "unknown format 'xyz'"),
+        ("--plot map.xyz", "unknown format '.xyz'"),
         ("--vehicle none", "choose ar_drone_2, ar_drone_2_unrounded, luukkonen"),
     ],
 )
@@ -456,7 +467,7 @@ def test_every_kind_of_figure_is_written_by_the_command(tmp_path, capsys, name) 
 
 def test_equal_figures_give_equal_files(tmp_path) -> None:
     for ending in style.FORMATS:
-        files = [tmp_path / f"{index}.{ending}" for index in range(2)]
+        files = [tmp_path / f"{index}{ending}" for index in range(2)]
         for file in files:
             style.save(gait_figure(plans.fixed([0.1, 0.2, 0.3, 0.4]), AR_DRONE), file)
         assert files[0].read_bytes() == files[1].read_bytes()
@@ -485,11 +496,11 @@ def test_a_bad_target_is_noticed_before_any_work(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(map_command, "parse_vehicle", work)
     closed = tmp_path / "closed.png"
     closed.touch()
-    monkeypatch.setattr(style.os, "access", lambda path, mode: path != closed)
+    monkeypatch.setattr(files.os, "access", lambda path, mode: path != closed)
     for target, message in (
-        (tmp_path / "f.bmp", "unknown format 'bmp'; choose pdf, png, svg"),
+        (tmp_path / "f.bmp", "unknown format '.bmp'; choose .png, .svg, .pdf"),
         (tmp_path / "no" / "f.png", "folder does not exist"),
-        (closed, "permission denied"),
+        (closed, "not writable"),
     ):
         for words in (["gait", "--angles", "0,0,0,0"], ["map"]):
             with pytest.raises(InputError, match=message):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -14,10 +16,11 @@ from tests.test_actuation import EVERYTHING
 from tests.test_air_layer import STORM
 from tests.test_laws import GUST, LAWS
 from tiltsim.batch import fly_all
+from tiltsim.flight import End
 from tiltsim.library import shipped_folder
 from tiltsim.loading import merge
 from tiltsim.loops import LOOPS, control_setup, loop_of
-from tiltsim.plants import flight_model, make_plant, what_decides_the_model
+from tiltsim.plants import make_plant
 
 TROT = {"amplitude": 0.3, "period": 0.8}
 GAITS = {
@@ -284,40 +287,6 @@ def test_every_row_flies_a_model_of_its_own():
     assert heights[3] < heights[5] < heights[4], "ground holds up"
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        HEAVY,
-        GUST,
-        {"ground": {"height": -1.0}},
-        {"ground": {"height": -1.0, "friction": 0.4}},
-        {"vehicle": {"mass": 0.5}},
-        {"vehicle": {"max_rotor_speed": 500.0}},
-        {"simulation": {"timestep": 0.001}},
-        {"simulation": {"integrator": "Euler"}},
-        {"initial": {"position": [1.0, 0.0, 0.0]}},
-        {"simulation": {"seed": 3}},
-        {"gait": {"period": 0.9}},
-    ],
-    ids=str,
-)
-def test_what_decides_the_model_tells_models_apart(change):
-    """Rows share a model exactly where MuJoCo would compile the same one."""
-    change = {"disturbance": change} if change is GUST else change
-    tables = {**LAYERED, "simulation": {"timestep": 0.002, "duration": 0.3}}
-    plain, changed = map(tiltsim.parse_scenario, (tables, merge(tables, change)))
-    models = [saved_model(flight_model(wanted, 40)) for wanted in (plain, changed)]
-    same_key = what_decides_the_model(plain) == what_decides_the_model(changed)
-    assert same_key == (models[0] == models[1])
-
-
-def saved_model(model):
-    """A compiled model as bytes."""
-    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
-    mujoco.mj_saveModel(model, None, buffer)
-    return buffer.tobytes()
-
-
 def test_own_controllers_are_flown_one_by_one_among_others(tmp_path):
     file = tmp_path / "hover.py"
     file.write_text(
@@ -421,6 +390,35 @@ def test_references_are_the_same_floats_natively(gait, decoupler, monkeypatch):
     del flight.__dict__["columns"]
     for name, column in flight.columns.items():
         np.testing.assert_array_equal(column, in_python[name])
+
+
+def test_references_of_the_law_with_gait_rates_are_the_same_floats_natively(monkeypatch):
+    flight = tiltsim.simulate(scenario(LAWS["gait_feedforward"], engine="python", duration=0.1))
+    in_python = dict(flight.columns)
+    monkeypatch.setattr(tiltsim.rows, "ROWS_WORTH_COMPILING", 0)
+    del flight.__dict__["columns"]
+    for name, column in flight.columns.items():
+        np.testing.assert_array_equal(column, in_python[name])
+
+
+def test_columns_beside_a_state_out_of_all_bounds_raise_nothing():
+    """A flight may be lost between two samples by a hundred orders of magnitude."""
+    flight = tiltsim.simulate(scenario(LAWS["gait_feedforward"], engine="python", duration=0.05))
+    samples = flight.samples.copy()
+    samples[-1, 3:] = 1e200  # squares overflow
+    lost = replace(flight, samples=samples, end=End("diverged", 0.05, "test"))
+    columns = lost.columns
+    assert np.isfinite([columns[name][:-1] for name in ("roll_ref", "alpha_ref_1")]).all()
+    assert lost.metrics()["diverged"] is True
+
+
+def test_a_row_without_a_result_is_no_number():
+    setup = control_setup(scenario({}))
+    rows = tiltsim.rows.evaluate_rows(
+        lambda time, state, _parameters, _table: (state[0], time / state[0]),
+        *(2, np.array([1.0, 2.0]), np.array([[0.0], [4.0]]), setup),
+    )
+    np.testing.assert_array_equal(rows, [[np.nan, np.nan], [4.0, 0.5]])
 
 
 def test_whether_native_code_is_cached_is_known_by_law_and_plant(monkeypatch, tmp_path):

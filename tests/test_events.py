@@ -50,6 +50,15 @@ def test_a_small_margin_is_told():
     assert near.level == "WARN"
 
 
+def test_a_supervisor_is_told_when_it_sets_in():
+    this = flight("supervised")
+    acts = this["time"][this["supervision"] > 0.01]
+    told = [event for event in flight_events(this) if "supervisor takes" in event.text]
+    assert told[0].time == acts[0]
+    assert {event.text for event in told} == {"supervisor takes the gait towards red"}
+    assert any("margin below 0.9 rad" in text for text in texts(flight_events(this)))
+
+
 def test_a_lost_flight_ends_with_its_cause():
     lost = replace(flight("fixed"), end=End("singular", 0.7, "why"))
     last = flight_events(lost)[-1]

@@ -214,7 +214,7 @@ MISTAKES = {
     "unknown set of gains": (
         '[controller]\ngains = "ch05"',
         'controller.gains = "ch05"',
-        "ch03, ch04 or exact",
+        "ch03, ch04, exact or feedforward",
     ),
     "number for gains": ("[controller]\ngains = 3", "controller.gains = 3", "must be a table"),
     "ch. 4's gains under the exact matrix": (
@@ -261,6 +261,12 @@ MISTAKES = {
         "[vehicle]\nmin_rotor_speed = 400.0\nmax_rotor_speed = 200.0",
         "vehicle.min_rotor_speed = 400.0",
         "below max_rotor_speed = 200.0",
+    ),
+    "half a circle beside a rectangle": (
+        '[gait]\ntype = "two_color"\nperiod = 1.0\nrectangle = [[0.2, 0.8], [-0.8, -0.2]]\n'
+        "radius = 0.3",
+        'gait.type = "two_color"',
+        "give one of rectangle",
     ),
     "start beyond the rotor limit": (
         "[vehicle]\nmax_rotor_speed = 200.0",

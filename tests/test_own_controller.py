@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 import tomllib
 from pathlib import Path
 
@@ -335,6 +336,25 @@ def raises(seen):
     return 1.0 / (0.0 if seen.time > 0.0349 else 1.0) and STILL
 
 
+class MuteError(Exception):
+    def __str__(self):
+        raise ValueError
+
+    __repr__ = __str__
+
+
+def raises_unspeakably(seen):
+    if seen.time > 0.0349:
+        raise MuteError
+    return STILL
+
+
+def leaves(seen):
+    if seen.time > 0.0349:
+        sys.exit(5)
+    return STILL
+
+
 def returning(value):
     return lambda seen: value if seen.time > 0.0349 else STILL
 
@@ -358,6 +378,10 @@ def returning(value):
             returning(Command(thrusts=[1] * 4, tilt_angles=[0, 0, 0, np.inf])),
             ["tilt_angles[3] = inf"],
         ),
+        (returning(Command(thrusts=[10**400] * 4)), ["; 4 numbers are wanted"]),
+        (returning(MuteError()), ["returned a MuteError; a tiltsim.Command is wanted"]),
+        (leaves, ["leaves raised SystemExit: 5"]),
+        (raises_unspeakably, ["raises_unspeakably raised MuteError (test_own_controller.py"]),
     ],
 )
 def test_a_failing_controller_ends_the_flight_with_one_line_and_a_log(law, words):
@@ -496,6 +520,8 @@ def test_a_failing_controller_exits_3_and_leaves_its_log(tmp_path, capsys):
         ("import tiltsim\nlaw = (\n", "law", ["was never closed", "broken.py, line 2"]),
         ("import nonexistent_module", "law", ["ModuleNotFoundError", "broken.py, line 1"]),
         ("class Law:\n    def __init__(self, gain): pass", "Law", ["TypeError", "when made"]),
+        ("import sys; sys.exit(3)", "law", ["raised SystemExit: 3", "broken.py, line 1"]),
+        ("\0", "law", ["null bytes (broken.py)"]),
     ],
 )
 def test_files_that_hold_no_controller_exit_2(tmp_path, capsys, text, name, words):

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import matplotlib
 import numpy as np
 import pytest
 
-from tests.flights import RECIPES, flight, saved
+import tiltsim
+from tests.flights import BASE, RECIPES, flight, saved
 from tiltsim.cli import main
+from tiltsim.figures.comparison import comparison_figure
 from tiltsim.figures.flight import flight_figure
+from tiltsim.flight import SAMPLE_FIELDS, End
 
 SIGNATURES = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
 PANELS = {
     *("Attitude", "Altitude", "Position error", "Tilt angles", "Rotor speeds", "Plan view"),
-    "Attitudes flown; shaded: out of reach",
 }
+PLANES = {f"Attitudes flown; {words} of reach" for words in ("shaded: out", "none is out")}
 
 
 def axes_by_title(figure):
@@ -27,6 +32,7 @@ def test_every_flight_can_be_drawn(name):
     figure.canvas.draw()
     titles = set(axes_by_title(figure))
     assert titles >= PANELS
+    assert titles & PLANES
     assert any(title.startswith("Singularity margin, least") for title in titles)
 
 
@@ -100,3 +106,104 @@ def test_a_bad_target_is_one_line_and_exit_code_2(out, words, tmp_path, capsys):
     assert main(["plot", str(folder), "--out", str(tmp_path / out)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert words in line
+
+
+def test_the_blow_up_of_a_lost_flight_does_not_flatten_what_came_before():
+    whole = flight("fixed")
+    samples = whole.samples.copy()
+    columns = [i for i, name in enumerate(SAMPLE_FIELDS) if name.startswith("rotor_speed")]
+    samples[-1, columns] *= 1e6
+    ends = {
+        "completed": End("completed", 1.2),
+        "diverged": End("diverged", 1.2, "rotor 1 at 3e+08 rad/s"),
+    }
+    spans = {}
+    for kind, end in ends.items():
+        panels = axes_by_title(flight_figure(replace(whole, samples=samples, end=end)))
+        low, high = panels["Rotor speeds"].get_ylim()
+        spans[kind] = high - low
+        words = [text.get_text() for text in panels["Rotor speeds"].texts]
+        assert words == (["ends off scale"] if kind == "diverged" else [])
+    assert spans["completed"] > 1e8
+    assert spans["diverged"] < 1e3
+
+
+def test_a_flight_of_one_sample_is_drawn_without_a_warning(recwarn):
+    whole = flight("fixed")
+    flight_figure(replace(whole, samples=whole.samples[:1].copy()))
+    assert not recwarn.list
+
+
+def test_a_red_gait_puts_no_attitude_out_of_reach():
+    red = BASE | {"gait": {"type": "fixed", "angles": [-0.3, 0.3, -0.3, 0.3]}}
+    panels = axes_by_title(flight_figure(tiltsim.simulate(tiltsim.parse_scenario(red))))
+    plane = panels["Attitudes flown; none is out of reach"]
+    assert [len(line.get_xdata()) > 1 for line in plane.lines].count(True) == 1  # what was flown
+
+
+# --- supervised flights, and several on one page -------------------------------------------------
+
+
+def supervised():
+    return flight("supervised")
+
+
+def test_the_margin_shows_its_threshold_and_when_the_supervisor_acts():
+    this = supervised()
+    assert 0.0 < this["supervision"].max() <= 1.0
+    panels = axes_by_title(flight_figure(this))
+    (title,) = [title for title in panels if title.startswith("Singularity margin")]
+    axes = panels[title]
+    levels = {line.get_ydata()[0] for line in axes.lines if len(set(line.get_ydata())) == 1}
+    assert 0.9 in levels
+    assert "shaded: supervisor acts" in {text.get_text() for text in axes.texts}
+    plain = next(
+        v for k, v in axes_by_title(flight_figure(flight("trot"))).items() if "margin" in k
+    )
+    assert "shaded: supervisor acts" not in {text.get_text() for text in plain.texts}
+
+
+def test_flights_are_compared_by_margin_determinant_and_error():
+    flights = [flight("jumps"), supervised()]
+    figure = comparison_figure(flights)
+    figure.canvas.draw()
+    panels = axes_by_title(figure)
+    assert list(panels) == [
+        "Singularity margin",
+        "Determinant, 4 for a level untilted vehicle",
+        "What the supervisor takes away",
+        "Distance from the reference",
+    ]
+    for axes, column in zip(
+        panels.values(), ("singularity_margin", "determinant", "supervision"), strict=False
+    ):
+        drawn = [line.get_ydata() for line in axes.lines if len(line.get_ydata()) > 2]
+        columns = [this.columns[column] for this in flights if column in this.columns]
+        for line, wanted in zip(drawn, columns, strict=True):
+            np.testing.assert_array_equal(line, np.maximum(wanted, 0.0))
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "tests/jumps",
+        "tests/supervised",
+    ]
+
+
+def test_a_lost_flight_says_so_in_a_comparison():
+    lost = replace(flight("jumps"), end=End("singular", 0.7, "why"))
+    (legend,) = comparison_figure([lost, supervised()]).legends
+    assert legend.get_texts()[0].get_text() == "tests/jumps, lost at 0.70 s"
+
+
+def test_the_command_compares_several_flights(tmp_path, capsys):
+    folders = [str(saved(name, tmp_path)) for name in ("jumps", "supervised")]
+    file = tmp_path / "both.svg"
+    assert main(["plot", *folders, "--out", str(file)]) == 0
+    assert "supervised" in file.read_text(encoding="utf-8")
+    assert capsys.readouterr().out == f"figure written to {file}\n"
+
+
+def test_a_vehicle_without_a_margin_is_not_compared(tmp_path, capsys):
+    folders = [str(saved(name, tmp_path)) for name in ("tilt_car", "jumps")]
+    assert main(["plot", *folders]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "the tilt_car has no margin to compare" in line

@@ -49,7 +49,7 @@ def strict(monkeypatch):
     monkeypatch.setenv("RERUN_STRICT", "1")
 
 
-@pytest.fixture(scope="module", params=["fixed", "trot", "limited", "free"])
+@pytest.fixture(scope="module", params=["fixed", "trot", "limited", "free", "supervised"])
 def recorded(request, tmp_path_factory):
     """A recording and the flight read back from its Parquet file."""
     folder = saved(request.param, tmp_path_factory.mktemp("flights"))
@@ -121,6 +121,15 @@ def test_time_series_are_those_of_the_parquet_file(recorded):
     for axis in error_axes(this.scenario):
         _, values = scalars(path, f"/position_error/{axis}")
         np.testing.assert_array_equal(values, this[f"{axis}_ref"] - this[axis])
+
+
+def test_a_supervisor_is_drawn_with_its_threshold(tmp_path):
+    path, this = tmp_path / "flight.rrd", flight("supervised")
+    save_recording([this], path)
+    _, values = scalars(path, "/singularity/supervision")
+    np.testing.assert_array_equal(values, this["supervision"])
+    _, levels = scalars(path, "/singularity/threshold")
+    assert set(levels) == {0.9}
 
 
 def test_poses_are_those_of_the_parquet_file(recorded):

@@ -218,6 +218,7 @@ def map_report(vehicle: Vehicle, path: Path | None = None) -> dict[str, Any]:
         verdict = check_path(path, vehicle)
         report["path"] = {
             "accepted": verdict.accepted,
+            "sound": verdict.sound,
             "theorem": verdict.theorem,
             "reasons": list(verdict.reasons),
             "crossings": [list(crossing) for crossing in verdict.crossings],

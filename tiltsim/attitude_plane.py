@@ -33,6 +33,9 @@ MARGIN_THRESHOLD: Final = 0.2
 ACTS: Final = 0.01
 """From this share on of what it can do a supervisor counts as acting."""
 
+ON_THE_FRAME: Final = 1e-3
+"""Where ``n`` leans by less (rad), the curve is as near to the square's frame: there is none."""
+
 _TINY: Final = 1e-12
 """Below this a component of the unit vector ``n`` counts as zero."""
 
@@ -56,13 +59,14 @@ def singular_curves(n: Floats, points: int = 61) -> Floats:
     """Unacceptable-attitude curves, shape (N, points, 2).
 
     Sampled evenly along the great circle, so that a steep or vertical curve (``R_theta = 0``) is
-    followed like any other. NaN where there is none within the plane: ``n`` vertical, or ``n = 0``
-    (singular at every attitude).
+    followed like any other. NaN where there is none within the plane: ``n`` vertical, as it is for
+    red gaits but for what servos and rounding leave (`ON_THE_FRAME`), or ``n = 0`` (singular at
+    every attitude).
     """
     nx, ny, nz = n[:, 0], n[:, 1], n[:, 2]
     lean = np.hypot(nx, ny)
     with np.errstate(invalid="ignore", divide="ignore"):
-        lean = np.where(lean > _TINY, lean, np.nan)
+        lean = np.where(lean > ON_THE_FRAME, lean, np.nan)
         level = np.stack([-ny, nx, np.zeros_like(nx)], axis=1) / lean[:, np.newaxis]
         upward = np.stack([-nx * nz, -ny * nz, lean * lean], axis=1)
         upward /= np.linalg.norm(upward, axis=1)[:, np.newaxis]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -21,7 +21,7 @@ import numpy as np
 
 from tiltsim.engine import control_callback
 from tiltsim.flight import End, Flight
-from tiltsim.loop import RECORDER, Floats, Loop
+from tiltsim.loop import RECORDER, Floats
 from tiltsim.loops import control_setup, loop_of
 from tiltsim.plants import (
     MujocoPlant,
@@ -44,9 +44,6 @@ MEMORY: Final = 256 * 2**20
 
 CALL_TIME: Final = 0.25
 """How long (s) a batch flies before Python looks at the rows and at the keyboard."""
-
-Way = str | tuple[Loop, Hashable]
-"""How flights are flown: those of one loop, and with models of one layout, share a batch."""
 
 WINDOW: Final = 512
 """How many scenarios are looked at together to find those that share a batch."""
@@ -117,7 +114,7 @@ def _fly_window(
     keep_samples: bool,
 ) -> Iterator[FlightResult]:
     """Fly scenarios group by group, and put the results back into their order."""
-    groups: dict[Way, list[int]] = {}
+    groups: dict[object, list[int]] = {}
     for index, scenario in enumerate(scenarios):
         groups.setdefault(_way_to_fly(scenario, native), []).append(index)
     done: dict[int, FlightResult] = {}
@@ -147,7 +144,7 @@ def _fly_window(
                 following += 1
 
 
-def _way_to_fly(scenario: Scenario, native: bool) -> Way:
+def _way_to_fly(scenario: Scenario, native: bool) -> object:
     """``alone``, on the ``thesis`` plant in threads, or what the rows of a batch have in common."""
     simulation, loop = scenario.simulation, loop_of(scenario)
     wanted = simulation.engine == "native" or (simulation.engine == "auto" and native)
@@ -158,7 +155,7 @@ def _way_to_fly(scenario: Scenario, native: bool) -> Way:
     # A stop of the tilt servos is a constraint, which gives a state more numbers, and ground gives
     # the model more shapes; a law with a layer around it has states and controls of its own.
     file = getattr(scenario.vehicle, "mjcf", None)
-    return loop, (scenario.vehicle.tilt_servo.stops, scenario.ground is not None, file)
+    return loop, scenario.vehicle.tilt_servo.stops, scenario.ground is not None, file
 
 
 def _natively(scenario: Scenario) -> Scenario:

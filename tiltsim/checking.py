@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 from tiltsim.engine import EngineName
 from tiltsim.errors import InputError
 from tiltsim.expectations import Verdict, judge
+from tiltsim.interrupts import interrupts_kept
 from tiltsim.library import library_name, read_toml, scenario_files, shipped_folder
 from tiltsim.loading import load_scenario, variant_names
 from tiltsim.loops import loop_of
@@ -63,6 +64,8 @@ def collect(paths: Iterable[str]) -> list[str]:
 
 
 def _find(name: str) -> Path:
+    if not name:
+        raise InputError("no scenario named; see tiltsim list")
     library = shipped_folder("scenarios")
     for place in (Path(name), library / name, library / f"{name}.toml"):
         if place.exists():
@@ -174,7 +177,8 @@ def shared_engine(scenarios: Sequence[Scenario], steps: int | None = None) -> En
     for scenario in scenarios:
         kind = (loop_of(scenario), scenario.simulation.plant)
         if kind not in ready and scenario.controller.law != "python":
-            make_plant(with_engine(scenario, "native")).advance(1)
+            with interrupts_kept():
+                make_plant(with_engine(scenario, "native")).advance(1)
             ready.add(kind)
     return "native"
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from importlib import import_module
+from io import TextIOWrapper
 from typing import Final, NoReturn
 
 from tiltsim.errors import InputError
@@ -16,12 +17,20 @@ COMMANDS: Final = (
 )
 
 
+def printable(text: str) -> str:
+    """Text on one line: line breaks and other control characters, as file names may have, escaped.
+
+    So that a message cannot do anything to the terminal.
+    """
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
 class Parser(argparse.ArgumentParser):
     """Says what is wrong in one line, like every other mistake."""
 
     def error(self, message: str) -> NoReturn:
         """Print the line and exit."""
-        self.exit(INVALID_INPUT, f"tiltsim: {message} (see {self.prog} --help)\n")
+        self.exit(INVALID_INPUT, f"tiltsim: {printable(message)} (see {self.prog} --help)\n")
 
 
 class _Version(argparse.Action):
@@ -50,11 +59,13 @@ def build_parser() -> argparse.ArgumentParser:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command and return its exit code."""
-    parsed = build_parser().parse_args(arguments)
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # as Python has it for standard error
     try:
+        parsed = build_parser().parse_args(arguments)
         return int(parsed.run(parsed))
     except InputError as error:
-        print(f"tiltsim: {error}", file=sys.stderr)
+        print(f"tiltsim: {printable(str(error))}", file=sys.stderr)
         return INVALID_INPUT
     except KeyboardInterrupt:
         print("tiltsim: interrupted", file=sys.stderr)
@@ -64,7 +75,8 @@ def main(arguments: list[str] | None = None) -> int:
         sys.stderr.close()
         return DONE
     except OSError as error:
-        print(f"tiltsim: {error.filename or 'output'}: {error.strerror}", file=sys.stderr)
+        place = printable(str(error.filename or "output"))
+        print(f"tiltsim: {place}: {error.strerror or error}", file=sys.stderr)
         return INVALID_INPUT
 
 

@@ -129,7 +129,7 @@ def checked(command: object, *, tilting: bool) -> Orders:
 def _four(name: str, value: Any) -> Quad:
     try:
         array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ControllerError(f"returned {name} = {_short(value)}; 4 numbers are wanted") from None
     if array.shape != (4,):
         raise ControllerError(f"returned {name} of shape {array.shape}; (4,) is wanted")
@@ -141,7 +141,10 @@ def _four(name: str, value: Any) -> Quad:
 
 
 def _short(value: object) -> str:
-    text = " ".join(repr(value).split())
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:
+        text = f"a {type(value).__name__}"
     return text if len(text) <= 60 else text[:57] + "..."
 
 
@@ -168,18 +171,20 @@ class OwnController:
     def _call(self, function: Callable[[Any], Any], argument: object) -> Any:
         try:
             return function(argument)
-        except Exception as error:
-            said = f": {_short_line(error)}" if str(error) else ""
-            raise ControllerError(
-                f"the controller {self._name} raised {type(error).__name__}{said}{_place(error)}"
-            ) from error
+        except (Exception, SystemExit) as error:
+            raise ControllerError(f"the controller {self._name} raised {_said(error)}") from error
 
 
-def _short_line(error: Exception) -> str:
-    return " ".join(str(error).split())[:200]
+def _said(error: BaseException) -> str:
+    """An error in one line: its type, what it says, and where it came from."""
+    try:
+        text = " ".join(str(error).split())[:200]
+    except Exception:
+        text = ""
+    return f"{type(error).__name__}{f': {text}' if text else ''}{_place(error)}"
 
 
-def _place(error: Exception) -> str:
+def _place(error: BaseException) -> str:
     """File and line of the controller's own code that an error went through last."""
     frames = traceback.extract_tb(error.__traceback__)[1:]  # without our own call
     if not frames:
@@ -239,11 +244,8 @@ def own_controller(scenario: Scenario, controller: Any = None) -> OwnController:
     if isinstance(controller, type):
         try:
             controller = controller()
-        except Exception as error:
-            raise InputError(
-                f"controller {name}: raised {type(error).__name__} when made: "
-                f"{_short_line(error)}{_place(error)}"
-            ) from error
+        except (Exception, SystemExit) as error:
+            raise InputError(f"controller {name}: when made raised {_said(error)}") from error
     return OwnController(controller, name)
 
 
@@ -252,8 +254,7 @@ def _load(address: str, table: PythonController) -> Any:
     start = f'{address}: controller.function = "{table.function}"'
     if table.file is None:
         raise InputError(
-            f"{start}: was given in Python; name a file's function as FILE.py:NAME, or pass "
-            "controller= to tiltsim.simulate"
+            f"{start}: names no file; write FILE.py:NAME, or pass controller= to tiltsim.simulate"
         )
     if not table.file.is_file():
         raise InputError(f"{start}: no such file")
@@ -280,11 +281,10 @@ def _run_file(start: str, file: Path) -> Any:
         # Compiled from its text, for a cached compilation may be older than a quick edit.
         exec(compile(file.read_bytes(), str(file), "exec"), module.__dict__)
     except SyntaxError as error:
-        raise InputError(f"{start}: {error.msg} ({file.name}, line {error.lineno})") from None
-    except Exception as error:
-        raise InputError(
-            f"{start}: raised {type(error).__name__}: {_short_line(error)}{_place(error)}"
-        ) from error
+        line = f", line {error.lineno}" if error.lineno else ""
+        raise InputError(f"{start}: {error.msg} ({file.name}{line})") from None
+    except (Exception, SystemExit) as error:
+        raise InputError(f"{start}: raised {_said(error)}") from error
     return module
 
 

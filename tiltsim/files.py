@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -34,15 +34,22 @@ def prepare_folder(folder: Path) -> None:
         raise InputError(f"--out {folder}: not writable")
 
 
-def prepare_file(option: str, file: Path) -> None:
+def prepare_file(option: str, file: Path, endings: Sequence[str] = ()) -> None:
     """See that a file can be written before the work for it begins.
 
-    Raises `InputError`, naming the command line's ``option``, where it cannot.
+    Raises `InputError`, naming the command line's ``option``, where it cannot, or its name does not
+    end in one of the ``endings``, where there are some (lower case, with their dots).
     """
+    if endings and file.suffix.lower() not in endings:
+        raise InputError(
+            f"{option} {file}: unknown format {file.suffix!r}; choose {', '.join(endings)}"
+        )
     folder = file.absolute().parent
     if not folder.is_dir():
         raise InputError(f"{option} {file}: its folder does not exist")
-    if file.is_dir() or not os.access(folder, os.W_OK):
+    if file.is_dir():
+        raise InputError(f"{option} {file}: is a folder")
+    if not os.access(file if file.exists() else folder, os.W_OK):
         raise InputError(f"{option} {file}: not writable")
 
 
@@ -112,7 +119,10 @@ def load_flight(path: str | Path) -> Flight:
         wall_time = float(origin["wall_time"])
     except (KeyError, ValueError, TypeError) as error:
         raise InputError(f"{file}: not a flight of tiltsim's: {_first_line(error)}") from error
-    scenario = parse_scenario(without_none(document), origin.get("address", ""))
+    try:
+        scenario = parse_scenario(without_none(document), origin.get("address", ""))
+    except InputError as error:
+        raise InputError(f"{file}: its scenario is not valid: {error}") from error
     fields = loop_of(scenario).sample_fields
     missing = [name for name in fields if name not in table.column_names]
     if missing:
@@ -125,6 +135,11 @@ def load_flight(path: str | Path) -> Flight:
         )
     except (ValueError, TypeError) as error:
         raise InputError(f"{file}: not a flight of tiltsim's: {_first_line(error)}") from error
+    for name, values in zip(fields, samples.T, strict=True):
+        if not np.isfinite(values).all():
+            raise InputError(f"{file}: damaged: {name} has values that are no finite numbers")
+    if (np.diff(samples[:, 0]) <= 0.0).any():
+        raise InputError(f"{file}: damaged: its times do not increase")
     return Flight(scenario, samples, end, engine, wall_time)
 
 

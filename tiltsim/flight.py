@@ -13,6 +13,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 
+import numpy as np
+
 from tiltsim.kinds import Floats
 from tiltsim.kinds.rotorcraft import COLUMN_UNITS as COLUMN_UNITS
 from tiltsim.kinds.rotorcraft import OBSERVED_FIELDS
@@ -38,6 +40,11 @@ class End:
     kind: EndKind
     time: float
     cause: str = ""
+
+
+def _far_out() -> np.errstate:
+    """For arithmetic with a last sample that may lie beyond what squares of floats can hold."""
+    return np.errstate(over="ignore", invalid="ignore")
 
 
 @dataclass(frozen=True)
@@ -71,15 +78,17 @@ class Flight:
         """All columns by name, each of shape (N,), in the order of `units`."""
         loop = loop_of(self.scenario)
         known = dict(zip(loop.sample_fields, self.samples.T, strict=True))
-        known |= loop.derive(known, control_setup(self.scenario))
-        known |= loop.kind.thrusts(known, self.scenario)
+        with _far_out():
+            known |= loop.derive(known, control_setup(self.scenario))
+            known |= loop.kind.thrusts(known, self.scenario)
         return {name: known[name] for name in self.units}
 
     @cached_property
     def _metrics(self) -> dict[str, float | bool]:
         from tiltsim.metrics import compute_metrics
 
-        return compute_metrics(self)
+        with _far_out():
+            return compute_metrics(self)
 
     def metrics(self) -> dict[str, float | bool]:
         """The flight in numbers; names and meanings in `tiltsim.metrics.METRICS`."""

@@ -142,8 +142,9 @@ class TwoColorGait(GaitTable):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        circle = self.centre is not None and self.radius is not None
-        if (self.rectangle is not None) + circle + bool(self.path) != 1:
+        circle = (self.centre is not None) + (self.radius is not None)
+        given = (self.rectangle is not None, circle > 0, bool(self.path))
+        if sum(given) != 1 or circle == 1:
             raise InvalidValueError(
                 "gait.type", "two_color", "give one of rectangle, centre with radius, and path"
             )

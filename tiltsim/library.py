@@ -57,7 +57,9 @@ def scenario_files(path: Path) -> list[Path]:
     """All scenario files under a folder, sorted, sweeps left out; a file stands for itself."""
     if not path.is_dir():
         return [path]
-    return sorted(file for file in path.rglob("*.toml") if not is_sweep(file))
+    # What is no ordinary file is none of ours, but a broken link is told of.
+    files = (file for file in path.rglob("*.toml") if file.is_file() or file.is_symlink())
+    return sorted(file for file in files if not is_sweep(file))
 
 
 def is_sweep(file: Path) -> bool:
@@ -98,7 +100,9 @@ def library_entries() -> Iterator[Entry]:
         variants = document.get("variant", [])
         for variant in variants or [{}]:
             address = f"{name}#{variant['name']}" if "name" in variant else name
-            title = variant.get("title", document.get("title", ""))
+            title = document.get("title", "")
+            if variant:
+                title = variant.get("title") or f"{title}: {_differences(document, variant)}"
             yield Entry(address, title, variant.get("source", document.get("source", "")))
 
 

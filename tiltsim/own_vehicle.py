@@ -149,6 +149,8 @@ def read_own_vehicle(path: str, model: str) -> OwnVehicle:
         modified = Path(path).stat().st_mtime_ns
     except OSError as error:
         raise ValueError(f"cannot be read: {error.strerror}") from None
+    if not Path(path).is_file():
+        raise ValueError("is no file")
     return _read(path, model, modified)
 
 

@@ -16,6 +16,7 @@ from tiltsim import thesis_plant
 from tiltsim.cache import native_code_is_cached, native_code_was_compiled
 from tiltsim.engine import EngineName, control_callback, make_engine
 from tiltsim.errors import InputError
+from tiltsim.interrupts import interrupts_kept
 from tiltsim.loop import EVALUATIONS, HEADER_SIZE, RECORDER, ControlSetup, Floats, Header, Loop
 from tiltsim.loops import control_setup, loop_of
 from tiltsim.scenario import Scenario
@@ -72,7 +73,9 @@ def make_plant(scenario: Scenario, controller: Any = None) -> Plant:
         from tiltsim.commanded_plant import ControlledPlant
 
         return ControlledPlant(scenario, controller)
-    return ThesisPlant(scenario) if scenario.simulation.plant == "thesis" else MujocoPlant(scenario)
+    thesis = scenario.simulation.plant == "thesis"
+    with interrupts_kept():  # it may compile
+        return ThesisPlant(scenario) if thesis else MujocoPlant(scenario)
 
 
 def choose_engine(scenario: Scenario) -> EngineName:
@@ -236,10 +239,17 @@ def flight_model(scenario: Scenario, parameters: int) -> mujoco.MjModel:
 
 
 _FLOWN_IN_ANY_MODEL: Final = frozenset(
-    {
-        *("title", "source", "without", "simulation", "initial", "gait", "reference", "sensors"),
+    (
+        "title",
+        "source",
+        "without",
+        "simulation",
+        "initial",
+        "gait",
+        "reference",
+        "sensors",
         "expect",
-    }
+    )
 )
 """Tables of a scenario that are parameters or initial state of a flight, or no part of it."""
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from tiltsim.controller import Controller, ControllerError, with_controller
 from tiltsim.flight import End, Flight
+from tiltsim.interrupts import interrupts_kept
 from tiltsim.limits import (
     ALTITUDE_ERROR,
     BODY_RATE,
@@ -60,7 +61,8 @@ def simulate(
         All samples up to the end. A flight that diverges or meets a singular decoupling matrix
         is a result, not an error: its log is complete up to there, and ``flight.end`` names the
         cause and, to one physics step, the time. So is a flight interrupted from the keyboard, or
-        by a controller of your own that raises or returns what is no command.
+        by a controller of your own that raises or returns what is no command. An interrupt before
+        the first sample raises KeyboardInterrupt.
     """
     if controller is not None:
         scenario = with_controller(scenario, controller)
@@ -83,7 +85,8 @@ def simulate(
             steps = min(simulation.record_steps, steps_left)
             count = max(1, min(chunk, steps_left // steps))
             began = perf_counter()
-            flown, end = fly_chunk(plant, watch, count, steps)
+            with interrupts_kept():
+                flown, end = fly_chunk(plant, watch, count, steps)
             for sample in flown:
                 keep(sample)
             steps_left -= count * steps
@@ -91,6 +94,8 @@ def simulate(
                 pace = CHUNK_TIME / max(perf_counter() - began, 1e-9)
                 chunk = max(1, min(int(count * pace), 2 * count, LARGEST_CHUNK))
     except KeyboardInterrupt:
+        if not samples:
+            raise
         end = End("interrupted", float(samples[-1][0]), "interrupted from the keyboard")
     except ControllerError as error:
         sample = _sample(plant)

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 # The outer bounds keep arithmetic far from overflow; nothing that flies comes near them.
 Positive = Annotated[float, Field(gt=0.0, le=1e9)]
+NotTiny = Annotated[float, Field(ge=1e-12, le=1e9)]  # for what others are divided by
 NonNegative = Annotated[float, Field(ge=0.0, le=1e9)]
 Period = Annotated[float, Field(ge=1e-3, le=1e9, description="s")]
 Factor = Annotated[float, Field(ge=-1e3, le=1e3)]

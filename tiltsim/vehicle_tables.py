@@ -11,7 +11,7 @@ from controllers.tilt_car.vehicle import THESIS_CAR, TiltCar
 from controllers.vehicle import PRESETS, Vehicle
 from tiltsim.messages import InvalidValueError
 from tiltsim.model import Pod, TiltServo
-from tiltsim.tables import Positive, Table
+from tiltsim.tables import NotTiny, Positive, Table
 
 if TYPE_CHECKING:
     from tiltsim.own_vehicle import OwnVehicle
@@ -67,9 +67,9 @@ class VehicleTable(Table):
     inertia: Annotated[tuple[Positive, Positive, Positive], Field(strict=False)] | None = Field(
         None, description="principal moments about the centre of mass, kg m^2, pods included"
     )
-    arm_length: Positive | None = Field(None, description="m")
-    thrust_coefficient: Positive | None = Field(None, description="N s^2/rad^2")
-    drag_coefficient: Positive | None = Field(None, description="N m s^2/rad^2")
+    arm_length: NotTiny | None = Field(None, description="m")
+    thrust_coefficient: NotTiny | None = Field(None, description="N s^2/rad^2")
+    drag_coefficient: NotTiny | None = Field(None, description="N m s^2/rad^2")
     gravity: Positive | None = Field(None, description="m/s^2")
     min_rotor_speed: Positive | None = Field(None, description="rad/s, absolute value")
     max_rotor_speed: Positive | None = Field(None, description="rad/s, absolute value")

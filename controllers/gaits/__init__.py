@@ -96,8 +96,8 @@ def tilt_reference(
 
     ``table`` holds the keyframes of gaits that have them (`controllers.gaits.keyframes`): a flat
     tuple of floats in Python, a one-dimensional array in native code; other gaits leave it unread.
-    Returns ``(alpha_1, ..., alpha_4, rate_1, ..., rate_4)``; at a jump the later angles and the
-    rate between jumps.
+    Returns ``(alpha_1, ..., alpha_4, rate_1, ..., rate_4)``. At a jump and at a corner what comes
+    after holds; but the first half of a trot's period includes its end, as ch. 4 prints it.
     """
     a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = planned_angles(time, gait, table)
     front = gait.scale

@@ -19,7 +19,7 @@ theta``, and slows down on the way there, for ``W`` grows without bound.
 
 from __future__ import annotations
 
-from math import cos, log, pi, sin, tan
+from math import copysign, cos, log, pi, sin, tan
 from typing import NamedTuple
 
 import numpy as np
@@ -154,8 +154,24 @@ def twist(speed_1: float, speed_2: float, car: TiltCar) -> float:
 
 
 def restored_lean(path: Orbit, car: TiltCar, rate: float) -> float:
-    """The lean (rad) at which a restoring rate (1/s) and the drift hold each other."""
-    lean = 0.0
-    for _ in range(100):
-        lean = drift_rate(lean, path, car) / rate
-    return lean
+    """The lean (rad) at which a restoring rate (1/s) and the drift hold each other.
+
+    There is one for every rate above 0, for the drift dies away towards the half angle.
+
+    Raises
+    ------
+    ValueError
+        If the rate is not above 0.
+    """
+    if not rate > 0.0:
+        raise ValueError(f"rate = {rate!r}: must be above 0")
+    low, high = 0.0, car.half_angle
+    for _ in range(200):  # bisection; both signs of the drift are alike
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            break
+        if abs(drift_rate(middle, path, car)) > rate * middle:
+            low = middle
+        else:
+            high = middle
+    return copysign(low, path.angular_frequency)

@@ -181,3 +181,17 @@ def test_restoring_holds_the_lean_where_drift_and_rate_balance():
     assert wanted == pytest.approx(drift_rate(0.0, PATH, THESIS_CAR), rel=1e-5)
     along, across = body_acceleration(end[0] ** 2, end[1] ** 2, THESIS_CAR)
     assert hypot(along, across) == pytest.approx(10.0, rel=1e-7)
+
+
+@pytest.mark.parametrize("rate", [1e-6, 3e-4, 0.1, 5.0])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_restoring_rate_however_slow_holds_the_lean_somewhere(rate, sign):
+    path = orbit(10.0, sign)
+    lean = restored_lean(path, THESIS_CAR, rate)
+    assert 0.0 < sign * lean < THESIS_CAR.half_angle
+    assert drift_rate(lean, path, THESIS_CAR) == pytest.approx(rate * lean, rel=1e-6)
+
+
+def test_no_rate_restores_nothing():
+    with pytest.raises(ValueError, match=r"rate = 0\.0: must be above 0"):
+        restored_lean(PATH, THESIS_CAR, 0.0)

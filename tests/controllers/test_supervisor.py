@@ -191,6 +191,7 @@ def test_a_flight_with_room_is_the_unsupervised_one_bit_for_bit(strategy):
     plain = tiltsim.simulate(tiltsim.parse_scenario(tables))
     tables["controller"] = {**tables["controller"], "supervisor": {"strategy": strategy}}
     watched = tiltsim.simulate(tiltsim.parse_scenario(tables))
+    assert len(watched) == len(plain) == 131
     assert not watched["supervision"].any()
     np.testing.assert_array_equal(watched.samples[:, : plain.samples.shape[1]], plain.samples)
 
@@ -234,6 +235,22 @@ def test_engines_batches_and_restarts_agree(law, strategy):
     restarted.state = saved
     restarted.advance(60)
     np.testing.assert_array_equal(restarted.state, straight.state)
+
+
+@pytest.mark.parametrize("strategy", ["scale", *WITH_STATES])
+def test_both_plants_fly_it_alike(strategy):
+    tables = tiltrotor(
+        gait={"type": "trot_continuous", "amplitude": 0.6, "period": 1.0},
+        controller={"supervisor": {"strategy": strategy, "min_margin": 1.2}},
+    )
+    flown = {}
+    for plant in ("mujoco", "thesis"):
+        tables["simulation"]["plant"] = plant
+        flown[plant] = tiltsim.simulate(tiltsim.parse_scenario(tables))
+        assert flown[plant]["supervision"].max() > 0.05
+    for column in ("alpha_ref_1", "supervision", "roll", "x"):
+        apart = np.abs(flown["mujoco"][column] - flown["thesis"][column]).max()
+        assert apart < 0.01, (column, apart)
 
 
 @pytest.mark.parametrize("strategy", WITH_STATES)

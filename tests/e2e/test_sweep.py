@@ -163,9 +163,12 @@ def test_plot_draws_a_map_of_two_axes(grid, tmp_path, capsys):
 
 def test_plot_draws_lines_and_says_what_was_lost(grid, tmp_path):
     text = GRID.replace("stop = 0.4", "stop = 3.1").replace("count = 3", "count = 2")
-    grid.write_text(text + '[plot]\nkind = "lines"\nx = "initial.attitude[0]"\n', encoding="utf-8")
+    grid.write_text(
+        text + '[plot]\nkind = "lines"\nx = "initial.attitude[0]"\nlog = ["y"]\n', encoding="utf-8"
+    )
     figure = sweep_figure(load_results(swept(grid, tmp_path / "out")), ("max_abs_roll",))
     assert figure.axes[0].get_xlabel() == "initial.attitude[0] (rad)"
+    assert (figure.axes[0].get_xscale(), figure.axes[0].get_yscale()) == ("linear", "log")
     assert len(figure.axes[0].lines) in {4, 5}  # two decouplers, their lost flights, the key
 
 

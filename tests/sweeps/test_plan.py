@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tiltsim.errors import InputError
-from tiltsim.sweeps.plan import Definition, Plan, load_definition
+from tiltsim.sweeps.plan import VALUES_TRIED, Definition, Plan, load_definition
 
 HEAD = """
 scenario = "ch04_tracking/circle#continuous_t2_modified"
@@ -33,6 +33,15 @@ relative = true
 low = 0.9
 high = 1.1
 """
+SEARCH = """
+[bisect]
+key = "gait.amplitude"
+start = 0.1
+stop = 1.0
+step = 0.1
+tolerance = 0.01
+holds = [{ metric = "diverged", equals = false }]
+"""
 
 
 @pytest.fixture
@@ -52,6 +61,17 @@ def test_axes_are_crossed_the_last_one_fastest(plan_of):
     assert [p["gait.period"] for p in points[:6]] == [1.0, 1.5, 2.0, 2.5, 3.0, 1.0]
     assert [p["gait.amplitude"] for p in points[::5]] == [0.1, 0.2, 0.3, 0.4, 0.5]
     assert sorted(i for n in range(plan.chunks) for i in plan.chunk(n)) == list(range(25))
+
+
+def test_a_table_is_no_value_of_an_axis(plan_of):
+    axis = """
+[[axis]]
+type = "list"
+key = "controller.gains"
+values = [{ attitude = { bandwidth = 20.0 }, altitude = { bandwidth = 8.0 } }]
+"""
+    with pytest.raises(InputError, match=r"controller\.gains is a table; vary its keys one by one"):
+        plan_of(axis).check()
 
 
 def test_axes_of_a_group_advance_together(plan_of):
@@ -212,6 +232,26 @@ def test_differences_are_named(plan_of, text, difference):
     assert bool(found) == bool(difference)
 
 
+def test_keys_that_came_after_a_definition_was_written_have_their_defaults(plan_of):
+    now = plan_of(PERIODS).definition
+    old = Definition.from_json(now.to_json())
+    del old.base["sensors"], old.base["simulation"]["control_latency"], old.sweep["keep_flights"]
+    assert old.difference(now) == ""
+    changed = plan_of(PERIODS + "[set]\nsimulation.timestep = 0.002").definition
+    assert "scenario.simulation.timestep" in old.difference(changed)
+    old.base["no_longer_known"] = 1
+    assert "no_longer_known was 1" in old.difference(now)
+
+
+@pytest.mark.parametrize("count", [10_000_000, 20_000])
+def test_huge_axes_are_refused_or_tried_in_a_few_places(plan_of, count):
+    axis = PERIODS.replace("5", str(count))
+    if count == 20_000:
+        assert len(plan_of(axis).check()) == VALUES_TRIED
+    with pytest.raises(InputError, match="more than 10000000 points"):
+        plan_of(axis + AMPLITUDES + MASS + "[sample]\ncount = 1000000")
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -239,6 +279,14 @@ def test_differences_are_named(plan_of, text, difference):
         ('metrics = ["realtime_factor"]\n' + PERIODS, ["metrics", "realtime_factor"]),
         (PERIODS + '[derive]\n"gait.amplitude" = "perod"', ["derive.gait.amplitude", "unknown"]),
         (PERIODS + '[derive]\n"gait.amplitude" = true', ["derive.gait.amplitude", "expression"]),
+        (PERIODS + '[derive]\n"gait.amplitude" = "1 / 0"', ["divides by zero"]),
+        (
+            PERIODS + 'relative = true\n[[axis]]\ntype = "list"\nkey = "gait.scale"\n'
+            'relative = true\nvalues = ["x"]',
+            ["axis.values", "relative values are numbers"],
+        ),
+        (SEARCH.replace("step = 0.1", "step = 1e-9"), ["bisect.step", "at most 1000000"]),
+        (SEARCH.replace("stop = 1.0", 'stop = "foo"'), [": bisect.stop", "foo is unknown"]),
         ('scenario = "no/such"\n' + PERIODS, ["scenario", "no/such"]),
         ('scenario = "ch04_tracking/circle"\n' + PERIODS, ["scenario", "choose a variant"]),
         (

@@ -16,9 +16,12 @@ import pytest
 from tests.sweeps.files import boundary_sweep, short_sweep
 from tiltsim import batch
 from tiltsim.errors import InputError
+from tiltsim.figures.sweep import sweep_figure
 from tiltsim.loading import parse_scenario
+from tiltsim.metrics import METRICS
 from tiltsim.simulation import simulate
 from tiltsim.sweeps import flying
+from tiltsim.sweeps.dataset import load_results
 from tiltsim.sweeps.folder import open_folder, write_durably
 from tiltsim.sweeps.plan import Plan, load_definition
 from tiltsim.sweeps.running import run_sweep
@@ -235,3 +238,38 @@ def test_processes_end_with_their_parent(tmp_path):
     else:
         os.killpg(process.pid, signal.SIGKILL)
         pytest.fail("processes outlive their parent")
+
+
+def test_a_damaged_folder_is_told_of_or_mended(tmp_path):
+    definition = load_definition(short_sweep(tmp_path / "sweep.toml"))
+    dataset = run_sweep(definition, tmp_path / "out")
+    whole = dataset.read_bytes()
+    dataset.write_bytes(whole[:100])  # follows from the parts
+    assert run_sweep(definition, tmp_path / "out").read_bytes() == whole
+    part = next(iter((tmp_path / "out" / "parts").iterdir()))
+    part.write_bytes(part.read_bytes()[:100])
+    with pytest.raises(InputError, match=f"{part.name}: not readable, delete it"):
+        run_sweep(definition, tmp_path / "out")
+
+
+def test_parts_with_other_columns_are_refused(tmp_path, monkeypatch):
+    definition = load_definition(short_sweep(tmp_path / "sweep.toml"))
+    run_sweep(definition, tmp_path / "out")
+    monkeypatch.setitem(METRICS, "a_metric_of_tomorrow", "of no use, m")
+    with pytest.raises(InputError, match=r"made by another tiltsim: .* a_metric_of_tomorrow"):
+        run_sweep(definition, tmp_path / "out")
+    assert sweep_figure(load_results(tmp_path / "out"))  # but they can be drawn
+
+
+def test_a_definition_that_is_none_is_refused(tmp_path):
+    definition = load_definition(short_sweep(tmp_path / "sweep.toml"))
+    run_sweep(definition, tmp_path / "out")
+    file = tmp_path / "out" / "sweep.json"
+    for text, words in (
+        ("{}", "keys are missing"),
+        ("junk", "not the definition"),
+        (file.read_text().replace('"axis"', '"axes"'), "axes"),
+    ):
+        file.write_text(text)
+        with pytest.raises(InputError, match=words):
+            load_results(tmp_path / "out")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -54,3 +55,8 @@ def test_a_coarse_tolerance_needs_no_bisection(tolerance):
     found, tried = search(lambda x: x < 0.25, 0.0, 1.0, 0.1, tolerance)
     assert found == Boundary(0.2, 0.3)
     assert len(tried) == 4
+
+
+def test_a_tolerance_finer_than_floats_ends_all_the_same():
+    found, _ = search(lambda x: x < 0.32, 0.0, 1.0, 0.1, 1e-30)
+    assert np.nextafter(found.holds, 1.0) == found.fails == 0.32

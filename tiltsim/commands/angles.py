@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import re
 from math import isfinite, pi
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.errors import InputError
 
 if TYPE_CHECKING:
     from controllers.vehicle import Vehicle
+
+LEAST: Final = 1e-12
+GREATEST: Final = 1e9
+"""What a parameter may be, far from underflow and overflow (SI units)."""
 
 
 def allow_negative_lists(parser: Any) -> None:
@@ -36,7 +40,8 @@ def parse_angles(option: str, text: str, count: int = 4) -> tuple[float, ...]:
     try:
         values = [float(part) for part in parts]
     except ValueError:
-        raise InputError(f"{option} {text}: must be {count} numbers, in rad") from None
+        what = "a number" if count == 1 else f"{count} numbers"
+        raise InputError(f"{option} {text}: must be {what}, in rad") from None
     return tuple(_checked(option, text, value) for value in values)
 
 
@@ -95,6 +100,6 @@ def _positive(place: str, text: str) -> float:
         value = float(text)
     except ValueError:
         value = -1.0
-    if not (isfinite(value) and value > 0.0):
-        raise InputError(f"{place} = {text}: must be a positive finite number")
+    if not LEAST <= value <= GREATEST:
+        raise InputError(f"{place} = {text}: must be a number from {LEAST:g} to {GREATEST:g}")
     return value

@@ -173,9 +173,10 @@ def _check_options(arguments: argparse.Namespace) -> None:
     if arguments.speed_limits is not None and kind != "attainable":
         raise InputError("--speed-limits: goes with --figure attainable")
     if arguments.plot is not None:
-        from tiltsim.figures.style import check_target
+        from tiltsim.figures.style import FORMATS
+        from tiltsim.files import prepare_file
 
-        check_target(arguments.plot)
+        prepare_file("--plot", arguments.plot, FORMATS)
 
 
 def _choose(arguments: argparse.Namespace) -> _Chosen:

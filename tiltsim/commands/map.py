@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.angles import allow_negative_lists, parse_angles, parse_vehicle
 from tiltsim.commands.text import aligned, json_text
+from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
 
 if TYPE_CHECKING:
     from controllers.two_color_planner import Circle, Polyline
     from controllers.vehicle import Vehicle
-
-ACCEPTED, REFUSED = 0, 1
 
 
 def add_parser(subparsers: Any) -> None:
@@ -25,7 +24,8 @@ def add_parser(subparsers: Any) -> None:
             "The Two Color Map of a vehicle: delta, P, the exact red and blue lines, the curve L "
             "and the grid search of ch. 6. With --leg or --circle, the verdict on a path."
         ),
-        epilog="exit codes: 0 done, 1 the path is refused, 2 invalid input",
+        epilog="exit codes: 0 done, 1 the path is refused by both theorems, or singular although "
+        "they accept it, as all of blue is, 2 invalid input",
     )
     allow_negative_lists(parser)
     parser.add_argument(
@@ -59,22 +59,24 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.errors import InputError
 
     if arguments.plot is not None:
-        from tiltsim.figures.style import check_target
+        from tiltsim.figures.style import FORMATS
+        from tiltsim.files import prepare_file
 
-        check_target(arguments.plot)
+        prepare_file("--plot", arguments.plot, FORMATS)
     vehicle = parse_vehicle(arguments.vehicle)
     path = _path(arguments, vehicle)
     try:
         report = map_report(vehicle, path)
     except ValueError as error:
-        raise InputError(f"path: {error}") from None
+        place = "path" if path is not None else f"--vehicle {arguments.vehicle}"
+        raise InputError(f"{place}: {error}") from None
     if arguments.plot is not None:
         from tiltsim.figures.style import save
         from tiltsim.figures.two_color_map import map_figure
 
         save(map_figure(vehicle, [("path", path)] if path else None), arguments.plot)
     print(json_text(report) if arguments.json else _summary(report))
-    return ACCEPTED if path is None or report["path"]["accepted"] else REFUSED
+    return DONE if path is None or report["path"]["sound"] else EXPECTATION_FAILED
 
 
 def _path(arguments: argparse.Namespace, vehicle: Vehicle) -> Polyline | Circle | None:
@@ -144,5 +146,5 @@ def _summary(report: dict[str, Any]) -> str:
         if path["accepted"]:
             lines.append(f"path: accepted by the {path['theorem']} theorem")
         lines += [f"path: refused: {reason}" for reason in path["reasons"]]
-        lines += [f"path: warning: {text}" for text in path["warnings"]]
+        lines += [f"path: singular: {text}" for text in path["warnings"]]
     return "\n".join(lines)

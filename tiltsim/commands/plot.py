@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-FORMATS: Final = (".png", ".svg", ".pdf")
 
 
 def add_parser(subparsers: Any) -> None:
@@ -101,10 +99,7 @@ def _sweep_figure(folder: Path, metrics: list[str], out: Path) -> Figure:
 
 
 def _check(out: Path) -> None:
-    from tiltsim.errors import InputError
+    from tiltsim.figures.style import FORMATS
     from tiltsim.files import prepare_file
 
-    if out.suffix.lower() not in FORMATS:
-        allowed = ", ".join(FORMATS)
-        raise InputError(f"--out {out}: unknown format {out.suffix!r}; choose {allowed}")
-    prepare_file("--out", out)
+    prepare_file("--out", out, FORMATS)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from tiltsim.commands.progress import progress_bar
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, FLIGHT_LOST, INTERRUPTED
+from tiltsim.interrupts import interrupts_deferred
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -77,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.out is not None:
         prepare_folder(arguments.out)
     if arguments.rerun is not None:
-        prepare_file("--rerun", arguments.rerun)
+        prepare_file("--rerun", arguments.rerun, (".rrd",))
 
     from controllers.vehicle import Vehicle
     from tiltsim.analysis import gait_warnings
@@ -93,7 +94,8 @@ def run(arguments: argparse.Namespace) -> int:
         with _RecordingAhead(scenario) as recording:
             flight = fly(scenario, arguments, recording.begin)
             _save(flight, arguments)
-            recording.file().save([flight], arguments.rerun)
+            with interrupts_deferred():
+                recording.file().save([flight], arguments.rerun)
     if flight.end.kind == "interrupted":
         kept = f"; the flight so far is in {arguments.out}" if arguments.out is not None else ""
         print(f"tiltsim: interrupted at t = {flight.end.time:.3f} s{kept}", file=sys.stderr)
@@ -162,7 +164,8 @@ def _recording_of(scenario: Scenario) -> RecordingFile:
 
 def _save(flight: Flight, arguments: argparse.Namespace) -> None:
     if arguments.out is not None:
-        flight.save(arguments.out)
+        with interrupts_deferred():
+            flight.save(arguments.out)
 
 
 def fly(

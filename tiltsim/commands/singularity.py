@@ -40,6 +40,11 @@ def run(arguments: argparse.Namespace) -> int:
         parse_angle("--roll", arguments.roll),
         parse_angle("--pitch", arguments.pitch),
     )
+    if arguments.plot is not None:
+        from tiltsim.figures.style import FORMATS
+        from tiltsim.files import prepare_file
+
+        prepare_file("--plot", arguments.plot, FORMATS)
     report = _report(vehicle, *attitude)
     if arguments.plot is not None:
         from tiltsim.figures.quadrotor_singularity import singularity_figure

@@ -44,37 +44,38 @@ def add_parser(subparsers: Any) -> None:
 
 def _size(text: str) -> tuple[int, int]:
     width, _, height = text.lower().partition("x")
-    size = int(width), int(height)
-    if not all(64 <= side <= 4096 and side % 2 == 0 for side in size):
-        raise argparse.ArgumentTypeError("must be even numbers from 64 to 4096, such as 1280x720")
-    return size
+    sides = [int(side) for side in (width, height) if side.isdecimal()]
+    if len(sides) != 2 or not all(64 <= side <= 4096 and side % 2 == 0 for side in sides):
+        raise argparse.ArgumentTypeError(
+            f"{text}: must be even numbers from 64 to 4096, such as 1280x720"
+        )
+    return sides[0], sides[1]
 
 
 def _frame_rate(text: str) -> int:
-    value = int(text)
-    if not 1 <= value <= 240:
-        raise argparse.ArgumentTypeError("must be from 1 to 240")
-    return value
+    if not (text.isdecimal() and 1 <= int(text) <= 240):
+        raise argparse.ArgumentTypeError(f"{text}: must be a whole number from 1 to 240")
+    return int(text)
 
 
 def _speed(text: str) -> float:
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
     if not 0.01 <= value <= 100.0:
-        raise argparse.ArgumentTypeError("must be from 0.01 to 100")
+        raise argparse.ArgumentTypeError(f"{text}: must be a number from 0.01 to 100")
     return value
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Draw and encode."""
-    from tiltsim.errors import InputError
     from tiltsim.files import load_flight, prepare_file
 
     flight = load_flight(arguments.flight)
     folder = arguments.flight if arguments.flight.is_dir() else arguments.flight.parent
     out = arguments.out or folder / "flight.mp4"
-    if out.suffix.lower() != ".mp4":
-        raise InputError(f"--out {out}: unknown format {out.suffix!r}; write FILE.mp4")
-    prepare_file("--out", out)
+    prepare_file("--out", out, (".mp4",))
 
     from tiltsim.video import prefer_offscreen_gl
 

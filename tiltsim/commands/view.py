@@ -52,6 +52,8 @@ def run(arguments: argparse.Namespace) -> int:
         view_recordings(recordings)
         return 0
 
+    if arguments.rerun is not None:
+        prepare_file("--rerun", arguments.rerun, (".rrd",))
     flights = [load_flight(path) for path in arguments.paths]
     if arguments.rerun is None:
         from tiltsim.rerun_stream import view_flights
@@ -60,7 +62,6 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     from tiltsim.rerun_stream import save_recording
 
-    prepare_file("--rerun", arguments.rerun)
     save_recording(flights, arguments.rerun)
     print(f"recording written to {arguments.rerun}; open it with: rerun {arguments.rerun}")
     return 0

@@ -21,7 +21,7 @@ from controllers.rotation import (
 )
 from controllers.scalar import Quad, Triple, scalar
 from controllers.vehicle import Vehicle
-from tiltsim.equations import quadrotor
+from tiltsim.equations.quadrotor import equations_of_motion, initial_state
 from tiltsim.equations.tiltrotor import rigid_body
 
 if TYPE_CHECKING:
@@ -55,6 +55,14 @@ def mechanics(scenario: Scenario) -> Mechanics:
         min_speed=-max_speed if vehicle.min_rotor_speed is None else vehicle.min_rotor_speed,
         max_speed=max_speed,
     )
+
+
+@scalar
+def clipped(value: float, low: float, high: float) -> float:
+    """The nearest number between two bounds; what is no number stays none."""
+    if value < low:
+        return low
+    return high if value > high else value
 
 
 class Driven(NamedTuple):
@@ -104,7 +112,7 @@ def tiltrotor_qvel(state: Sequence[float]) -> tuple[float, ...]:
 def servo_acceleration(told: float, angle: float, rate: float, mechanics: Mechanics) -> float:
     """``omega^2 (told - alpha) - 2 zeta omega alpha'`` (rad/s^2) of a pod without mass."""
     omega, limit = mechanics.servo_frequency, mechanics.max_tilt
-    told = min(limit, max(-limit, told))
+    told = clipped(told, -limit, limit)
     return omega * omega * (told - angle) - 2.0 * mechanics.servo_damping * omega * rate
 
 
@@ -150,7 +158,7 @@ def settled_tiltrotor(state: Sequence[float], mechanics: Mechanics) -> list[floa
     settled = list(state)
     for rotor in range(4):
         spin = -1.0 if rotor % 2 == 0 else 1.0
-        settled[26 + rotor] = spin * min(high, max(low, spin * state[26 + rotor]))
+        settled[26 + rotor] = spin * clipped(spin * state[26 + rotor], low, high)
         tilt, rate = state[18 + rotor], state[22 + rotor]
         if abs(tilt) > stop:
             settled[18 + rotor] = stop if tilt > 0.0 else -stop
@@ -210,7 +218,7 @@ def quadrotor_rates(
         lever * (ctrl[2] - ctrl[0]) + torque_y,
         vehicle.drag_coefficient * (ctrl[0] - ctrl[1] + ctrl[2] - ctrl[3]) + torque_z,
     )
-    return quadrotor.equations_of_motion(state, inputs, vehicle, push)
+    return equations_of_motion(state, inputs, vehicle, push)
 
 
 @scalar
@@ -236,7 +244,7 @@ DRIVEN: Final[dict[str, Driven]] = {
         qvel=quadrotor_qvel,
         rates=quadrotor_rates,
         settled=settled_quadrotor,
-        initial=quadrotor.initial_state,
+        initial=initial_state,
     ),
 }
 """By the vehicle's model."""

@@ -56,8 +56,20 @@ def attainable_figure(
         space.locator_params(nbins=5)
         space.set_box_aspect(None, zoom=0.92)
         _accelerations(plane, attainable_accelerations(angles, vehicle, limits))
+        _legend(figure)
         figure.supxlabel(_conditions(limits), fontsize=8, x=0.01, ha="left")
         return figure
+
+
+def _legend(figure: Figure) -> None:
+    from matplotlib.patches import Patch
+
+    handles = [
+        Patch(color=style.SKY, alpha=0.3, lw=0.0, label="all that is attainable"),
+        Patch(facecolor=style.BLUE, edgecolor=style.INK, alpha=0.45, label="at one thrust $F_Z$"),
+        Patch(facecolor=style.PALE, edgecolor=style.BLUE, label="accelerations"),
+    ]
+    figure.legend(handles=handles, loc="outside upper right", ncols=3)
 
 
 def _conditions(limits: tuple[float, float]) -> str:

@@ -18,7 +18,7 @@ from tiltsim.attitude_plane import (
     torque_free_directions,
 )
 from tiltsim.figures import style
-from tiltsim.figures.page import SIZE, add_headings, label, plan_view, widen
+from tiltsim.figures.page import SIZE, add_headings, cut_blow_up, label, plan_view, widen
 from tiltsim.figures.tilt_car import tilt_car_figure
 from tiltsim.loops import follows_position, loop_of
 from tiltsim.loops.supervised import SUPERVISION
@@ -34,13 +34,6 @@ INSTANTS: Final = 120
 
 _ROTORS: Final = (1, 2, 3, 4)
 _SUBSCRIPTS: Final = "₁₂₃₄"
-# Equal angles and speeds would hide each other: later lines are thinner and broken.
-_ROTOR_LINES: Final[tuple[dict[str, Any], ...]] = (
-    {"color": style.AMBER, "ls": "-", "lw": 3.0},
-    {"color": style.BLUE, "ls": "-", "lw": 1.8},
-    {"color": style.INK, "ls": (0, (4, 2)), "lw": 1.2},
-    {"color": style.SKY, "ls": (0, (1, 1.5)), "lw": 1.2},
-)
 
 
 def flight_figure(flight: Flight) -> Figure:
@@ -59,7 +52,9 @@ def rotorcraft_figure(flight: Flight) -> Figure:
         series: Any = left.subplots(3, 2, sharex=True)
         for axes, panel in zip(series.flat, panels, strict=True):
             panel(axes, flight)
-            axes.set_xlim(0.0, flight["time"][-1])
+            if panel is not _margin:
+                cut_blow_up(axes, flight)
+            style.time_axis(axes, flight["time"][-1])
         for axes in series[-1]:
             axes.set_xlabel("time (s)")
         above, below = right.subplots(2, 1)
@@ -96,7 +91,7 @@ def _position_error(axes: Any, flight: Flight) -> None:
 
 
 def _tilt_angles(axes: Any, flight: Flight) -> None:
-    for rotor, line in zip(_ROTORS, _ROTOR_LINES, strict=True):
+    for rotor, line in zip(_ROTORS, style.ROTOR_LINES, strict=True):
         name = f"α{_SUBSCRIPTS[rotor - 1]}"
         axes.plot(flight["time"], flight[f"alpha_{rotor}"], label=name, **line)
     widen(axes, 0.1)
@@ -104,7 +99,7 @@ def _tilt_angles(axes: Any, flight: Flight) -> None:
 
 
 def _rotor_speeds(axes: Any, flight: Flight) -> None:
-    for rotor, spin, line in zip(_ROTORS, SPIN, _ROTOR_LINES, strict=True):
+    for rotor, spin, line in zip(_ROTORS, SPIN, style.ROTOR_LINES, strict=True):
         speed = spin * flight[f"rotor_speed_{rotor}"]
         axes.plot(flight["time"], speed, label=f"{rotor}", **line)
     vehicle = flight.scenario.rotorcraft
@@ -144,13 +139,15 @@ def _roll_pitch_plane(axes: Any, flight: Flight) -> None:
     margin = flight["singularity_margin"]
     closest = int(np.argmin(np.abs(margin)))
     side = float(np.sign(margin[0])) or 1.0
-    _shade_forbidden(axes, n, side)
+    shaded = _shade_forbidden(axes, n, side)
     attitude = np.stack([flight["roll"], flight["pitch"]], axis=1)
     axes.plot(*attitude.T, color=style.BLUE, lw=0.9)
-    axes.plot(*singular_curves(n[[closest]], 181)[0].T, color=style.RED, lw=1.8)
+    curve = singular_curves(n[[closest]], 181)[0]
     here = attitude[closest]
-    there = nearest_singular(n[[closest]], attitude[[closest]])[0]
-    axes.plot(*np.stack([here, there]).T, color=style.INK, lw=1.0, ls="--")
+    if np.isfinite(curve).any():
+        axes.plot(*curve.T, color=style.RED, lw=1.8)
+        there = nearest_singular(n[[closest]], attitude[[closest]])[0]
+        axes.plot(*np.stack([here, there]).T, color=style.INK, lw=1.0, ls="--")
     axes.plot(*here, "o", color=style.RED, ms=5, zorder=5)
     axes.text(
         *(0.97, 0.03),
@@ -165,11 +162,11 @@ def _roll_pitch_plane(axes: Any, flight: Flight) -> None:
     axes.set_aspect("equal")
     axes.set_xlabel("roll φ (rad)")
     axes.set_ylabel("pitch θ (rad)")
-    axes.set_title("Attitudes flown; shaded: out of reach")
+    axes.set_title(f"Attitudes flown; {'shaded: out' if shaded else 'none is out'} of reach")
 
 
-def _shade_forbidden(axes: Any, n: np.typing.NDArray[np.float64], side: float) -> None:
-    """Shade what the gait puts out of reach, the darker the longer it does."""
+def _shade_forbidden(axes: Any, n: np.typing.NDArray[np.float64], side: float) -> bool:
+    """Shade what the gait puts out of reach, the darker the longer it does; whether it does."""
     instants = np.unique(np.linspace(0, len(n) - 1, INSTANTS).round().astype(int))
     edges = np.linspace(-HALF_WIDTH, HALF_WIDTH, 361)
     centres = 0.5 * (edges[1:] + edges[:-1])
@@ -182,6 +179,7 @@ def _shade_forbidden(axes: Any, n: np.typing.NDArray[np.float64], side: float) -
 
     shades = LinearSegmentedColormap.from_list("forbidden", ["#FFFFFF", FORBIDDEN, "#E9B49A"])
     axes.pcolormesh(edges, edges, share, cmap=shades, vmin=0.0, vmax=1.0, rasterized=True)
+    return bool(share.any())
 
 
 _PAGES: Final = {"rotorcraft": rotorcraft_figure, "tilt_car": tilt_car_figure}

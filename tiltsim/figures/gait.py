@@ -7,9 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from controllers.singularity import determinant, margin_over_gait, singular_values
+from controllers.singularity import (
+    determinant,
+    margin_over_gait,
+    singular_values,
+    torque_free_direction,
+)
 from controllers.unacceptable_attitudes import unacceptable_attitudes
 from tiltsim.analysis import NEARLY_SINGULAR
+from tiltsim.attitude_plane import ON_THE_FRAME
 from tiltsim.figures import style
 
 if TYPE_CHECKING:
@@ -96,13 +102,19 @@ def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> None:
     if not singular:
         axes.contourf(roll, pitch, allowed, levels=[0.5, 1.5], colors=[style.PALE])
     colors = colormaps[style.SEQUENTIAL](np.arange(len(curves)) / len(curves) * _LAST_SHADE)
-    for curve, color in zip(curves, colors, strict=True):
-        axes.plot(curve.roll, curve.pitch, color=style.RED if len(curves) == 1 else color, lw=1.3)
+    n = np.nan_to_num(torque_free_direction(angles, vehicle))
+    drawn = np.hypot(n[:, 0], n[:, 1]) > ON_THE_FRAME
+    for curve, color, is_drawn in zip(curves, colors, drawn, strict=True):
+        if is_drawn:
+            line = style.RED if len(curves) == 1 else color
+            axes.plot(curve.roll, curve.pitch, color=line, lw=1.3)
     values = singular_values(angles, vehicle)
     conditioning = float((values[:, 2] / values[:, 0]).min())
     if not singular and conditioning < NEARLY_SINGULAR:
         ratio = f"{conditioning:.0e}".replace("e-0", "e−")
         _note(axes, 0.75, f"nearly singular at every attitude:\nσ₃/σ₁ of τ is {ratio}")
+    elif not singular and not drawn.any():
+        _note(axes, 0.35, "no attitude is out of reach")
     if singular:
         share = "at every attitude"
         if singular < len(curves):
@@ -151,13 +163,8 @@ def _roll_pitch_legend(figure: Figure, *, constant: bool = False) -> None:
 
 def _angles(axes: Axes, gait: Gait) -> None:
     times = gait.sample_times(401)
-    # Opposite arms share a hue; on red they share their angle too, and both must be seen.
-    looks = [(style.SKY, "-", 3.4), (style.AMBER, "-", 3.4)]
-    looks += [(style.BLUE, "--", 1.3), (style.RED, "--", 1.3)]
-    for name, angle, (color, dashes, width) in zip(
-        "₁₂₃₄", gait.angles(times).T, looks, strict=True
-    ):
-        axes.plot(times, angle, dashes, color=color, lw=width, label=f"α{name}")
+    for name, angle, line in zip("₁₂₃₄", gait.angles(times).T, style.ROTOR_LINES, strict=True):
+        axes.plot(times, angle, label=f"α{name}", **line)
     axes.set_ylabel("tilt angle (rad)")
     axes.legend(ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
 

@@ -44,6 +44,13 @@ def _headings(flight: Flight) -> tuple[str, str]:
     return scenario.title or scenario.address or "Flight", "  ·  ".join(parts)
 
 
+LAST_MOMENTS: Final = 0.02
+"""Share of a lost flight whose end does not count for the scale of a panel."""
+
+FAR_BEYOND: Final = 4.0
+"""How many times wider its last moments must make a panel to be cut off."""
+
+
 def plan_view(axes: Any, flight: Flight) -> None:
     """The path seen from above."""
     x, y = flight["x"], flight["y"]
@@ -87,3 +94,23 @@ def widen(axes: Any, least: float) -> None:
     if high - low < least:
         middle = 0.5 * (low + high)
         axes.set_ylim(middle - 0.5 * least, middle + 0.5 * least)
+
+
+def cut_blow_up(axes: Any, flight: Flight) -> None:
+    """Scale a panel of a lost flight by what came before its last moments, if these go far beyond.
+
+    A loss ends in numbers of any size, next to which all of the flight would be a flat line.
+    """
+    if flight.end.kind == "completed":
+        return
+    last = max(1, round(LAST_MOMENTS * len(flight)))
+    series = [line.get_ydata() for line in axes.get_lines() if len(line.get_xdata()) == len(flight)]
+    if not series or len(flight) <= last:
+        return
+    values = np.array(series)
+    before = values[:, :-last]
+    low, high = float(before.min()), float(before.max())
+    if np.ptp(values) > FAR_BEYOND * max(high - low, 1e-3 * abs(high), 1e-6):
+        room = 0.3 * max(high - low, 0.1 * abs(high), 1e-2)
+        axes.set_ylim(low - room, high + room)
+        axes.text(0.995, 0.02, "ends off scale", transform=axes.transAxes, ha="right", fontsize=7.5)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.errors import InputError
+from tiltsim.files import replacing
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -23,11 +24,26 @@ PURPLE: Final = "#CC79A7"
 SKY: Final = "#56B4E9"
 INK: Final = "#222222"
 GREY: Final = "#8A8A8A"
-PALE: Final = "#E4EEF3"
+PALE: Final = "#D6E6EF"
 CYCLE: Final = (BLUE, RED, GREEN, PURPLE, AMBER, SKY, INK)
+DASHES: Final[tuple[Any, ...]] = (
+    *("-", (0, (6, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2))),
+    *((0, (3, 1)), (0, (10, 3)), (0, (3, 1, 1, 1, 1, 1))),
+)
+MARKERS: Final = "os^DvPX"
+"""Dashes and markers that go with the colours of `CYCLE`, for prints without colour."""
 SEQUENTIAL: Final = "cividis"
 
-FORMATS: Final = ("pdf", "png", "svg")
+# Equal angles and speeds would hide each other: later lines are thinner and broken.
+ROTOR_LINES: Final[tuple[dict[str, Any], ...]] = (
+    {"color": AMBER, "ls": "-", "lw": 3.0},
+    {"color": BLUE, "ls": "-", "lw": 1.8},
+    {"color": INK, "ls": (0, (4, 2)), "lw": 1.2},
+    {"color": SKY, "ls": (0, (1, 1.2)), "lw": 1.6},
+)
+"""How the lines of rotors 1 to 4 are drawn in one panel, in this order."""
+
+FORMATS: Final = (".png", ".svg", ".pdf")
 """File formats of a figure, by the ending of the file."""
 
 _SETTINGS: Final = {
@@ -89,39 +105,26 @@ def angle_axis(axes: Axes, axis: str, limit: float) -> None:
     set_limits(-limit, limit)
 
 
-def check_target(path: Path) -> None:
-    """Refuse a file that `save` could not write, before any work is done for it.
-
-    Raises
-    ------
-    InputError
-        If the format is unknown, or the file or its folder is missing or closed.
-    """
-    ending = path.suffix.lstrip(".").lower()
-    if ending not in FORMATS:
-        raise InputError(f"--plot {path}: unknown format {ending!r}; choose {', '.join(FORMATS)}")
-    if path.is_dir():
-        raise InputError(f"--plot {path}: is a folder")
-    if not path.absolute().parent.is_dir():
-        raise InputError(f"--plot {path}: its folder does not exist")
-    if not os.access(path if path.exists() else path.absolute().parent, os.W_OK):
-        raise InputError(f"--plot {path}: cannot be written: permission denied")
+def time_axis(axes: Axes, end: float) -> None:
+    """Limits from zero to the end of a flight (s), which may have ended where it began."""
+    axes.set_xlim(0.0, end if end > 0.0 else 1.0)
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure; the ending of ``path`` chooses the format.
+    """Write a figure whole or not at all; the ending of ``path`` chooses the format.
 
-    Equal figures give equal files: no date is written.
+    Equal figures give equal files: no date is written. Callers have asked
+    `tiltsim.files.prepare_file` whether the file can be written.
 
     Raises
     ------
     InputError
-        As `check_target`, or if writing fails.
+        If writing fails.
     """
-    check_target(path)
+    ending = path.suffix.lower()
     undated = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
     try:
-        with paper_style():
-            figure.savefig(path, metadata=undated.get(path.suffix.lower()))
+        with paper_style(), replacing(path) as temporary:
+            figure.savefig(temporary, format=ending[1:], metadata=undated.get(ending))
     except OSError as error:
-        raise InputError(f"--plot {path}: cannot be written: {error.strerror}") from error
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from error

@@ -11,7 +11,9 @@ from tiltsim.errors import InputError
 from tiltsim.figures.distributions import distributions_figure
 from tiltsim.figures.style import (
     CYCLE,
+    DASHES,
     GREY,
+    MARKERS,
     PALE,
     RED,
     SEQUENTIAL,
@@ -89,7 +91,8 @@ def _text_axes(results: SweepResults) -> list[str]:
 
 
 def _metrics(results: SweepResults, wanted: tuple[str, ...]) -> tuple[str, ...]:
-    kept = results.plan.metrics
+    # Results of an earlier tiltsim lack the metrics that came later.
+    kept = tuple(name for name in results.plan.metrics if name in results.columns)
     chosen = wanted or results.plan.sweep.plot.metrics
     for name in chosen:
         if name not in kept:
@@ -124,6 +127,16 @@ def _panel_grid(rows: int, columns: int, width: float, height: float) -> tuple[F
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
+def _look(number: int) -> dict[str, Any]:
+    """Colour and dashes of a line, by its number."""
+    return {"color": CYCLE[number % MAX_LINES], "ls": DASHES[number % len(DASHES)]}
+
+
+def _mark(number: int) -> dict[str, str]:
+    """The marker that goes with `_look`."""
+    return {"marker": MARKERS[number % len(MARKERS)]}
+
+
 # --- lines ---------------------------------------------------------------------------------------
 
 
@@ -141,7 +154,7 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
                 order = np.argsort(abscissa[group], kind="stable")
                 values = np.where(flown, results.columns[metric], np.nan)[group][order]
                 line = abscissa[group][order]
-                axes.plot(line, values, "o-", ms=3, color=color, label=name)
+                axes.plot(line, values, ms=3.5, label=name, **_look(number), **_mark(number))
                 lost = line[np.isnan(values)]
                 axes.plot(
                     *(lost, np.full(len(lost), 0.03 + 0.04 * number), "x"),
@@ -226,7 +239,7 @@ def _boundary_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure
             color = CYCLE[number % MAX_LINES]
             order = np.argsort(abscissa[group], kind="stable")
             line, last, first = (v[group][order] for v in (abscissa, holds, fails))
-            axes.plot(line, last, "o-", ms=3.5, color=color, label=name)
+            axes.plot(line, last, marker="o", ms=3.5, label=name, **_look(number))
             axes.fill_between(line, last, first, color=color, alpha=0.25, lw=0)
             whole = np.isnan(first)
             axes.plot(line[whole], last[whole], "^", ms=6, color=color)
@@ -245,7 +258,7 @@ def _boundary_key(axes: Axes, holds: Column, fails: Column) -> None:
     words = ["▲ holds to the end"] if np.isnan(fails).any() else []
     words += ["× fails at the start"] if np.isnan(holds).any() else []
     place: Any = {"xycoords": "axes fraction", "ha": "right", "va": "bottom", "fontsize": 8}
-    axes.annotate("\n".join(words), (0.99, 0.01), **place)
+    axes.annotate("   ".join(words), (1.0, 1.015), **place)
 
 
 def _plane_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure:
@@ -282,5 +295,9 @@ def _plane_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure:
         add_legend(axes, plot.lines)
     for axes in grid.flat[len(columns) :]:
         axes.set_axis_off()
+    reached = np.concatenate([x[~np.isnan(holds)], y[~np.isnan(holds)], [-1e-3, 1e-3]])
+    for axes, (_, mask) in zip(grid.flat, columns):
+        if np.isnan(holds[mask]).all():  # nothing to see: as wide as the others
+            axes.plot([reached.min(), reached.max()], [reached.min(), reached.max()], alpha=0.0)
     _boundary_key(grid.flat[0], np.zeros(1), fails)
     return figure

@@ -98,7 +98,7 @@ def _lyapunov(axes: Any, flight: Flight) -> None:
 
 
 def _whole(axes: Any, flight: Flight) -> None:
-    axes.set_xlim(0.0, flight["time"][-1])
+    style.time_axis(axes, flight["time"][-1])
 
 
 def _portrait(axes: Any, flight: Flight) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import pi
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -19,10 +19,14 @@ if TYPE_CHECKING:
     from controllers.vehicle import Vehicle
 
 
+BELOW: Final = "#F8F8F8"
+"""Where R < 0 on red."""
+
+
 def map_figure(vehicle: Vehicle, paths: list[tuple[str, Path]] | None = None) -> Figure:
     """Regions S_U and S_D of red, the curve L, P, and paths as pairs of label and path."""
     with style.paper_style():
-        figure = style.new_figure(7.0, 4.8)
+        figure = style.new_figure(5.4, 6.1)
         axes: Any = figure.subplots()
         axes.grid(False)
         limit = pi / 2
@@ -30,7 +34,7 @@ def map_figure(vehicle: Vehicle, paths: list[tuple[str, Path]] | None = None) ->
         alpha_1, alpha_2 = np.meshgrid(side, side)
         residual = red_residual(alpha_1, alpha_2, vehicle)
         axes.contourf(
-            alpha_1, alpha_2, residual, [-np.inf, 0.0, np.inf], colors=["#F3F3F3", style.PALE]
+            alpha_1, alpha_2, residual, [-np.inf, 0.0, np.inf], colors=[BELOW, style.PALE]
         )
         inside = np.linspace(-limit, limit, 801)[1:-1]
         axes.plot(inside, curve_l(inside, vehicle), color=style.INK, lw=1.6)
@@ -48,13 +52,13 @@ def map_figure(vehicle: Vehicle, paths: list[tuple[str, Path]] | None = None) ->
         shown: set[str] = set()
         for label, path in paths or []:
             shown |= _draw_path(axes, label, path, vehicle)
-        _legend(axes, f"P = ({first:.4f}, {second:.4f})".replace("-", "−"), shown)
+        _legend(figure, f"P = (δ, −δ), δ = {first:.4f} rad", shown)
         style.angle_axis(axes, "x", limit)
         style.angle_axis(axes, "y", limit)
         axes.set_aspect("equal")
         axes.set_xlabel("α₁ (rad)")
         axes.set_ylabel("α₂ (rad)")
-        axes.set_title("Two Color Map: sign of R on red (blue has rank 2 everywhere)")
+        axes.set_title("Two Color Map: sign of R on red; blue is singular everywhere")
         return figure
 
 
@@ -83,27 +87,32 @@ def _draw_path(axes: Axes, label: str, path: Path, vehicle: Vehicle) -> set[str]
     return shown | ({"crossing"} if verdict.crossings else set())
 
 
-def _legend(axes: Axes, label_of_p: str, shown: set[str]) -> None:
+def _legend(figure: Figure, label_of_p: str, shown: set[str]) -> None:
     from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
     dashed = (0, (5, 3))
     handles = [
-        Line2D([], [], color=style.INK, lw=1.6, label="L: tan α₂ = tan α₁ − 2r"),
-        Line2D([], [], color=style.INK, lw=0.6, ls=":", label="other zeros of R"),
+        Patch(facecolor=style.PALE, edgecolor=style.GREY, lw=0.4, label="$S_U$: R > 0 on red"),
+        Patch(facecolor=BELOW, edgecolor=style.GREY, lw=0.4, label="$S_D$: R < 0 on red"),
+        Line2D([], [], color=style.INK, lw=1.6, label="L, R = 0: tan α₂ = tan α₁ − 2 tan δ"),
+        Line2D([], [], color=style.INK, lw=0.6, ls=":", label="R = 0 as well"),
         Line2D([], [], color=style.AMBER, marker="o", mec=style.INK, ls="", label=label_of_p),
-        Line2D([], [], color=style.GREY, lw=0.8, ls=dashed, label="|α₁|, |α₂| ≤ 1 (ch. 8)"),
+        Line2D([], [], color=style.GREY, lw=0.8, ls=dashed, label="|α₁|, |α₂| ≤ 1, as ch. 8 asks"),
     ]
-    blue = Line2D([], [], color=style.BLUE, lw=1.8, ls=(0, (4, 2)), label="blue path (rank 2)")
+    blue = Line2D([], [], color=style.BLUE, lw=1.8, ls=(0, (4, 2)), label="blue path: singular")
     marks = [
         (Line2D([], [], color=style.RED, lw=1.8, label="red path"), "red" in shown),
         (blue, "blue" in shown),
         (
-            Line2D([], [], color=style.INK, marker="x", mew=1.8, ls="", label="red crosses L"),
+            Line2D(
+                [], [], color=style.INK, marker="x", mew=1.8, ls="", label="red meets L: singular"
+            ),
             "crossing" in shown,
         ),
     ]
     handles += [mark for mark, is_shown in marks if is_shown]
-    axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    figure.legend(handles=handles, loc="outside lower center", ncols=2)
 
 
 def _outlines(path: Path) -> list[tuple[str, Any]]:

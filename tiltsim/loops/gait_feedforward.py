@@ -6,27 +6,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-import numpy as np
-
 from controllers.attitude_altitude import STATE_FIELDS
 from controllers.decouplers import DECOUPLERS
 from controllers.gait_feedforward import INTEGRAL_FIELDS, Parameters, tracking_inputs
 from controllers.gaits import tilt_reference
 from controllers.references import position_reference
 from controllers.scalar import Triple, scalar
-from controllers.supervisor import gait_share, governed
+from controllers.supervisor import AT_REST, gait_share, governed
 from controllers.vehicle import drag_ratio
 from tiltsim.controller_tables import AttitudeAltitudeController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
 from tiltsim.loops.tiltrotor import (
-    REFERENCE_COLUMNS,
     SUPERVISOR_FIELDS,
-    TILT_REFERENCE_COLUMNS,
     follows_position,
     gait_singularity,
     initial_rotor_speeds,
     observe_tiltrotor,
+    reference_columns,
     refreshed_controls,
     regularity,
     rotor_spins,
@@ -141,33 +138,73 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     return ControlSetup(ControlParameters(signature, lead, law), table)
 
 
-def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    law, table = setup.parameters.law, setup.table
-    fields = (*STATE_FIELDS, *TILT_RATE_COLUMNS, *INTEGRAL_FIELDS)
-    values = np.stack([samples[name] for name in fields], axis=-1).tolist()
-    resting = np.zeros((len(values), 2))
-    states = [samples[name] for name in SUPERVISOR_FIELDS if name in samples]
-    governors = (np.stack(states, axis=-1) if states else resting).tolist()
+@scalar
+def references_under(
+    time: float,
+    state: Sequence[float],
+    governor: Triple,
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, float, float, float, float, float]:
+    """Position (m) and attitude (rad) to track at a time: the state is `_STATES`."""
+    law = parameters.law
+    x, y, z, _, _, _, _, _, _ = position_reference(time, law.reference, table)
+    _, _, _, _, _, _, _, roll, pitch, yaw = tracking_inputs(
+        time,
+        (
+            *(state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7]),
+            *(state[8], state[9], state[10], state[11], state[12], state[13], state[14]),
+            *(state[15], state[16], state[17], state[18], state[19]),
+        ),
+        (state[20], state[21], state[22], state[23]),
+        (state[24], state[25], state[26]),
+        law,
+        table,
+        governor,
+    )
+    return x, y, z, roll, pitch, yaw
+
+
+@scalar
+def references_in_force(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """Columns of references at a time: the state is `_STATES`."""
+    law = parameters.law
+    planned = tilt_reference(time, law.gait, table)
+    share = gait_share(planned, state[6], state[7], law.supervisor, drag_ratio(law.vehicle))
+    return (
+        *references_under(time, state, AT_REST, parameters, table),
+        *servo_commands(planned, share, 0.0),
+    )
+
+
+@scalar
+def supervised_references(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """As `references_in_force`, under a supervisor whose two states follow `_STATES`."""
+    law = parameters.law
+    governor = (state[27], state[28], 0.0)
     ratio = drag_ratio(law.vehicle)
-    rows = []
-    for time, value, (held, rate) in zip(samples["time"].tolist(), values, governors, strict=True):
-        governor = held, rate, 0.0
-        position = position_reference(time, law.reference, table)[:3]
-        attitude = tracking_inputs(
-            time, value[:20], value[20:24], value[24:], law, table, governor
-        )[7:]
-        if states:
-            told = supervised_commands(
-                time, governor, law.gait, table, law.supervisor, ratio, lead=0.0
-            )
-        else:
-            planned = tilt_reference(time, law.gait, table)
-            share = gait_share(planned, value[6], value[7], law.supervisor, ratio)
-            told = servo_commands(planned, share, 0.0)
-        rows.append((*position, *attitude, *told))
-    names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)
-    columns = np.array(rows).reshape(len(rows), len(names))
-    return dict(zip(names, columns.T, strict=True)) | gait_singularity(samples, law.vehicle)
+    return (
+        *references_under(time, state, governor, parameters, table),
+        *supervised_commands(time, governor, law.gait, table, law.supervisor, ratio, 0.0),
+    )
+
+
+_STATES: Final = (*STATE_FIELDS, *TILT_RATE_COLUMNS, *INTEGRAL_FIELDS)
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    columns = reference_columns(references_in_force, _STATES, samples, setup)
+    return columns | gait_singularity(samples, setup.parameters.law.vehicle)
+
+
+def _derive_supervised(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    fields = (*_STATES, *SUPERVISOR_FIELDS)
+    columns = reference_columns(supervised_references, fields, samples, setup)
+    return columns | gait_singularity(samples, setup.parameters.law.vehicle)
 
 
 @scalar
@@ -287,6 +324,7 @@ SUPERVISED_GAIT_FEEDFORWARD: Final = replace(
     controls=supervised_controls,
     initial_activations=lambda s, _setup: (*initial_rotor_speeds(s), *(0.0,) * 5),
     observe=observe_supervised,
+    derive=_derive_supervised,
     equations=None,
     law_states=5,
     law_fields=(*INTEGRAL_FIELDS, *SUPERVISOR_FIELDS),

@@ -273,25 +273,27 @@ def supervised_references(
     return x, y, z, roll, pitch, yaw, a1, a2, a3, a4
 
 
+def reference_columns(
+    in_force: Callable[..., tuple[float, ...]],
+    fields: Sequence[str],
+    samples: Mapping[str, Floats],
+    setup: ControlSetup,
+) -> dict[str, Floats]:
+    """The columns that a function such as `references_in_force` tells of samples' ``fields``."""
+    states = np.stack([samples[name] for name in fields], axis=-1)
+    names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)
+    rows = evaluate_rows(in_force, len(names), samples["time"], states, setup)
+    return dict(zip(names, rows.T, strict=True))
+
+
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    return _references(samples, setup, STATE_FIELDS, references_in_force)
+    columns = reference_columns(references_in_force, STATE_FIELDS, samples, setup)
+    return columns | gait_singularity(samples, setup.parameters.law.vehicle)
 
 
 def _derive_supervised(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     fields = (*STATE_FIELDS, *SUPERVISOR_FIELDS)
-    return _references(samples, setup, fields, supervised_references)
-
-
-def _references(
-    samples: Mapping[str, Floats],
-    setup: ControlSetup,
-    fields: Sequence[str],
-    references: Callable[..., tuple[float, ...]],
-) -> dict[str, Floats]:
-    states = np.stack([samples[name] for name in fields], axis=-1)
-    rows = evaluate_rows(references, samples["time"], states, setup)
-    names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)
-    columns = dict(zip(names, rows.reshape(-1, len(names)).T, strict=True))
+    columns = reference_columns(supervised_references, fields, samples, setup)
     return columns | gait_singularity(samples, setup.parameters.law.vehicle)
 
 

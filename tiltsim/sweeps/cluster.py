@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import logging
+import re
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -28,6 +29,10 @@ def fly_on_cluster(
 
 
 def _connect(address: str) -> Any:
+    if not re.search(r"[\w\]]:\d+$", address):
+        raise InputError(
+            f"--cluster {address}: no scheduler's address; write one such as tcp://192.168.0.1:8786"
+        )
     try:
         from distributed import Client
     except ImportError:

@@ -9,12 +9,14 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import ValidationError
 
 from tiltsim.errors import InputError
-from tiltsim.messages import show
+from tiltsim.messages import one_line, show
 from tiltsim.sweeps.expressions import evaluate
 from tiltsim.sweeps.folder import DATASET, DEFINITION, read_definition
 from tiltsim.sweeps.plan import Plan
+from tiltsim.sweeps.tables import Sweep
 
 Column = npt.NDArray[Any]
 
@@ -69,7 +71,12 @@ def load_results(folder: Path) -> SweepResults:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    plan = Plan(read_definition(folder / DEFINITION))
+    definition = read_definition(folder / DEFINITION)
+    try:
+        plan = Plan(definition)
+    except ValidationError as error:
+        mistake = one_line(error, definition.sweep, Sweep)
+        raise InputError(f"{folder / DEFINITION}: {mistake}") from None
     finished = folder / DATASET
     files = [finished] if finished.exists() else sorted(folder.glob("parts/[0-9]*.parquet"))
     if not files:

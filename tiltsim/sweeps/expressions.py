@@ -50,9 +50,18 @@ def evaluate(expression: str, values: Mapping[str, Any]) -> float:
         In a few words: what cannot be read, or has no value.
     """
     try:
-        return float(_value(_parse(expression), values))
-    except (ArithmeticError, TypeError) as error:
+        value = _value(_parse(expression), values)
+    except ZeroDivisionError:
+        raise ValueError("divides by zero") from None
+    except OverflowError:
+        raise ValueError("is too large") from None
+    except ArithmeticError as error:
         raise ValueError(f"has no value: {error}") from None
+    except TypeError:
+        raise ValueError("applies something to what it is not for") from None
+    if not (_is_number(value) and math.isfinite(value)):
+        raise ValueError("is no real number")
+    return float(value)
 
 
 def names(expression: str) -> set[str]:

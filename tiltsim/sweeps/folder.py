@@ -39,9 +39,42 @@ class SweepFolder:
         """The finished dataset."""
         return self.path / DATASET
 
+    def check(self) -> None:
+        """Raise `InputError` where a finished chunk cannot be read, or has other columns."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        from tiltsim.sweeps.flying import schema
+
+        wanted = schema(self._plan)
+        for file in sorted(self._parts.glob("[0-9]*.parquet")):
+            try:
+                found = pq.read_schema(file)
+            except (OSError, pa.ArrowException) as error:
+                reason = str(error).partition("\n")[0]
+                raise InputError(f"{file}: not readable, delete it: {reason}") from error
+            odd = {*found.names} ^ {*wanted.names}
+            if odd:
+                raise InputError(
+                    f"--out {self.path}: made by another tiltsim: {file.name} differs in column "
+                    f"{min(odd)}; choose another folder, or delete this one"
+                )
+
     def finished(self) -> set[int]:
         """Numbers of the chunks that are safe on disk."""
         return {int(file.stem) for file in self._parts.glob("[0-9]*.parquet")}
+
+    @property
+    def is_joined(self) -> bool:
+        """Whether the dataset is there and whole."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        try:
+            pq.read_schema(self.dataset)
+        except (OSError, pa.ArrowException):
+            return False
+        return True
 
     def keep(self, part: Part) -> None:
         """Make a finished chunk safe: when this returns, no crash can lose it."""
@@ -100,15 +133,19 @@ def open_folder(path: Path, plan: Plan) -> Iterator[SweepFolder]:
             raise InputError(f"--out {path}: holds other results; choose another folder")
         for folder in ("parts", *(["flights"] if plan.sweep.keep_flights else [])):
             (path / folder).mkdir(exist_ok=True)
+        opened = SweepFolder(path, plan)
+        opened.check()
         write_durably(definition, plan.definition.to_json().encode())
-        yield SweepFolder(path, plan)
+        yield opened
 
 
 def read_definition(file: Path) -> Definition:
     """The definition that a folder was made for. Raises InputError where it cannot be read."""
     try:
         return Definition.from_json(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError, TypeError) as error:
+    except TypeError:
+        raise InputError(f"{file}: not the definition of a sweep: keys are missing") from None
+    except (OSError, ValueError) as error:
         raise InputError(f"{file}: not the definition of a sweep: {error}") from None
 
 

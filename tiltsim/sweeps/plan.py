@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
 from math import prod
@@ -37,6 +37,7 @@ from tiltsim.scenario import Scenario
 from tiltsim.sweeps.expressions import evaluate, names
 from tiltsim.sweeps.tables import (
     AxisTable,
+    BisectTable,
     CasesAxis,
     GridAxis,
     NormalAxis,
@@ -48,6 +49,10 @@ from tiltsim.sweeps.tables import (
 from tiltsim.vehicle_tables import VehicleTable
 
 MAX_POINTS: Final = 10_000_000
+MAX_SEARCH: Final = 1_000_000
+"""Steps that a search may walk at one point."""
+VALUES_TRIED: Final = 1000
+"""So many values of an axis are tried before any is flown."""
 LARGEST_CHUNK: Final = 32
 """Points of a chunk unless the file says otherwise: few enough to lose little when killed."""
 
@@ -90,13 +95,27 @@ class Definition:
         return Definition(**json.loads(text))
 
     def difference(self, other: Definition) -> str:
-        """The first thing in which another definition would give other rows, else empty."""
-        ours, theirs = _flat(self._decisive()), _flat(other._decisive())
+        """The first thing in which another definition would give other rows, else empty.
+
+        A key that one of them does not name, as it was written before there was such a key, has
+        its default there.
+        """
+        ours, theirs = (_flat(known._completed()._decisive()) for known in (self, other))
         for key in [*ours, *theirs]:
             before, now = ours.get(key), theirs.get(key)
             if before != now:
                 return f"{key} was {show(before)} and is {show(now)}"
         return ""
+
+    def _completed(self) -> Definition:
+        """The same with today's defaults written out; as it is where it is no longer valid."""
+        try:
+            sweep = Sweep.model_validate(self.sweep).model_dump_json(exclude_none=True)
+            base = without_none(parse_scenario(self.base).model_dump(mode="json"))
+        except (ValidationError, InputError):
+            return self
+        base.pop("expect", None)
+        return replace(self, sweep=json.loads(sweep), base=base)
 
     def _decisive(self) -> dict[str, Any]:
         sweep = {key: value for key, value in self.sweep.items() if key not in COSMETIC}
@@ -189,6 +208,7 @@ class Plan:
         self.definition = definition
         self.sweep = Sweep.model_validate(definition.sweep)
         self.base = definition.base
+        self._check_count()
         self._groups = self._make_groups()
         axes = self.sweep.axis
         self._drawn = [axis for axis in axes if isinstance(axis, UniformAxis | NormalAxis)]
@@ -196,8 +216,6 @@ class Plan:
         self._cases = [axis for axis in axes if isinstance(axis, CasesAxis)]
         samples = self.sweep.sample.count if self.sweep.sample is not None else 1
         self._lengths = [*(len(group) for group in self._groups), samples]
-        if len(self) > MAX_POINTS:
-            raise self._mistake("axis", len(self), f"more than {MAX_POINTS} points")
 
     def __len__(self) -> int:
         """Number of points."""
@@ -252,7 +270,8 @@ class Plan:
 
     def derived(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """What ``[derive]`` makes of the axes' values. Raises InputError where it makes nothing."""
-        return {key: self._evaluate(key, rule, values) for key, rule in self.sweep.derive.items()}
+        rules = self.sweep.derive.items()
+        return {key: self._evaluate(f"derive.{key}", rule, values) for key, rule in rules}
 
     def stop(self, values: Mapping[str, Any]) -> float:
         """Where the bisected key stops at a point."""
@@ -277,16 +296,20 @@ class Plan:
         return parse_scenario(self.document(values), self.definition.address)
 
     def check(self) -> list[Scenario]:
-        """Try every value of every axis, with the others at their first.
+        """Try the values of every axis, with the others at their first.
 
-        Returns the scenarios. Raises `InputError` where one is invalid.
+        Of an axis with more than `VALUES_TRIED` as many, spread evenly and both ends among them;
+        what is wrong with others is told in their rows. Returns the scenarios. Raises `InputError`
+        where one is invalid.
         """
         self._check_names()
         first = self.point(0)
         points = [first]
         for position, length in enumerate(self._lengths[:-1]):
             stride = prod(self._lengths[position + 1 :])
-            points += [self.point(step * stride) for step in range(1, length)]
+            count = min(length, VALUES_TRIED)
+            places = [place * (length - 1) // max(1, count - 1) for place in range(1, count)]
+            points += [self.point(place * stride) for place in places]
         for values in points:
             tables = [key for key, value in values.items() if isinstance(value, dict)]
             if tables:
@@ -301,8 +324,15 @@ class Plan:
         start = {} if bisect is None else {bisect.key: bisect.start}
         for values in points:
             if bisect is not None:
-                self.stop(values)
+                self._check_search(bisect, self.stop(values))
         return [self.scenario(values | start) for values in points]
+
+    def _check_search(self, bisect: BisectTable, stop: float) -> None:
+        """Refuse a walk that would never end."""
+        steps = abs(stop - bisect.start) / bisect.step
+        if steps > MAX_SEARCH:
+            allowed = f"{steps:.3g} steps to stop = {stop:g}; at most {MAX_SEARCH}"
+            raise self._mistake("bisect.step", bisect.step, allowed)
 
     def _check_names(self) -> None:
         sweep = self.sweep
@@ -327,6 +357,18 @@ class Plan:
         for key in sweep.derive:
             if "." not in key:
                 raise self._mistake("derive", key, "must be a key of the scenario, as gait.angles")
+
+    def _check_count(self) -> None:
+        """Refuse more points than a sweep may have, before any of them is made."""
+        sample = self.sweep.sample
+        points = 1 if sample is None else sample.count
+        groups: set[str] = set()
+        for axis in self.sweep.axis:
+            if isinstance(axis, GridAxis) and axis.group not in groups:
+                points *= axis.length
+                groups |= {axis.group} if axis.group else set()
+        if points > MAX_POINTS:
+            raise self._mistake("axis", points, f"more than {MAX_POINTS} points")
 
     def _make_groups(self) -> list[list[dict[str, Any]]]:
         members: dict[str, list[list[dict[str, Any]]]] = {}
@@ -395,7 +437,11 @@ class Plan:
             return float(base * factor)
         if _is_number(factor) and isinstance(base, list) and all(map(_is_number, base)):
             return [float(value * factor) for value in base]
-        raise self._mistake("axis.relative", True, f"{key} = {show(base)} in the base scenario")
+        if not _is_number(factor):
+            raise self._mistake("axis.values", factor, "relative values are numbers")
+        raise self._mistake(
+            "axis.relative", True, f"{key} = {show(base)} in the base scenario is no number"
+        )
 
     def _look_up(self, key: str) -> Any:
         value: Any = self._known
@@ -425,10 +471,10 @@ class Plan:
             try:
                 return evaluate(rule, values)
             except ValueError as error:
-                raise self._mistake(f"derive.{key}", rule, str(error)) from None
+                raise self._mistake(key, rule, str(error)) from None
         if _is_number(rule):
             return float(rule)
-        raise self._mistake(f"derive.{key}", rule, "must be an expression or a list of them")
+        raise self._mistake(key, rule, "must be an expression or a list of them")
 
     def _mistake(self, key: str, value: object, allowed: str) -> InputError:
         return InputError(f"{self.definition.address}: {key} = {show(value)}: {allowed}")

@@ -71,7 +71,7 @@ def run_sweep(
                 folder.keep(part)
                 rows += part.rows
                 report(rows)
-        if todo or not folder.dataset.exists():
+        if todo or not folder.is_joined:
             folder.join()
         return folder.dataset
 

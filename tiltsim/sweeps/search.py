@@ -24,7 +24,7 @@ def boundary(
 
     The value walks from ``start`` to ``stop`` (either way) by ``step``, the last step shorter where
     need be, as ch. 3, Eq. (26), asks: all values before the boundary hold. From the first failure
-    on, the bracket is halved until it is at most ``tolerance`` wide.
+    on, the bracket is halved until it is at most ``tolerance`` wide, or as narrow as floats are.
     """
     length = abs(stop - start)
     last = start
@@ -41,6 +41,8 @@ def boundary(
         return Boundary(None, last)
     while abs(last - holding) > tolerance * (1.0 + 1e-9):
         middle = 0.5 * (holding + last)
+        if middle in (holding, last):
+            break
         if (yield middle):
             holding = middle
         else:

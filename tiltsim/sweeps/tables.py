@@ -61,6 +61,11 @@ class ListAxis(AxisTable):
                 )
         return self
 
+    @property
+    def length(self) -> int:
+        """Number of points."""
+        return len(self.values)
+
     def rows(self) -> list[tuple[Any, ...]]:
         """The values of all keys, point by point."""
         return [tuple(value) if self.keys else (value,) for value in self.values]
@@ -74,6 +79,11 @@ class LinspaceAxis(AxisTable):
     stop: float
     count: Annotated[int, Field(ge=2, le=10_000_000)]
     group: str | None = Field(None, description="axes of one group advance together, not crossed")
+
+    @property
+    def length(self) -> int:
+        """Number of points."""
+        return self.count
 
     def rows(self) -> list[tuple[Any, ...]]:
         """The values of all keys, point by point."""
@@ -132,6 +142,11 @@ class CasesAxis(AxisTable):
         if "." in self.key:
             raise InvalidValueError("axis.key", self.key, "cases have a name without a dot")
         return self
+
+    @property
+    def length(self) -> int:
+        """Number of cases."""
+        return len(self.cases)
 
     def rows(self) -> list[tuple[Any, ...]]:
         """The names of the cases."""

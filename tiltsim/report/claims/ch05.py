@@ -46,7 +46,7 @@ _FITTED: Final = " (keyframes fitted)"
 
 _WALK_AND_PERIOD: Final = (
     "Under the conventional decoupler the walk's error grows by 6 % from T = 1 s to 3 s, as "
-    "published; what the modified one leaves nearly doubles, and it is 0.2 m to 0.3 m."
+    "published; what the modified one leaves, 0.2 m at T = 1 s, nearly doubles."
 )
 
 EQ_15_R_PHI: Final = {

@@ -1,0 +1,112 @@
+"""Interrupts from the keyboard: none is dropped, and none loses what is computed."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import sys
+import threading
+
+import pytest
+
+import tiltsim.commands.run
+from tests.flights import flight as flight_named
+from tiltsim.cli import main
+from tiltsim.files import load_flight
+from tiltsim.interrupts import interrupts_deferred, interrupts_kept
+
+CALLED_BACK = ctypes.CFUNCTYPE(None)
+
+
+def interrupt():
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+def call_from_c(function):
+    """Call a function as compiled code does: what it raises is reported and dropped."""
+    CALLED_BACK(function)()
+
+
+def test_an_interrupt_that_c_dropped_is_raised_after_the_block():
+    def raises():
+        raise KeyboardInterrupt
+
+    seen = []
+
+    def work():
+        with interrupts_kept():
+            call_from_c(raises)
+            seen.append("goes on")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert seen == ["goes on"]
+
+
+def test_other_exceptions_that_c_dropped_are_reported_as_ever(monkeypatch):
+    def raises():
+        raise LookupError
+
+    reported = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda found: reported.append(found.exc_type))
+    with interrupts_kept():
+        call_from_c(raises)
+    call_from_c(raises)
+    assert reported == [LookupError, LookupError]
+
+
+def test_an_interrupt_waits_for_the_block_and_is_raised_after_it():
+    done = []
+
+    def work():
+        with interrupts_deferred():
+            interrupt()
+            done.append("finished")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done == ["finished"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_second_interrupt_does_not_wait():
+    def work():
+        with interrupts_deferred():
+            interrupt()
+            interrupt()
+            pytest.fail("still running")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_other_threads_run_as_ever():
+    ran = []
+
+    def work():
+        with interrupts_deferred(), interrupts_kept():
+            ran.append(True)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert ran == [True]
+
+
+def test_an_interrupt_while_files_are_written_loses_none(tmp_path, monkeypatch, capsys):
+    flight = flight_named("fixed")
+    monkeypatch.setattr(tiltsim.commands.run, "fly", lambda *_: flight)
+    save = type(flight).save
+
+    def interrupted_save(self, folder):
+        interrupt()
+        save(self, folder)
+
+    monkeypatch.setattr(type(flight), "save", interrupted_save)
+    address = "ch04_tracking/setpoint#rho_065_modified"
+    assert main(["run", address, "--out", str(tmp_path), "--quiet"]) == 130
+    assert len(load_flight(tmp_path)) == len(flight)
+    assert (tmp_path / "scenario.toml").exists()
+    assert "interrupted" in capsys.readouterr().err

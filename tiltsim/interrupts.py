@@ -1,0 +1,72 @@
+"""Interrupts from the keyboard that must neither get lost nor lose what is computed."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from types import FrameType
+
+
+@contextmanager
+def interrupts_kept() -> Iterator[None]:
+    """Raise KeyboardInterrupt after the block where one was dropped within it.
+
+    Where compiled code calls Python back, as LLVM does while it compiles, no exception can pass:
+    Python reports it as unraisable and goes on as if there had been no interrupt. Interrupts come
+    to the main thread alone; in others the block runs as ever.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = sys.unraisablehook
+    dropped = False
+
+    def keep(unraisable: Any) -> None:
+        nonlocal dropped
+        if issubclass(unraisable.exc_type, KeyboardInterrupt):
+            dropped = True
+        else:
+            before(unraisable)
+
+    sys.unraisablehook = keep
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
+    if dropped:
+        raise KeyboardInterrupt
+
+
+@contextmanager
+def interrupts_deferred() -> Iterator[None]:
+    """Let the block finish: an interrupt within it is raised at its end, a second one at once.
+
+    For what is short and must not be lost, such as writing a flight's files. In threads other than
+    the main one the block runs as ever.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    if not (in_main_thread and callable(before)):  # else interrupts are ignored, or not Python's
+        yield
+        return
+    interrupted = False
+
+    def defer(number: int, frame: FrameType | None) -> None:
+        nonlocal interrupted
+        if interrupted:
+            before(number, frame)
+        interrupted = True
+
+    signal.signal(signal.SIGINT, defer)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if interrupted:
+        raise KeyboardInterrupt
