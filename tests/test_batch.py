@@ -20,7 +20,7 @@ from tiltsim.flight import End
 from tiltsim.library import shipped_folder
 from tiltsim.loading import merge
 from tiltsim.loops import LOOPS, control_setup, loop_of
-from tiltsim.plants import make_plant
+from tiltsim.plants import flight_model, make_plant, what_decides_the_model
 
 TROT = {"amplitude": 0.3, "period": 0.8}
 GAITS = {
@@ -285,6 +285,40 @@ def test_every_row_flies_a_model_of_its_own():
     heights = [float(row.flight["z"].min()) for row in rows]
     assert len(set(heights)) == len(rows)
     assert heights[3] < heights[5] < heights[4], "ground holds up"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        HEAVY,
+        GUST,
+        {"ground": {"height": -1.0}},
+        {"ground": {"height": -1.0, "friction": 0.4}},
+        {"vehicle": {"mass": 0.5}},
+        {"vehicle": {"max_rotor_speed": 500.0}},
+        {"simulation": {"timestep": 0.001}},
+        {"simulation": {"integrator": "Euler"}},
+        {"initial": {"position": [1.0, 0.0, 0.0]}},
+        {"simulation": {"seed": 3}},
+        {"gait": {"period": 0.9}},
+    ],
+    ids=str,
+)
+def test_what_decides_the_model_tells_models_apart(change):
+    """Rows share a model exactly where MuJoCo would compile the same one."""
+    change = {"disturbance": change} if change is GUST else change
+    tables = {**LAYERED, "simulation": {"timestep": 0.002, "duration": 0.3}}
+    plain, changed = map(tiltsim.parse_scenario, (tables, merge(tables, change)))
+    models = [saved_model(flight_model(wanted, 40)) for wanted in (plain, changed)]
+    same_key = what_decides_the_model(plain) == what_decides_the_model(changed)
+    assert same_key == (models[0] == models[1])
+
+
+def saved_model(model):
+    """A compiled model as bytes."""
+    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return buffer.tobytes()
 
 
 def test_own_controllers_are_flown_one_by_one_among_others(tmp_path):

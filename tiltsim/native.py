@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import cache
 from math import copysign, isfinite, nan
+from threading import Lock
 from typing import Any, Final, NamedTuple
 
 import mujoco
@@ -230,12 +231,14 @@ def watch_nothing(values: Any, parameters: Any) -> tuple[float]:
 
 def _register_scalar_functions() -> None:
     """Let compiled code call every scalar function known so far."""
-    for function in scalar_functions()[len(_registered) :]:
-        register_jitable(error_model="numpy")(function)
-        _registered.append(function)
+    with _registering:  # batches build plants in threads
+        for function in scalar_functions()[len(_registered) :]:
+            register_jitable(error_model="numpy")(function)
+            _registered.append(function)
 
 
 _registered: list[Any] = []
+_registering = Lock()
 
 
 @cache

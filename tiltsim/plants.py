@@ -239,17 +239,10 @@ def flight_model(scenario: Scenario, parameters: int) -> mujoco.MjModel:
 
 
 _FLOWN_IN_ANY_MODEL: Final = frozenset(
-    (
-        "title",
-        "source",
-        "without",
-        "simulation",
-        "initial",
-        "gait",
-        "reference",
-        "sensors",
+    {
+        *("title", "source", "without", "simulation", "initial", "gait", "reference", "sensors"),
         "expect",
-    )
+    }
 )
 """Tables of a scenario that are parameters or initial state of a flight, or no part of it."""
 
