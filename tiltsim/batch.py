@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -21,7 +21,7 @@ import numpy as np
 
 from tiltsim.engine import control_callback
 from tiltsim.flight import End, Flight
-from tiltsim.loop import RECORDER, Floats, Loop
+from tiltsim.loop import RECORDER, Floats
 from tiltsim.loops import control_setup, loop_of
 from tiltsim.plants import (
     MujocoPlant,
@@ -44,9 +44,6 @@ MEMORY: Final = 256 * 2**20
 
 CALL_TIME: Final = 0.25
 """How long (s) a batch flies before Python looks at the rows and at the keyboard."""
-
-Way = str | tuple[Loop, Hashable]
-"""How flights are flown: those of one loop, and with models of one layout, share a batch."""
 
 WINDOW: Final = 512
 """How many scenarios are looked at together to find those that share a batch."""
