@@ -72,6 +72,7 @@ def test_the_layer_alone_changes_nothing(timing):
     np.testing.assert_array_equal(plain.samples, layered.samples)
 
 
+@pytest.mark.slow
 @continuous_and_late
 def test_engines_fly_the_same_flight(timing):
     python, native = (

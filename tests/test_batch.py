@@ -223,6 +223,7 @@ def layered(*changes, seed=1, **simulation):
     return scenario(tables, timestep=0.002, duration=0.3, seed=seed, **simulation)
 
 
+@pytest.mark.slow
 def test_rows_with_and_without_layers_fly_the_same_three_ways():
     rows = three_ways(
         [
@@ -245,6 +246,7 @@ def test_rows_with_and_without_layers_fly_the_same_three_ways():
     assert all(a != b for i, a in enumerate(paths[:-1]) for b in paths[:i])
 
 
+@pytest.mark.slow
 def test_layers_around_the_law_that_knows_its_gait_fly_the_same_three_ways():
     rows = three_ways(
         [

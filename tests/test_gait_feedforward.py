@@ -52,6 +52,7 @@ def test_poles_are_gains_of_the_plain_law_too():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
 def test_on_a_smooth_gait_the_error_dies_out(plant):
     changes = {

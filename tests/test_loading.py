@@ -273,8 +273,8 @@ MISTAKES = {
         "initial.rotor_speed = 300.0",
         "200.0",
     ),
-    "rotor limits on the thesis plant": (
-        '[simulation]\nplant = "thesis"\n[vehicle]\nmax_rotor_speed = 400.0',
+    "ground on the thesis plant": (
+        '[simulation]\nplant = "thesis"\n[ground]\nheight = -1.0',
         'simulation.plant = "thesis"',
         "use mujoco",
     ),

@@ -175,6 +175,7 @@ LAYERED = {
 on_layered_flights = pytest.mark.parametrize("name", LAYERED)
 
 
+@pytest.mark.slow
 @on_layered_flights
 def test_engines_fly_the_same_flight(name):
     python, native = (

@@ -210,6 +210,7 @@ FEEDFORWARD = {
 EXACT = {"decoupling": "exact", "gains": "exact"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("strategy", WITH_STATES)
 @pytest.mark.parametrize("law", [{}, FEEDFORWARD])
 def test_engines_batches_and_restarts_agree(law, strategy):

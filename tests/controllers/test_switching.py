@@ -223,6 +223,7 @@ def test_no_law_at_ninety_degrees():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("extension", EXTENSIONS)
 def test_compiled_code_gives_the_same_bits(extension, native):
     random = np.random.default_rng(6)

@@ -243,6 +243,7 @@ count = 2
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["python", "native"])
 def test_axes_of_layers_fly_as_their_rows_say(tmp_path, engine):
     """Wind, noise, mass and seed: in batches as alone, the layers coming and going by row."""

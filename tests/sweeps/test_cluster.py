@@ -51,6 +51,7 @@ def wait_for_workers(address, count):
         client.wait_for_workers(count, timeout=120)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_a_cluster_that_loses_a_worker_gives_the_local_dataset(tmp_path):
     file = short_sweep(tmp_path / "sweep.toml", count=60, chunk_size=3)
