@@ -28,7 +28,7 @@ CASES: Final = ("equal", "half", "negative", "negative_half")
 
 @dataclass(frozen=True)
 class _Chosen:
-    """The gait to analyse, its vehicle, and the gait it is compared with, if any."""
+    """The gait to analyze, its vehicle, and the gait it is compared with, if any."""
 
     gait: Gait
     vehicle: Vehicle
@@ -53,7 +53,7 @@ def add_parser(subparsers: Any) -> None:
     """Declare the command."""
     parser = subparsers.add_parser(
         "gait",
-        help="analyse the singularities of a gait",
+        help="analyze the singularities of a gait",
         description=(
             "Rank and singular values of the torque matrix, the residuals R, R_phi and R_theta, "
             "the singularity margin and the unacceptable attitudes of a gait; over one period, if "
@@ -85,7 +85,7 @@ def add_parser(subparsers: Any) -> None:
         metavar="VEHICLE",
         help="ar_drone_2 (default), luukkonen, KEY=VALUE,..., or a preset with KEY=VALUE,...",
     )
-    parser.add_argument("--roll", metavar="RAD", help="attitude to analyse, default level")
+    parser.add_argument("--roll", metavar="RAD", help="attitude to analyze, default level")
     parser.add_argument("--pitch", metavar="RAD")
     parser.add_argument(
         "--faults", action="store_true", help="also which losses of a rotor the vehicle hovers with"
@@ -118,7 +118,7 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Analyse, print, draw."""
+    """Analyze, print, draw."""
     _check_options(arguments)
     if arguments.list:
         _print(arguments, _list_report(), _list_text)
@@ -195,7 +195,7 @@ def _choose(arguments: argparse.Namespace) -> _Chosen:
         if not isinstance(vehicle, Vehicle):
             raise InputError(
                 f"{arguments.scenario}: vehicle.model = {scenario.vehicle.model!r}: has no gait of "
-                "four tilt angles to analyse"
+                "four tilt angles to analyze"
             )
         gait = replace(scenario.gait.plan(vehicle), source=scenario.source)
         if scenario.gait.bias == 1.0:

@@ -155,7 +155,7 @@ def fly(
     return flights
 
 
-def analyse(folder: Path, jobs: int) -> dict[str, Value]:
+def analyze(folder: Path, jobs: int) -> dict[str, Value]:
     """The measured values of all claims that are computed, by `AnalysisClaim.key`.
 
     Kept in the folder like flights, for as long as neither the core nor the claims change.
@@ -178,9 +178,9 @@ def analyse(folder: Path, jobs: int) -> dict[str, Value]:
     if not missing:
         return values
     if jobs == 1:
-        values |= {key: _analyse_one(key) for key in missing}
+        values |= {key: _analyze_one(key) for key in missing}
     else:
-        for key, future in in_processes(_analyse_one, missing, jobs):
+        for key, future in in_processes(_analyze_one, missing, jobs):
             error = future.exception()
             if error is not None:
                 raise InputError(f"{key}: {type(error).__name__}: {error}") from error
@@ -194,7 +194,7 @@ def _analysis_claims() -> dict[str, AnalysisClaim]:
     return {claim.key: claim for claim in registered_claims() if isinstance(claim, AnalysisClaim)}
 
 
-def _analyse_one(key: str) -> Value:
+def _analyze_one(key: str) -> Value:
     return plain(_analysis_claims()[key].measure())
 
 

@@ -10,7 +10,7 @@ from tiltsim.library import shipped_folder
 from tiltsim.report.comparisons import compare
 from tiltsim.report.content import Report
 from tiltsim.report.findings import FINDINGS
-from tiltsim.report.flying import analyse, fly, plan_flights
+from tiltsim.report.flying import analyze, fly, plan_flights
 from tiltsim.report.pictures import draw_all
 from tiltsim.report.rows import failures, make_rows
 
@@ -43,7 +43,7 @@ def make_report(
     whole = not paths
     plans = plan_flights(collect(paths or [str(shipped_folder("scenarios"))]))
     flights = fly(plans, folder, jobs, progress)
-    values = analyse(folder, jobs) if whole else {}
+    values = analyze(folder, jobs) if whole else {}
     rows = make_rows(plans, flights, values, whole=whole)
     return Report(
         plans=plans,
