@@ -336,13 +336,21 @@ def _compose(
 
 
 def strip(root: Any, contacts: bool) -> None:
-    """Remove what is only drawn or read: geoms without contacts, cameras, lights and sensors."""
+    """Remove what is only drawn or read: geoms without contacts, cameras, lights and sensors.
+
+    The shipped vehicles have neither springs nor dampers, so that MuJoCo need not look for them.
+    """
+    root.option.flag.spring = root.option.flag.damper = "disable"
     for geom in root.find_all("geom"):
         if not contacts or not geom.name.endswith(("collision", "ground")):
             geom.remove()
     for kind in ("camera", "light", "sensor"):
         for element in root.find_all(kind):
             element.remove()
+    acted_on = {getattr(actuator.site, "name", actuator.site) for actuator in root.actuator.general}
+    for site in root.find_all("site"):
+        if site.name not in acted_on:
+            site.remove()
 
 
 def parse_mjcf(path: Path) -> Any:
