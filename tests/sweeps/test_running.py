@@ -196,6 +196,7 @@ def test_boundaries_are_found_to_their_tolerance(tmp_path):
         assert row["initial.attitude"] == [row["roll"], 0.0, 2 * row["roll"]]
 
 
+@pytest.mark.slow
 def test_killed_at_random_moments_it_continues_to_the_same_dataset(tmp_path):
     file = short_sweep(tmp_path / "sweep.toml", count=40, chunk_size=2)
     whole = run_sweep(load_definition(file), tmp_path / "whole")
