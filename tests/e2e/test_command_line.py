@@ -329,7 +329,7 @@ def test_bench_prints_ratios_for_every_engine_and_integrator():
     assert all(keys | {"realtime_factor"} == set(row) for row in rows)
     cases = {(row["case"], row["engine"]) for row in rows}
     assert cases == {
-        *(("single", name) for name in ("bare", "empty", "state", "python", "native")),
+        *(("single", name) for name in ("bare", "empty", "python", "native")),
         *(("recorded", "native"), ("batch", "bare"), ("batch", "native")),
     }
     for case in cases:
