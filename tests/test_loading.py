@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tiltsim.checking import collect
 from tiltsim.errors import InputError
 from tiltsim.files import scenario_toml
 from tiltsim.library import library_entries
@@ -336,6 +337,32 @@ def test_an_unknown_name_is_no_scenario_of_the_library():
     assert refusal("ch99/nothing").startswith("ch99/nothing: no such file, nor a scenario")
 
 
+@pytest.mark.parametrize("name", ["ch04_tracking/setpont", "ch04_trackin/setpoint.toml#rho_0"])
+def test_a_misspelt_file_is_answered_with_the_closest(name):
+    assert "did you mean ch04_tracking/setpoint? see tiltsim list" in refusal(name)
+    with pytest.raises(InputError, match=r"did you mean ch04_tracking\?"):
+        collect(["ch04_trackin"])
+
+
+@pytest.mark.parametrize(
+    ("text", "question"),
+    [
+        ('[[expect]]\nmetric = "max_abs_rol"\nmax = 1.0', "did you mean max_abs_roll? choose"),
+        ('[gait]\ntype = "trot_instnt"', "did you mean trot_instant? choose"),
+    ],
+)
+def test_a_misspelt_name_is_answered_with_the_closest(write, text, question):
+    assert question in refusal(write(text))
+
+
+def test_a_misspelt_list_is_answered_with_the_closest(write):
+    path = write("[initial]\nattitude = [0.0, 0.0, 0.0]")
+    with pytest.raises(InputError, match=r"no such entry; did you mean attitude\? give the whole"):
+        load_scenario(path, {"initial.atitude[0]": 1.0})
+    with pytest.raises(InputError, match="no such entry; give the whole list"):
+        load_scenario(path, {"initial.position[0]": 1.0})
+
+
 def test_a_folder_is_not_a_scenario(tmp_path):
     assert (
         refusal(tmp_path)
@@ -426,6 +453,7 @@ def test_an_unknown_variant_lists_the_known_ones(write):
     assert refusal(f"{path}#short") == (
         f"{path}#short: no such variant; choose plain, long, trotting, tilted"
     )
+    assert "did you mean trotting? choose plain, long" in refusal(f"{path}#troting")
 
 
 def test_a_file_without_variants_says_so(write):

@@ -15,7 +15,13 @@ from tiltsim.engine import EngineName
 from tiltsim.errors import InputError
 from tiltsim.expectations import Verdict, judge
 from tiltsim.interrupts import interrupts_kept
-from tiltsim.library import library_name, read_toml, scenario_files, shipped_folder
+from tiltsim.library import (
+    closest_in_library,
+    library_name,
+    read_toml,
+    scenario_files,
+    shipped_folder,
+)
 from tiltsim.loading import load_scenario, variant_names
 from tiltsim.loops import loop_of
 from tiltsim.parallel import in_processes
@@ -70,7 +76,10 @@ def _find(name: str) -> Path:
     for place in (Path(name), library / name, library / f"{name}.toml"):
         if place.exists():
             return place
-    raise InputError(f"{name}: no such file or folder, nor one of the library (see tiltsim list)")
+    hint = closest_in_library(name)
+    raise InputError(
+        f"{name}: no such file or folder, nor one of the library ({hint}see tiltsim list)"
+    )
 
 
 def check_one(

@@ -6,7 +6,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from tiltsim.messages import InvalidValueError
+from tiltsim.messages import InvalidValueError, choose
 from tiltsim.metrics import BOOLEAN_METRICS, METRICS
 from tiltsim.tables import NonNegative, Range, Table
 
@@ -39,7 +39,7 @@ class Expectation(Table):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.metric not in METRICS:
-            raise InvalidValueError("expect.metric", self.metric, f"choose {', '.join(METRICS)}")
+            raise InvalidValueError("expect.metric", self.metric, choose(self.metric, METRICS))
         boolean = self.metric in BOOLEAN_METRICS
         bounded = self.min is not None or self.max is not None
         if boolean and (bounded or self.equals is None):

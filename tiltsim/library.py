@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from tiltsim.errors import InputError
+from tiltsim.messages import did_you_mean
 
 _SWEEP: Final = re.compile(r"^\s*\[\[?\s*(axis|bisect)\s*\]", re.MULTILINE)
 """The tables that tell a sweep from a scenario."""
@@ -38,7 +39,18 @@ def find_scenario_file(path: str | Path) -> Path:
                 return candidate
     if given.is_dir():
         raise InputError(f"{path}: a folder, not a scenario file; tiltsim check takes folders")
-    raise InputError(f"{path}: no such file, nor a scenario of the library (see tiltsim list)")
+    hint = closest_in_library(path)
+    raise InputError(
+        f"{path}: no such file, nor a scenario of the library ({hint}see tiltsim list)"
+    )
+
+
+def closest_in_library(path: str | Path) -> str:
+    """A question with the file or folder of the library that is called most like a path, if any."""
+    library = shipped_folder("scenarios")
+    places = (place.relative_to(library) for place in library.rglob("*"))
+    names = [place.with_suffix("").as_posix() for place in places]
+    return did_you_mean(Path(path).with_suffix("").as_posix(), names)
 
 
 def read_toml(path: Path) -> dict[str, Any]:

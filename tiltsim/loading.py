@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from tiltsim.controller_tables import DEFAULT_LAW
 from tiltsim.errors import InputError
 from tiltsim.library import find_scenario_file, library_name, read_toml
-from tiltsim.messages import one_line, show
+from tiltsim.messages import choose, did_you_mean, one_line, show
 from tiltsim.scenario import Scenario, Variant
 
 KIND_KEYS: Final = {"type": None, "law": DEFAULT_LAW}
@@ -105,7 +105,7 @@ def variant_names(file: Path, document: Mapping[str, Any]) -> list[str]:
 def _select_variant(file: Path, document: dict[str, Any], name: str) -> dict[str, Any]:
     names = variant_names(file, document)
     if name not in names:
-        allowed = f"choose {', '.join(names)}" if names else "the file has no variants"
+        allowed = choose(name, names) if names else "the file has no variants"
         raise InputError(f"{library_name(file)}#{name}: no such variant; {allowed}")
     base = {key: value for key, value in document.items() if key != "variant"}
     chosen = dict(document["variant"][names.index(name)])
@@ -146,15 +146,26 @@ def _override(address: str, document: dict[str, Any], key: str, value: object) -
         target = _enter(target, step)
     if isinstance(last, int):
         if not isinstance(target, list) or last >= len(target):
+            hint = _other_list(document, path)
             raise InputError(
-                f"{address}: {key} = {show(value)}: there is no such entry; give the whole list "
-                f"{key.rpartition('[')[0]}"
+                f"{address}: {key} = {show(value)}: there is no such entry; {hint}give the whole "
+                f"list {key.rpartition('[')[0]}"
             )
     elif not isinstance(target, dict):
         raise InputError(f"{address}: {key} = {show(value)}: {key.rpartition('.')[0]} is no table")
     elif last in KIND_KEYS and target.get(last, KIND_KEYS[last]) != value:
         target.clear()
     target[last] = value
+
+
+def _other_list(document: dict[str, Any], path: list[str | int]) -> str:
+    """Whether a list that is not there may be another, misspelt."""
+    *above, name = path
+    table: Any = document
+    for step in above:
+        table = _enter(table, step)
+    lists = table.items() if isinstance(table, dict) else ()
+    return did_you_mean(name, (key for key, value in lists if isinstance(value, list)))
 
 
 def _enter(target: object, step: str | int) -> object:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from math import pi
 from typing import TYPE_CHECKING, Any, Final, get_args
@@ -36,6 +36,18 @@ def show(value: object) -> str:
     """A value as the user wrote it, cut where it is long."""
     text = json.dumps(value, default=str)
     return text if len(text) <= 80 else text[:77] + "..."
+
+
+def did_you_mean(name: object, names: Iterable[str]) -> str:
+    """A question with the closest of some names, where one is close."""
+    close = get_close_matches(str(name), list(names), n=1)
+    return f"did you mean {close[0]}? " if close else ""
+
+
+def choose(name: object, names: Iterable[str]) -> str:
+    """What is allowed in place of an unknown name, the closest first."""
+    names = list(names)
+    return f"{did_you_mean(name, names)}choose {', '.join(names)}"
 
 
 def one_line(error: ValidationError, document: Mapping[str, Any], schema: type[BaseModel]) -> str:
@@ -86,7 +98,7 @@ def _describe(detail: Any, document: Mapping[str, Any], schema: type[BaseModel])
         allowed = ", ".join(tags)
         if tag not in value:
             return f"{key}.{tag}: missing; choose {allowed}"
-        return f"{key}.{tag} = {show(value[tag])}: choose {allowed}"
+        return f"{key}.{tag} = {show(value[tag])}: {choose(value[tag], tags)}"
     if kind == "literal_error":
         return f"{key} = {show(value)}: choose {context['expected'].replace(chr(39), '')}"
     if kind in {"too_short", "too_long"}:
@@ -146,9 +158,7 @@ def _known_keys(schema: Any, location: tuple[Any, ...], key: str) -> str:
     for part in location[:-1]:
         schema = _member(schema, part)
     names = sorted(schema.model_fields) if hasattr(schema, "model_fields") else []
-    close = get_close_matches(key.rpartition(".")[2], names, n=1)
-    hint = f"did you mean {close[0]}? " if close else ""
-    return f"{hint}known: {', '.join(names)}"
+    return f"{did_you_mean(key.rpartition('.')[2], names)}known: {', '.join(names)}"
 
 
 def _member(schema: Any, part: object) -> Any:

@@ -92,6 +92,7 @@ def test_a_changed_sweep_is_refused(grid, tmp_path, capsys):
         (["ch04_tracking/sweeps/periods", "--jobs", "0"], "at least 1"),
         (["ch04_tracking/sweeps/periods", "--set", "gait.perod=1"], "did you mean period"),
         (["ch04_tracking/sweeps/periods", "--set", "gait.period=1"], "an axis sets it, too"),
+        (["ch04_tracking/sweeps/perods"], "did you mean ch04_tracking/sweeps/periods?"),
     ],
 )
 def test_mistakes_are_one_line_and_exit_2(arguments, words, capsys):
@@ -241,6 +242,54 @@ key = "simulation.seed"
 [sample]
 count = 2
 """
+
+
+def test_groups_of_a_distribution_are_told_apart_without_colour(tmp_path):
+    out = swept(short_sweep(tmp_path / "sweep.toml", count=8), tmp_path / "out")
+    figure = sweep_figure(load_results(out), ("max_abs_roll",))
+    shares, curves = figure.subfigs[0].axes
+    assert len({bar.get_hatch() for bar in shares.patches}) == 2
+    drawn = [line for line in curves.lines if len(line.get_xdata()) > 1]
+    assert len(drawn) == len({str(line._unscaled_dash_pattern) for line in drawn}) == 2
+    assert len({line.get_marker() for line in curves.lines} - {"None"}) == 2
+    dots = figure.subfigs[1].axes[0].lines
+    assert len({line.get_marker() for line in dots} - {"x"}) == 2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("", '[plot]\nkind = "map"', "needs two axes of numbers, or x and y"),
+        ('title = "short flights"', "metrics = []", "none is kept, so there is nothing to draw"),
+        (
+            "",
+            '[plot]\nx = "initial.atitude[0]"\nkind = "lines"',
+            "did you mean initial.attitude[0]?",
+        ),
+    ],
+)
+def test_figures_that_cannot_be_drawn_are_refused_in_one_line(tmp_path, capsys, old, new, words):
+    file = short_sweep(tmp_path / "sweep.toml", count=1)
+    text = file.read_text(encoding="utf-8")
+    file.write_text(text.replace(old, new) if old else text + new, encoding="utf-8")
+    assert main(["plot", str(swept(file, tmp_path / "out"))]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert words in error
+
+
+def test_a_users_words_are_no_formulas(tmp_path):
+    file = short_sweep(tmp_path / "sweep.toml", count=1)
+    text = file.read_text(encoding="utf-8").partition("[[axis]]")[0].replace("flights", "$x_$ ü")
+    cases = '[[axis]]\ntype = "cases"\nkey = "price"\n'
+    for number, name in enumerate(("5 $", "$y_$")):
+        cases += f'[axis.cases."{name}"]\ninitial.attitude = [{number}.1, 0, 0]\n'
+    file.write_text(text + cases + '[plot]\npanels = "price"\n', encoding="utf-8")
+    out = swept(file, tmp_path / "out")
+    assert main(["plot", str(out)]) == 0
+    figure = sweep_figure(load_results(out))
+    assert figure.get_suptitle() == r"short \$x_\$ ü"
+    assert [axes.get_title(loc="left") for axes in figure.axes[:2]] == [r"5 \$", r"\$y_\$"]
 
 
 @pytest.mark.slow

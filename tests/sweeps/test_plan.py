@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+from math import ceil, log2
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -305,3 +309,20 @@ def test_mistakes_are_named_in_one_line(plan_of, text, words):
     assert "sweep.toml" in message
     for word in words:
         assert word in message
+
+
+def test_documented_sweeps_are_valid_and_end_soon(tmp_path):
+    text = (Path(__file__).parents[2] / "docs" / "sweeps.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    sweeps = [block for block in blocks if "\nscenario = " in f"\n{block}"]
+    assert len(sweeps) == 3
+    for number, block in enumerate(sweeps):
+        file = tmp_path / f"{number}.toml"
+        file.write_text(block, encoding="utf-8")
+        plan = Plan(load_definition(file))
+        flights = len(plan)
+        if (bisect := plan.sweep.bisect) is not None:
+            steps = (plan.stop(plan.point(i)) - bisect.start for i in range(len(plan)))
+            halvings = ceil(log2(bisect.step / bisect.tolerance))
+            flights = sum(ceil(length / bisect.step) + 1 + halvings for length in steps)
+        assert flights <= 256

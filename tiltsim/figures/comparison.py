@@ -47,12 +47,12 @@ def comparison_figure(flights: Sequence[Flight]) -> Figure:
         rows: Any = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (draw, title, unit) in zip(rows, panels, strict=True):
             for number, flight in enumerate(flights):
-                color = style.CYCLE[number]
+                color, dashes = style.CYCLE[number], style.DASHES[number]
                 line = draw(axes, flight)
                 if line is None:
                     continue
                 time = flight["time"]
-                axes.plot(time, line, color=color, lw=1.3)
+                axes.plot(time, line, color=color, ls=dashes, lw=1.3)
                 if flight.end.kind != "completed":
                     low, high = axes.get_ylim()
                     last = float(np.clip(line[-1], low, high))
@@ -64,14 +64,16 @@ def comparison_figure(flights: Sequence[Flight]) -> Figure:
         for number, flight in enumerate(flights):
             lost = flight.end.kind != "completed"
             label = f"{_name(flight)}, lost at {flight.end.time:.2f} s" if lost else _name(flight)
-            rows[0].plot([], [], color=style.CYCLE[number], label=label)
+            color, dashes = style.CYCLE[number], style.DASHES[number]
+            rows[0].plot([], [], color=color, ls=dashes, label=label)
         figure.legend(loc="outside upper left", ncols=2, alignment="left")
         return figure
 
 
 def _name(flight: Flight) -> str:
     """What tells a flight from the others of its family."""
-    return flight.scenario.address.rpartition("#")[2] or flight.scenario.title or "flight"
+    scenario = flight.scenario
+    return style.verbatim(scenario.address.rpartition("#")[2] or scenario.title or "flight")
 
 
 def _margin(axes: Any, flight: Flight) -> Any:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.figures.style import CYCLE, INK, new_figure
+from tiltsim.figures.style import CYCLE, DASHES, INK, MARKERS, new_figure
 from tiltsim.figures.sweep_columns import (
     are_completed,
     drawn_keys,
@@ -27,6 +27,9 @@ QUANTILES: Final = (0.05, 0.5, 0.95)
 
 MOST_TELLING: Final = 4
 """Drawn keys that get a panel each."""
+
+HATCHES: Final = ("", "///", "...", "\\\\\\", "xxx", "---", "+++")
+"""Of the bars, beside the colours of `CYCLE`, as dashes and markers are of curves and dots."""
 
 NORMAL_95: Final = 1.959963984540054
 
@@ -48,7 +51,7 @@ def distributions_figure(results: SweepResults, metrics: tuple[str, ...]) -> Fig
     _draw_shares(shares, results, groups)
     for axes, metric in zip(curves, metrics):
         for number, (_, group) in enumerate(groups):
-            _draw_curve(axes, results, metric, group, CYCLE[number % len(CYCLE)])
+            _draw_curve(axes, results, metric, group, number % len(CYCLE))
         if is_wide(results.columns[metric][are_completed(results)]):
             axes.set_xscale("log")
         axes.margins(x=0.1)  # room for the numbers
@@ -86,7 +89,10 @@ def _draw_shares(axes: Axes, results: SweepResults, groups: list[tuple[str, Colu
         flown, trials = int((group & completed).sum()), int(group.sum())
         low, high = wilson_interval(flown, trials)
         share, color = flown / trials, CYCLE[number % len(CYCLE)]
-        axes.barh(number, share, height=0.34, color=color, alpha=0.85)
+        hatch = HATCHES[number % len(CYCLE)]
+        axes.barh(
+            number, share, height=0.34, color=color, alpha=0.85, hatch=hatch, ec="white", lw=0
+        )
         axes.plot([low, high], [number, number], color=INK, lw=1.6, solid_capstyle="butt")
         words = f"{name}: {flown} of {trials}".lstrip(": ")
         axes.annotate(words, (0.01, number - 0.25), fontsize=8.5, color=color).set_in_layout(False)
@@ -97,19 +103,20 @@ def _draw_shares(axes: Axes, results: SweepResults, groups: list[tuple[str, Colu
     axes.set_xlabel("share that completes")
 
 
-def _draw_curve(axes: Axes, results: SweepResults, metric: str, group: Column, color: str) -> None:
+def _draw_curve(axes: Axes, results: SweepResults, metric: str, group: Column, look: int) -> None:
+    color, marker = CYCLE[look], MARKERS[look]
     values = results.columns[metric][group & are_completed(results)]
     values = np.sort(values[~np.isnan(values)])
     total = int(group.sum())
     lost = total - len(values) if metric.startswith("min_") else 0
     share = (lost + np.arange(1, len(values) + 1)) / total
-    axes.step(values, share, where="post", color=color)
+    axes.step(values, share, where="post", color=color, ls=DASHES[look])
     for quantile in QUANTILES:
         place = int(np.searchsorted(share, quantile - 1e-12))
         if place == len(values) or (place == 0 and lost):
             continue  # among the lost
         value = float(values[place])
-        axes.plot(value, share[place], "o", ms=3.5, color=color)
+        axes.plot(value, share[place], marker, ms=4.5, color=color)
         axes.annotate(
             f"{value:.3g}",
             (value, share[place]),
@@ -164,9 +171,10 @@ def _draw_scatter(
     draws, values, completed = results.columns[key], results.columns[metric], are_completed(results)
     many = len(results) > 1000
     for number, (_, group) in enumerate(groups):
-        color, flown, lost = CYCLE[number % len(CYCLE)], group & completed, group & ~completed
+        look, flown, lost = number % len(CYCLE), group & completed, group & ~completed
+        color, marker = CYCLE[look], MARKERS[look]
         dots: Any = {"ms": 1.6 if many else 2.5, "alpha": 0.5 if many else 0.7, "mew": 0}
-        axes.plot(draws[flown], values[flown], "o", color=color, rasterized=many, **dots)
+        axes.plot(draws[flown], values[flown], marker, color=color, rasterized=many, **dots)
         height = np.full(int(lost.sum()), 1.03 + 0.04 * number)
         crosses: Any = {"ms": 3.0, "mew": 0.8, "clip_on": False}
         above = axes.get_xaxis_transform()

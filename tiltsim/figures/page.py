@@ -23,7 +23,7 @@ def add_headings(figure: Figure, flight: Flight) -> None:
     layout: Any = figure.get_layout_engine()
     layout.set(w_pad=0.06, h_pad=0.06, rect=(0.0, 0.0, 1.0, 0.925))
     title, line = _headings(flight)
-    figure.text(0.012, 0.972, title, fontsize=12, fontweight="bold", va="center")
+    figure.text(0.012, 0.972, style.verbatim(title), fontsize=12, fontweight="bold", va="center")
     figure.text(0.012, 0.941, line, fontsize=9.5, color="#555555", va="center")
 
 

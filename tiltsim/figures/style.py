@@ -86,6 +86,11 @@ def paper_style() -> Iterator[None]:
         yield
 
 
+def verbatim(text: str) -> str:
+    """A user's text for a figure, in which dollars are dollars and no formula begins."""
+    return text.replace("$", r"\$")
+
+
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure of the given size (inches) with constrained layout."""
     from matplotlib.figure import Figure

@@ -19,6 +19,7 @@ from tiltsim.figures.style import (
     SEQUENTIAL,
     new_figure,
     paper_style,
+    verbatim,
 )
 from tiltsim.figures.sweep_columns import (
     add_legend,
@@ -27,6 +28,7 @@ from tiltsim.figures.sweep_columns import (
     is_wide,
     label_of,
 )
+from tiltsim.messages import choose
 from tiltsim.sweeps.dataset import Column, SweepResults
 from tiltsim.sweeps.tables import GridAxis, SampledAxis
 
@@ -62,12 +64,16 @@ def sweep_figure(results: SweepResults, metrics: tuple[str, ...] = ()) -> Figure
         "boundary": _boundary_figure,
         "plane": _plane_figure,
     }[kind]
+    chosen = _metrics(results, metrics)
+    if not chosen and kind not in {"boundary", "plane"}:
+        address = results.plan.definition.address
+        raise InputError(f"{address}: metrics = []: none is kept, so there is nothing to draw")
     with paper_style():
-        figure = draw(results, _metrics(results, metrics))
+        figure = draw(results, chosen)
         title = results.plan.sweep.title or results.plan.definition.address
         missing = len(results.plan) - len(results)
         more = f" ({missing} of {len(results.plan)} points still to come)" if missing else ""
-        lines = fill(title + more, round(11.0 * figure.get_figwidth()))
+        lines = fill(verbatim(title) + more, round(11.0 * figure.get_figwidth()))
         figure.suptitle(lines, x=0.01, ha="left", fontsize=10.5)
         return figure
 
@@ -98,7 +104,7 @@ def _metrics(results: SweepResults, wanted: tuple[str, ...]) -> tuple[str, ...]:
         if name not in kept:
             raise InputError(
                 f"{results.plan.definition.address}: plot.metrics = {name!r}: not in these "
-                f"results; choose {', '.join(kept)}"
+                f"results; {choose(name, kept)}"
             )
     return chosen or tuple(name for name in kept if _varies(results.columns[name]))[:3] or kept[:1]
 
@@ -189,8 +195,10 @@ def _map_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
     from matplotlib.colors import LogNorm, Normalize
 
     plot, numeric = results.plan.sweep.plot, _numeric_axes(results)
-    x = plot.x or numeric[0]
-    y = plot.y or next(key for key in numeric if key != x)
+    x = plot.x or next((key for key in numeric if key != plot.y), None)
+    y = plot.y or next((key for key in numeric if key != x), None)
+    if x is None or y is None:
+        raise InputError("plot.kind = 'map': needs two axes of numbers, or x and y")
     panels = plot.panels or next(iter(_text_axes(results)), None)
     columns = list(groups_of(results, panels, np.ones(len(results), dtype=bool)))
     figure, grid = _panel_grid(len(metrics), len(columns), 4.0, 3.1)

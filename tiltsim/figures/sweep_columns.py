@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from tiltsim.figures.style import verbatim
 from tiltsim.metrics import METRICS
 from tiltsim.sweeps.dataset import Column, SweepResults
 from tiltsim.sweeps.tables import NormalAxis, UniformAxis
@@ -66,7 +67,7 @@ def text_of(value: Any) -> str:
     """A value as figures write it."""
     if isinstance(value, list):
         return "(" + ", ".join(map(text_of, value)) + ")"
-    return f"{value:g}" if isinstance(value, float | int) else str(value)
+    return f"{value:g}" if isinstance(value, float | int) else verbatim(str(value))
 
 
 def label_of(name: str) -> str:

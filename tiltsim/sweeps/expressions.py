@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
 from typing import Any, Final, TypeGuard
 
+from tiltsim.messages import did_you_mean
+
 _BINARY: Final[dict[type[ast.operator], Callable[[Any, Any], Any]]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -106,7 +108,8 @@ def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
         name = ast.unparse(node)
         known = {**CONSTANTS, **values}
         if name not in known:
-            raise ValueError(f"{name} is unknown; known: {', '.join(sorted(known))}")
+            hint = did_you_mean(name, known)
+            raise ValueError(f"{name} is unknown; {hint}known: {', '.join(sorted(known))}")
         return known[name]
     if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
         return _BINARY[type(node.op)](_value(node.left, values), _value(node.right, values))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from math import isfinite
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from tiltsim.expectation_table import Expectation
-from tiltsim.messages import InvalidValueError
+from tiltsim.messages import InvalidValueError, choose
 from tiltsim.metrics import METRICS, WALL_CLOCK_METRICS
 from tiltsim.tables import Positive, Table
 
@@ -45,6 +47,15 @@ class AxisTable(Table):
         return self
 
 
+def _leaves(value: Any) -> Iterator[Any]:
+    """What lists within lists hold."""
+    if isinstance(value, list | tuple):
+        for item in value:
+            yield from _leaves(item)
+    else:
+        yield value
+
+
 class ListAxis(AxisTable):
     """Values written out; for several keys, a row of values each."""
 
@@ -54,6 +65,9 @@ class ListAxis(AxisTable):
 
     @model_validator(mode="after")
     def _check_rows(self) -> Self:
+        for value in self.values:
+            if any(isinstance(v, float) and not isfinite(v) for v in _leaves(value)):
+                raise InvalidValueError("axis.values", value, "must be finite")
         for row in self.values if self.keys else ():
             if not isinstance(row, list | tuple) or len(row) != len(self.keys or ()):
                 raise InvalidValueError(
@@ -257,11 +271,13 @@ class Sweep(Table):
     def _check(self) -> Self:
         for metric in self.metrics or ():
             if metric in WALL_CLOCK_METRICS or metric not in METRICS:
-                allowed = ", ".join(name for name in METRICS if name not in WALL_CLOCK_METRICS)
-                raise InvalidValueError("metrics", metric, f"choose {allowed}")
+                allowed = [name for name in METRICS if name not in WALL_CLOCK_METRICS]
+                raise InvalidValueError("metrics", metric, choose(metric, allowed))
         for metric in self.plot.metrics:
-            if metric not in (METRICS if self.metrics is None else self.metrics):
-                raise InvalidValueError("plot.metrics", metric, "is not among the metrics kept")
+            kept = METRICS if self.metrics is None else self.metrics
+            if metric not in kept:
+                words = f"is not among the metrics kept; {choose(metric, kept)}"
+                raise InvalidValueError("plot.metrics", metric, words)
         if not self.axis and self.bisect is None:
             raise InvalidValueError("axis", [], "a sweep needs at least one [[axis]] or a [bisect]")
         drawn = [a for a in self.axis if isinstance(a, SampledAxis)]
