@@ -272,6 +272,7 @@ def test_huge_axes_are_refused_or_tried_in_a_few_places(plan_of, count):
         (PERIODS.replace("gait.period", "period"), ["period", "[derive]"]),
         (PERIODS.replace("start = 1", "start = -1"), ["gait.period = -1", "greater"]),
         (PERIODS.replace("gait.period", "gait.angles[0]"), ["gait.angles[0]", "no such entry"]),
+        (AMPLITUDES.replace("0.5", "nan"), ["axis.values = NaN", "must be finite"]),
         (PERIODS.replace('key = "gait.period"', ""), ["axis.key", "key or keys"]),
         (PERIODS + PERIODS, ["gait.period", "set twice"]),
         (PERIODS + "[set]\ngait.period = 1.0", ["set.gait.period", "an axis sets it, too"]),
