@@ -305,6 +305,25 @@ def test_episodes_are_drawn_from_the_axes():
     assert len(set(places)) == 12
 
 
+def test_axes_of_a_group_are_drawn_together():
+    axis = {"type": "list", "values": [0.1, 0.2, 0.3], "group": "diagonal"}
+    domain = [{**axis, "key": f"initial.position[{i}]"} for i in range(2)]
+    env = TiltrotorEnv(domain=[*domain, {**axis, "group": "other", "key": "initial.position[2]"}])
+    drawn = set()
+    for _ in range(40):
+        env.reset()
+        drawn.add(env.scenario.initial.position)
+    assert {x for x, _, _ in drawn} == {0.1, 0.2, 0.3}
+    assert all(x == y for x, y, _ in drawn)
+    assert any(x != z for x, _, z in drawn)
+
+
+def test_a_bound_that_is_none_is_refused():
+    for bound in (0.0, float("nan")):
+        with pytest.raises(InputError, match="max_position_error"):
+            TiltrotorEnv(max_position_error=bound)
+
+
 def test_the_drawn_mass_is_the_one_that_flies():
     axis = {"key": "vehicle.mass", "type": "list", "values": [0.8 * VEHICLE.mass]}
     env = TiltrotorEnv(scenario(), domain=[axis])
@@ -324,6 +343,8 @@ def test_the_drawn_mass_is_the_one_that_flies():
             "choose list, linspace, cases, uniform",
         ),
         ({"type": "uniform", "low": 1.0, "high": 2.0}, "give either key or keys"),
+        ({"key": "vehicle.mass", "type": "list", "values": [0.4, -1.0]}, r"mass = -1\.0"),
+        ({"key": "vehicle.mas", "type": "uniform", "low": 0.4, "high": 0.5}, "did you mean mass"),
     ],
 )
 def test_bad_axes_are_told_when_the_environment_is_made(axis, words):
@@ -333,10 +354,15 @@ def test_bad_axes_are_told_when_the_environment_is_made(axis, words):
 
 
 def test_a_draw_that_cannot_fly_is_told_with_its_key():
-    axis = {"key": "vehicle.mass", "type": "list", "values": [-1.0]}
+    axis = {"key": "vehicle.mass", "type": "uniform", "low": -1.0, "high": 1.0}
     env = TiltrotorEnv(scenario(), domain=[axis])
-    with pytest.raises(InputError, match=r"vehicle\.mass = -1\.0"):
-        env.reset()
+
+    def draw_twenty():
+        for _ in range(20):
+            env.reset()
+
+    with pytest.raises(InputError, match=r"vehicle\.mass = -0\."):
+        draw_twenty()
 
 
 def test_a_sweeps_file_is_a_domain(tmp_path):
@@ -405,6 +431,20 @@ def test_gymnasium_tells_a_loss_from_the_end_of_time():
     assert reward == 0.0
     assert "away from the reference" in info["cause"]
     assert observation in env.observation_space
+
+
+def test_gymnasium_refuses_steps_outside_of_an_episode_and_actions_of_other_shapes():
+    pytest.importorskip("gymnasium")
+    from tiltsim.env.gymnasium import GymnasiumEnv
+
+    env = GymnasiumEnv()
+    with pytest.raises(RuntimeError, match="call reset"):
+        env.step(np.zeros(8))
+    env.reset(seed=1)
+    for action in (0.0, [0.0], np.zeros(4)):
+        with pytest.raises(ValueError, match=r"\(8,\) is wanted"):
+            env.step(action)
+    env.step(np.full(8, 5.0))  # clipped
 
 
 def test_zeros_hover_under_gymnasium():

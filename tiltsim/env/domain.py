@@ -27,8 +27,8 @@ class Domain:
     """Scenarios around a base: values drawn along axes, independently for every episode.
 
     ``uniform`` and ``normal`` axes are drawn from their distributions, those with values of their
-    own (``list``, ``linspace``, ``cases``) from these, each as likely as the next; a ``seed`` is
-    any.
+    own (``list``, ``linspace``, ``cases``) from these, each as likely as the next, and one place
+    for all axes of a group; a ``seed`` is any.
     """
 
     def __init__(self, scenario: Scenario, axes: Sequence[Mapping[str, Any]]) -> None:
@@ -46,6 +46,7 @@ class Domain:
         base = without_none(scenario.model_dump(mode="json"))
         base.pop("expect", None)
         self._plan = _plan(sweep, base)
+        self._plan.check()
 
     @classmethod
     def of_sweep(cls, path: str | Path) -> tuple[Domain, Scenario]:
@@ -64,8 +65,9 @@ class Domain:
     def draw(self, generator: np.random.Generator) -> Scenario:
         """A scenario of the domain. Raises `InputError` where what was drawn cannot be flown."""
         values: dict[str, Any] = {}
+        places: dict[str, int] = {}
         for axis in self._plan.sweep.axis:
-            values |= self._plan.place(axis, _row(axis, generator))
+            values |= self._plan.place(axis, _row(axis, generator, places))
         return self._plan.scenario(values)
 
 
@@ -74,8 +76,11 @@ def _plan(sweep: Sweep, base: dict[str, Any]) -> Plan:
     return Plan(Definition("domain", tables, json.loads(json.dumps(base)), {}))
 
 
-def _row(axis: Axis, generator: np.random.Generator) -> Sequence[Any]:
-    """One value for each key of an axis; keys that move together get the same draw."""
+def _row(axis: Axis, generator: np.random.Generator, places: dict[str, int]) -> Sequence[Any]:
+    """One value for each key of an axis; keys that move together get the same draw.
+
+    ``places`` are those drawn for groups so far.
+    """
     if isinstance(axis, UniformAxis):
         return [float(generator.uniform(axis.low, axis.high))] * len(axis.targets)
     if isinstance(axis, NormalAxis):
@@ -84,4 +89,9 @@ def _row(axis: Axis, generator: np.random.Generator) -> Sequence[Any]:
     if isinstance(axis, SeedAxis):
         return [int(generator.integers(LARGEST_SEED))] * len(axis.targets)
     rows = axis.rows()
-    return rows[int(generator.integers(len(rows)))]
+    if axis.group in places:
+        return rows[places[axis.group]]
+    place = int(generator.integers(len(rows)))
+    if axis.group is not None:
+        places[axis.group] = place
+    return rows[place]

@@ -158,6 +158,10 @@ class TiltrotorEnv(dm_env.Environment):  # type: ignore[misc]
     def _start(
         self, base: Scenario, domain: Domain | None, reward: Reward, max_position_error: float
     ) -> None:
+        if not max_position_error > 0.0:
+            raise InputError(
+                f"environment: max_position_error = {max_position_error}: must be greater than 0"
+            )
         self._base, self._domain, self._reward = base, domain, reward
         self._max_position_error = max_position_error
         self._tilting = base.vehicle.model == "tiltrotor"

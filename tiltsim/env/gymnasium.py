@@ -45,6 +45,7 @@ class GymnasiumEnv(gymnasium.Env):  # type: ignore[misc]
     def __init__(self, env: TiltrotorEnv | None = None, **arguments: Any) -> None:
         self.env = TiltrotorEnv(**arguments) if env is None else env
         self.render_mode = None
+        self._flying = False
         spec = self.env.action_spec()
         self._middle = 0.5 * (spec.maximum + spec.minimum)
         self._half = 0.5 * (spec.maximum - spec.minimum)
@@ -59,14 +60,19 @@ class GymnasiumEnv(gymnasium.Env):  # type: ignore[misc]
         """Begin an episode; a seed starts the draws anew. There are no options."""
         super().reset(seed=seed)
         self.env.reseed(self.np_random)
-        return dict(self.env.reset().observation), {}
+        observation = dict(self.env.reset().observation)
+        self._flying = True
+        return observation, {}
 
     def step(self, action: Floats) -> tuple[dict[str, Floats], float, bool, bool, dict[str, Any]]:
         """Hold an action for one control step; ``info["cause"]`` tells why a flight was lost."""
-        if self.env.end is not None:
-            raise RuntimeError("the episode has ended: call reset()")
-        told = self._middle + self._half * np.asarray(action, dtype=np.float64)
-        step = self.env.step(told)
+        if not self._flying:
+            raise RuntimeError("no episode goes on: call reset()")
+        told = np.asarray(action, dtype=np.float64)
+        if told.shape != self._middle.shape:
+            raise ValueError(f"action of shape {told.shape}; {self._middle.shape} is wanted")
+        step = self.env.step(self._middle + self._half * told)
+        self._flying = not step.last()
         lost = bool(step.last() and step.discount == 0.0)
         info: dict[str, Any] = (
             {"cause": self.env.end.cause} if lost and self.env.end is not None else {}
