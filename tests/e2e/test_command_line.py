@@ -8,13 +8,16 @@ import signal
 import subprocess
 import sys
 import tomllib
+from contextlib import contextmanager
 from pathlib import Path
+from threading import Timer
 from xml.etree import ElementTree
 
 import pyarrow.parquet as pq
 import pytest
 
 from tiltsim.cli import main
+from tiltsim.commands import run as run_command
 from tiltsim.flight import COLUMN_UNITS
 from tiltsim.loops.tiltrotor import TILTROTOR
 from tiltsim.metrics import METRICS
@@ -223,39 +226,47 @@ def test_check_survives_a_file_that_cannot_be_read_as_toml(tmp_path, capsys):
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_interrupt_ends_a_whole_check_at_once(tmp_path, jobs):
     compile_callbacks(TILTROTOR)  # so that the interrupt falls into the flights
-    for name in ("a", "b", "c"):
-        (tmp_path / f"{name}.toml").write_text("[simulation]\nduration = 90.0\n")
+    for name, duration in (("a", 0.01), ("b", 900.0), ("c", 900.0)):
+        (tmp_path / f"{name}.toml").write_text(f"[simulation]\nduration = {duration}\n")
+    # Of two processes one has the longest flight, the other what comes before it.
+    paths = [tmp_path / f"{name}.toml" for name in ("abc" if jobs == "1" else "ab")]
     process = subprocess.Popen(
-        [*COMMAND, "check", str(tmp_path), "--jobs", jobs],
+        [*COMMAND, "check", *map(str, paths), "--jobs", jobs],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         start_new_session=True,
     )
+    assert process.stdout.readline().startswith(b"ok ")  # the short one; a long one is under way
     with pytest.raises(subprocess.TimeoutExpired):
-        process.communicate(timeout=6.0)
+        process.wait(timeout=0.5)
     os.killpg(process.pid, signal.SIGINT)
     _, error = process.communicate(timeout=15.0)
     assert process.returncode == 130
     assert error.decode().strip().endswith("tiltsim: interrupted")
 
 
-def test_interrupted_run_keeps_its_files_and_says_so(tmp_path):
+def test_interrupted_run_keeps_its_files_and_says_so(tmp_path, capsys, monkeypatch):
     compile_callbacks(TILTROTOR)  # so that the interrupt falls into the flight
+
+    @contextmanager
+    def no_bar(*_arguments, **_options):
+        begun = False
+
+        def advance_to(_time):
+            nonlocal begun
+            if not begun:  # and from then on native code flies, a second at a time
+                Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+            begun = True
+
+        yield advance_to
+
+    monkeypatch.setattr(run_command, "progress_bar", no_bar)
     # So few samples that none of what follows from them is worth compiling either.
     long = ["--set", "simulation.duration=2000.0", "--set", "simulation.record_timestep=1.0"]
-    process = subprocess.Popen(
-        [*COMMAND, "run", SETPOINT, "--out", str(tmp_path), *long],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        start_new_session=True,
-    )
-    with pytest.raises(subprocess.TimeoutExpired):
-        process.communicate(timeout=8.0)
-    os.killpg(process.pid, signal.SIGINT)
-    output, error = process.communicate(timeout=15.0)
-    assert process.returncode == 130
-    assert output == b""
-    assert error.decode().startswith("tiltsim: interrupted at t = ")
+    assert main(["run", SETPOINT, "--out", str(tmp_path), *long]) == 130
+    output, error = capsys.readouterr()
+    assert output == ""
+    assert error.startswith("tiltsim: interrupted at t = ")
     flown = json.loads((tmp_path / "metrics.json").read_text())["duration"]
     assert 0.0 < flown < 2000.0
 
