@@ -95,6 +95,14 @@ def test_a_cluster_that_is_not_there_is_one_line(tmp_path, capsys, monkeypatch):
     assert address in error
 
 
+@pytest.mark.parametrize("address", ["nowhere", "tcp://nowhere", "http://nowhere:8786", ":1"])
+def test_what_is_no_address_is_refused_at_once(tmp_path, capsys, address):
+    file = short_sweep(tmp_path / "sweep.toml")
+    options = ["--cluster", address, "--out", str(tmp_path / "out"), "--quiet"]
+    assert main(["sweep", str(file), *options]) == 2
+    assert capsys.readouterr().err.endswith("write one such as tcp://192.168.0.1:8786\n")
+
+
 def test_without_dask_the_extra_is_named(tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     file = short_sweep(tmp_path / "sweep.toml")

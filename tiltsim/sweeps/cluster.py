@@ -29,7 +29,7 @@ def fly_on_cluster(
 
 
 def _connect(address: str) -> Any:
-    if not re.search(r"[\w\]]:\d+$", address):
+    if not re.fullmatch(r"((tcp|tls|ucx|wss?)://)?[^/]*[\w\]]:\d+", address):
         raise InputError(
             f"--cluster {address}: no scheduler's address; write one such as tcp://192.168.0.1:8786"
         )
