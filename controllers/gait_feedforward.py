@@ -53,7 +53,7 @@ from controllers.jets import (
     jet_sum,
 )
 from controllers.references import ReferenceParameters, reference_derivatives
-from controllers.rotation import rotation_from_euler, shortest_turn
+from controllers.rotation import rotation_from_euler, shortest_turn, to_world
 from controllers.scalar import Quad, Triple, scalar
 from controllers.supervisor import AT_REST, Supervisor, gait_share, gait_time, supervised_tilts
 from controllers.vehicle import Vehicle, drag_ratio
@@ -68,10 +68,6 @@ class Ingredients(NamedTuple):
     euler_rates: float = 1.0  # exact derivatives of the Euler angles, else the body rates
     gyroscopic_torque: float = 1.0  # omega x I omega
     integral_action: float = 1.0
-
-
-INGREDIENTS: Final = Ingredients._fields
-"""What can be left out, by the name a scenario gives it."""
 
 
 class Parameters(NamedTuple):
@@ -213,17 +209,6 @@ def body_jerk(roll: Jet, pitch: Jet, yaw: Jet, jerk: Triple) -> Triple:
 def cross(a: Triple, b: Triple) -> Triple:
     """The vector product ``a x b``."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@scalar
-def rotated(rotation: Sequence[float], b: Triple) -> Triple:
-    """A vector of the body in world axes; ``rotation`` holds nine entries, rows first."""
-    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
-    return (
-        r11 * b[0] + r12 * b[1] + r13 * b[2],
-        r21 * b[0] + r22 * b[1] + r23 * b[2],
-        r31 * b[0] + r32 * b[1] + r33 * b[2],
-    )
 
 
 # --- the law -----------------------------------------------------------------------------------
@@ -411,7 +396,7 @@ def tracking_inputs(
     # Newton and Euler: accelerations of the body and of its Euler angles.
     rotation = rotation_from_euler(roll, pitch, yaw)
     specific = (per_force * fx, per_force * fy, per_force * fz)
-    ax, ay, lift = rotated(rotation, specific)
+    ax, ay, lift = to_world(rotation, specific)
     omega = (p, q, r)
     cx, cy, cz = cross(omega, (ixx * p, iyy * q, izz * r))
     omega_rate = (
@@ -473,7 +458,7 @@ def tracking_inputs(
             size = -size
         size = size * counted
         swept = cross(omega, specific)
-        jx, jy, _ = rotated(
+        jx, jy, _ = to_world(
             rotation,
             (
                 swept[0] + size * jet_quotient(nx, length)[1],
