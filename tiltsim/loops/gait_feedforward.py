@@ -12,7 +12,6 @@ from controllers.gaits import tilt_reference
 from controllers.references import position_reference
 from controllers.scalar import Triple, scalar
 from controllers.supervisor import AT_REST, gait_share
-from controllers.vehicle import drag_ratio
 from tiltsim.controller_tables import AttitudeAltitudeController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
@@ -77,7 +76,7 @@ def gait_feedforward_controls(
     law = parameters.law
     state = tiltrotor_state(qpos, qvel, act)
     planned = tilt_reference(time, law.gait, table)
-    share = gait_share(planned, state[6], state[7], law.supervisor, drag_ratio(law.vehicle))
+    share = gait_share(planned, state[6], state[7], law.supervisor, law.vehicle)
     return (
         *servo_commands(planned, share, parameters.servo_lead),
         *rotor_thrust_controls(act),
@@ -145,7 +144,7 @@ def references_in_force(
     """Columns of references at a time: the state is `SEEN`."""
     law = parameters.law
     planned = tilt_reference(time, law.gait, table)
-    share = gait_share(planned, state[6], state[7], law.supervisor, drag_ratio(law.vehicle))
+    share = gait_share(planned, state[6], state[7], law.supervisor, law.vehicle)
     return (
         *references_under(time, state, AT_REST, parameters, table),
         *servo_commands(planned, share, 0.0),

@@ -210,10 +210,11 @@ def _supervision(
     if supervisor.strategy != STRATEGIES["scale"]:
         held, rate = (samples[name] for name in SUPERVISOR_FIELDS)
         return rate if supervisor.strategy == HOLD else held
-    ratio = drag_ratio(law.vehicle)
     attitudes = zip(samples["time"].tolist(), samples["roll"].tolist(), samples["pitch"].tolist())
     shares = [
-        gait_share(tilt_reference(time, law.gait, setup.table), roll, pitch, supervisor, ratio)
+        gait_share(
+            tilt_reference(time, law.gait, setup.table), roll, pitch, supervisor, law.vehicle
+        )
         for time, roll, pitch in attitudes
     ]
     return 1.0 - np.array(shares)
