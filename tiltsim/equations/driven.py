@@ -20,7 +20,7 @@ from controllers.rotation import (
     rotation_from_euler,
     to_world,
 )
-from controllers.scalar import Quad, Triple, scalar
+from controllers.scalar import Quad, Triple, clipped, scalar
 from controllers.vehicle import Vehicle
 from tiltsim.equations.quadrotor import equations_of_motion, initial_state
 from tiltsim.equations.tiltrotor import rigid_body
@@ -56,14 +56,6 @@ def mechanics(scenario: Scenario) -> Mechanics:
         min_speed=-max_speed if vehicle.min_rotor_speed is None else vehicle.min_rotor_speed,
         max_speed=max_speed,
     )
-
-
-@scalar
-def clipped(value: float, low: float, high: float) -> float:
-    """The nearest number between two bounds; what is no number stays none."""
-    if value < low:
-        return low
-    return high if value > high else value
 
 
 @scalar
