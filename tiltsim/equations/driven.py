@@ -47,13 +47,13 @@ def mechanics(scenario: Scenario) -> Mechanics:
     """The mechanics of a scenario's rotorcraft."""
     vehicle = scenario.rotorcraft
     servo = vehicle.tilt_servo
-    max_speed = inf if vehicle.max_rotor_speed is None else vehicle.max_rotor_speed
+    min_speed, max_speed = vehicle.speeds_along_spin
     return Mechanics(
         scenario.true_rotorcraft,
         servo.natural_frequency,
         servo.damping_ratio,
         max_tilt=inf if servo.max_angle is None else servo.max_angle,
-        min_speed=-max_speed if vehicle.min_rotor_speed is None else vehicle.min_rotor_speed,
+        min_speed=min_speed,
         max_speed=max_speed,
     )
 
