@@ -260,7 +260,8 @@ def with_actuation(loop: Loop, latency_steps: int) -> Loop:
     law_act, law_ctrl = loop.sizes.act, loop.sizes.ctrl
     line = law_act + ROTORS  # after the speeds that the motors are told
     under_way = COMMANDS * latency_steps
-    memory = law_ctrl + ROTORS + under_way  # the commands in force, last of the controls
+    after_told = law_ctrl + ROTORS  # the delay line's controls
+    memory = after_told + under_way  # the commands in force, last of the controls
     extra = ExtraActuators(states=ROTORS + under_way, memories=COMMANDS)
     sizes = loop.sizes._replace(
         act=law_act + extra.states, ctrl=law_ctrl + extra.states + extra.memories
@@ -312,7 +313,7 @@ def with_actuation(loop: Loop, latency_steps: int) -> Loop:
             *motor_controls(act, law_act, commands, actuation),
             *ctrl[LAW_CONTROLS:law_ctrl],
             *told_rates(act, law_act, commands, actuation),
-            *ctrl[law_ctrl + ROTORS :],
+            *ctrl[after_told:],
         )
 
     @scalar
