@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import pi
+from math import inf, pi
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
@@ -95,6 +95,13 @@ class VehicleTable(Table):
         own = self.own
         base = PRESETS[self.preset] if own is None else own.vehicle
         return base._replace(**known)
+
+    @property
+    def speeds_along_spin(self) -> tuple[float, float]:
+        """Least and greatest speed (rad/s) of a rotor along its spin; infinite without limits."""
+        low, high = self.min_rotor_speed, self.max_rotor_speed
+        greatest = inf if high is None else high
+        return -greatest if low is None else low, greatest
 
     @property
     def own(self) -> OwnVehicle | None:
