@@ -5,8 +5,10 @@ from __future__ import annotations
 import ctypes
 import os
 import signal
+import subprocess
 import sys
 import threading
+import time
 
 import pytest
 
@@ -14,13 +16,37 @@ import tiltsim.commands.run
 from tests.flights import flight as flight_named
 from tiltsim.cli import main
 from tiltsim.files import load_flight
-from tiltsim.interrupts import interrupts_deferred, interrupts_kept
+from tiltsim.interrupts import (
+    TERMINATIONS,
+    interrupts_deferred,
+    interrupts_kept,
+    terminations_interrupt,
+)
 
 CALLED_BACK = ctypes.CFUNCTYPE(None)
+TELLING = """
+import time
+from pathlib import Path
+from tiltsim import Command
+
+def law(seen):
+    if seen.time > 0.1:
+        Path(__file__).with_suffix(".flying").touch()
+        time.sleep(0.05)
+    return Command(thrusts=[1.05105] * 4)
+"""
 
 
 def interrupt():
     os.kill(os.getpid(), signal.SIGINT)
+
+
+@pytest.fixture
+def default_terminations():
+    before = {number: signal.signal(number, signal.SIG_DFL) for number in TERMINATIONS}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 def call_from_c(function):
@@ -80,6 +106,52 @@ def test_a_second_interrupt_does_not_wait():
     with pytest.raises(KeyboardInterrupt):
         work()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize("number", TERMINATIONS)
+def test_what_ends_a_process_interrupts_it_and_can_be_deferred(number, default_terminations):
+    done = []
+
+    def work():
+        with interrupts_deferred():
+            signal.raise_signal(number)
+            done.append("finished")
+
+    terminations_interrupt()
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done == ["finished"]
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(number)
+
+
+def test_signals_that_are_ignored_stay_ignored(default_terminations):
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    terminations_interrupt()
+    with interrupts_deferred():
+        signal.raise_signal(signal.SIGTERM)
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
+
+
+def test_a_terminated_run_keeps_its_flight_and_leaves_no_part_file(tmp_path):
+    law, out = tmp_path / "law.py", tmp_path / "out"
+    law.write_text(TELLING, encoding="utf-8")
+    command = [sys.executable, "-m", "tiltsim", "run", "ch04_tracking/setpoint#rho_065_modified"]
+    options = ["--controller", f"{law}:law", "--out", str(out), "--rerun", str(out / "flight.rrd")]
+    out.mkdir()
+    with subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True) as process:
+        deadline = time.monotonic() + 30.0
+        while not law.with_suffix(".flying").exists() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        process.terminate()
+        _, error = process.communicate(timeout=30.0)
+    assert (process.returncode, error.splitlines()[-1][:29]) == (
+        130,
+        "tiltsim: interrupted at t = 0",
+    )
+    assert load_flight(out).end.kind == "interrupted"
+    names = ["flight.parquet", "flight.rrd", "law.py", "metrics.json", "scenario.toml"]
+    assert sorted(path.name for path in out.iterdir()) == names
 
 
 def test_other_threads_run_as_ever():

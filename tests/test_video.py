@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 
 import mujoco
 import numpy as np
@@ -146,6 +147,21 @@ def test_the_command_films_without_a_screen(tmp_path):
 
 
 # --- what can go wrong -------------------------------------------------------------------------
+
+
+@needs_gl
+def test_a_film_that_is_terminated_leaves_nothing_behind(tmp_path):
+    folder = saved("fixed", tmp_path)
+    before = sorted(folder.iterdir())
+    command = [sys.executable, "-m", "tiltsim", "video", str(folder), "--speed", "0.01"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        deadline = time.monotonic() + 30.0
+        while sorted(folder.iterdir()) == before and time.monotonic() < deadline:
+            time.sleep(0.02)
+        process.terminate()
+        _, error = process.communicate(timeout=30.0)
+    assert (process.returncode, error.splitlines()[-1]) == (130, "tiltsim: interrupted")
+    assert sorted(folder.iterdir()) == before
 
 
 def test_no_way_to_draw_is_one_line_with_the_way_out(monkeypatch):

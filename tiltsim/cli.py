@@ -12,6 +12,7 @@ from typing import Final, NoReturn
 
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT
+from tiltsim.interrupts import terminations_interrupt
 
 COMMANDS: Final = (
     *("run", "check", "sweep", "list", "view", "plot", "video"),
@@ -77,6 +78,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run one command, the process's own unless it is given, and return its exit code."""
     if arguments is None:
         spare_garbage_collection()
+        terminations_interrupt()
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # as Python has it for standard error
     try:

@@ -1,4 +1,7 @@
-"""Interrupts from the keyboard that must neither get lost nor lose what is computed."""
+"""Interrupts from the keyboard that must neither get lost nor lose what is computed.
+
+`terminations_interrupt` makes what ends a process otherwise, such as ``kill``, an interrupt, too.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,25 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from types import FrameType
+
+TERMINATIONS: Final = [
+    getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)
+]
+"""Signals that ask a process to end: those of ``kill`` and of a terminal that is closed."""
+
+
+def terminations_interrupt() -> None:
+    """Let the signals that ask the process to end raise KeyboardInterrupt, unless ignored.
+
+    By default they end it on the spot: half-written files would stay and the flight be lost.
+    """
+    for number in TERMINATIONS:
+        if signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, signal.default_int_handler)
 
 
 @contextmanager
@@ -50,23 +68,26 @@ def interrupts_deferred() -> Iterator[None]:
     For what is short and must not be lost, such as writing a flight's files. In threads other than
     the main one the block runs as ever.
     """
-    before = signal.getsignal(signal.SIGINT)
-    in_main_thread = threading.current_thread() is threading.main_thread()
-    if not (in_main_thread and callable(before)):  # else interrupts are ignored, or not Python's
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
+    found = {number: signal.getsignal(number) for number in (signal.SIGINT, *TERMINATIONS)}
+    # The others are ignored, end the process on the spot, or are not Python's.
+    handlers = {number: handler for number, handler in found.items() if callable(handler)}
     interrupted = False
 
     def defer(number: int, frame: FrameType | None) -> None:
         nonlocal interrupted
         if interrupted:
-            before(number, frame)
+            handlers[number](number, frame)
         interrupted = True
 
-    signal.signal(signal.SIGINT, defer)
+    for number in handlers:
+        signal.signal(number, defer)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
     if interrupted:
         raise KeyboardInterrupt
