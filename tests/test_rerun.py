@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
 import threading
 import time
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -23,7 +25,7 @@ from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.files import load_flight
 from tiltsim.model import MODELS, compile_model
-from tiltsim.rerun_stream import TIMELINE, save_recording
+from tiltsim.rerun_stream import TIMELINE, RecordingProcess, save_recording
 from tiltsim.rerun_stream.geometry import geom_archetypes, log_geometry
 from tiltsim.rerun_stream.live import LiveStream
 from tiltsim.rerun_stream.recorder import FlightRecorder
@@ -344,6 +346,79 @@ def test_run_and_view_write_equal_recordings(tmp_path, capsys):
     assert f"open it with: rerun {viewed}" in capsys.readouterr().out
     done = rerun_rrd("compare", flown, viewed)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.fixture
+def full_disk(monkeypatch):
+    """The next recording goes to where there is no room."""
+    if not Path("/dev/full").exists():
+        pytest.skip("this system has no /dev/full")
+
+    @contextmanager
+    def to_nowhere(_path):
+        yield Path("/dev/full")
+
+    monkeypatch.setattr("tiltsim.rerun_stream.recording.replacing", to_nowhere)
+
+
+def test_a_full_disk_is_said_in_one_line(full_disk, tmp_path, capfd):
+    path = tmp_path / "flight.rrd"
+    with pytest.raises(InputError, match=r"flight\.rrd: cannot be written: No space left"):
+        save_recording([flight("fixed")], path)
+    assert capfd.readouterr().err == ""
+
+
+def test_the_recordings_process_tells_what_went_wrong(tmp_path):
+    path = tmp_path / "no folder" / "flight.rrd"
+    with RecordingProcess(flight("fixed").scenario) as process:
+        process.start(flight("fixed"), path)
+        with pytest.raises(InputError, match=r"flight\.rrd: cannot be written: No such file"):
+            process.finish()
+
+
+def test_a_recording_whose_process_is_killed_is_written_all_the_same(tmp_path):
+    this, paths = flight("trot"), [tmp_path / "a.rrd", tmp_path / "b.rrd"]
+    with RecordingProcess(this.scenario) as process:
+        process._process.kill()
+        process._process.wait()
+        process.start(this, paths[0])
+        process.finish()
+    save_recording([this], paths[1])
+    done = rerun_rrd("compare", *paths)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_recordings_process_ends_with_a_flight_that_comes_to_nothing():
+    with pytest.raises(KeyboardInterrupt), RecordingProcess(flight("trot").scenario) as process:
+        raise KeyboardInterrupt
+    assert process._process.returncode is not None
+
+
+def test_the_recordings_process_ends_with_the_one_that_it_serves(tmp_path):
+    """Also when that is killed, with no time to clean up."""
+    program = (
+        "import os, signal; from tests.flights import flight; "
+        "from tiltsim.rerun_stream import RecordingProcess; "
+        "RecordingProcess(flight('fixed').scenario); os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    # Both write to one pipe, of which the end is seen when both have ended.
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, env=environment, stderr=subprocess.PIPE, text=True, timeout=30)
+    assert (done.returncode, done.stderr) == (-signal.SIGKILL, "")
+
+
+def test_a_flight_is_recorded_without_loading_rerun_beside_it(tmp_path):
+    path = tmp_path / "flight.rrd"
+    options = ["--set", "simulation.duration=0.1", "--quiet", "--rerun", str(path)]
+    arguments = ["run", "ch04_tracking/setpoint#rho_065_modified", *options]
+    program = (
+        f"import sys; from tiltsim.cli import main; main({arguments!r}); "
+        "assert 'rerun' not in sys.modules"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert path.is_file()
 
 
 @pytest.mark.parametrize(
