@@ -12,10 +12,11 @@ import pytest
 
 from controllers.vehicle import PRESETS
 from tests.flights import flight, saved
-from tiltsim.attitude_plane import torque_free_directions
+from tiltsim.attitude_plane import MOVING_TRAIL_TIME, torque_free_directions
 from tiltsim.cli import main
 from tiltsim.errors import InputError
-from tiltsim.video import inset, offscreen
+from tiltsim.video import aspects, inset, offscreen
+from tiltsim.video.aspects import RotorcraftAspect
 from tiltsim.video.film import Format, _Stage, film_flight, frames
 from tiltsim.video.inset import PlaneInset, lay_over
 from tiltsim.video.offscreen import make_gl_context
@@ -68,6 +69,18 @@ def test_an_inset_covers_its_corner_alone():
     lay_over(frame, np.full((30, 30, 3), 200, dtype=np.uint8), 5)
     assert frame[70, 70].min() > 150
     assert frame[:65].max() == frame[:, :65].max() == frame[95:].max() == 0
+
+
+@pytest.mark.parametrize(("name", "whole"), [("fixed", True), ("trot", False)])
+def test_the_insets_trail_is_short_beside_a_curve_that_moves(name, whole, monkeypatch):
+    this, trails = flight(name), []
+    monkeypatch.setattr(PlaneInset, "paint", lambda _self, _n, trail, _margin: trails.append(trail))
+    monkeypatch.setattr(aspects, "lay_over", lambda *_: None)
+    last = len(this) - 1
+    RotorcraftAspect(this, 180).paint(np.zeros((180, 320, 3), dtype=np.uint8), last)
+    began = 0.0 if whole else this["time"][last] - MOVING_TRAIL_TIME
+    (first,) = np.flatnonzero(np.isclose(this["time"], began))
+    np.testing.assert_array_equal(trails[0][0], [this["roll"][first], this["pitch"][first]])
 
 
 # --- frames and films --------------------------------------------------------------------------

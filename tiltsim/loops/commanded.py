@@ -172,6 +172,7 @@ QUADROTOR: Final = Loop(
     derive=_derive_quadrotor,
     watched=lambda _sample, _setup: (),
     follows_position=_follows_position,
+    flies_gait=False,
 )
 """The quadrotor under commands."""
 
