@@ -49,8 +49,8 @@ class Panel:
 
 
 PANELS: Final = (
-    Panel("attitude", "Attitude (rad)", 7.0, (("roll", "Roll (rad)"), ("pitch", "Pitch (rad)"))),
-    Panel("tilt_angles", "Tilt angles (rad)", 7.0, ()),
+    Panel("attitude", "Attitude (rad)", 7.5, (("roll", "Roll (rad)"), ("pitch", "Pitch (rad)"))),
+    Panel("tilt_angles", "Tilt angles (rad)", 6.5, ()),
     Panel(
         "rotor_speeds",
         "Rotor speeds along their spins (rad/s)",
