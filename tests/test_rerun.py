@@ -523,6 +523,20 @@ def test_no_screen_is_said_in_one_line(monkeypatch):
         require_viewer(None)
 
 
+@pytest.mark.parametrize("how", ["run", "view", "live"])
+def test_rerun_switched_off_is_said_in_one_line(how, tmp_path, monkeypatch, capfd):
+    monkeypatch.setenv("RERUN", "Off")
+    folder, target = saved("fixed", tmp_path), str(tmp_path / "flight.rrd")
+    arguments = {
+        "run": ["run", "ch04_tracking/setpoint#rho_065_modified", "--rerun", target],
+        "view": ["view", str(folder), "--rerun", target],
+        "live": ["run", "ch04_tracking/setpoint#rho_065_modified", "--live"],
+    }
+    assert main(arguments[how]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line == "tiltsim: RERUN=Off in the environment switches Rerun off; unset it"
+
+
 def test_a_port_where_nobody_listens_is_said_in_one_line():
     with pytest.raises(InputError, match="no viewer listens there"):
         require_viewer(f"rerun+http://127.0.0.1:{free_port()}/proxy")

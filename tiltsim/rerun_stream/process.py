@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Self
 
 from tiltsim.errors import InputError
+from tiltsim.rerun_stream.viewer import require_rerun
 
 if TYPE_CHECKING:
     from tiltsim.flight import Flight
@@ -34,9 +35,15 @@ class RecordingProcess:
     ----------
     scenario
         What is flown.
+
+    Raises
+    ------
+    InputError
+        If the environment switches Rerun off.
     """
 
     def __init__(self, scenario: Scenario) -> None:
+        require_rerun()
         # Modules are looked for where this process found them, not in the current folder first.
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", _PROGRAM],

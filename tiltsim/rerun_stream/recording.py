@@ -12,6 +12,7 @@ from tiltsim.files import replacing
 from tiltsim.rerun_stream import APPLICATION, palette
 from tiltsim.rerun_stream.blueprint import flight_blueprint
 from tiltsim.rerun_stream.recorder import FlightRecorder
+from tiltsim.rerun_stream.viewer import require_rerun
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -39,6 +40,7 @@ class RecordingFile:
     def __init__(self, scenarios: Sequence[Scenario]) -> None:
         import rerun as rr
 
+        require_rerun()
         # Flushed by rows and bytes alone: a clock would cut the chunks elsewhere in every run.
         unhurried = rr.ChunkBatcherConfig(flush_tick=UNHURRIED)
         self._recording = new_recording(scenarios, batching=unhurried)

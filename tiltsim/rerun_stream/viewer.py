@@ -78,11 +78,19 @@ def _require_recording(path: Path) -> None:
         raise InputError(f"{path}: not a Rerun recording")
 
 
+def require_rerun() -> None:
+    """Raise `InputError` where the environment switches Rerun off: it would record nothing."""
+    value = os.environ.get("RERUN", "")
+    if value.strip().lower() in {"0", "false", "off"}:
+        raise InputError(f"RERUN={value} in the environment switches Rerun off; unset it")
+
+
 def require_viewer(url: str | None) -> None:
     """Make sure that a viewer listens at a URL or, without one, that there is a screen.
 
     Raises `InputError` otherwise, in one line with the way out.
     """
+    require_rerun()
     if url is not None:
         _require_listener(url)
     elif sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ):
