@@ -16,12 +16,7 @@ import tiltsim.commands.run
 from tests.flights import flight as flight_named
 from tiltsim.cli import main
 from tiltsim.files import load_flight
-from tiltsim.interrupts import (
-    TERMINATIONS,
-    interrupts_deferred,
-    interrupts_kept,
-    terminations_interrupt,
-)
+from tiltsim.interrupts import interrupts_deferred, interrupts_kept, terminations_as_interrupts
 
 CALLED_BACK = ctypes.CFUNCTYPE(None)
 TELLING = """
@@ -39,14 +34,6 @@ def law(seen):
 
 def interrupt():
     os.kill(os.getpid(), signal.SIGINT)
-
-
-@pytest.fixture
-def default_terminations():
-    before = {number: signal.signal(number, signal.SIG_DFL) for number in TERMINATIONS}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 def call_from_c(function):
@@ -108,52 +95,6 @@ def test_a_second_interrupt_does_not_wait():
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-@pytest.mark.parametrize("number", TERMINATIONS)
-def test_what_ends_a_process_interrupts_it_and_can_be_deferred(number, default_terminations):
-    done = []
-
-    def work():
-        with interrupts_deferred():
-            signal.raise_signal(number)
-            done.append("finished")
-
-    terminations_interrupt()
-    with pytest.raises(KeyboardInterrupt):
-        work()
-    assert done == ["finished"]
-    with pytest.raises(KeyboardInterrupt):
-        signal.raise_signal(number)
-
-
-def test_signals_that_are_ignored_stay_ignored(default_terminations):
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    terminations_interrupt()
-    with interrupts_deferred():
-        signal.raise_signal(signal.SIGTERM)
-    assert signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
-
-
-def test_a_terminated_run_keeps_its_flight_and_leaves_no_part_file(tmp_path):
-    law, out = tmp_path / "law.py", tmp_path / "out"
-    law.write_text(TELLING, encoding="utf-8")
-    command = [sys.executable, "-m", "tiltsim", "run", "ch04_tracking/setpoint#rho_065_modified"]
-    options = ["--controller", f"{law}:law", "--out", str(out), "--rerun", str(out / "flight.rrd")]
-    out.mkdir()
-    with subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True) as process:
-        deadline = time.monotonic() + 30.0
-        while not law.with_suffix(".flying").exists() and time.monotonic() < deadline:
-            time.sleep(0.02)
-        process.terminate()
-        _, error = process.communicate(timeout=30.0)
-    assert (process.returncode, error.splitlines()[-1][:29]) == (
-        130,
-        "tiltsim: interrupted at t = 0",
-    )
-    assert load_flight(out).end.kind == "interrupted"
-    names = ["flight.parquet", "flight.rrd", "law.py", "metrics.json", "scenario.toml"]
-    assert sorted(path.name for path in out.iterdir()) == names
-
-
 def test_other_threads_run_as_ever():
     ran = []
 
@@ -182,3 +123,57 @@ def test_an_interrupt_while_files_are_written_loses_none(tmp_path, monkeypatch, 
     assert len(load_flight(tmp_path)) == len(flight)
     assert (tmp_path / "scenario.toml").exists()
     assert "interrupted" in capsys.readouterr().err
+
+
+def terminate():
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+@pytest.mark.parametrize("keyboard", [signal.default_int_handler, signal.SIG_IGN])
+def test_a_termination_interrupts_and_a_second_one_would_kill(keyboard):
+    before = signal.signal(signal.SIGINT, keyboard)
+    ended = signal.getsignal(signal.SIGTERM)
+    try:
+        with terminations_as_interrupts() as terminated:
+            assert not terminated()
+            with pytest.raises(KeyboardInterrupt):
+                terminate()
+            assert terminated()
+            assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert signal.getsignal(signal.SIGTERM) is ended
+
+
+def test_a_termination_waits_for_what_must_not_be_lost():
+    done = []
+
+    def work():
+        with terminations_as_interrupts(), interrupts_deferred():
+            terminate()
+            done.append("finished")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done == ["finished"]
+
+
+def test_a_terminated_run_keeps_its_flight_and_leaves_no_part_file(tmp_path):
+    law, out = tmp_path / "law.py", tmp_path / "out"
+    law.write_text(TELLING, encoding="utf-8")
+    command = [sys.executable, "-m", "tiltsim", "run", "ch04_tracking/setpoint#rho_065_modified"]
+    options = ["--controller", f"{law}:law", "--out", str(out), "--rerun", str(out / "flight.rrd")]
+    out.mkdir()
+    with subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True) as process:
+        deadline = time.monotonic() + 30.0
+        while not law.with_suffix(".flying").exists() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        process.terminate()
+        _, error = process.communicate(timeout=30.0)
+    assert (process.returncode, error.splitlines()[-1][:29]) == (
+        143,
+        "tiltsim: interrupted at t = 0",
+    )
+    assert load_flight(out).end.kind == "interrupted"
+    names = ["flight.parquet", "flight.rrd", "law.py", "metrics.json", "scenario.toml"]
+    assert sorted(path.name for path in out.iterdir()) == names

@@ -173,7 +173,7 @@ def test_a_film_that_is_terminated_leaves_nothing_behind(tmp_path):
             time.sleep(0.02)
         process.terminate()
         _, error = process.communicate(timeout=30.0)
-    assert (process.returncode, error.splitlines()[-1]) == (130, "tiltsim: interrupted")
+    assert (process.returncode, error.splitlines()[-1]) == (143, "tiltsim: interrupted")
     assert sorted(folder.iterdir()) == before
 
 

@@ -11,8 +11,8 @@ from io import TextIOWrapper
 from typing import Final, NoReturn
 
 from tiltsim.errors import InputError
-from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT
-from tiltsim.interrupts import terminations_interrupt
+from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT, TERMINATED
+from tiltsim.interrupts import terminations_as_interrupts
 
 COMMANDS: Final = (
     *("run", "check", "sweep", "list", "view", "plot", "video"),
@@ -78,9 +78,15 @@ def main(arguments: list[str] | None = None) -> int:
     """Run one command, the process's own unless it is given, and return its exit code."""
     if arguments is None:
         spare_garbage_collection()
-        terminations_interrupt()
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # as Python has it for standard error
+    with terminations_as_interrupts() as terminated:
+        code = _run(arguments)
+    return TERMINATED if code == INTERRUPTED and terminated() else code
+
+
+def _run(arguments: list[str] | None) -> int:
+    """Parse and run; every mistake becomes a line and an exit code."""
     try:
         parsed = build_parser().parse_args(arguments)
         return int(parsed.run(parsed))

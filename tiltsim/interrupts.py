@@ -1,34 +1,16 @@
-"""Interrupts from the keyboard that must neither get lost nor lose what is computed.
-
-`terminations_interrupt` makes what ends a process otherwise, such as ``kill``, an interrupt, too.
-"""
+"""Interrupts that must neither get lost nor lose what is computed."""
 
 from __future__ import annotations
 
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from types import FrameType
-
-TERMINATIONS: Final = [
-    getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)
-]
-"""Signals that ask a process to end: those of ``kill`` and of a terminal that is closed."""
-
-
-def terminations_interrupt() -> None:
-    """Let the signals that ask the process to end raise KeyboardInterrupt, unless ignored.
-
-    By default they end it on the spot: half-written files would stay and the flight be lost.
-    """
-    for number in TERMINATIONS:
-        if signal.getsignal(number) is signal.SIG_DFL:
-            signal.signal(number, signal.default_int_handler)
 
 
 @contextmanager
@@ -68,26 +50,51 @@ def interrupts_deferred() -> Iterator[None]:
     For what is short and must not be lost, such as writing a flight's files. In threads other than
     the main one the block runs as ever.
     """
-    if threading.current_thread() is not threading.main_thread():
+    before = signal.getsignal(signal.SIGINT)
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    if not (in_main_thread and callable(before)):  # else interrupts are ignored, or not Python's
         yield
         return
-    found = {number: signal.getsignal(number) for number in (signal.SIGINT, *TERMINATIONS)}
-    # The others are ignored, end the process on the spot, or are not Python's.
-    handlers = {number: handler for number, handler in found.items() if callable(handler)}
     interrupted = False
 
     def defer(number: int, frame: FrameType | None) -> None:
         nonlocal interrupted
         if interrupted:
-            handlers[number](number, frame)
+            before(number, frame)
         interrupted = True
 
-    for number in handlers:
-        signal.signal(number, defer)
+    signal.signal(signal.SIGINT, defer)
     try:
         yield
     finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
+        signal.signal(signal.SIGINT, before)
     if interrupted:
         raise KeyboardInterrupt
+
+
+@contextmanager
+def terminations_as_interrupts() -> Iterator[Callable[[], bool]]:
+    """Within the block SIGTERM is an interrupt, so that it, too, is cleaned up after.
+
+    Schedulers and ``kill`` end a process so. A second one ends it at once. Yields whether there
+    was one. In threads other than the main one the block runs as ever.
+    """
+    terminated = False
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: terminated
+        return
+
+    def interrupt(_number: int, frame: FrameType | None) -> None:
+        nonlocal terminated
+        terminated = True
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        handler = signal.getsignal(signal.SIGINT)
+        if not callable(handler):  # a shell's job in the background ignores the keyboard
+            raise KeyboardInterrupt
+        handler(signal.SIGINT, frame)
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield lambda: terminated
+    finally:
+        signal.signal(signal.SIGTERM, before)
