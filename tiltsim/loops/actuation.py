@@ -37,6 +37,7 @@ from controllers.gaits import tilt_reference
 from controllers.rotation import euler_from_quaternion
 from controllers.scalar import scalar
 from controllers.vehicle import Vehicle
+from tiltsim.kinds.rotorcraft import initial_tilts
 from tiltsim.loop import ControlSetup, ExtraActuators, Floats, Loop
 from tiltsim.loops.layer import around
 from tiltsim.loops.tiltrotor import rotor_thrust_controls, servo_lead
@@ -307,7 +308,7 @@ def with_actuation(loop: Loop, latency_steps: int) -> Loop:
 
     def initial_activations(scenario: Scenario, setup: ControlSetup) -> Sequence[float]:
         law_states = layered.initial_activations(scenario, setup)
-        waiting = (*_initial_tilts(scenario), 0.0, 0.0, 0.0, 0.0) * latency_steps
+        waiting = (*initial_tilts(scenario)[0], 0.0, 0.0, 0.0, 0.0) * latency_steps
         return (*law_states, *law_states[:ROTORS], *waiting)
 
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -328,11 +329,6 @@ def with_actuation(loop: Loop, latency_steps: int) -> Loop:
         extra_actuators=(*loop.extra_actuators, extra),
         extra_columns={**loop.extra_columns, **dict.fromkeys(THRUST_FACTORS, "1")},
     )
-
-
-def _initial_tilts(scenario: Scenario) -> tuple[float, ...]:
-    gait = scenario.gait.plan(scenario.vehicle.resolve())
-    return tilt_reference(0.0, gait.parameters, gait.table)[:4]
 
 
 def _actuation(scenario: Scenario) -> Actuation:
