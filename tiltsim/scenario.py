@@ -337,17 +337,11 @@ class Scenario(Table):
             raise InvalidValueError(
                 "vehicle.model", self.vehicle.model, "has no air around it; leave air out"
             )
-        if self.has_air and self.controller.law == "python":
-            raise InvalidValueError(
-                "controller.law", "python", "a controller of your own flies without air"
-            )
         for key, value, ideal in self._real_actuators():
-            if value == ideal:
-                continue
-            if self.vehicle.model != "tiltrotor" or self.controller.law == "python":
-                own = self.controller.law == "python"
-                whose = "a controller of your own" if own else f"the {self.vehicle.model}"
-                raise InvalidValueError(key, value, f"{whose} flies without; leave it out")
+            if value != ideal and self.vehicle.model != "tiltrotor":
+                raise InvalidValueError(
+                    key, value, f"the {self.vehicle.model} flies without; leave it out"
+                )
         kinds = [(f.rotor, f.type == "stuck_servo") for f in self.fault]
         for fault, kind in zip(self.fault, kinds, strict=True):
             if kinds.count(kind) > 1:

@@ -11,6 +11,7 @@ import numpy as np
 from controllers.attitude_altitude import STATE_FIELDS
 from controllers.gaits import tilt_reference
 from controllers.rotation import quaternion_from_euler
+from controllers.scalar import Quad
 from controllers.vehicle import SPIN
 from tiltsim.kinds import Floats, Kind
 from tiltsim.limits import rotorcraft_limit_exceeded
@@ -98,16 +99,17 @@ def _compile(
     )
 
 
-def initial_tilts(scenario: Scenario) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def initial_tilts(scenario: Scenario) -> tuple[Quad, Quad]:
     """Tilt angles (rad) and tilt rates (rad/s) of a tiltrotor at time zero: its gait's.
 
     A flight begins in the midst of its gait, as the thesis has it, whose angles follow the plan
     exactly. So nothing swings in, and no pod is faster than its servo can be.
     """
     gait = scenario.gait.plan(scenario.rotorcraft.resolve())
-    planned = tilt_reference(0.0, gait.parameters, gait.table)
+    a1, a2, a3, a4, *planned = tilt_reference(0.0, gait.parameters, gait.table)
     fastest = scenario.rotorcraft.tilt_servo.max_rate or inf
-    return planned[:4], tuple(min(max(rate, -fastest), fastest) for rate in planned[4:])
+    rate_1, rate_2, rate_3, rate_4 = (min(max(rate, -fastest), fastest) for rate in planned)
+    return (a1, a2, a3, a4), (rate_1, rate_2, rate_3, rate_4)
 
 
 def _initial_motion(scenario: Scenario) -> tuple[Sequence[float], Sequence[float]]:

@@ -337,7 +337,7 @@ def _actuation(scenario: Scenario) -> Actuation:
     allocation = getattr(controller, "allocation", "inversion")
     max_rate, time_constant = vehicle.tilt_servo.max_rate, vehicle.rotor_time_constant
     return Actuation(
-        sensors=_sensors(scenario),
+        sensors=sensors_of(scenario),
         allocation=Allocation(
             active=float(allocation == "prioritized"),
             horizon=getattr(controller, "allocation_horizon", 1.0),
@@ -352,7 +352,8 @@ def _actuation(scenario: Scenario) -> Actuation:
     )
 
 
-def _sensors(scenario: Scenario) -> Sensors:
+def sensors_of(scenario: Scenario) -> Sensors:
+    """What a scenario's law is told of the vehicle's motion."""
     table, simulation = scenario.sensors, scenario.simulation
     vectors = {
         name: Sensor(getattr(table, f"{name}_noise"), *getattr(table, f"{name}_bias"))
