@@ -225,6 +225,31 @@ def test_full_pose_holds_a_position_at_a_tilted_attitude():
     assert metrics["max_tilt_rate"] < 25.0
 
 
+@pytest.mark.parametrize("law", ["full_pose", "attitude_altitude"])
+def test_a_reference_of_attitude_and_altitude_frees_the_position_of_laws_without_a_say_in_it(law):
+    """Six outputs hold x = y = 0; four let the vehicle drift at the speed that it has."""
+    free = {"decoupler": "none", "decoupling": "exact", "gains": "exact"}
+    flight = tiltsim.simulate(
+        tiltsim.parse_scenario(
+            {
+                "simulation": {"duration": 3.0, "timestep": 0.002, "engine": "python"},
+                "initial": {
+                    **{"position": [0.3, -0.2, 0.1], "velocity": [0.0, 0.5, 0.0]},
+                    "rotor_speed": 361.0,
+                },
+                "controller": {"law": law, **({"gains": SLOW} if law == "full_pose" else free)},
+                "reference": {"type": "attitude_altitude"},
+            }
+        )
+    )
+    x, y = flight["x"][-1], flight["y"][-1]
+    if law == "full_pose":
+        assert max(abs(x), abs(y)) < 1e-6
+    else:
+        assert (x, y) == pytest.approx((0.3, -0.2 + 0.5 * 3.0), abs=1e-6)
+    assert loop_of(flight.scenario).follows_position(flight.scenario) is (law == "full_pose")
+
+
 # --- disturbances ------------------------------------------------------------------------------
 
 
