@@ -345,7 +345,9 @@ def planned_force(
     gait, supervisor = parameters.gait, parameters.supervisor
     ratio = drag_ratio(parameters.vehicle)
     clock = gait_time(time, governor, supervisor)
-    share = gait_share(tilt_reference(clock, gait, table), roll, pitch, supervisor, ratio)
+    share = gait_share(
+        tilt_reference(clock, gait, table), roll, pitch, supervisor, parameters.vehicle
+    )
     alpha_1, alpha_2, alpha_3, alpha_4 = supervised_tilts(
         anticipated_tilts(clock, gait, table, parameters.anticipation),
         *(share, governor, supervisor, ratio),

@@ -12,7 +12,8 @@ def euler_from_quaternion(w: float, x: float, y: float, z: float) -> Triple:
     """Roll, pitch and yaw (rad) of a unit quaternion, scalar first."""
     sin_pitch = 2.0 * (w * y - z * x)
     # Rounding may carry the sine past one at pitch = +-90 degrees.
-    sin_pitch = min(1.0, max(-1.0, sin_pitch))
+    if not -1.0 <= sin_pitch <= 1.0:
+        sin_pitch = min(1.0, max(-1.0, sin_pitch))
     return (
         atan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
         asin(sin_pitch),

@@ -68,7 +68,7 @@ def test_what_passes_is_regular_and_a_little_more_is_not(tilts, roll, pitch):
 
 def test_without_thresholds_everything_passes():
     wild = (3.0, -2.0, 1.0, 2.5, 0.0, 0.0, 0.0, 0.0)
-    assert gait_share(wild, 2.0, 1.0, Supervisor(), RATIO) == 1.0
+    assert gait_share(wild, 2.0, 1.0, Supervisor(), VEHICLE) == 1.0
 
 
 def test_a_vehicle_that_leans_too_far_gets_no_tilt():

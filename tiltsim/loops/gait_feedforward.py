@@ -63,7 +63,7 @@ def gait_feedforward_controls(
     law = parameters.law
     state = tiltrotor_state(qpos, qvel, act)
     planned = tilt_reference(time, law.gait, table)
-    share = gait_share(planned, state[6], state[7], law.supervisor, drag_ratio(law.vehicle))
+    share = gait_share(planned, state[6], state[7], law.supervisor, law.vehicle)
     u1, u2, u3, u4, x_rate, y_rate, z_rate, _roll, _pitch, _yaw = tracking_inputs(
         time,
         state,
@@ -172,7 +172,7 @@ def references_in_force(
     """Columns of references at a time: the state is `_STATES`."""
     law = parameters.law
     planned = tilt_reference(time, law.gait, table)
-    share = gait_share(planned, state[6], state[7], law.supervisor, drag_ratio(law.vehicle))
+    share = gait_share(planned, state[6], state[7], law.supervisor, law.vehicle)
     return (
         *references_under(time, state, (0.0, 0.0, 0.0), parameters, table),
         *servo_commands(planned, share, 0.0),

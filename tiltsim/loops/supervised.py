@@ -11,7 +11,6 @@ import numpy as np
 
 from controllers.gaits import tilt_reference
 from controllers.supervisor import HOLD, STRATEGIES, Supervisor, gait_share
-from controllers.vehicle import drag_ratio
 from tiltsim.loop import ControlSetup, Floats, Loop
 from tiltsim.loops.gait_feedforward import GAIT_FEEDFORWARD, SUPERVISED_GAIT_FEEDFORWARD
 from tiltsim.loops.tiltrotor import SUPERVISED_TILTROTOR, SUPERVISOR_FIELDS, TILTROTOR
@@ -51,10 +50,11 @@ def _supervision(samples: Mapping[str, Floats], setup: ControlSetup) -> Floats:
     if supervisor.strategy != STRATEGIES["scale"]:
         held, rate = (samples[name] for name in SUPERVISOR_FIELDS)
         return rate if supervisor.strategy == HOLD else held
-    ratio = drag_ratio(law.vehicle)
     attitudes = zip(samples["time"].tolist(), samples["roll"].tolist(), samples["pitch"].tolist())
     shares = [
-        gait_share(tilt_reference(time, law.gait, setup.table), roll, pitch, supervisor, ratio)
+        gait_share(
+            tilt_reference(time, law.gait, setup.table), roll, pitch, supervisor, law.vehicle
+        )
         for time, roll, pitch in attitudes
     ]
     return 1.0 - np.array(shares)

@@ -80,12 +80,13 @@ def tiltrotor_state(qpos: Sequence[float], qvel: Sequence[float], act: Sequence[
     in world axes, the body rates in body axes and the tilt rates in ``qvel``.
     """
     x, y, z, qw, qx, qy, qz, alpha_1, alpha_2, alpha_3, alpha_4 = qpos
-    vx, vy, vz, p, q, r = qvel[0], qvel[1], qvel[2], qvel[3], qvel[4], qvel[5]
+    vx, vy, vz, p, q, r, _, _, _, _ = qvel
     roll, pitch, yaw = euler_from_quaternion(qw, qx, qy, qz)
+    # One tuple: to join two costs Python a third of this function.
     return (
-        *(x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r),
-        *(alpha_1, alpha_2, alpha_3, alpha_4, act[0], act[1], act[2], act[3]),
-    )
+        x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r,
+        alpha_1, alpha_2, alpha_3, alpha_4, act[0], act[1], act[2], act[3],
+    )  # fmt: skip
 
 
 @scalar
@@ -129,7 +130,7 @@ def tiltrotor_controls(
     law = parameters.law
     state = tiltrotor_state(qpos, qvel, act)
     planned = tilt_reference(time, law.gait, table)
-    share = gait_share(planned, state[6], state[7], parameters.supervisor, drag_ratio(law.vehicle))
+    share = gait_share(planned, state[6], state[7], parameters.supervisor, law.vehicle)
     return (
         *servo_commands(planned, share, parameters.servo_lead),
         *rotor_thrust_controls(act),
@@ -255,7 +256,7 @@ def references_in_force(
     x, y, z, _, _, _, _, _, _ = position_reference(time, law.reference, table)
     roll, pitch, yaw, _, _, _ = attitude_reference(time, state, trig, torque, law, table)
     planned = tilt_reference(time, law.gait, table)
-    share = gait_share(planned, state[6], state[7], parameters.supervisor, ratio)
+    share = gait_share(planned, state[6], state[7], parameters.supervisor, law.vehicle)
     a1, a2, a3, a4 = servo_commands(planned, share, 0.0)
     return x, y, z, roll, pitch, yaw, a1, a2, a3, a4
 
