@@ -223,6 +223,23 @@ def test_no_pod_begins_faster_than_its_servo(plant):
     assert np.abs(rates).max() == pytest.approx(0.2, rel=1e-3)
 
 
+# --- allocation --------------------------------------------------------------------------------
+
+
+def test_allocation_from_a_lean_does_not_hang_on_a_last_bit():
+    """From 0.27 s on one of two opposite rotors is at its limit, on a gait that is symmetric."""
+    changes = {"simulation.duration": 0.6, "simulation.engine": "python"}
+    address = "beyond/allocation#prioritized_from_a_lean"
+    one, other = (
+        tiltsim.simulate(
+            tiltsim.load_scenario(address, {**changes, "initial.position": [x, 0.0, -20.0]})
+        )
+        for x in (2.0, 2.0 + 1e-12)
+    )
+    assert np.abs(one["r"]).max() > 0.1
+    assert np.abs(one["r"] - other["r"]).max() < 1e-9
+
+
 # --- latency -----------------------------------------------------------------------------------
 
 
