@@ -70,6 +70,16 @@ def body_force(trig: Octet, w1: float, w2: float, w3: float, w4: float) -> Tripl
 
 
 @scalar
+def body_torque(torque: Octet, w1: float, w2: float, w3: float, w4: float) -> Triple:
+    """The product ``tau(alpha) w / (L K_f)`` in body axes (ch. 3, Eq. 5).
+
+    ``torque`` are the `torque_entries`.
+    """
+    x2, x4, y1, y3, z1, z2, z3, z4 = torque
+    return x2 * w2 + x4 * w4, y1 * w1 + y3 * w3, z1 * w1 + z2 * w2 + z3 * w3 + z4 * w4
+
+
+@scalar
 def vertical_force_entries(trig: Octet, ux: float, uy: float, uz: float) -> Quad:
     """The row ``u^T F(alpha) / K_f``: force along the body-frame direction ``u``, by rotor.
 

@@ -18,7 +18,7 @@ from controllers.gaits import tilt_reference
 from controllers.records import flatten, slotted
 from controllers.references import reference_derivatives
 from controllers.rotation import euler_from_quaternion
-from controllers.scalar import Quad
+from controllers.scalar import Quad, clipped
 from controllers.vehicle import SPIN
 from tiltsim.controller import (
     ControllerError,
@@ -62,7 +62,7 @@ class CommandedPlant(MujocoPlant):
         super().__init__(scenario)
         vehicle = scenario.rotorcraft
         self.tilting = vehicle.model == "tiltrotor"
-        self._slowest, self._fastest = vehicle.min_rotor_speed, vehicle.max_rotor_speed
+        self._slowest, self._fastest = vehicle.speeds_along_spin
         self._commanded = commanded_parameters(self._setup.parameters)
         self._sensors = sensors_of(scenario)
         self._slotted = slotted(self._setup.parameters)
@@ -157,10 +157,7 @@ class CommandedPlant(MujocoPlant):
         )
 
     def _limited(self, speed: float) -> float:
-        low, high = self._slowest, self._fastest
-        if high is not None:
-            speed = min(high, max(-high, speed))
-        return speed if low is None else max(low, speed)
+        return clipped(speed, self._slowest, self._fastest)
 
     def advance(self, steps: int) -> None:
         """See `Plant.advance`."""

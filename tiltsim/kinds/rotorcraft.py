@@ -11,7 +11,7 @@ import numpy as np
 from controllers.attitude_altitude import STATE_FIELDS
 from controllers.gaits import tilt_reference
 from controllers.rotation import quaternion_from_euler
-from controllers.scalar import Quad
+from controllers.scalar import Quad, clipped
 from controllers.vehicle import SPIN
 from tiltsim.kinds import Floats, Kind
 from tiltsim.limits import rotorcraft_limit_exceeded
@@ -108,7 +108,7 @@ def initial_tilts(scenario: Scenario) -> tuple[Quad, Quad]:
     gait = scenario.gait.plan(scenario.rotorcraft.resolve())
     a1, a2, a3, a4, *planned = tilt_reference(0.0, gait.parameters, gait.table)
     fastest = scenario.rotorcraft.tilt_servo.max_rate or inf
-    rate_1, rate_2, rate_3, rate_4 = (min(max(rate, -fastest), fastest) for rate in planned)
+    rate_1, rate_2, rate_3, rate_4 = (clipped(rate, -fastest, fastest) for rate in planned)
     return (a1, a2, a3, a4), (rate_1, rate_2, rate_3, rate_4)
 
 
