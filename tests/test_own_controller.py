@@ -150,6 +150,7 @@ LAYERS = {
     "noise": [NOISE],
     "faults": [FAULTS],
     "wind": [WIND],
+    "wrong model": [{"model_error": {"mass": 1.05, "thrust_coefficient": 0.98}}],
     "everything": [LATE, LAG, SLOW, NOISE, FAULTS, WIND, LIMITS],
 }
 

@@ -119,7 +119,10 @@ class CommandedPlant(MujocoPlant):
         data, table = self.data, self._setup.table
         state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
         parameters = with_told(self._setup.parameters, told)
-        data.ctrl[:] = self._loop.controls(float(data.time), *state, parameters, table)
+        try:
+            data.ctrl[:] = self._loop.controls(float(data.time), *state, parameters, table)
+        except (ArithmeticError, ValueError):
+            data.ctrl[:] = nan  # as the engines do; MuJoCo reports it
 
     def thrusts_and_tilts(self, orders: Orders) -> Floats:
         """What orders come to as thrusts (N) and tilt angles (rad), shape (8,) or (4,).
@@ -174,7 +177,7 @@ class CommandedPlant(MujocoPlant):
         try:
             data.ctrl[:] = self._loop.held(*state, data.ctrl.tolist(), self._slotted)
         except (ArithmeticError, ValueError):
-            data.ctrl[:] = nan  # as the engines do; MuJoCo reports it
+            data.ctrl[:] = nan
 
     @property
     def steps_taken(self) -> int:

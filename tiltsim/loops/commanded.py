@@ -120,7 +120,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
 
 
 def with_told(parameters: Any, told: Told) -> Any:
-    """Parameters of a vehicle under commands, whatever the layers around it, with others."""
+    """Parameters of a vehicle under commands, whatever the layers around it, told otherwise."""
     if isinstance(parameters, ControlParameters):
         return parameters._replace(told=told)
     return parameters._replace(law=with_told(parameters.law, told))
