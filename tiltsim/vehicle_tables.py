@@ -11,7 +11,7 @@ from controllers.tilt_car.vehicle import THESIS_CAR, TiltCar
 from controllers.vehicle import PRESETS, Vehicle
 from tiltsim.messages import InvalidValueError
 from tiltsim.model import Pod, TiltServo
-from tiltsim.tables import NotTiny, Positive, Table
+from tiltsim.tables import NonNegative, NotTiny, Positive, Table
 
 if TYPE_CHECKING:
     from tiltsim.own_vehicle import OwnVehicle
@@ -71,7 +71,9 @@ class VehicleTable(Table):
     thrust_coefficient: NotTiny | None = Field(None, description="N s^2/rad^2")
     drag_coefficient: NotTiny | None = Field(None, description="N m s^2/rad^2")
     gravity: Positive | None = Field(None, description="m/s^2")
-    min_rotor_speed: Positive | None = Field(None, description="rad/s, absolute value")
+    min_rotor_speed: NonNegative | None = Field(
+        None, description="rad/s, absolute value; at 0 a rotor may stop, but not reverse"
+    )
     max_rotor_speed: Positive | None = Field(None, description="rad/s, absolute value")
     rotor_time_constant: Positive | None = Field(
         None, description="s, of the lag between the speed a rotor is told and its own"
