@@ -224,7 +224,8 @@ def test_check_survives_a_file_that_cannot_be_read_as_toml(tmp_path, capsys):
 def test_interrupt_ends_a_whole_check_at_once(tmp_path, jobs):
     compile_callbacks(TILTROTOR)  # so that the interrupt falls into the flights
     for name in ("a", "b", "c"):
-        (tmp_path / f"{name}.toml").write_text("[simulation]\nduration = 90.0\n")
+        endless = "[simulation]\nduration = 2000.0\nrecord_timestep = 1.0\n"
+        (tmp_path / f"{name}.toml").write_text(endless)
     process = subprocess.Popen(
         [*COMMAND, "check", str(tmp_path), "--jobs", jobs],
         stdout=subprocess.PIPE,
