@@ -88,6 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not arguments.quiet and isinstance(vehicle, Vehicle):
         for warning in gait_warnings(scenario.gait.plan(vehicle), vehicle):
             print(f"tiltsim: warning: gait: {warning}", file=sys.stderr)
+        _tell_what_the_law_does_not_know(scenario)
     if arguments.rerun is None:
         flight = fly(scenario, arguments)
         _save(flight, arguments)
@@ -120,6 +121,18 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"tiltsim: {lost(flight)}", file=sys.stderr)
         return FLIGHT_LOST
     return DONE if all(verdict.holds for verdict in verdicts) else EXPECTATION_FAILED
+
+
+def _tell_what_the_law_does_not_know(scenario: Scenario) -> None:
+    """A line on what a law of ours has wrong of a user's own vehicle."""
+    own = scenario.rotorcraft.own
+    if own is not None and own.unknown_to_laws and scenario.controller.law != "python":
+        print(
+            f"tiltsim: warning: vehicle.mjcf: the {scenario.controller.law} law, which takes the "
+            "centre of mass for the body's origin and the inertia for diagonal, does not know of "
+            f"{own.unknown_to_laws}",
+            file=sys.stderr,
+        )
 
 
 class _RecordingAhead:
