@@ -115,6 +115,26 @@ def test_the_full_pose_law_flies_in_the_layer():
     assert abs(flight["roll"][-1]) < 0.01
 
 
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_full_pose_tells_no_pod_more_than_its_limit(plant):
+    """At the servo's stop a pod stays below the same limit, however long the law turns it on."""
+    flight = tiltsim.simulate(
+        tiltsim.parse_scenario(
+            {
+                "simulation": BASE["simulation"] | {"timestep": 0.001, "plant": plant},
+                "initial": {"position": [-3.0, 0.0, 0.0], "rotor_speed": 361.0},
+                "vehicle": {"tilt_servo": {"max_angle": 0.3}},
+                "controller": {
+                    **{"law": "full_pose", "max_tilt_angle": 0.3, "max_tilt_rate": 10.0},
+                    "gains": {"position": [15.0, 75.0, 125.0], "attitude": [40.0, 600.0, 4000.0]},
+                },
+            }
+        )
+    )
+    assert flight["alpha_2"].max() == pytest.approx(0.3, abs=0.001)
+    assert flight["tilt_command_2"].max() == pytest.approx(0.3, abs=0.02)
+
+
 # --- rotors ------------------------------------------------------------------------------------
 
 

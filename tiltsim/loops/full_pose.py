@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from controllers.full_pose import Parameters, full_pose_inputs
+from controllers.full_pose import Parameters, full_pose_inputs, limited_tilt_rate
 from controllers.scalar import Quad, Triple, scalar
 from tiltsim.controller_tables import FullPoseController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
@@ -58,6 +58,12 @@ def full_pose_controls(
     u1, u2, u3, u4, rate_1, rate_2, rate_3, rate_4 = full_pose_inputs(
         time, state, parameters.law, table
     )
+    # A pod at the stop of its servo is within the law's limit for good: what it is told is not.
+    limits = parameters.law.limits
+    rate_1 = limited_tilt_rate(rate_1, act[4], limits)
+    rate_2 = limited_tilt_rate(rate_2, act[5], limits)
+    rate_3 = limited_tilt_rate(rate_3, act[6], limits)
+    rate_4 = limited_tilt_rate(rate_4, act[7], limits)
     return (
         *(act[4] + lead * rate_1, act[5] + lead * rate_2),
         *(act[6] + lead * rate_3, act[7] + lead * rate_4),
