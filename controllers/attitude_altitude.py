@@ -26,7 +26,7 @@ from controllers.decoupling_matrix import (
     sines_and_cosines,
     solve_by_pairs,
     torque_entries,
-    torque_free_direction,
+    unscaled_torque_free_force,
     vertical_force_entries,
 )
 from controllers.gaits import GaitParameters
@@ -120,7 +120,7 @@ def attitude_reference(
         roll_ref, pitch_ref = conventional_decoupler(ax, ay, yaw_ref, gravity)
         return roll_ref, pitch_ref, yaw_ref, z_ref, vz_ref, az_ref
 
-    n = torque_free_direction(trig, torque)
+    n = unscaled_torque_free_force(trig, torque)
     if parameters.decoupler == EXACT:
         roll_ref, pitch_ref = exact_decoupler(ax, ay, az_ref, yaw_ref, gravity, n)
     else:

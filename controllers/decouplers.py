@@ -60,7 +60,7 @@ def exact_decoupler(
     Solves ``Ry(pitch) Rx(roll) n = d |n|`` with ``d`` the unit vector along ``Rz(-yaw) (ax, ay,
     g + az)``, on the branch that is level when ``n`` and ``d`` are vertical. Where no roll reaches
     ``d`` (a gait with a large side force asked for more along it) the nearest one is returned; NaN
-    where the torque-free force has neither a side nor a vertical part.
+    where the torque-free force has neither a side nor a vertical part, and in free fall, ``d = 0``.
     """
     sin_yaw, cos_yaw = sin(yaw), cos(yaw)
     dx = ax * cos_yaw + ay * sin_yaw
@@ -70,9 +70,10 @@ def exact_decoupler(
     side = 1.0 if n[2] >= 0.0 else -1.0
     nx, ny, nz = side * n[0], side * n[1], side * n[2]
     lateral = sqrt(ny * ny + nz * nz)
-    if lateral == 0.0:
+    wanted = dx * dx + dy * dy + dz * dz
+    if lateral == 0.0 or wanted == 0.0:
         return nan, nan
-    scale = sqrt((nx * nx + ny * ny + nz * nz) / (dx * dx + dy * dy + dz * dz))
+    scale = sqrt((nx * nx + ny * ny + nz * nz) / wanted)
     roll = acos(min(1.0, max(-1.0, dy * scale / lateral))) - atan2(nz, ny)
     pitch = atan2(dx, dz) - atan2(nx, ny * sin(roll) + nz * cos(roll))
     return roll, pitch

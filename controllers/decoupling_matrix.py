@@ -110,7 +110,7 @@ def torque_free_inputs(torque: Octet) -> Quad:
 
 
 @scalar
-def torque_free_direction(trig: Octet, torque: Octet) -> Triple:
+def unscaled_torque_free_force(trig: Octet, torque: Octet) -> Triple:
     """Where the rotors push at zero torque, body axes: along `torque_free_force`, of any length."""
     w1, w2, w3, w4 = torque_free_inputs(torque)
     return body_force(trig, w1, w2, w3, w4)
@@ -125,7 +125,7 @@ def torque_free_force(trig: Octet, torque: Octet, drag_ratio: float) -> Triple:
     the torque-free inputs of the two pairs push against each other, as red gaits do on the curve L
     of the Two Color Map.
     """
-    nx, ny, nz = torque_free_direction(trig, torque)
+    nx, ny, nz = unscaled_torque_free_force(trig, torque)
     scale = 0.5 / drag_ratio
     return nx * scale, ny * scale, nz * scale
 

@@ -26,11 +26,13 @@ def rounded_ramp(x: float, half: float) -> Jet:
     if x >= half:
         return x, 1.0, 0.0
     u = x / half
-    square = u * u
+    second = u * u
+    fourth = second * second
+    left = 1.0 - second
     return (
-        half * (0.5 * u + (15.0 * square - 5.0 * square**2 + square**3 + 5.0) / 32.0),
-        0.5 + u * (15.0 - 10.0 * square + 3.0 * square**2) / 16.0,
-        0.9375 * (1.0 - square) ** 2 / half,
+        half * (0.5 * u + (15.0 * second - 5.0 * fourth + second * fourth + 5.0) / 32.0),
+        0.5 + u * (15.0 - 10.0 * second + 3.0 * fourth) / 16.0,
+        0.9375 * (left * left) / half,
     )
 
 

@@ -293,6 +293,11 @@ def test_exact_decoupler_points_the_torque_free_force_along_the_wanted_one(side)
         np.testing.assert_allclose(force, wanted / np.linalg.norm(wanted), rtol=0, atol=1e-13)
 
 
+def test_exact_decoupler_has_no_answer_in_free_fall():
+    """Floats do not divide by zero, native code does and went on with an answer."""
+    assert np.isnan(exact_decoupler(0.0, 0.0, -GRAVITY, 0.3, GRAVITY, (0.1, 0.2, 3.0))).all()
+
+
 def test_exact_decoupler_gets_as_near_as_any_attitude_where_none_reaches_the_wanted_force():
     n = np.array([3.0, 0.2, 1.0])  # across the body lies at most a third of it
     ax, ay, az, yaw = 1.0, 12.0, 0.0, 0.4

@@ -118,6 +118,12 @@ def test_scalar_code_has_no_side_effects(function):
 
 
 @by_function
+def test_powers_are_written_as_products(function):
+    """A power of Python's differs from the products of native code in the last bit."""
+    assert not {i.argrepr for i in instructions(function.__code__)} & {"**", "**="}
+
+
+@by_function
 def test_callees_are_registered_before_their_callers(function):
     position = FUNCTIONS.index(function)
     for value in globals_read(function).values():

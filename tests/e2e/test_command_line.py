@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import json
 import os
 import signal
@@ -48,6 +50,17 @@ def tiltsim(*arguments):
         text=True,
         check=False,
     )
+
+
+def test_a_process_of_its_own_spends_no_time_on_garbage(monkeypatch):
+    done = []
+    monkeypatch.setattr(gc, "set_threshold", lambda *_: done.append("seldom"))
+    monkeypatch.setattr(atexit, "register", done.append)
+    monkeypatch.setattr(sys, "argv", ["tiltsim", "schema"])
+    assert main(["schema"]) == 0
+    assert done == []
+    assert main() == 0
+    assert done == ["seldom", gc.freeze]
 
 
 @pytest.fixture
