@@ -11,12 +11,12 @@ from tiltsim.errors import InputError
 from tiltsim.figures.distributions import distributions_figure
 from tiltsim.figures.style import (
     CYCLE,
-    DASHES,
     GREY,
     MARKERS,
     PALE,
     RED,
     SEQUENTIAL,
+    line_look,
     new_figure,
     paper_style,
 )
@@ -127,13 +127,8 @@ def _panel_grid(rows: int, columns: int, width: float, height: float) -> tuple[F
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
-def _look(number: int) -> dict[str, Any]:
-    """Colour and dashes of a line, by its number."""
-    return {"color": CYCLE[number % MAX_LINES], "ls": DASHES[number % len(DASHES)]}
-
-
 def _mark(number: int) -> dict[str, str]:
-    """The marker that goes with `_look`."""
+    """The marker that goes with `line_look`."""
     return {"marker": MARKERS[number % len(MARKERS)]}
 
 
@@ -154,7 +149,7 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
                 order = np.argsort(abscissa[group], kind="stable")
                 values = np.where(flown, results.columns[metric], np.nan)[group][order]
                 line = abscissa[group][order]
-                axes.plot(line, values, ms=3.5, label=name, **_look(number), **_mark(number))
+                axes.plot(line, values, ms=3.5, label=name, **line_look(number), **_mark(number))
                 lost = line[np.isnan(values)]
                 axes.plot(
                     *(lost, np.full(len(lost), 0.03 + 0.04 * number), "x"),
@@ -239,7 +234,7 @@ def _boundary_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure
             color = CYCLE[number % MAX_LINES]
             order = np.argsort(abscissa[group], kind="stable")
             line, last, first = (v[group][order] for v in (abscissa, holds, fails))
-            axes.plot(line, last, marker="o", ms=3.5, label=name, **_look(number))
+            axes.plot(line, last, marker="o", ms=3.5, label=name, **line_look(number))
             axes.fill_between(line, last, first, color=color, alpha=0.25, lw=0)
             whole = np.isnan(first)
             axes.plot(line[whole], last[whole], "^", ms=6, color=color)
