@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -25,6 +26,21 @@ SHORT = ("--set", "simulation.duration=0.2")
 LONGER = ("--set", "simulation.duration=2.0")
 UPSIDE_DOWN = ("--set", "initial.attitude=[3.14159, 0.0, 0.0]")
 COMMAND = (sys.executable, "-m", "tiltsim")
+
+CLAIMING = """
+[simulation]
+duration = 0.2
+[[expect]]
+metric = "max_rotor_speed"
+max = 1000.0
+published = true
+claim = "Rotors stay slow"
+[[expect]]
+metric = "diverged"
+equals = false
+published = false
+claim = "The flight is lost"
+"""
 
 EXPECTING = """
 title = "expecting"
@@ -62,7 +78,9 @@ def test_run_writes_the_three_files_and_prints_a_summary(tmp_path, capsys):
     assert main(["run", SETPOINT, *SHORT, "--set", "expect=[]", "--out", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "Setpoint, trot angle fixed at rho = 0.65, modified decoupler" in printed
-    assert "final_position_error_x" in printed
+    assert f"  {SETPOINT}\n" in printed
+    assert re.search(r"^  final_position_error_x  +-?[\d.e-]+ m$", printed, re.MULTILINE)
+    assert re.search(r"^  min_decoupling_condition  +[\d.]+$", printed, re.MULTILINE)
     assert sorted(path.name for path in out.iterdir()) == [
         "flight.parquet",
         "metrics.json",
@@ -224,7 +242,7 @@ def test_check_survives_a_file_that_cannot_be_read_as_toml(tmp_path, capsys):
 def test_interrupt_ends_a_whole_check_at_once(tmp_path, jobs):
     compile_callbacks(TILTROTOR)  # so that the interrupt falls into the flights
     for name in ("a", "b", "c"):
-        (tmp_path / f"{name}.toml").write_text("[simulation]\nduration = 90.0\n")
+        (tmp_path / f"{name}.toml").write_text("[simulation]\nduration = 900.0\n")
     process = subprocess.Popen(
         [*COMMAND, "check", str(tmp_path), "--jobs", jobs],
         stdout=subprocess.PIPE,
@@ -293,6 +311,27 @@ def test_list_shows_every_scenario_with_title_and_source(capsys):
     assert len(trots) == 2
     shown = {line.split()[0] for line in lines if line}
     assert all(part in shown for e in entries for part in split_address(e["scenario"]))
+
+
+def test_long_lines_are_wrapped_on_a_terminal_alone(capsys, monkeypatch):
+    assert main(["list"]) == 0
+    piped = capsys.readouterr().out
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    assert main(["list"]) == 0
+    shown = capsys.readouterr().out
+    assert max(map(len, piped.splitlines())) > 120
+    assert max(map(len, shown.splitlines())) <= 80
+    assert shown.split() == piped.split()
+
+
+def test_a_bound_on_what_was_claimed_is_not_shown_as_a_published_value(tmp_path, capsys):
+    path = tmp_path / "claiming.toml"
+    path.write_text(CLAIMING, encoding="utf-8")
+    assert main(["run", str(path)]) == 0
+    printed = capsys.readouterr().out
+    assert re.search(r"ok  max_rotor_speed  +[\d.]+ +claimed +<= 1000$", printed, re.MULTILINE)
+    assert re.search(r"ok  diverged  +false +false +false$", printed, re.MULTILINE)
 
 
 def test_schema_knows_every_table_and_the_variants(capsys):

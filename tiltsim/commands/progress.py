@@ -29,17 +29,17 @@ def progress_bar(total: float, unit: str, *, shown: bool) -> Iterator[Callable[[
 
 @contextmanager
 def counting_bar(total: int, unit: str, *, shown: bool) -> Iterator[Callable[[int], None]]:
-    """A progress bar for things that are counted, with their rate and the time left.
+    """A progress bar for things that are counted, with the time left.
 
-    Like `progress_bar`; the first call says what was finished before, which counts for no rate.
+    Like `progress_bar`; the first call says what was finished before, which took no time.
     """
     if not shown or not sys.stderr.isatty():
         yield lambda value: None
         return
     from tqdm import tqdm
 
-    layout = "{l_bar}{bar}| {n}/{total} " + unit + " [{elapsed}<{remaining}, {rate_fmt}]"
-    with tqdm(total=total, unit=f" {unit}", leave=False, bar_format=layout) as bar:
+    layout = "{l_bar}{bar}| {n}/{total} " + unit + " [{elapsed}<{remaining}]"
+    with tqdm(total=total, unit=unit, leave=False, bar_format=layout) as bar:
         begun = False
 
         def move(value: int) -> None:

@@ -207,8 +207,12 @@ def lost(flight: Flight) -> str:
 
 def summary(flight: Flight, verdicts: list[Verdict]) -> str:
     """The flight in a few aligned lines."""
+    from tiltsim.report.model import unit_of
+
     scenario, metrics = flight.scenario, flight.metrics()
     lines = [scenario.title or scenario.address or "scenario"]
+    if scenario.title and "#" in scenario.address:  # a family's title may not tell its member
+        lines.append(f"  {scenario.address}")
     if scenario.source:
         lines.append(f"  {scenario.source}")
     simulation = scenario.simulation
@@ -218,9 +222,12 @@ def summary(flight: Flight, verdicts: list[Verdict]) -> str:
         f"{simulation.timestep:g} s, {flight.engine} engine, {metrics['realtime_factor']:.0f} times"
         " real time"
     )
-    rows = [(name, f"{value:.6g}") for name, value in metrics.items() if name not in _IN_HEADER]
-    width = max(len(name) for name, _ in rows)
-    lines += ["", *(f"  {name:<{width}}  {value:>12}" for name, value in rows)]
+    shown = [name for name in metrics if name not in _IN_HEADER]
+    width = max(map(len, shown))
+    lines.append("")
+    lines += [
+        f"  {name:<{width}}  {metrics[name]:>12.6g} {unit_of(name)}".rstrip() for name in shown
+    ]
     if verdicts:
         lines += ["", *expectation_lines(verdicts)]
     return "\n".join(lines)
@@ -238,9 +245,13 @@ def _measured(verdict: Verdict) -> str:
     return "flight under 20 s" if metric.endswith("after_20s") else "no value"
 
 
-def _published(value: float | bool | None) -> str:
+def _published(verdict: Verdict) -> str:
+    """The published number, or what is said of a number that the bounds stand for."""
+    value = verdict.expectation.published
     if value is None:
         return ""
+    if isinstance(value, bool) and not isinstance(verdict.measured, bool):
+        return "claimed" if value else "denied"
     return str(value).lower() if isinstance(value, bool) else f"{value:g}"
 
 
@@ -254,7 +265,7 @@ def expectation_lines(verdicts: list[Verdict]) -> list[str]:
                 "ok" if verdict.holds else "FAILED",
                 wanted.metric,
                 _measured(verdict),
-                _published(wanted.published),
+                _published(verdict),
                 verdict.bounds,
             )
         )
