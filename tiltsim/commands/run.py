@@ -207,7 +207,7 @@ def lost(flight: Flight) -> str:
 
 def summary(flight: Flight, verdicts: list[Verdict]) -> str:
     """The flight in a few aligned lines."""
-    from tiltsim.report.model import unit_of
+    from tiltsim.metrics import unit_of
 
     scenario, metrics = flight.scenario, flight.metrics()
     lines = [scenario.title or scenario.address or "scenario"]
