@@ -14,7 +14,7 @@ from PIL import Image
 from tiltsim.checking import collect
 from tiltsim.cli import main
 from tiltsim.exit_codes import EXPECTATION_FAILED, INVALID_INPUT
-from tiltsim.figures.style import new_figure
+from tiltsim.figures.style import CYCLE, new_figure
 from tiltsim.report import flying
 from tiltsim.report.content import Group, failure_text, measured_text, published_text
 from tiltsim.report.findings import FINDINGS
@@ -242,7 +242,10 @@ def test_rows_of_one_flight_are_told_by_their_metrics(report, library):
 
 def test_drawings_have_a_palette():
     figure = new_figure(3.0, 2.0)
-    figure.subplots().plot([0.0, 1.0, 0.5])
+    shades = figure.subplots()
+    shades.imshow(np.linspace(0.0, 1.0, 10_000).reshape(100, 100), cmap="cividis", aspect="auto")
+    for number, color in enumerate(CYCLE):
+        shades.axhline(10.0 * number, lw=0.4, color=color)
     drawn, packed = BytesIO(), png(figure)
     figure.savefig(drawn, dpi=DPI)
     with Image.open(BytesIO(packed)) as image, Image.open(drawn) as full:

@@ -181,8 +181,10 @@ def png(figure: Figure) -> bytes:
     with paper_style():
         figure.savefig(drawn, format="png", dpi=DPI)
     with Image.open(drawn) as image:
-        palette = image.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
-    palette.save(packed, format="PNG", optimize=True)
+        # Other methods spend the palette on large areas and give thin lines another hue.
+        method, dither = Image.Quantize.MAXCOVERAGE, Image.Dither.NONE
+        few = image.convert("RGB").quantize(COLOURS, method, dither=dither)
+    few.save(packed, format="PNG", optimize=True)
     return packed.getvalue()
 
 
