@@ -93,6 +93,20 @@ def rate_limited_command(command: float, angle: float, reach: float) -> float:
     return command
 
 
+@scalar
+def told_rate(told: float, rate: float, spin: float, slowest: float, fastest: float) -> float:
+    """The rate (rad/s^2) of the speed that a motor is told, from the one that a law asks for.
+
+    Beyond the rotor's limits (rad/s, along its spin) it goes no further: what no rotor can follow
+    would have to be taken back before the rotor obeys again.
+    """
+    if spin * told >= fastest and spin * rate > 0.0:
+        return 0.0
+    if spin * told <= slowest and spin * rate < 0.0:
+        return 0.0
+    return rate
+
+
 # --- faults ------------------------------------------------------------------------------------
 
 

@@ -26,7 +26,7 @@ from controllers.decoupling_matrix import (
     sines_and_cosines,
     solve_by_pairs,
     torque_entries,
-    torque_free_force,
+    torque_free_direction,
     vertical_force_entries,
 )
 from controllers.gaits import GaitParameters
@@ -115,13 +115,12 @@ def attitude_reference(
     ax = ax_ref + gains.position_1 * (vx_ref - state[3]) + gains.position_2 * (x_ref - state[0])
     ay = ay_ref + gains.position_1 * (vy_ref - state[4]) + gains.position_2 * (y_ref - state[1])
 
-    vehicle = parameters.vehicle
-    gravity = vehicle.gravity
+    gravity = parameters.vehicle.gravity
     if parameters.decoupler == CONVENTIONAL:
         roll_ref, pitch_ref = conventional_decoupler(ax, ay, yaw_ref, gravity)
         return roll_ref, pitch_ref, yaw_ref, z_ref, vz_ref, az_ref
 
-    n = torque_free_force(trig, torque, drag_ratio(vehicle))
+    n = torque_free_direction(trig, torque)
     if parameters.decoupler == EXACT:
         roll_ref, pitch_ref = exact_decoupler(ax, ay, az_ref, yaw_ref, gravity, n)
     else:
@@ -151,53 +150,58 @@ def rotor_accelerations(
         time, state, trig, torque, parameters, table
     )
 
-    # Second derivatives of the outputs, Eq. (10), from w_i = varpi_i |varpi_i|.
-    w1, w2, w3, w4 = s1 * abs(s1), s2 * abs(s2), s3 * abs(s3), s4 * abs(s4)
-    per_torque = vehicle.arm_length * vehicle.thrust_coefficient
-    per_roll = per_torque / vehicle.inertia_xx
-    per_pitch = per_torque / vehicle.inertia_yy
-    per_yaw = per_torque / vehicle.inertia_zz
-    roll_acceleration = per_roll * (x2 * w2 + x4 * w4)
-    pitch_acceleration = per_pitch * (y1 * w1 + y3 * w3)
-    yaw_acceleration = per_yaw * (z1 * w1 + z2 * w2 + z3 * w3 + z4 * w4)
+    # What the rotors do now, from w_i = varpi_i |varpi_i|: second derivatives of the outputs, Eq.
+    # (10), as torques in units of L K_f and forces in units of K_f, the decoupling matrix's own.
     ux, uy, uz = world_up_in_body(roll, pitch)
+    h1, h2, h3, h4 = vertical_force_entries(trig, ux, uy, uz)
+    size_1, size_2, size_3, size_4 = abs(s1), abs(s2), abs(s3), abs(s4)
+    w1, w2, w3, w4 = s1 * size_1, s2 * size_2, s3 * size_3, s4 * size_4
+    roll_torque = x2 * w2 + x4 * w4
+    pitch_torque = y1 * w1 + y3 * w3
+    yaw_torque = z1 * w1 + z2 * w2 + z3 * w3 + z4 * w4
+    lift = h1 * w1 + h2 * w2 + h3 * w3 + h4 * w4
+
+    # Ma, Eq. (18): the thrust direction turns with the body, r3^T (omega x F w).
     fx, fy, fz = body_force(trig, w1, w2, w3, w4)
-    per_lift = vehicle.thrust_coefficient / vehicle.mass
-    altitude_acceleration = per_lift * (ux * fx + uy * fy + uz * fz) - vehicle.gravity
+    turning = ux * (q * fz - r * fy) + uy * (r * fx - p * fz) + uz * (p * fy - q * fx)
 
-    # Ma, Eq. (18): the thrust direction turns with the body, r3^T (omega x F w) / m.
-    turning = per_lift * (ux * (q * fz - r * fy) + uy * (r * fx - p * fz) + uz * (p * fy - q * fx))
-
-    # Third-order laws, Eqs. (26)-(27); the references of roll, pitch and yaw are held constant.
-    roll_jerk = (
-        gains.roll_3 * (roll_ref - roll) - gains.roll_2 * p - gains.roll_1 * roll_acceleration
+    # Third-order laws, Eqs. (26)-(27), as rates of those torques and of the lift; the references
+    # of roll, pitch and yaw are held constant.
+    per_torque = 1.0 / (vehicle.arm_length * vehicle.thrust_coefficient)
+    roll_rate = (
+        vehicle.inertia_xx * per_torque * (gains.roll_3 * (roll_ref - roll) - gains.roll_2 * p)
+        - gains.roll_1 * roll_torque
     )
-    pitch_jerk = (
-        gains.pitch_3 * (pitch_ref - pitch) - gains.pitch_2 * q - gains.pitch_1 * pitch_acceleration
+    pitch_rate = (
+        vehicle.inertia_yy * per_torque * (gains.pitch_3 * (pitch_ref - pitch) - gains.pitch_2 * q)
+        - gains.pitch_1 * pitch_torque
     )
     yaw_error = shortest_turn(yaw_ref - yaw)
-    yaw_jerk = gains.yaw_3 * yaw_error - gains.yaw_2 * r - gains.yaw_1 * yaw_acceleration
-    altitude_jerk = (
-        gains.altitude_3 * (z_ref - z)
-        + gains.altitude_2 * (vz_ref - vz)
-        + gains.altitude_1 * (az_ref - altitude_acceleration)
+    yaw_rate = (
+        vehicle.inertia_zz * per_torque * (gains.yaw_3 * yaw_error - gains.yaw_2 * r)
+        - gains.yaw_1 * yaw_torque
+    )
+    lift_rate = (
+        vehicle.mass
+        / vehicle.thrust_coefficient
+        * (
+            gains.altitude_3 * (z_ref - z)
+            + gains.altitude_2 * (vz_ref - vz)
+            + gains.altitude_1 * (az_ref + vehicle.gravity)
+        )
+        - gains.altitude_1 * lift
+        - turning
     )
 
     # Eq. (19). The published matrix has the factor 2 |varpi_i| in its last row alone; the exact one
     # has it in every row, so that it can be taken out of the matrix and divided out of the answer.
-    h1, h2, h3, h4 = vertical_force_entries(trig, ux, uy, uz)
-    f1, f2, f3, f4 = 2.0 * abs(s1), 2.0 * abs(s2), 2.0 * abs(s3), 2.0 * abs(s4)
+    f1, f2, f3, f4 = 2.0 * size_1, 2.0 * size_2, 2.0 * size_3, 2.0 * size_4
     if parameters.decoupling == PUBLISHED_DECOUPLING:
-        h1, h2, h3, h4 = h1 * f1, h2 * f2, h3 * f3, h4 * f4
-        f1 = f2 = f3 = f4 = 1.0
-    v1, v2, v3, v4 = solve_by_pairs(
-        torque,
-        (h1, h2, h3, h4),
-        roll_jerk / per_roll,
-        pitch_jerk / per_pitch,
-        yaw_jerk / per_yaw,
-        (altitude_jerk - turning) / per_lift,
-    )
+        published = (h1 * f1, h2 * f2, h3 * f3, h4 * f4)
+        return solve_by_pairs(torque, published, roll_rate, pitch_rate, yaw_rate, lift_rate)
     if f1 == 0.0 or f2 == 0.0 or f3 == 0.0 or f4 == 0.0:
         return nan, nan, nan, nan
+    v1, v2, v3, v4 = solve_by_pairs(
+        torque, (h1, h2, h3, h4), roll_rate, pitch_rate, yaw_rate, lift_rate
+    )
     return v1 / f1, v2 / f2, v3 / f3, v4 / f4

@@ -70,6 +70,16 @@ def body_force(trig: Octet, w1: float, w2: float, w3: float, w4: float) -> Tripl
 
 
 @scalar
+def body_torque(torque: Octet, w1: float, w2: float, w3: float, w4: float) -> Triple:
+    """The product ``tau(alpha) w / (L K_f)`` in body axes (ch. 3, Eq. 5).
+
+    ``torque`` are the `torque_entries`.
+    """
+    x2, x4, y1, y3, z1, z2, z3, z4 = torque
+    return x2 * w2 + x4 * w4, y1 * w1 + y3 * w3, z1 * w1 + z2 * w2 + z3 * w3 + z4 * w4
+
+
+@scalar
 def vertical_force_entries(trig: Octet, ux: float, uy: float, uz: float) -> Quad:
     """The row ``u^T F(alpha) / K_f``: force along the body-frame direction ``u``, by rotor.
 
@@ -100,16 +110,22 @@ def torque_free_inputs(torque: Octet) -> Quad:
 
 
 @scalar
+def torque_free_direction(trig: Octet, torque: Octet) -> Triple:
+    """Where the rotors push at zero torque, body axes: along `torque_free_force`, of any length."""
+    w1, w2, w3, w4 = torque_free_inputs(torque)
+    return body_force(trig, w1, w2, w3, w4)
+
+
+@scalar
 def torque_free_force(trig: Octet, torque: Octet, drag_ratio: float) -> Triple:
-    """The force direction at zero torque, ``n = (-R_theta, R_phi, R)``, body axes.
+    """The force at zero torque, ``n = (-R_theta, R_phi, R)``, body axes.
 
     Its length carries ch. 3's normalisation: ``R = 4`` for an untilted vehicle. Where ``n = 0`` the
     decoupling matrix is singular at every attitude: wherever ``tau`` has lost rank, and also where
     the torque-free inputs of the two pairs push against each other, as red gaits do on the curve L
     of the Two Color Map.
     """
-    w1, w2, w3, w4 = torque_free_inputs(torque)
-    nx, ny, nz = body_force(trig, w1, w2, w3, w4)
+    nx, ny, nz = torque_free_direction(trig, torque)
     scale = 0.5 / drag_ratio
     return nx * scale, ny * scale, nz * scale
 

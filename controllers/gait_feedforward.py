@@ -20,26 +20,22 @@ Each ingredient can be left out, to see what it is worth.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, cos, nan, sin, sqrt
+from math import atan2, nan, sqrt
 from typing import Final, NamedTuple
 
 from controllers.attitude_altitude import Gains, State
 from controllers.decouplers import NONE
 from controllers.decoupling_matrix import (
     body_force,
+    body_torque,
     sines_and_cosines,
     solve_by_pairs,
     torque_entries,
     vertical_force_entries,
 )
 from controllers.gains import IntegralGains
-from controllers.gaits import (
-    FIXED,
-    TWO_COLOR_CIRCLE,
-    GaitParameters,
-    tilt_acceleration,
-    tilt_reference,
-)
+from controllers.gaits import GaitParameters, tilt_reference
+from controllers.gaits.anticipation import anticipated_tilts
 from controllers.gaits.keyframes import NO_KEYFRAMES
 from controllers.jets import (
     Jet,
@@ -53,8 +49,9 @@ from controllers.jets import (
     jet_sum,
 )
 from controllers.references import ReferenceParameters, reference_derivatives
-from controllers.rotation import rotation_from_euler, shortest_turn
-from controllers.scalar import Quad, Triple, scalar
+from controllers.rigid_body import body_jerk, cross, euler_motion, torque_rate
+from controllers.rotation import rotation_from_euler, shortest_turn, to_world
+from controllers.scalar import Quad, Triple, clipped, scalar
 from controllers.supervisor import AT_REST, Supervisor, gait_share, gait_time, supervised_tilts
 from controllers.vehicle import Vehicle, drag_ratio
 
@@ -68,10 +65,6 @@ class Ingredients(NamedTuple):
     euler_rates: float = 1.0  # exact derivatives of the Euler angles, else the body rates
     gyroscopic_torque: float = 1.0  # omega x I omega
     integral_action: float = 1.0
-
-
-INGREDIENTS: Final = Ingredients._fields
-"""What can be left out, by the name a scenario gives it."""
 
 
 class Parameters(NamedTuple):
@@ -163,66 +156,32 @@ def exact_decoupler_jet(
 
 
 @scalar
-def euler_motion(
-    roll: float, pitch: float, omega: Triple, omega_rate: Triple
-) -> tuple[float, float, float, float, float, float]:
-    """First and second derivatives of roll, pitch and yaw from the body rates and their rates.
+def jerk_along(
+    nx: Jet, ny: Jet, nz: Jet, specific: Triple, omega: Triple, counted: float
+) -> Triple:
+    """Jerk (m/s^3, body axes) of a body whose force stays along ``n``, of the size that it has.
 
-    Inverts ``omega = M(roll, pitch) eta'`` and ``omega' = M eta'' + M' eta'``. Infinite where the
-    pitch is a right angle.
+    ``specific`` is the force per mass (m/s^2, body axes). It turns with the body and, ``counted``
+    times, with ``n`` in it.
     """
-    p, q, r = omega
-    sr, cr, sp, cp = sin(roll), cos(roll), sin(pitch), cos(pitch)
-    yaw_rate = (sr * q + cr * r) / cp
-    pitch_rate = cr * q - sr * r
-    roll_rate = p + sp * yaw_rate
-    # omega' - M' eta'
-    p_rate = omega_rate[0] + cp * pitch_rate * yaw_rate
-    q_rate = omega_rate[1] - (
-        -sr * roll_rate * pitch_rate + (cr * cp * roll_rate - sr * sp * pitch_rate) * yaw_rate
+    length = jet_square_root(
+        jet_sum(
+            1.0,
+            jet_sum(1.0, jet_product(nx, nx), 1.0, jet_product(ny, ny)),
+            1.0,
+            jet_product(nz, nz),
+        )
     )
-    r_rate = omega_rate[2] - (
-        -cr * roll_rate * pitch_rate - (sr * cp * roll_rate + cr * sp * pitch_rate) * yaw_rate
-    )
-    yaw_acceleration = (sr * q_rate + cr * r_rate) / cp
+    push_x, push_y, push_z = specific
+    size = sqrt(push_x * push_x + push_y * push_y + push_z * push_z)
+    if nz[0] < 0.0:
+        size = -size
+    size = size * counted
+    swept = cross(omega, specific)
     return (
-        *(roll_rate, pitch_rate, yaw_rate),
-        *(p_rate + sp * yaw_acceleration, cr * q_rate - sr * r_rate, yaw_acceleration),
-    )
-
-
-@scalar
-def body_jerk(roll: Jet, pitch: Jet, yaw: Jet, jerk: Triple) -> Triple:
-    """Second derivatives of the body rates when roll, pitch and yaw have the given ``jerk``.
-
-    ``p = roll' - yaw' sin(pitch)``, ``q = pitch' cos(roll) + yaw' sin(roll) cos(pitch)``, ``r =
-    -pitch' sin(roll) + yaw' cos(roll) cos(pitch)``, each differentiated twice.
-    """
-    sin_roll, cos_roll = jet_sine(roll), jet_cosine(roll)
-    sin_pitch, cos_pitch = jet_sine(pitch), jet_cosine(pitch)
-    pitch_rate = (pitch[1], pitch[2], jerk[1])
-    yaw_rate = (yaw[1], yaw[2], jerk[2])
-    across = jet_product(yaw_rate, cos_pitch)
-    along = jet_product(yaw_rate, sin_pitch)
-    q = jet_sum(1.0, jet_product(pitch_rate, cos_roll), 1.0, jet_product(across, sin_roll))
-    r = jet_sum(-1.0, jet_product(pitch_rate, sin_roll), 1.0, jet_product(across, cos_roll))
-    return jerk[0] - along[2], q[2], r[2]
-
-
-@scalar
-def cross(a: Triple, b: Triple) -> Triple:
-    """The vector product ``a x b``."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@scalar
-def rotated(rotation: Sequence[float], b: Triple) -> Triple:
-    """A vector of the body in world axes; ``rotation`` holds nine entries, rows first."""
-    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
-    return (
-        r11 * b[0] + r12 * b[1] + r13 * b[2],
-        r21 * b[0] + r22 * b[1] + r23 * b[2],
-        r31 * b[0] + r32 * b[1] + r33 * b[2],
+        swept[0] + size * jet_quotient(nx, length)[1],
+        swept[1] + size * jet_quotient(ny, length)[1],
+        swept[2] + size * jet_quotient(nz, length)[1],
     )
 
 
@@ -240,17 +199,23 @@ def limited_acceleration(x: Jet, y: Jet, limit: float) -> tuple[Jet, Jet]:
 
 
 @scalar
+def position_feedback(
+    error: Jet, jerk_error: float, integral: float, k1: float, k2: float, k3: float
+) -> Jet:
+    """``k1 e' + k2 e + k3 integral`` of a position error and its integral, and how it moves."""
+    return (
+        k1 * error[1] + k2 * error[0] + k3 * integral,
+        k1 * error[2] + k2 * error[1] + k3 * error[0],
+        k1 * jerk_error + k2 * error[2] + k3 * error[1],
+    )
+
+
+@scalar
 def integrator_rate(error: float, wanted: float, limit: float) -> float:
     """Rate of an integrator of ``error``: it stops where it would push a limit further."""
     if abs(wanted) > limit and error * wanted > 0.0:
         return 0.0
     return error
-
-
-@scalar
-def clamped(value: float, limit: float) -> float:
-    """The value nearest to the given one within plus and minus ``limit``."""
-    return min(limit, max(-limit, value))
 
 
 @scalar
@@ -261,71 +226,9 @@ def attitude_jerk(wanted: Jet, now: Jet, k1: float, k2: float, k3: float, limit:
     rate, the rate for an acceleration), the acceleration asked for by the errors is held to
     ``limit`` and the rate to what it brakes from, so that a large error does not stop a rotor.
     """
-    rate = clamped(k3 / k2 * (wanted[0] - now[0]), limit * k1 / k2)
-    acceleration = clamped(k2 / k1 * (rate + wanted[1] - now[1]) + wanted[2], limit)
+    rate = clipped(k3 / k2 * (wanted[0] - now[0]), -limit * k1 / k2, limit * k1 / k2)
+    acceleration = clipped(k2 / k1 * (rate + wanted[1] - now[1]) + wanted[2], -limit, limit)
     return k1 * (acceleration - now[2])
-
-
-@scalar
-def rounded_ramp(x: float, half: float) -> Jet:
-    """The ramp ``max(x, 0)``, smooth within ``half`` of its corner.
-
-    Its second derivative is the kernel ``15/16 (1 - (x/half)^2)^2 / half`` of area one.
-    """
-    if x <= -half:
-        return 0.0, 0.0, 0.0
-    if x >= half:
-        return x, 1.0, 0.0
-    u = x / half
-    square = u * u
-    return (
-        half * (0.5 * u + (15.0 * square - 5.0 * square**2 + square**3 + 5.0) / 32.0),
-        0.5 + u * (15.0 - 10.0 * square + 3.0 * square**2) / 16.0,
-        0.9375 * (1.0 - square) ** 2 / half,
-    )
-
-
-@scalar
-def rounded_corner(
-    start: float, start_rate: float, stop: float, stop_rate: float, half: float
-) -> Jet:
-    """A motion along two straight lines, its corner rounded, in the middle of a window.
-
-    The window lasts ``2 half`` seconds and holds one corner at most; ``start`` and ``stop`` are the
-    values at its ends. The lines tell where the corner is.
-    """
-    middle = start + half * start_rate
-    bend = stop_rate - start_rate
-    if bend == 0.0:
-        return middle, start_rate, 0.0
-    since = (stop - middle - half * start_rate) / bend - half
-    value, first, second = rounded_ramp(clamped(since, half), half)
-    return middle + bend * value, start_rate + bend * first, bend * second
-
-
-@scalar
-def anticipated_tilts(
-    time: float, gait: GaitParameters, table: Sequence[float], half: float
-) -> tuple[Jet, Jet, Jet, Jet]:
-    """The planned tilt angles, for the attitude: their corners rounded, ``half`` seconds each way.
-
-    A gait of straight lines turns about at once, the body cannot. But the corner is known before
-    it comes, so the body starts ``half`` before and ends ``half`` after it; what it misses before
-    makes up for what it misses after, but for second order. Smooth gaits stay as they are, and so
-    do jumps, which have no rates.
-    """
-    if half <= 0.0 or gait.type == FIXED or gait.type == TWO_COLOR_CIRCLE:
-        a1, a2, a3, a4, v1, v2, v3, v4 = tilt_reference(time, gait, table)
-        b1, b2, b3, b4 = tilt_acceleration(time, gait)
-        return (a1, v1, b1), (a2, v2, b2), (a3, v3, b3), (a4, v4, b4)
-    a1, a2, a3, a4, v1, v2, v3, v4 = tilt_reference(time - half, gait, table)
-    b1, b2, b3, b4, w1, w2, w3, w4 = tilt_reference(time + half, gait, table)
-    return (
-        rounded_corner(a1, v1, b1, w1, half),
-        rounded_corner(a2, v2, b2, w2, half),
-        rounded_corner(a3, v3, b3, w3, half),
-        rounded_corner(a4, v4, b4, w4, half),
-    )
 
 
 @scalar
@@ -345,7 +248,9 @@ def planned_force(
     gait, supervisor = parameters.gait, parameters.supervisor
     ratio = drag_ratio(parameters.vehicle)
     clock = gait_time(time, governor, supervisor)
-    share = gait_share(tilt_reference(clock, gait, table), roll, pitch, supervisor, ratio)
+    share = gait_share(
+        tilt_reference(clock, gait, table), roll, pitch, supervisor, parameters.vehicle
+    )
     alpha_1, alpha_2, alpha_3, alpha_4 = supervised_tilts(
         anticipated_tilts(clock, gait, table, parameters.anticipation),
         *(share, governor, supervisor, ratio),
@@ -393,31 +298,21 @@ def tracking_inputs(
     )
     w1, w2, w3, w4 = s1 * abs(s1), s2 * abs(s2), s3 * abs(s3), s4 * abs(s4)
     entries = torque_entries(trig, ratio)
-    x2, x4, y1, y3, z1, z2, z3, z4 = entries
-    dx2, dx4, dy1, dy3, dz1, dz2, dz3, dz4 = torque_entries(turning, ratio)
-    torque = (
-        per_torque * (x2 * w2 + x4 * w4),
-        per_torque * (y1 * w1 + y3 * w3),
-        per_torque * (z1 * w1 + z2 * w2 + z3 * w3 + z4 * w4),
-    )
-    torque_turning = (
-        per_torque * (dx2 * w2 + dx4 * w4),
-        per_torque * (dy1 * w1 + dy3 * w3),
-        per_torque * (dz1 * w1 + dz2 * w2 + dz3 * w3 + dz4 * w4),
-    )
+    tx, ty, tz = body_torque(entries, w1, w2, w3, w4)
+    hx, hy, hz = body_torque(torque_entries(turning, ratio), w1, w2, w3, w4)
     fx, fy, fz = body_force(trig, w1, w2, w3, w4)
     gx, gy, gz = body_force(turning, w1, w2, w3, w4)
 
     # Newton and Euler: accelerations of the body and of its Euler angles.
     rotation = rotation_from_euler(roll, pitch, yaw)
     specific = (per_force * fx, per_force * fy, per_force * fz)
-    ax, ay, lift = rotated(rotation, specific)
+    ax, ay, lift = to_world(rotation, specific)
     omega = (p, q, r)
     cx, cy, cz = cross(omega, (ixx * p, iyy * q, izz * r))
     omega_rate = (
-        (torque[0] - gyroscopic * cx) / ixx,
-        (torque[1] - gyroscopic * cy) / iyy,
-        (torque[2] - gyroscopic * cz) / izz,
+        (per_torque * tx - gyroscopic * cx) / ixx,
+        (per_torque * ty - gyroscopic * cy) / iyy,
+        (per_torque * tz - gyroscopic * cz) / izz,
     )
     if ingredients.euler_rates == 0.0:
         roll_now = (roll, p, omega_rate[0])
@@ -458,39 +353,13 @@ def tracking_inputs(
     roll_ref, pitch_ref = (reference.roll, 0.0, 0.0), (reference.pitch, 0.0, 0.0)
     if parameters.decoupler != NONE:
         nx, ny, nz = planned_force(time, roll, pitch, governor, parameters, table)
-        # Jerk of the body if its force stays along n: it turns with the body and with the gait.
-        length = jet_square_root(
-            jet_sum(
-                1.0,
-                jet_sum(1.0, jet_product(nx, nx), 1.0, jet_product(ny, ny)),
-                1.0,
-                jet_product(nz, nz),
-            )
-        )
-        push_x, push_y, push_z = specific
-        size = sqrt(push_x * push_x + push_y * push_y + push_z * push_z)
-        if nz[0] < 0.0:
-            size = -size
-        size = size * counted
-        swept = cross(omega, specific)
-        jx, jy, _ = rotated(
-            rotation,
-            (
-                swept[0] + size * jet_quotient(nx, length)[1],
-                swept[1] + size * jet_quotient(ny, length)[1],
-                swept[2] + size * jet_quotient(nz, length)[1],
-            ),
-        )
+        jx, jy, _ = to_world(rotation, jerk_along(nx, ny, nz, specific, omega, counted))
         k1, k2 = gains.position_1, gains.position_2
-        back_x = (
-            k1 * evx + k2 * ex + of_position * integrals[0],
-            k1 * (ax_ref - ax) + k2 * evx + of_position * ex,
-            k1 * (jx_ref - jx) + k2 * (ax_ref - ax) + of_position * evx,
+        back_x = position_feedback(
+            (ex, evx, ax_ref - ax), jx_ref - jx, integrals[0], k1, k2, of_position
         )
-        back_y = (
-            k1 * evy + k2 * ey + of_position * integrals[1],
-            k1 * (ay_ref - ay) + k2 * evy + of_position * ey,
-            k1 * (jy_ref - jy) + k2 * (ay_ref - ay) + of_position * evy,
+        back_y = position_feedback(
+            (ey, evy, ay_ref - ay), jy_ref - jy, integrals[1], k1, k2, of_position
         )
         xi_rate = integrator_rate(ex, back_x[0], limit)
         yi_rate = integrator_rate(ey, back_y[0], limit)
@@ -522,12 +391,7 @@ def tracking_inputs(
     )
 
     # The torques must change so that omega'' comes out; what turns by itself is taken off.
-    ox, oy, oz = omega_rate
-    mx, my, mz = cross(omega_rate, (ixx * p, iyy * q, izz * r))
-    lx, ly, lz = cross(omega, (ixx * ox, iyy * oy, izz * oz))
-    roll_torque = ixx * wanted[0] + gyroscopic * (mx + lx) - torque_turning[0]
-    pitch_torque = iyy * wanted[1] + gyroscopic * (my + ly) - torque_turning[1]
-    yaw_torque = izz * wanted[2] + gyroscopic * (mz + lz) - torque_turning[2]
+    mx, my, mz = torque_rate(omega, omega_rate, wanted, (ixx, iyy, izz), gyroscopic)
 
     # Likewise the lift: the force turns with the body and with the pods.
     up_x, up_y, up_z = rotation[6], rotation[7], rotation[8]
@@ -536,9 +400,9 @@ def tracking_inputs(
     v1, v2, v3, v4 = solve_by_pairs(
         entries,
         vertical_force_entries(trig, up_x, up_y, up_z),
-        roll_torque / per_torque,
-        pitch_torque / per_torque,
-        yaw_torque / per_torque,
+        (mx - per_torque * hx) / per_torque,
+        (my - per_torque * hy) / per_torque,
+        (mz - per_torque * hz) / per_torque,
         altitude_jerk / per_force - swept_lift,
     )
     if s1 == 0.0 or s2 == 0.0 or s3 == 0.0 or s4 == 0.0:

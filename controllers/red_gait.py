@@ -3,8 +3,11 @@
 Red is the plane ``alpha_3 = alpha_1, alpha_4 = alpha_2`` of the Two Color Map, on which the
 torque-free force ``n`` is vertical whatever the tilts, but for the curve L on which it vanishes
 (`controllers.two_color_map`). The nearest point of the plane has the means of opposite angles. The
-way there keeps their sums and shrinks their differences, so that ``n_x`` and ``n_y`` only fall and
-``n_z`` only grows: the margin of a level vehicle grows all the way.
+way there keeps their sums and shrinks their differences. Where these are below a right angle,
+``n_x`` and ``n_y`` only fall and ``n_z`` only grows: the margin of a level vehicle grows all the
+way. Opposite pods further apart come by a difference of a right angle, where ``n`` leans most, and
+the margin may fall before it grows; beyond half a revolution ``n_z`` falls, too, and the way may be
+singular.
 
 With ``delta = atan(r)``, ``u = alpha_1 - delta`` and ``v = alpha_2 + delta`` the residual on red is
 

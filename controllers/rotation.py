@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import asin, atan2, cos, floor, pi, sin, sqrt
 
 from controllers.scalar import Quad, Triple, scalar
@@ -12,7 +13,8 @@ def euler_from_quaternion(w: float, x: float, y: float, z: float) -> Triple:
     """Roll, pitch and yaw (rad) of a unit quaternion, scalar first."""
     sin_pitch = 2.0 * (w * y - z * x)
     # Rounding may carry the sine past one at pitch = +-90 degrees.
-    sin_pitch = min(1.0, max(-1.0, sin_pitch))
+    if not -1.0 <= sin_pitch <= 1.0:
+        sin_pitch = min(1.0, max(-1.0, sin_pitch))
     return (
         atan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
         asin(sin_pitch),
@@ -84,6 +86,18 @@ def rotation_from_quaternion(w: float, x: float, y: float, z: float) -> tuple[fl
         2.0 * (x * z - w * y),
         2.0 * (y * z + w * x),
         1.0 - 2.0 * (x * x + y * y),
+    )
+
+
+@scalar
+def to_world(rotation: Sequence[float], vector: Triple) -> Triple:
+    """A vector in body axes, turned to the world's; ``rotation`` holds nine entries, rows first."""
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
+    x, y, z = vector
+    return (
+        r11 * x + r12 * y + r13 * z,
+        r21 * x + r22 * y + r23 * z,
+        r31 * x + r32 * y + r33 * z,
     )
 
 

@@ -29,3 +29,11 @@ def scalar(function: Function) -> Function:
 def scalar_functions() -> tuple[Callable[..., Any], ...]:
     """All functions registered so far, callees before their callers."""
     return tuple(_registry)
+
+
+@scalar
+def clipped(value: float, low: float, high: float) -> float:
+    """The nearest number between two bounds; what is no number stays none."""
+    if value < low:
+        return low
+    return high if value > high else value

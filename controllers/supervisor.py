@@ -35,6 +35,7 @@ from controllers.jets import Jet, jet_product, jet_scaled, jet_sum
 from controllers.red_gait import Jets4, nearest_red
 from controllers.rotation import world_up_in_body
 from controllers.scalar import Quad, Triple, scalar
+from controllers.vehicle import Vehicle, drag_ratio
 
 SCALE: Final = 0
 HOLD: Final = 1
@@ -131,7 +132,7 @@ def allowed_scale(
 
 @scalar
 def gait_share(
-    planned: TiltsAndRates, roll: float, pitch: float, supervisor: Supervisor, drag_ratio: float
+    planned: TiltsAndRates, roll: float, pitch: float, supervisor: Supervisor, vehicle: Vehicle
 ) -> float:
     """How much of a planned gait passes at an attitude: 1 where nothing is scaled."""
     if supervisor.strategy != SCALE:
@@ -139,7 +140,7 @@ def gait_share(
     if supervisor.min_margin <= 0.0 and supervisor.min_determinant <= 0.0:
         return 1.0
     tilts = planned[0], planned[1], planned[2], planned[3]
-    return allowed_scale(tilts, roll, pitch, supervisor, drag_ratio)
+    return allowed_scale(tilts, roll, pitch, supervisor, drag_ratio(vehicle))
 
 
 # --- hold and return -----------------------------------------------------------------------------

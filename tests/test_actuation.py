@@ -180,6 +180,24 @@ def test_flights_with_rotor_lag_end_where_routh_says(share, survives):
     assert bool(late < early) is survives
 
 
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+@pytest.mark.parametrize("timing", [{}, {"control_timestep": 0.004}], ids=["continuous", "held"])
+def test_a_lagging_rotor_leaves_its_limit_as_soon_as_one_without_lag(plant, timing):
+    """Speeds told beyond it would first have to be taken back: 0.47 m past, or lost where held."""
+    past = []
+    for lag in ({}, {"rotor_time_constant": 0.02}):
+        flight = fly(
+            simulation={"duration": 6.0, "timestep": 0.002, "plant": plant, **timing},
+            vehicle={"min_rotor_speed": 200.0, "max_rotor_speed": 390.0, **lag},
+            gait={"amplitude": 0.0},
+            initial={"position": [0.0, 0.0, -6.0]},
+            reference={"type": "setpoint"},
+        )
+        assert max(np.abs(flight["rotor_speed_1"])) == pytest.approx(390.0)
+        past.append(flight["z"].max())
+    assert past[1] == pytest.approx(past[0], abs=0.02)
+
+
 # --- servos ------------------------------------------------------------------------------------
 
 

@@ -235,6 +235,12 @@ def test_a_blue_gait_as_printed_is_said_to_be_nearly_singular(capsys) -> None:
     assert "tau is nearly singular: its smallest singular value is 0.00011" in report["warnings"][0]
 
 
+EVERYTHING = (
+    "mass=1.2,inertia_xx=0.01,inertia_yy=0.02,inertia_zz=0.025,arm_length=0.3,"
+    "thrust_coefficient=1.1e-05,drag_coefficient=2e-07,gravity=1.62"
+)
+
+
 @pytest.mark.parametrize(
     ("text", "changes"),
     [
@@ -255,6 +261,25 @@ def test_overrides_alone_change_the_default_vehicle(capsys) -> None:
     report = run_json(capsys, "map", "--vehicle", text)
     assert report["P"] == pytest.approx([np.arctan(ratio), -np.arctan(ratio)])
     assert report["blue"]["alpha_3"]["offset"] == pytest.approx(2 * np.arctan(ratio))
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("luukkonen", "luukkonen"),
+        ("mass=0.5,arm_length=0.2", "ar_drone_2,mass=0.5,arm_length=0.2"),
+        ("luukkonen,gravity=1.62", "luukkonen,gravity=1.62"),
+        (EVERYTHING, EVERYTHING),
+    ],
+)
+@pytest.mark.parametrize("command", [("gait", "--angles", "0,0,0,0"), ("map",)])
+def test_a_vehicle_is_printed_as_it_is_given(command, text, shown, capsys) -> None:
+    assert run(*command, "--vehicle", text) == 0
+    rows = dict(
+        line.split("  ", 1) for line in capsys.readouterr().out.splitlines() if "  " in line
+    )
+    assert rows["vehicle"].strip() == shown
+    assert parse_vehicle(shown) == parse_vehicle(text)
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,10 @@ from tiltsim.flight import End
 from tiltsim.library import shipped_folder
 from tiltsim.loading import merge
 from tiltsim.loops import LOOPS, control_setup, loop_of
+from tiltsim.loops.actuation import with_actuation
+from tiltsim.loops.air import with_air
+from tiltsim.loops.on_equations import on_equations
+from tiltsim.loops.supervised import with_supervisor
 from tiltsim.native import compile_callbacks, compile_stepper
 from tiltsim.plants import flight_model, make_plant, what_decides_the_model
 
@@ -523,3 +527,18 @@ def test_whether_native_code_is_cached_is_known_by_law_and_plant(monkeypatch, tm
     assert choose_engine(wanted) == "python"
     cache.native_code_was_compiled(LOOPS["attitude_altitude"].native_name("mujoco"))
     assert choose_engine(wanted) == "native"
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_no_two_control_steps_share_a_name_of_native_code(plant):
+    """Else an automatic engine takes one law for compiled where another is."""
+    tilting = [LOOPS["attitude_altitude"], LOOPS["gait_feedforward"]]
+    laws = [*LOOPS.values(), *(with_supervisor(loop, "hold") for loop in tilting)]
+    tiltrotors = [loop for loop in laws if loop.model == "tiltrotor"]
+    real = [with_actuation(loop, steps) for loop in tiltrotors for steps in (0, 2)]
+    aired = [with_air(loop) for loop in [*laws, *real] if loop.model != "tilt_car"]
+    loops = [*laws, *real, *aired]
+    if plant == "thesis":
+        loops = [*laws[: len(LOOPS)], *map(on_equations, [*laws[len(LOOPS) :], *real, *aired])]
+    names = [loop.native_name(plant) for loop in loops]
+    assert len(set(names)) == len(names) == len(loops) > 30

@@ -6,6 +6,7 @@ from math import inf, nan, nextafter
 
 import pytest
 
+from tiltsim.commands.run import expectation_lines
 from tiltsim.expectation_table import Expectation
 from tiltsim.expectations import Verdict, judge
 from tiltsim.scenario import Scenario
@@ -105,3 +106,19 @@ def test_an_expectation_may_speak_of_one_plant_alone(plant, judged):
     )
     verdicts = judge(scenario, {"final_roll": 0.0})
     assert [verdict.expectation.max for verdict in verdicts] == judged
+
+
+@pytest.mark.parametrize(
+    ("bounds", "measured", "shown"),
+    [
+        ({"max": 2.0, "published": -0.38}, 1.5, "-0.38"),
+        ({"max": 2.0, "published": True}, 1.5, "in bounds"),
+        ({"max": 2.0, "published": False}, 1.5, "out of bounds"),
+        ({"equals": True, "published": True}, True, "true"),
+        ({"equals": True, "published": False}, True, "false"),
+        ({"max": 2.0}, 1.5, "<= 2"),
+    ],
+)
+def test_the_table_shows_what_the_thesis_says_of_a_metric(bounds, measured, shown):
+    header, line = expectation_lines([Verdict(expects(**bounds), measured)])
+    assert line[header.index("published") :].strip().startswith(shown)

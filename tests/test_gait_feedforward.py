@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tiltsim
-from controllers.gait_feedforward import INGREDIENTS
+from controllers.gait_feedforward import Ingredients
 from tiltsim.controller_tables import Ingredient
 from tiltsim.errors import InputError
 
@@ -15,7 +15,7 @@ PUBLISHED = "ch04_tracking/circle#continuous_t2_modified"
 
 
 def test_what_can_be_left_out_is_what_the_law_counts_in():
-    assert set(Ingredient.__args__) == set(INGREDIENTS)
+    assert set(Ingredient.__args__) == set(Ingredients._fields)
 
 
 @pytest.mark.parametrize(

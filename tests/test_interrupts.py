@@ -14,7 +14,7 @@ import tiltsim.commands.run
 from tests.flights import flight as flight_named
 from tiltsim.cli import main
 from tiltsim.files import load_flight
-from tiltsim.interrupts import interrupts_deferred, interrupts_kept
+from tiltsim.interrupts import interrupts_deferred, interrupts_kept, terminations_as_interrupts
 
 CALLED_BACK = ctypes.CFUNCTYPE(None)
 
@@ -110,3 +110,36 @@ def test_an_interrupt_while_files_are_written_loses_none(tmp_path, monkeypatch, 
     assert len(load_flight(tmp_path)) == len(flight)
     assert (tmp_path / "scenario.toml").exists()
     assert "interrupted" in capsys.readouterr().err
+
+
+def terminate():
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+@pytest.mark.parametrize("keyboard", [signal.default_int_handler, signal.SIG_IGN])
+def test_a_termination_interrupts_and_a_second_one_would_kill(keyboard):
+    before = signal.signal(signal.SIGINT, keyboard)
+    ended = signal.getsignal(signal.SIGTERM)
+    try:
+        with terminations_as_interrupts() as terminated:
+            assert not terminated()
+            with pytest.raises(KeyboardInterrupt):
+                terminate()
+            assert terminated()
+            assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert signal.getsignal(signal.SIGTERM) is ended
+
+
+def test_a_termination_waits_for_what_must_not_be_lost():
+    done = []
+
+    def work():
+        with terminations_as_interrupts(), interrupts_deferred():
+            terminate()
+            done.append("finished")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done == ["finished"]

@@ -10,6 +10,7 @@ import pytest
 import tiltsim
 from controllers.yaw_position import gyroscopic_acceleration
 from tiltsim import plants
+from tiltsim.equations.driven import DRIVEN
 from tiltsim.errors import InputError
 from tiltsim.loops import LOOPS, loop_of
 from tiltsim.plants import make_plant
@@ -201,6 +202,19 @@ def test_a_saved_state_restarts_bit_identically(name):
 
 
 # --- the thesis' vehicle -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("base", [TILTROTOR, QUADROTOR])
+def test_a_state_that_has_overflowed_is_seen_as_no_number(base):
+    """The last addition of a step may give infinity, of which floats have no sine."""
+    plant = make_plant(scenario(base, STORM, {"simulation": {"plant": "thesis"}}))
+    state, motion = plant.state, DRIVEN[base.get("vehicle", {}).get("model", "tiltrotor")].motion
+    first = 1 + len(plant._held)
+    for index in range(motion):
+        overflowed = state.copy()
+        overflowed[first + index] = np.inf
+        plant.state = overflowed
+        assert not np.isfinite(plant.observe()).all()
 
 
 def test_a_vehicle_that_does_as_told_flies_the_printed_equations():

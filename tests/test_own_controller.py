@@ -259,6 +259,18 @@ def test_rotor_limits_hold(model):
     assert speeds == [500.0, 500.0, 100.0, 100.0]
 
 
+@each_model
+def test_rotors_whose_least_speed_is_0_stop_and_do_not_reverse(model):
+    def law(seen):
+        return Command(rotor_accelerations=[-4e4, 0.0, -4e4, 0.0])
+
+    for limits, stopped in (({"min_rotor_speed": 0.0}, True), ({}, False)):
+        flight = tiltsim.simulate(scenario(vehicle={"model": model, **limits}), controller=law)
+        metrics = flight.metrics()
+        assert (metrics["min_rotor_speed"] == 0.0) == stopped
+        assert (metrics["saturated_fraction"] > 0.5) == stopped
+
+
 @pytest.mark.parametrize(("control_timestep", "calls"), [(0.0, 30), (0.001, 30), (0.005, 6)])
 def test_asked_at_every_control_sample(control_timestep, calls):
     times = []

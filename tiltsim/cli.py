@@ -9,7 +9,8 @@ from io import TextIOWrapper
 from typing import Final, NoReturn
 
 from tiltsim.errors import InputError
-from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT
+from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT, TERMINATED
+from tiltsim.interrupts import terminations_as_interrupts
 
 COMMANDS: Final = (
     *("run", "check", "sweep", "list", "view", "plot", "video"),
@@ -61,6 +62,13 @@ def main(arguments: list[str] | None = None) -> int:
     """Run one command and return its exit code."""
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # as Python has it for standard error
+    with terminations_as_interrupts() as terminated:
+        code = _run(arguments)
+    return TERMINATED if code == INTERRUPTED and terminated() else code
+
+
+def _run(arguments: list[str] | None) -> int:
+    """Parse and run; every mistake becomes a line and an exit code."""
     try:
         parsed = build_parser().parse_args(arguments)
         return int(parsed.run(parsed))

@@ -50,7 +50,8 @@ class PythonEngine:
         parameters = slotted(unflatten(loop.parameters, values))
         table = tuple(values[loop.record_size :])
         # Views of MuJoCo's own memory; looking them up anew would cost a tenth of the callback.
-        qpos, qvel, act, ctrl = data.qpos, data.qvel, data.act, data.ctrl
+        vectors = data.qpos, data.qvel, data.act, data.ctrl
+        qpos, qvel, act, ctrl = (memoryview(vector) for vector in vectors)
         header = data.userdata[:HEADER_SIZE]
         write_controls = Struct(f"{len(ctrl)}d").pack_into
 
@@ -63,7 +64,7 @@ class PythonEngine:
                 write_controls(ctrl, 0, *values)
             except (ArithmeticError, ValueError):
                 # Where floats raise (sin of infinity), native code has NaN; MuJoCo reports both.
-                ctrl[:] = nan
+                write_controls(ctrl, 0, *(nan,) * len(ctrl))
 
         def between_samples() -> tuple[float, ...]:
             if loop.hold is None:

@@ -1,11 +1,11 @@
-"""Interrupts from the keyboard that must neither get lost nor lose what is computed."""
+"""Interrupts that must neither get lost nor lose what is computed."""
 
 from __future__ import annotations
 
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -70,3 +70,31 @@ def interrupts_deferred() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
     if interrupted:
         raise KeyboardInterrupt
+
+
+@contextmanager
+def terminations_as_interrupts() -> Iterator[Callable[[], bool]]:
+    """Within the block SIGTERM is an interrupt, so that it, too, is cleaned up after.
+
+    Schedulers and ``kill`` end a process so. A second one ends it at once. Yields whether there
+    was one. In threads other than the main one the block runs as ever.
+    """
+    terminated = False
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: terminated
+        return
+
+    def interrupt(_number: int, frame: FrameType | None) -> None:
+        nonlocal terminated
+        terminated = True
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        handler = signal.getsignal(signal.SIGINT)
+        if not callable(handler):  # a shell's job in the background ignores the keyboard
+            raise KeyboardInterrupt
+        handler(signal.SIGINT, frame)
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield lambda: terminated
+    finally:
+        signal.signal(signal.SIGTERM, before)

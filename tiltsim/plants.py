@@ -398,9 +398,12 @@ class ThesisPlant:
     def observe(self) -> tuple[float, ...]:
         """See `Plant.observe`."""
         setup = self._setup
-        return self._equations.observe(
-            self.time, self._state, self._inputs_in_force(), setup.parameters, setup.table
-        )
+        try:
+            return self._equations.observe(
+                self.time, self._state, self._inputs_in_force(), setup.parameters, setup.table
+            )
+        except (ArithmeticError, ValueError):
+            return (nan,) * (len(self._loop.sample_fields) - 1)
 
     def _inputs_in_force(self) -> Sequence[float]:
         every = self._control_steps

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import pi
+from math import inf, pi
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
@@ -11,7 +11,7 @@ from controllers.tilt_car.vehicle import THESIS_CAR, TiltCar
 from controllers.vehicle import PRESETS, Vehicle
 from tiltsim.messages import InvalidValueError
 from tiltsim.model import Pod, TiltServo
-from tiltsim.tables import NotTiny, Positive, Table
+from tiltsim.tables import NonNegative, NotTiny, Positive, Table
 
 if TYPE_CHECKING:
     from tiltsim.own_vehicle import OwnVehicle
@@ -71,7 +71,9 @@ class VehicleTable(Table):
     thrust_coefficient: NotTiny | None = Field(None, description="N s^2/rad^2")
     drag_coefficient: NotTiny | None = Field(None, description="N m s^2/rad^2")
     gravity: Positive | None = Field(None, description="m/s^2")
-    min_rotor_speed: Positive | None = Field(None, description="rad/s, absolute value")
+    min_rotor_speed: NonNegative | None = Field(
+        None, description="rad/s, absolute value; at 0 a rotor may stop, but not reverse"
+    )
     max_rotor_speed: Positive | None = Field(None, description="rad/s, absolute value")
     rotor_time_constant: Positive | None = Field(
         None, description="s, of the lag between the speed a rotor is told and its own"
@@ -93,6 +95,13 @@ class VehicleTable(Table):
         own = self.own
         base = PRESETS[self.preset] if own is None else own.vehicle
         return base._replace(**known)
+
+    @property
+    def speeds_along_spin(self) -> tuple[float, float]:
+        """Least and greatest speed (rad/s) of a rotor along its spin; infinite without limits."""
+        low, high = self.min_rotor_speed, self.max_rotor_speed
+        greatest = inf if high is None else high
+        return -greatest if low is None else low, greatest
 
     @property
     def own(self) -> OwnVehicle | None:

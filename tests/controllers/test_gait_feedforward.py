@@ -21,24 +21,20 @@ from controllers.gains import (
     third_order_gains,
 )
 from controllers.gait_feedforward import (
-    INGREDIENTS,
     Ingredients,
     Parameters,
-    anticipated_tilts,
     attitude_jerk,
-    body_jerk,
-    euler_motion,
     exact_decoupler_jet,
     integrator_rate,
     limited_acceleration,
-    rounded_corner,
-    rounded_ramp,
     torque_free_force_jet,
     tracking_inputs,
 )
 from controllers.gaits import GAIT_TYPES, GaitParameters, tilt_acceleration, tilt_reference
+from controllers.gaits.anticipation import anticipated_tilts, rounded_corner, rounded_ramp
 from controllers.gaits.plans import continuous_trot, fixed, keyframes, two_color_circle
 from controllers.references import REFERENCE_TYPES, ReferenceParameters
+from controllers.rigid_body import body_jerk, euler_motion
 from controllers.stability import feedforward_loops
 from controllers.vehicle import PRESETS, SPIN, drag_ratio
 from tests.thesis import force_matrix, torque_matrix
@@ -442,5 +438,8 @@ def test_the_closed_loops_are_those_of_the_poles():
     assert not unstable[-1].stable
 
 
-def test_ingredients_are_named_after_the_record():
-    assert set(INGREDIENTS) == set(Ingredients()._asdict())
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_a_reference_that_is_no_number_asks_for_no_number(place):
+    wanted = [0.1, 0.2, 0.3]
+    wanted[place] = float("nan")
+    assert isnan(attitude_jerk(tuple(wanted), (0.0, 0.0, 0.0), 40.0, 600.0, 4000.0, 50.0))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from controllers.decoupling_matrix import sines_and_cosines, torque_entries, torque_free_inputs
 from controllers.red_gait import determinant_at_clearance, nearest_red, red_determinant
-from controllers.singularity import residuals
+from controllers.singularity import determinant, margin_over_gait, residuals
 from controllers.two_color_map import curve_l, red_residual
 from controllers.vehicle import PRESETS, drag_ratio
 
@@ -91,6 +91,17 @@ def test_on_the_way_the_margin_of_a_level_vehicle_grows(angles, share):
     assert np.diff(R)[0] >= -1e-12
     assert np.diff(np.abs(R_phi))[0] <= 1e-12
     assert np.diff(np.abs(R_theta))[0] <= 1e-12
+
+
+def test_pods_more_than_a_right_angle_apart_may_lean_further_before_they_lean_less():
+    """What the module says of the way from there: the margin of a level vehicle, in between."""
+    start = np.array([-1.03, -1.21, -1.03, 1.91])
+    way = red(start) - start
+    leaning = [start + share * way for share in (0.0, 0.15, 1.0)]
+    before, between, after = margin_over_gait(np.array(leaning), VEHICLE, 0.0, 0.0)
+    assert between < before - 0.9
+    assert after == pytest.approx(pi / 2)
+    assert (determinant(np.array(leaning), 0.0, 0.0, VEHICLE) > 0.0).all()
 
 
 def test_rates_are_those_of_the_moving_angles():

@@ -39,6 +39,11 @@ RATIO = drag_ratio(VEHICLE)
 WATCH = Supervisor(min_margin=0.3, min_determinant=1.0)
 SCENARIO = "beyond/supervisor#supervised"
 RED = {"controller.supervisor.strategy": "return_to_red"}
+SLOW_LAW = {
+    "controller.decoupling": "exact",
+    "controller.gains": {"attitude": [[9.0] * 3, [27.0] * 3, [27.0] * 3], "altitude": [9, 27, 27]},
+}
+SELDOM = {"simulation.control_timestep": 0.05}
 
 angles = st.tuples(*[st.floats(-1.5, 1.5)] * 4)
 leans = st.floats(-0.5, 0.5)
@@ -68,7 +73,7 @@ def test_what_passes_is_regular_and_a_little_more_is_not(tilts, roll, pitch):
 
 def test_without_thresholds_everything_passes():
     wild = (3.0, -2.0, 1.0, 2.5, 0.0, 0.0, 0.0, 0.0)
-    assert gait_share(wild, 2.0, 1.0, Supervisor(), RATIO) == 1.0
+    assert gait_share(wild, 2.0, 1.0, Supervisor(), VEHICLE) == 1.0
 
 
 def test_a_vehicle_that_leans_too_far_gets_no_tilt():
@@ -272,6 +277,22 @@ def test_it_flies_sampled_and_through_real_actuators(strategy):
     assert "thrust_factor_1" in flight.columns
 
 
+@pytest.mark.parametrize("address", ["beyond/supervisor#held", "beyond/supervisor#returned_to_red"])
+def test_sampled_as_seldom_as_allowed_it_stays_within_bounds(address):
+    """Under a law that is slow enough itself; from 0.05 s on the states would swing up."""
+    changes = {
+        **{"simulation.control_timestep": 0.045, "simulation.duration": 2.4},
+        **{"simulation.timestep": 0.0025, **SLOW_LAW},
+    }
+    flight = tiltsim.simulate(tiltsim.load_scenario(address, changes))
+    assert flight.end.kind == "completed"
+    assert flight["supervisor_state"].min() >= 0.0
+    if address.endswith("held"):
+        assert flight["supervisor_rate"].max() < 1.2
+    else:
+        assert 0.5 < flight["supervisor_state"].max() <= 1.0
+
+
 def test_the_way_to_red_is_no_faster_than_asked():
     """A planned gait that rests and is not allowed: the tilts set out for red."""
     tables = tiltrotor(
@@ -306,6 +327,8 @@ def test_the_way_to_red_is_no_faster_than_asked():
         ({**RED, "controller.supervisor.clearance": 0.2}, "must be below 0.1671"),
         ({**RED, "controller.supervisor.clearance": 0.07}, "below min_determinant = 2"),
         ({"controller.supervisor.strategy": "stop"}, "scale, hold or return_to_red"),
+        ({**SELDOM, "controller.supervisor.strategy": "hold"}, "control_timestep = 0.05: too long"),
+        ({**SELDOM, **RED}, "strategy = return_to_red, which moves with a lag of 0.025 s; below"),
     ],
 )
 def test_mistakes_are_one_line(changes, message):

@@ -241,6 +241,26 @@ def test_processes_end_with_their_parent(tmp_path):
         pytest.fail("processes outlive their parent")
 
 
+def test_a_terminated_sweep_cleans_up_and_continues(tmp_path):
+    file = short_sweep(tmp_path / "sweep.toml", count=60, chunk_size=2)
+    folder = tmp_path / "out"
+    process = subprocess.Popen(command(file, folder, "--jobs=2"), stderr=subprocess.PIPE)
+    while not parts_in(folder):
+        time.sleep(0.01)
+    process.terminate()
+    _, error = process.communicate(timeout=30.0)
+    assert process.returncode == 143
+    assert error.decode() == (
+        f"tiltsim: interrupted; what is finished is in {folder}, the same command continues\n"
+    )
+    kept = parts_in(folder)
+    assert 0 < kept < 60
+    reports = []
+    run_sweep(load_definition(file), folder, report=reports.append)
+    assert reports[0] == 2 * kept
+    assert [row["index"] for row in rows(folder)] == list(range(120))
+
+
 def test_a_damaged_folder_is_told_of_or_mended(tmp_path):
     definition = load_definition(short_sweep(tmp_path / "sweep.toml"))
     dataset = run_sweep(definition, tmp_path / "out")

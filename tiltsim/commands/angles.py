@@ -84,6 +84,23 @@ def parse_vehicle(text: str | None) -> Vehicle:
     return vehicle._replace(**changes)
 
 
+def vehicle_text(vehicle: str | dict[str, float]) -> str:
+    """A report's vehicle as `parse_vehicle` reads it: the closest preset and what differs."""
+    from controllers.vehicle import PRESETS
+
+    if isinstance(vehicle, str):
+        return vehicle
+    differing = {
+        name: [
+            f"{key}={value!r}" for key, value in vehicle.items() if getattr(preset, key) != value
+        ]
+        for name, preset in PRESETS.items()
+    }
+    name = min(differing, key=lambda name: len(differing[name]))
+    none_shared = len(differing[name]) == len(vehicle)
+    return ",".join(differing[name] if none_shared else [name, *differing[name]])
+
+
 def parse_speed_limits(text: str) -> tuple[float, float]:
     """Least and greatest rotor speed (rad/s), separated by a comma."""
     parts = text.split(",")

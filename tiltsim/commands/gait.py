@@ -13,6 +13,7 @@ from tiltsim.commands.angles import (
     parse_angles,
     parse_speed_limits,
     parse_vehicle,
+    vehicle_text,
 )
 from tiltsim.commands.text import aligned, json_text, number, numbers, table, tell_of_figure
 
@@ -329,7 +330,7 @@ def _summary(report: dict[str, Any]) -> str:
     direction = report["torque_free_direction"]
     rows = [
         ("gait", report["gait"] + (f" ({report['source']})" if report["source"] else "")),
-        ("vehicle", str(report["vehicle"])),
+        ("vehicle", vehicle_text(report["vehicle"])),
         ("tilt angles", numbers(report["angles"]) + " rad"),
         ("rank of tau", str(report["rank"])),
         ("singular values", numbers(report["singular_values"]) + " of tau / (L K_f)"),

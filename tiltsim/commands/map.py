@@ -6,7 +6,12 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tiltsim.commands.angles import allow_negative_lists, parse_angles, parse_vehicle
+from tiltsim.commands.angles import (
+    allow_negative_lists,
+    parse_angles,
+    parse_vehicle,
+    vehicle_text,
+)
 from tiltsim.commands.text import aligned, json_text, tell_of_figure
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
 
@@ -124,7 +129,7 @@ def _summary(report: dict[str, Any]) -> str:
     counts = report["roots"]["count"]
     classes = ", ".join(f"{count} {name}" for name, count in report["roots"]["classes"].items())
     rows = [
-        ("vehicle", str(report["vehicle"])),
+        ("vehicle", vehicle_text(report["vehicle"])),
         ("delta = atan(K_m / (L K_f))", f"{report['delta']:.9g} rad"),
         ("P", f"({report['P'][0]:.9g}, {report['P'][1]:.9g}) rad, on the curve L"),
         ("red", "alpha_3 = alpha_1, alpha_4 = alpha_2"),

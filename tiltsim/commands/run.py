@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from concurrent.futures import Future, ThreadPoolExecutor
 
+    from tiltsim.expectation_table import Expectation
     from tiltsim.expectations import Verdict
     from tiltsim.flight import Flight
     from tiltsim.loop import Floats
@@ -245,14 +246,15 @@ def _measured(verdict: Verdict) -> str:
     return "flight under 20 s" if metric.endswith("after_20s") else "no value"
 
 
-def _published(verdict: Verdict) -> str:
-    """The published number, or what is said of a number that the bounds stand for."""
-    value = verdict.expectation.published
+def _published(wanted: Expectation) -> str:
+    value = wanted.published
     if value is None:
         return ""
-    if isinstance(value, bool) and not isinstance(verdict.measured, bool):
-        return "claimed" if value else "denied"
-    return str(value).lower() if isinstance(value, bool) else f"{value:g}"
+    if not isinstance(value, bool):
+        return f"{value:g}"
+    # The thesis states that a number lies within the bounds, and prints none.
+    words = ("out of bounds", "in bounds") if wanted.equals is None else ("false", "true")
+    return words[value]
 
 
 def expectation_lines(verdicts: list[Verdict]) -> list[str]:
@@ -265,7 +267,7 @@ def expectation_lines(verdicts: list[Verdict]) -> list[str]:
                 "ok" if verdict.holds else "FAILED",
                 wanted.metric,
                 _measured(verdict),
-                _published(verdict),
+                _published(wanted),
                 verdict.bounds,
             )
         )

@@ -18,8 +18,9 @@ from controllers.rotation import (
     quaternion_from_euler,
     quaternion_from_rotation,
     rotation_from_euler,
+    to_world,
 )
-from controllers.scalar import Quad, Triple, scalar
+from controllers.scalar import Quad, Triple, clipped, scalar
 from controllers.vehicle import Vehicle
 from tiltsim.equations.quadrotor import equations_of_motion, initial_state
 from tiltsim.equations.tiltrotor import rigid_body
@@ -46,23 +47,23 @@ def mechanics(scenario: Scenario) -> Mechanics:
     """The mechanics of a scenario's rotorcraft."""
     vehicle = scenario.rotorcraft
     servo = vehicle.tilt_servo
-    max_speed = inf if vehicle.max_rotor_speed is None else vehicle.max_rotor_speed
+    min_speed, max_speed = vehicle.speeds_along_spin
     return Mechanics(
         scenario.true_rotorcraft,
         servo.natural_frequency,
         servo.damping_ratio,
         max_tilt=inf if servo.max_angle is None else servo.max_angle,
-        min_speed=-max_speed if vehicle.min_rotor_speed is None else vehicle.min_rotor_speed,
+        min_speed=min_speed,
         max_speed=max_speed,
     )
 
 
 @scalar
-def clipped(value: float, low: float, high: float) -> float:
-    """The nearest number between two bounds; what is no number stays none."""
-    if value < low:
-        return low
-    return high if value > high else value
+def pushed(rotation: Sequence[float], wrench: Wrench, mass: float, disturbance: Triple) -> Triple:
+    """The acceleration (m/s^2, world) by a wrench's force and a disturbance (m/s^2, world)."""
+    force_x, force_y, force_z = to_world(rotation, (wrench[0], wrench[1], wrench[2]))
+    gust_x, gust_y, gust_z = disturbance
+    return gust_x + force_x / mass, gust_y + force_y / mass, gust_z + force_z / mass
 
 
 class Driven(NamedTuple):
@@ -85,14 +86,18 @@ class Driven(NamedTuple):
 
 
 @scalar
+def rotation_of(state: Sequence[float]) -> tuple[float, ...]:
+    """The nine entries, rows first, of the body-to-world rotation."""
+    return (
+        *(state[6], state[7], state[8], state[9], state[10], state[11]),
+        *(state[12], state[13], state[14]),
+    )
+
+
+@scalar
 def tiltrotor_qpos(state: Sequence[float]) -> tuple[float, ...]:
     """Position, quaternion and tilts."""
-    qw, qx, qy, qz = quaternion_from_rotation(
-        (
-            *(state[6], state[7], state[8], state[9], state[10], state[11]),
-            *(state[12], state[13], state[14]),
-        )
-    )
+    qw, qx, qy, qz = quaternion_from_rotation(rotation_of(state))
     return (
         *(state[0], state[1], state[2], qw, qx, qy, qz),
         *(state[18], state[19], state[20], state[21]),
@@ -126,14 +131,9 @@ def tiltrotor_rates(
 ) -> tuple[float, ...]:
     """Chapter 3's rigid body under thrusts, servos and a wrench."""
     vehicle = mechanics.vehicle
-    force_x, force_y, force_z, torque_x, torque_y, torque_z = wrench
+    _, _, _, torque_x, torque_y, torque_z = wrench
     tilts: Quad = (state[18], state[19], state[20], state[21])
-    gust_x, gust_y, gust_z = disturbance
-    push = (
-        gust_x + (state[6] * force_x + state[7] * force_y + state[8] * force_z) / vehicle.mass,
-        gust_y + (state[9] * force_x + state[10] * force_y + state[11] * force_z) / vehicle.mass,
-        gust_z + (state[12] * force_x + state[13] * force_y + state[14] * force_z) / vehicle.mass,
-    )
+    push = pushed(rotation_of(state), wrench, vehicle.mass, disturbance)
     turn = (
         torque_x / vehicle.inertia_xx,
         torque_y / vehicle.inertia_yy,
@@ -203,14 +203,9 @@ def quadrotor_rates(
 ) -> tuple[float, ...]:
     """Chapter 2's rigid body under thrusts and a wrench."""
     vehicle = mechanics.vehicle
-    force_x, force_y, force_z, torque_x, torque_y, torque_z = wrench
-    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_from_euler(state[6], state[7], state[8])
-    gust_x, gust_y, gust_z = disturbance
-    push = (
-        gust_x + (r11 * force_x + r12 * force_y + r13 * force_z) / vehicle.mass,
-        gust_y + (r21 * force_x + r22 * force_y + r23 * force_z) / vehicle.mass,
-        gust_z + (r31 * force_x + r32 * force_y + r33 * force_z) / vehicle.mass,
-    )
+    _, _, _, torque_x, torque_y, torque_z = wrench
+    rotation = rotation_from_euler(state[6], state[7], state[8])
+    push = pushed(rotation, wrench, vehicle.mass, disturbance)
     lever = vehicle.arm_length * vehicle.thrust_coefficient
     inputs = (
         vehicle.thrust_coefficient * (ctrl[0] + ctrl[1] + ctrl[2] + ctrl[3]),

@@ -11,7 +11,12 @@ from math import asin, atan2
 from typing import TYPE_CHECKING
 
 from controllers.attitude_altitude import State
-from controllers.decoupling_matrix import body_force, sines_and_cosines, torque_entries
+from controllers.decoupling_matrix import (
+    body_force,
+    body_torque,
+    sines_and_cosines,
+    torque_entries,
+)
 from controllers.rotation import rotation_from_euler
 from controllers.scalar import Quad, Triple, scalar
 from controllers.vehicle import Vehicle, drag_ratio
@@ -71,11 +76,11 @@ def rigid_body(
     az = per_force * (r31 * fx + r32 * fy + r33 * fz) - vehicle.gravity + push_z
 
     # Eq. (4): torque alone, no gyroscopic term.
-    x2, x4, y1, y3, z1, z2, z3, z4 = torque_entries(trig, drag_ratio(vehicle))
+    tx, ty, tz = body_torque(torque_entries(trig, drag_ratio(vehicle)), w1, w2, w3, w4)
     per_torque = vehicle.arm_length * vehicle.thrust_coefficient
-    p_rate = per_torque * (x2 * w2 + x4 * w4) / vehicle.inertia_xx
-    q_rate = per_torque * (y1 * w1 + y3 * w3) / vehicle.inertia_yy
-    r_rate = per_torque * (z1 * w1 + z2 * w2 + z3 * w3 + z4 * w4) / vehicle.inertia_zz
+    p_rate = per_torque * tx / vehicle.inertia_xx
+    q_rate = per_torque * ty / vehicle.inertia_yy
+    r_rate = per_torque * tz / vehicle.inertia_zz
 
     return (
         *(state[3], state[4], state[5], ax, ay, az),

@@ -30,6 +30,7 @@ from controllers.actuators import (
     reading_index,
     servo_command,
     thrust_factor,
+    told_rate,
     turned_quaternion,
 )
 from controllers.allocation import allocated
@@ -73,6 +74,8 @@ class Actuation(NamedTuple):
     sensors: Sensors
     allocation: Allocation
     control_timestep: float  # s; 0 if continuous
+    slowest: float  # rad/s, of a rotor along its spin
+    fastest: float
     rotor_pole: float  # 1/s, one over the rotors' time constant; 0 where they follow at once
     servo_reach: float  # rad, see `controllers.actuators.rate_limited_command`
     faults: Faults
@@ -174,6 +177,20 @@ def motor_controls(
 
 
 @scalar
+def told_rates(
+    act: Sequence[float], first: int, commands: Sequence[float], actuation: Actuation
+) -> tuple[float, float, float, float]:
+    """Rates (rad/s^2) of the speeds that the motors are told, activations from ``first`` on."""
+    low, high = actuation.slowest, actuation.fastest
+    return (
+        told_rate(act[first], commands[4], -1.0, low, high),
+        told_rate(act[first + 1], commands[5], 1.0, low, high),
+        told_rate(act[first + 2], commands[6], -1.0, low, high),
+        told_rate(act[first + 3], commands[7], 1.0, low, high),
+    )
+
+
+@scalar
 def first_eight(values: Sequence[float]) -> tuple[float, ...]:
     """The first eight of some numbers."""
     return (
@@ -243,8 +260,8 @@ def with_actuation(loop: Loop, latency_steps: int) -> Loop:
     law_act, law_ctrl = loop.sizes.act, loop.sizes.ctrl
     line = law_act + ROTORS  # after the speeds that the motors are told
     under_way = COMMANDS * latency_steps
-    memory = law_ctrl + ROTORS + under_way  # the commands in force, last of the controls
-    first_state = LAW_CONTROLS  # states of the law, motor speeds and delay line, one after another
+    after_told = law_ctrl + ROTORS  # the delay line's controls
+    memory = after_told + under_way  # the commands in force, last of the controls
     extra = ExtraActuators(states=ROTORS + under_way, memories=COMMANDS)
     sizes = loop.sizes._replace(
         act=law_act + extra.states, ctrl=law_ctrl + extra.states + extra.memories
@@ -274,7 +291,7 @@ def with_actuation(loop: Loop, latency_steps: int) -> Loop:
             *thrust_controls(time, act, actuation.faults),
             *motor_controls(act, law_act, commands, actuation),
             *asked[LAW_CONTROLS:],
-            *commands[4:],
+            *told_rates(act, law_act, commands, actuation),
             *line_rates(act, sent, actuation.control_timestep),
             *commands,
         )
@@ -294,7 +311,9 @@ def with_actuation(loop: Loop, latency_steps: int) -> Loop:
             *servo_controls(time, qpos, commands, actuation),
             *thrust_controls(time, act, actuation.faults),
             *motor_controls(act, law_act, commands, actuation),
-            *ctrl[first_state:],
+            *ctrl[LAW_CONTROLS:law_ctrl],
+            *told_rates(act, law_act, commands, actuation),
+            *ctrl[after_told:],
         )
 
     @scalar
@@ -338,6 +357,7 @@ def _initial_tilts(scenario: Scenario) -> tuple[float, ...]:
 def _actuation(scenario: Scenario) -> Actuation:
     vehicle, simulation, controller = scenario.rotorcraft, scenario.simulation, scenario.controller
     low, high = vehicle.min_rotor_speed, vehicle.max_rotor_speed
+    slowest, fastest = vehicle.speeds_along_spin
     allocation = getattr(controller, "allocation", "inversion")
     max_rate, time_constant = vehicle.tilt_servo.max_rate, vehicle.rotor_time_constant
     return Actuation(
@@ -350,6 +370,8 @@ def _actuation(scenario: Scenario) -> Actuation:
             vehicle=vehicle.resolve(),
         ),
         control_timestep=simulation.control_timestep,
+        slowest=slowest,
+        fastest=fastest,
         rotor_pole=0.0 if time_constant is None else 1.0 / time_constant,
         servo_reach=inf if max_rate is None else servo_lead(vehicle.tilt_servo) * max_rate,
         faults=_faults(scenario),

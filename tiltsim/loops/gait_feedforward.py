@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from controllers.attitude_altitude import STATE_FIELDS
+from controllers.attitude_altitude import STATE_FIELDS, State
 from controllers.decouplers import DECOUPLERS
 from controllers.gait_feedforward import INTEGRAL_FIELDS, Parameters, tracking_inputs
 from controllers.gaits import tilt_reference
 from controllers.references import position_reference
 from controllers.scalar import Triple, scalar
-from controllers.supervisor import gait_share, governed
-from controllers.vehicle import drag_ratio
+from controllers.supervisor import AT_REST, gait_share
 from tiltsim.controller_tables import AttitudeAltitudeController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
 from tiltsim.loops.tiltrotor import (
-    SUPERVISOR_FIELDS,
     follows_position,
     gait_singularity,
     initial_rotor_speeds,
@@ -32,7 +29,6 @@ from tiltsim.loops.tiltrotor import (
     servo_commands,
     servo_lead,
     singular_matrix,
-    supervised_commands,
     tiltrotor_state,
 )
 
@@ -51,6 +47,23 @@ class ControlParameters(NamedTuple):
 
 
 @scalar
+def law_rates(
+    time: float,
+    state: State,
+    qvel: Sequence[float],
+    act: Sequence[float],
+    governor: Triple,
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """The law's part of the controls: rotor accelerations, rates of the integrals."""
+    tilt_rates, integrals = (qvel[6], qvel[7], qvel[8], qvel[9]), (act[4], act[5], act[6])
+    return tracking_inputs(*(time, state, tilt_rates, integrals, parameters.law, table, governor))[
+        :7
+    ]
+
+
+@scalar
 def gait_feedforward_controls(
     time: float,
     qpos: Sequence[float],
@@ -63,52 +76,11 @@ def gait_feedforward_controls(
     law = parameters.law
     state = tiltrotor_state(qpos, qvel, act)
     planned = tilt_reference(time, law.gait, table)
-    share = gait_share(planned, state[6], state[7], law.supervisor, drag_ratio(law.vehicle))
-    u1, u2, u3, u4, x_rate, y_rate, z_rate, _roll, _pitch, _yaw = tracking_inputs(
-        time,
-        state,
-        (qvel[6], qvel[7], qvel[8], qvel[9]),
-        (act[4], act[5], act[6]),
-        law,
-        table,
-    )
+    share = gait_share(planned, state[6], state[7], law.supervisor, law.vehicle)
     return (
         *servo_commands(planned, share, parameters.servo_lead),
         *rotor_thrust_controls(act),
-        *(u1, u2, u3, u4, x_rate, y_rate, z_rate),
-    )
-
-
-@scalar
-def supervised_controls(
-    time: float,
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
-    """The fifteen controls under a supervisor with states, and the rates of its two states."""
-    law = parameters.law
-    state = tiltrotor_state(qpos, qvel, act)
-    ratio = drag_ratio(law.vehicle)
-    governor = governed(
-        time, state[6], state[7], act[7], act[8], law.gait, table, law.supervisor, ratio
-    )
-    u1, u2, u3, u4, x_rate, y_rate, z_rate, _roll, _pitch, _yaw = tracking_inputs(
-        time,
-        state,
-        (qvel[6], qvel[7], qvel[8], qvel[9]),
-        (act[4], act[5], act[6]),
-        law,
-        table,
-        governor,
-    )
-    lead = parameters.servo_lead
-    return (
-        *supervised_commands(time, governor, law.gait, table, law.supervisor, ratio, lead),
-        *rotor_thrust_controls(act),
-        *(u1, u2, u3, u4, x_rate, y_rate, z_rate, governor[1], governor[2]),
+        *law_rates(time, state, qvel, act, AT_REST, parameters, table),
     )
 
 
@@ -146,7 +118,7 @@ def references_under(
     parameters: ControlParameters,
     table: Sequence[float],
 ) -> tuple[float, float, float, float, float, float]:
-    """Position (m) and attitude (rad) to track at a time: the state is `_STATES`."""
+    """Position (m) and attitude (rad) to track at a time: the state is `SEEN`."""
     law = parameters.law
     x, y, z, _, _, _, _, _, _ = position_reference(time, law.reference, table)
     _, _, _, _, _, _, _, roll, pitch, yaw = tracking_inputs(
@@ -169,41 +141,22 @@ def references_under(
 def references_in_force(
     time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
 ) -> tuple[float, ...]:
-    """Columns of references at a time: the state is `_STATES`."""
+    """Columns of references at a time: the state is `SEEN`."""
     law = parameters.law
     planned = tilt_reference(time, law.gait, table)
-    share = gait_share(planned, state[6], state[7], law.supervisor, drag_ratio(law.vehicle))
+    share = gait_share(planned, state[6], state[7], law.supervisor, law.vehicle)
     return (
-        *references_under(time, state, (0.0, 0.0, 0.0), parameters, table),
+        *references_under(time, state, AT_REST, parameters, table),
         *servo_commands(planned, share, 0.0),
     )
 
 
-@scalar
-def supervised_references(
-    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
-) -> tuple[float, ...]:
-    """As `references_in_force`, under a supervisor whose two states follow `_STATES`."""
-    law = parameters.law
-    governor = (state[27], state[28], 0.0)
-    ratio = drag_ratio(law.vehicle)
-    return (
-        *references_under(time, state, governor, parameters, table),
-        *supervised_commands(time, governor, law.gait, table, law.supervisor, ratio, 0.0),
-    )
-
-
-_STATES: Final = (*STATE_FIELDS, *TILT_RATE_COLUMNS, *INTEGRAL_FIELDS)
+SEEN: Final = (*STATE_FIELDS, *TILT_RATE_COLUMNS, *INTEGRAL_FIELDS)
+"""Of a sample, what references are made from."""
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    columns = reference_columns(references_in_force, _STATES, samples, setup)
-    return columns | gait_singularity(samples, setup.parameters.law.vehicle)
-
-
-def _derive_supervised(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    fields = (*_STATES, *SUPERVISOR_FIELDS)
-    columns = reference_columns(supervised_references, fields, samples, setup)
+    columns = reference_columns(references_in_force, SEEN, samples, setup)
     return columns | gait_singularity(samples, setup.parameters.law.vehicle)
 
 
@@ -308,25 +261,3 @@ GAIT_FEEDFORWARD: Final = Loop(
     follows_position=follows_position,
 )
 """The attitude-altitude law with gait-rate feed-forward around the tiltrotor."""
-
-
-@scalar
-def observe_supervised(
-    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
-) -> tuple[float, ...]:
-    """The tiltrotor, the law's own states and the supervisor's."""
-    return (*observe_gait_feedforward(qpos, qvel, act, ctrl), act[7], act[8])
-
-
-SUPERVISED_GAIT_FEEDFORWARD: Final = replace(
-    GAIT_FEEDFORWARD,
-    sizes=GAIT_FEEDFORWARD.sizes._replace(act=9, ctrl=17),
-    controls=supervised_controls,
-    initial_activations=lambda s, _setup: (*initial_rotor_speeds(s), *(0.0,) * 5),
-    observe=observe_supervised,
-    derive=_derive_supervised,
-    equations=None,
-    law_states=5,
-    law_fields=(*INTEGRAL_FIELDS, *SUPERVISOR_FIELDS),
-)
-"""The same law under a supervisor that holds the gait or returns to red."""

@@ -2,29 +2,185 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from controllers.gaits import tilt_reference
-from controllers.supervisor import HOLD, STRATEGIES, Supervisor, gait_share
+import tiltsim.loops.gait_feedforward as gait_feedforward
+import tiltsim.loops.tiltrotor as tiltrotor
+from controllers.attitude_altitude import STATE_FIELDS
+from controllers.gaits import GaitParameters, tilt_reference
+from controllers.scalar import Quad, Triple, scalar
+from controllers.supervisor import (
+    HOLD,
+    STRATEGIES,
+    Supervisor,
+    gait_share,
+    gait_time,
+    governed,
+    planned_tilts,
+    supervised_tilts,
+)
 from controllers.vehicle import drag_ratio
 from tiltsim.loop import ControlSetup, Floats, Loop
-from tiltsim.loops.gait_feedforward import GAIT_FEEDFORWARD, SUPERVISED_GAIT_FEEDFORWARD
-from tiltsim.loops.tiltrotor import SUPERVISED_TILTROTOR, SUPERVISOR_FIELDS, TILTROTOR
+from tiltsim.loops.gait_feedforward import GAIT_FEEDFORWARD
+from tiltsim.loops.tiltrotor import (
+    TILTROTOR,
+    gait_singularity,
+    reference_columns,
+    rotor_thrust_controls,
+    tiltrotor_state,
+)
+
+if TYPE_CHECKING:
+    from tiltsim.scenario import Scenario
 
 SUPERVISION: Final = "supervision"
 """A column: how much the supervisor does, 0 nothing to 1 all it can."""
 
-_WITH_STATES: Final = {
-    TILTROTOR: SUPERVISED_TILTROTOR,
-    GAIT_FEEDFORWARD: SUPERVISED_GAIT_FEEDFORWARD,
-}
+SUPERVISOR_FIELDS: Final = ("supervisor_state", "supervisor_rate")
+"""States of a supervisor that has any: see `controllers.supervisor`."""
 
 _STATE_UNITS: Final = {"hold": ("s", "1"), "return_to_red": ("1", "1/s")}
+
+
+class _Law(NamedTuple):
+    """What a supervisor needs to know of a law; the functions are scalar code.
+
+    ``governor`` is the supervisor's state with its rate and acceleration, ``state`` the law's as of
+    `tiltrotor_state`.
+    """
+
+    supervisor: Callable[[Any], Supervisor]  # of the loop's parameters
+    rates: Callable[..., tuple[float, ...]]
+    """``(time, state, qvel, act, governor, parameters, table)``: the controls from the rotor
+    accelerations on."""
+    references: Callable[..., tuple[float, ...]]
+    """``(time, seen, governor, parameters, table)``: `tiltrotor.REFERENCE_COLUMNS`."""
+    seen: tuple[str, ...]  # the fields of a sample that the references need
+
+
+@scalar
+def _beside_law(parameters: Any) -> Supervisor:
+    supervisor: Supervisor = parameters.supervisor
+    return supervisor
+
+
+@scalar
+def _within_law(parameters: Any) -> Supervisor:
+    supervisor: Supervisor = parameters.law.supervisor
+    return supervisor
+
+
+_LAWS: Final = {
+    TILTROTOR: _Law(_beside_law, tiltrotor.law_rates, tiltrotor.references_under, STATE_FIELDS),
+    GAIT_FEEDFORWARD: _Law(
+        _within_law,
+        gait_feedforward.law_rates,
+        gait_feedforward.references_under,
+        gait_feedforward.SEEN,
+    ),
+}
+
+
+@scalar
+def supervised_commands(
+    time: float,
+    governor: Triple,
+    gait: GaitParameters,
+    table: Sequence[float],
+    supervisor: Supervisor,
+    ratio: float,
+    lead: float,
+) -> Quad:
+    """Commands (rad) of the tilt servos under a supervisor with states (`controllers.supervisor`).
+
+    ``governor`` is its state with rate and acceleration, ``ratio`` the vehicle's drag ratio.
+    """
+    clock = gait_time(time, governor, supervisor)
+    planned = planned_tilts(clock, gait, table)
+    a1, a2, a3, a4 = supervised_tilts(planned, 1.0, governor, supervisor, ratio)
+    return (
+        a1[0] + lead * a1[1],
+        a2[0] + lead * a2[1],
+        a3[0] + lead * a3[1],
+        a4[0] + lead * a4[1],
+    )
+
+
+@cache
+def _with_states(loop: Loop) -> Loop:
+    """The loop of a law under a supervisor that holds the gait or returns to red.
+
+    The supervisor's two states follow those of the law.
+    """
+    supervisor_of, law_rates, references, fields = _LAWS[loop]
+    inner_observe, first, seen = loop.observe, loop.sizes.act, len(fields)
+
+    @scalar
+    def controls(
+        time: float,
+        qpos: Sequence[float],
+        qvel: Sequence[float],
+        act: Sequence[float],
+        parameters: Any,
+        table: Sequence[float],
+    ) -> tuple[float, ...]:
+        law, supervisor = parameters.law, supervisor_of(parameters)
+        state = tiltrotor_state(qpos, qvel, act)
+        ratio, lead = drag_ratio(law.vehicle), parameters.servo_lead
+        governor = governed(
+            *(time, state[6], state[7], act[first], act[first + 1]),
+            *(law.gait, table, supervisor, ratio),
+        )
+        return (
+            *supervised_commands(time, governor, law.gait, table, supervisor, ratio, lead),
+            *rotor_thrust_controls(act),
+            *law_rates(time, state, qvel, act, governor, parameters, table),
+            *(governor[1], governor[2]),
+        )
+
+    @scalar
+    def observe(
+        qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+    ) -> tuple[float, ...]:
+        return (*inner_observe(qpos, qvel, act, ctrl), act[first], act[first + 1])
+
+    @scalar
+    def references_in_force(
+        time: float, state: Sequence[float], parameters: Any, table: Sequence[float]
+    ) -> tuple[float, ...]:
+        law, supervisor = parameters.law, supervisor_of(parameters)
+        governor = (state[seen], state[seen + 1], 0.0)
+        ratio = drag_ratio(law.vehicle)
+        return (
+            *references(time, state, governor, parameters, table),
+            *supervised_commands(time, governor, law.gait, table, supervisor, ratio, 0.0),
+        )
+
+    def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+        states = (*fields, *SUPERVISOR_FIELDS)
+        columns = reference_columns(references_in_force, states, samples, setup)
+        return columns | gait_singularity(samples, setup.parameters.law.vehicle)
+
+    def initial_activations(scenario: Scenario, setup: ControlSetup) -> Sequence[float]:
+        return (*loop.initial_activations(scenario, setup), 0.0, 0.0)
+
+    controls.__qualname__ = f"supervised.{loop.controls.__qualname__}"
+    return replace(
+        loop,
+        sizes=loop.sizes._replace(act=first + 2, ctrl=loop.sizes.ctrl + 2),
+        controls=controls,
+        initial_activations=initial_activations,
+        observe=observe,
+        derive=derive,
+        equations=None,
+        law_states=loop.law_states + 2,
+        law_fields=(*loop.law_fields, *SUPERVISOR_FIELDS),
+    )
 
 
 @cache
@@ -33,28 +189,32 @@ def with_supervisor(loop: Loop, strategy: str) -> Loop:
 
     Raises KeyError where the law flies no planned gait.
     """
+    law = _LAWS[loop]
     units = dict(zip(SUPERVISOR_FIELDS, _STATE_UNITS.get(strategy, ())))
-    inner = _WITH_STATES[loop] if units else loop
+    inner = _with_states(loop) if units else loop
 
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-        return inner.derive(samples, setup) | {SUPERVISION: _supervision(samples, setup)}
+        supervision = _supervision(samples, law.supervisor(setup.parameters), setup)
+        return inner.derive(samples, setup) | {SUPERVISION: supervision}
 
     return replace(
         inner, derive=derive, extra_columns={**inner.extra_columns, **units, SUPERVISION: "1"}
     )
 
 
-def _supervision(samples: Mapping[str, Floats], setup: ControlSetup) -> Floats:
+def _supervision(
+    samples: Mapping[str, Floats], supervisor: Supervisor, setup: ControlSetup
+) -> Floats:
     """The share of the gait's speed, of the way to red, or of its angles that is taken away."""
     law = setup.parameters.law
-    supervisor: Supervisor = getattr(law, "supervisor", None) or setup.parameters.supervisor
     if supervisor.strategy != STRATEGIES["scale"]:
         held, rate = (samples[name] for name in SUPERVISOR_FIELDS)
         return rate if supervisor.strategy == HOLD else held
-    ratio = drag_ratio(law.vehicle)
     attitudes = zip(samples["time"].tolist(), samples["roll"].tolist(), samples["pitch"].tolist())
     shares = [
-        gait_share(tilt_reference(time, law.gait, setup.table), roll, pitch, supervisor, ratio)
+        gait_share(
+            tilt_reference(time, law.gait, setup.table), roll, pitch, supervisor, law.vehicle
+        )
         for time, roll, pitch in attitudes
     ]
     return 1.0 - np.array(shares)

@@ -8,7 +8,6 @@ every engine. It is a pure function of time, `qpos`, `qvel`, `act` and the param
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -24,20 +23,13 @@ from controllers.attitude_altitude import (
 )
 from controllers.decouplers import DECOUPLERS
 from controllers.decoupling_matrix import sines_and_cosines, torque_entries, torque_free_force
-from controllers.gaits import GaitParameters, tilt_reference
+from controllers.gaits import tilt_reference
 from controllers.gaits.trot import TiltsAndRates
 from controllers.references import position_reference
 from controllers.rotation import euler_from_quaternion, world_up_in_body
 from controllers.scalar import Quad, Triple, scalar
 from controllers.singularity import determinant, margin_over_gait
-from controllers.supervisor import (
-    Supervisor,
-    gait_share,
-    gait_time,
-    governed,
-    planned_tilts,
-    supervised_tilts,
-)
+from controllers.supervisor import Supervisor, gait_share
 from controllers.vehicle import SPIN, Vehicle, drag_ratio
 from tiltsim.controller_tables import AttitudeAltitudeController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
@@ -59,8 +51,6 @@ if TYPE_CHECKING:
 REFERENCE_COLUMNS: Final = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
 TILT_COLUMNS: Final = ("alpha_1", "alpha_2", "alpha_3", "alpha_4")
 TILT_REFERENCE_COLUMNS: Final = tuple(f"alpha_ref_{rotor}" for rotor in (1, 2, 3, 4))
-SUPERVISOR_FIELDS: Final = ("supervisor_state", "supervisor_rate")
-"""States of a supervisor that has any: see `controllers.supervisor`."""
 
 
 class ControlParameters(NamedTuple):
@@ -80,12 +70,13 @@ def tiltrotor_state(qpos: Sequence[float], qvel: Sequence[float], act: Sequence[
     in world axes, the body rates in body axes and the tilt rates in ``qvel``.
     """
     x, y, z, qw, qx, qy, qz, alpha_1, alpha_2, alpha_3, alpha_4 = qpos
-    vx, vy, vz, p, q, r = qvel[0], qvel[1], qvel[2], qvel[3], qvel[4], qvel[5]
+    vx, vy, vz, p, q, r, _, _, _, _ = qvel
     roll, pitch, yaw = euler_from_quaternion(qw, qx, qy, qz)
+    # One tuple: to join two costs Python a third of this function.
     return (
-        *(x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r),
-        *(alpha_1, alpha_2, alpha_3, alpha_4, act[0], act[1], act[2], act[3]),
-    )
+        x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r,
+        alpha_1, alpha_2, alpha_3, alpha_4, act[0], act[1], act[2], act[3],
+    )  # fmt: skip
 
 
 @scalar
@@ -129,7 +120,7 @@ def tiltrotor_controls(
     law = parameters.law
     state = tiltrotor_state(qpos, qvel, act)
     planned = tilt_reference(time, law.gait, table)
-    share = gait_share(planned, state[6], state[7], parameters.supervisor, drag_ratio(law.vehicle))
+    share = gait_share(planned, state[6], state[7], parameters.supervisor, law.vehicle)
     return (
         *servo_commands(planned, share, parameters.servo_lead),
         *rotor_thrust_controls(act),
@@ -138,53 +129,17 @@ def tiltrotor_controls(
 
 
 @scalar
-def supervised_commands(
+def law_rates(
     time: float,
-    governor: Triple,
-    gait: GaitParameters,
-    table: Sequence[float],
-    supervisor: Supervisor,
-    ratio: float,
-    lead: float,
-) -> Quad:
-    """Commands (rad) of the tilt servos under a supervisor with states (`controllers.supervisor`).
-
-    ``governor`` is its state with rate and acceleration, ``ratio`` the vehicle's drag ratio.
-    """
-    clock = gait_time(time, governor, supervisor)
-    planned = planned_tilts(clock, gait, table)
-    a1, a2, a3, a4 = supervised_tilts(planned, 1.0, governor, supervisor, ratio)
-    return (
-        a1[0] + lead * a1[1],
-        a2[0] + lead * a2[1],
-        a3[0] + lead * a3[1],
-        a4[0] + lead * a4[1],
-    )
-
-
-@scalar
-def supervised_controls(
-    time: float,
-    qpos: Sequence[float],
+    state: State,
     qvel: Sequence[float],
     act: Sequence[float],
+    governor: Triple,
     parameters: ControlParameters,
     table: Sequence[float],
-) -> tuple[float, ...]:
-    """The twelve controls under a supervisor with states, and the rates of its two states."""
-    law, supervisor = parameters.law, parameters.supervisor
-    state = tiltrotor_state(qpos, qvel, act)
-    ratio = drag_ratio(law.vehicle)
-    governor = governed(
-        time, state[6], state[7], act[4], act[5], law.gait, table, supervisor, ratio
-    )
-    lead = parameters.servo_lead
-    return (
-        *supervised_commands(time, governor, law.gait, table, supervisor, ratio, lead),
-        *rotor_thrust_controls(act),
-        *rotor_accelerations(time, state, law, table),
-        *(governor[1], governor[2]),
-    )
+) -> Quad:
+    """The law's part of the controls, for `tiltsim.loops.supervised`: rotor accelerations."""
+    return rotor_accelerations(time, state, parameters.law, table)
 
 
 @scalar
@@ -255,22 +210,21 @@ def references_in_force(
     x, y, z, _, _, _, _, _, _ = position_reference(time, law.reference, table)
     roll, pitch, yaw, _, _, _ = attitude_reference(time, state, trig, torque, law, table)
     planned = tilt_reference(time, law.gait, table)
-    share = gait_share(planned, state[6], state[7], parameters.supervisor, ratio)
+    share = gait_share(planned, state[6], state[7], parameters.supervisor, law.vehicle)
     a1, a2, a3, a4 = servo_commands(planned, share, 0.0)
     return x, y, z, roll, pitch, yaw, a1, a2, a3, a4
 
 
 @scalar
-def supervised_references(
-    time: float, state: State, parameters: ControlParameters, table: Sequence[float]
+def references_under(
+    time: float,
+    state: State,
+    governor: Triple,
+    parameters: ControlParameters,
+    table: Sequence[float],
 ) -> tuple[float, ...]:
-    """As `references_in_force`, under a supervisor whose two states follow the law's ``state``."""
-    law, supervisor = parameters.law, parameters.supervisor
-    x, y, z, roll, pitch, yaw, _, _, _, _ = references_in_force(time, state, parameters, table)
-    governor = (state[20], state[21], 0.0)
-    ratio = drag_ratio(law.vehicle)
-    a1, a2, a3, a4 = supervised_commands(time, governor, law.gait, table, supervisor, ratio, 0.0)
-    return x, y, z, roll, pitch, yaw, a1, a2, a3, a4
+    """`REFERENCE_COLUMNS`, for `tiltsim.loops.supervised`."""
+    return references_in_force(time, state, parameters, table)[:6]
 
 
 def reference_columns(
@@ -288,12 +242,6 @@ def reference_columns(
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     columns = reference_columns(references_in_force, STATE_FIELDS, samples, setup)
-    return columns | gait_singularity(samples, setup.parameters.law.vehicle)
-
-
-def _derive_supervised(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    fields = (*STATE_FIELDS, *SUPERVISOR_FIELDS)
-    columns = reference_columns(supervised_references, fields, samples, setup)
     return columns | gait_singularity(samples, setup.parameters.law.vehicle)
 
 
@@ -425,25 +373,3 @@ TILTROTOR: Final = Loop(
     ),
 )
 """The attitude-altitude law around the tiltrotor."""
-
-
-@scalar
-def observe_supervised(
-    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
-) -> tuple[float, ...]:
-    """The tiltrotor and the supervisor's states."""
-    return (*observe_tiltrotor(qpos, qvel, act, ctrl), act[4], act[5])
-
-
-SUPERVISED_TILTROTOR: Final = replace(
-    TILTROTOR,
-    sizes=TILTROTOR.sizes._replace(act=6, ctrl=14),
-    controls=supervised_controls,
-    initial_activations=lambda scenario, _setup: (*initial_rotor_speeds(scenario), 0.0, 0.0),
-    observe=observe_supervised,
-    derive=_derive_supervised,
-    equations=None,
-    law_states=2,
-    law_fields=SUPERVISOR_FIELDS,
-)
-"""The same law under a supervisor that holds the gait or returns to red."""

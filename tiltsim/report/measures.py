@@ -91,11 +91,6 @@ def falls(value: Quantity, flights: Mapping[str, Metrics]) -> bool:
     return grows(value, dict(reversed(list(flights.items()))))
 
 
-def metric_of(address: str, metric: str) -> Callable[[Mapping[str, Metrics]], float]:
-    """A measure: one metric of one flight."""
-    return lambda flights: float(flights[address][metric])
-
-
 def no_rotor_stops(flights: Mapping[str, Metrics]) -> bool:
     """A measure: in no flight did a rotor come to rest."""
     return all(float(metrics["min_rotor_speed"]) > 0.0 for metrics in flights.values())

@@ -153,8 +153,3 @@ def failures(plans: list[Plan], flights: Flights) -> list[Failure]:
 def count(rows: Iterable[Row]) -> Counter[Outcome]:
     """How many rows have each verdict."""
     return Counter(row.outcome for row in rows)
-
-
-def count_plant(rows: Iterable[Row], plant: Plant) -> Counter[Outcome]:
-    """How many cells of a plant have each verdict."""
-    return Counter(cell.outcome for row in rows if (cell := row.cell(plant)) is not None)

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
-import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 from tiltsim.checking import shared_engine
 from tiltsim.engine import EngineName
 from tiltsim.errors import InputError
+from tiltsim.parallel import ProcessDiedError, in_processes
 from tiltsim.scenario import Scenario
 from tiltsim.sweeps.flying import Part, fly_numbered_chunk
 from tiltsim.sweeps.folder import open_folder
@@ -105,59 +101,24 @@ def fly_on_processes(
     A process that dies is replaced, and its chunk flown again. Raises InputError where that does
     not help.
     """
-    waiting, deaths = list(reversed(numbers)), 0
+    work = partial(_fly_chunk, definition=definition, engine=engine)
+    waiting, deaths = numbers, 0
     while waiting:
         lost: list[int] = []
-        for part in _one_pool(definition, waiting, lost, jobs, engine):
-            deaths = 0
-            yield part
-        if lost:
+        for number, future in in_processes(work, waiting, jobs):
+            if not isinstance(future.exception(), ProcessDiedError):
+                deaths = 0
+                yield future.result()
+                continue
+            lost.append(number)
             deaths += 1
             if deaths == MAX_DEATHS:
                 raise InputError(
                     f"--jobs {jobs}: processes keep dying while they fly chunk {min(lost)}; is "
                     "there too little memory? What is finished is kept"
                 )
-            waiting += sorted(lost, reverse=True)
+        waiting = sorted(lost)
 
 
-def _one_pool(
-    definition: str, waiting: list[int], lost: list[int], jobs: int, engine: EngineName | None
-) -> Iterator[Part]:
-    """Fly what waits until all is flown or a process dies; then name what is lost."""
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(
-        min(jobs, len(waiting)), mp_context=context, initializer=_begin_process
-    )
-    flying: dict[Future[Part], int] = {}
-    try:
-        while waiting or flying:
-            # Two a process: one in flight, one next. More would only wait in memory.
-            while waiting and len(flying) < 2 * jobs:
-                number = waiting.pop()
-                flying[pool.submit(fly_numbered_chunk, definition, number, engine)] = number
-            for future in wait(flying, return_when=FIRST_COMPLETED).done:
-                part = future.result()
-                del flying[future]
-                yield part
-    except BrokenProcessPool:
-        lost += flying.values()
-    except (KeyboardInterrupt, GeneratorExit):
-        for process in multiprocessing.active_children():
-            process.terminate()
-        raise
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _begin_process() -> None:
-    """Leave interrupts to the parent, and end when it ends, even if it is killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-
-
-def _end_with(parent: multiprocessing.process.BaseProcess) -> None:
-    parent.join()
-    os._exit(1)
+def _fly_chunk(number: int, definition: str, engine: EngineName | None) -> Part:
+    return fly_numbered_chunk(definition, number, engine)
