@@ -144,15 +144,17 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
     abscissa, completed = results.values(x), are_completed(results)
     for row, metric in zip(grid, metrics):
         for axes, (title, mask) in zip(row, columns):
-            for number, (name, group) in enumerate(groups_of(results, lines, mask)):
+            groups = list(groups_of(results, lines, mask))
+            for number, (name, group) in enumerate(groups):
                 color, flown = CYCLE[number % MAX_LINES], group & completed
                 order = np.argsort(abscissa[group], kind="stable")
                 values = np.where(flown, results.columns[metric], np.nan)[group][order]
                 line = abscissa[group][order]
                 axes.plot(line, values, ms=3.5, label=name, **line_look(number), **_mark(number))
                 lost = line[np.isnan(values)]
+                height = 0.03 + 0.04 * (len(groups) - 1 - number)  # in the order of the legend
                 axes.plot(
-                    *(lost, np.full(len(lost), 0.03 + 0.04 * number), "x"),
+                    *(lost, np.full(len(lost), height), "x"),
                     **{"color": color, "ms": 4, "transform": axes.get_xaxis_transform()},
                 )
             axes.set_title(title)
@@ -163,7 +165,9 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
             getattr(axes, f"set_{axis}scale")("log")
     _share_limits(grid)
     if not completed.all():
-        grid[0][0].plot([], [], "x", color=GREY, ms=4, label="lost")
+        for axes in grid.flat:
+            _make_room_below(axes, 0.03 + 0.04 * len(groups))
+        grid[0][0].plot([], [], "x", color=GREY, ms=4, label="lost, rows in this order")
     add_legend(grid[0][0], lines)
     return figure
 
@@ -175,6 +179,13 @@ def _share_limits(grid: Any) -> None:
         high = max(axes.get_ylim()[1] for axes in row)
         for axes in row:
             axes.set_ylim(low, high)
+
+
+def _make_room_below(axes: Any, share: float) -> None:
+    """Leave the lowest ``share`` of a panel's height to the marks of lost flights."""
+    scale = axes.yaxis.get_transform()
+    low, high = scale.transform(np.array(axes.get_ylim()))
+    axes.set_ylim(bottom=scale.inverted().transform(low - (high - low) * share / (1.0 - share)))
 
 
 # --- map -----------------------------------------------------------------------------------------
