@@ -15,6 +15,7 @@ and pitch. Each answer is that of a small linear program with ``beta`` eliminate
 from __future__ import annotations
 
 from math import inf
+from typing import Final
 
 from controllers.decoupling_matrix import (
     sines_and_cosines,
@@ -27,6 +28,12 @@ from controllers.rotation import world_up_in_body
 from controllers.scalar import Quad, scalar
 from controllers.vehicle import Vehicle, drag_ratio
 
+ALIKE: Final = 1e-9
+"""Relative difference below which two rotors move alike, well above rounding.
+
+By the last bit alone yaw would get all that is asked for or nothing.
+"""
+
 
 @scalar
 def pair_bound(
@@ -34,11 +41,14 @@ def pair_bound(
 ) -> float:
     """The largest ``kappa`` for which one rotor's least ``beta`` is below another's greatest.
 
-    ``beta >= (low - kappa own) / slope`` and ``beta <= (high - kappa other) / other_slope``.
+    ``beta >= (low - kappa own) / slope`` and ``beta <= (high - kappa other) / other_slope``. Two
+    rotors that ``kappa`` moves alike, as opposite ones with ``alpha_3 = -alpha_1`` in yaw, do not
+    bound it, however little room they have.
     """
-    rise = other / other_slope - own / slope
+    above, below = other / other_slope, own / slope
+    rise = above - below
     room = high / other_slope - low / slope
-    return room / rise if rise > 0.0 else inf
+    return room / rise if rise > ALIKE * (abs(above) + abs(below)) else inf
 
 
 @scalar

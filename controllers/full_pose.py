@@ -250,8 +250,9 @@ def full_pose_inputs(
     """The rotor accelerations (rad/s^2) and tilt rates (rad/s), four each, at a time and state.
 
     ``state`` is that of `controllers.attitude_altitude.STATE_FIELDS`, world z up. The reference
-    gives position, roll, pitch and yaw. All NaN where the 6 x 8 matrix has lost rank or a rotor
-    stands still, as its acceleration does not move its thrust there.
+    gives position, roll, pitch and yaw; one of attitude and altitude gives x = y = 0. All NaN where
+    the 6 x 8 matrix has lost rank or a rotor stands still, as its acceleration does not move its
+    thrust there.
     """
     vehicle, gains, reference = parameters.vehicle, parameters.gains, parameters.reference
     x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r = state[0:12]

@@ -215,6 +215,49 @@ def test_a_servo_turns_no_faster_than_it_can():
     assert arrived - 0.1 == pytest.approx(0.19 / 2.0, abs=2.0 * lag)
 
 
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_a_flight_begins_in_the_midst_of_its_gait(plant):
+    """Pods that began at rest would fall behind by 1.3 / (5 e) rad; stiff ones, by 1.6 mrad."""
+    flight = fly(
+        simulation={"duration": 0.3, "plant": plant},
+        vehicle={"tilt_servo": {"natural_frequency": 5.0}},
+        gait={"type": "trot_continuous", "amplitude": 0.65, "period": 2.0},
+    )
+    for rotor in (1, 2, 3, 4):
+        assert abs(flight[f"alpha_rate_{rotor}"][0]) == 1.3
+        off = flight[f"alpha_{rotor}"] - flight[f"alpha_ref_{rotor}"]
+        assert np.abs(off).max() < 1e-6
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_no_pod_begins_faster_than_its_servo(plant):
+    flight = fly(
+        simulation={"duration": 0.1, "plant": plant},
+        vehicle={"tilt_servo": {"max_rate": 0.2}},
+        gait={"type": "trot_continuous", "amplitude": 0.65, "period": 2.0},
+    )
+    rates = [flight[f"alpha_rate_{rotor}"] for rotor in (1, 2, 3, 4)]
+    assert [rate[0] for rate in rates] == [0.2, 0.2, -0.2, -0.2]
+    assert np.abs(rates).max() == pytest.approx(0.2, rel=1e-3)
+
+
+# --- allocation --------------------------------------------------------------------------------
+
+
+def test_allocation_from_a_lean_does_not_hang_on_a_last_bit():
+    """From 0.27 s on one of two opposite rotors is at its limit, on a gait that is symmetric."""
+    changes = {"simulation.duration": 0.6, "simulation.engine": "python"}
+    address = "beyond/allocation#prioritized_from_a_lean"
+    one, other = (
+        tiltsim.simulate(
+            tiltsim.load_scenario(address, {**changes, "initial.position": [x, 0.0, -20.0]})
+        )
+        for x in (2.0, 2.0 + 1e-12)
+    )
+    assert np.abs(one["r"]).max() > 0.1
+    assert np.abs(one["r"] - other["r"]).max() < 1e-9
+
+
 # --- latency -----------------------------------------------------------------------------------
 
 

@@ -95,11 +95,21 @@ def test_the_same_seed_gives_the_same_episodes_bit_for_bit():
     )
 
 
-def test_an_episode_does_not_depend_on_those_before():
-    used = TiltrotorEnv(scenario())
+REAL = {
+    "simulation": {"control_latency": 0.04},
+    "vehicle": {"rotor_time_constant": 0.03, "tilt_servo": {"max_rate": 2.0}},
+    "sensors": {"position_noise": 0.05, "body_rates_noise": 0.1},
+    "air": {"wind": [2.0, 0.0, 0.0], "drag": {"linear": [0.3, 0.3, 0.1]}},
+}
+ideal_and_real = pytest.mark.parametrize("layers", [{}, REAL], ids=["ideal", "real"])
+
+
+@ideal_and_real
+def test_an_episode_does_not_depend_on_those_before(layers):
+    used = TiltrotorEnv(scenario(**layers))
     rollout(used, 17)
     used.reset()
-    fresh = TiltrotorEnv(scenario())
+    fresh = TiltrotorEnv(scenario(**layers))
     fresh.reset()
     assert_same(rollout(used, 10, seed=5), rollout(fresh, 10, seed=5))
 
@@ -126,9 +136,10 @@ def test_hovering_holds_the_place_and_earns_the_whole_reward():
     np.testing.assert_allclose(step.observation["position"], 0.0, atol=1e-6)
 
 
-def test_a_step_is_the_flight_of_a_held_command():
+@ideal_and_real
+def test_a_step_is_the_flight_of_a_held_command(layers):
     """Physics, step by step from outside, is that of `tiltsim.simulate`."""
-    this = scenario(initial={"attitude": [0.1, 0.2, 0.3]})
+    this = scenario(initial={"attitude": [0.1, 0.2, 0.3]}, **layers)
     action = np.array([1.0, 1.1, 0.9, 1.2, 0.1, -0.2, 0.3, 0.0])
     env = TiltrotorEnv(this)
     env.reset()
@@ -138,8 +149,22 @@ def test_a_step_is_the_flight_of_a_held_command():
     flown = tiltsim.simulate(this, controller=lambda _: command)
     episode = env.flight()
     np.testing.assert_array_equal(episode.samples, flown.samples[::2])
-    np.testing.assert_array_equal(step.observation["position"], [flown[a][-1] for a in "xyz"])
+    noise = np.abs(step.observation["position"] - [flown[a][-1] for a in "xyz"]).max()
+    assert bool(noise > 0.0) is ("sensors" in layers)
     assert len(episode) == 11
+
+
+def test_a_seed_axis_draws_other_noise_every_episode():
+    axis = {"key": "simulation.seed", "type": "seed"}
+    env = TiltrotorEnv(scenario(sensors=REAL["sensors"]), domain=[axis], seed=1)
+    seen = [env.reset().observation["position"][0] for _ in range(3)]
+    assert len(set(map(float, seen))) == 3
+
+
+def test_an_episode_is_lost_where_the_vehicle_is_not_where_it_is_said_to_be():
+    env = TiltrotorEnv(scenario(sensors={"position_bias": [9.0, 9.0, 0.0]}), max_position_error=1.0)
+    env.reset()
+    assert not env.step(HOVER).last()
 
 
 def test_episodes_are_flights_with_files_and_metrics(tmp_path):

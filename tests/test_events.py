@@ -10,6 +10,7 @@ import tiltsim
 from tests.flights import flight
 from tiltsim.events import EventWatch, flight_events
 from tiltsim.flight import SAMPLE_FIELDS, End
+from tiltsim.loading import load_scenario
 
 
 def texts(events):
@@ -21,8 +22,13 @@ def test_a_quiet_flight_tells_what_it_is_how_close_it_came_and_that_it_ended():
     assert first.text.startswith(
         "tests/fixed: gait fixed, modified decoupler, attitude-altitude law"
     )
-    assert "closest to singular: margin" in closest.text
+    assert "closest to singular: " in closest.text
     assert (last.text, last.level, last.time) == ("flight completed", "INFO", pytest.approx(1.2))
+
+
+def test_no_gait_is_told_of_a_quadrotor():
+    scenario = load_scenario("ch01_gust/hover#quadrotor")
+    assert EventWatch(scenario).opening().text == "Quadrotor: yaw-position law, mujoco plant"
 
 
 def test_saturation_is_told_when_it_sets_in():

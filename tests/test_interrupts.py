@@ -5,8 +5,10 @@ from __future__ import annotations
 import ctypes
 import os
 import signal
+import subprocess
 import sys
 import threading
+import time
 
 import pytest
 
@@ -17,6 +19,17 @@ from tiltsim.files import load_flight
 from tiltsim.interrupts import interrupts_deferred, interrupts_kept, terminations_as_interrupts
 
 CALLED_BACK = ctypes.CFUNCTYPE(None)
+TELLING = """
+import time
+from pathlib import Path
+from tiltsim import Command
+
+def law(seen):
+    if seen.time > 0.1:
+        Path(__file__).with_suffix(".flying").touch()
+        time.sleep(0.05)
+    return Command(thrusts=[1.05105] * 4)
+"""
 
 
 def interrupt():
@@ -143,3 +156,24 @@ def test_a_termination_waits_for_what_must_not_be_lost():
     with pytest.raises(KeyboardInterrupt):
         work()
     assert done == ["finished"]
+
+
+def test_a_terminated_run_keeps_its_flight_and_leaves_no_part_file(tmp_path):
+    law, out = tmp_path / "law.py", tmp_path / "out"
+    law.write_text(TELLING, encoding="utf-8")
+    command = [sys.executable, "-m", "tiltsim", "run", "ch04_tracking/setpoint#rho_065_modified"]
+    options = ["--controller", f"{law}:law", "--out", str(out), "--rerun", str(out / "flight.rrd")]
+    out.mkdir()
+    with subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True) as process:
+        deadline = time.monotonic() + 30.0
+        while not law.with_suffix(".flying").exists() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        process.terminate()
+        _, error = process.communicate(timeout=30.0)
+    assert (process.returncode, error.splitlines()[-1][:29]) == (
+        143,
+        "tiltsim: interrupted at t = 0",
+    )
+    assert load_flight(out).end.kind == "interrupted"
+    names = ["flight.parquet", "flight.rrd", "law.py", "metrics.json", "scenario.toml"]
+    assert sorted(path.name for path in out.iterdir()) == names

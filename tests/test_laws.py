@@ -7,6 +7,7 @@ from math import atan
 import mujoco
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import tiltsim
 from controllers.balance import balanced_gait
@@ -223,6 +224,87 @@ def test_full_pose_holds_a_position_at_a_tilted_attitude():
     assert abs(metrics["final_position_error_x"]) < 1e-4
     assert abs(metrics["final_roll"] - 0.05) < 1e-4
     assert metrics["max_tilt_rate"] < 25.0
+
+
+@pytest.mark.parametrize("law", ["full_pose", "attitude_altitude"])
+def test_a_reference_of_attitude_and_altitude_frees_the_position_of_laws_without_a_say_in_it(law):
+    """Six outputs hold x = y = 0; four let the vehicle drift at the speed that it has."""
+    free = {"decoupler": "none", "decoupling": "exact", "gains": "exact"}
+    flight = tiltsim.simulate(
+        tiltsim.parse_scenario(
+            {
+                "simulation": {"duration": 3.0, "timestep": 0.002, "engine": "python"},
+                "initial": {
+                    **{"position": [0.3, -0.2, 0.1], "velocity": [0.0, 0.5, 0.0]},
+                    "rotor_speed": 361.0,
+                },
+                "controller": {"law": law, **({"gains": SLOW} if law == "full_pose" else free)},
+                "reference": {"type": "attitude_altitude"},
+            }
+        )
+    )
+    x, y = flight["x"][-1], flight["y"][-1]
+    if law == "full_pose":
+        assert max(abs(x), abs(y)) < 1e-6
+    else:
+        assert (x, y) == pytest.approx((0.3, -0.2 + 0.5 * 3.0), abs=1e-6)
+    assert loop_of(flight.scenario).follows_position(flight.scenario) is (law == "full_pose")
+
+
+# --- yaw ---------------------------------------------------------------------------------------
+
+LIMITED = {"min_rotor_speed": 100.0, "max_rotor_speed": 600.0}
+SLOW_YAW = {
+    "attitude": {"bandwidth": 20.0},
+    "yaw": {"bandwidth": 3.0},
+    "altitude": {"bandwidth": 5.0},
+    "position": {"bandwidth": 1.0},
+}
+
+
+def turned(step, duration, speed, vehicle=None, **controller):
+    exact = {"decoupling": "exact", "decoupler": "exact", "gains": "exact"}
+    return tiltsim.simulate(
+        tiltsim.parse_scenario(
+            {
+                "simulation": {"duration": duration, "timestep": 0.002, "engine": "python"},
+                "vehicle": vehicle or {},
+                "initial": {"rotor_speed": speed},
+                "controller": exact | controller,
+                "reference": {"type": "setpoint", "yaw": step},
+            }
+        )
+    )
+
+
+def test_a_step_in_yaw_stops_a_rotor_where_its_torque_ends():
+    """Not for an error of the law: for the acceleration that its gains ask for."""
+    vehicle = PRESETS["ar_drone_2"]
+    hover = vehicle.hover_rotor_speed
+    most = 4.0 * vehicle.drag_coefficient * hover**2 / vehicle.inertia_zz
+    assert most == pytest.approx(26.4, abs=0.05)
+    loop = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-4000.0, -600.0, -40.0]])
+    instants = np.linspace(0.0, 0.3, 301)
+    asked = max(abs((expm(loop * t) @ [-1.0, 0.0, 0.0])[2]) for t in instants)
+    assert most / asked == pytest.approx(0.39, abs=0.005)
+    below, above = (turned(share * most / asked, 0.1, hover) for share in (0.98, 1.02))
+    assert below.end.kind == "completed"
+    assert below.metrics()["min_rotor_speed"] < 0.3 * hover
+    assert above.end.kind == "singular"
+    assert "came to a stop" in above.end.cause
+    assert turned(0.35, 0.1, 300.0).end.time == pytest.approx(0.022, abs=0.003)
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "controller"),
+    [(LIMITED, {"allocation": "prioritized"}), ({}, {"gains": SLOW_YAW})],
+    ids=["prioritized", "slow yaw"],
+)
+def test_what_the_documentation_names_flies_a_large_step_in_yaw(vehicle, controller):
+    flight = turned(3.0, 6.0, 300.0, vehicle, **controller)
+    assert flight.end.kind == "completed"
+    assert flight["yaw"][-1] == pytest.approx(3.0, abs=1e-3)
+    assert flight["z"].min() > -0.5
 
 
 # --- disturbances ------------------------------------------------------------------------------

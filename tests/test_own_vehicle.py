@@ -138,6 +138,79 @@ def test_a_centre_of_mass_off_the_origin_stays_where_it_is(write):
     )
 
 
+SKEW = "".join(
+    f'<geom name="skew_{side}" type="sphere" size="0.01" pos="{x} {x} {z}" mass="0.05"/>'
+    for side, x, z in (("front", 0.05, 0.03), ("back", -0.05, -0.03))
+)
+
+
+@pytest.mark.parametrize("vehicle", [{}, {"mass": 0.9}, {"inertia": [4e-3, 5e-3, 8e-3]}])
+def test_products_of_inertia_stay_the_files(write, vehicle):
+    path = write(changed('<site name="imu"/>', SKEW + '<site name="imu"/>'))
+    _, inertia = total_inertia(build_model(scenario(path, vehicle=vehicle)))
+    products = [inertia[0, 1], inertia[0, 2], inertia[1, 2]]
+    np.testing.assert_allclose(products, [-2.5e-4, -1.5e-4, -1.5e-4], atol=1e-9)
+
+
+def off_centre(x):
+    return f'<geom name="battery" type="sphere" size="0.01" pos="{x} 0 0" mass="0.05"/>'
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ("", None),
+        (off_centre(1e-4), None),  # 7 micrometres: less than what must be aligned may be off
+        (off_centre(0.073), "does not know of its centre of mass at (0.005, 0, 0) m\n"),
+        (
+            SKEW,
+            "does not know of its products of inertia (xy, xz, yz) = "
+            "(-0.00025, -0.00015, -0.00015) kg m^2\n",
+        ),
+        (SKEW + off_centre(0.083), "(0.005, 0, 0) m and its products of inertia"),
+    ],
+)
+def test_what_the_law_does_not_know_is_told(write, tmp_path, capsys, more, words):
+    write(changed('<site name="imu"/>', more + '<site name="imu"/>'))
+    (tmp_path / "my_flight.toml").write_text(block("toml"), encoding="utf-8")
+    command = ["run", str(tmp_path / "my_flight.toml"), "--set", "simulation.duration=0.01"]
+    assert main([*command, "--set", "expect=[]"]) == 0
+    error = capsys.readouterr().err
+    assert (words is None and error == "") or words in error
+    assert error.count("\n") <= 1
+    assert main([*command, "--set", "expect=[]", "--quiet"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_an_own_controller_may_know_more(write, tmp_path, capsys):
+    write(changed('<site name="imu"/>', SKEW + off_centre(0.083) + '<site name="imu"/>'))
+    (tmp_path / "my_flight.toml").write_text(block("toml"), encoding="utf-8")
+    (tmp_path / "law.py").write_text(
+        "import tiltsim\n\ndef law(seen):\n    return tiltsim.Command(rotor_speeds=[470.0] * 4)\n"
+    )
+    command = ["run", str(tmp_path / "my_flight.toml"), "--set", "simulation.duration=0.01"]
+    assert main([*command, "--set", "expect=[]", "--controller", f"{tmp_path}/law.py:law"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_a_centre_of_mass_to_the_side_costs_what_the_documentation_says(write):
+    path = write(changed('<site name="imu"/>', off_centre(0.0073) + '<site name="imu"/>'))
+    flight = tiltsim.simulate(
+        scenario(
+            path,
+            simulation={"duration": 12.0, "timestep": 0.004},
+            initial={"rotor_speed": 470.0},
+            controller={"decoupling": "exact", "decoupler": "exact", "gains": "exact"},
+        )
+    )
+    vehicle = flight.scenario.rotorcraft.resolve()
+    turn = vehicle.mass * vehicle.gravity * 0.0005 / vehicle.inertia_yy
+    expected = -vehicle.gravity * (40.0 / 4000.0) * turn / 1.0
+    measured = flight.metrics()["final_position_error_x"]
+    assert measured == pytest.approx(expected, rel=0.01)
+    assert measured == pytest.approx(-0.093, abs=1e-3)
+
+
 def test_the_servo_is_the_scenarios(write):
     servo = {"natural_frequency": 40.0, "damping_ratio": 0.7, "max_angle": 0.5}
     model = build_model(scenario(write(), vehicle={"tilt_servo": servo}))

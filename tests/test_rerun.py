@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
 import threading
 import time
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -19,15 +21,18 @@ import pytest
 from controllers.vehicle import PRESETS
 from tests.flights import flight, saved
 from tests.viewer_shot import free_port, missing_driver, shoot, viewer, viewer_process, wait_for
+from tiltsim.attitude_plane import MOVING_TRAIL_TIME
 from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.files import load_flight
+from tiltsim.loading import load_scenario
 from tiltsim.model import MODELS, compile_model
-from tiltsim.rerun_stream import TIMELINE, save_recording
+from tiltsim.rerun_stream import TIMELINE, RecordingProcess, save_recording
+from tiltsim.rerun_stream.blueprint import flight_blueprint
 from tiltsim.rerun_stream.geometry import geom_archetypes, log_geometry
 from tiltsim.rerun_stream.live import LiveStream
 from tiltsim.rerun_stream.recorder import FlightRecorder
-from tiltsim.rerun_stream.recording import flight_names, new_recording
+from tiltsim.rerun_stream.recording import flight_names, make_recorders, new_recording
 from tiltsim.rerun_stream.series import error_axes, limit_series
 from tiltsim.rerun_stream.viewer import require_viewer
 from tiltsim.simulation import simulate
@@ -253,6 +258,70 @@ def test_several_flights_share_a_recording_under_names_of_their_own(tmp_path):
         assert all(text.startswith(f"{name}: ") for (text,) in texts)
 
 
+def test_compared_flights_have_their_margins_in_the_plot_alone(tmp_path):
+    """Labels of several would hide each other in the plane."""
+    alone, compared = tmp_path / "alone.rrd", tmp_path / "compared.rrd"
+    save_recording([flight("fixed")], alone)
+    save_recording([flight("fixed"), flight("trot")], compared)
+    _, labels = rows(alone, "/plane/attitude", "Points2D:labels")
+    assert len(labels) == len(flight("fixed"))
+    _, labels = rows(compared, "/plane/fixed/attitude", "Points2D:labels")
+    assert labels == []
+
+
+def test_vehicle_and_reference_are_seen_from_however_far(recorded):
+    from rerun.chunk import RrdReader
+
+    path, this = recorded
+    wanted = {"/world/camera/dot", "/world/reference/now"}
+    if this.scenario.controller.decoupler == "none":
+        wanted.remove("/world/reference/now")
+    radii = {}
+    for chunk in RrdReader(path).stream().filter(is_static=True):
+        if chunk.entity_path in wanted:
+            (radii[chunk.entity_path],) = chunk.to_record_batch()["Points3D:radii"].to_pylist()
+    assert wanted == radii.keys()
+    assert all(radius < 0.0 for (radius,) in radii.values()), "in points of the screen"
+
+
+# --- the blueprint -----------------------------------------------------------------------------
+
+
+def views_of(*scenarios):
+    """The views that flights of these scenarios are shown in, by their titles."""
+    recorders = make_recorders(new_recording(scenarios), scenarios)
+    blueprint = flight_blueprint([recorder.shown() for recorder in recorders])
+    found, waiting = {}, [blueprint.root_container]
+    while waiting:
+        part = waiting.pop()
+        waiting += [inner for inner in part.contents if hasattr(inner, "column_shares")]
+        found |= {view.name: view for view in part.contents if not hasattr(view, "column_shares")}
+    return found
+
+
+def test_a_vehicle_without_tilt_angles_has_no_plot_of_them():
+    tilts = "Tilt angles (rad)"
+    quadrotor = views_of(load_scenario("ch01_gust/hover#quadrotor")).keys()
+    assert views_of(flight("fixed").scenario).keys() - quadrotor == {tilts}
+
+
+def test_compared_flights_have_one_legend():
+    def legends(*names):
+        views = views_of(*(flight(name).scenario for name in names)).values()
+        plots = [view.properties["PlotLegend"] for view in views if "PlotLegend" in view.properties]
+        return [legend.visible.as_arrow_array().to_pylist() == [True] for legend in plots]
+
+    assert legends("fixed") == [True] * 5
+    assert sorted(legends("fixed", "trot")) == [False] * 4 + [True]
+
+
+@pytest.mark.parametrize(("name", "whole"), [("fixed", True), ("trot", False)])
+def test_the_attitudes_trail_is_short_beside_a_curve_that_moves(name, whole):
+    view = views_of(flight(name).scenario)["Attitude (shaded: unacceptable attitudes)"]
+    (shown,) = view.visualizer_overrides["plane/trail"].ranges.as_arrow_array().to_pylist()
+    assert shown["range"]["start"] == (None if whole else -1e9 * MOVING_TRAIL_TIME)
+
+
 def test_equal_names_are_numbered():
     scenario = flight("fixed").scenario
     assert flight_names([scenario, flight("trot").scenario, scenario]) == [
@@ -346,6 +415,79 @@ def test_run_and_view_write_equal_recordings(tmp_path, capsys):
     assert done.returncode == 0, done.stderr
 
 
+@pytest.fixture
+def full_disk(monkeypatch):
+    """The next recording goes to where there is no room."""
+    if not Path("/dev/full").exists():
+        pytest.skip("this system has no /dev/full")
+
+    @contextmanager
+    def to_nowhere(_path):
+        yield Path("/dev/full")
+
+    monkeypatch.setattr("tiltsim.rerun_stream.recording.replacing", to_nowhere)
+
+
+def test_a_full_disk_is_said_in_one_line(full_disk, tmp_path, capfd):
+    path = tmp_path / "flight.rrd"
+    with pytest.raises(InputError, match=r"flight\.rrd: cannot be written: No space left"):
+        save_recording([flight("fixed")], path)
+    assert capfd.readouterr().err == ""
+
+
+def test_the_recordings_process_tells_what_went_wrong(tmp_path):
+    path = tmp_path / "no folder" / "flight.rrd"
+    with RecordingProcess(flight("fixed").scenario) as process:
+        process.start(flight("fixed"), path)
+        with pytest.raises(InputError, match=r"flight\.rrd: cannot be written: No such file"):
+            process.finish()
+
+
+def test_a_recording_whose_process_is_killed_is_written_all_the_same(tmp_path):
+    this, paths = flight("trot"), [tmp_path / "a.rrd", tmp_path / "b.rrd"]
+    with RecordingProcess(this.scenario) as process:
+        process._process.kill()
+        process._process.wait()
+        process.start(this, paths[0])
+        process.finish()
+    save_recording([this], paths[1])
+    done = rerun_rrd("compare", *paths)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_recordings_process_ends_with_a_flight_that_comes_to_nothing():
+    with pytest.raises(KeyboardInterrupt), RecordingProcess(flight("trot").scenario) as process:
+        raise KeyboardInterrupt
+    assert process._process.returncode is not None
+
+
+def test_the_recordings_process_ends_with_the_one_that_it_serves(tmp_path):
+    """Also when that is killed, with no time to clean up."""
+    program = (
+        "import os, signal; from tests.flights import flight; "
+        "from tiltsim.rerun_stream import RecordingProcess; "
+        "RecordingProcess(flight('fixed').scenario); os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    # Both write to one pipe, of which the end is seen when both have ended.
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, env=environment, stderr=subprocess.PIPE, text=True, timeout=30)
+    assert (done.returncode, done.stderr) == (-signal.SIGKILL, "")
+
+
+def test_a_flight_is_recorded_without_loading_rerun_beside_it(tmp_path):
+    path = tmp_path / "flight.rrd"
+    options = ["--set", "simulation.duration=0.1", "--quiet", "--rerun", str(path)]
+    arguments = ["run", "ch04_tracking/setpoint#rho_065_modified", *options]
+    program = (
+        f"import sys; from tiltsim.cli import main; main({arguments!r}); "
+        "assert 'rerun' not in sys.modules"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert path.is_file()
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -362,12 +504,37 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, words, capsys):
     assert words in line
 
 
+@pytest.mark.parametrize(("content", "words"), [(b"", "not a Rerun"), (b"PAR1", "not a Rerun")])
+def test_what_is_no_recording_is_said_in_one_line(content, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: pytest.fail("opens the viewer"))
+    monkeypatch.setenv("DISPLAY", ":0")
+    path = tmp_path / "flight.RRD"
+    path.write_bytes(content)
+    assert main(["view", str(path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert words in line
+
+
 def test_no_screen_is_said_in_one_line(monkeypatch):
     monkeypatch.setattr(sys, "platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     with pytest.raises(InputError, match=r"no screen .* --rerun FILE\.rrd"):
         require_viewer(None)
+
+
+@pytest.mark.parametrize("how", ["run", "view", "live"])
+def test_rerun_switched_off_is_said_in_one_line(how, tmp_path, monkeypatch, capfd):
+    monkeypatch.setenv("RERUN", "Off")
+    folder, target = saved("fixed", tmp_path), str(tmp_path / "flight.rrd")
+    arguments = {
+        "run": ["run", "ch04_tracking/setpoint#rho_065_modified", "--rerun", target],
+        "view": ["view", str(folder), "--rerun", target],
+        "live": ["run", "ch04_tracking/setpoint#rho_065_modified", "--live"],
+    }
+    assert main(arguments[how]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line == "tiltsim: RERUN=Off in the environment switches Rerun off; unset it"
 
 
 def test_a_port_where_nobody_listens_is_said_in_one_line():

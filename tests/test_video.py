@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 
 import mujoco
 import numpy as np
@@ -11,10 +12,11 @@ import pytest
 
 from controllers.vehicle import PRESETS
 from tests.flights import flight, saved
-from tiltsim.attitude_plane import torque_free_directions
+from tiltsim.attitude_plane import MOVING_TRAIL_TIME, torque_free_directions
 from tiltsim.cli import main
 from tiltsim.errors import InputError
-from tiltsim.video import inset, offscreen
+from tiltsim.video import aspects, inset, offscreen
+from tiltsim.video.aspects import RotorcraftAspect
 from tiltsim.video.film import Format, _Stage, film_flight, frames
 from tiltsim.video.inset import PlaneInset, lay_over
 from tiltsim.video.offscreen import make_gl_context
@@ -67,6 +69,18 @@ def test_an_inset_covers_its_corner_alone():
     lay_over(frame, np.full((30, 30, 3), 200, dtype=np.uint8), 5)
     assert frame[70, 70].min() > 150
     assert frame[:65].max() == frame[:, :65].max() == frame[95:].max() == 0
+
+
+@pytest.mark.parametrize(("name", "whole"), [("fixed", True), ("trot", False)])
+def test_the_insets_trail_is_short_beside_a_curve_that_moves(name, whole, monkeypatch):
+    this, trails = flight(name), []
+    monkeypatch.setattr(PlaneInset, "paint", lambda _self, _n, trail, _margin: trails.append(trail))
+    monkeypatch.setattr(aspects, "lay_over", lambda *_: None)
+    last = len(this) - 1
+    RotorcraftAspect(this, 180).paint(np.zeros((180, 320, 3), dtype=np.uint8), last)
+    began = 0.0 if whole else this["time"][last] - MOVING_TRAIL_TIME
+    (first,) = np.flatnonzero(np.isclose(this["time"], began))
+    np.testing.assert_array_equal(trails[0][0], [this["roll"][first], this["pitch"][first]])
 
 
 # --- frames and films --------------------------------------------------------------------------
@@ -146,6 +160,21 @@ def test_the_command_films_without_a_screen(tmp_path):
 
 
 # --- what can go wrong -------------------------------------------------------------------------
+
+
+@needs_gl
+def test_a_film_that_is_terminated_leaves_nothing_behind(tmp_path):
+    folder = saved("fixed", tmp_path)
+    before = sorted(folder.iterdir())
+    command = [sys.executable, "-m", "tiltsim", "video", str(folder), "--speed", "0.01"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        deadline = time.monotonic() + 30.0
+        while sorted(folder.iterdir()) == before and time.monotonic() < deadline:
+            time.sleep(0.02)
+        process.terminate()
+        _, error = process.communicate(timeout=30.0)
+    assert (process.returncode, error.splitlines()[-1]) == (143, "tiltsim: interrupted")
+    assert sorted(folder.iterdir()) == before
 
 
 def test_no_way_to_draw_is_one_line_with_the_way_out(monkeypatch):

@@ -36,6 +36,9 @@ ACTS: Final = 0.01
 ON_THE_FRAME: Final = 1e-3
 """Where ``n`` leans by less (rad), the curve is as near to the square's frame: there is none."""
 
+MOVING_TRAIL_TIME: Final = 1.0
+"""How much (s) of the attitude's trail is shown beside a curve that moves."""
+
 _TINY: Final = 1e-12
 """Below this a component of the unit vector ``n`` counts as zero."""
 
@@ -44,6 +47,13 @@ def margin_threshold(scenario: Scenario) -> float:
     """The margin (rad) not to be missed: a supervisor's, else `MARGIN_THRESHOLD`."""
     supervisor = getattr(scenario.controller, "supervisor", None)
     return supervisor.min_margin if supervisor is not None else MARGIN_THRESHOLD
+
+
+def curve_stands(scenario: Scenario) -> bool:
+    """Whether the unacceptable-attitude curve is the same throughout a scenario's flights."""
+    if scenario.vehicle.model == "quadrotor":
+        return True
+    return scenario.controller.law == "attitude_altitude" and scenario.gait.type == "fixed"
 
 
 def torque_free_directions(columns: Mapping[str, Floats], vehicle: Vehicle) -> Floats:

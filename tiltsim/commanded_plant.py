@@ -1,18 +1,24 @@
-"""The MuJoCo plant under commands: from a user's own controller, or step by step from outside."""
+"""The MuJoCo plant under commands: from a user's own controller, or step by step from outside.
+
+The commands and what is seen go through the same layers as those of the shipped laws. Only their
+latency is another: a rotor may be told a speed, to be taken at once, and no line of activations
+(`tiltsim.loops.actuation`) can hand on a jump. So commands under way are a state of this plant.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import sqrt
-from typing import Any
+from math import nan, sqrt
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
 from controllers.gaits import tilt_reference
+from controllers.records import flatten, slotted
 from controllers.references import reference_derivatives
 from controllers.rotation import euler_from_quaternion
-from controllers.scalar import Quad
+from controllers.scalar import Quad, clipped
 from controllers.vehicle import SPIN
 from tiltsim.controller import (
     ControllerError,
@@ -23,44 +29,100 @@ from tiltsim.controller import (
     own_controller,
 )
 from tiltsim.engine import control_callback
+from tiltsim.kinds.rotorcraft import initial_tilts
 from tiltsim.loop import Floats
-from tiltsim.loops.commanded import ControlParameters, planned_servo_commands
-from tiltsim.loops.tiltrotor import rotor_thrust_controls
+from tiltsim.loops.actuation import measured_position, measured_velocity, sensors_of
+from tiltsim.loops.commanded import (
+    COMMANDED,
+    Told,
+    commanded_parameters,
+    planned_servo_commands,
+    with_told,
+)
 from tiltsim.plants import MujocoPlant, quiet_warnings
 from tiltsim.scenario import Scenario
 
 
-class CommandedPlant(MujocoPlant):
-    """A vehicle that does what it was last told.
+class _Sent(NamedTuple):
+    """A command as it travels: numbers alone."""
 
-    MuJoCo steps by itself as long as the rotors keep their speeds; the control callback is there
-    for commanded accelerations alone.
+    speeds: float  # whether the rotors are told speeds, not accelerations
+    rotors: Quad  # rad/s or rad/s^2, with their signs
+    tilts: Quad  # rad
+
+
+class CommandedPlant(MujocoPlant):
+    """A vehicle that does what it was told, a latency ago.
+
+    MuJoCo steps by itself as long as no layer has a say and the rotors keep their speeds; else the
+    control callback holds the commands.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         super().__init__(scenario)
-        self.tilting = scenario.vehicle.model == "tiltrotor"
-        self._first_thrust = 4 if self.tilting else 0
-        self._first_rate = self._first_thrust + 4
         vehicle = scenario.rotorcraft
-        self._slowest = vehicle.min_rotor_speed
-        self._fastest = vehicle.max_rotor_speed
-        data, setup = self.data, self._setup
-        state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
-        data.ctrl[:] = self._loop.controls(0.0, *state, setup.parameters, setup.table)
+        self.tilting = vehicle.model == "tiltrotor"
+        self._slowest, self._fastest = vehicle.speeds_along_spin
+        self._commanded = commanded_parameters(self._setup.parameters)
+        self._sensors = sensors_of(scenario)
+        self._slotted = slotted(self._setup.parameters)
+        self._layered = self._loop is not COMMANDED[vehicle.model]
+        first = 8 if self.tilting else 4  # after servos and thrusts
+        self._rates = slice(first, first + 4)
+        # The activations that a commanded speed is written to: where rotors lag behind it, the one
+        # that the layer keeps after the four rotor speeds.
+        first = 0 if vehicle.rotor_time_constant is None else 4
+        self._speeds = slice(first, first + 4)
+        # Before the first command arrives the servos hold the pods where they are.
+        waiting = _Sent(0.0, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))
+        if self.tilting:
+            waiting = waiting._replace(tilts=initial_tilts(scenario)[0])
+        self._under_way = [waiting] * scenario.simulation.latency_steps  # the oldest first
+        self._write_controls(self._commanded.told)
+
+    @property
+    def state(self) -> Floats:
+        """See `Plant.state`: MuJoCo's, and the commands under way."""
+        return np.array([*super().state, *flatten(tuple(self._under_way))])
+
+    @state.setter
+    def state(self, value: Floats) -> None:
+        length = len(value) - 9 * len(self._under_way)
+        MujocoPlant.state.fset(self, value[:length])  # type: ignore[attr-defined]
+        self._under_way = [
+            _Sent(speeds, (r1, r2, r3, r4), (a1, a2, a3, a4))
+            for speeds, r1, r2, r3, r4, a1, a2, a3, a4 in value[length:].reshape(-1, 9).tolist()
+        ]
 
     def apply(self, orders: Orders) -> None:
-        """Obey until told otherwise; the plant's observed state has the new speeds at once."""
-        ctrl, act = self.data.ctrl, self.data.act
-        if self.tilting:
-            ctrl[:4] = orders.tilt_angles or self._planned_servo_commands()
-        rates = (0.0, 0.0, 0.0, 0.0)
+        """Send a command, once a control sample, and obey the one that arrives until the next.
+
+        Rotors take a commanded speed at once, unless they lag: the plant's observed state has it.
+        """
+        self._under_way.append(self._sent(orders))
+        arrived = self._under_way.pop(0)
+        rates = arrived.rotors
+        if arrived.speeds:
+            self.data.act[self._speeds] = arrived.rotors
+            rates = (0.0, 0.0, 0.0, 0.0)
+        self._write_controls(Told(*arrived.tilts, *rates))
+
+    def _sent(self, orders: Orders) -> _Sent:
+        tilts = orders.tilt_angles
+        if tilts is None:
+            tilts = self._planned_servo_commands() if self.tilting else (0.0, 0.0, 0.0, 0.0)
         if orders.kind == "rotor_accelerations":
-            rates = _signed(orders.rotors)
-        else:
-            act[:] = _signed(self._along_spin(orders))
-            ctrl[self._first_thrust : self._first_rate] = rotor_thrust_controls(act.tolist())
-        ctrl[self._first_rate : self._first_rate + 4] = rates
+            return _Sent(0.0, _signed(orders.rotors), tilts)
+        return _Sent(1.0, _signed(self._along_spin(orders)), tilts)
+
+    def _write_controls(self, told: Told) -> None:
+        data, table = self.data, self._setup.table
+        state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
+        parameters = with_told(self._setup.parameters, told)
+        try:
+            data.ctrl[:] = self._loop.controls(float(data.time), *state, parameters, table)
+        except (ArithmeticError, ValueError):
+            data.ctrl[:] = nan  # as the engines do; MuJoCo reports it
 
     def thrusts_and_tilts(self, orders: Orders) -> Floats:
         """What orders come to as thrusts (N) and tilt angles (rad), shape (8,) or (4,).
@@ -71,22 +133,21 @@ class CommandedPlant(MujocoPlant):
             raise ControllerError(
                 "commanded rotor_accelerations; thrusts or rotor_speeds are wanted"
             )
-        coefficient = self._setup.parameters.vehicle.thrust_coefficient
+        coefficient = self._commanded.vehicle.thrust_coefficient
         thrusts = [coefficient * speed * abs(speed) for speed in self._along_spin(orders)]
         if not self.tilting:
             return np.array(thrusts)
         return np.array([*thrusts, *(orders.tilt_angles or self._planned_servo_commands())])
 
-    def _planned_servo_commands(self) -> tuple[float, ...]:
-        parameters: ControlParameters = self._setup.parameters
-        lead, gait = parameters.servo_lead, parameters.gait
+    def _planned_servo_commands(self) -> Quad:
+        lead, gait = self._commanded.servo_lead, self._commanded.gait
         return planned_servo_commands(float(self.data.time), lead, gait, self._setup.table)
 
     def _along_spin(self, orders: Orders) -> Quad:
         """Commanded speeds, within the rotors' limits."""
         first, second, third, fourth = orders.rotors
         if orders.kind == "thrusts":
-            coefficient = self._setup.parameters.vehicle.thrust_coefficient
+            coefficient = self._commanded.vehicle.thrust_coefficient
             first, second, third, fourth = (
                 sqrt(abs(thrust) / coefficient) * (1.0 if thrust >= 0.0 else -1.0)
                 for thrust in orders.rotors
@@ -99,22 +160,24 @@ class CommandedPlant(MujocoPlant):
         )
 
     def _limited(self, speed: float) -> float:
-        low, high = self._slowest, self._fastest
-        if high is not None:
-            speed = min(high, max(-high, speed))
-        return speed if low is None else max(low, speed)
+        return clipped(speed, self._slowest, self._fastest)
 
     def advance(self, steps: int) -> None:
         """See `Plant.advance`."""
-        accelerating = self.data.ctrl[self._first_rate : self._first_rate + 4].any()
-        with control_callback(self._hold if accelerating else None), quiet_warnings():
+        moving = self._layered or self.data.ctrl[self._rates].any()
+        with control_callback(self._hold if moving else None), quiet_warnings():
             mujoco.mj_step(self.model, self.data, nstep=steps)
 
     def _hold(self, _model: mujoco.MjModel, called: mujoco.MjData) -> None:
-        """Let the thrusts follow the rotor speeds, all other controls held."""
+        """Let the thrusts follow the rotor speeds, and layers do what they do, between commands."""
         data = self.data
-        if called is data:
-            data.ctrl[:] = self._loop.refresh(data.ctrl.tolist(), data.act.tolist())
+        if called is not data:
+            return
+        state = float(data.time), data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
+        try:
+            data.ctrl[:] = self._loop.held(*state, data.ctrl.tolist(), self._slotted)
+        except (ArithmeticError, ValueError):
+            data.ctrl[:] = nan
 
     @property
     def steps_taken(self) -> int:
@@ -122,9 +185,12 @@ class CommandedPlant(MujocoPlant):
         return round(float(self.data.time) / float(self.model.opt.timestep))
 
     def seen(self) -> Observation:
-        """The present state as a controller sees it."""
-        data, parameters = self.data, self._setup.parameters
-        time = float(data.time)
+        """The present state as a controller sees it, through the scenario's sensors."""
+        data, parameters = self.data, self._commanded
+        time, qpos, qvel = float(data.time), data.qpos, data.qvel
+        if self._sensors.active:
+            qpos = np.array(measured_position(time, qpos.tolist(), self._sensors))
+            qvel = np.array(measured_velocity(time, qvel.tolist(), self._sensors))
         motion = np.array(reference_derivatives(time, parameters.reference, self._setup.table)[:9])
         wanted = parameters.reference
         planned = np.zeros(8)
@@ -138,10 +204,9 @@ class CommandedPlant(MujocoPlant):
             tilt_angles=planned[:4],
             tilt_rates=planned[4:],
         )
-        qpos = data.qpos
         attitude = euler_from_quaternion(*qpos[3:7].tolist())
-        speeds = _signed(data.act.tolist())
-        return observation(time, qpos, data.qvel, speeds, attitude, reference, parameters.vehicle)
+        speeds = _signed(data.act[:4].tolist())
+        return observation(time, qpos, qvel, speeds, attitude, reference, parameters.vehicle)
 
     def _controls_in_force(self, *_state: Sequence[float]) -> Sequence[float]:
         return list(self.data.ctrl.tolist())

@@ -49,7 +49,8 @@ class Reference:
 class Observation:
     """What a controller sees: the vehicle's state as arrays, its reference, its parameters.
 
-    The arrays are copies: a controller may keep or change them.
+    The state is what the scenario's sensors say of it. The arrays are copies: a controller may keep
+    or change them.
     """
 
     time: float  # s
@@ -69,12 +70,14 @@ class Observation:
 class Command:
     """What a controller tells the vehicle: one of the three for the rotors, and tilt angles.
 
+    It takes effect after the scenario's latency; speeds then at once, or with the rotors' lag.
+
     Attributes
     ----------
     thrusts
-        (4,), N, along each rotor's axis. The rotors take the speeds for it at once.
+        (4,), N, along each rotor's axis, as speeds.
     rotor_speeds
-        (4,), rad/s, positive along each rotor's spin, taken at once.
+        (4,), rad/s, positive along each rotor's spin.
     rotor_accelerations
         (4,), rad/s^2, likewise; the speeds grow evenly until the next sample.
     tilt_angles

@@ -219,7 +219,11 @@ class AttitudeAltitudeController(LawTable):
         | Annotated[GainTable, Tag("table")]
         | Annotated[PolePlacementTable, Tag("poles")],
         Discriminator(_attitude_altitude_gain_kind),
-    ] = "ch04"
+    ] = Field(
+        "ch04",
+        description="a set by name, gains, or poles; yaw has little torque, and exact stops a "
+        "rotor at a step of 0.39 rad: see docs/beyond.md",
+    )
     allocation: Literal["inversion", "prioritized"] = Field(
         "inversion", description="within rotor limits: each for itself, or attitude first"
     )

@@ -83,7 +83,7 @@ class EventWatch:
         ending = Event(end.time, level, f"flight {end.kind}{cause}")
         if margin == float("inf"):
             return [ending]
-        text = f"closest to singular: margin {margin:.3f} rad at t = {time:.2f} s"
+        text = f"closest to singular: {margin:.3f} rad at {time:.2f} s"
         return [Event(end.time, "INFO", text), ending]
 
     def _conditions(

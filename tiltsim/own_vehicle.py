@@ -39,6 +39,9 @@ SITES: Final = ("imu", *(f"rotor_{i}" for i in ROTORS))
 ALIGNED: Final = 1e-4
 """How far, as a share of the arm or of a unit vector, what must be aligned may be off."""
 
+SMALL_PRODUCT: Final = 0.01
+"""Products of inertia worth telling, as a share of the least moment."""
+
 
 @dataclass(frozen=True, eq=False)
 class OwnVehicle:
@@ -64,6 +67,8 @@ class OwnVehicle:
         Its inertia about the body's origin, (3, 3), kg m^2.
     center
         The whole vehicle's centre of mass, m, body axes.
+    products
+        The entries xy, xz and yz of its inertia about the centre of mass, kg m^2, body axes.
     can_touch
         Whether it has the geoms by which a scenario's ground is touched.
     """
@@ -77,12 +82,28 @@ class OwnVehicle:
     rest_moment: Floats
     rest_inertia: Floats
     center: Floats
+    products: tuple[float, float, float]
     can_touch: bool
 
-    def set_inertia(self, root: Any, vehicle: Vehicle) -> None:
-        """Let mass and inertia of the whole be a vehicle's; what differs goes into the body.
+    @property
+    def unknown_to_laws(self) -> str:
+        """In what the shipped laws take it for another vehicle, in words; empty where in nothing.
 
-        Raises ValueError where no body makes up for it.
+        They fly all the same, with a model error. docs/own_vehicle.md says what it costs.
+        """
+        found = []
+        if np.linalg.norm(self.center) > ALIGNED * self.vehicle.arm_length:
+            found.append(f"its centre of mass at {_triple(self.center)} m")
+        if np.abs(self.products).max() > SMALL_PRODUCT * min(self.vehicle[1:4]):
+            products = _triple(np.array(self.products))
+            found.append(f"its products of inertia (xy, xz, yz) = {products} kg m^2")
+        return " and ".join(found)
+
+    def set_inertia(self, root: Any, vehicle: Vehicle) -> None:
+        """Let mass and moments of the whole be a vehicle's; what differs goes into the body.
+
+        Centre of mass and products of inertia stay the file's. Raises ValueError where no body
+        makes up for it.
         """
         if vehicle[:4] == self.vehicle[:4]:
             return
@@ -93,7 +114,10 @@ class OwnVehicle:
                 f"have {self.rest_mass:.6g} kg already"
             )
         center = (vehicle.mass * self.center - self.rest_moment) / mass
-        whole = np.diag(vehicle[1:4]) + vehicle.mass * _parallel_axis(self.center)
+        xy, xz, yz = self.products
+        xx, yy, zz = vehicle[1:4]
+        about_center = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        whole = about_center + vehicle.mass * _parallel_axis(self.center)
         inertia = whole - self.rest_inertia - mass * _parallel_axis(center)
         moments = np.linalg.eigvalsh(inertia)
         if moments[0] <= 0.0 or 2.0 * moments[-1] > moments.sum():
@@ -196,6 +220,7 @@ def _read(path: str, model: str, modified: int) -> OwnVehicle:
         tuple(float(compiled.dof_M0[dof]) for dof in tilts),
         *rest,
         center,
+        (float(inertia[0, 1]), float(inertia[0, 2]), float(inertia[1, 2])),
         _can_touch(compiled),
     )
 

@@ -196,7 +196,11 @@ def _by_axis(name: str, values: tuple[float, float, float]) -> dict[str, float]:
 
 
 class AttitudeAltitudeReference(_Reference):
-    """Attitude and altitude to hold; the horizontal position is free (ch. 3)."""
+    """Attitude and altitude to hold (ch. 3); x = y = 0 for laws that steer them as well.
+
+    Four rotors under a planned gait, and a quadrotor, leave the horizontal position free. The
+    full_pose law has six outputs and holds it.
+    """
 
     type: Literal["attitude_altitude"]
     roll: Tilt = Field(0.0, description="rad")

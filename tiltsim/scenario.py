@@ -131,7 +131,7 @@ class SimulationTable(Table):
 
 
 class InitialTable(Table):
-    """The state at time zero; the tilt angles are the gait's."""
+    """The state at time zero; the tilt angles and their rates are the gait's."""
 
     position: Vector3 = Field((0.0, 0.0, 0.0), description="m, world")
     velocity: Vector3 = Field((0.0, 0.0, 0.0), description="m/s, world")

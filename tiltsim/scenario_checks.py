@@ -93,17 +93,11 @@ def _check_actuators(scenario: Scenario) -> None:
         raise InvalidValueError(
             "vehicle.model", scenario.vehicle.model, "has no air around it; leave air out"
         )
-    if scenario.has_air and scenario.controller.law == "python":
-        raise InvalidValueError(
-            "controller.law", "python", "a controller of your own flies without air"
-        )
     for key, value, ideal in scenario.real_actuators():
-        if value == ideal:
-            continue
-        if scenario.vehicle.model != "tiltrotor" or scenario.controller.law == "python":
-            own = scenario.controller.law == "python"
-            whose = "a controller of your own" if own else f"the {scenario.vehicle.model}"
-            raise InvalidValueError(key, value, f"{whose} flies without; leave it out")
+        if value != ideal and scenario.vehicle.model != "tiltrotor":
+            raise InvalidValueError(
+                key, value, f"the {scenario.vehicle.model} flies without; leave it out"
+            )
     kinds = [(f.rotor, f.type == "stuck_servo") for f in scenario.fault]
     for fault, kind in zip(scenario.fault, kinds, strict=True):
         if kinds.count(kind) > 1:

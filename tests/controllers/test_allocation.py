@@ -58,8 +58,20 @@ def test_the_answer_is_in_the_box_and_wanted_where_allowed(
     assert (found >= low - 1e-9).all()
     assert (found <= high + 1e-9).all()
     wanted = np.array(tilting) + turning + lift * np.array(direction)
-    if (wanted > low + 1e-9).all() and (wanted < high - 1e-9).all():
+    # Roll and pitch come first, also where yaw alone would bring them within the box.
+    first = largest_share(tilting, direction, tuple(low.tolist()), tuple(high.tolist()))
+    if first == 1.0 and (wanted > low + 1e-9).all() and (wanted < high - 1e-9).all():
         np.testing.assert_allclose(found, wanted, atol=1e-9)
+
+
+@pytest.mark.parametrize("rounding", [-1e-14, 0.0, 1e-14])
+@pytest.mark.parametrize("room", [-1e-14, 0.0, 1e-14])
+def test_rotors_that_a_share_moves_alike_do_not_bound_it(rounding, room):
+    """The first cannot go below 2, the third not above: rounding alone would leave no share."""
+    wanted = (1.0, -1.0, 1.0 + rounding, -1.0)
+    low, high = (2.0, -9.0, -9.0, -9.0), (9.0, 9.0, 2.0 + room, 9.0)
+    assert largest_share(wanted, (1.0, 1.0, 1.0, 1.0), low, high) == 1.0
+    assert largest_share((1.0, -1.0, 1.1, -1.0), (1.0,) * 4, low, high) < 1e-12
 
 
 def decoupling(angles, rotor_speeds, roll, pitch):

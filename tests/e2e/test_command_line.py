@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import json
 import os
 import re
@@ -46,6 +48,17 @@ def tiltsim(*arguments):
         text=True,
         check=False,
     )
+
+
+def test_a_process_of_its_own_spends_no_time_on_garbage(monkeypatch):
+    done = []
+    monkeypatch.setattr(gc, "set_threshold", lambda *_: done.append("seldom"))
+    monkeypatch.setattr(atexit, "register", done.append)
+    monkeypatch.setattr(sys, "argv", ["tiltsim", "schema"])
+    assert main(["schema"]) == 0
+    assert done == []
+    assert main() == 0
+    assert done == ["seldom", gc.freeze]
 
 
 @pytest.fixture
@@ -227,7 +240,8 @@ def test_check_survives_a_file_that_cannot_be_read_as_toml(tmp_path, capsys):
 def test_interrupt_ends_a_whole_check_at_once(tmp_path, jobs):
     compile_callbacks(TILTROTOR)  # so that the interrupt falls into the flights
     for name in ("a", "b", "c"):
-        (tmp_path / f"{name}.toml").write_text("[simulation]\nduration = 900.0\n")
+        endless = "[simulation]\nduration = 2000.0\nrecord_timestep = 1.0\n"
+        (tmp_path / f"{name}.toml").write_text(endless)
     process = subprocess.Popen(
         [*COMMAND, "check", str(tmp_path), "--jobs", jobs],
         stdout=subprocess.PIPE,

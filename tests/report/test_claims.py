@@ -85,6 +85,15 @@ def test_chapter_5_is_flown_with_the_swings_that_are_judged():
         assert (gait.lean, gait.amplitude) == SWINGS[gait.type], scenario.address
 
 
+@pytest.mark.parametrize("measured", [0.1852, 0.1949, 0.1839, 0.1961])
+def test_the_walk_is_not_judged_by_a_lucky_digit(measured):
+    """Both plants lie 0.0002 m within half a unit of the printed digit; a hair must not count."""
+    walk = load_scenario("ch05_gaits/line#walk_third_t1_modified")
+    [claim] = scenario_claims(walk)
+    assert judge_value(claim, measured) is Outcome.REPRODUCED
+    assert judge_value(claim, 0.19 + 3.0 * (measured - 0.19)) is Outcome.IN_KIND
+
+
 def test_every_chapter_has_claims():
     entries = [load_scenario(address) for address, _, _ in library_entries()]
     chapters = {claim.chapter for scenario in entries for claim in scenario_claims(scenario)}

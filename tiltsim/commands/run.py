@@ -6,21 +6,18 @@ import argparse
 import sys
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.progress import progress_bar
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, FLIGHT_LOST, INTERRUPTED
 from tiltsim.interrupts import interrupts_deferred
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from concurrent.futures import Future, ThreadPoolExecutor
-
     from tiltsim.expectation_table import Expectation
     from tiltsim.expectations import Verdict
     from tiltsim.flight import Flight
     from tiltsim.loop import Floats
-    from tiltsim.rerun_stream import LiveStream, RecordingFile
+    from tiltsim.rerun_stream import LiveStream
     from tiltsim.scenario import Scenario
 
 
@@ -88,15 +85,19 @@ def run(arguments: argparse.Namespace) -> int:
     if not arguments.quiet and isinstance(vehicle, Vehicle):
         for warning in gait_warnings(scenario.gait.plan(vehicle), vehicle):
             print(f"tiltsim: warning: gait: {warning}", file=sys.stderr)
+        _tell_what_the_law_does_not_know(scenario)
     if arguments.rerun is None:
         flight = fly(scenario, arguments)
         _save(flight, arguments)
     else:
-        with _RecordingAhead(scenario) as recording:
-            flight = fly(scenario, arguments, recording.begin)
-            _save(flight, arguments)
+        from tiltsim.rerun_stream import RecordingProcess
+
+        with RecordingProcess(scenario) as recording:
+            flight = fly(scenario, arguments)
             with interrupts_deferred():
-                recording.file().save([flight], arguments.rerun)
+                recording.start(flight, arguments.rerun)
+                _save(flight, arguments)
+                recording.finish()
     if flight.end.kind == "interrupted":
         kept = f"; the flight so far is in {arguments.out}" if arguments.out is not None else ""
         print(f"tiltsim: interrupted at t = {flight.end.time:.3f} s{kept}", file=sys.stderr)
@@ -122,45 +123,16 @@ def run(arguments: argparse.Namespace) -> int:
     return DONE if all(verdict.holds for verdict in verdicts) else EXPECTATION_FAILED
 
 
-class _RecordingAhead:
-    """A recording that is made ready while its flight goes on.
-
-    Native code flies without Python's lock, so this costs no time while there is a core. Under a
-    Python callback MuJoCo could not compile the recording's model meanwhile.
-    """
-
-    def __init__(self, scenario: Scenario) -> None:
-        self._scenario = scenario
-        self._pool: ThreadPoolExecutor | None = None
-        self._file: Future[RecordingFile] | None = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_error: object) -> None:
-        if self._pool is not None:
-            self._pool.shutdown()
-
-    def begin(self) -> None:
-        """The flight begins."""
-        from tiltsim.plants import choose_engine
-
-        scenario = self._scenario
-        if scenario.controller.law != "python" and choose_engine(scenario) == "native":
-            from concurrent.futures import ThreadPoolExecutor
-
-            self._pool = ThreadPoolExecutor(1)
-            self._file = self._pool.submit(_recording_of, scenario)
-
-    def file(self) -> RecordingFile:
-        """The recording, ready for the flight."""
-        return _recording_of(self._scenario) if self._file is None else self._file.result()
-
-
-def _recording_of(scenario: Scenario) -> RecordingFile:
-    from tiltsim.rerun_stream import RecordingFile
-
-    return RecordingFile([scenario])
+def _tell_what_the_law_does_not_know(scenario: Scenario) -> None:
+    """A line on what a law of ours has wrong of a user's own vehicle."""
+    own = scenario.rotorcraft.own
+    if own is not None and own.unknown_to_laws and scenario.controller.law != "python":
+        print(
+            f"tiltsim: warning: vehicle.mjcf: the {scenario.controller.law} law, which takes the "
+            "centre of mass for the body's origin and the inertia for diagonal, does not know of "
+            f"{own.unknown_to_laws}",
+            file=sys.stderr,
+        )
 
 
 def _save(flight: Flight, arguments: argparse.Namespace) -> None:
@@ -169,12 +141,8 @@ def _save(flight: Flight, arguments: argparse.Namespace) -> None:
             flight.save(arguments.out)
 
 
-def fly(
-    scenario: Scenario,
-    arguments: argparse.Namespace,
-    begin: Callable[[], None] | None = None,
-) -> Flight:
-    """Simulate, with a progress bar and, if asked, a live view; ``begin`` is called at lift-off."""
+def fly(scenario: Scenario, arguments: argparse.Namespace) -> Flight:
+    """Simulate, with a progress bar and, if asked, a live view."""
     from tiltsim.simulation import simulate
 
     with ExitStack() as stack:
@@ -187,10 +155,6 @@ def fly(
         advance_to = stack.enter_context(bar)
 
         def observe(sample: Floats) -> None:
-            nonlocal begin
-            if begin is not None:
-                begin()
-                begin = None
             advance_to(float(sample[0]))
             if live is not None:
                 live(sample)

@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.errors import InputError
     from tiltsim.files import load_flight, prepare_file
 
-    recordings = [path for path in arguments.paths if path.suffix == ".rrd"]
+    recordings = [path for path in arguments.paths if path.suffix.lower() == ".rrd"]
     if recordings:
         if len(recordings) < len(arguments.paths) or arguments.rerun or arguments.connect:
             raise InputError(

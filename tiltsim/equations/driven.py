@@ -13,7 +13,6 @@ from collections.abc import Callable, Sequence
 from math import inf
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from controllers.gaits import tilt_reference
 from controllers.rotation import (
     quaternion_from_euler,
     quaternion_from_rotation,
@@ -24,6 +23,7 @@ from controllers.scalar import Quad, Triple, clipped, scalar
 from controllers.vehicle import Vehicle
 from tiltsim.equations.quadrotor import equations_of_motion, initial_state
 from tiltsim.equations.tiltrotor import rigid_body
+from tiltsim.kinds.rotorcraft import initial_tilts
 
 if TYPE_CHECKING:
     from tiltsim.scenario import Scenario
@@ -167,13 +167,12 @@ def settled_tiltrotor(state: list[float], mechanics: Mechanics) -> list[float]:
 
 
 def initial_tiltrotor(scenario: Scenario) -> tuple[float, ...]:
-    """The motion at time zero; pods at rest at the gait's angles."""
+    """The motion at time zero; pods as in MuJoCo."""
     initial = scenario.initial
-    gait = scenario.gait.plan(scenario.rotorcraft.resolve())
-    tilts = tilt_reference(0.0, gait.parameters, gait.table)[:4]
+    tilts, tilt_rates = initial_tilts(scenario)
     motion = (*initial.position, *initial.velocity)
     rotation = rotation_from_euler(*initial.attitude)
-    return (*motion, *rotation, *initial.angular_velocity, *tilts, 0.0, 0.0, 0.0, 0.0)
+    return (*motion, *rotation, *initial.angular_velocity, *tilts, *tilt_rates)
 
 
 # --- quadrotor ---------------------------------------------------------------------------------

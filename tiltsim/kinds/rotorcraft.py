@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import inf
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from controllers.attitude_altitude import STATE_FIELDS
 from controllers.gaits import tilt_reference
 from controllers.rotation import quaternion_from_euler
+from controllers.scalar import Quad, clipped
 from controllers.vehicle import SPIN
 from tiltsim.kinds import Floats, Kind
 from tiltsim.limits import rotorcraft_limit_exceeded
@@ -97,14 +99,26 @@ def _compile(
     )
 
 
+def initial_tilts(scenario: Scenario) -> tuple[Quad, Quad]:
+    """Tilt angles (rad) and tilt rates (rad/s) of a tiltrotor at time zero: its gait's.
+
+    A flight begins in the midst of its gait, as the thesis has it, whose angles follow the plan
+    exactly. So nothing swings in, and no pod is faster than its servo can be.
+    """
+    gait = scenario.gait.plan(scenario.rotorcraft.resolve())
+    a1, a2, a3, a4, *planned = tilt_reference(0.0, gait.parameters, gait.table)
+    fastest = scenario.rotorcraft.tilt_servo.max_rate or inf
+    rate_1, rate_2, rate_3, rate_4 = (clipped(rate, -fastest, fastest) for rate in planned)
+    return (a1, a2, a3, a4), (rate_1, rate_2, rate_3, rate_4)
+
+
 def _initial_motion(scenario: Scenario) -> tuple[Sequence[float], Sequence[float]]:
-    initial, vehicle = scenario.initial, scenario.rotorcraft
-    gait = scenario.gait.plan(vehicle.resolve())
-    tilts = tilt_reference(0.0, gait.parameters, gait.table)[:4]
-    hinges = tilts if vehicle.model == "tiltrotor" else ()
+    initial = scenario.initial
+    tilting = scenario.rotorcraft.model == "tiltrotor"
+    angles, rates = initial_tilts(scenario) if tilting else ((), ())
     return (
-        (*initial.position, *quaternion_from_euler(*initial.attitude), *hinges),
-        (*initial.velocity, *initial.angular_velocity, *(0.0 for _ in hinges)),
+        (*initial.position, *quaternion_from_euler(*initial.attitude), *angles),
+        (*initial.velocity, *initial.angular_velocity, *rates),
     )
 
 

@@ -39,14 +39,14 @@ LOOPS: Final[dict[str, Loop]] = {
 
 def loop_of(scenario: Scenario) -> Loop:
     """The loop that a scenario flies: its law, within layers for what is not ideal."""
-    if scenario.controller.law == "python":
-        return COMMANDED[scenario.vehicle.model]
-    loop = LOOPS[scenario.controller.loop_name]
+    own, latency = scenario.controller.law == "python", scenario.simulation.latency_steps
+    loop = COMMANDED[scenario.vehicle.model] if own else LOOPS[scenario.controller.loop_name]
     supervisor = getattr(scenario.controller, "supervisor", None)
     if supervisor is not None:
         loop = with_supervisor(loop, supervisor.strategy)
     if scenario.has_real_actuators:
-        loop = with_actuation(loop, scenario.simulation.latency_steps)
+        # Commands from outside are under way in their plant, `tiltsim.commanded_plant`.
+        loop = with_actuation(loop, 0 if own else latency)
     if scenario.has_air:
         loop = with_air(loop)
     by_controls = scenario.simulation.plant == "thesis" and not scenario.does_as_told

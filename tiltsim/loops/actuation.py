@@ -38,6 +38,7 @@ from controllers.gaits import tilt_reference
 from controllers.rotation import euler_from_quaternion
 from controllers.scalar import scalar
 from controllers.vehicle import Vehicle
+from tiltsim.kinds.rotorcraft import initial_tilts
 from tiltsim.loop import ControlSetup, ExtraActuators, Floats, Loop
 from tiltsim.loops.layer import around
 from tiltsim.loops.tiltrotor import rotor_thrust_controls, servo_lead
@@ -326,7 +327,7 @@ def with_actuation(loop: Loop, latency_steps: int) -> Loop:
 
     def initial_activations(scenario: Scenario, setup: ControlSetup) -> Sequence[float]:
         law_states = layered.initial_activations(scenario, setup)
-        waiting = (*_initial_tilts(scenario), 0.0, 0.0, 0.0, 0.0) * latency_steps
+        waiting = (*initial_tilts(scenario)[0], 0.0, 0.0, 0.0, 0.0) * latency_steps
         return (*law_states, *law_states[:ROTORS], *waiting)
 
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -349,11 +350,6 @@ def with_actuation(loop: Loop, latency_steps: int) -> Loop:
     )
 
 
-def _initial_tilts(scenario: Scenario) -> tuple[float, ...]:
-    gait = scenario.gait.plan(scenario.vehicle.resolve())
-    return tilt_reference(0.0, gait.parameters, gait.table)[:4]
-
-
 def _actuation(scenario: Scenario) -> Actuation:
     vehicle, simulation, controller = scenario.rotorcraft, scenario.simulation, scenario.controller
     low, high = vehicle.min_rotor_speed, vehicle.max_rotor_speed
@@ -361,7 +357,7 @@ def _actuation(scenario: Scenario) -> Actuation:
     allocation = getattr(controller, "allocation", "inversion")
     max_rate, time_constant = vehicle.tilt_servo.max_rate, vehicle.rotor_time_constant
     return Actuation(
-        sensors=_sensors(scenario),
+        sensors=sensors_of(scenario),
         allocation=Allocation(
             active=float(allocation == "prioritized"),
             horizon=getattr(controller, "allocation_horizon", 1.0),
@@ -378,7 +374,8 @@ def _actuation(scenario: Scenario) -> Actuation:
     )
 
 
-def _sensors(scenario: Scenario) -> Sensors:
+def sensors_of(scenario: Scenario) -> Sensors:
+    """What a scenario's law is told of the vehicle's motion."""
     table, simulation = scenario.sensors, scenario.simulation
     vectors = {
         name: Sensor(getattr(table, f"{name}_noise"), *getattr(table, f"{name}_bias"))

@@ -1,19 +1,20 @@
 """Vehicles that do what they are told from outside: by a user's controller, or an environment.
 
-The commands stand in MuJoCo's controls and stay there until the next. Both vehicles have the speeds
-of their rotors as states here, so that they can be told speeds, thrusts or accelerations.
+Their law is to do what `Told` says; layers around it make of that what they make of any law's
+commands. Both vehicles have the speeds of their rotors as states here, so that they can be told
+speeds, thrusts or accelerations.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from controllers.gaits import GaitParameters, tilt_reference
 from controllers.references import ReferenceParameters
-from controllers.scalar import scalar
+from controllers.scalar import Quad, scalar
 from controllers.vehicle import Vehicle
 from tiltsim.loop import ControlSetup, Floats, Loop, Sizes
 from tiltsim.loops.full_pose import TILT_COMMANDS
@@ -32,6 +33,19 @@ if TYPE_CHECKING:
     from tiltsim.scenario import Scenario
 
 
+class Told(NamedTuple):
+    """What the vehicle was told last."""
+
+    tilt_1: float = 0.0  # rad, for the servos
+    tilt_2: float = 0.0
+    tilt_3: float = 0.0
+    tilt_4: float = 0.0
+    acceleration_1: float = 0.0  # rad/s^2, of the rotors, with their signs
+    acceleration_2: float = 0.0
+    acceleration_3: float = 0.0
+    acceleration_4: float = 0.0
+
+
 class ControlParameters(NamedTuple):
     """The head of `userdata`."""
 
@@ -40,19 +54,20 @@ class ControlParameters(NamedTuple):
     vehicle: Vehicle
     gait: GaitParameters
     reference: ReferenceParameters
+    told: Told = Told()  # changes with every command, in the plant's copy of the parameters
 
 
 @scalar
 def planned_servo_commands(
     time: float, lead: float, gait: GaitParameters, table: Sequence[float]
-) -> tuple[float, ...]:
+) -> Quad:
     """What the tilt servos are told to follow the planned gait, their lag allowed for."""
     a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, gait, table)
     return a1 + lead * rate_1, a2 + lead * rate_2, a3 + lead * rate_3, a4 + lead * rate_4
 
 
 @scalar
-def resting_tiltrotor_controls(
+def commanded_tiltrotor_controls(
     time: float,
     qpos: Sequence[float],
     qvel: Sequence[float],
@@ -60,16 +75,17 @@ def resting_tiltrotor_controls(
     parameters: ControlParameters,
     table: Sequence[float],
 ) -> tuple[float, ...]:
-    """All twelve controls as long as nothing is commanded: the planned gait at constant speeds."""
+    """All twelve controls of the tiltrotor."""
+    told = parameters.told
     return (
-        *planned_servo_commands(time, parameters.servo_lead, parameters.gait, table),
+        *(told.tilt_1, told.tilt_2, told.tilt_3, told.tilt_4),
         *rotor_thrust_controls(act),
-        *(0.0, 0.0, 0.0, 0.0),
+        *(told.acceleration_1, told.acceleration_2, told.acceleration_3, told.acceleration_4),
     )
 
 
 @scalar
-def resting_quadrotor_controls(
+def commanded_quadrotor_controls(
     time: float,
     qpos: Sequence[float],
     qvel: Sequence[float],
@@ -77,8 +93,12 @@ def resting_quadrotor_controls(
     parameters: ControlParameters,
     table: Sequence[float],
 ) -> tuple[float, ...]:
-    """All eight controls as long as nothing is commanded: constant speeds."""
-    return (*rotor_thrust_controls(act), 0.0, 0.0, 0.0, 0.0)
+    """All eight controls of the quadrotor."""
+    told = parameters.told
+    return (
+        *rotor_thrust_controls(act),
+        *(told.acceleration_1, told.acceleration_2, told.acceleration_3, told.acceleration_4),
+    )
 
 
 @scalar
@@ -92,8 +112,25 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     gait = scenario.gait.plan(vehicle)
     reference, table = scenario.reference_and_table()
     lead = servo_lead(scenario.rotorcraft.tilt_servo)
-    parameters = ControlParameters(signature, lead, vehicle, gait.parameters, reference)
-    return ControlSetup(parameters, table)
+    tilts = planned_servo_commands(0.0, lead, gait.parameters, table)
+    told = Told(*tilts)
+    return ControlSetup(
+        ControlParameters(signature, lead, vehicle, gait.parameters, reference, told), table
+    )
+
+
+def with_told(parameters: Any, told: Told) -> Any:
+    """Parameters of a vehicle under commands, whatever the layers around it, told otherwise."""
+    if isinstance(parameters, ControlParameters):
+        return parameters._replace(told=told)
+    return parameters._replace(law=with_told(parameters.law, told))
+
+
+def commanded_parameters(parameters: Any) -> ControlParameters:
+    """The parameters of the vehicle under commands within those of its layers."""
+    while not isinstance(parameters, ControlParameters):
+        parameters = parameters.law
+    return parameters
 
 
 @scalar
@@ -147,7 +184,7 @@ TILTROTOR: Final = Loop(
     model="tiltrotor",
     sizes=Sizes(qpos=11, qvel=10, act=4, ctrl=12),
     parameters=ControlParameters,
-    controls=resting_tiltrotor_controls,
+    controls=commanded_tiltrotor_controls,
     refresh=refreshed_controls,
     setup=_setup,
     initial_activations=lambda scenario, _setup: initial_rotor_speeds(scenario),
@@ -164,7 +201,7 @@ QUADROTOR: Final = Loop(
     model="quadrotor",
     sizes=Sizes(qpos=7, qvel=6, act=4, ctrl=8),
     parameters=ControlParameters,
-    controls=resting_quadrotor_controls,
+    controls=commanded_quadrotor_controls,
     refresh=refreshed_quadrotor_controls,
     setup=_setup,
     initial_activations=lambda scenario, _setup: initial_rotor_speeds(scenario),
@@ -172,6 +209,7 @@ QUADROTOR: Final = Loop(
     derive=_derive_quadrotor,
     watched=lambda _sample, _setup: (),
     follows_position=_follows_position,
+    flies_gait=False,
 )
 """The quadrotor under commands."""
 

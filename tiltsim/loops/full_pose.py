@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from controllers.full_pose import Parameters, full_pose_inputs
-from controllers.gaits import tilt_reference
 from controllers.scalar import Quad, Triple, scalar
 from tiltsim.controller_tables import FullPoseController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
+from tiltsim.kinds.rotorcraft import initial_tilts
 from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes
 from tiltsim.loops.quadrotor import references
 from tiltsim.loops.tiltrotor import (
@@ -78,11 +78,6 @@ def observe_full_pose(
 def watch_rotor_stops(values: Sequence[float], parameters: ControlParameters) -> Quad:
     """The rotor speeds along their spin."""
     return rotor_spins(values)
-
-
-def _initial_tilts(scenario: Scenario) -> tuple[float, ...]:
-    gait = scenario.gait.plan(scenario.rotorcraft.resolve())
-    return tilt_reference(0.0, gait.parameters, gait.table)[:4]
 
 
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
@@ -164,7 +159,7 @@ FULL_POSE: Final = Loop(
     controls=full_pose_controls,
     refresh=refreshed_controls,
     setup=_setup,
-    initial_activations=lambda s, _setup: (*initial_rotor_speeds(s), *_initial_tilts(s)),
+    initial_activations=lambda s, _setup: (*initial_rotor_speeds(s), *initial_tilts(s)[0]),
     observe=observe_full_pose,
     derive=_derive,
     watched=lambda sample, _setup: rotor_stops(sample),
@@ -175,7 +170,7 @@ FULL_POSE: Final = Loop(
         rates=equation_rates,
         initial=lambda s, _setup: (
             *initial_state(s, initial_rotor_speeds(s)),
-            *_initial_tilts(s),
+            *initial_tilts(s)[0],
         ),
         observe=observe_equations,
     ),

@@ -186,6 +186,7 @@ def extended_loop(
         derive=derive,
         watched=watched,
         watch=watch,
+        flies_gait=False,
         law_states=2,
         law_fields=LAW_FIELDS,
         extra_columns={**EXTENSION_COLUMNS, **(own_columns or {})},

@@ -135,5 +135,6 @@ QUADROTOR_ATTITUDE_ALTITUDE: Final = Loop(
     watch=watch_attitude,
     follows_position=lambda _scenario: False,
     equations=equations(equation_inputs, 4, equation_rates, observe_in_equations),
+    flies_gait=False,
 )
 """The attitude-altitude law around the quadrotor."""

@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from tiltsim.rerun_stream.live import LiveStream
-    from tiltsim.rerun_stream.recording import RecordingFile, save_recording
+    from tiltsim.rerun_stream.process import RecordingProcess
+    from tiltsim.rerun_stream.recording import save_recording
     from tiltsim.rerun_stream.viewer import view_flights, view_recordings
 
 APPLICATION: Final = "tiltsim"
@@ -26,7 +27,7 @@ TIMELINE: Final = "sim_time"
 
 _HOMES = {
     "LiveStream": "live",
-    "RecordingFile": "recording",
+    "RecordingProcess": "process",
     "save_recording": "recording",
     "view_flights": "viewer",
     "view_recordings": "viewer",
@@ -36,7 +37,7 @@ __all__ = [
     "APPLICATION",
     "TIMELINE",
     "LiveStream",
-    "RecordingFile",
+    "RecordingProcess",
     "save_recording",
     "view_flights",
     "view_recordings",

@@ -15,11 +15,11 @@ from tiltsim.rerun_stream.car_series import (
 )
 from tiltsim.rerun_stream.plane import AttitudePlane
 from tiltsim.rerun_stream.series import (
-    PANELS,
     Panel,
     Series,
     limit_series,
     measured_series,
+    panels,
     series_values,
 )
 
@@ -60,7 +60,7 @@ class Aspect:
 
 ASPECTS: Final = {
     "rotorcraft": Aspect(
-        panels=lambda _scenario: PANELS,
+        panels=panels,
         measured=measured_series,
         limits=limit_series,
         values=series_values,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from tiltsim.attitude_plane import MOVING_TRAIL_TIME
 from tiltsim.rerun_stream import TIMELINE
 from tiltsim.rerun_stream.plane import BOUND
 
@@ -24,6 +25,7 @@ class Shown:
     camera: str
     floor: str
     plane: str  # empty where there is none
+    plane_stands: bool  # whether its curve stays where it is
     panels: tuple[Panel, ...]
     eye: tuple[float, float, float]  # seen from the vehicle, in radii of it
     up: tuple[float, float, float]
@@ -112,9 +114,9 @@ def _plane_view(flights: list[Shown]) -> Any:
 
     return rrb.Spatial2DView(
         origin="plane",
-        name="Attitude among the unacceptable attitudes",
+        name="Attitude (shaded: unacceptable attitudes)",
         visual_bounds=rrb.VisualBounds2D(x_range=(-BOUND, BOUND), y_range=(-BOUND, BOUND)),
-        overrides={f"{flight.plane}/trail": _from_the_start() for flight in flights},
+        overrides={f"{flight.plane}/trail": _attitude_trail(flight) for flight in flights},
     )
 
 
@@ -125,27 +127,31 @@ def _events_view() -> Any:
         origin="events",
         name="Events",
         columns=rrb.TextLogColumns(
-            timeline_columns=[TIMELINE], text_log_columns=["LogLevel", "Body"]
+            timeline_columns=[TIMELINE],
+            text_log_columns=["Body"],  # colours tell the levels
         ),
     )
 
 
 def _plots(flights: list[Shown]) -> tuple[list[Any], list[float]]:
-    """The time series and their heights; of several flights what they are compared by."""
+    """The time series and their heights; of several flights what they are compared by.
+
+    Flights keep their colours, so one legend will do; long names would hide half of every plot.
+    """
     panels = flights[0].panels
     if len(flights) == 1:
         whole = [(panel.title, [f"{panel.path}/**"]) for panel in panels]
         return [_plot(*plot) for plot in whole], [panel.height for panel in panels]
-    plots = []
+    plots: list[Any] = []
     for panel in panels:
         levels = [f"{flights[0].name}/{panel.path}/{level}" for level in panel.levels]
         for series, title in panel.compared:
             lines = [f"{flight.name}/{panel.path}/{series}" for flight in flights]
-            plots.append(_plot(title, [*lines, *levels]))
+            plots.append(_plot(title, [*lines, *levels], legend=not plots))
     return plots, [1.0] * len(plots)
 
 
-def _plot(title: str, contents: list[str]) -> Any:
+def _plot(title: str, contents: list[str], *, legend: bool = True) -> Any:
     import rerun.blueprint as rrb
 
     return rrb.TimeSeriesView(
@@ -153,7 +159,7 @@ def _plot(title: str, contents: list[str]) -> Any:
         contents=contents,
         name=title,
         axis_x=rrb.TimeAxis(link="LinkToGlobal"),
-        plot_legend=rrb.PlotLegend("RightTop"),
+        plot_legend=rrb.PlotLegend("RightTop", visible=legend),
     )
 
 
@@ -167,6 +173,20 @@ def _grid(height: float) -> Any:
 
 def _trails(flights: list[Shown]) -> dict[str, Any]:
     return {f"{flight.world}/trail": _from_the_start() for flight in flights}
+
+
+def _attitude_trail(flight: Shown) -> Any:
+    """All attitudes so far, or the latest: earlier ones were among other unacceptable ones."""
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    if flight.plane_stands:
+        return _from_the_start()
+    return rrb.VisibleTimeRanges(
+        timeline=TIMELINE,
+        start=rr.TimeRangeBoundary.cursor_relative(seconds=-MOVING_TRAIL_TIME),
+        end=rr.TimeRangeBoundary.cursor_relative(),
+    )
 
 
 def _from_the_start() -> Any:

@@ -45,15 +45,21 @@ BOUND: Final = HALF_WIDTH * 1.28
 
 
 class AttitudePlane:
-    """The entities below ``plane`` for one flight."""
+    """The entities below ``plane`` for one flight, ``among_others`` where several are compared."""
 
     def __init__(
-        self, recording: rr.RecordingStream, scenario: Scenario, root: str, color: Color
+        self,
+        recording: rr.RecordingStream,
+        scenario: Scenario,
+        root: str,
+        color: Color,
+        among_others: bool = False,
     ) -> None:
         self._recording = recording
         self._vehicle = scenario.rotorcraft.resolve()
         self._root = root
         self._color = color
+        self._labelled = not among_others  # labels of several would hide each other
         self._curve_ticks = Ticks(CURVE_INTERVAL)
         self._trail_ticks = Ticks(ATTITUDE_TRAIL_INTERVAL)
         self._drawn: Floats | None = None  # the unit vector along n that the curve shows
@@ -72,7 +78,9 @@ class AttitudePlane:
                 colors=[palette.FORBIDDEN], radii=[STRIPE_RADIUS], draw_order=-20.0
             ),
             "curve": rr.LineStrips2D.from_fields(
-                colors=[palette.RED if paints else self._color], radii=[-2.0], draw_order=1.0
+                colors=[palette.RED if paints else self._color],
+                radii=[-2.0],
+                draw_order=1.5 if paints else 1.0,  # on its ground also where others are the same
             ),
             "margin": rr.LineStrips2D.from_fields(radii=[-1.2], draw_order=2.0),
             "trail": rr.LineStrips2D.from_fields(
@@ -93,7 +101,8 @@ class AttitudePlane:
         n = torque_free_directions(piece.columns, self._vehicle)
         self._append_curves(time, n)
         attitude = np.stack([piece["roll"], piece["pitch"]], axis=1)
-        points = rr.Points2D.columns(positions=on_screen(attitude), labels=margin_labels(margin))
+        labels = margin_labels(margin) if self._labelled else None
+        points = rr.Points2D.columns(positions=on_screen(attitude), labels=labels)
         self._send("attitude", time, points)
         reach = np.stack([attitude, nearest_singular(n, attitude)], axis=1)
         near = np.abs(margin) < MARGIN_THRESHOLD

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tiltsim.attitude_plane import curve_stands
 from tiltsim.events import Event, EventWatch
 from tiltsim.replay import thrust_scale, vehicle_radius, visible_model
 from tiltsim.rerun_stream import palette
@@ -72,7 +73,7 @@ class FlightRecorder:
         self._aspect = aspect = aspect_of(scenario)
         self._plane = None
         if aspect.plane is not None:
-            self._plane = aspect.plane(recording, scenario, f"plane{suffix}", color)
+            self._plane = aspect.plane(recording, scenario, f"plane{suffix}", color, bool(name))
         series = comparison_series(name, color, scenario) if name else aspect.measured(scenario)
         self._series = TimeSeries(recording, series, aspect.values, f"{part}/" if name else "")
         self._plane_root, self._scene_root = f"plane{suffix}", f"world{suffix}"
@@ -89,6 +90,7 @@ class FlightRecorder:
             camera=self._scene.camera,
             floor=self._scene.floor,
             plane=self._plane_root if self._plane is not None else "",
+            plane_stands=curve_stands(self._scenario),
             panels=self._aspect.panels(self._scenario),
             eye=self._aspect.eye,
             up=self._aspect.up,

@@ -12,6 +12,7 @@ from tiltsim.files import replacing
 from tiltsim.rerun_stream import APPLICATION, palette
 from tiltsim.rerun_stream.blueprint import flight_blueprint
 from tiltsim.rerun_stream.recorder import FlightRecorder
+from tiltsim.rerun_stream.viewer import require_rerun
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -39,24 +40,29 @@ class RecordingFile:
     def __init__(self, scenarios: Sequence[Scenario]) -> None:
         import rerun as rr
 
+        require_rerun()
         # Flushed by rows and bytes alone: a clock would cut the chunks elsewhere in every run.
         unhurried = rr.ChunkBatcherConfig(flush_tick=UNHURRIED)
         self._recording = new_recording(scenarios, batching=unhurried)
         self._recorders = make_recorders(self._recording, scenarios)
         for recorder in self._recorders:
             recorder.begin()
-        self._blueprint = flight_blueprint([recorder.shown() for recorder in self._recorders])
+        blueprint = flight_blueprint([recorder.shown() for recorder in self._recorders])
+        # Not into a file: Rerun would take no notice of a full disk.
+        self._content = self._recording.memory_recording()
+        self._recording.send_blueprint(blueprint, make_active=False, make_default=True)
 
     def save(self, flights: Sequence[Flight], path: Path) -> None:
         """Write the flights, one a scenario; the file appears whole or not at all.
 
         Equal flights give equal recordings. Raises `InputError` where the file cannot be written.
         """
+        write_flights(self._recorders, flights)
+        content = self._content.drain_as_bytes()
+        self._recording.disconnect()
         try:
             with replacing(path) as temporary:
-                self._recording.save(temporary, default_blueprint=self._blueprint)
-                write_flights(self._recorders, flights)
-                self._recording.disconnect()
+                temporary.write_bytes(content)
         except OSError as error:
             raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
 

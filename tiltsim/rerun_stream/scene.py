@@ -35,6 +35,7 @@ TRAIL_INTERVAL: Final = 0.1  # s between the corners of a trail
 REFERENCE_POINTS: Final = 400
 TRAIL_WIDTH: Final = -1.5  # negative: in points of the screen, whatever the distance
 REFERENCE_WIDTH: Final = -1.0
+DOT: Final = -4.0  # vehicle and reference, to be seen from however far
 FLOOR_CELL: Final = 1.0  # m
 FLOOR_CELLS: Final = 12  # either way of the vehicle
 
@@ -103,15 +104,14 @@ class Scene:
         )
         self._begin_thrust()
         self._begin_floor()
-        if self._name:
-            label = rr.Points3D(
-                [(0.0, 0.0, 0.0)],
-                radii=[0.0],
-                colors=[self._color],
-                labels=[self._name],
-                show_labels=True,
-            )
-            self._log(f"{self.camera}/name", label)
+        dot = rr.Points3D(
+            [(0.0, 0.0, 0.0)],
+            radii=[DOT],
+            colors=[self._color],
+            labels=[self._name] if self._name else None,
+            show_labels=True,
+        )
+        self._log(f"{self.camera}/dot", dot)
         return left_out
 
     def append(self, piece: Flight) -> None:
@@ -170,9 +170,7 @@ class Scene:
         if not self._follows:
             return
         path = reference_path(self._scenario, until)
-        size = 0.08 * vehicle_radius(self._model)
-        color = palette.WHITE
-        now = rr.Points3D.from_fields(colors=[color], radii=[size])
+        now = rr.Points3D.from_fields(colors=[palette.WHITE], radii=[DOT])
         self._log(f"{self.root}/reference/now", now)
         if np.ptp(path, axis=0).max() > 0.0:
             line = rr.LineStrips3D([path], colors=[palette.GREY], radii=[REFERENCE_WIDTH])

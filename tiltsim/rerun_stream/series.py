@@ -49,20 +49,20 @@ class Panel:
 
 
 PANELS: Final = (
-    Panel("attitude", "Attitude (rad)", 6.5, (("roll", "Roll (rad)"), ("pitch", "Pitch (rad)"))),
-    Panel("tilt_angles", "Tilt angles (rad)", 7.5, ()),
+    Panel("attitude", "Attitude (rad)", 7.5, (("roll", "Roll (rad)"), ("pitch", "Pitch (rad)"))),
+    Panel("tilt_angles", "Tilt angles (rad)", 6.5, ()),
     Panel(
         "rotor_speeds",
         "Rotor speeds along their spins (rad/s)",
-        5.5,
-        (("slowest", "Slowest rotor (rad/s)"),),
+        6.0,
+        (("slowest", "Slowest rotor and limits (rad/s)"),),
         ("min", "max"),
     ),
     Panel(
         "singularity",
         "Singularity margin (rad)",
-        4.5,
-        (("margin", "Singularity margin (rad)"),),
+        6.0,
+        (("margin", "Singularity margin and threshold (rad)"),),
         ("threshold", "singular"),
     ),
     Panel(
@@ -72,7 +72,7 @@ PANELS: Final = (
         (("distance", "Distance from the reference (m)"),),
     ),
 )
-"""The plots of a flight, from top to bottom."""
+"""The plots of a flight, from top to bottom; legends fit a window of 1600 by 1000 pixels."""
 
 _ROTORS: Final = (1, 2, 3, 4)
 _ROTOR_COLORS: Final = (palette.AMBER, palette.SKY, palette.PINK, palette.GREEN)
@@ -80,6 +80,12 @@ _ROTOR_COLORS: Final = (palette.AMBER, palette.SKY, palette.PINK, palette.GREEN)
 _ROTOR_WIDTHS: Final = (4.0, 3.0, 2.0, 1.2)
 _ANGLE_COLORS: Final = {"roll": palette.RED, "pitch": palette.GREEN, "yaw": palette.SKY}
 _AXIS_COLORS: Final = {"x": palette.RED, "y": palette.GREEN, "z": palette.SKY}
+
+
+def panels(scenario: Scenario) -> tuple[Panel, ...]:
+    """The plots of a scenario's flights; a quadrotor has no tilt angles to plot."""
+    tilts = scenario.vehicle.model != "quadrotor"
+    return tuple(panel for panel in PANELS if tilts or panel.path != "tilt_angles")
 
 
 def measured_series(scenario: Scenario) -> list[Series]:

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 DEFAULT_URL: Final = "rerun+http://127.0.0.1:9876/proxy"
 """Where a viewer listens unless told otherwise."""
 
+RECORDING_START: Final = b"RRF"
+"""What every recording begins with; the version follows."""
+
 PATIENCE: Final = 2.0  # s to wait for a viewer to answer
 
 
@@ -45,9 +48,14 @@ def view_flights(flights: Sequence[Flight], url: str | None = None) -> None:
 
 
 def view_recordings(paths: Sequence[Path]) -> None:
-    """Open saved recordings in a viewer. Raises `InputError` where there is no screen."""
+    """Open saved recordings in a viewer.
+
+    Raises `InputError` where one cannot be read or is no recording, or where there is no screen.
+    """
     import rerun_cli
 
+    for path in paths:
+        _require_recording(path)
     require_viewer(None)
     program = Path(rerun_cli.__file__).with_name("rerun")
     program = program.with_suffix(".exe") if sys.platform == "win32" else program
@@ -59,11 +67,30 @@ def view_recordings(paths: Sequence[Path]) -> None:
     )
 
 
+def _require_recording(path: Path) -> None:
+    """The viewer would open with nothing but a notice that soon goes away."""
+    try:
+        with path.open("rb") as file:
+            start = file.read(len(RECORDING_START))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+    if start != RECORDING_START:
+        raise InputError(f"{path}: not a Rerun recording")
+
+
+def require_rerun() -> None:
+    """Raise `InputError` where the environment switches Rerun off: it would record nothing."""
+    value = os.environ.get("RERUN", "")
+    if value.strip().lower() in {"0", "false", "off"}:
+        raise InputError(f"RERUN={value} in the environment switches Rerun off; unset it")
+
+
 def require_viewer(url: str | None) -> None:
     """Make sure that a viewer listens at a URL or, without one, that there is a screen.
 
     Raises `InputError` otherwise, in one line with the way out.
     """
+    require_rerun()
     if url is not None:
         _require_listener(url)
     elif sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 import numpy as np
 
-from tiltsim.attitude_plane import torque_free_directions
+from tiltsim.attitude_plane import MOVING_TRAIL_TIME, curve_stands, torque_free_directions
 from tiltsim.loops import loop_of
 from tiltsim.video.inset import PlaneInset, lay_over
 from tiltsim.video.offscreen import Caption, Image
@@ -50,6 +50,7 @@ class RotorcraftAspect:
         self._attitude = np.stack([flight["roll"], flight["pitch"]], axis=1)
         side = float(np.sign(flight["singularity_margin"][0])) or 1.0
         self._inset = PlaneInset(round(INSET_SHARE * height), side)
+        self._curve_stands = curve_stands(flight.scenario)
         self._gap = round(GAP_SHARE * height)
         self.caption = Caption(
             "shaded: attitudes out of reach", self._gap, self._inset.size + self._gap
@@ -65,10 +66,18 @@ class RotorcraftAspect:
 
     def paint(self, image: Image, sample: int) -> None:
         """See `Aspect.paint`."""
-        trail = self._attitude[: sample + 1 : 2]
+        trail = self._attitude[self._trail_start(sample) : sample + 1 : 2]
         trail = np.concatenate([trail, self._attitude[sample : sample + 1]])
         margin = float(self._flight["singularity_margin"][sample])
         lay_over(image, self._inset.paint(self._n[sample], trail, margin), self._gap)
+
+    def _trail_start(self, sample: int) -> int:
+        """The first sample of the trail, an even one lest the trail crawl from frame to frame."""
+        if self._curve_stands:
+            return 0
+        time = self._flight["time"]
+        start = int(np.searchsorted(time, time[sample] - MOVING_TRAIL_TIME))
+        return start - start % 2
 
 
 class TiltCarAspect:
