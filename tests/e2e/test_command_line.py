@@ -17,7 +17,9 @@ from xml.etree import ElementTree
 import pyarrow.parquet as pq
 import pytest
 
+from tiltsim.cache import before_compiling
 from tiltsim.cli import main
+from tiltsim.commands.progress import compiling_told
 from tiltsim.flight import COLUMN_UNITS
 from tiltsim.loops.tiltrotor import TILTROTOR
 from tiltsim.metrics import METRICS
@@ -322,6 +324,20 @@ def test_long_lines_are_wrapped_on_a_terminal_alone(capsys, monkeypatch):
     assert max(map(len, piped.splitlines())) > 120
     assert max(map(len, shown.splitlines())) <= 80
     assert shown.split() == piped.split()
+
+
+def test_a_terminal_is_told_what_is_being_compiled(capsys, monkeypatch):
+    name = TILTROTOR.native_name("thesis")
+    with compiling_told(shown=True):
+        assert before_compiling == []  # standard error is no terminal here
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    with compiling_told(shown=False):
+        assert before_compiling == []
+    with compiling_told(shown=True):
+        (tell,) = before_compiling
+        tell(name)
+    assert before_compiling == []
+    assert "tiltsim: compiling tiltrotor for the thesis plant, once" in capsys.readouterr().err
 
 
 def test_schema_knows_every_table_and_the_variants(capsys):
