@@ -297,3 +297,16 @@ def test_mistakes_are_one_clear_line(tmp_path, capsys):
         captured = capsys.readouterr()
         assert captured.err.startswith("tiltsim: ")
         assert captured.err.count("\n") == 1
+
+
+def test_digest_of_sources_is_that_of_their_contents_wherever_they_lie(tmp_path):
+    for first, second in (("a", "b"), ("z", "c")):  # the order of the folders is another
+        for folder, text in ((first, "one"), (second, "two")):
+            (tmp_path / folder).mkdir()
+            (tmp_path / folder / "law.py").write_text(text)
+    here = sorted(tmp_path.glob("[ab]/law.py"))
+    there = sorted(tmp_path.glob("[cz]/law.py"))
+    assert flying.sources_digest(here, "numpy") == flying.sources_digest(there, "numpy")
+    assert flying.sources_digest(here) != flying.sources_digest(here, "numpy")
+    there[0].write_text("three")
+    assert flying.sources_digest(here, "numpy") != flying.sources_digest(there, "numpy")
