@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import mujoco
@@ -24,6 +25,7 @@ from tiltsim.loops.actuation import with_actuation
 from tiltsim.loops.air import with_air
 from tiltsim.loops.on_equations import on_equations
 from tiltsim.loops.supervised import with_supervisor
+from tiltsim.native import compile_callbacks, compile_stepper
 from tiltsim.plants import flight_model, make_plant, what_decides_the_model
 
 TROT = {"amplitude": 0.3, "period": 0.8}
@@ -459,6 +461,58 @@ def test_a_row_without_a_result_is_no_number():
         *(2, np.array([1.0, 2.0]), np.array([[0.0], [4.0]]), setup),
     )
     np.testing.assert_array_equal(rows, [[np.nan, np.nan], [4.0, 0.5]])
+
+
+def test_what_is_about_to_be_compiled_is_told_and_what_is_cached_is_not(monkeypatch, tmp_path):
+    import tiltsim.cache as cache
+
+    monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
+    told = []
+    monkeypatch.setattr(cache, "before_compiling", [told.append])
+    cache.native_code_is_needed("mujoco.some.law")
+    assert told == ["mujoco.some.law"]
+    cache.native_code_was_compiled("mujoco.some.law")
+    cache.native_code_is_needed("mujoco.some.law")
+    assert told == ["mujoco.some.law"]
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_each_plant_tells_what_it_compiles(monkeypatch, tmp_path, plant):
+    import tiltsim.cache as cache
+
+    class ToldError(Exception):
+        pass
+
+    def stop(name):
+        raise ToldError(name)
+
+    monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
+    monkeypatch.setattr(cache, "before_compiling", [stop])
+    loop = LOOPS["attitude_altitude"]
+    compiling = compile_callbacks if plant == "mujoco" else compile_stepper
+    with pytest.raises(ToldError, match=re.escape(loop.native_name(plant))):
+        compiling.__wrapped__(loop)
+
+
+def test_all_that_processes_fly_with_is_compiled_for_them_once(monkeypatch):
+    import tiltsim.checking as checking
+
+    calls = []
+
+    class Recorded:
+        def __init__(self, wanted):
+            calls.append(wanted.simulation.plant)
+
+        def record(self, samples, steps):
+            calls.append("record")
+
+        def advance(self, steps):
+            calls.append("advance")
+
+    monkeypatch.setattr(checking, "make_plant", Recorded)
+    flights = [scenario({}, plant="thesis", duration=1000.0) for _ in range(2)]
+    assert checking.shared_engine(flights) == "native"
+    assert calls == ["thesis", "record", "advance"]
 
 
 def test_whether_native_code_is_cached_is_known_by_law_and_plant(monkeypatch, tmp_path):

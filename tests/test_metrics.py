@@ -9,7 +9,7 @@ import pytest
 
 from tiltsim.flight import COLUMN_UNITS, SAMPLE_FIELDS, End, Flight
 from tiltsim.loading import parse_scenario
-from tiltsim.metrics import METRICS
+from tiltsim.metrics import METRICS, unit_of
 
 R = 2.423e-7 / (0.1785 * 8.048e-6)  # K_m / (L K_f), ch. 3
 HOVER = {f"rotor_speed_{i}": sign * 360.0 for i, sign in zip((1, 2, 3, 4), (-1, 1, -1, 1))}
@@ -311,3 +311,10 @@ def test_the_final_attitude_error_is_the_largest_of_the_last_second():
 def test_a_whole_turn_of_yaw_is_no_error():
     metrics = fly(yaw=np.full(len(TIMES), 2.0 * pi + 0.02)).metrics()
     assert metrics["final_attitude_error"] == pytest.approx(0.02)
+
+
+def test_units_are_those_of_the_metrics():
+    assert unit_of("final_position_error_x") == "m"
+    assert unit_of("max_rotor_speed") == "rad/s"
+    assert unit_of("duration") == "s"
+    assert unit_of("switches") == unit_of("diverged") == unit_of("saturated_fraction") == ""

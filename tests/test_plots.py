@@ -55,6 +55,26 @@ def test_axes_say_their_units():
         assert any(unit in axes.get_ylabel() for unit in ("rad", "m")), axes.get_title(loc="left")
 
 
+@pytest.mark.parametrize("panel", ["Attitude", "Position error"])
+def test_lines_of_a_panel_differ_without_color(panel):
+    lines = axes_by_title(flight_figure(flight("trot")))[panel].lines
+    named = [line for line in lines if line.get_label() in {"roll", "pitch", "yaw", *"xyz"}]
+    assert len({str(line._dash_pattern) for line in named}) == 3
+
+
+@pytest.mark.parametrize(("period", "shown"), [(0.5, "Tilt angles"), (0.05, "last 0.3 s")])
+def test_a_gait_of_very_many_periods_is_shown_by_its_last(period, shown):
+    this = flight("trot")
+    gait = this.scenario.gait.model_copy(update={"period": period})
+    this = replace(this, scenario=this.scenario.model_copy(update={"gait": gait}))
+    panels = axes_by_title(flight_figure(this))
+    [title] = [title for title in panels if title.startswith("Tilt angles")]
+    assert title.endswith(shown)
+    end = this["time"][-1]
+    assert panels[title].get_xlim() == pytest.approx((end - 0.3 if period < 0.1 else 0.0, end))
+    assert panels["Rotor speeds"].get_xlim() == pytest.approx((0.0, end))
+
+
 def test_rotor_limits_are_drawn_where_there_are_some():
     limited = axes_by_title(flight_figure(flight("limited")))["Rotor speeds"]
     free = axes_by_title(flight_figure(flight("fixed")))["Rotor speeds"]

@@ -54,6 +54,7 @@ def test_the_figure_is_drawn(capsys, tmp_path):
     file = tmp_path / "figure.png"
     assert main(["singularity", "quadrotor", "--plot", str(file)]) == 0
     assert file.read_bytes().startswith(b"\x89PNG")
+    assert capsys.readouterr().out.endswith(f"\nfigure written to {file}\n")
     assert len(singularity_figure(PRESETS["ar_drone_2"]).axes) == 8
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
+from collections.abc import Callable
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -39,6 +40,17 @@ def native_code_folder() -> Path:
 def native_code_is_cached(name: str) -> bool:
     """Whether native code of this name would be loaded rather than compiled."""
     return _mark(name).exists()
+
+
+before_compiling: Final[list[Callable[[str], None]]] = []
+"""Called with a name before its code is compiled, which takes seconds, for a screen to say so."""
+
+
+def native_code_is_needed(name: str) -> None:
+    """Say that native code of this name will be loaded or, where there is none yet, compiled."""
+    if before_compiling and not native_code_is_cached(name):
+        for tell in before_compiling:
+            tell(name)
 
 
 def native_code_was_compiled(name: str) -> None:

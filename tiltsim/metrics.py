@@ -56,6 +56,17 @@ WALL_CLOCK_METRICS: Final = frozenset({"realtime_factor"})
 
 BOOLEAN_METRICS: Final = frozenset({"diverged"})
 
+_UNITS: Final = frozenset(
+    {"m", "rad", "s", "rad/s", "m/s", "m/s^2", "N", "N m", "m^2/s^2", "rad^2/s^2"}
+)
+
+
+def unit_of(metric: str) -> str:
+    """The unit of a metric, empty where it has none."""
+    unit = METRICS[metric].rpartition(", ")[2].partition(" (")[0]
+    return unit if unit in _UNITS and metric not in BOOLEAN_METRICS else ""
+
+
 SETTLED_ALTITUDE: Final = 0.005  # m
 SETTLED: Final = 20.0  # s, from when the supremum of the position error counts
 

@@ -29,6 +29,7 @@ from controllers.scalar import scalar, scalar_functions
 from tiltsim.cache import (
     native_code_can_be_kept,
     native_code_folder,
+    native_code_is_needed,
     native_code_was_compiled,
 )
 from tiltsim.engine import EngineName, check_model
@@ -252,6 +253,7 @@ def compile_callbacks(loop: Loop) -> Callbacks:
     The cache knows the callback by the values it closes over, so these must pickle to the same
     bytes in every process: module-level functions, numbers and dtypes do.
     """
+    native_code_is_needed(loop.native_name("mujoco"))
     controls, hold, signature = loop.controls, loop.held, loop.signature
     observe, watch = loop.observe, loop.watch or watch_nothing
     _register_scalar_functions()
@@ -324,6 +326,7 @@ def compile_stepper(loop: Loop) -> tuple[Any, Any]:
     in front of that the address of a `Recorder` and a number of samples; it stops where recording
     is over. Neither holds Python's lock.
     """
+    native_code_is_needed(loop.native_name("thesis"))
     _register_scalar_functions()
     assert loop.equations is not None
     inputs, observe = loop.equations.inputs, loop.equations.observe

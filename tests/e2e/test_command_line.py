@@ -6,6 +6,7 @@ import atexit
 import gc
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -18,8 +19,10 @@ from xml.etree import ElementTree
 import pyarrow.parquet as pq
 import pytest
 
+from tiltsim.cache import before_compiling
 from tiltsim.cli import main
 from tiltsim.commands import run as run_command
+from tiltsim.commands.progress import compiling_told
 from tiltsim.flight import COLUMN_UNITS
 from tiltsim.loops.tiltrotor import TILTROTOR
 from tiltsim.metrics import METRICS
@@ -78,7 +81,9 @@ def test_run_writes_the_three_files_and_prints_a_summary(tmp_path, capsys):
     assert main(["run", SETPOINT, *SHORT, "--set", "expect=[]", "--out", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "Setpoint, trot angle fixed at rho = 0.65, modified decoupler" in printed
-    assert "final_position_error_x" in printed
+    assert f"  {SETPOINT}\n" in printed
+    assert re.search(r"^  final_position_error_x  +-?[\d.e-]+ m$", printed, re.MULTILINE)
+    assert re.search(r"^  min_decoupling_condition  +[\d.]+$", printed, re.MULTILINE)
     assert sorted(path.name for path in out.iterdir()) == [
         "flight.parquet",
         "metrics.json",
@@ -319,6 +324,32 @@ def test_list_shows_every_scenario_with_title_and_source(capsys):
     assert len(trots) == 2
     shown = {line.split()[0] for line in lines if line}
     assert all(part in shown for e in entries for part in split_address(e["scenario"]))
+
+
+def test_long_lines_are_wrapped_on_a_terminal_alone(capsys, monkeypatch):
+    assert main(["list"]) == 0
+    piped = capsys.readouterr().out
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    assert main(["list"]) == 0
+    shown = capsys.readouterr().out
+    assert max(map(len, piped.splitlines())) > 120
+    assert max(map(len, shown.splitlines())) <= 80
+    assert shown.split() == piped.split()
+
+
+def test_a_terminal_is_told_what_is_being_compiled(capsys, monkeypatch):
+    name = TILTROTOR.native_name("thesis")
+    with compiling_told(shown=True):
+        assert before_compiling == []  # standard error is no terminal here
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    with compiling_told(shown=False):
+        assert before_compiling == []
+    with compiling_told(shown=True):
+        (tell,) = before_compiling
+        tell(name)
+    assert before_compiling == []
+    assert "tiltsim: compiling tiltrotor for the thesis plant, once" in capsys.readouterr().err
 
 
 def test_schema_knows_every_table_and_the_variants(capsys):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
@@ -171,6 +172,27 @@ def test_plot_draws_lines_and_says_what_was_lost(grid, tmp_path):
     assert figure.axes[0].get_xlabel() == "initial.attitude[0] (rad)"
     assert (figure.axes[0].get_xscale(), figure.axes[0].get_yscale()) == ("linear", "log")
     assert len(figure.axes[0].lines) in {4, 5}  # two decouplers, their lost flights, the key
+
+
+def test_lost_flights_lie_below_the_lines_in_the_order_of_the_legend(grid, tmp_path):
+    text = GRID.replace("count = 3", "count = 2").replace("stop = 0.4", "stop = 3.1")
+    plot = '[plot]\nkind = "lines"\nx = "initial.attitude[0]"\nlines = "controller.decoupler"\n'
+    grid.write_text(text + plot, encoding="utf-8")
+    results = load_results(swept(grid, tmp_path / "out"))
+    for name in ("max_abs_roll", "max_abs_pitch"):  # as if half of them had been lost
+        results.columns[name][results.columns["initial.attitude[0]"] > 1.5] = np.nan
+    results.columns["end"][results.columns["initial.attitude[0]"] > 1.5] = "diverged"
+    axes = sweep_figure(results, ("max_abs_roll",)).axes[0]
+    named = [line for line in axes.lines if not line.get_label().startswith("_")]
+    assert [line.get_label() for line in named] == [
+        *("conventional", "modified", "lost, rows in this order"),
+    ]
+    rows = [line for line in axes.lines if line.get_marker() == "x" and len(line.get_xdata())]
+    first, second = (line.get_ydata()[0] for line in rows)
+    assert first > second
+    low, high = axes.get_ylim()
+    least = min(np.nanmin(line.get_ydata()) for line in named[:2])
+    assert (least - low) / (high - low) > first
 
 
 def test_plot_draws_distributions(tmp_path):

@@ -91,6 +91,14 @@ def test_page_and_summary_have_them(pushed):
     assert "A push &lt;from&gt; the | left" in html
 
 
+def test_the_page_names_a_flight_once_for_all_its_metrics(pushed):
+    html = page(pushed)
+    assert html.count("A push &lt;from&gt; the | left") == 1
+    row = html[html.index('rowspan="2">A push') :]
+    row = row[: row.index("Thrown")]
+    assert [row.count(f"<td>{name}") for name in ("final position error x", "diverged")] == [1, 1]
+
+
 def test_the_library_sets_flights_beside_flights_of_the_library():
     addresses = {address for address, _, _ in library_entries()}
     pairs = {a: other_address(a, load_scenario(a).without) for a in addresses}

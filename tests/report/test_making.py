@@ -5,21 +5,25 @@ from __future__ import annotations
 import dataclasses
 import re
 from html.parser import HTMLParser
+from io import BytesIO
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from tiltsim.checking import collect
 from tiltsim.cli import main
 from tiltsim.exit_codes import EXPECTATION_FAILED, INVALID_INPUT
+from tiltsim.figures.style import CYCLE, new_figure
 from tiltsim.report import flying
-from tiltsim.report.content import failure_text, measured_text, published_text
+from tiltsim.report.content import Group, failure_text, measured_text, published_text
 from tiltsim.report.findings import FINDINGS
 from tiltsim.report.flying import Record, Refusal, flight_key, fly, plan_flights
 from tiltsim.report.making import make_report
 from tiltsim.report.markdown import markdown
 from tiltsim.report.model import Outcome
 from tiltsim.report.page import page
-from tiltsim.report.pictures import AnalysisPicture, Drawing, png
+from tiltsim.report.pictures import DPI, AnalysisPicture, Drawing, png
 from tiltsim.report.rows import count
 
 
@@ -219,6 +223,40 @@ def test_the_page_says_what_was_found(full):
     assert "{" not in re.sub(r"<style>.*?</style>", "", text, flags=re.DOTALL)
 
 
+def test_rows_of_one_flight_are_told_by_their_metrics(report, library):
+    [row] = rows_of(report, "The flight is lost")
+    claim = dataclasses.replace(row.claim, statement="Both", case="Blue")
+    wanted = claim.expectation.model_copy(update={"metric": "final_roll"})
+    other = dataclasses.replace(claim, expectation=wanted)
+    elsewhere = dataclasses.replace(claim, address=f"{library}/a_file.toml")
+    rows = [dataclasses.replace(row, claim=one) for one in (claim, other)]
+    assert [Group("Both", rows).case(one) for one in rows] == [
+        "Blue (diverged)",
+        "Blue (final roll)",
+    ]
+    assert Group("Both", rows[:1]).case(rows[0]) == "Blue"
+    rows.append(dataclasses.replace(row, claim=elsewhere))
+    cases = [Group("Both", rows).case(one) for one in rows]
+    assert cases == ["Blue (lost, diverged)", "Blue (lost, final roll)", "Blue (a file)"]
+
+
+def test_drawings_have_a_palette():
+    figure = new_figure(3.0, 2.0)
+    shades = figure.subplots()
+    shades.imshow(np.linspace(0.0, 1.0, 10_000).reshape(100, 100), cmap="cividis", aspect="auto")
+    for number, color in enumerate(CYCLE):
+        shades.axhline(10.0 * number, lw=0.4, color=color)
+    drawn, packed = BytesIO(), png(figure)
+    figure.savefig(drawn, dpi=DPI)
+    with Image.open(BytesIO(packed)) as image, Image.open(drawn) as full:
+        assert image.mode == "P"
+        assert image.size == full.size
+        far = np.abs(np.asarray(image.convert("RGB"), int) - np.asarray(full.convert("RGB"), int))
+    assert far.max() < 24  # of 255
+    assert len(packed) < 0.7 * len(drawn.getvalue())
+    assert png(figure) == packed
+
+
 def test_the_summary_is_stable_and_well_formed(full, library, kept):
     text = markdown(full)
     assert text == markdown(dataclasses.replace(full, drawings=[]))
@@ -259,3 +297,16 @@ def test_mistakes_are_one_clear_line(tmp_path, capsys):
         captured = capsys.readouterr()
         assert captured.err.startswith("tiltsim: ")
         assert captured.err.count("\n") == 1
+
+
+def test_digest_of_sources_is_that_of_their_contents_wherever_they_lie(tmp_path):
+    for first, second in (("a", "b"), ("z", "c")):  # the order of the folders is another
+        for folder, text in ((first, "one"), (second, "two")):
+            (tmp_path / folder).mkdir()
+            (tmp_path / folder / "law.py").write_text(text)
+    here = sorted(tmp_path.glob("[ab]/law.py"))
+    there = sorted(tmp_path.glob("[cz]/law.py"))
+    assert flying.sources_digest(here, "numpy") == flying.sources_digest(there, "numpy")
+    assert flying.sources_digest(here) != flying.sources_digest(here, "numpy")
+    there[0].write_text("three")
+    assert flying.sources_digest(here, "numpy") != flying.sources_digest(there, "numpy")

@@ -18,7 +18,6 @@ from tiltsim.report.model import (
     Outcome,
     judge_value,
     scenario_claims,
-    unit_of,
     worst,
 )
 
@@ -192,13 +191,6 @@ def test_a_claim_without_sense_is_refused_with_its_key(more, words):
     expect = {key: value for key, value in expect.items() if value is not None}
     with pytest.raises(InputError, match=words):
         scenario([expect])
-
-
-def test_units_are_those_of_the_metrics():
-    assert unit_of("final_position_error_x") == "m"
-    assert unit_of("max_rotor_speed") == "rad/s"
-    assert unit_of("duration") == "s"
-    assert unit_of("switches") == unit_of("diverged") == unit_of("saturated_fraction") == ""
 
 
 def test_the_registry_holds_claims_that_can_be_told_apart():

@@ -6,6 +6,7 @@ import argparse
 import json
 from typing import Any
 
+from tiltsim.commands.progress import compiling_told
 from tiltsim.errors import InputError
 
 
@@ -50,14 +51,15 @@ def run(arguments: argparse.Namespace) -> int:
 
     from tiltsim.benchmark import bench_accuracy, bench_flights, run_benchmark
 
-    if arguments.vehicles is not None:
-        rows = bench_flights(
-            arguments.vehicles, arguments.duration, arguments.integrator, arguments.timestep
-        )
-    elif arguments.accuracy:
-        rows = bench_accuracy()
-    else:
-        rows = run_benchmark()
+    with compiling_told(shown=True):
+        if arguments.vehicles is not None:
+            rows = bench_flights(
+                arguments.vehicles, arguments.duration, arguments.integrator, arguments.timestep
+            )
+        elif arguments.accuracy:
+            rows = bench_accuracy()
+        else:
+            rows = run_benchmark()
     if arguments.json:
         print(json.dumps(rows, indent=2))
         return 0

@@ -8,6 +8,7 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tiltsim.commands.progress import compiling_told
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, FLIGHT_LOST, INVALID_INPUT
 
 if TYPE_CHECKING:
@@ -64,9 +65,10 @@ def run(arguments: argparse.Namespace) -> int:
     overrides = dict(parse_override(text) for text in arguments.overrides)
     addresses = collect(arguments.paths or [str(shipped_folder("scenarios"))])
     width = max(len(address) for address in addresses)
-    results = check_all(
-        addresses, arguments.jobs, overrides, lambda result: _print_result(result, width)
-    )
+    with compiling_told(shown=True):
+        results = check_all(
+            addresses, arguments.jobs, overrides, lambda result: _print_result(result, width)
+        )
     if junit is not None:
         write_junit(results, junit)
     counts = Counter(result.status for result in results)

@@ -15,7 +15,7 @@ from tiltsim.commands.angles import (
     parse_vehicle,
     vehicle_text,
 )
-from tiltsim.commands.text import aligned, json_text, number, numbers, table
+from tiltsim.commands.text import aligned, json_text, number, numbers, table, tell_of_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -142,6 +142,7 @@ def run(arguments: argparse.Namespace) -> int:
         opposite_speed = OPPOSITE_SHARE * chosen.vehicle.hover_rotor_speed
         report["faults"] = fault_report((a1, a2, a3, a4), chosen.vehicle, opposite_speed)
     _print(arguments, report, _summary)
+    tell_of_figure(arguments)
     return 0
 
 
@@ -254,6 +255,7 @@ def _run_determinant(arguments: argparse.Namespace) -> int:
     vehicle, case = parse_vehicle(arguments.vehicle), arguments.case or "equal"
     save(determinant_figure(case, vehicle), arguments.plot)
     _print(arguments, determinant_report(case, vehicle), _determinant_text)
+    tell_of_figure(arguments)
     return 0
 
 
@@ -270,8 +272,7 @@ def _list_report() -> list[dict[str, Any]]:
 
 
 def _list_text(report: list[dict[str, Any]]) -> str:
-    header = ["gait", "color", "angles", "margin", "on exact lines", "biased"]
-    header += ["conditioning", "claim holds"]
+    header = ["gait", "color", "angles", "margin", "exact", "biased", "condition", "claim"]
     claims = {True: "yes", False: "no", None: "-"}
     rows = [
         (
@@ -290,8 +291,9 @@ def _list_text(report: list[dict[str, Any]]) -> str:
         [
             table(header, rows, frozenset({3, 4, 5, 6})),
             "",
-            "margin: smallest over a period at level attitude, rad; negative: R changes sign",
-            "conditioning: smallest over largest singular value of tau on the exact lines, least",
+            "margin: smallest over a period at level attitude, rad; below 0: R changes sign",
+            "exact: the same on the exact lines of the color; biased: of the biased twin",
+            "condition: smallest over largest singular value of tau, on the exact lines",
             "claim: more robust than the biased twin, and not singular itself",
         ]
     )

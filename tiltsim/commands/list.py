@@ -6,6 +6,7 @@ import argparse
 import json
 from typing import Any
 
+from tiltsim.commands.text import fitted
 from tiltsim.library import Entry, library_entries, library_families, library_sweeps
 
 
@@ -46,4 +47,5 @@ def _print_families() -> None:
 
 
 def _line(entry: Entry, address: str) -> str:
-    return f"{address}  {entry.title}" + (f" ({entry.source})" if entry.source else "")
+    line = f"{address}  {entry.title}" + (f" ({entry.source})" if entry.source else "")
+    return fitted(line, len(address) + 2 if address.startswith(" ") else 4)

@@ -12,7 +12,7 @@ from tiltsim.commands.angles import (
     parse_vehicle,
     vehicle_text,
 )
-from tiltsim.commands.text import aligned, json_text
+from tiltsim.commands.text import aligned, json_text, tell_of_figure
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
 
 if TYPE_CHECKING:
@@ -81,6 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
 
         save(map_figure(vehicle, [("path", path)] if path else None), arguments.plot)
     print(json_text(report) if arguments.json else _summary(report))
+    tell_of_figure(arguments)
     return DONE if path is None or report["path"]["sound"] else EXPECTATION_FAILED
 
 

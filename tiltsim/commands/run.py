@@ -172,8 +172,12 @@ def lost(flight: Flight) -> str:
 
 def summary(flight: Flight, verdicts: list[Verdict]) -> str:
     """The flight in a few aligned lines."""
+    from tiltsim.metrics import unit_of
+
     scenario, metrics = flight.scenario, flight.metrics()
     lines = [scenario.title or scenario.address or "scenario"]
+    if scenario.title and "#" in scenario.address:  # a family's title may not tell its member
+        lines.append(f"  {scenario.address}")
     if scenario.source:
         lines.append(f"  {scenario.source}")
     simulation = scenario.simulation
@@ -183,9 +187,12 @@ def summary(flight: Flight, verdicts: list[Verdict]) -> str:
         f"{simulation.timestep:g} s, {flight.engine} engine, {metrics['realtime_factor']:.0f} times"
         " real time"
     )
-    rows = [(name, f"{value:.6g}") for name, value in metrics.items() if name not in _IN_HEADER]
-    width = max(len(name) for name, _ in rows)
-    lines += ["", *(f"  {name:<{width}}  {value:>12}" for name, value in rows)]
+    shown = [name for name in metrics if name not in _IN_HEADER]
+    width = max(map(len, shown))
+    lines.append("")
+    lines += [
+        f"  {name:<{width}}  {metrics[name]:>12.6g} {unit_of(name)}".rstrip() for name in shown
+    ]
     if verdicts:
         lines += ["", *expectation_lines(verdicts)]
     return "\n".join(lines)

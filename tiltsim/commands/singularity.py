@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.angles import allow_negative_lists, parse_angle, parse_vehicle
+from tiltsim.commands.text import aligned, tell_of_figure
 
 if TYPE_CHECKING:
     from controllers.vehicle import Vehicle
@@ -52,6 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
 
         save(singularity_figure(vehicle), arguments.plot)
     print(json.dumps(report, indent=2) if arguments.json else _summary(report))
+    tell_of_figure(arguments)
     return 0
 
 
@@ -109,5 +111,4 @@ def _summary(report: dict[str, Any]) -> str:
             f"pitch {zone['pitch_min']:.4g} to {zone['pitch_max']:.4g} rad",
         ),
     ]
-    width = max(len(name) for name, _ in rows)
-    return "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
+    return "\n".join(aligned(rows))

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import argparse
 import json
+import shutil
+import sys
 from collections.abc import Iterable, Sequence
+from textwrap import fill
 from typing import Any
 
 
@@ -16,6 +20,12 @@ def number(value: float, form: str = ".6g") -> str:
 def numbers(values: Iterable[float]) -> str:
     """Numbers as text, separated by commas."""
     return ", ".join(number(value) for value in values)
+
+
+def tell_of_figure(arguments: argparse.Namespace) -> None:
+    """Say where ``--plot`` went, as `tiltsim plot` does, unless the output is JSON."""
+    if arguments.plot is not None and not arguments.json:
+        print(f"figure written to {arguments.plot}")
 
 
 def json_text(report: Any) -> str:
@@ -34,7 +44,20 @@ def _unsigned_zeros(value: Any) -> Any:
 def aligned(rows: Sequence[tuple[str, str]]) -> list[str]:
     """Pairs of name and value as lines, the values under each other."""
     width = max(len(name) for name, _ in rows)
-    return [f"{name:<{width}}  {value}" for name, value in rows]
+    return [fitted(f"{name:<{width}}  {value}", width + 2) for name, value in rows]
+
+
+def fitted(line: str, indent: int) -> str:
+    """A line; on a terminal that is too narrow for it, wrapped with the rest indented.
+
+    Files and pipes get lines as they are, so that a program finds one thing on each.
+    """
+    if not sys.stdout.isatty():
+        return line
+    width = max(shutil.get_terminal_size().columns, indent + 20)
+    return fill(
+        line, width, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False
+    )
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]], numeric: frozenset[int]) -> str:

@@ -38,7 +38,7 @@ def comparison_figure(flights: Sequence[Flight]) -> Figure:
             raise InputError(f"plot: {_name(flight)}: the {model} has no margin to compare")
     panels: list[tuple[Any, str, str]] = [(_margin, "Singularity margin", "rad")]
     if all("determinant" in flight.units for flight in flights):
-        panels.append((_determinant, "Determinant, 4 for a level untilted vehicle", "1"))
+        panels.append((_determinant, "Determinant, 4 for a level untilted vehicle", "n · r₃"))
     if any(SUPERVISION in flight.columns for flight in flights):
         panels.append((_supervision, "What the supervisor takes away", "share"))
     panels.append((_error, "Distance from the reference", "m"))
@@ -47,16 +47,19 @@ def comparison_figure(flights: Sequence[Flight]) -> Figure:
         rows: Any = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (draw, title, unit) in zip(rows, panels, strict=True):
             for number, flight in enumerate(flights):
-                color, dashes = style.CYCLE[number], style.DASHES[number]
+                look = style.line_look(number)
                 line = draw(axes, flight)
                 if line is None:
                     continue
                 time = flight["time"]
-                axes.plot(time, line, color=color, ls=dashes, lw=1.3)
+                axes.plot(time, line, lw=1.3, **look)
                 if flight.end.kind != "completed":
                     low, high = axes.get_ylim()
                     last = float(np.clip(line[-1], low, high))
-                    axes.plot(time[-1], last, "X", color=color, ms=8, zorder=6, clip_on=False)
+                    axes.plot(
+                        *(time[-1], last, "X"),
+                        **{"color": look["color"], "ms": 7, "zorder": 6, "clip_on": False},
+                    )
             axes.set_title(title)
             axes.set_ylabel(unit)
         rows[-1].set_xlim(0.0, max(float(flight["time"][-1]) for flight in flights))
@@ -64,8 +67,7 @@ def comparison_figure(flights: Sequence[Flight]) -> Figure:
         for number, flight in enumerate(flights):
             lost = flight.end.kind != "completed"
             label = f"{_name(flight)}, lost at {flight.end.time:.2f} s" if lost else _name(flight)
-            color, dashes = style.CYCLE[number], style.DASHES[number]
-            rows[0].plot([], [], color=color, ls=dashes, label=label)
+            rows[0].plot([], [], label=label, **style.line_look(number))
         figure.legend(loc="outside upper left", ncols=2, alignment="left")
         return figure
 

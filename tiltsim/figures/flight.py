@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from controllers.vehicle import SPIN
+from controllers.vehicle import SPIN, Vehicle
 from tiltsim.attitude_plane import (
     ACTS,
     HALF_WIDTH,
@@ -32,6 +32,12 @@ FORBIDDEN: Final = "#F6DDD0"
 INSTANTS: Final = 120
 """Instants of the flight for which the plane shows what its gait forbids."""
 
+MANY: Final = 20
+"""A panel with more periods of a gait than this would be a solid band."""
+
+LAST: Final = 6
+"""So many periods are shown then."""
+
 _ROTORS: Final = (1, 2, 3, 4)
 _SUBSCRIPTS: Final = "₁₂₃₄"
 
@@ -49,12 +55,13 @@ def rotorcraft_figure(flight: Flight) -> Figure:
         halves: Any = figure.subfigures(1, 2, width_ratios=[2.1, 1.0])
         left, right = halves
         panels = (_attitude, _tilt_angles, _altitude, _rotor_speeds, _position_error, _margin)
-        series: Any = left.subplots(3, 2, sharex=True)
+        series: Any = left.subplots(3, 2)
         for axes, panel in zip(series.flat, panels, strict=True):
+            style.time_axis(axes, flight["time"][-1])
+            axes.tick_params(labelbottom=axes in series[-1])
             panel(axes, flight)
             if panel is not _margin:
                 cut_blow_up(axes, flight)
-            style.time_axis(axes, flight["time"][-1])
         for axes in series[-1]:
             axes.set_xlabel("time (s)")
         above, below = right.subplots(2, 1)
@@ -64,9 +71,8 @@ def rotorcraft_figure(flight: Flight) -> Figure:
 
 
 def _attitude(axes: Any, flight: Flight) -> None:
-    colors = {"roll": style.BLUE, "pitch": style.RED, "yaw": style.GREEN}
-    for angle, color in colors.items():
-        axes.plot(flight["time"], flight[angle], color=color, label=angle)
+    for angle, look in zip(("roll", "pitch", "yaw"), style.AXIS_LINES):
+        axes.plot(flight["time"], flight[angle], label=angle, **look)
         axes.plot(flight["time"], flight[f"{angle}_ref"], color=style.INK, ls=":", lw=0.8)
     axes.plot([], [], color=style.INK, ls=":", lw=0.8, label="reference")
     label(axes, "Attitude", "rad", columns=4)
@@ -81,21 +87,36 @@ def _altitude(axes: Any, flight: Flight) -> None:
 
 def _position_error(axes: Any, flight: Flight) -> None:
     follows = follows_position(flight.scenario)
-    colors = {"x": style.BLUE, "y": style.RED, "z": style.GREEN}
     axes.axhline(0.0, color=style.GREY, lw=0.7)
-    for axis in "xyz" if follows else "z":
-        error = flight[f"{axis}_ref"] - flight[axis]
-        axes.plot(flight["time"], error, color=colors[axis], label=axis)
+    for axis, look in zip("xyz", style.AXIS_LINES):
+        if follows or axis == "z":
+            error = flight[f"{axis}_ref"] - flight[axis]
+            axes.plot(flight["time"], error, label=axis, **look)
     widen(axes, 0.1)
     label(axes, "Position error", "m")
 
 
 def _tilt_angles(axes: Any, flight: Flight) -> None:
+    end, begin = flight["time"][-1], _begin_of_gait(flight)
     for rotor, line in zip(_ROTORS, style.ROTOR_LINES, strict=True):
         name = f"α{_SUBSCRIPTS[rotor - 1]}"
         axes.plot(flight["time"], flight[f"alpha_{rotor}"], label=name, **line)
     widen(axes, 0.1)
-    label(axes, "Tilt angles", "rad", columns=4)
+    title = "Tilt angles"
+    if begin > 0.0:
+        axes.set_xlim(begin, end)
+        axes.tick_params(labelbottom=True)
+        title += f", last {end - begin:g} s"
+    label(axes, title, "rad", columns=4)
+
+
+def _begin_of_gait(flight: Flight) -> float:
+    """From when on (s) tilt angles are shown: all of them, or the last of very many periods."""
+    vehicle, end = flight.scenario.vehicle.resolve(), float(flight["time"][-1])
+    if not isinstance(vehicle, Vehicle) or SUPERVISION in flight.columns:
+        return 0.0
+    period = flight.scenario.gait.plan(vehicle).period
+    return 0.0 if period is None or end <= MANY * period else end - LAST * period
 
 
 def _rotor_speeds(axes: Any, flight: Flight) -> None:
@@ -115,6 +136,8 @@ def _margin(axes: Any, flight: Flight) -> None:
     closest = int(np.argmin(margin))
     threshold = margin_threshold(flight.scenario)
     axes.fill_between(time, 0.0, threshold, color=FORBIDDEN, lw=0.0)
+    words = f"below {threshold:g} rad"
+    axes.text(0.012, 0.03, words, transform=axes.transAxes, fontsize=7.5, color="#7A4A33")
     if SUPERVISION in flight.columns:
         acts = flight[SUPERVISION] > ACTS
         axes.axhline(threshold, color=style.RED, ls="--", lw=0.9)

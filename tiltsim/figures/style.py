@@ -43,6 +43,13 @@ ROTOR_LINES: Final[tuple[dict[str, Any], ...]] = (
 )
 """How the lines of rotors 1 to 4 are drawn in one panel, in this order."""
 
+AXIS_LINES: Final[tuple[dict[str, Any], ...]] = (
+    {"color": BLUE, "ls": "-", "lw": 1.4},
+    {"color": RED, "ls": (0, (5, 1.2)), "lw": 1.4},
+    {"color": GREEN, "ls": (0, (5, 1.2, 1, 1.2)), "lw": 1.4},
+)
+"""How the lines of x, y, z, or roll, pitch, yaw, are drawn in one panel: as for rotors."""
+
 FORMATS: Final = (".png", ".svg", ".pdf")
 """File formats of a figure, by the ending of the file."""
 
@@ -74,6 +81,11 @@ _SETTINGS: Final = {
     "svg.hashsalt": "tiltsim",
     "pdf.fonttype": 42,
 }
+
+
+def line_look(number: int) -> dict[str, Any]:
+    """Colour and dashes of a line among others, by its number."""
+    return {"color": CYCLE[number % len(CYCLE)], "ls": DASHES[number % len(DASHES)]}
 
 
 @contextmanager

@@ -11,12 +11,12 @@ from tiltsim.errors import InputError
 from tiltsim.figures.distributions import distributions_figure
 from tiltsim.figures.style import (
     CYCLE,
-    DASHES,
     GREY,
     MARKERS,
     PALE,
     RED,
     SEQUENTIAL,
+    line_look,
     new_figure,
     paper_style,
     verbatim,
@@ -133,13 +133,8 @@ def _panel_grid(rows: int, columns: int, width: float, height: float) -> tuple[F
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
-def _look(number: int) -> dict[str, Any]:
-    """Colour and dashes of a line, by its number."""
-    return {"color": CYCLE[number % MAX_LINES], "ls": DASHES[number % len(DASHES)]}
-
-
 def _mark(number: int) -> dict[str, str]:
-    """The marker that goes with `_look`."""
+    """The marker that goes with `line_look`."""
     return {"marker": MARKERS[number % len(MARKERS)]}
 
 
@@ -155,15 +150,17 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
     abscissa, completed = results.values(x), are_completed(results)
     for row, metric in zip(grid, metrics):
         for axes, (title, mask) in zip(row, columns):
-            for number, (name, group) in enumerate(groups_of(results, lines, mask)):
+            groups = list(groups_of(results, lines, mask))
+            for number, (name, group) in enumerate(groups):
                 color, flown = CYCLE[number % MAX_LINES], group & completed
                 order = np.argsort(abscissa[group], kind="stable")
                 values = np.where(flown, results.columns[metric], np.nan)[group][order]
                 line = abscissa[group][order]
-                axes.plot(line, values, ms=3.5, label=name, **_look(number), **_mark(number))
+                axes.plot(line, values, ms=3.5, label=name, **line_look(number), **_mark(number))
                 lost = line[np.isnan(values)]
+                height = 0.03 + 0.04 * (len(groups) - 1 - number)  # in the order of the legend
                 axes.plot(
-                    *(lost, np.full(len(lost), 0.03 + 0.04 * number), "x"),
+                    *(lost, np.full(len(lost), height), "x"),
                     **{"color": color, "ms": 4, "transform": axes.get_xaxis_transform()},
                 )
             axes.set_title(title)
@@ -174,7 +171,9 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
             getattr(axes, f"set_{axis}scale")("log")
     _share_limits(grid)
     if not completed.all():
-        grid[0][0].plot([], [], "x", color=GREY, ms=4, label="lost")
+        for axes in grid.flat:
+            _make_room_below(axes, 0.03 + 0.04 * len(groups))
+        grid[0][0].plot([], [], "x", color=GREY, ms=4, label="lost, rows in this order")
     add_legend(grid[0][0], lines)
     return figure
 
@@ -186,6 +185,13 @@ def _share_limits(grid: Any) -> None:
         high = max(axes.get_ylim()[1] for axes in row)
         for axes in row:
             axes.set_ylim(low, high)
+
+
+def _make_room_below(axes: Any, share: float) -> None:
+    """Leave the lowest ``share`` of a panel's height to the marks of lost flights."""
+    scale = axes.yaxis.get_transform()
+    low, high = scale.transform(np.array(axes.get_ylim()))
+    axes.set_ylim(bottom=scale.inverted().transform(low - (high - low) * share / (1.0 - share)))
 
 
 # --- map -----------------------------------------------------------------------------------------
@@ -247,7 +253,7 @@ def _boundary_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure
             color = CYCLE[number % MAX_LINES]
             order = np.argsort(abscissa[group], kind="stable")
             line, last, first = (v[group][order] for v in (abscissa, holds, fails))
-            axes.plot(line, last, marker="o", ms=3.5, label=name, **_look(number))
+            axes.plot(line, last, marker="o", ms=3.5, label=name, **line_look(number))
             axes.fill_between(line, last, first, color=color, alpha=0.25, lw=0)
             whole = np.isnan(first)
             axes.plot(line[whole], last[whole], "^", ms=6, color=color)

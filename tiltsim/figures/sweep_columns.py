@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltsim.figures.style import verbatim
-from tiltsim.metrics import METRICS
+from tiltsim.metrics import METRICS, unit_of
 from tiltsim.sweeps.dataset import Column, SweepResults
 from tiltsim.sweeps.tables import NormalAxis, UniformAxis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_UNITS: Final = frozenset({"m", "s", "rad", "rad/s"})
 _KEY_UNITS: Final = {
     "gait.period": "s",
     "gait.amplitude": "rad",
@@ -72,9 +71,8 @@ def text_of(value: Any) -> str:
 
 def label_of(name: str) -> str:
     """A column's name with its unit, where it is known."""
-    unit = METRICS.get(name, "").rpartition(", ")[2]
-    if unit not in _UNITS:
-        unit = _KEY_UNITS.get(name.partition("[")[0], "")
+    key = name.partition("[")[0]
+    unit = unit_of(name) if name in METRICS else _KEY_UNITS.get(key, "")
     return f"{name} ({unit})" if unit else name
 
 

@@ -38,9 +38,9 @@ def tilt_car_figure(flight: Flight) -> Figure:
 
 def _errors(axes: Any, flight: Flight) -> None:
     axes.axhline(0.0, color=style.GREY, lw=0.7)
-    for axis, color in {"x": style.BLUE, "y": style.RED}.items():
+    for axis, look in zip("xy", style.AXIS_LINES):
         error = flight[f"{axis}_ref"] - flight[axis]
-        axes.plot(flight["time"], error, color=color, label=axis)
+        axes.plot(flight["time"], error, label=axis, **look)
     _whole(axes, flight)
     widen(axes, 1e-6)
     label(axes, "Dynamic state error, reference minus actual", "m")

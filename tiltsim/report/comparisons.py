@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Final
 
+from tiltsim.metrics import unit_of
 from tiltsim.report.flying import PLANTS, Flights, Plan, Plant, Record
-from tiltsim.report.model import CHAPTER, unit_of
+from tiltsim.report.model import CHAPTER
 
 TITLE: Final = "Beyond the thesis"
 EXPLANATION: Final = (

@@ -106,12 +106,19 @@ class Group:
         return reasons[0] if len(reasons) > 1 and len(set(reasons)) == 1 else ""
 
     def case(self, row: Row) -> str:
-        """What tells a row from the others; flights of the same title by their files, too."""
-        alike = [other for other in self.rows if other.claim.case == row.claim.case]
-        if len(alike) < 2 or not isinstance(row.claim, ExpectationClaim):
-            return row.claim.case
-        file = row.claim.address.partition("#")[0].rpartition("/")[2]
-        return f"{row.claim.case} ({file.removesuffix('.toml').replace('_', ' ')})"
+        """What tells a row from the others; where titles are the same, file or metric, too."""
+        claim = row.claim
+        alike = [other.claim for other in self.rows if other.claim.case == claim.case]
+        if len(alike) < 2 or not isinstance(claim, ExpectationClaim):
+            return claim.case
+        flights = [other for other in alike if isinstance(other, ExpectationClaim)]
+        words = []
+        if len({other.address for other in flights}) > 1:
+            file = claim.address.partition("#")[0].rpartition("/")[2]
+            words.append(file.removesuffix(".toml").replace("_", " "))
+        if sum(other.address == claim.address for other in flights) > 1:
+            words.append(claim.expectation.metric.replace("_", " "))
+        return f"{claim.case} ({', '.join(words)})"
 
 
 def why_of(row: Row) -> str:

@@ -273,8 +273,6 @@ def code_digest() -> bytes:
 
 
 def sources_digest(sources: list[Path], *more: str) -> bytes:
-    """Digest of files, whatever their order, and of strings."""
-    digest = hashlib.sha256(repr(more).encode())
-    for source in sorted(sources):
-        digest.update(source.name.encode() + source.read_bytes())
-    return digest.digest()
+    """Digest of files, wherever they lie and whatever their order, and of strings."""
+    files = (hashlib.sha256(f.name.encode() + f.read_bytes()).digest() for f in sources)
+    return hashlib.sha256(repr(more).encode() + b"".join(sorted(files))).digest()

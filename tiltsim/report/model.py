@@ -10,7 +10,7 @@ from enum import Enum
 from math import isfinite
 from typing import TYPE_CHECKING, Final, TypeAlias
 
-from tiltsim.metrics import BOOLEAN_METRICS, METRICS
+from tiltsim.metrics import unit_of
 
 if TYPE_CHECKING:
     from tiltsim.expectation_table import Expectation
@@ -214,17 +214,6 @@ def scenario_claims(scenario: Scenario) -> list[ExpectationClaim]:
         for wanted in scenario.expect
         if wanted.published is not None
     ]
-
-
-_UNITS: Final = frozenset(
-    {"m", "rad", "s", "rad/s", "m/s", "m/s^2", "N", "N m", "m^2/s^2", "rad^2/s^2"}
-)
-
-
-def unit_of(metric: str) -> str:
-    """The unit of a metric, empty where it has none."""
-    unit = METRICS[metric].rpartition(", ")[2].partition(" (")[0]
-    return unit if unit in _UNITS and metric not in BOOLEAN_METRICS else ""
 
 
 def _meaning(metric: str) -> str:

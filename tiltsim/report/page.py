@@ -7,6 +7,7 @@ from base64 import b64encode
 from collections.abc import Iterable, Iterator
 from html import escape
 from importlib.metadata import version
+from itertools import groupby
 from pathlib import Path
 from typing import Final
 
@@ -180,18 +181,24 @@ def _beyond(rows: list[comparisons.Comparison]) -> Iterator[str]:
             f'<tbody><tr class="group"><th colspan="4" scope="rowgroup"><div>{escape(file)} '
             f'<span class="section">{escape(members[0].source)}</span></div></th></tr>'
         )
-        for one in members:
-            beside = f'<span class="section">beside {escape(one.without)}</span>'
-            cells = "".join(
-                f'<td class="n">{escape(one.plants.get(plant, "–"))}</td>' for plant in PLANTS
-            )
-            yield (
-                f'<tr class="case"><th class="what" scope="row">{_prose(one.title)} '
-                f"{beside if one.without else ''}</th>"
-                f"<td>{escape(comparisons.quantity(one))}</td>{cells}</tr>"
-            )
+        for _, metrics in groupby(members, lambda one: one.address):
+            yield from _compared(list(metrics))
         yield "</tbody>"
     yield "</table></div></section>"
+
+
+def _compared(metrics: list[comparisons.Comparison]) -> Iterator[str]:
+    """The rows of one flight, named once."""
+    one = metrics[0]
+    beside = f' <span class="section">beside {escape(one.without)}</span>' if one.without else ""
+    title = f"{_prose(one.title)}{beside}"
+    head = f'<th class="what" scope="rowgroup" rowspan="{len(metrics)}">{title}</th>'
+    for metric in metrics:
+        cells = "".join(
+            f'<td class="n">{escape(metric.plants.get(plant, "–"))}</td>' for plant in PLANTS
+        )
+        yield f'<tr class="case">{head}<td>{escape(comparisons.quantity(metric))}</td>{cells}</tr>'
+        head = ""
 
 
 def _group(group: Group) -> Iterator[str]:
@@ -211,10 +218,8 @@ def _group(group: Group) -> Iterator[str]:
         why = why_of(row) if not group.shared_why else ""
         note = f'<span class="why">{_prose(why)}</span>' if why else ""
         kind = "" if single else ' class="case"'
-        # On narrow screens the verdicts are out of sight until the table is scrolled.
-        dot = f'<span class="mark dot {_CLASSES[row.outcome]}" aria-hidden="true"></span>'
         yield (
-            f'<tr{kind}><th class="what" scope="row">{dot}{head}</th>'
+            f'<tr{kind}><th class="what" scope="row">{head}</th>'
             f'<td class="n">{_number(published_text(row.claim), row)}</td>{_measured(row)}'
             f'<td class="verdict">{_mark(row.outcome)}{note}</td></tr>'
         )
