@@ -36,8 +36,8 @@ from controllers.rotation import shortest_turn, world_up_in_body
 from controllers.scalar import Quad, scalar
 from controllers.vehicle import Vehicle, drag_ratio
 
-PUBLISHED_DECOUPLING: Final = 0
-EXACT_DECOUPLING: Final = 1
+PUBLISHED_DECOUPLING: Final = 0.0
+EXACT_DECOUPLING: Final = 1.0
 
 DECOUPLINGS: Final = {"published": PUBLISHED_DECOUPLING, "exact": EXACT_DECOUPLING}
 """Forms of the decoupling matrix by the name a scenario gives them."""

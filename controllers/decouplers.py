@@ -13,10 +13,10 @@ from typing import Final
 
 from controllers.scalar import Triple, scalar
 
-NONE: Final = 0
-CONVENTIONAL: Final = 1
-MODIFIED: Final = 2
-EXACT: Final = 3
+NONE: Final = 0.0
+CONVENTIONAL: Final = 1.0
+MODIFIED: Final = 2.0
+EXACT: Final = 3.0
 
 DECOUPLERS: Final = {
     "none": NONE,

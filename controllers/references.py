@@ -10,12 +10,12 @@ from controllers.gaits.keyframes import NO_KEYFRAMES
 from controllers.scalar import scalar
 from controllers.waypoints import waypoint_motion
 
-SETPOINT: Final = 0
-LINE: Final = 1
-CIRCLE: Final = 2
-ATTITUDE_ALTITUDE: Final = 3
-LISSAJOUS: Final = 4
-WAYPOINTS: Final = 5
+SETPOINT: Final = 0.0
+LINE: Final = 1.0
+CIRCLE: Final = 2.0
+ATTITUDE_ALTITUDE: Final = 3.0
+LISSAJOUS: Final = 4.0
+WAYPOINTS: Final = 5.0
 
 REFERENCE_TYPES: Final = {
     "setpoint": SETPOINT,

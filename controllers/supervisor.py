@@ -37,9 +37,9 @@ from controllers.rotation import world_up_in_body
 from controllers.scalar import Quad, Triple, scalar
 from controllers.vehicle import Vehicle, drag_ratio
 
-SCALE: Final = 0
-HOLD: Final = 1
-RETURN_TO_RED: Final = 2
+SCALE: Final = 0.0
+HOLD: Final = 1.0
+RETURN_TO_RED: Final = 2.0
 
 STRATEGIES: Final = {"scale": SCALE, "hold": HOLD, "return_to_red": RETURN_TO_RED}
 """What a supervisor can do, by the name a scenario gives it."""

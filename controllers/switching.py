@@ -23,9 +23,9 @@ from controllers.references import reference_derivatives
 from controllers.scalar import scalar
 from controllers.yaw_position import Inputs, State, euler_rates, yaw_position_inputs
 
-RUNNING: Final = 0
-HELD: Final = 1
-BUMPLESS: Final = 2
+RUNNING: Final = 0.0
+HELD: Final = 1.0
+BUMPLESS: Final = 2.0
 
 EXTENSIONS: Final = {"running": RUNNING, "held": HELD, "bumpless": BUMPLESS}
 """What the extension's states do while the attitude-altitude law flies, by name.

@@ -36,9 +36,9 @@ from tiltsim.loops.commanded import (
     COMMANDED,
     Told,
     commanded_parameters,
-    planned_servo_commands,
     with_told,
 )
+from tiltsim.loops.tiltrotor import planned_servo_commands
 from tiltsim.plants import MujocoPlant, quiet_warnings
 from tiltsim.scenario import Scenario
 

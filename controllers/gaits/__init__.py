@@ -16,13 +16,13 @@ from controllers.gaits.trot import TiltsAndRates, continuous_trot, instant_trot
 from controllers.gaits.two_color import RED, two_color_circle
 from controllers.scalar import Quad, scalar
 
-FIXED: Final = 0
-TROT_INSTANT: Final = 1
-TROT_CONTINUOUS: Final = 2
-KEYFRAMES: Final = 3
-TWO_COLOR_CIRCLE: Final = 4
-PENGUIN: Final = 5
-ROTATING: Final = 6
+FIXED: Final = 0.0
+TROT_INSTANT: Final = 1.0
+TROT_CONTINUOUS: Final = 2.0
+KEYFRAMES: Final = 3.0
+TWO_COLOR_CIRCLE: Final = 4.0
+PENGUIN: Final = 5.0
+ROTATING: Final = 6.0
 
 GAIT_TYPES: Final = {
     "fixed": FIXED,

@@ -270,7 +270,7 @@ def two_color_circle(
     return Gait(name, parameters, source=source)
 
 
-def color_code(color: str) -> int:
+def color_code(color: str) -> float:
     """The code of a colour's name; ValueError with the choices for any other name."""
     if color not in COLORS:
         raise ValueError(f"{color!r} is no color; choose {', '.join(COLORS)}")

@@ -14,8 +14,8 @@ from typing import Final
 from controllers.gaits.trot import TiltsAndRates
 from controllers.scalar import scalar
 
-RED: Final = 0
-BLUE: Final = 1
+RED: Final = 0.0
+BLUE: Final = 1.0
 
 COLORS: Final = {"red": RED, "blue": BLUE}
 """Colours by the name a scenario gives them."""

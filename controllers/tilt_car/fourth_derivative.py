@@ -33,8 +33,8 @@ EXTENDED_STATE_FIELDS: Final = (
 )
 """The state of the car and the law's own first derivatives."""
 
-PUBLISHED: Final = 0
-EXACT: Final = 1
+PUBLISHED: Final = 0.0
+EXACT: Final = 1.0
 DECOUPLINGS: Final = {"published": PUBLISHED, "exact": EXACT}
 """Forms of the tilt's column by name."""
 

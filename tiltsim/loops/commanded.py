@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from controllers.gaits import GaitParameters, tilt_reference
+from controllers.gaits import GaitParameters
 from controllers.references import ReferenceParameters
-from controllers.scalar import Quad, scalar
+from controllers.scalar import scalar
 from controllers.vehicle import Vehicle
 from tiltsim.loop import ControlSetup, Floats, Loop, Sizes
 from tiltsim.loops.full_pose import TILT_COMMANDS
@@ -24,6 +24,7 @@ from tiltsim.loops.tiltrotor import (
     gait_singularity,
     initial_rotor_speeds,
     observe_tiltrotor,
+    planned_servo_commands,
     refreshed_controls,
     rotor_thrust_controls,
     servo_lead,
@@ -55,15 +56,6 @@ class ControlParameters(NamedTuple):
     gait: GaitParameters
     reference: ReferenceParameters
     told: Told = Told()  # changes with every command, in the plant's copy of the parameters
-
-
-@scalar
-def planned_servo_commands(
-    time: float, lead: float, gait: GaitParameters, table: Sequence[float]
-) -> Quad:
-    """What the tilt servos are told to follow the planned gait, their lag allowed for."""
-    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, gait, table)
-    return a1 + lead * rate_1, a2 + lead * rate_2, a3 + lead * rate_3, a4 + lead * rate_4
 
 
 @scalar

@@ -11,7 +11,7 @@ from controllers.gait_feedforward import INTEGRAL_FIELDS, Parameters, tracking_i
 from controllers.gaits import tilt_reference
 from controllers.references import position_reference
 from controllers.scalar import Triple, scalar
-from controllers.supervisor import AT_REST, gait_share
+from controllers.supervisor import AT_REST
 from tiltsim.controller_tables import AttitudeAltitudeController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
@@ -20,13 +20,13 @@ from tiltsim.loops.tiltrotor import (
     gait_singularity,
     initial_rotor_speeds,
     observe_tiltrotor,
+    planned_servo_commands,
     reference_columns,
     refreshed_controls,
     regularity,
     rotor_spins,
     rotor_stops,
     rotor_thrust_controls,
-    servo_commands,
     servo_lead,
     singular_matrix,
     tiltrotor_state,
@@ -75,10 +75,8 @@ def gait_feedforward_controls(
     """All fifteen controls: tilt servos, thrusts, rotor accelerations, rates of the integrals."""
     law = parameters.law
     state = tiltrotor_state(qpos, qvel, act)
-    planned = tilt_reference(time, law.gait, table)
-    share = gait_share(planned, state[6], state[7], law.supervisor, law.vehicle)
     return (
-        *servo_commands(planned, share, parameters.servo_lead),
+        *planned_servo_commands(time, parameters.servo_lead, law.gait, table),
         *rotor_thrust_controls(act),
         *law_rates(time, state, qvel, act, AT_REST, parameters, table),
     )
@@ -142,13 +140,8 @@ def references_in_force(
     time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
 ) -> tuple[float, ...]:
     """Columns of references at a time: the state is `SEEN`."""
-    law = parameters.law
-    planned = tilt_reference(time, law.gait, table)
-    share = gait_share(planned, state[6], state[7], law.supervisor, law.vehicle)
-    return (
-        *references_under(time, state, AT_REST, parameters, table),
-        *servo_commands(planned, share, 0.0),
-    )
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, parameters.law.gait, table)
+    return (*references_under(time, state, AT_REST, parameters, table), a1, a2, a3, a4)
 
 
 SEEN: Final = (*STATE_FIELDS, *TILT_RATE_COLUMNS, *INTEGRAL_FIELDS)

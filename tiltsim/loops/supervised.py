@@ -13,10 +13,10 @@ import tiltsim.loops.gait_feedforward as gait_feedforward
 import tiltsim.loops.tiltrotor as tiltrotor
 from controllers.attitude_altitude import STATE_FIELDS
 from controllers.gaits import GaitParameters, tilt_reference
+from controllers.rotation import euler_from_quaternion
 from controllers.scalar import Quad, Triple, scalar
 from controllers.supervisor import (
     HOLD,
-    STRATEGIES,
     Supervisor,
     gait_share,
     gait_time,
@@ -28,6 +28,7 @@ from controllers.vehicle import drag_ratio
 from tiltsim.loop import ControlSetup, Floats, Loop
 from tiltsim.loops.gait_feedforward import GAIT_FEEDFORWARD
 from tiltsim.loops.tiltrotor import (
+    TILT_REFERENCE_COLUMNS,
     TILTROTOR,
     gait_singularity,
     reference_columns,
@@ -39,7 +40,10 @@ if TYPE_CHECKING:
     from tiltsim.scenario import Scenario
 
 SUPERVISION: Final = "supervision"
-"""A column: how much the supervisor does, 0 nothing to 1 all it can."""
+"""A column: how much the supervisor does, 0 nothing to 1 all it can.
+
+It is the share of the gait's angles or of its speed that is taken away, or of the way to red.
+"""
 
 SUPERVISOR_FIELDS: Final = ("supervisor_state", "supervisor_rate")
 """States of a supervisor that has any: see `controllers.supervisor`."""
@@ -111,6 +115,62 @@ def supervised_commands(
     )
 
 
+@scalar
+def scaled_share(
+    time: float,
+    roll: float,
+    pitch: float,
+    law: Any,
+    supervisor: Supervisor,
+    table: Sequence[float],
+) -> float:
+    """The `gait_share` of the gait that a ``law`` flies."""
+    planned = tilt_reference(time, law.gait, table)
+    return gait_share(planned, roll, pitch, supervisor, law.vehicle)
+
+
+@cache
+def _scaling(loop: Loop) -> Loop:
+    """The loop of a law under a supervisor that scales the gait: it has no states."""
+    supervisor_of, inner_controls = _LAWS[loop].supervisor, loop.controls
+
+    @scalar
+    def controls(
+        time: float,
+        qpos: Sequence[float],
+        qvel: Sequence[float],
+        act: Sequence[float],
+        parameters: Any,
+        table: Sequence[float],
+    ) -> tuple[float, ...]:
+        planned = inner_controls(time, qpos, qvel, act, parameters, table)
+        roll, pitch, _yaw = euler_from_quaternion(qpos[3], qpos[4], qpos[5], qpos[6])
+        supervisor = supervisor_of(parameters)
+        share = scaled_share(time, roll, pitch, parameters.law, supervisor, table)
+        return (
+            *(share * planned[0], share * planned[1], share * planned[2], share * planned[3]),
+            *planned[4:],
+        )
+
+    def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+        columns = loop.derive(samples, setup)
+        share = _shares(samples, setup, supervisor_of(setup.parameters))
+        return (
+            columns
+            | {name: share * columns[name] for name in TILT_REFERENCE_COLUMNS}
+            | {SUPERVISION: 1.0 - share}
+        )
+
+    controls.__qualname__ = f"scaling.{loop.controls.__qualname__}"
+    return replace(loop, controls=controls, derive=derive, equations=None)
+
+
+def _shares(samples: Mapping[str, Floats], setup: ControlSetup, supervisor: Supervisor) -> Floats:
+    attitudes = zip(samples["time"].tolist(), samples["roll"].tolist(), samples["pitch"].tolist())
+    law, table = setup.parameters.law, setup.table
+    return np.array([scaled_share(*attitude, law, supervisor, table) for attitude in attitudes])
+
+
 @cache
 def _with_states(loop: Loop) -> Loop:
     """The loop of a law under a supervisor that holds the gait or returns to red.
@@ -164,7 +224,13 @@ def _with_states(loop: Loop) -> Loop:
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
         states = (*fields, *SUPERVISOR_FIELDS)
         columns = reference_columns(references_in_force, states, samples, setup)
-        return columns | gait_singularity(samples, setup.parameters.law.vehicle)
+        held, rate = (samples[name] for name in SUPERVISOR_FIELDS)
+        supervision = rate if supervisor_of(setup.parameters).strategy == HOLD else held
+        return (
+            columns
+            | gait_singularity(samples, setup.parameters.law.vehicle)
+            | {SUPERVISION: supervision}
+        )
 
     def initial_activations(scenario: Scenario, setup: ControlSetup) -> Sequence[float]:
         return (*loop.initial_activations(scenario, setup), 0.0, 0.0)
@@ -189,32 +255,6 @@ def with_supervisor(loop: Loop, strategy: str) -> Loop:
 
     Raises KeyError where the law flies no planned gait.
     """
-    law = _LAWS[loop]
     units = dict(zip(SUPERVISOR_FIELDS, _STATE_UNITS.get(strategy, ())))
-    inner = _with_states(loop) if units else loop
-
-    def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-        supervision = _supervision(samples, law.supervisor(setup.parameters), setup)
-        return inner.derive(samples, setup) | {SUPERVISION: supervision}
-
-    return replace(
-        inner, derive=derive, extra_columns={**inner.extra_columns, **units, SUPERVISION: "1"}
-    )
-
-
-def _supervision(
-    samples: Mapping[str, Floats], supervisor: Supervisor, setup: ControlSetup
-) -> Floats:
-    """The share of the gait's speed, of the way to red, or of its angles that is taken away."""
-    law = setup.parameters.law
-    if supervisor.strategy != STRATEGIES["scale"]:
-        held, rate = (samples[name] for name in SUPERVISOR_FIELDS)
-        return rate if supervisor.strategy == HOLD else held
-    attitudes = zip(samples["time"].tolist(), samples["roll"].tolist(), samples["pitch"].tolist())
-    shares = [
-        gait_share(
-            tilt_reference(time, law.gait, setup.table), roll, pitch, supervisor, law.vehicle
-        )
-        for time, roll, pitch in attitudes
-    ]
-    return 1.0 - np.array(shares)
+    inner = _with_states(loop) if units else _scaling(loop)
+    return replace(inner, extra_columns={**inner.extra_columns, **units, SUPERVISION: "1"})

@@ -23,13 +23,12 @@ from controllers.attitude_altitude import (
 )
 from controllers.decouplers import DECOUPLERS
 from controllers.decoupling_matrix import sines_and_cosines, torque_entries, torque_free_force
-from controllers.gaits import tilt_reference
-from controllers.gaits.trot import TiltsAndRates
+from controllers.gaits import GaitParameters, tilt_reference
 from controllers.references import position_reference
 from controllers.rotation import euler_from_quaternion, world_up_in_body
 from controllers.scalar import Quad, Triple, scalar
 from controllers.singularity import determinant, margin_over_gait
-from controllers.supervisor import Supervisor, gait_share
+from controllers.supervisor import Supervisor
 from controllers.vehicle import SPIN, Vehicle, drag_ratio
 from tiltsim.controller_tables import AttitudeAltitudeController
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
@@ -92,15 +91,12 @@ def rotor_thrust_controls(act: Sequence[float]) -> Quad:
 
 
 @scalar
-def servo_commands(planned: TiltsAndRates, share: float, lead: float) -> Quad:
-    """Commands (rad) of the tilt servos for a ``share`` of the planned gait."""
-    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = planned
-    return (
-        share * (a1 + lead * rate_1),
-        share * (a2 + lead * rate_2),
-        share * (a3 + lead * rate_3),
-        share * (a4 + lead * rate_4),
-    )
+def planned_servo_commands(
+    time: float, lead: float, gait: GaitParameters, table: Sequence[float]
+) -> Quad:
+    """What the tilt servos are told (rad) to follow the planned gait, their lag allowed for."""
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, gait, table)
+    return a1 + lead * rate_1, a2 + lead * rate_2, a3 + lead * rate_3, a4 + lead * rate_4
 
 
 @scalar
@@ -119,10 +115,8 @@ def tiltrotor_controls(
     """
     law = parameters.law
     state = tiltrotor_state(qpos, qvel, act)
-    planned = tilt_reference(time, law.gait, table)
-    share = gait_share(planned, state[6], state[7], parameters.supervisor, law.vehicle)
     return (
-        *servo_commands(planned, share, parameters.servo_lead),
+        *planned_servo_commands(time, parameters.servo_lead, law.gait, table),
         *rotor_thrust_controls(act),
         *rotor_accelerations(time, state, law, table),
     )
@@ -209,9 +203,7 @@ def references_in_force(
     torque = torque_entries(trig, ratio)
     x, y, z, _, _, _, _, _, _ = position_reference(time, law.reference, table)
     roll, pitch, yaw, _, _, _ = attitude_reference(time, state, trig, torque, law, table)
-    planned = tilt_reference(time, law.gait, table)
-    share = gait_share(planned, state[6], state[7], parameters.supervisor, law.vehicle)
-    a1, a2, a3, a4 = servo_commands(planned, share, 0.0)
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, table)
     return x, y, z, roll, pitch, yaw, a1, a2, a3, a4
 
 
