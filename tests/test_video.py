@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import time
+from ctypes.util import find_library
 
 import mujoco
 import numpy as np
@@ -15,20 +17,25 @@ from tests.flights import flight, saved
 from tiltsim.attitude_plane import MOVING_TRAIL_TIME, torque_free_directions
 from tiltsim.cli import main
 from tiltsim.errors import InputError
-from tiltsim.video import aspects, inset, offscreen
+from tiltsim.video import aspects, has_screen, inset, offscreen
 from tiltsim.video.aspects import RotorcraftAspect
 from tiltsim.video.film import Format, _Stage, film_flight, frames
 from tiltsim.video.inset import PlaneInset, lay_over
-from tiltsim.video.offscreen import make_gl_context
+from tiltsim.video.offscreen import make_contexts
 
 SMALL = Format(width=320, height=180, fps=10, speed=2.0)
 
 
+NOTHING = mujoco.MjModel.from_xml_string("<mujoco/>")
+
+
 def missing_gl():
     try:
-        make_gl_context(64, 64).free()
+        gl, context = make_contexts(NOTHING, 64, 64)
     except InputError as error:
         return str(error)
+    context.free()
+    gl.free()
     return ""
 
 
@@ -183,11 +190,31 @@ def test_no_way_to_draw_is_one_line_with_the_way_out(monkeypatch):
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     monkeypatch.setattr(offscreen, "MODULES", dict.fromkeys(offscreen.MODULES, "mujoco.no_such"))
     with pytest.raises(InputError) as caught:
-        make_gl_context(64, 64)
+        make_contexts(NOTHING, 64, 64)
     line = str(caught.value)
     assert len(line.splitlines()) == 1
     assert "apt-get install libegl1" in line
     assert "MUJOCO_GL=egl" in line
+
+
+def test_a_way_that_only_warns_is_one_line_too(monkeypatch):
+    if sys.platform != "linux" or has_screen():
+        pytest.skip("for Linux without a screen")
+    monkeypatch.setenv("MUJOCO_GL", "glfw")
+    with pytest.raises(InputError, match=r"no OpenGL to draw with \(glfw: .*; install a driver"):
+        make_contexts(NOTHING, 64, 64)
+
+
+@pytest.mark.parametrize("way", ["nonsense", "osmesa"])
+def test_what_mujoco_cannot_be_loaded_with_is_one_line(way, tmp_path):
+    if way == "osmesa" and (sys.platform != "linux" or find_library("OSMesa")):
+        pytest.skip("OSMesa is installed")
+    command = [sys.executable, "-m", "tiltsim", "run", "ch01_gust/hover#quadrotor", "--quiet"]
+    environment = os.environ | {"MUJOCO_GL": way}
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=60)
+    (line,) = done.stderr.splitlines()
+    assert (done.returncode, done.stdout) == (2, "")
+    assert line.startswith(f"tiltsim: MUJOCO_GL = {way!r}: MuJoCo cannot be loaded with it (")
 
 
 @pytest.mark.parametrize(

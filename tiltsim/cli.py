@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import atexit
 import gc
+import os
 import sys
 from importlib import import_module
 from io import TextIOWrapper
+from traceback import walk_tb
 from typing import Final, NoReturn
 
 from tiltsim.errors import InputError
@@ -60,6 +62,9 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
+LOOK_FOR_OPENGL: Final = ("mujoco", "dm_control._render")
+"""Packages that fail to load where what MUJOCO_GL names is not there."""
+
 OBJECTS_BETWEEN_COLLECTIONS: Final = 50_000
 """How many more objects than before there must be for a search for garbage to be worth its time."""
 
@@ -104,6 +109,24 @@ def _run(arguments: list[str] | None) -> int:
         place = printable(str(error.filename or "output"))
         print(f"tiltsim: {place}: {error.strerror or error}", file=sys.stderr)
         return INVALID_INPUT
+    except Exception as error:
+        if not (_rose_while_mujoco_loaded(error) and "MUJOCO_GL" in os.environ):
+            raise
+        way, reason = os.environ["MUJOCO_GL"], str(error).strip().partition("\n")[0]
+        print(
+            f"tiltsim: MUJOCO_GL = {way!r}: MuJoCo cannot be loaded with it ({reason}); choose "
+            "egl, osmesa or glfw, whichever is installed, or unset it",
+            file=sys.stderr,
+        )
+        return INVALID_INPUT
+
+
+def _rose_while_mujoco_loaded(error: Exception) -> bool:
+    """Whether an error comes from an import, where MuJoCo looks for what MUJOCO_GL names."""
+    return any(
+        frame.f_code.co_name == "<module>" and frame.f_globals["__name__"] in LOOK_FOR_OPENGL
+        for frame, _ in walk_tb(error.__traceback__)
+    )
 
 
 if __name__ == "__main__":

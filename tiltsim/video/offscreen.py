@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Callable
 from importlib import import_module
 from typing import Any, Final, NamedTuple, Self
@@ -23,22 +24,25 @@ MODULES: Final = {"egl": "mujoco.egl", "osmesa": "mujoco.osmesa", "glfw": "mujoc
 FONT_SIZE: Final = mujoco.mjtFontScale.mjFONTSCALE_100
 
 
-def make_gl_context(width: int, height: int) -> Any:
-    """An OpenGL context of at least this size (pixels), made current.
+def make_contexts(model: mujoco.MjModel, width: int, height: int) -> tuple[Any, mujoco.MjrContext]:
+    """An OpenGL context of at least this size (pixels), made current, and MuJoCo's for a model.
 
     MUJOCO_GL chooses the way to it; without it, EGL is tried first where there is no screen.
     Raises `InputError`, in one line with the way out, where none works.
     """
     failures = []
     for name, make in _ways().items():
-        try:
-            context = make(width, height)
-            context.make_current()
-        except Exception as error:  # every library fails in its own way
-            reason = str(error).strip().partition("\n")[0] or type(error).__name__
-            failures.append(f"{name}: {reason}")
-        else:
-            return context
+        # GLFW warns where others raise, and only MuJoCo notices that there is no context.
+        with warnings.catch_warnings(record=True) as heard:
+            warnings.simplefilter("always")
+            try:
+                context = make(width, height)
+                context.make_current()
+                return context, mujoco.MjrContext(model, FONT_SIZE.value)
+            except Exception as error:  # every library fails in its own way
+                said = str(heard[0].message if heard else error)
+                reason = said.strip().partition("\n")[0] or type(error).__name__
+                failures.append(f"{name}: {reason}")
     raise InputError(
         f"no OpenGL to draw with ({'; '.join(failures)}); install a driver, on Debian "
         "apt-get install libegl1 libgl1-mesa-dri, and set MUJOCO_GL=egl"
@@ -87,8 +91,7 @@ class Canvas:
         model.vis.global_.offwidth = max(width, model.vis.global_.offwidth)
         model.vis.global_.offheight = max(height, model.vis.global_.offheight)
         self._model = model
-        self._gl = make_gl_context(width, height)
-        self._context = mujoco.MjrContext(model, FONT_SIZE.value)
+        self._gl, self._context = make_contexts(model, width, height)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
         self._frame = mujoco.MjrRect(0, 0, width, height)
         self._options = mujoco.MjvOption()
