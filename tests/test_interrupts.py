@@ -145,17 +145,25 @@ def test_a_termination_interrupts_and_a_second_one_would_kill(keyboard):
     assert signal.getsignal(signal.SIGTERM) is ended
 
 
-def test_a_termination_waits_for_what_must_not_be_lost():
+@pytest.mark.parametrize("keyboard", [signal.default_int_handler, signal.SIG_IGN])
+def test_a_termination_waits_for_what_must_not_be_lost(keyboard):
     done = []
 
     def work():
         with terminations_as_interrupts(), interrupts_deferred():
-            terminate()
-            done.append("finished")
+            with interrupts_deferred():
+                terminate()
+                done.append("inner")
+            done.append("outer")
 
-    with pytest.raises(KeyboardInterrupt):
-        work()
-    assert done == ["finished"]
+    before = signal.signal(signal.SIGINT, keyboard)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            work()
+        assert signal.getsignal(signal.SIGINT) is keyboard
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert done == ["inner", "outer"]
 
 
 def test_a_terminated_run_keeps_its_flight_and_leaves_no_part_file(tmp_path):

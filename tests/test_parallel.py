@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 
 import pytest
 
@@ -36,6 +37,18 @@ def test_each_item_is_answered_whatever_becomes_of_the_others():
     with pytest.raises(InputError, match="no such luck"):
         found["raises"].result()
     assert not multiprocessing.active_children()
+
+
+def interrupts_blocked(_item):
+    return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_processes_meet_no_interrupt_while_they_begin():
+    """They would print a traceback: the keyboard's go to all processes of a terminal's job."""
+    found = dict(in_processes(interrupts_blocked, "ab", 2))
+    assert [found[item].result() for item in "ab"] == [True, True]
+    assert not interrupts_blocked(None)
 
 
 def test_leaving_ends_processes_that_are_answering():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -459,6 +460,24 @@ def test_the_recordings_process_ends_with_a_flight_that_comes_to_nothing():
     with pytest.raises(KeyboardInterrupt), RecordingProcess(flight("trot").scenario) as process:
         raise KeyboardInterrupt
     assert process._process.returncode is not None
+
+
+def test_the_recordings_process_says_nothing_where_its_answer_is_not_awaited(tmp_path, capfd):
+    """As where another file of the flight cannot be written."""
+    path = tmp_path / "flight.rrd"
+    with RecordingProcess(flight("fixed").scenario) as process:
+        process.start(flight("fixed"), path)
+    assert process._process.returncode == 0
+    assert path.is_file()
+    assert capfd.readouterr().err == ""
+
+
+def test_the_recordings_process_says_nothing_of_half_a_flight(capfd):
+    with RecordingProcess(flight("fixed").scenario) as process:
+        process._work = flight("fixed"), Path("nowhere")
+        process._process.stdin.write(pickle.dumps(process._work)[:1000])
+    assert process._process.returncode == 0
+    assert capfd.readouterr().err == ""
 
 
 def test_the_recordings_process_ends_with_the_one_that_it_serves(tmp_path):

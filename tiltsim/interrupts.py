@@ -48,28 +48,44 @@ def interrupts_deferred() -> Iterator[None]:
     """Let the block finish: an interrupt within it is raised at its end, a second one at once.
 
     For what is short and must not be lost, such as writing a flight's files. In threads other than
-    the main one the block runs as ever.
+    the main one the block runs as ever. A block within another leaves its interrupt to the outer
+    one. Where the keyboard is ignored, as by a shell's job in the background, it still is, but
+    terminations are deferred there, too.
     """
-    before = signal.getsignal(signal.SIGINT)
-    in_main_thread = threading.current_thread() is threading.main_thread()
-    if not (in_main_thread and callable(before)):  # else interrupts are ignored, or not Python's
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
+    before = signal.getsignal(signal.SIGINT)
+    outer = _deferring[-1] if _deferring else before
     interrupted = False
 
-    def defer(number: int, frame: FrameType | None) -> None:
+    def defer(_number: int, frame: FrameType | None) -> None:
         nonlocal interrupted
         if interrupted:
-            before(number, frame)
+            _interrupt(outer, frame)
         interrupted = True
 
-    signal.signal(signal.SIGINT, defer)
+    if callable(before):
+        signal.signal(signal.SIGINT, defer)
+    _deferring.append(defer)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        _deferring.remove(defer)
+        if callable(before):
+            signal.signal(signal.SIGINT, before)
     if interrupted:
+        _interrupt(outer, None)
+
+
+_deferring: list[Callable[[int, FrameType | None], None]] = []
+
+
+def _interrupt(handler: Any, frame: FrameType | None) -> None:
+    """Do what a handler of SIGINT does; one that ignores the keyboard is passed by."""
+    if not callable(handler):
         raise KeyboardInterrupt
+    handler(signal.SIGINT, frame)
 
 
 @contextmanager
@@ -88,10 +104,7 @@ def terminations_as_interrupts() -> Iterator[Callable[[], bool]]:
         nonlocal terminated
         terminated = True
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        handler = signal.getsignal(signal.SIGINT)
-        if not callable(handler):  # a shell's job in the background ignores the keyboard
-            raise KeyboardInterrupt
-        handler(signal.SIGINT, frame)
+        _interrupt(_deferring[-1] if _deferring else signal.getsignal(signal.SIGINT), frame)
 
     before = signal.signal(signal.SIGTERM, interrupt)
     try:

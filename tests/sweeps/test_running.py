@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import Future
 
 import pyarrow.parquet as pq
 import pytest
@@ -19,8 +20,9 @@ from tiltsim.errors import InputError
 from tiltsim.figures.sweep import sweep_figure
 from tiltsim.loading import parse_scenario
 from tiltsim.metrics import METRICS
+from tiltsim.parallel import ProcessDiedError
 from tiltsim.simulation import simulate
-from tiltsim.sweeps import flying
+from tiltsim.sweeps import flying, running
 from tiltsim.sweeps.dataset import load_results
 from tiltsim.sweeps.folder import open_folder, write_durably
 from tiltsim.sweeps.plan import Plan, load_definition
@@ -239,6 +241,30 @@ def test_processes_end_with_their_parent(tmp_path):
     else:
         os.killpg(process.pid, signal.SIGKILL)
         pytest.fail("processes outlive their parent")
+
+
+@pytest.mark.parametrize("times", [2, 3])
+def test_all_processes_may_die_at_once_but_not_again_and_again(times, monkeypatch):
+    """As when memory runs out under all of them."""
+    rounds = []
+
+    def in_processes(_work, items, jobs):
+        rounds.append(items)
+        for item in items:
+            future = Future()
+            if len(rounds) <= times:
+                future.set_exception(ProcessDiedError())
+            else:
+                future.set_result(item)
+            yield item, future
+
+    monkeypatch.setattr(running, "in_processes", in_processes)
+    flown = running.fly_on_processes("", [0, 1, 2, 3], 4, None)
+    if times == 2:
+        assert list(flown) == [0, 1, 2, 3]
+    else:
+        with pytest.raises(InputError, match="processes keep dying while they fly chunk 0"):
+            list(flown)
 
 
 def test_a_terminated_sweep_cleans_up_and_continues(tmp_path):

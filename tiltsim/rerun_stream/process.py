@@ -63,8 +63,8 @@ class RecordingProcess:
             self._process.kill()
         with suppress(OSError):  # it may have ended by itself
             self._process.stdin.close()  # type: ignore[union-attr]
-        self._process.stdout.close()  # type: ignore[union-attr]
         self._process.wait()
+        self._process.stdout.close()  # type: ignore[union-attr]  # not before it has answered
 
     def start(self, flight: Flight, path: Path) -> None:
         """Begin to write the flight."""
@@ -99,14 +99,15 @@ class RecordingProcess:
 def serve() -> None:
     """What the process does: a scenario in, its flight and a path in, out what went wrong."""
     gc.disable()  # it does not live long enough to make garbage
-    with os.fdopen(os.dup(1), "wb") as answer:
+    # Nobody wants an answer, or what is ready, where the flight's process has ended.
+    with suppress(BrokenPipeError), os.fdopen(os.dup(1), "wb") as answer:
         os.dup2(2, 1)  # what libraries print is no answer
         from tiltsim.rerun_stream.recording import RecordingFile
 
-        file = RecordingFile([pickle.load(sys.stdin.buffer)])
         try:
+            file = RecordingFile([pickle.load(sys.stdin.buffer)])
             flight, path = pickle.load(sys.stdin.buffer)
-        except EOFError:  # the flight's process has ended: nobody wants what is ready
+        except (EOFError, pickle.UnpicklingError):  # the latter if it ended while it spoke
             os._exit(0)
         error = None
         try:

@@ -17,7 +17,7 @@ from tiltsim.sweeps.folder import open_folder
 from tiltsim.sweeps.plan import Definition, Plan
 
 MAX_DEATHS: Final = 3
-"""So many times in a row may processes die before a single chunk gets finished."""
+"""So many times in a row may all processes die before a single chunk gets finished."""
 
 Report = Callable[[int], None]
 
@@ -102,7 +102,7 @@ def fly_on_processes(
     not help.
     """
     work = partial(_fly_chunk, definition=definition, engine=engine)
-    waiting, deaths = numbers, 0
+    waiting, deaths, most = numbers, 0, MAX_DEATHS * min(jobs, len(numbers))
     while waiting:
         lost: list[int] = []
         for number, future in in_processes(work, waiting, jobs):
@@ -112,7 +112,7 @@ def fly_on_processes(
                 continue
             lost.append(number)
             deaths += 1
-            if deaths == MAX_DEATHS:
+            if deaths == most:
                 raise InputError(
                     f"--jobs {jobs}: processes keep dying while they fly chunk {min(lost)}; is "
                     "there too little memory? What is finished is kept"
