@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import cache
 from math import copysign, isfinite, nan
+from pathlib import Path
 from threading import Lock
 from typing import Any, Final, NamedTuple
 
@@ -20,6 +21,7 @@ import numba
 import numba.core.config
 import numpy as np
 from numba import carray, cfunc, njit, types
+from numba.core.caching import IndexDataCacheFile
 from numba.extending import intrinsic, register_jitable
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
@@ -34,6 +36,7 @@ from tiltsim.cache import (
 )
 from tiltsim.engine import EngineName, check_model
 from tiltsim.limits import SINGULAR, WITHIN
+from tiltsim.locks import locked
 from tiltsim.loop import (
     CONTROL_PERIOD,
     EVALUATIONS,
@@ -51,6 +54,22 @@ _OPTIONS: Final = {"error_model": "numpy", "cache": native_code_can_be_kept()}
 # What only compiled code calls needs no ways in from Python and C: a sixth less to compile.
 _INNER: Final = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 numba.core.config.CACHE_DIR = str(native_code_folder())
+
+
+def _alone(save: Callable[..., None]) -> Callable[..., None]:
+    """Numba reads an index, adds to it and writes it as if there were no other process.
+
+    Of two that compile at once, both could take the same name, and each load the other's code.
+    """
+
+    def save_alone(index: Any, key: Any, data: Any) -> None:
+        with locked(Path(f"{index._index_path}.lock"), wait=True):
+            save(index, key, data)
+
+    return save_alone
+
+
+IndexDataCacheFile.save = _alone(IndexDataCacheFile.save)
 
 
 def _cast(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

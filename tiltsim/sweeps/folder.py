@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.errors import InputError
 from tiltsim.files import prepare_folder
+from tiltsim.locks import locked
 from tiltsim.sweeps.plan import Definition, Plan
 
 if TYPE_CHECKING:
@@ -118,7 +119,11 @@ def open_folder(path: Path, plan: Plan) -> Iterator[SweepFolder]:
         difference.
     """
     prepare_folder(path)
-    with _locked(path):
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(locked(path / ".lock", wait=False))
+        except BlockingIOError:
+            raise InputError(f"--out {path}: another tiltsim sweep is at work there") from None
         for leftover in [*path.glob(".*.new"), *path.glob("*/.*.new")]:
             leftover.unlink()
         definition = path / DEFINITION
@@ -147,22 +152,6 @@ def read_definition(file: Path) -> Definition:
         raise InputError(f"{file}: not the definition of a sweep: keys are missing") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{file}: not the definition of a sweep: {error}") from None
-
-
-@contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    """Keep other processes out; the lock ends with the process, however that ends."""
-    try:
-        import fcntl
-    except ImportError:  # not on this system: take care yourself
-        yield
-        return
-    with (path / ".lock").open("w", encoding="utf-8") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise InputError(f"--out {path}: another tiltsim sweep is at work there") from None
-        yield
 
 
 def write_durably(path: Path, content: bytes) -> None:
