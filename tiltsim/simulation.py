@@ -60,7 +60,7 @@ def simulate(
     Flight
         All samples up to the end. A flight that diverges or meets a singular decoupling matrix
         is a result, not an error: its log is complete up to there, and ``flight.end`` names the
-        cause and, to one physics step, the time. So is a flight interrupted from the keyboard, or
+        cause and, to one physics step, the time. So is a flight interrupted from outside, or
         by a controller of your own that raises or returns what is no command. An interrupt before
         the first sample raises KeyboardInterrupt.
     """
@@ -96,7 +96,7 @@ def simulate(
     except KeyboardInterrupt:
         if not samples:
             raise
-        end = End("interrupted", float(samples[-1][0]), "interrupted from the keyboard")
+        end = End("interrupted", float(samples[-1][0]), "interrupted from outside")
     except ControllerError as error:
         sample = _sample(plant)
         end = watch.judge(plant, sample) or End("failed", plant.time, str(error))
