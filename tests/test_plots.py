@@ -11,6 +11,7 @@ import pytest
 import tiltsim
 from tests.flights import BASE, RECIPES, flight, saved
 from tiltsim.cli import main
+from tiltsim.figures import style
 from tiltsim.figures.comparison import comparison_figure
 from tiltsim.figures.flight import flight_figure
 from tiltsim.flight import SAMPLE_FIELDS, End
@@ -203,15 +204,16 @@ def test_flights_are_compared_by_margin_determinant_and_error():
             np.testing.assert_array_equal(line, np.maximum(wanted, 0.0))
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()] == [
-        "tests/jumps",
-        "tests/supervised",
+        "jumps",
+        "supervised",
     ]
+    assert legend.get_title().get_text() == "2 flights compared"
 
 
 def test_a_lost_flight_says_so_in_a_comparison():
     lost = replace(flight("jumps"), end=End("singular", 0.7, "why"))
     (legend,) = comparison_figure([lost, supervised()]).legends
-    assert legend.get_texts()[0].get_text() == "tests/jumps, lost at 0.70 s"
+    assert legend.get_texts()[0].get_text() == "jumps, lost at 0.70 s"
 
 
 def test_the_command_compares_several_flights(tmp_path, capsys):
@@ -220,6 +222,19 @@ def test_the_command_compares_several_flights(tmp_path, capsys):
     assert main(["plot", *folders, "--out", str(file)]) == 0
     assert "supervised" in file.read_text(encoding="utf-8")
     assert capsys.readouterr().out == f"figure written to {file}\n"
+
+
+def test_flights_of_one_scenario_are_compared_by_their_folders(tmp_path, monkeypatch):
+    folders = [tmp_path / "mod", tmp_path / "con$v"]
+    for folder in folders:
+        flight("trot").save(folder)
+    shown = []
+    monkeypatch.setattr(style, "save", lambda figure, _path: shown.append(figure))
+    assert main(["plot", *map(str, folders), "--out", str(tmp_path / "both.png")]) == 0
+    (figure,) = shown
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["mod", r"con\$v"]
+    assert legend.get_title().get_text() == "A trot around a circle"
 
 
 def test_a_vehicle_without_a_margin_is_not_compared(tmp_path, capsys):

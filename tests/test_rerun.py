@@ -33,7 +33,7 @@ from tiltsim.rerun_stream.blueprint import flight_blueprint
 from tiltsim.rerun_stream.geometry import geom_archetypes, log_geometry
 from tiltsim.rerun_stream.live import LiveStream
 from tiltsim.rerun_stream.recorder import FlightRecorder
-from tiltsim.rerun_stream.recording import flight_names, make_recorders, new_recording
+from tiltsim.rerun_stream.recording import make_recorders, new_recording
 from tiltsim.rerun_stream.series import error_axes, limit_series
 from tiltsim.rerun_stream.viewer import require_viewer
 from tiltsim.simulation import simulate
@@ -288,9 +288,9 @@ def test_vehicle_and_reference_are_seen_from_however_far(recorded):
 # --- the blueprint -----------------------------------------------------------------------------
 
 
-def views_of(*scenarios):
+def views_of(*scenarios, names=()):
     """The views that flights of these scenarios are shown in, by their titles."""
-    recorders = make_recorders(new_recording(scenarios), scenarios)
+    recorders = make_recorders(new_recording(scenarios, names), scenarios, names)
     blueprint = flight_blueprint([recorder.shown() for recorder in recorders])
     found, waiting = {}, [blueprint.root_container]
     while waiting:
@@ -323,13 +323,20 @@ def test_the_attitudes_trail_is_short_beside_a_curve_that_moves(name, whole):
     assert shown["range"]["start"] == (None if whole else -1e9 * MOVING_TRAIL_TIME)
 
 
-def test_equal_names_are_numbered():
-    scenario = flight("fixed").scenario
-    assert flight_names([scenario, flight("trot").scenario, scenario]) == [
-        "fixed_1",
-        "trot",
-        "fixed_2",
+def test_flights_of_one_scenario_are_recorded_under_their_folders(tmp_path, capsys):
+    folders = [tmp_path / "mod", tmp_path / "with a.dot"]
+    for folder in folders:
+        flight("fixed").save(folder)
+    path = tmp_path / "both.rrd"
+    assert main(["view", *map(str, folders), "--rerun", str(path)]) == 0
+    assert {"/mod/singularity/margin", r"/with\ a.dot/singularity/margin"} <= entities(path)
+
+
+def test_the_plots_of_compared_flights_find_lines_of_any_name():
+    view = views_of(*[flight("fixed").scenario] * 2, names=("mod", "a b"))[
+        "Singularity margin and threshold (rad)"
     ]
+    assert [line.partition("/singularity")[0] for line in view.contents[:2]] == ["mod", r"a\ b"]
 
 
 # --- any model ---------------------------------------------------------------------------------

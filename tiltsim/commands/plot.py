@@ -81,8 +81,10 @@ def _flights_figure(paths: list[Path], out: Path) -> Figure:
     _check(out)
     if len(flights) > 1:
         from tiltsim.figures.comparison import comparison_figure
+        from tiltsim.flight_names import flight_names
 
-        return comparison_figure(flights)
+        names = flight_names([flight.scenario for flight in flights], paths)
+        return comparison_figure(flights, names)
     from tiltsim.figures.flight import flight_figure
 
     return flight_figure(flights[0])

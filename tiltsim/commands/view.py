@@ -36,6 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Open the viewer, or save what it would show."""
     from tiltsim.errors import InputError
     from tiltsim.files import load_flight, prepare_file
+    from tiltsim.flight_names import flight_names
 
     recordings = [path for path in arguments.paths if path.suffix.lower() == ".rrd"]
     if recordings:
@@ -55,13 +56,14 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.rerun is not None:
         prepare_file("--rerun", arguments.rerun, (".rrd",))
     flights = [load_flight(path) for path in arguments.paths]
+    names = flight_names([flight.scenario for flight in flights], arguments.paths)
     if arguments.rerun is None:
         from tiltsim.rerun_stream import view_flights
 
-        view_flights(flights, arguments.connect)
+        view_flights(flights, arguments.connect, names)
         return 0
     from tiltsim.rerun_stream import save_recording
 
-    save_recording(flights, arguments.rerun)
+    save_recording(flights, arguments.rerun, names)
     print(f"recording written to {arguments.rerun}; open it with: rerun {arguments.rerun}")
     return 0

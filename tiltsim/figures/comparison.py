@@ -11,6 +11,7 @@ import numpy as np
 from tiltsim.attitude_plane import margin_threshold
 from tiltsim.errors import InputError
 from tiltsim.figures import style
+from tiltsim.flight_names import common_title, flight_names
 from tiltsim.loops import follows_position
 from tiltsim.loops.supervised import SUPERVISION
 
@@ -22,8 +23,10 @@ if TYPE_CHECKING:
 MAX_FLIGHTS: Final = len(style.CYCLE)
 
 
-def comparison_figure(flights: Sequence[Flight]) -> Figure:
+def comparison_figure(flights: Sequence[Flight], names: Sequence[str] = ()) -> Figure:
     """Margin, determinant, supervisor and position error of rotorcraft flights over time.
+
+    ``names`` are those of the flights, by default `flight_names`.
 
     Raises
     ------
@@ -32,10 +35,12 @@ def comparison_figure(flights: Sequence[Flight]) -> Figure:
     """
     if len(flights) > MAX_FLIGHTS:
         raise InputError(f"plot: {len(flights)} flights, at most {MAX_FLIGHTS} on one page")
-    for flight in flights:
+    scenarios = [flight.scenario for flight in flights]
+    names = names or flight_names(scenarios)
+    for flight, name in zip(flights, names, strict=True):
         if "singularity_margin" not in flight.units:
             model = flight.scenario.vehicle.model
-            raise InputError(f"plot: {_name(flight)}: the {model} has no margin to compare")
+            raise InputError(f"plot: {name}: the {model} has no margin to compare")
     panels: list[tuple[Any, str, str]] = [(_margin, "Singularity margin", "rad")]
     if all("determinant" in flight.units for flight in flights):
         panels.append((_determinant, "Determinant, 4 for a level untilted vehicle", "n · r₃"))
@@ -43,7 +48,7 @@ def comparison_figure(flights: Sequence[Flight]) -> Figure:
         panels.append((_supervision, "What the supervisor takes away", "share"))
     panels.append((_error, "Distance from the reference", "m"))
     with style.paper_style():
-        figure = style.new_figure(8.2, 1.9 * len(panels) + 0.8)
+        figure = style.new_figure(8.2, 1.9 * len(panels) + 1.1)
         rows: Any = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (draw, title, unit) in zip(rows, panels, strict=True):
             for number, flight in enumerate(flights):
@@ -64,18 +69,20 @@ def comparison_figure(flights: Sequence[Flight]) -> Figure:
             axes.set_ylabel(unit)
         rows[-1].set_xlim(0.0, max(float(flight["time"][-1]) for flight in flights))
         rows[-1].set_xlabel("time (s)")
-        for number, flight in enumerate(flights):
+        for number, (flight, name) in enumerate(zip(flights, names, strict=True)):
             lost = flight.end.kind != "completed"
-            label = f"{_name(flight)}, lost at {flight.end.time:.2f} s" if lost else _name(flight)
+            label = style.verbatim(name) + (f", lost at {flight.end.time:.2f} s" if lost else "")
             rows[0].plot([], [], label=label, **style.line_look(number))
-        figure.legend(loc="outside upper left", ncols=2, alignment="left")
+        # As the legend's title the heading keeps clear of it, however many rows that has.
+        heading = common_title(scenarios) or f"{len(flights)} flights compared"
+        figure.legend(
+            loc="outside upper left",
+            ncols=2,
+            alignment="left",
+            title=style.verbatim(heading),
+            title_fontproperties={"size": 12, "weight": "bold"},
+        )
         return figure
-
-
-def _name(flight: Flight) -> str:
-    """What tells a flight from the others of its family."""
-    scenario = flight.scenario
-    return style.verbatim(scenario.address.rpartition("#")[2] or scenario.title or "flight")
 
 
 def _margin(axes: Any, flight: Flight) -> Any:

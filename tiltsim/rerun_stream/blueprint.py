@@ -142,11 +142,14 @@ def _plots(flights: list[Shown]) -> tuple[list[Any], list[float]]:
     if len(flights) == 1:
         whole = [(panel.title, [f"{panel.path}/**"]) for panel in panels]
         return [_plot(*plot) for plot in whole], [panel.height for panel in panels]
+    import rerun as rr
+
+    parts = [rr.escape_entity_path_part(flight.name) for flight in flights]
     plots: list[Any] = []
     for panel in panels:
-        levels = [f"{flights[0].name}/{panel.path}/{level}" for level in panel.levels]
+        levels = [f"{parts[0]}/{panel.path}/{level}" for level in panel.levels]
         for series, title in panel.compared:
-            lines = [f"{flight.name}/{panel.path}/{series}" for flight in flights]
+            lines = [f"{part}/{panel.path}/{series}" for part in parts]
             plots.append(_plot(title, [*lines, *levels], legend=not plots))
     return plots, [1.0] * len(plots)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from tiltsim.errors import InputError
 from tiltsim.files import replacing
+from tiltsim.flight_names import common_title, flight_names
 from tiltsim.rerun_stream import APPLICATION, palette
 from tiltsim.rerun_stream.blueprint import flight_blueprint
 from tiltsim.rerun_stream.recorder import FlightRecorder
@@ -35,16 +36,18 @@ class RecordingFile:
     ----------
     scenarios
         What the recording will show.
+    names
+        Those of several flights, by default `flight_names`.
     """
 
-    def __init__(self, scenarios: Sequence[Scenario]) -> None:
+    def __init__(self, scenarios: Sequence[Scenario], names: Sequence[str] = ()) -> None:
         import rerun as rr
 
         require_rerun()
         # Flushed by rows and bytes alone: a clock would cut the chunks elsewhere in every run.
         unhurried = rr.ChunkBatcherConfig(flush_tick=UNHURRIED)
-        self._recording = new_recording(scenarios, batching=unhurried)
-        self._recorders = make_recorders(self._recording, scenarios)
+        self._recording = new_recording(scenarios, names, batching=unhurried)
+        self._recorders = make_recorders(self._recording, scenarios, names)
         for recorder in self._recorders:
             recorder.begin()
         blueprint = flight_blueprint([recorder.shown() for recorder in self._recorders])
@@ -67,24 +70,25 @@ class RecordingFile:
             raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
-def save_recording(flights: Sequence[Flight], path: Path) -> None:
+def save_recording(flights: Sequence[Flight], path: Path, names: Sequence[str] = ()) -> None:
     """Write flights into one recording; see `RecordingFile.save`."""
-    RecordingFile([flight.scenario for flight in flights]).save(flights, path)
+    RecordingFile([flight.scenario for flight in flights], names).save(flights, path)
 
 
 def new_recording(
     scenarios: Sequence[Scenario],
+    names: Sequence[str] = (),
     *,
     salt: str = "",
     batching: rr.ChunkBatcherConfig | None = None,
 ) -> rr.RecordingStream:
-    """An empty recording that is the same for the same scenarios, whenever it is made.
+    """An empty recording that is the same for the same scenarios and names, whenever it is made.
 
     Recordings of equal name are one to the viewer; ``salt`` tells them apart.
     """
     import rerun as rr
 
-    content = "\n".join([*(scenario.model_dump_json() for scenario in scenarios), salt])
+    content = "\n".join([*(scenario.model_dump_json() for scenario in scenarios), *names, salt])
     digest = hashlib.sha256(content.encode()).hexdigest()[:16]
     recording = rr.RecordingStream(
         APPLICATION,
@@ -93,18 +97,22 @@ def new_recording(
         batcher_config=batching,
     )
     recording.set_log_time_enabled(False)
-    title = " / ".join(scenario.title or scenario.address or "flight" for scenario in scenarios)
+    title = common_title(scenarios)
+    if len(scenarios) > 1:
+        compared = " / ".join(names or flight_names(scenarios))
+        title = f"{title}: {compared}" if title else compared
+    title = title or scenarios[0].address or "flight"
     recording.send_recording_name(title)
     return recording
 
 
 def make_recorders(
-    recording: rr.RecordingStream, scenarios: Sequence[Scenario]
+    recording: rr.RecordingStream, scenarios: Sequence[Scenario], names: Sequence[str] = ()
 ) -> list[FlightRecorder]:
     """A recorder for each flight; several flights get names and colours of their own."""
     if len(scenarios) == 1:
         return [FlightRecorder(recording, scenarios[0])]
-    names = flight_names(scenarios)
+    names = names or flight_names(scenarios)
     return [
         FlightRecorder(
             recording,
@@ -124,15 +132,3 @@ def write_flights(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]
         recorder.draw_references(until)
         recorder.append(flight)
         recorder.finish(flight.end)
-
-
-def flight_names(scenarios: Sequence[Scenario]) -> list[str]:
-    """A short name for each flight: its variant or file, numbered where two would be equal."""
-    short = []
-    for index, scenario in enumerate(scenarios, start=1):
-        file, _, variant = scenario.address.partition("#")
-        short.append(variant or file.rpartition("/")[2].removesuffix(".toml") or f"flight_{index}")
-    return [
-        name if short.count(name) == 1 else f"{name}_{short[: index + 1].count(name)}"
-        for index, name in enumerate(short)
-    ]

@@ -28,9 +28,12 @@ RECORDING_START: Final = b"RRF"
 PATIENCE: Final = 2.0  # s to wait for a viewer to answer
 
 
-def view_flights(flights: Sequence[Flight], url: str | None = None) -> None:
+def view_flights(
+    flights: Sequence[Flight], url: str | None = None, names: Sequence[str] = ()
+) -> None:
     """Show flights, in the viewer at a URL or else in one of our own.
 
+    ``names`` are those of several flights, by default `tiltsim.flight_names.flight_names`.
     Raises `InputError` where there is no viewer, or no screen to open one on.
     """
     from tiltsim.rerun_stream.blueprint import flight_blueprint
@@ -38,8 +41,8 @@ def view_flights(flights: Sequence[Flight], url: str | None = None) -> None:
 
     require_viewer(url)
     scenarios = [flight.scenario for flight in flights]
-    recording = new_recording(scenarios)
-    recorders = make_recorders(recording, scenarios)
+    recording = new_recording(scenarios, names)
+    recorders = make_recorders(recording, scenarios, names)
     attach_viewer(recording, url, flight_blueprint([recorder.shown() for recorder in recorders]))
     for recorder in recorders:
         recorder.begin()
