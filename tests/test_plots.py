@@ -237,6 +237,18 @@ def test_flights_of_one_scenario_are_compared_by_their_folders(tmp_path, monkeyp
     assert legend.get_title().get_text() == "A trot around a circle"
 
 
+def test_the_page_of_a_variant_names_it():
+    def subtitle(address):
+        scenario = tiltsim.parse_scenario(BASE | RECIPES["trot"], address)
+        page = flight_figure(replace(flight("trot"), scenario=scenario))
+        title, line = (text.get_text() for text in page.texts)
+        assert title == "A trot around a circle"
+        return line
+
+    plain = subtitle("ch04/circle")
+    assert subtitle("ch04/circle#modified_t2") == f"modified_t2  ·  {plain}"
+
+
 def test_a_vehicle_without_a_margin_is_not_compared(tmp_path, capsys):
     folders = [str(saved(name, tmp_path)) for name in ("tilt_car", "jumps")]
     assert main(["plot", *folders]) == 2

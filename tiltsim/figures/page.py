@@ -35,7 +35,9 @@ def _headings(flight: Flight) -> tuple[str, str]:
         outcome = f"completed after {end.time:g} s"
     else:
         outcome = f"{end.kind} at {end.time:.2f} s"
+    variant = scenario.address.partition("#")[2]
     parts = (
+        *([style.verbatim(variant)] if variant else []),
         *(words.replace("_", " ") for words in gait_in_words(scenario)),
         *law_in_words(scenario),
         f"{scenario.simulation.plant} plant",
