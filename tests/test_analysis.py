@@ -491,6 +491,36 @@ def test_every_kind_of_figure_is_written_by_the_command(tmp_path, capsys, name) 
     assert capsys.readouterr().out
 
 
+def test_nothing_attainable_is_said_in_words(tmp_path, capsys) -> None:
+    figure = ["--figure", "attainable", "--plot", str(tmp_path / "attainable.png")]
+    words = "nothing is attainable: no rotor speeds from 305.27 to 394.10 rad/s hover"
+    for gait, told in (("ch09_gait_1", True), ("ch09_gait_2", False)):
+        run("gait", "--published", gait, *figure)
+        assert (f"warning: {words}" in capsys.readouterr().out) is told
+        warnings = run_json(capsys, "gait", "--published", gait, *figure)["warnings"]
+        assert any(warning.startswith(words) for warning in warnings) is told
+    run("gait", "--published", "ch09_gait_1")
+    assert words not in capsys.readouterr().out
+
+
+ALL_MARKS = ["acceptable at all times", "unacceptable", "level"]
+
+
+@pytest.mark.parametrize(
+    ("gait", "marks", "bar"),
+    [
+        (plans.continuous_trot(0.65, 1.0), ALL_MARKS, True),
+        (PUBLISHED_GAITS["ch08_gait_1"].gait, ["level"], False),
+        (plans.fixed([0.0] * 4), ["acceptable", "level"], False),
+    ],
+)
+def test_the_legend_explains_what_there_is(gait, marks, bar) -> None:
+    figure = gait_figure(gait, AR_DRONE)
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == marks
+    assert any(axes.get_ylabel() == "time (s)" for axes in figure.axes) is bar
+
+
 def test_equal_figures_give_equal_files(tmp_path) -> None:
     for ending in style.FORMATS:
         files = [tmp_path / f"{index}{ending}" for index in range(2)]

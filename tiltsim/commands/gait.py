@@ -141,6 +141,8 @@ def run(arguments: argparse.Namespace) -> int:
         a1, a2, a3, a4 = chosen.gait.angles(0.0).tolist()
         opposite_speed = OPPOSITE_SHARE * chosen.vehicle.hover_rotor_speed
         report["faults"] = fault_report((a1, a2, a3, a4), chosen.vehicle, opposite_speed)
+    if arguments.figure == "attainable":
+        report["warnings"] += _attainable_warnings(arguments, chosen)
     _print(arguments, report, _summary)
     tell_of_figure(arguments)
     return 0
@@ -237,13 +239,35 @@ def _draw(arguments: argparse.Namespace, chosen: _Chosen) -> Figure:
     if kind == "attainable":
         if not chosen.gait.is_constant:
             raise InputError(f"--figure attainable: {chosen.gait.name} moves; give fixed angles")
-        limits = arguments.speed_limits and parse_speed_limits(arguments.speed_limits)
+        limits = _speed_limits(arguments, chosen)
         return attainable.attainable_figure(chosen.gait, chosen.vehicle, limits)
     if kind == "comparison":
         return gait.comparison_figure(compared, chosen.vehicle)
     if kind == "margin":
         return gait.margin_figure(compared, chosen.vehicle)
     return gait.gait_figure(chosen.gait, chosen.vehicle)
+
+
+def _speed_limits(arguments: argparse.Namespace, chosen: _Chosen) -> tuple[float, float]:
+    """Least and greatest rotor speed (rad/s) of the attainable figure."""
+    from controllers.attainable import published_speed_limits
+
+    if arguments.speed_limits is None:
+        return published_speed_limits(chosen.vehicle)
+    return parse_speed_limits(arguments.speed_limits)
+
+
+def _attainable_warnings(arguments: argparse.Namespace, chosen: _Chosen) -> list[str]:
+    """What an empty attainable figure means."""
+    from controllers.attainable import attainable_torque_thrust
+
+    limits = _speed_limits(arguments, chosen)
+    if not attainable_torque_thrust(chosen.gait.angles(0.0), chosen.vehicle, limits).is_empty:
+        return []
+    return [
+        f"nothing is attainable: no rotor speeds from {limits[0]:.2f} to {limits[1]:.2f} rad/s "
+        "hover without yaw torque; the figure holds a sentence alone"
+    ]
 
 
 def _run_determinant(arguments: argparse.Namespace) -> int:

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 _CURVES = 24
 """Instants of a period at which the unacceptable-attitude curve is drawn."""
 
+AREA, CURVE = "area", "curve"
+"""What a roll-pitch diagram may show besides the level attitude."""
+
 _LAST_SHADE = 0.92
 """Share of the colour map in use; beyond it, lines fade on white."""
 
@@ -38,15 +41,15 @@ def gait_figure(gait: Gait, vehicle: Vehicle) -> Figure:
         if gait.is_constant:
             figure = style.new_figure(4.2, 4.2)
             axes: Any = figure.subplots()
-            _roll_pitch(axes, gait, vehicle)
-            _roll_pitch_legend(figure, constant=True)
+            _roll_pitch_legend(figure, _roll_pitch(axes, gait, vehicle), constant=True)
             return figure
         figure = style.new_figure(8.6, 4.2)
         grid = figure.add_gridspec(2, 2, width_ratios=[1.05, 1.0])
         diagram = figure.add_subplot(grid[:, 0])
-        _roll_pitch(diagram, gait, vehicle)
-        _time_bar(figure, [diagram], gait)
-        _roll_pitch_legend(figure)
+        shown = _roll_pitch(diagram, gait, vehicle)
+        if CURVE in shown:
+            _time_bar(figure, [diagram], gait)
+        _roll_pitch_legend(figure, shown)
         upper = figure.add_subplot(grid[0, 1])
         lower = figure.add_subplot(grid[1, 1], sharex=upper)
         _angles(upper, gait)
@@ -63,13 +66,15 @@ def comparison_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure
     with style.paper_style():
         figure = style.new_figure(3.5 * len(gaits) + 0.8, 4.2)
         row = figure.subplots(1, len(gaits), squeeze=False, sharey=True)[0]
+        shown: set[str] = set()
         for axes, (title, gait) in zip(row, gaits, strict=True):
-            _roll_pitch(axes, gait, vehicle)
+            shown |= _roll_pitch(axes, gait, vehicle)
             axes.set_title(title)
             if axes is not row[0]:
                 axes.set_ylabel("")
-        _time_bar(figure, list(row), gaits[-1][1])
-        _roll_pitch_legend(figure)
+        if CURVE in shown:
+            _time_bar(figure, list(row), gaits[-1][1])
+        _roll_pitch_legend(figure, shown)
         return figure
 
 
@@ -83,8 +88,11 @@ def margin_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure:
         return figure
 
 
-def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> None:
-    """Unacceptable-attitude curves at instants of a period; shaded where no instant forbids."""
+def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> set[str]:
+    """Unacceptable-attitude curves at instants of a period; shaded where no instant forbids.
+
+    Tells which of `AREA` and `CURVE` the legend must explain.
+    """
     from matplotlib import colormaps
 
     period = gait.period or 1.0
@@ -128,6 +136,8 @@ def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> None:
     axes.set_xlabel("roll φ (rad)")
     axes.set_ylabel("pitch θ (rad)")
     axes.set_title(f"Unacceptable attitudes, {gait.name}")
+    shown = {CURVE} if drawn.any() else set()
+    return shown | ({AREA} if allowed.any() and not singular else set())
 
 
 def _note(axes: Axes, height: float, text: str) -> None:
@@ -147,17 +157,18 @@ def _time_bar(figure: Figure, diagrams: list[Axes], gait: Gait) -> None:
     bar.outline.set_linewidth(0.5)
 
 
-def _roll_pitch_legend(figure: Figure, *, constant: bool = False) -> None:
+def _roll_pitch_legend(figure: Figure, shown: set[str], *, constant: bool = False) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     line = style.RED if constant else style.GREY
     always = "acceptable" if constant else "acceptable at all times"
-    handles = [
-        Patch(facecolor=style.PALE, edgecolor=style.GREY, linewidth=0.4, label=always),
-        Line2D([], [], color=line, lw=1.3, label="unacceptable"),
-        Line2D([], [], color=style.INK, marker="+", ls="", ms=8, mew=1.2, label="level"),
-    ]
+    marks = {
+        AREA: Patch(facecolor=style.PALE, edgecolor=style.GREY, linewidth=0.4, label=always),
+        CURVE: Line2D([], [], color=line, lw=1.3, label="unacceptable"),
+    }
+    handles = [mark for name, mark in marks.items() if name in shown]
+    handles.append(Line2D([], [], color=style.INK, marker="+", ls="", ms=8, mew=1.2, label="level"))
     figure.legend(handles=handles, loc="outside lower left", ncols=3)
 
 
