@@ -106,6 +106,18 @@ def test_frames_come_at_the_films_rate_and_show_motion():
 
 
 @needs_gl
+@pytest.mark.parametrize(
+    ("speed", "clock"), [(1.0, "1.2 s"), (10.0, "1.2 s, 10x"), (0.5, "1.2 s, 0.5x")]
+)
+def test_a_film_faster_or_slower_than_the_flight_says_so(speed, clock):
+    stage = _Stage(flight("fixed"), Format(width=320, height=180, speed=speed))
+    with stage.canvas:
+        names, values = stage._table(-1)
+    assert names.splitlines()[0] == "time"
+    assert values.splitlines()[0] == clock
+
+
+@needs_gl
 def test_every_flight_can_be_filmed():
     for name in ("fixed", "limited", "free"):
         _, image = next(frames(flight(name), SMALL))

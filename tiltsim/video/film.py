@@ -99,6 +99,7 @@ class _Stage:
 
     def __init__(self, flight: Flight, form: Format) -> None:
         self._flight = flight
+        self._pace = "" if form.speed == 1.0 else f", {form.speed:g}x"
         self._model = model = visible_model(flight.scenario)
         self._data = mujoco.MjData(model)
         self._qpos = joint_positions(model, flight.columns)
@@ -134,7 +135,10 @@ class _Stage:
         return image
 
     def _table(self, sample: int) -> tuple[str, str]:
-        rows = {"time": f"{self._flight['time'][sample]:.1f} s", **self._aspect.rows(sample)}
+        rows = {
+            "time": f"{self._flight['time'][sample]:.1f} s{self._pace}",
+            **self._aspect.rows(sample),
+        }
         if self._reference is not None:
             error = self._targets[sample] - self._position[sample]
             rows["position error"] = f"{np.linalg.norm(error):.2f} m"
