@@ -53,3 +53,5 @@ def test_a_title_is_common_where_all_have_it():
     assert common_title([tiltsim.parse_scenario(trot)] * 2) == "A trot around a circle"
     assert common_title([tiltsim.parse_scenario(one) for one in (fixed, trot)]) == ""
     assert common_title(scenarios(*SAME)) == ""
+    assert common_title(scenarios("ch06/walk#a", "ch06/walk#b")) == "ch06/walk"
+    assert common_title(scenarios("ch06/walk#a", "ch04/walk#a")) == ""

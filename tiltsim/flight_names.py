@@ -35,9 +35,11 @@ def flight_names(scenarios: Sequence[Scenario], paths: Sequence[Path] = ()) -> l
 
 
 def common_title(scenarios: Sequence[Scenario]) -> str:
-    """The title that all scenarios have; empty where they differ or have none."""
+    """The title that all scenarios have, else the family that all are of; else empty."""
     titles = {scenario.title for scenario in scenarios}
-    return titles.pop() if len(titles) == 1 else ""
+    families = {file for file, _, _ in (one.address.rpartition("#") for one in scenarios)}
+    title = titles.pop() if len(titles) == 1 else ""
+    return title or (families.pop() if len(families) == 1 else "")
 
 
 def _short(address: str) -> str:
