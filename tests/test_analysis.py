@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from controllers.fault_tolerance import fixed_tilt_hover
 from controllers.gaits import plans
 from controllers.published_gaits import DETERMINANT_CASES, PATHS, PUBLISHED_GAITS, TRIANGLE
-from controllers.singularity import residuals
+from controllers.singularity import force_matrix, residuals, torque_matrix
 from controllers.two_color_planner import Circle
-from controllers.vehicle import PRESETS
-from tiltsim import files
+from controllers.vehicle import PRESETS, SPIN
+from tiltsim import files, load_scenario, simulate
 from tiltsim.analysis import gait_report, map_report, vehicle_name
 from tiltsim.commands import gait as gait_command
 from tiltsim.commands import map as map_command
@@ -205,10 +206,89 @@ def test_the_table_of_published_gaits(capsys) -> None:
     assert max(map(len, lines)) <= 80
 
 
-@pytest.mark.skipif(not GAIT_PAGE.is_file(), reason="the docs are not part of a distribution")
+with_docs = pytest.mark.skipif(
+    not GAIT_PAGE.is_file(), reason="the docs are not part of a distribution"
+)
+
+
+@with_docs
 def test_the_page_on_gaits_shows_the_table_of_today(capsys) -> None:
     run("gait", "--list")
     assert capsys.readouterr().out in GAIT_PAGE.read_text(encoding="utf-8")
+
+
+@with_docs
+def test_the_documented_gait_of_ones_own_flies_and_is_judged_as_shown(tmp_path, capsys) -> None:
+    page = GAIT_PAGE.read_text(encoding="utf-8")
+    section = page.partition("## A gait of your own")[2].partition("\n## ")[0]
+    file = tmp_path / "my_gait.toml"
+    file.write_text(re.findall(r"```toml\n(.*?)```", section, re.S)[0])
+    brief = {"simulation.duration": 0.1, "simulation.engine": "python"}
+    flight = simulate(load_scenario(file, brief))
+    assert flight.end.kind == "completed"
+    assert flight.metrics()["min_singularity_margin"] > 1.3
+    run("gait", str(file))
+    assert capsys.readouterr().out in section
+
+
+@pytest.mark.parametrize(
+    ("angles", "backward"),
+    [
+        ("0.2,0.1,0.2,0.1", "rotors 2 and 4"),
+        ("-0.1,-0.2,-0.1,-0.2", "rotors 1 and 3"),
+        ("0,0,0,0", ""),
+    ],
+)
+def test_rotors_that_would_turn_backwards_to_hover_are_named(capsys, angles, backward) -> None:
+    words = ["gait", f"--angles={angles}"]
+    report = run_json(capsys, *words)
+    squares = np.array(SPIN) * np.sign(report["hover_rotor_speeds"])
+    squares *= np.square(report["hover_rotor_speeds"]) * AR_DRONE.thrust_coefficient
+    weight = AR_DRONE.mass * AR_DRONE.gravity
+    assert force_matrix(report["angles"]) @ squares == pytest.approx([0, 0, weight], abs=1e-9)
+    assert torque_matrix(report["angles"], AR_DRONE) @ squares == pytest.approx([0] * 3, abs=1e-9)
+    warning = f"{backward} would have to turn backwards to hover"
+    assert report["warnings"] == ([warning] if backward else [])
+    run(*words)
+    text = capsys.readouterr().out
+    shown = ", ".join(f"{speed:.6g}" for speed in report["hover_rotor_speeds"])
+    assert re.search(rf"^hover rotor speeds  {shown} rad/s along the spins$", text, re.M)
+    assert ("warning: " in text) is bool(backward)
+
+
+def test_a_leaning_hover_agrees_with_that_of_the_fault_analysis() -> None:
+    tilts = (-0.65, -0.65, 0.65, 0.65)
+    hover = fixed_tilt_hover(tilts, AR_DRONE)
+    assert hover is not None
+    assert gait_report(plans.fixed(tilts), AR_DRONE)["hover_rotor_speeds"] == pytest.approx(
+        hover.rotor_speeds
+    )
+
+
+def test_without_a_hover_there_are_no_hover_speeds(capsys) -> None:
+    blue = "0.5,-0.5,-0.165813558,0.165813558"
+    for gait in (f"--angles={blue}", "--published=ch06_gait_3"):
+        assert run_json(capsys, "gait", gait)["hover_rotor_speeds"] is None
+        run("gait", gait)
+        assert "hover rotor speeds" not in capsys.readouterr().out
+
+
+def test_a_rotor_at_rest_does_not_count_as_turning_backwards() -> None:
+    # Rotors 2 and 4 hover alone at minus delta: what rounding leaves of the others has a sign.
+    delta = np.arctan(gait_report(plans.fixed([0] * 4), AR_DRONE)["drag_ratio"])
+    for nudge in (-1e-15, 0.0, 1e-15):
+        report = gait_report(plans.fixed([0.1, -delta + nudge, 0.1, -delta]), AR_DRONE)
+        assert report["hover_rotor_speeds"][0] == pytest.approx(0.0, abs=1e-4)
+        assert report["warnings"] == []
+
+
+def test_a_moving_gait_tells_its_start_from_its_worst(capsys) -> None:
+    run("gait", "ch05_gaits/line#walk_full")
+    text = capsys.readouterr().out
+    assert "\nsingularity margin  0.839116 rad at the gait's start\n" in text
+    assert re.search(r"\nleast margin +-0.874638 rad over the period\n +its sign counts", text)
+    assert "\nlargest tilt angle  2.305 rad\n" in text
+    assert "amplitude" not in text
 
 
 def test_no_number_is_a_negative_zero(capsys) -> None:

@@ -309,7 +309,9 @@ def test_a_mistake_is_one_line_with_file_key_value_and_what_is_allowed(write, mi
 
 def test_the_number_of_further_mistakes_is_told(write):
     line = refusal(write("[vehicle]\nmass = -1.0\narm_length = -1.0\ngravity = -1.0"))
-    assert line.endswith("vehicle.mass = -1.0: must be greater than 0 (and 2 more)")
+    assert line.endswith("vehicle.mass = -1.0: must be greater than 0 (and 2 more mistakes)")
+    line = refusal(write('[gait]\ntype = "fixed"\nangels = [0, 0, 0, 0]\nbiass = 1.0'))
+    assert line.endswith("known: angles, bias, scale, type (and 1 more mistake)")
 
 
 def test_a_long_value_is_cut(write):

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from math import asin, atan, cos, pi, sin
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tiltsim.flight import COLUMN_UNITS, SAMPLE_FIELDS, End, Flight
 from tiltsim.loading import parse_scenario
-from tiltsim.metrics import METRICS, unit_of
+from tiltsim.metrics import BOOLEAN_METRICS, METRICS, unit_of
+from tiltsim.schema import scenario_schema
 
 R = 2.423e-7 / (0.1785 * 8.048e-6)  # K_m / (L K_f), ch. 3
 HOVER = {f"rotor_speed_{i}": sign * 360.0 for i, sign in zip((1, 2, 3, 4), (-1, 1, -1, 1))}
+METRICS_PAGE = Path(__file__).parents[1] / "docs" / "metrics.md"
 COMPLETED = End("completed", 0.0)
 
 
@@ -311,6 +315,20 @@ def test_the_final_attitude_error_is_the_largest_of_the_last_second():
 def test_a_whole_turn_of_yaw_is_no_error():
     metrics = fly(yaw=np.full(len(TIMES), 2.0 * pi + 0.02)).metrics()
     assert metrics["final_attitude_error"] == pytest.approx(0.02)
+
+
+@pytest.mark.skipif(not METRICS_PAGE.is_file(), reason="the docs are not part of a distribution")
+def test_the_page_on_metrics_names_all_of_them_with_their_units():
+    rows = re.findall(r"^\| `(\w+)` \| (.+?) \| .+ \|$", METRICS_PAGE.read_text("utf-8"), re.M)
+    units = {name: unit_of(name) or "-" for name in METRICS}
+    units |= dict.fromkeys(BOOLEAN_METRICS, "true or false")
+    assert dict(rows) == units
+    assert len(rows) == len(METRICS)
+
+
+def test_editors_complete_the_metrics_of_expectations():
+    metric = scenario_schema()["$defs"]["Expectation"]["properties"]["metric"]
+    assert metric["enum"] == list(METRICS)
 
 
 def test_units_are_those_of_the_metrics():

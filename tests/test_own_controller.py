@@ -739,7 +739,7 @@ def test_the_documented_examples_fly(capsys):
 def test_the_readmes_law_is_the_documented_one_and_short():
     (readme,) = (block for block in python_blocks("README.md") if "controller=law" in block)
     documented = python_blocks("docs/own_controller.md")[0]
-    head, _, tail = readme.partition("\n\n\nflight = ")
+    head, _, tail = readme.partition("\n\n\nscenario = ")
     assert documented.startswith(head)
     assert len([line for line in readme.splitlines() if line.strip()]) <= 15
-    assert tail == "tiltsim.simulate(tiltsim.Scenario(), controller=law)\n"
+    assert "controller=law" in tail

@@ -421,3 +421,13 @@ def test_samples_cannot_be_changed_behind_the_columns():
     flight = tiltsim.simulate(scenario(simulation={"duration": 0.02}))
     with pytest.raises(ValueError, match="read-only"):
         flight.samples[0, 0] = 1.0
+
+
+def test_a_flight_is_told_of_in_one_line_and_knows_its_columns():
+    flown = tiltsim.simulate(
+        tiltsim.parse_scenario({"simulation": {"duration": 0.1, "engine": "python"}})
+    )
+    line = "<Flight of scenario: completed at 0.1 s, 11 samples of 41 columns>"
+    assert repr(flown) == line
+    with pytest.raises(KeyError, match=r"'rol': no column of this flight; did you mean roll\?"):
+        flown["rol"]

@@ -28,6 +28,7 @@ from controllers.singularity import (
     singularity_margin,
     torque_free_direction,
 )
+from controllers.statics import hover_rotor_speeds
 from controllers.two_color_planner import check_path
 from controllers.unacceptable_attitudes import acceptable_share, unacceptable_attitudes
 from controllers.vehicle import PRESETS, drag_ratio
@@ -50,6 +51,10 @@ Blue gaits with angles rounded as in the thesis stay below 3e-4, sound gaits abo
 """
 
 
+STANDS_STILL: Final = 1e-6
+"""Share of the fastest rotor's speed below which a rotor stands still."""
+
+
 def gait_report(
     gait: Gait,
     vehicle: Vehicle,
@@ -62,7 +67,8 @@ def gait_report(
 
     The values at the top are those at time zero. A gait that moves adds ``time``, a table of arrays
     over one period, and ``min_singularity_margin`` over it. With ``roll`` or ``pitch`` (rad) the
-    margins and the determinant are taken at that attitude, else margins at level.
+    margins and the determinant are taken at that attitude, else margins at level. Fixed angles have
+    ``hover_rotor_speeds`` (rad/s, along the spins), null where they cannot hover.
     """
     at_attitude = roll is not None or pitch is not None
     roll, pitch = roll or 0.0, pitch or 0.0
@@ -102,6 +108,12 @@ def gait_report(
             "time": table,
         }
     report["warnings"] = gait_warnings(gait, vehicle, samples)
+    report["hover_rotor_speeds"] = None
+    if gait.is_constant:
+        a1, a2, a3, a4 = start.tolist()
+        speeds = hover_rotor_speeds((a1, a2, a3, a4), vehicle)
+        report["hover_rotor_speeds"] = speeds
+        report["warnings"] += _backward_rotors(speeds)
     return report
 
 
@@ -139,6 +151,19 @@ def gait_warnings(gait: Gait, vehicle: Vehicle, samples: int = 201) -> list[str]
             "singular on the way"
         )
     return warnings
+
+
+def _backward_rotors(speeds: Quad | None) -> list[str]:
+    """The warning on hover speeds along the spins, if some are negative."""
+    if speeds is None:
+        return []
+    # A rotor at rest may have either sign by rounding.
+    still = STANDS_STILL * max(map(abs, speeds))
+    backward = [str(rotor) for rotor, speed in zip(ROTORS, speeds, strict=True) if speed < -still]
+    if not backward:
+        return []
+    names = ("rotors " if len(backward) > 1 else "rotor ") + " and ".join(backward)
+    return [f"{names} would have to turn backwards to hover"]
 
 
 def fault_report(tilts: Quad, vehicle: Vehicle, opposite_speed: float) -> dict[str, Any]:

@@ -14,7 +14,8 @@ from tiltsim.tables import NonNegative, Range, Table
 class Expectation(Table):
     """A bound on a metric, judged after the flight."""
 
-    metric: str
+    # An editor completes the names; the message on an unknown one is ours.
+    metric: str = Field(json_schema_extra={"enum": list(METRICS)})
     claim: str = Field("", description="what the thesis states, in our words, for the report")
     published: float | bool | None = Field(
         None,

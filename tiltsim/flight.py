@@ -19,6 +19,7 @@ from tiltsim.kinds import Floats
 from tiltsim.kinds.rotorcraft import COLUMN_UNITS as COLUMN_UNITS
 from tiltsim.kinds.rotorcraft import OBSERVED_FIELDS
 from tiltsim.loops import control_setup, loop_of
+from tiltsim.messages import did_you_mean
 
 if TYPE_CHECKING:
     import pyarrow
@@ -47,7 +48,7 @@ def _far_out() -> np.errstate:
     return np.errstate(over="ignore", invalid="ignore")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Flight:
     """The record of one flight."""
 
@@ -60,12 +61,21 @@ class Flight:
     def __post_init__(self) -> None:
         self.samples.setflags(write=False)  # what is derived from them is kept
 
+    def __repr__(self) -> str:
+        """One line: what was flown, and how it ended."""
+        name = self.scenario.address or self.scenario.title
+        end = f"{self.end.kind} at {self.end.time:g} s"
+        return f"<Flight of {name}: {end}, {len(self)} samples of {len(self.units)} columns>"
+
     def __len__(self) -> int:
         """Number of samples."""
         return len(self.samples)
 
     def __getitem__(self, column: str) -> Floats:
         """A column by name, shape (N,); see `units`."""
+        if column not in self.units:
+            hint = did_you_mean(column, self.units)
+            raise KeyError(f"{column!r}: no column of this flight; {hint}see Flight.units")
         return self.columns[column]
 
     @cached_property

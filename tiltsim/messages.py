@@ -58,7 +58,7 @@ def one_line(error: ValidationError, document: Mapping[str, Any], schema: type[B
     line = _short_list(details, document) or _describe(details[0], document, schema)
     # Missing entries of one list, and the options of one union, are one mistake each.
     more = len({_mistake(detail, document) for detail in details}) - 1
-    return f"{line} (and {more} more)" if more else line
+    return f"{line} (and {more} more mistake{'s' if more > 1 else ''})" if more else line
 
 
 def _mistake(detail: Any, document: Mapping[str, Any]) -> str:

@@ -328,6 +328,7 @@ def _balanced(text: str, vehicle: Vehicle) -> Gait:
 def _summary(report: dict[str, Any]) -> str:
     """The report in aligned lines; what moves is given at time zero and as its worst."""
     direction = report["torque_free_direction"]
+    at_start = " at the gait's start" if "time" in report else ""
     rows = [
         ("gait", report["gait"] + (f" ({report['source']})" if report["source"] else "")),
         ("vehicle", vehicle_text(report["vehicle"])),
@@ -336,7 +337,7 @@ def _summary(report: dict[str, Any]) -> str:
         ("singular values", numbers(report["singular_values"]) + " of tau / (L K_f)"),
         ("R, R_phi, R_theta", numbers([report["R"], report["R_phi"], report["R_theta"]])),
         ("torque-free force", "along " + numbers(direction) if direction else "none"),
-        ("singularity margin", f"{number(report['singularity_margin'])} rad"),
+        ("singularity margin", f"{number(report['singularity_margin'])} rad{at_start}"),
         (
             "acceptable share",
             f"{100.0 * report['acceptable_share']:.2f} % of the roll-pitch square",
@@ -346,14 +347,18 @@ def _summary(report: dict[str, Any]) -> str:
     if "determinant" in report:
         attitude = f"roll {number(report['roll'])}, pitch {number(report['pitch'])} rad"
         rows.insert(8, ("determinant", f"{number(report['determinant'])} at {attitude}"))
+    if report["hover_rotor_speeds"] is not None:
+        speeds = numbers(report["hover_rotor_speeds"])
+        rows.append(("hover rotor speeds", f"{speeds} rad/s along the spins"))
     if "time" in report:
         rate = "jumps" if report["max_rate"] is None else f"{report['max_rate']:.6g} rad/s"
         rows += [
             ("period", f"{report['period']:g} s; the values above are those at t = 0"),
-            ("amplitude", f"{report['amplitude']:.6g} rad"),
+            ("largest tilt angle", f"{report['amplitude']:.6g} rad"),
             ("largest rate", rate),
             ("least rank", str(report["min_rank"])),
             ("least margin", f"{number(report['min_singularity_margin'])} rad over the period"),
+            ("", "its sign counts from the gait's start: negative once R has changed sign"),
         ]
     if "faults" in report:
         for loss in report["faults"]["rotor_loss"]:
