@@ -29,7 +29,7 @@ from tiltsim.plants import STEPS_WORTH_COMPILING, make_plant
 from tiltsim.scenario import Scenario
 from tiltsim.simulation import simulate
 
-Status = Literal["passed", "failed", "lost", "invalid", "crashed"]
+Status = Literal["passed", "failed", "lost", "invalid", "crashed", "interrupted"]
 
 
 @dataclass(frozen=True)
@@ -194,10 +194,15 @@ def shared_engine(scenarios: Sequence[Scenario], steps: int | None = None) -> En
     return "native"
 
 
+def not_flown(address: str) -> CheckResult:
+    """What stands for a scenario that an interrupt left without an outcome."""
+    return CheckResult(address, "interrupted", "not flown: interrupted")
+
+
 def write_junit(results: list[CheckResult], path: Path) -> None:
     """Write results as JUnit XML, which CI services read."""
     failures = sum(result.status in {"failed", "lost"} for result in results)
-    errors = sum(result.status in {"invalid", "crashed"} for result in results)
+    errors = sum(result.status in {"invalid", "crashed", "interrupted"} for result in results)
     suite = ElementTree.Element(
         "testsuite",
         name="tiltsim check",

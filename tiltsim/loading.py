@@ -43,6 +43,8 @@ def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) 
     file = find_scenario_file(name)
     document = read_toml(file)
     address = library_name(file) + (f"#{variant}" if variant else "")
+    if {"axis", "bisect"} & document.keys():
+        raise InputError(f"{address}: this is a sweep: tiltsim sweep {library_name(file)}")
     names = variant_names(file, document)
     if variant:
         document = _select_variant(file, document, variant)

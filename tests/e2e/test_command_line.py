@@ -120,6 +120,23 @@ def test_run_quiet_prints_nothing(capsys):
     assert capsys.readouterr() == ("", "")
 
 
+def test_run_quiet_tells_what_failed(expecting, capsys):
+    assert main(["run", str(expecting(-1.0)), "--quiet"]) == 1
+    output, error = capsys.readouterr()
+    assert output == ""
+    assert error == "tiltsim: FAILED max_abs_roll: measured 0, expected <= -1\n"
+
+
+def test_a_sweep_is_no_scenario(tmp_path, capsys):
+    path = tmp_path / "sw.toml"
+    path.write_text('scenario = "x"\n[[axis]]\ntype = "list"\nkey = "gait.period"\nvalues = [1]\n')
+    words = f"{path}: this is a sweep: tiltsim sweep {path}\n"
+    assert main(["run", str(path)]) == 2
+    assert capsys.readouterr().err == f"tiltsim: {words}"
+    assert main(["check", str(path)]) == 2
+    assert words in capsys.readouterr().out
+
+
 def test_run_of_a_family_lists_its_variants_and_exits_2(capsys):
     assert main(["run", "ch04_tracking/setpoint"]) == 2
     error = capsys.readouterr().err
@@ -220,6 +237,25 @@ def test_check_reports_every_outcome_and_writes_junit(tmp_path, capsys):
     assert main(["check", str(tmp_path / "lost.toml"), "--jobs", "1"]) == 3
 
 
+def test_check_tells_flights_that_nothing_judges(tmp_path, capsys):
+    (tmp_path / "a.toml").write_text("[simulation]\nduration = 0.01\n")
+    (tmp_path / "b.toml").write_text(EXPECTING.format(bound=1.0))
+    (tmp_path / "c.toml").write_text("titel = 'x'\n")
+    junit = tmp_path / "junit.xml"
+    good = [str(tmp_path / "a.toml"), str(tmp_path / "b.toml")]
+    assert main(["check", *good, "--jobs", "1", "--junit", str(junit)]) == 0
+    rows = capsys.readouterr().out.splitlines()
+    assert [row[:3] for row in rows[:2]] == ["ok ", "ok "]
+    assert ["nothing judged" in row for row in rows[:2]] == [True, False]
+    assert "1/1 hold" in rows[1]
+    assert rows[-1] == "2 scenarios: 1 nothing judged, 1 passed"
+    assert len(ElementTree.parse(junit).getroot()[0]) == 2
+    assert main(["check", str(tmp_path / "c.toml")]) == 2
+    output = capsys.readouterr().out
+    assert "hold" not in output
+    assert output.endswith("1 scenario: 1 invalid\n")
+
+
 def test_check_judges_what_speaks_of_the_plant_it_flies(tmp_path, capsys):
     path = tmp_path / "plants.toml"
     path.write_text(
@@ -241,8 +277,13 @@ def test_check_survives_a_file_that_cannot_be_read_as_toml(tmp_path, capsys):
     assert "3 scenarios: 2 invalid, 1 passed" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("jobs", ["1", "2"])
-def test_interrupt_ends_a_whole_check_at_once(tmp_path, jobs):
+@pytest.mark.parametrize(
+    ("jobs", "signal_", "code"),
+    [("1", signal.SIGINT, 130), ("2", signal.SIGINT, 130), ("2", signal.SIGTERM, 143)],
+)
+def test_interrupt_ends_a_whole_check_at_once_and_keeps_what_is_finished(
+    tmp_path, jobs, signal_, code
+):
     compile_callbacks(TILTROTOR)  # so that the interrupt falls into the flights
     (tmp_path / "a.toml").write_text("[simulation]\nduration = 0.01\n")
     for name in ("b", "c"):
@@ -251,7 +292,7 @@ def test_interrupt_ends_a_whole_check_at_once(tmp_path, jobs):
     # Of two processes one has the longest flight, the other what comes before it.
     paths = [tmp_path / f"{name}.toml" for name in ("abc" if jobs == "1" else "ab")]
     process = subprocess.Popen(
-        [*COMMAND, "check", *map(str, paths), "--jobs", jobs],
+        [*COMMAND, "check", *map(str, paths), "--jobs", jobs, "--junit", tmp_path / "j.xml"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         start_new_session=True,
@@ -259,10 +300,19 @@ def test_interrupt_ends_a_whole_check_at_once(tmp_path, jobs):
     assert process.stdout.readline().startswith(b"ok ")  # the short one; a long one is under way
     with pytest.raises(subprocess.TimeoutExpired):
         process.wait(timeout=0.5)
-    os.killpg(process.pid, signal.SIGINT)
+    if signal_ == signal.SIGINT:  # the keyboard's go to all processes
+        os.killpg(process.pid, signal_)
+    else:
+        process.send_signal(signal_)
     _, error = process.communicate(timeout=15.0)
-    assert process.returncode == 130
+    assert process.returncode == code
     assert error.decode().strip().endswith("tiltsim: interrupted")
+    suite = ElementTree.parse(tmp_path / "j.xml").getroot()[0]
+    unflown = len(paths) - 1
+    assert (suite.get("tests"), suite.get("errors")) == (str(len(paths)), str(unflown))
+    assert [case.get("name") for case in suite] == [path.name for path in paths]
+    errors = [None if not len(case) else (case[0].tag, case[0].get("message")) for case in suite]
+    assert errors == [None, *[("error", "not flown: interrupted")] * unflown]
 
 
 def test_interrupted_run_keeps_its_files_and_says_so(tmp_path, capsys, monkeypatch):
@@ -272,11 +322,11 @@ def test_interrupted_run_keeps_its_files_and_says_so(tmp_path, capsys, monkeypat
     def no_bar(*_arguments, **_options):
         begun = False
 
-        def advance_to(_time):
+        def advance_to(time):
             nonlocal begun
-            if not begun:  # and from then on native code flies, a second at a time
+            if time > 0.0 and not begun:  # native code flies, a second at a time
                 Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
-            begun = True
+                begun = True
 
         yield advance_to
 

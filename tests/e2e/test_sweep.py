@@ -63,6 +63,17 @@ def test_sweep_writes_one_dataset_and_sums_up(grid, tmp_path, capsys):
     assert capsys.readouterr() == ("", "")
 
 
+def test_a_continued_sweep_says_what_is_kept(grid, tmp_path, capsys):
+    command = ["sweep", str(grid), "--out", str(tmp_path / "out"), "--jobs", "1"]
+    assert main([*command, "--quiet"]) == 0
+    assert main(command) == 0
+    assert capsys.readouterr().err == "A grid: all 24 flights kept, nothing to fly\n"
+    for number in (3, 7):
+        (tmp_path / "out" / "parts" / f"{number:06d}.parquet").unlink()
+    assert main(command) == 0
+    assert capsys.readouterr().err == "A grid: 22 of 24 flights kept, 2 to fly\n"
+
+
 def test_the_dataset_goes_to_a_folder_of_its_own_by_default(grid, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["sweep", "grid.toml", "--jobs", "1", "--quiet"]) == 0

@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.progress import compiling_told
+from tiltsim.commands.text import counted
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, FLIGHT_LOST, INVALID_INPUT
+from tiltsim.interrupts import interrupts_deferred
 
 if TYPE_CHECKING:
     from tiltsim.checking import CheckResult
@@ -20,8 +22,15 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "check",
         help="fly all scenarios under some paths and judge them",
-        description="Fly all scenarios under files and folders, and judge their expectations.",
-        epilog="exit codes: 0 all passed, 1 an expectation failed, 2 invalid, 3 a flight was lost",
+        description=(
+            "Fly all scenarios under files and folders, and judge their expectations. Sweeps in a "
+            "folder are passed over. Interrupted, it still writes the JUnit file: what is not "
+            "flown counts there as an error."
+        ),
+        epilog=(
+            "exit codes: 0 all passed, 1 an expectation failed, 2 invalid or crashed, 3 a flight "
+            "was lost; where several apply, 2 goes before 3, and 3 before 1"
+        ),
     )
     parser.add_argument(
         "paths", nargs="*", metavar="PATH", help="files, folders or library names; default: all"
@@ -54,7 +63,7 @@ def positive_integer(text: str) -> int:
 
 def run(arguments: argparse.Namespace) -> int:
     """Check everything and print a table."""
-    from tiltsim.checking import check_all, collect, write_junit
+    from tiltsim.checking import check_all, collect, not_flown, write_junit
     from tiltsim.errors import InputError
     from tiltsim.library import shipped_folder
     from tiltsim.loading import parse_override
@@ -65,16 +74,28 @@ def run(arguments: argparse.Namespace) -> int:
     overrides = dict(parse_override(text) for text in arguments.overrides)
     addresses = collect(arguments.paths or [str(shipped_folder("scenarios"))])
     width = max(len(address) for address in addresses)
-    with compiling_told(shown=True):
-        results = check_all(
-            addresses, arguments.jobs, overrides, lambda result: _print_result(result, width)
-        )
+    finished: dict[str, CheckResult] = {}
+
+    def report(result: CheckResult) -> None:
+        finished[result.address] = result
+        _print_result(result, width)
+
+    try:
+        with compiling_told(shown=True):
+            results = check_all(addresses, arguments.jobs, overrides, report)
+    except KeyboardInterrupt:
+        if junit is not None:
+            with interrupts_deferred():
+                write_junit([finished.get(name) or not_flown(name) for name in addresses], junit)
+        raise
     if junit is not None:
         write_junit(results, junit)
-    counts = Counter(result.status for result in results)
+    labels = Counter("nothing judged" if _unjudged(result) else result.status for result in results)
     print(
-        f"\n{len(results)} scenarios: " + ", ".join(f"{n} {status}" for status, n in counts.items())
+        f"\n{counted(len(results), 'scenario', 'scenarios')}: "
+        + ", ".join(f"{n} {label}" for label, n in labels.items())
     )
+    counts = Counter(result.status for result in results)
     if counts["invalid"] or counts["crashed"]:
         return INVALID_INPUT
     if counts["lost"]:
@@ -82,12 +103,20 @@ def run(arguments: argparse.Namespace) -> int:
     return EXPECTATION_FAILED if counts["failed"] else DONE
 
 
+def _unjudged(result: CheckResult) -> bool:
+    """Whether a flight went well that no expectation speaks of."""
+    return result.status == "passed" and not result.verdicts
+
+
 def _print_result(result: CheckResult, width: int) -> None:
-    held = sum(verdict.holds for verdict in result.verdicts)
+    if result.verdicts:
+        held = sum(verdict.holds for verdict in result.verdicts)
+        judged = f"{held}/{len(result.verdicts)} hold"
+    else:
+        judged = "nothing judged" if _unjudged(result) else ""
     mark = "ok" if result.status == "passed" else result.status.upper()
     print(
-        f"{mark:<8}{result.address:<{width}}  {held}/{len(result.verdicts)} hold"
-        f"  {result.wall_time:6.1f} s",
+        f"{mark:<8}{result.address:<{width}}  {judged:<14}  {result.wall_time:6.1f} s",
         flush=True,
     )
     if result.message:

@@ -120,7 +120,15 @@ def run(arguments: argparse.Namespace) -> int:
     if flight.end.kind != "completed":
         print(f"tiltsim: {lost(flight)}", file=sys.stderr)
         return FLIGHT_LOST
-    return DONE if all(verdict.holds for verdict in verdicts) else EXPECTATION_FAILED
+    failed = [verdict for verdict in verdicts if not verdict.holds]
+    if arguments.quiet:
+        for verdict in failed:
+            print(
+                f"tiltsim: FAILED {verdict.expectation.metric}: measured {_measured(verdict)}, "
+                f"expected {verdict.bounds}",
+                file=sys.stderr,
+            )
+    return EXPECTATION_FAILED if failed else DONE
 
 
 def _tell_what_the_law_does_not_know(scenario: Scenario) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.check import positive_integer
 from tiltsim.commands.progress import counting_bar
+from tiltsim.commands.text import counted
 from tiltsim.exit_codes import INTERRUPTED
 
 if TYPE_CHECKING:
@@ -67,17 +68,24 @@ def run(arguments: argparse.Namespace) -> int:
     plan = Plan(definition)
     out = arguments.out or Path("sweeps") / Path(definition.address).stem
     shown = not arguments.quiet
-    unit = "flights" if plan.sweep.bisect is None else "boundaries"
-    if shown:
-        print(_headline(plan, unit), file=sys.stderr)
+    units = ("flight", "flights") if plan.sweep.bisect is None else ("boundary", "boundaries")
+    begun = False
+
+    def report(rows: int) -> None:
+        nonlocal begun
+        if shown and not begun:
+            print(_headline(plan, rows, units), file=sys.stderr)
+        begun = True
+        move(rows)
+
     try:
-        with counting_bar(len(plan), unit, shown=shown) as move:
+        with counting_bar(len(plan), units[1], shown=shown) as move:
             dataset = run_sweep(
                 definition,
                 out,
                 jobs=arguments.jobs,
                 cluster=arguments.cluster,
-                report=move,
+                report=report,
             )
     except KeyboardInterrupt:
         print(
@@ -86,20 +94,26 @@ def run(arguments: argparse.Namespace) -> int:
         )
         return INTERRUPTED
     if shown:
-        print(_summary(dataset, unit))
+        print(_summary(dataset, units))
     return 0
 
 
-def _headline(plan: Plan, unit: str) -> str:
+def _headline(plan: Plan, kept: int, units: tuple[str, str]) -> str:
+    """What there is to do, less what an earlier run has finished."""
     title = plan.sweep.title or plan.definition.address
-    return f"{title}: {len(plan)} {unit}"
+    everything = counted(len(plan), *units)
+    if kept == len(plan):
+        return f"{title}: all {everything} kept, nothing to fly"
+    if kept:
+        return f"{title}: {kept} of {everything} kept, {len(plan) - kept} to fly"
+    return f"{title}: {everything}"
 
 
-def _summary(dataset: Path, unit: str) -> str:
+def _summary(dataset: Path, units: tuple[str, str]) -> str:
     from collections import Counter
 
     import pyarrow.parquet as pq
 
     ends = Counter(pq.read_table(dataset, columns=["end"])["end"].to_pylist())
     counts = ", ".join(f"{count} {end}" for end, count in ends.most_common())
-    return f"{sum(ends.values())} {unit}: {counts}\nwritten to {dataset}"
+    return f"{counted(sum(ends.values()), *units)}: {counts}\nwritten to {dataset}"

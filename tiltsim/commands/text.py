@@ -22,6 +22,11 @@ def numbers(values: Iterable[float]) -> str:
     return ", ".join(number(value) for value in values)
 
 
+def counted(count: int, one: str, many: str) -> str:
+    """How many there are: ``1 flight``, ``2 flights``."""
+    return f"{count} {one if count == 1 else many}"
+
+
 def tell_of_figure(arguments: argparse.Namespace) -> None:
     """Say where ``--plot`` went, as `tiltsim plot` does, unless the output is JSON."""
     if arguments.plot is not None and not arguments.json:

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any, Final
 
-from tiltsim.commands.progress import progress_bar
+from tiltsim.commands.progress import counting_bar
 
 MANY_FRAMES: Final = 100
 """From here on the user is told how long it may take."""
@@ -80,19 +80,21 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.video import prefer_offscreen_gl
 
     prefer_offscreen_gl()  # before anything imports MuJoCo
-    from tiltsim.video.film import Format, film_flight
+    from tiltsim.video.film import Format, film_flight, moments
 
     width, height = arguments.size
     form = Format(width, height, arguments.fps, arguments.speed)
-    count = int(float(flight["time"][-1]) * form.fps / form.speed) + 1
+    count = len(moments(flight, form))
     if count > MANY_FRAMES and not arguments.quiet:
         print(
             f"{count} frames of {width}x{height}; without a graphics card a frame takes up to half "
             "a second (--speed, --fps and --size change that)",
             file=sys.stderr,
         )
-    with progress_bar(float(flight["time"][-1]), "s", shown=not arguments.quiet) as advance_to:
-        film_flight(flight, out, form, advance_to)
+    with counting_bar(count, "frames", shown=not arguments.quiet) as move:
+        move(0)
+        drawn = iter(range(1, count + 1))
+        film_flight(flight, out, form, lambda _time: move(next(drawn)))
     if not arguments.quiet:
         print(f"film written to {out}")
     return 0

@@ -82,14 +82,17 @@ def film_flight(
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
+def moments(flight: Flight, form: Format) -> Floats:
+    """The times of the flight (s) that the frames of the film are to show."""
+    return np.arange(0.0, float(flight["time"][-1]) + 1e-9, form.speed / form.fps)
+
+
 def frames(flight: Flight, form: Format) -> Iterator[tuple[float, Image]]:
     """The frames of the film and their times (s), one after the other."""
     time = flight["time"]
-    last = float(time[-1])
-    wanted = np.arange(0.0, last + 1e-9, form.speed / form.fps)
     scene = _Stage(flight, form)
     with scene.canvas:
-        for moment in wanted:
+        for moment in moments(flight, form):
             sample = min(int(np.searchsorted(time, moment - 1e-9)), len(time) - 1)
             yield float(time[sample]), scene.frame(sample)
 
