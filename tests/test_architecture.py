@@ -9,13 +9,12 @@ from pathlib import Path
 
 import pytest
 
-import controllers
 import tiltsim
+import tiltsim_controllers
+from tiltsim.folders import CONTROLLERS, ENTRANCE, FLYING, FOUNDATION, SHOWING
 
-PACKAGES = {
-    "controllers": Path(controllers.__file__).parent,
-    "tiltsim": Path(tiltsim.__file__).parent,
-}
+ROOT = Path(tiltsim.__file__).parent
+PACKAGES = {"tiltsim_controllers": Path(tiltsim_controllers.__file__).parent, "tiltsim": ROOT}
 FILES = {
     ".".join((name, *file.relative_to(folder).with_suffix("").parts)).removesuffix(
         ".__init__"
@@ -25,12 +24,11 @@ FILES = {
 }
 TREES = {module: ast.parse(file.read_text(encoding="utf-8")) for module, file in FILES.items()}
 
-CORE = (
-    *("model", "simulation", "scenario", "metrics", "flight", "plants", "engine", "loop"),
-    *("loops", "controller_tables"),
-)
-SCREENS = ("__main__", "cli", "commands", "figures", "report", "rerun_stream", "video")
-"""First letters of the modules that show flights; nothing that computes them may need one."""
+ORDER = {
+    "tiltsim_controllers": ("__init__", *CONTROLLERS),
+    "tiltsim": (*FOUNDATION, *FLYING, *SHOWING, *ENTRANCE),
+}
+"""Folders and root modules of each package; imports go to the same or to an earlier one."""
 
 HEAVY = {"av", "mujoco", "numba", "matplotlib", "rerun", "pyarrow", "dm_control", "pydantic"}
 
@@ -49,13 +47,29 @@ def imports(module):
                 parents = package.split(".")[: len(package.split(".")) - node.level + 1]
                 base = ".".join([*parents, *filter(None, [node.module])])
             yield base
-            # ``from tiltsim import model`` imports the module tiltsim.model
+            # ``from tiltsim import model`` imports the module tiltsim.models.rotorcraft
             yield from (name for a in node.names if (name := f"{base}.{a.name}") in TREES)
 
 
-def shows(module):
-    package, _, rest = module.partition(".")
-    return package == "tiltsim" and rest.startswith(SCREENS)
+def place(module):
+    """Position of a module in the order: of its package, then of its folder or root module."""
+    package, *rest = module.split(".")
+    return list(ORDER).index(package), ORDER[package].index(rest[0] if rest else "__init__")
+
+
+def upward_imports(module):
+    """Imports of a module that go to a later folder."""
+    return [name for name in imports(module) if name in TREES and place(name) > place(module)]
+
+
+def circles():
+    """Groups of modules that import each other, directly or through others."""
+    leads_to = {module: reachable(module) for module in TREES}
+    groups = (
+        frozenset(other for other in leads_to[module] if module in leads_to[other])
+        for module in TREES
+    )
+    return sorted(sorted(group) for group in set(groups) if len(group) > 1)
 
 
 def reachable(module):
@@ -90,38 +104,44 @@ def public_definitions(tree):
                         yield f"{node.name}.{member.name}", member
 
 
-def test_the_core_modules_named_here_exist():
-    assert {f"tiltsim.{name}" for name in CORE} <= set(TREES)
-    assert shows("tiltsim.cli")
-    assert shows("tiltsim.commands.run")
+def test_every_folder_and_module_has_its_place_in_the_order():
+    for package, folder in PACKAGES.items():
+        found = {file.stem for file in folder.glob("*.py")}
+        found |= {init.parent.name for init in folder.glob("*/__init__.py")}
+        assert found == set(ORDER[package])
 
 
-@pytest.mark.parametrize("module", [name for name in TREES if name.startswith("controllers")])
+@in_every_module
+def test_imports_go_to_the_same_or_an_earlier_folder(module):
+    if module != "tiltsim":  # it imports its public names on first use
+        assert upward_imports(module) == []
+
+
+def test_an_upward_import_is_noticed(monkeypatch):
+    upward = ast.parse("def f():\n    from tiltsim.plants import plant\n")
+    monkeypatch.setitem(TREES, "tiltsim.scenario.loading", upward)
+    assert upward_imports("tiltsim.scenario.loading") == ["tiltsim.plants", "tiltsim.plants.plant"]
+
+
+def test_no_modules_import_each_other():
+    assert circles() == []
+
+
+def test_few_modules_lie_directly_in_the_package():
+    assert len(list(ROOT.glob("*.py"))) <= 8
+
+
+@pytest.mark.parametrize("module", [name for name in TREES if name.startswith("tiltsim_con")])
 def test_controllers_know_neither_mujoco_nor_the_testbed(module):
     roots = {name.partition(".")[0] for name in imports(module)}
     assert not roots & {"mujoco", "dm_control", "tiltsim", "numba"}
 
 
-@pytest.mark.parametrize("name", CORE)
-def test_the_core_leads_to_no_screen(name):
-    assert sorted(filter(shows, reachable(f"tiltsim.{name}"))) == []
-
-
-@pytest.mark.parametrize("name", CORE)
-def test_the_core_needs_no_library_for_screens(name):
-    roots = {
-        imported.partition(".")[0]
-        for module in reachable(f"tiltsim.{name}")
-        for imported in imports(module)
-    }
-    assert not roots & {"argparse", "av", "matplotlib", "rerun", "tqdm"}
-
-
 @in_every_module
-def test_only_the_command_line_knows_commands(module):
-    if module in {"tiltsim.__main__", "tiltsim.cli"} or module.startswith("tiltsim.commands"):
-        return
-    assert not [name for name in imports(module) if name.startswith("tiltsim.c") and shows(name)]
+def test_flying_needs_no_library_for_screens(module):
+    if module.startswith("tiltsim.") and module.split(".")[1] in FLYING:
+        roots = {name.partition(".")[0] for name in imports(module)}
+        assert not roots & {"argparse", "av", "matplotlib", "rerun", "tqdm"}
 
 
 @pytest.mark.parametrize(

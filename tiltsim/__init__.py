@@ -14,26 +14,27 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tiltsim.controller import Command, Observation
     from tiltsim.errors import InputError, TiltsimError
-    from tiltsim.files import load_flight
-    from tiltsim.flight import End, Flight
-    from tiltsim.loading import load_scenario, parse_scenario
-    from tiltsim.scenario import Scenario
-    from tiltsim.simulation import simulate
+    from tiltsim.flight.end import End
+    from tiltsim.flight.flight import Flight
+    from tiltsim.flight.reading import load_flight
+    from tiltsim.plants.command import Command, Observation
+    from tiltsim.scenario.loading import load_scenario, parse_scenario
+    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.simulation.simulate import simulate
 
 _HOMES = {
-    "Command": "controller",
-    "End": "flight",
-    "Flight": "flight",
+    "Command": "plants.command",
+    "End": "flight.end",
+    "Flight": "flight.flight",
     "InputError": "errors",
-    "Observation": "controller",
-    "Scenario": "scenario",
+    "Observation": "plants.command",
+    "Scenario": "scenario.scenario",
     "TiltsimError": "errors",
-    "load_flight": "files",
-    "load_scenario": "loading",
-    "parse_scenario": "loading",
-    "simulate": "simulation",
+    "load_flight": "flight.reading",
+    "load_scenario": "scenario.loading",
+    "parse_scenario": "scenario.loading",
+    "simulate": "simulation.simulate",
 }
 
 __all__ = [

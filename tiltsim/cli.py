@@ -14,7 +14,7 @@ from typing import Final, NoReturn
 
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT, TERMINATED
-from tiltsim.interrupts import terminations_as_interrupts
+from tiltsim.system.interrupts import terminations_as_interrupts
 
 COMMANDS: Final = (
     *("run", "check", "sweep", "list", "view", "plot", "video"),

@@ -6,9 +6,13 @@ from math import cos, isfinite, pi, sin
 
 import numpy as np
 
-from controllers.decoupling_matrix import body_force, sines_and_cosines, torque_entries
-from controllers.rotation import rotation_from_euler
-from controllers.vehicle import drag_ratio
+from tiltsim_controllers.mathematics.rotation import rotation_from_euler
+from tiltsim_controllers.vehicle.decoupling_matrix import (
+    body_force,
+    sines_and_cosines,
+    torque_entries,
+)
+from tiltsim_controllers.vehicle.parameters import drag_ratio
 
 
 def quadrotor_rates(state, inputs, vehicle):

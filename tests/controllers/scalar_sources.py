@@ -9,8 +9,8 @@ import numba
 import numpy as np
 import sympy
 
-from controllers.records import flatten, record_dtype
-from controllers.scalar import scalar_functions
+from tiltsim_controllers.mathematics.records import flatten, record_dtype
+from tiltsim_controllers.mathematics.scalar import scalar_functions
 
 
 def rebuilt(make, replaced=()):

@@ -14,24 +14,24 @@ from types import CodeType, FunctionType
 
 import pytest
 
-import controllers
-import tiltsim.loops
-import tiltsim.thesis_plant
-from controllers.attitude_altitude import Parameters, rotor_accelerations
-from controllers.decouplers import DECOUPLERS
-from controllers.gains import GAIN_SETS
-from controllers.gaits import GAIT_TYPES, GaitParameters
-from controllers.references import REFERENCE_TYPES, ReferenceParameters
-from controllers.scalar import scalar_functions
-from controllers.vehicle import PRESETS
+import tiltsim.equations.ode3
+import tiltsim.laws.assembling
+import tiltsim_controllers
+from tiltsim_controllers.gaits import GAIT_TYPES, GaitParameters
+from tiltsim_controllers.laws.attitude_altitude import Parameters, rotor_accelerations
+from tiltsim_controllers.laws.decouplers import DECOUPLERS
+from tiltsim_controllers.laws.gains import GAIN_SETS
+from tiltsim_controllers.mathematics.scalar import scalar_functions
+from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
+from tiltsim_controllers.vehicle.parameters import PRESETS
 
 MODULES = [
     import_module(module.name)
-    for module in pkgutil.walk_packages(controllers.__path__, "controllers.")
+    for module in pkgutil.walk_packages(tiltsim_controllers.__path__, "tiltsim_controllers.")
 ]
 LOOP_MODULES = [
-    import_module(f"tiltsim.loops.{module.name}")
-    for module in pkgutil.iter_modules(tiltsim.loops.__path__)
+    import_module(f"tiltsim.laws.{module.name}")
+    for module in pkgutil.iter_modules(tiltsim.laws.__path__)
 ]
 FUNCTIONS = scalar_functions()
 PLAIN_BUILTINS = {
@@ -93,7 +93,7 @@ def is_constant(value):
 
 def test_there_is_scalar_code():
     assert rotor_accelerations in FUNCTIONS
-    assert tiltsim.loops.tiltrotor.tiltrotor_controls in FUNCTIONS
+    assert tiltsim.laws.attitude_altitude.tiltrotor_controls in FUNCTIONS
 
 
 def test_nothing_is_registered_twice():

@@ -19,14 +19,14 @@ from xml.etree import ElementTree
 import pyarrow.parquet as pq
 import pytest
 
-from tiltsim.cache import before_compiling
 from tiltsim.cli import main
 from tiltsim.commands import run as run_command
 from tiltsim.commands.progress import compiling_told
-from tiltsim.flight import COLUMN_UNITS
-from tiltsim.loops.tiltrotor import TILTROTOR
-from tiltsim.metrics import METRICS
-from tiltsim.native import compile_callbacks
+from tiltsim.engines.cache import before_compiling
+from tiltsim.engines.native_engine import compile_callbacks
+from tiltsim.laws.attitude_altitude import TILTROTOR
+from tiltsim.scenario.metric_names import METRICS
+from tiltsim.vehicles.rotorcraft import COLUMN_UNITS
 
 SETPOINT = "ch04_tracking/setpoint#rho_065_modified"
 SHORT = ("--set", "simulation.duration=0.2")
@@ -461,7 +461,7 @@ def test_bench_of_no_flights_is_a_mistake(capsys):
 
 
 def test_library_scenarios_are_shipped_beside_the_package():
-    from tiltsim.library import shipped_folder
+    from tiltsim.resources import shipped_folder
 
     assert (shipped_folder("scenarios") / "ch04_tracking" / "setpoint.toml").is_file()
     assert Path(shipped_folder("mjcf") / "tiltrotor.xml").is_file()

@@ -11,11 +11,13 @@ import pytest
 import tiltsim
 from tests.sweeps.files import boundary_sweep, short_sweep
 from tiltsim.cli import main
-from tiltsim.figures.distributions import wilson_interval
-from tiltsim.figures.sweep import sweep_figure
-from tiltsim.library import library_sweeps, scenario_files, shipped_folder
+from tiltsim.resources import shipped_folder
+from tiltsim.scenario.library import library_sweeps, scenario_files
 from tiltsim.sweeps.dataset import load_results
-from tiltsim.sweeps.plan import Plan, load_definition
+from tiltsim.sweeps.loading import load_definition
+from tiltsim.sweeps.plan import Plan
+from tiltsim.views.figures.distributions import wilson_interval
+from tiltsim.views.figures.sweep import sweep_figure
 
 SHIPPED = [address for address, _, _ in library_sweeps()]
 GRID = """

@@ -7,11 +7,6 @@ import random
 import numpy as np
 import pytest
 
-from controllers.gaits.cat import SWINGS
-from controllers.singularity import residuals
-from controllers.vehicle import PRESETS
-from tiltsim.library import library_entries
-from tiltsim.loading import load_scenario
 from tiltsim.report.claims import registered_claims
 from tiltsim.report.claims.ch03 import EQ_17, EQ_19
 from tiltsim.report.measures import determinant_coefficients
@@ -23,6 +18,11 @@ from tiltsim.report.model import (
     plain,
     scenario_claims,
 )
+from tiltsim.scenario.library import library_entries
+from tiltsim.scenario.loading import load_scenario
+from tiltsim_controllers.analysis.singularity import residuals
+from tiltsim_controllers.gaits.cat import SWINGS
+from tiltsim_controllers.vehicle.parameters import PRESETS
 
 AR_DRONE = PRESETS["ar_drone_2"]
 CLAIMS = registered_claims()

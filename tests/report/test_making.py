@@ -11,10 +11,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tiltsim.checking import collect
 from tiltsim.cli import main
 from tiltsim.exit_codes import EXPECTATION_FAILED, INVALID_INPUT
-from tiltsim.figures.style import CYCLE, new_figure
 from tiltsim.report import flying
 from tiltsim.report.content import Group, failure_text, measured_text, published_text
 from tiltsim.report.findings import FINDINGS
@@ -25,6 +23,8 @@ from tiltsim.report.model import Outcome
 from tiltsim.report.page import page
 from tiltsim.report.pictures import DPI, AnalysisPicture, Drawing, png
 from tiltsim.report.rows import count
+from tiltsim.studies.checking import collect
+from tiltsim.views.figures.style import CYCLE, new_figure
 
 
 def rows_of(report, statement):
@@ -155,7 +155,11 @@ def test_the_digest_covers_the_core_and_spares_the_screens(monkeypatch):
     monkeypatch.setattr(flying, "sources_digest", lambda files, *_: seen.extend(files) or b"")
     flying.code_digest.__wrapped__()
     names = {file.as_posix() for file in seen}
-    for name in ("tiltsim/metrics.py", "tiltsim/loops/tiltrotor.py", "controllers/vehicle.py"):
+    for name in (
+        "tiltsim/flight/metrics.py",
+        "tiltsim/laws/tiltrotor.py",
+        "controllers/tiltsim_controllers/vehicle/parameters.py",
+    ):
         assert any(path.endswith(name) for path in names), name
     assert any(path.endswith(".xml") for path in names)
     assert not any("/report/" in path or "/figures/" in path for path in names)

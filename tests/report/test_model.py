@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tiltsim.errors import InputError
-from tiltsim.loading import parse_scenario
 from tiltsim.report.claims import registered_claims
 from tiltsim.report.model import (
     AnalysisClaim,
@@ -20,6 +19,7 @@ from tiltsim.report.model import (
     scenario_claims,
     worst,
 )
+from tiltsim.scenario.loading import parse_scenario
 
 
 def claim(published, **more):

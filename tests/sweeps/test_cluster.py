@@ -14,7 +14,7 @@ import pytest
 
 from tests.sweeps.files import short_sweep
 from tiltsim.cli import main
-from tiltsim.sweeps.plan import load_definition
+from tiltsim.sweeps.loading import load_definition
 from tiltsim.sweeps.running import run_sweep
 
 pytest.importorskip("distributed", reason="needs the extra tiltsim[cluster]")

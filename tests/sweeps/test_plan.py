@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from tiltsim.errors import InputError
-from tiltsim.sweeps.plan import VALUES_TRIED, Definition, Plan, load_definition
+from tiltsim.sweeps.definition import Definition
+from tiltsim.sweeps.loading import load_definition
+from tiltsim.sweeps.plan import VALUES_TRIED, Plan
 
 HEAD = """
 scenario = "ch04_tracking/circle#continuous_t2_modified"

@@ -15,18 +15,19 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.sweeps.files import boundary_sweep, short_sweep
-from tiltsim import batch
 from tiltsim.errors import InputError
-from tiltsim.figures.sweep import sweep_figure
-from tiltsim.loading import parse_scenario
-from tiltsim.metrics import METRICS
-from tiltsim.parallel import ProcessDiedError
-from tiltsim.simulation import simulate
+from tiltsim.scenario.loading import parse_scenario
+from tiltsim.scenario.metric_names import METRICS
+from tiltsim.simulation import batch
+from tiltsim.simulation.simulate import simulate
 from tiltsim.sweeps import flying, running
 from tiltsim.sweeps.dataset import load_results
 from tiltsim.sweeps.folder import open_folder, write_durably
-from tiltsim.sweeps.plan import Plan, load_definition
+from tiltsim.sweeps.loading import load_definition
+from tiltsim.sweeps.plan import Plan
 from tiltsim.sweeps.running import run_sweep
+from tiltsim.system.processes import ProcessDiedError
+from tiltsim.views.figures.sweep import sweep_figure
 
 
 def rows(folder):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from tiltsim.errors import InputError
 
 if TYPE_CHECKING:
-    from controllers.vehicle import Vehicle
+    from tiltsim_controllers.vehicle.parameters import Vehicle
 
 LEAST: Final = 1e-12
 GREATEST: Final = 1e9
@@ -62,7 +62,7 @@ def parse_vehicle(text: str | None) -> Vehicle:
     The parts are separated by commas, the preset first; without one, and for None, it is
     ar_drone_2. `InputError` lists the choices.
     """
-    from controllers.vehicle import PRESETS
+    from tiltsim_controllers.vehicle.parameters import PRESETS
 
     parts = [] if text is None else [part.strip() for part in text.split(",")]
     name = parts.pop(0) if parts and "=" not in parts[0] else "ar_drone_2"
@@ -86,7 +86,7 @@ def parse_vehicle(text: str | None) -> Vehicle:
 
 def vehicle_text(vehicle: str | dict[str, float]) -> str:
     """A report's vehicle as `parse_vehicle` reads it: the closest preset and what differs."""
-    from controllers.vehicle import PRESETS
+    from tiltsim_controllers.vehicle.parameters import PRESETS
 
     if isinstance(vehicle, str):
         return vehicle

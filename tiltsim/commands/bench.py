@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.vehicles is not None and arguments.vehicles < 1:
         raise InputError(f"--vehicles {arguments.vehicles}: must be at least 1")
 
-    from tiltsim.benchmark import bench_accuracy, bench_flights, run_benchmark
+    from tiltsim.studies.benchmark import bench_accuracy, bench_flights, run_benchmark
 
     with compiling_told(shown=True):
         if arguments.vehicles is not None:

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 from tiltsim.commands.progress import compiling_told
 from tiltsim.commands.text import counted
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, FLIGHT_LOST, INVALID_INPUT
-from tiltsim.interrupts import interrupts_deferred
+from tiltsim.system.interrupts import interrupts_deferred
 
 if TYPE_CHECKING:
-    from tiltsim.checking import CheckResult
+    from tiltsim.studies.checking import CheckResult
 
 
 def add_parser(subparsers: Any) -> None:
@@ -63,10 +63,10 @@ def positive_integer(text: str) -> int:
 
 def run(arguments: argparse.Namespace) -> int:
     """Check everything and print a table."""
-    from tiltsim.checking import check_all, collect, not_flown, write_junit
     from tiltsim.errors import InputError
-    from tiltsim.library import shipped_folder
-    from tiltsim.loading import parse_override
+    from tiltsim.resources import shipped_folder
+    from tiltsim.scenario.loading import parse_override
+    from tiltsim.studies.checking import check_all, collect, not_flown, write_junit
 
     junit: Path | None = arguments.junit
     if junit is not None and (junit.is_dir() or not junit.absolute().parent.is_dir()):

@@ -20,8 +20,8 @@ from tiltsim.commands.text import aligned, json_text, number, numbers, table, te
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from controllers.gaits.plans import Gait
-    from controllers.vehicle import Vehicle
+    from tiltsim_controllers.gaits.plans import Gait
+    from tiltsim_controllers.vehicle.parameters import Vehicle
 
 FIGURES: Final = ("roll_pitch", "comparison", "margin", "attainable", "determinant", "faults")
 CASES: Final = ("equal", "half", "negative", "negative_half")
@@ -130,10 +130,10 @@ def run(arguments: argparse.Namespace) -> int:
     roll = None if arguments.roll is None else parse_angle("--roll", arguments.roll)
     pitch = None if arguments.pitch is None else parse_angle("--pitch", arguments.pitch)
 
-    from tiltsim.analysis import fault_report, gait_report
+    from tiltsim.studies.gait_analysis import fault_report, gait_report
 
     if arguments.plot is not None:
-        from tiltsim.figures.style import save
+        from tiltsim.views.figures.style import save
 
         save(_draw(arguments, chosen), arguments.plot)
     report = gait_report(chosen.gait, chosen.vehicle, roll=roll, pitch=pitch)
@@ -177,22 +177,22 @@ def _check_options(arguments: argparse.Namespace) -> None:
     if arguments.speed_limits is not None and kind != "attainable":
         raise InputError("--speed-limits: goes with --figure attainable")
     if arguments.plot is not None:
-        from tiltsim.figures.style import FORMATS
-        from tiltsim.files import prepare_file
+        from tiltsim.system.files import prepare_file
+        from tiltsim.views.figures.style import FORMATS
 
         prepare_file("--plot", arguments.plot, FORMATS)
 
 
 def _choose(arguments: argparse.Namespace) -> _Chosen:
     """The gait and the vehicle that the arguments name."""
-    from controllers.gaits import plans
-    from controllers.vehicle import Vehicle
     from tiltsim.errors import InputError
+    from tiltsim_controllers.gaits import plans
+    from tiltsim_controllers.vehicle.parameters import Vehicle
 
     if arguments.scenario is not None:
         if arguments.vehicle is not None:
             raise InputError("--vehicle: the scenario has a vehicle of its own; leave one out")
-        from tiltsim.loading import load_scenario
+        from tiltsim.scenario.loading import load_scenario
 
         scenario = load_scenario(arguments.scenario)
         vehicle = scenario.vehicle.resolve()
@@ -211,7 +211,7 @@ def _choose(arguments: argparse.Namespace) -> _Chosen:
         return _Chosen(plans.fixed(parse_angles("--angles", arguments.angles)), vehicle)
     if arguments.balance is not None:
         return _Chosen(_balanced(arguments.balance, vehicle), vehicle)
-    from controllers.published_gaits import PUBLISHED_GAITS
+    from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS
 
     if arguments.published not in PUBLISHED_GAITS:
         raise InputError(
@@ -226,7 +226,7 @@ def _choose(arguments: argparse.Namespace) -> _Chosen:
 def _draw(arguments: argparse.Namespace, chosen: _Chosen) -> Figure:
     """The figure of a gait that the arguments name."""
     from tiltsim.errors import InputError
-    from tiltsim.figures import attainable, faults, gait
+    from tiltsim.views.figures import attainable, faults, gait
 
     compared = [(chosen.title, chosen.gait)]
     if chosen.twin is not None:
@@ -250,7 +250,7 @@ def _draw(arguments: argparse.Namespace, chosen: _Chosen) -> Figure:
 
 def _speed_limits(arguments: argparse.Namespace, chosen: _Chosen) -> tuple[float, float]:
     """Least and greatest rotor speed (rad/s) of the attainable figure."""
-    from controllers.attainable import published_speed_limits
+    from tiltsim_controllers.analysis.attainable import published_speed_limits
 
     if arguments.speed_limits is None:
         return published_speed_limits(chosen.vehicle)
@@ -259,7 +259,7 @@ def _speed_limits(arguments: argparse.Namespace, chosen: _Chosen) -> tuple[float
 
 def _attainable_warnings(arguments: argparse.Namespace, chosen: _Chosen) -> list[str]:
     """What an empty attainable figure means."""
-    from controllers.attainable import attainable_torque_thrust
+    from tiltsim_controllers.analysis.attainable import attainable_torque_thrust
 
     limits = _speed_limits(arguments, chosen)
     if not attainable_torque_thrust(chosen.gait.angles(0.0), chosen.vehicle, limits).is_empty:
@@ -272,9 +272,9 @@ def _attainable_warnings(arguments: argparse.Namespace, chosen: _Chosen) -> list
 
 def _run_determinant(arguments: argparse.Namespace) -> int:
     """The restrictions of ch. 3, Sec. 5.1: a figure, and how far from singular they are."""
-    from tiltsim.analysis import determinant_report
-    from tiltsim.figures.determinant import determinant_figure
-    from tiltsim.figures.style import save
+    from tiltsim.studies.gait_analysis import determinant_report
+    from tiltsim.views.figures.determinant import determinant_figure
+    from tiltsim.views.figures.style import save
 
     vehicle, case = parse_vehicle(arguments.vehicle), arguments.case or "equal"
     save(determinant_figure(case, vehicle), arguments.plot)
@@ -290,7 +290,7 @@ def _print(arguments: argparse.Namespace, report: Any, text: Any) -> None:
 def _list_report() -> list[dict[str, Any]]:
     from dataclasses import asdict
 
-    from controllers.published_gaits import robustness_table
+    from tiltsim_controllers.analysis.published_gaits import robustness_table
 
     return [asdict(row) for row in robustness_table()]
 
@@ -334,9 +334,9 @@ def _determinant_text(report: dict[str, Any]) -> str:
 
 def _balanced(text: str, vehicle: Vehicle) -> Gait:
     """The gait that balances an acceleration, given as ``AX,AY,AZ``."""
-    from controllers.balance import balanced_gait
-    from controllers.gaits import plans
     from tiltsim.errors import InputError
+    from tiltsim_controllers.analysis.balance import balanced_gait
+    from tiltsim_controllers.gaits import plans
 
     try:
         ax, ay, az = (float(part) for part in text.split(","))

@@ -7,7 +7,7 @@ import json
 from typing import Any
 
 from tiltsim.commands.text import fitted
-from tiltsim.library import Entry, library_entries, library_families, library_sweeps
+from tiltsim.scenario.library import Entry, library_entries, library_families, library_sweeps
 
 
 def add_parser(subparsers: Any) -> None:

@@ -6,18 +6,13 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tiltsim.commands.angles import (
-    allow_negative_lists,
-    parse_angles,
-    parse_vehicle,
-    vehicle_text,
-)
+from tiltsim.commands.angles import allow_negative_lists, parse_angles, parse_vehicle, vehicle_text
 from tiltsim.commands.text import aligned, json_text, tell_of_figure
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
 
 if TYPE_CHECKING:
-    from controllers.two_color_planner import Circle, Polyline
-    from controllers.vehicle import Vehicle
+    from tiltsim_controllers.analysis.two_color_planner import Circle, Polyline
+    from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
 def add_parser(subparsers: Any) -> None:
@@ -60,12 +55,12 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Report, draw, judge."""
-    from tiltsim.analysis import map_report
     from tiltsim.errors import InputError
+    from tiltsim.studies.gait_analysis import map_report
 
     if arguments.plot is not None:
-        from tiltsim.figures.style import FORMATS
-        from tiltsim.files import prepare_file
+        from tiltsim.system.files import prepare_file
+        from tiltsim.views.figures.style import FORMATS
 
         prepare_file("--plot", arguments.plot, FORMATS)
     vehicle = parse_vehicle(arguments.vehicle)
@@ -76,8 +71,8 @@ def run(arguments: argparse.Namespace) -> int:
         place = "path" if path is not None else f"--vehicle {arguments.vehicle}"
         raise InputError(f"{place}: {error}") from None
     if arguments.plot is not None:
-        from tiltsim.figures.style import save
-        from tiltsim.figures.two_color_map import map_figure
+        from tiltsim.views.figures.style import save
+        from tiltsim.views.figures.two_color_map import map_figure
 
         save(map_figure(vehicle, [("path", path)] if path else None), arguments.plot)
     print(json_text(report) if arguments.json else _summary(report))
@@ -86,8 +81,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _path(arguments: argparse.Namespace, vehicle: Vehicle) -> Polyline | Circle | None:
-    from controllers.two_color_planner import Circle, Leg, Polyline
     from tiltsim.errors import InputError
+    from tiltsim_controllers.analysis.two_color_planner import Circle, Leg, Polyline
 
     if arguments.leg and arguments.circle:
         raise InputError("map: give either --leg or --circle")
@@ -107,7 +102,7 @@ def _path(arguments: argparse.Namespace, vehicle: Vehicle) -> Polyline | Circle 
 
 
 def _vertex(text: str, vehicle: Vehicle) -> tuple[float, float]:
-    from controllers.two_color_map import point_p
+    from tiltsim_controllers.analysis.two_color_map import point_p
 
     if text == "P":
         return point_p(vehicle)
@@ -116,8 +111,8 @@ def _vertex(text: str, vehicle: Vehicle) -> tuple[float, float]:
 
 
 def _color(option: str, name: str) -> str:
-    from controllers.gaits.two_color import COLORS
     from tiltsim.errors import InputError
+    from tiltsim_controllers.gaits.two_color import COLORS
 
     if name not in COLORS:
         raise InputError(f"{option} {name}: unknown color; choose {', '.join(COLORS)}")

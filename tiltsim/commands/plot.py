@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         figure = _flights_figure(arguments.flights, out)
 
-    from tiltsim.figures.style import save
+    from tiltsim.views.figures.style import save
 
     save(figure, out)
     print(f"figure written to {out}")
@@ -75,17 +75,17 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _flights_figure(paths: list[Path], out: Path) -> Figure:
-    from tiltsim.files import load_flight
+    from tiltsim.flight.reading import load_flight
 
     flights = [load_flight(path) for path in paths]
     _check(out)
     if len(flights) > 1:
-        from tiltsim.figures.comparison import comparison_figure
-        from tiltsim.flight_names import flight_names
+        from tiltsim.views.figures.comparison import comparison_figure
+        from tiltsim.views.titles import flight_names
 
         names = flight_names([flight.scenario for flight in flights], paths)
         return comparison_figure(flights, names)
-    from tiltsim.figures.flight import flight_figure
+    from tiltsim.views.figures.flight import flight_figure
 
     return flight_figure(flights[0])
 
@@ -95,13 +95,13 @@ def _sweep_figure(folder: Path, metrics: list[str], out: Path) -> Figure:
 
     results = load_results(folder)
     _check(out)
-    from tiltsim.figures.sweep import sweep_figure
+    from tiltsim.views.figures.sweep import sweep_figure
 
     return sweep_figure(results, tuple(metrics))
 
 
 def _check(out: Path) -> None:
-    from tiltsim.figures.style import FORMATS
-    from tiltsim.files import prepare_file
+    from tiltsim.system.files import prepare_file
+    from tiltsim.views.figures.style import FORMATS
 
     prepare_file("--out", out, FORMATS)

@@ -19,7 +19,7 @@ def compiling_told(*, shown: bool) -> Iterator[None]:
     if not shown or not sys.stderr.isatty():
         yield
         return
-    from tiltsim.cache import before_compiling
+    from tiltsim.engines.cache import before_compiling
 
     def tell(name: str) -> None:
         from tqdm import tqdm

@@ -50,12 +50,12 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Fly, judge, write."""
     from tiltsim.commands.progress import progress_bar
-    from tiltsim.files import prepare_file, prepare_folder
     from tiltsim.report.content import failure_text
     from tiltsim.report.making import make_report
     from tiltsim.report.markdown import markdown
     from tiltsim.report.page import page
     from tiltsim.report.rows import count
+    from tiltsim.system.files import prepare_file, prepare_folder
 
     out: Path = arguments.out
     target = out / "report.html"

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.progress import progress_bar
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, FLIGHT_LOST, INTERRUPTED
-from tiltsim.interrupts import interrupts_deferred
+from tiltsim.system.interrupts import interrupts_deferred
 
 if TYPE_CHECKING:
-    from tiltsim.expectation_table import Expectation
-    from tiltsim.expectations import Verdict
-    from tiltsim.flight import Flight
-    from tiltsim.loop import Floats
-    from tiltsim.rerun_stream import LiveStream
-    from tiltsim.scenario import Scenario
+    from tiltsim.closed_loop.loop import Floats
+    from tiltsim.flight.flight import Flight
+    from tiltsim.flight.verdicts import Verdict
+    from tiltsim.scenario.expectation import Expectation
+    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.views.rerun.live import LiveStream
 
 
 def add_parser(subparsers: Any) -> None:
@@ -65,9 +65,9 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fly, save, judge."""
-    from tiltsim.expectations import judge
-    from tiltsim.files import prepare_file, prepare_folder
-    from tiltsim.loading import load_scenario, parse_override
+    from tiltsim.flight.verdicts import judge
+    from tiltsim.scenario.loading import load_scenario, parse_override
+    from tiltsim.system.files import prepare_file, prepare_folder
 
     overrides = dict(parse_override(text) for text in arguments.overrides)
     if arguments.controller is not None:
@@ -78,8 +78,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.rerun is not None:
         prepare_file("--rerun", arguments.rerun, (".rrd",))
 
-    from controllers.vehicle import Vehicle
-    from tiltsim.analysis import gait_warnings
+    from tiltsim.studies.gait_analysis import gait_warnings
+    from tiltsim_controllers.vehicle.parameters import Vehicle
 
     vehicle = scenario.vehicle.resolve()
     if not arguments.quiet and isinstance(vehicle, Vehicle):
@@ -90,7 +90,7 @@ def run(arguments: argparse.Namespace) -> int:
         flight = fly(scenario, arguments)
         _save(flight, arguments)
     else:
-        from tiltsim.rerun_stream import RecordingProcess
+        from tiltsim.views.rerun.process import RecordingProcess
 
         with RecordingProcess(scenario) as recording:
             flight = fly(scenario, arguments)
@@ -151,12 +151,12 @@ def _save(flight: Flight, arguments: argparse.Namespace) -> None:
 
 def fly(scenario: Scenario, arguments: argparse.Namespace) -> Flight:
     """Simulate, with a progress bar and, if asked, a live view."""
-    from tiltsim.simulation import simulate
+    from tiltsim.simulation.simulate import simulate
 
     with ExitStack() as stack:
         live: LiveStream | None = None
         if arguments.live or arguments.connect is not None:
-            from tiltsim.rerun_stream import LiveStream
+            from tiltsim.views.rerun.live import LiveStream
 
             live = stack.enter_context(LiveStream(scenario, arguments.connect))
         bar = progress_bar(scenario.simulation.duration, "s", shown=not arguments.quiet)
@@ -180,7 +180,7 @@ def lost(flight: Flight) -> str:
 
 def summary(flight: Flight, verdicts: list[Verdict]) -> str:
     """The flight in a few aligned lines."""
-    from tiltsim.metrics import unit_of
+    from tiltsim.scenario.metric_names import unit_of
 
     scenario, metrics = flight.scenario, flight.metrics()
     lines = [scenario.title or scenario.address or "scenario"]

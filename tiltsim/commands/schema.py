@@ -6,6 +6,8 @@ import argparse
 import json
 from typing import Any
 
+from tiltsim.scenario.scenario import Scenario, Variant
+
 
 def add_parser(subparsers: Any) -> None:
     """Declare the command."""
@@ -20,7 +22,36 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the schema."""
-    from tiltsim.schema import scenario_schema, sweep_schema
+    pass
 
     print(json.dumps(sweep_schema() if arguments.sweep else scenario_schema(), indent=2))
     return 0
+
+
+def scenario_schema() -> dict[str, Any]:
+    """The schema of a scenario file: a base, and variants that may change any of its tables.
+
+    A variant names only what differs from the base, so nothing in it is required but its name.
+    """
+    schema = Scenario.model_json_schema()
+    schema["title"] = "tiltsim scenario"
+    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    variant = Variant.model_json_schema()
+    variant["properties"] |= {
+        key: value if key in {"title", "source", "expect", "disturbance"} else {"type": "object"}
+        for key, value in schema["properties"].items()
+    }
+    variant["additionalProperties"] = False
+    schema["$defs"]["Variant"] = variant
+    schema["properties"]["variant"] = {"type": "array", "items": {"$ref": "#/$defs/Variant"}}
+    return schema
+
+
+def sweep_schema() -> dict[str, Any]:
+    """The schema of a sweep file."""
+    from tiltsim.sweeps.tables import Sweep
+
+    schema = Sweep.model_json_schema()
+    schema["title"] = "tiltsim sweep"
+    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    return schema

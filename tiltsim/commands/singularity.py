@@ -11,7 +11,7 @@ from tiltsim.commands.angles import allow_negative_lists, parse_angle, parse_veh
 from tiltsim.commands.text import aligned, tell_of_figure
 
 if TYPE_CHECKING:
-    from controllers.vehicle import Vehicle
+    from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
 def add_parser(subparsers: Any) -> None:
@@ -42,14 +42,14 @@ def run(arguments: argparse.Namespace) -> int:
         parse_angle("--pitch", arguments.pitch),
     )
     if arguments.plot is not None:
-        from tiltsim.figures.style import FORMATS
-        from tiltsim.files import prepare_file
+        from tiltsim.system.files import prepare_file
+        from tiltsim.views.figures.style import FORMATS
 
         prepare_file("--plot", arguments.plot, FORMATS)
     report = _report(vehicle, *attitude)
     if arguments.plot is not None:
-        from tiltsim.figures.quadrotor_singularity import singularity_figure
-        from tiltsim.figures.style import save
+        from tiltsim.views.figures.quadrotor_singularity import singularity_figure
+        from tiltsim.views.figures.style import save
 
         save(singularity_figure(vehicle), arguments.plot)
     print(json.dumps(report, indent=2) if arguments.json else _summary(report))
@@ -60,13 +60,13 @@ def run(arguments: argparse.Namespace) -> int:
 def _report(vehicle: Vehicle, roll: float, pitch: float) -> dict[str, Any]:
     from math import asin, cos
 
-    from controllers.quadrotor_singularity import (
+    from tiltsim_controllers.analysis.quadrotor_singularity import (
         exact_determinant,
         normalized_determinant,
         published_determinant,
         published_singular_curve,
     )
-    from controllers.switching import PUBLISHED_ZONE
+    from tiltsim_controllers.laws.switching import PUBLISHED_ZONE
 
     hover = vehicle.mass * vehicle.gravity
     curve_roll, curve_pitch = published_singular_curve()

@@ -59,8 +59,9 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fly what is not yet finished, and sum up."""
-    from tiltsim.loading import parse_override
-    from tiltsim.sweeps.plan import Plan, load_definition
+    from tiltsim.scenario.loading import parse_override
+    from tiltsim.sweeps.loading import load_definition
+    from tiltsim.sweeps.plan import Plan
     from tiltsim.sweeps.running import run_sweep
 
     overrides = dict(parse_override(text) for text in arguments.overrides)

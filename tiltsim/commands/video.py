@@ -70,17 +70,18 @@ def _speed(text: str) -> float:
 
 def run(arguments: argparse.Namespace) -> int:
     """Draw and encode."""
-    from tiltsim.files import load_flight, prepare_file
+    from tiltsim.flight.reading import load_flight
+    from tiltsim.system.files import prepare_file
 
     flight = load_flight(arguments.flight)
     folder = arguments.flight if arguments.flight.is_dir() else arguments.flight.parent
     out = arguments.out or folder / "flight.mp4"
     prepare_file("--out", out, (".mp4",))
 
-    from tiltsim.video import prefer_offscreen_gl
+    from tiltsim.views.video import prefer_offscreen_gl
 
     prefer_offscreen_gl()  # before anything imports MuJoCo
-    from tiltsim.video.film import Format, film_flight, moments
+    from tiltsim.views.video.film import Format, film_flight, moments
 
     width, height = arguments.size
     form = Format(width, height, arguments.fps, arguments.speed)

@@ -35,8 +35,9 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Open the viewer, or save what it would show."""
     from tiltsim.errors import InputError
-    from tiltsim.files import load_flight, prepare_file
-    from tiltsim.flight_names import flight_names
+    from tiltsim.flight.reading import load_flight
+    from tiltsim.system.files import prepare_file
+    from tiltsim.views.titles import flight_names
 
     recordings = [path for path in arguments.paths if path.suffix.lower() == ".rrd"]
     if recordings:
@@ -48,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
         for path in recordings:
             if not path.is_file():
                 raise InputError(f"{path}: no such file")
-        from tiltsim.rerun_stream import view_recordings
+        from tiltsim.views.rerun.viewer import view_recordings
 
         view_recordings(recordings)
         return 0
@@ -58,11 +59,11 @@ def run(arguments: argparse.Namespace) -> int:
     flights = [load_flight(path) for path in arguments.paths]
     names = flight_names([flight.scenario for flight in flights], arguments.paths)
     if arguments.rerun is None:
-        from tiltsim.rerun_stream import view_flights
+        from tiltsim.views.rerun.viewer import view_flights
 
         view_flights(flights, arguments.connect, names)
         return 0
-    from tiltsim.rerun_stream import save_recording
+    from tiltsim.views.rerun.recording import save_recording
 
     save_recording(flights, arguments.rerun, names)
     print(f"recording written to {arguments.rerun}; open it with: rerun {arguments.rerun}")

@@ -11,13 +11,15 @@ import numpy as np
 from pydantic import ValidationError
 
 from tiltsim.errors import InputError
-from tiltsim.files import without_none
-from tiltsim.messages import one_line
-from tiltsim.sweeps.plan import Definition, Plan, load_definition
+from tiltsim.scenario.document import without_none
+from tiltsim.scenario.messages import one_line
+from tiltsim.sweeps.definition import Definition
+from tiltsim.sweeps.loading import load_definition
+from tiltsim.sweeps.plan import Plan
 from tiltsim.sweeps.tables import NormalAxis, SeedAxis, Sweep, UniformAxis
 
 if TYPE_CHECKING:
-    from tiltsim.scenario import Scenario
+    from tiltsim.scenario.scenario import Scenario
     from tiltsim.sweeps.tables import Axis
 
 LARGEST_SEED: Final = 2**31

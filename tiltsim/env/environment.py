@@ -17,15 +17,17 @@ import numpy as np
 import numpy.typing as npt
 from dm_env import specs
 
-from tiltsim.commanded_plant import CommandedPlant
-from tiltsim.controller import Command, Observation, Orders, checked, commanded_scenario
+from tiltsim.closed_loop.loop import Floats
 from tiltsim.env.domain import Domain
 from tiltsim.errors import InputError
-from tiltsim.flight import End, Flight
-from tiltsim.loading import load_scenario, parse_scenario
-from tiltsim.loop import Floats
-from tiltsim.scenario import Scenario
-from tiltsim.simulation import Watch
+from tiltsim.flight.end import End
+from tiltsim.flight.flight import Flight
+from tiltsim.plants.command import Command, Observation, Orders, checked
+from tiltsim.plants.commanded_plant import CommandedPlant
+from tiltsim.plants.user_controller import commanded_scenario
+from tiltsim.scenario.loading import load_scenario, parse_scenario
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.simulation.monitor import Watch
 
 Observed = dict[str, Floats]
 Reward = Callable[[Mapping[str, Floats], Floats], float]
@@ -286,7 +288,7 @@ class TiltrotorEnv(dm_env.Environment):  # type: ignore[misc]
     def action(self, command: Command) -> Floats:
         """The action for a controller's command of thrusts or rotor speeds.
 
-        Raises `tiltsim.controller.ControllerError` where it is invalid or of another kind.
+        Raises `tiltsim.plants.command.ControllerError` where it is invalid or of another kind.
         """
         if self._plant is None:
             raise InputError("environment: no episode has begun; call reset() first")

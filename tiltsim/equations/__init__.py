@@ -1,1 +1,1 @@
-"""The thesis' own equations of motion, one module a vehicle, for `tiltsim.plants.ThesisPlant`."""
+"""The thesis's own equations of motion, one module per vehicle."""

@@ -1,10 +1,11 @@
 """The vehicles on the thesis' equations, driven as MuJoCo drives them: by the controls of a model.
 
 The thesis' vehicles do as they are told: pods stand at the gait's angles, rotors take any speed.
-With a layer around the law (`tiltsim.loops.layer`) they do not, and what the layer says, it says as
-controls and activations of the MuJoCo model. Here these controls act on the thesis' rigid body, on
-pods without mass that follow the equation of their servo, and on rotors with limits. Nothing of
-MuJoCo is in it but the order of the controls, so that its flights can be checked against these.
+With a layer around the law (`tiltsim.laws.layers.layer`) they do not, and what the layer says, it
+says as controls and activations of the MuJoCo model. Here these controls act on the thesis' rigid
+body, on pods without mass that follow the equation of their servo, and on rotors with limits.
+Nothing of MuJoCo is in it but the order of the controls, so that its flights can be checked against
+these.
 """
 
 from __future__ import annotations
@@ -13,20 +14,20 @@ from collections.abc import Callable, Sequence
 from math import inf
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from controllers.rotation import (
+from tiltsim.equations.quadrotor import equations_of_motion, initial_state
+from tiltsim.equations.tiltrotor import rigid_body
+from tiltsim.vehicles.rotorcraft import initial_tilts
+from tiltsim_controllers.mathematics.rotation import (
     quaternion_from_euler,
     quaternion_from_rotation,
     rotation_from_euler,
     to_world,
 )
-from controllers.scalar import Quad, Triple, clipped, scalar
-from controllers.vehicle import Vehicle
-from tiltsim.equations.quadrotor import equations_of_motion, initial_state
-from tiltsim.equations.tiltrotor import rigid_body
-from tiltsim.kinds.rotorcraft import initial_tilts
+from tiltsim_controllers.mathematics.scalar import Quad, Triple, clipped, scalar
+from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
-    from tiltsim.scenario import Scenario
+    from tiltsim.scenario.scenario import Scenario
 
 Wrench = tuple[float, float, float, float, float, float]
 """Force (N) and torque (N m) on the body, body axes."""
@@ -77,7 +78,9 @@ class Driven(NamedTuple):
         [Sequence[float], Sequence[float], Wrench, Mechanics, Triple], tuple[float, ...]
     ]
     """Time derivative of the motion: state, controls, wrench, mechanics, disturbance (m/s^2)."""
-    settled: Callable[[list[float], Mechanics], list[float]]  # see `tiltsim.loop.Equations`
+    settled: Callable[
+        [list[float], Mechanics], list[float]
+    ]  # see `tiltsim.closed_loop.loop.Equations`
     initial: Callable[[Scenario], tuple[float, ...]]  # motion
 
 

@@ -10,18 +10,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from controllers.rotation import rotation_from_euler
-from controllers.scalar import Triple, scalar
-from controllers.vehicle import Vehicle
-from controllers.yaw_position import State, euler_rates, gyroscopic_acceleration
+from tiltsim_controllers.laws.yaw_position import State, euler_rates, gyroscopic_acceleration
+from tiltsim_controllers.mathematics.rotation import rotation_from_euler
+from tiltsim_controllers.mathematics.scalar import Triple, scalar
+from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
-    from tiltsim.scenario import Scenario
+    from tiltsim.scenario.scenario import Scenario
 
 
 @scalar
 def rigid_body(state: Sequence[float]) -> State:
-    """The laws' state (`controllers.yaw_position.STATE_FIELDS`), for laws without states."""
+    """State of laws without states: `tiltsim_controllers.laws.yaw_position.STATE_FIELDS`."""
     return (
         *(state[0], state[1], state[2], state[3], state[4], state[5], state[6]),
         *(state[7], state[8], state[9], state[10], state[11], 0.0, 0.0),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from controllers.scalar import Triple, scalar
-from controllers.tilt_car.vehicle import TiltCar, acceleration, yaw_share
+from tiltsim_controllers.mathematics.scalar import Triple, scalar
+from tiltsim_controllers.tilt_car.vehicle import TiltCar, acceleration, yaw_share
 
 
 @scalar

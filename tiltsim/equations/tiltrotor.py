@@ -10,24 +10,24 @@ from collections.abc import Sequence
 from math import asin, atan2
 from typing import TYPE_CHECKING
 
-from controllers.attitude_altitude import State
-from controllers.decoupling_matrix import (
+from tiltsim_controllers.laws.attitude_altitude import State
+from tiltsim_controllers.mathematics.rotation import rotation_from_euler
+from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
+from tiltsim_controllers.vehicle.decoupling_matrix import (
     body_force,
     body_torque,
     sines_and_cosines,
     torque_entries,
 )
-from controllers.rotation import rotation_from_euler
-from controllers.scalar import Quad, Triple, scalar
-from controllers.vehicle import Vehicle, drag_ratio
+from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
 if TYPE_CHECKING:
-    from tiltsim.scenario import Scenario
+    from tiltsim.scenario.scenario import Scenario
 
 
 @scalar
 def law_state(state: Sequence[float], tilts: Quad) -> State:
-    """The laws' state (`controllers.attitude_altitude.STATE_FIELDS`): Euler angles, tilts."""
+    """State of the laws: `tiltsim_controllers.laws.attitude_altitude.STATE_FIELDS`."""
     sin_pitch = min(1.0, max(-1.0, -state[12]))  # rounding may carry the sine past one
     return (
         *(state[0], state[1], state[2], state[3], state[4], state[5]),

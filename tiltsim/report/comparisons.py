@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Final
 
-from tiltsim.metrics import unit_of
 from tiltsim.report.flying import PLANTS, Flights, Plan, Plant, Record
 from tiltsim.report.model import CHAPTER
+from tiltsim.scenario.metric_names import unit_of
 
 TITLE: Final = "Beyond the thesis"
 EXPLANATION: Final = (

@@ -212,6 +212,6 @@ def flown_text(report: Report) -> str:
 
 
 def _flies(scenario: object) -> bool:
-    from tiltsim.scenario import Scenario
+    from tiltsim.scenario.scenario import Scenario
 
     return isinstance(scenario, Scenario)

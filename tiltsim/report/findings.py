@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from controllers.vehicle import PRESETS
+from tiltsim_controllers.vehicle.parameters import PRESETS
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
 
@@ -43,8 +43,8 @@ class Finding:
 
 
 def _matrix_gain() -> dict[str, str]:
-    from controllers.gains import GAIN_SETS
-    from controllers.stability import third_order_loop
+    from tiltsim_controllers.analysis.stability import third_order_loop
+    from tiltsim_controllers.laws.gains import GAIN_SETS
 
     gains = GAIN_SETS["ch04"]
     factor = 2.0 * _VEHICLE.hover_rotor_speed
@@ -59,7 +59,7 @@ def _matrix_gain() -> dict[str, str]:
 
 
 def _map_numbers() -> dict[str, str]:
-    from controllers.two_color_map import delta
+    from tiltsim_controllers.analysis.two_color_map import delta
 
     return {
         "ar": f"{2.0 * delta(_VEHICLE):.9f}",
@@ -68,8 +68,8 @@ def _map_numbers() -> dict[str, str]:
 
 
 def _blue_numbers() -> dict[str, str]:
-    from controllers.published_gaits import PUBLISHED_GAITS
-    from controllers.singularity import residuals, singular_values
+    from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS
+    from tiltsim_controllers.analysis.singularity import residuals, singular_values
 
     printed = PUBLISHED_GAITS["ch06_gait_1"]
     assert printed.exact is not None
@@ -88,8 +88,11 @@ def _blue_numbers() -> dict[str, str]:
 
 
 def _quadrotor_numbers() -> dict[str, str]:
-    from controllers.quadrotor_singularity import normalized_determinant, published_singular_curve
-    from controllers.yaw_position import GAIN_SETS
+    from tiltsim_controllers.analysis.quadrotor_singularity import (
+        normalized_determinant,
+        published_singular_curve,
+    )
+    from tiltsim_controllers.laws.yaw_position import GAIN_SETS
 
     vehicle = PRESETS["ar_drone_2_unrounded"]
     hover = vehicle.mass * vehicle.gravity
@@ -104,12 +107,12 @@ def _quadrotor_numbers() -> dict[str, str]:
 
 
 def _attainable_numbers() -> dict[str, str]:
-    from controllers.attainable import (
+    from tiltsim_controllers.analysis.attainable import (
         attainable_accelerations,
         attainable_torque_thrust,
         published_speed_limits,
     )
-    from controllers.published_gaits import PUBLISHED_GAITS
+    from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS
 
     limits = published_speed_limits(_VEHICLE)
     angles = PUBLISHED_GAITS["ch09_gait_2"].gait.angles(0.0)
@@ -142,15 +145,15 @@ FINDINGS: Final = (
         ),
         (
             *_in(
-                "controllers/test_decoupling_matrix",
+                "controllers/vehicle/test_decoupling_matrix",
                 "test_determinant_has_the_closed_form",
             ),
             *_in(
-                "controllers/test_singularity",
+                "controllers/analysis/test_singularity",
                 "test_margin_is_the_smallest_rotation_to_a_singular_attitude",
             ),
             *_in(
-                "controllers/test_unacceptable_attitudes",
+                "controllers/analysis/test_unacceptable_attitudes",
                 "test_the_closed_form_is_singular_and_agrees_with_the_great_circle",
             ),
         ),
@@ -166,7 +169,7 @@ FINDINGS: Final = (
         ),
         (
             *_in(
-                "controllers/test_singularity",
+                "controllers/analysis/test_singularity",
                 "test_the_slips_of_the_pen_are_slips",
                 "test_printed_coefficients_of_chapter_3",
             ),
@@ -191,7 +194,7 @@ FINDINGS: Final = (
         ),
         (
             *_in(
-                "controllers/test_stability",
+                "controllers/analysis/test_stability",
                 "test_published_attitude_gains_fail_under_the_exact_matrix",
                 "test_published_gains_pass_under_the_published_matrix",
                 "test_published_matrix_multiplies_the_attitude_loops_by_twice_the_hover_speed",
@@ -213,7 +216,7 @@ FINDINGS: Final = (
         ),
         (
             *_in(
-                "controllers/test_two_color_map",
+                "controllers/analysis/test_two_color_map",
                 "test_residuals_factor",
                 "test_roots_are_roots_and_lie_on_the_lines",
                 "test_printed_coefficients_explain_the_published_offset",
@@ -232,11 +235,11 @@ FINDINGS: Final = (
         ),
         (
             *_in(
-                "controllers/test_singularity",
+                "controllers/analysis/test_singularity",
                 "test_blue_gaits_lose_rank_and_red_gaits_are_vertical",
             ),
             *_in(
-                "controllers/test_two_color_map",
+                "controllers/analysis/test_two_color_map",
                 "test_p_lies_on_l_and_both_colors_meet_there",
             ),
         ),
@@ -255,19 +258,19 @@ FINDINGS: Final = (
         ),
         (
             *_in(
-                "controllers/test_two_color_map",
+                "controllers/analysis/test_two_color_map",
                 "test_blue_has_no_margin_and_red_all_of_it",
             ),
             *_in(
-                "controllers/test_attainable",
+                "controllers/analysis/test_attainable",
                 "test_linear_coupling_of_blue_gaits_is_their_loss_of_rank",
             ),
             *_in(
-                "controllers/test_singularity",
+                "controllers/analysis/test_singularity",
                 "test_thesis_rounding_of_the_blue_offset_leaves_a_trace_of_rank",
             ),
             *_in(
-                "test_simulation",
+                "simulation/test_simulate",
                 "test_blue_gait_is_singular_from_the_start",
             ),
         ),
@@ -284,7 +287,7 @@ FINDINGS: Final = (
         ),
         (
             *_in(
-                "controllers/test_two_color_map",
+                "controllers/analysis/test_two_color_map",
                 "test_positive_residual_needs_red_and_fills_a_triangle",
             ),
         ),
@@ -317,13 +320,13 @@ FINDINGS: Final = (
         ),
         (
             *_in(
-                "test_simulation",
+                "simulation/test_simulate",
                 "test_setpoint_flights_come_to_rest_where_statics_say",
                 "test_setpoint_error_is_the_published_one",
                 "test_exact_decoupler_leaves_no_steady_error",
             ),
             *_in(
-                "controllers/test_attitude_altitude",
+                "controllers/laws/test_attitude_altitude",
                 "test_exact_decoupler_points_the_torque_free_force_along_the_wanted_one",
             ),
         ),
@@ -339,7 +342,7 @@ FINDINGS: Final = (
         ),
         (
             *_in(
-                "test_simulation",
+                "simulation/test_simulate",
                 "test_plants_differ_by_the_gyroscopic_torque_once_the_body_rolls_and_yaws",
                 "test_plants_agree_where_they_model_the_same",
             ),
@@ -360,13 +363,13 @@ FINDINGS: Final = (
         ),
         (
             *_in(
-                "controllers/test_yaw_position",
+                "controllers/laws/test_yaw_position",
                 "test_the_determinant_is_the_exact_one",
                 "test_the_published_gains_are_unstable_by_themselves_and_ours_are_not",
                 "test_stable_gains_fly_the_circle_through_the_published_curve",
             ),
             *_in(
-                "controllers/test_quadrotor_singularity",
+                "controllers/analysis/test_quadrotor_singularity",
                 "test_the_surface_comes_from_one_missing_entry_of_eq_43",
                 "test_the_slip_in_eq_31_does_not_touch_the_determinant",
             ),
@@ -385,7 +388,7 @@ FINDINGS: Final = (
         ),
         (
             *_in(
-                "controllers/test_switching",
+                "controllers/laws/test_switching",
                 "test_experiment_2_is_lost_after_switches",
                 "test_experiment_2_with_the_other_reference_rests_on_the_zones_edge",
             ),
@@ -403,7 +406,7 @@ FINDINGS: Final = (
         ),
         (
             *_in(
-                "controllers/test_attainable",
+                "controllers/analysis/test_attainable",
                 "test_published_speed_limits",
                 "test_gaits_1_and_4_cannot_free_themselves_of_yaw",
                 "test_gaits_2_and_3",

@@ -17,21 +17,22 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 
-from tiltsim.cache import core_sources
-from tiltsim.checking import shared_engine, with_engine
+from tiltsim.engines.cache import core_sources
 from tiltsim.errors import InputError
-from tiltsim.files import replacing
-from tiltsim.library import shipped_folder
-from tiltsim.loading import load_scenario
-from tiltsim.metrics import WALL_CLOCK_METRICS
-from tiltsim.parallel import in_processes
+from tiltsim.plants.engine_choice import with_engine
 from tiltsim.report.claims import registered_claims
 from tiltsim.report.model import AnalysisClaim, Value, plain
+from tiltsim.resources import shipped_folder
+from tiltsim.scenario.loading import load_scenario
+from tiltsim.scenario.metric_names import WALL_CLOCK_METRICS
+from tiltsim.simulation.shared_engine import shared_engine
+from tiltsim.system.files import replacing
+from tiltsim.system.processes import in_processes
 
 if TYPE_CHECKING:
-    from tiltsim.engine import EngineName
-    from tiltsim.flight import Flight
-    from tiltsim.scenario import Scenario
+    from tiltsim.engines.base import EngineName
+    from tiltsim.flight.flight import Flight
+    from tiltsim.scenario.scenario import Scenario
 
 Plant = Literal["thesis", "mujoco"]
 PLANTS: Final[tuple[Plant, ...]] = ("thesis", "mujoco")
@@ -214,7 +215,7 @@ def _fly_all(
 
 
 def _fly_one(task: _Task, folder: Path, engine: EngineName | None) -> Record:
-    from tiltsim.simulation import simulate
+    from tiltsim.simulation.simulate import simulate
 
     scenario = variant_for(task.address, task.plant)
     if engine is not None and scenario.simulation.engine == "auto":

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from tiltsim.checking import collect
-from tiltsim.library import shipped_folder
 from tiltsim.report.comparisons import compare
 from tiltsim.report.content import Report
 from tiltsim.report.findings import FINDINGS
 from tiltsim.report.flying import analyze, fly, plan_flights
 from tiltsim.report.pictures import draw_all
 from tiltsim.report.rows import failures, make_rows
+from tiltsim.resources import shipped_folder
+from tiltsim.studies.checking import collect
 
 
 def make_report(
@@ -26,8 +26,8 @@ def make_report(
     Parameters
     ----------
     paths
-        Files, folders or library names, as in `tiltsim.checking.collect`. Without any, the report
-        is the whole: all scenarios, all claims, and the findings.
+        Files, folders or library names, as in `tiltsim.studies.checking.collect`. Without any, the
+        report is the whole: all scenarios, all claims, and the findings.
     folder
         Where flights, computed values and drawings are kept.
     jobs

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from controllers.gains import GAIN_SETS
-from controllers.published_gaits import PUBLISHED_GAITS, robustness
-from controllers.singularity import residuals
-from controllers.stability import third_order_loop
 from tiltsim.report.model import Metrics
+from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS, robustness
+from tiltsim_controllers.analysis.singularity import residuals
+from tiltsim_controllers.analysis.stability import third_order_loop
+from tiltsim_controllers.laws.gains import GAIN_SETS
 
 if TYPE_CHECKING:
-    from controllers.vehicle import Vehicle
+    from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
 PRINTED: Final = 1e-3

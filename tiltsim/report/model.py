@@ -10,11 +10,11 @@ from enum import Enum
 from math import isfinite
 from typing import TYPE_CHECKING, Final, TypeAlias
 
-from tiltsim.metrics import unit_of
+from tiltsim.scenario.metric_names import unit_of
 
 if TYPE_CHECKING:
-    from tiltsim.expectation_table import Expectation
-    from tiltsim.scenario import Scenario
+    from tiltsim.scenario.expectation import Expectation
+    from tiltsim.scenario.scenario import Scenario
 
 Value: TypeAlias = "float | bool | tuple[float, ...]"
 """A measured value: a number, yes or no, or several numbers."""
@@ -144,7 +144,7 @@ class ExpectationClaim(Claim):
 
     def measure(self, metrics: Metrics) -> Value | None:
         """The measured value, or whether the bounds hold where the thesis says yes or no."""
-        from tiltsim.expectations import Verdict
+        from tiltsim.flight.verdicts import Verdict
 
         value = metrics.get(self.expectation.metric)
         if value is None or isinstance(value, bool) or not isinstance(self.published, bool):

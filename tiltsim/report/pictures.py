@@ -1,4 +1,4 @@
-"""The figures of the report, a few a chapter, drawn with `tiltsim.figures`."""
+"""The figures of the report, a few a chapter, drawn with `tiltsim.views.figures`."""
 
 from __future__ import annotations
 
@@ -11,10 +11,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from controllers.published_gaits import PATHS, PUBLISHED_GAITS
-from controllers.vehicle import PRESETS
 from tiltsim.errors import InputError
-from tiltsim.parallel import in_processes
 from tiltsim.report.flying import (
     Flights,
     Plan,
@@ -26,7 +23,10 @@ from tiltsim.report.flying import (
     sources_digest,
 )
 from tiltsim.report.model import Metrics
-from tiltsim.scenario import Scenario
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.system.processes import in_processes
+from tiltsim_controllers.analysis.published_gaits import PATHS, PUBLISHED_GAITS
+from tiltsim_controllers.vehicle.parameters import PRESETS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,7 +54,7 @@ class AnalysisPicture(Picture):
 
 @dataclass(frozen=True)
 class FlightPicture(Picture):
-    """The page of one flight (`tiltsim.figures.flight`)."""
+    """The page of one flight (`tiltsim.views.figures.flight`)."""
 
     address: str = ""
     plant: Plant = "mujoco"
@@ -97,7 +97,7 @@ def draw_all(
     InputError
         If a figure cannot be drawn or a process dies.
     """
-    sources = Path(__file__).parent.parent / "figures"
+    sources = Path(__file__).parents[1] / "views" / "figures"
     style = sources_digest([*sources.glob("*.py"), Path(__file__)], code_digest().hex())
     scenarios = {
         (plan.address, plant): scenario
@@ -175,7 +175,7 @@ def png(figure: Figure) -> bytes:
     """
     from PIL import Image
 
-    from tiltsim.figures.style import paper_style
+    from tiltsim.views.figures.style import paper_style
 
     drawn, packed = BytesIO(), BytesIO()
     with paper_style():
@@ -189,9 +189,9 @@ def png(figure: Figure) -> bytes:
 
 
 def _flight_page(picture: FlightPicture) -> Figure:
-    from tiltsim.figures.flight import flight_figure
     from tiltsim.report.flying import variant_for
-    from tiltsim.simulation import simulate
+    from tiltsim.simulation.simulate import simulate
+    from tiltsim.views.figures.flight import flight_figure
 
     return flight_figure(simulate(variant_for(picture.address, picture.plant)))
 
@@ -220,7 +220,7 @@ FIG_4: Final = {
 
 
 def _setpoint_errors(metrics: Mapping[tuple[str, Plant], Metrics]) -> Figure:
-    from tiltsim.figures.tracking_errors import SetpointErrors, setpoint_figure
+    from tiltsim.views.figures.tracking_errors import SetpointErrors, setpoint_figure
 
     families = []
     for decoupler, letter in _LETTERS.items():
@@ -236,7 +236,7 @@ def _setpoint_errors(metrics: Mapping[tuple[str, Plant], Metrics]) -> Figure:
 
 
 def _trot_errors(metrics: Mapping[tuple[str, Plant], Metrics]) -> Figure:
-    from tiltsim.figures.tracking_errors import PeriodErrors, period_figure
+    from tiltsim.views.figures.tracking_errors import PeriodErrors, period_figure
 
     def series(reference: str, form: str, decoupler: str, plant: Plant) -> PeriodErrors:
         errors: list[float | None] = []
@@ -259,19 +259,19 @@ def _trot_errors(metrics: Mapping[tuple[str, Plant], Metrics]) -> Figure:
 
 
 def _singular_surface() -> Figure:
-    from tiltsim.figures.quadrotor_singularity import singularity_figure
+    from tiltsim.views.figures.quadrotor_singularity import singularity_figure
 
     return singularity_figure(PRESETS["ar_drone_2_unrounded"])
 
 
 def _determinant() -> Figure:
-    from tiltsim.figures.determinant import determinant_figure
+    from tiltsim.views.figures.determinant import determinant_figure
 
     return determinant_figure("equal", _VEHICLE)
 
 
 def _gait_and_twin(key: str) -> Figure:
-    from tiltsim.figures.gait import comparison_figure
+    from tiltsim.views.figures.gait import comparison_figure
 
     published = PUBLISHED_GAITS[key]
     assert published.biased is not None
@@ -280,13 +280,13 @@ def _gait_and_twin(key: str) -> Figure:
 
 
 def _map(preset: str, *, examples: bool = False) -> Figure:
-    from tiltsim.figures.two_color_map import map_figure
+    from tiltsim.views.figures.two_color_map import map_figure
 
     return map_figure(PRESETS[preset], list(PATHS.items()) if examples else None)
 
 
 def _attainable(key: str) -> Figure:
-    from tiltsim.figures.attainable import attainable_figure
+    from tiltsim.views.figures.attainable import attainable_figure
 
     return attainable_figure(PUBLISHED_GAITS[key].gait, _VEHICLE)
 

@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from tiltsim.expectations import Verdict, judge
+from tiltsim.flight.verdicts import Verdict, judge
 from tiltsim.report.claims import registered_claims
 from tiltsim.report.flying import PLANTS, Flights, Plan, Plant, Record
 from tiltsim.report.model import (
@@ -20,7 +20,7 @@ from tiltsim.report.model import (
     scenario_claims,
     worst,
 )
-from tiltsim.scenario import Scenario
+from tiltsim.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator
 from typing import Any, Final
 
-from tiltsim.engine import EngineName
+from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
 from tiltsim.sweeps.flying import Part, fly_numbered_chunk, installed_versions
 

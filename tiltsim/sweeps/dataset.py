@@ -12,7 +12,7 @@ import numpy.typing as npt
 from pydantic import ValidationError
 
 from tiltsim.errors import InputError
-from tiltsim.messages import one_line, show
+from tiltsim.scenario.messages import one_line, show
 from tiltsim.sweeps.expressions import evaluate
 from tiltsim.sweeps.folder import DATASET, DEFINITION, read_definition
 from tiltsim.sweeps.plan import Plan

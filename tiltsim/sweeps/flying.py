@@ -15,22 +15,24 @@ from functools import lru_cache
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, Final
 
-from tiltsim.batch import fly_all
-from tiltsim.checking import with_engine
-from tiltsim.engine import EngineName
+from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
-from tiltsim.expectations import Verdict
-from tiltsim.files import without_none
-from tiltsim.metrics import BOOLEAN_METRICS
-from tiltsim.scenario import Scenario
-from tiltsim.simulation import simulate
-from tiltsim.sweeps.plan import VERSIONS, Definition, Plan
+from tiltsim.flight.verdicts import Verdict
+from tiltsim.plants.engine_choice import with_engine
+from tiltsim.scenario.document import without_none
+from tiltsim.scenario.metric_names import BOOLEAN_METRICS
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.simulation.batch import fly_all
+from tiltsim.simulation.simulate import simulate
+from tiltsim.sweeps.definition import VERSIONS, Definition
+from tiltsim.sweeps.plan import Plan
 from tiltsim.sweeps.search import boundary
 
 if TYPE_CHECKING:
     import pyarrow
 
-    from tiltsim.flight import End, Flight
+    from tiltsim.flight.end import End
+    from tiltsim.flight.flight import Flight
 
 _ONE_FLIGHT_AT_A_TIME: Final = threading.Lock()
 """MuJoCo's control callback is global to the process, and a cluster may use threads."""

@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.errors import InputError
-from tiltsim.files import prepare_folder
-from tiltsim.locks import locked
-from tiltsim.sweeps.plan import Definition, Plan
+from tiltsim.sweeps.definition import Definition
+from tiltsim.sweeps.plan import Plan
+from tiltsim.system.files import prepare_folder
+from tiltsim.system.locks import locked
 
 if TYPE_CHECKING:
     from tiltsim.sweeps.flying import Part

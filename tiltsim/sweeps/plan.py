@@ -6,34 +6,27 @@ every point.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, replace
 from functools import cached_property
-from importlib.metadata import version
 from math import prod
-from pathlib import Path
 from typing import Any, Final, cast
 
 import numpy as np
-from pydantic import ValidationError
 
+from tiltsim.closed_loop.loop import Floats
 from tiltsim.errors import InputError
-from tiltsim.files import without_none
-from tiltsim.library import find_scenario_file, library_name, read_toml
-from tiltsim.loading import (
-    anchor_files,
+from tiltsim.scenario.loading import (
     apply_overrides,
     key_steps,
-    load_scenario,
     merge,
     parse_scenario,
 )
-from tiltsim.loop import Floats
-from tiltsim.messages import one_line, show
-from tiltsim.metrics import METRICS, WALL_CLOCK_METRICS
-from tiltsim.scenario import Scenario
+from tiltsim.scenario.messages import show
+from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.vehicle import VehicleTable
+from tiltsim.sweeps.definition import VERSIONS, Definition
 from tiltsim.sweeps.expressions import evaluate, names
 from tiltsim.sweeps.tables import (
     AxisTable,
@@ -44,9 +37,7 @@ from tiltsim.sweeps.tables import (
     SeedAxis,
     Sweep,
     UniformAxis,
-    dotted,
 )
-from tiltsim.vehicle_tables import VehicleTable
 
 MAX_POINTS: Final = 10_000_000
 MAX_SEARCH: Final = 1_000_000
@@ -56,145 +47,8 @@ VALUES_TRIED: Final = 1000
 LARGEST_CHUNK: Final = 32
 """Points of a chunk unless the file says otherwise: few enough to lose little when killed."""
 
-VERSIONS: Final = ("tiltsim", "mujoco", "numpy", "scipy")
 RESERVED: Final = ("index", "end", "end_time", "cause", "scenario", "flights")
 """Columns of every dataset, besides metrics and versions."""
-
-COSMETIC: Final = ("title", "source", "without", "plot")
-"""Keys of a sweep file that change no flight."""
-
-
-@dataclass(frozen=True)
-class Definition:
-    """All that decides the rows of a sweep, in plain dicts and lists.
-
-    Attributes
-    ----------
-    address
-        How the sweep is called on the command line.
-    sweep
-        The validated file.
-    base
-        The base scenario with every default written out.
-    versions
-        Of the packages whose arithmetic the rows depend on.
-    """
-
-    address: str
-    sweep: dict[str, Any]
-    base: dict[str, Any]
-    versions: dict[str, str]
-
-    def to_json(self) -> str:
-        """The definition as text, for a file."""
-        return json.dumps(vars(self), indent=2) + "\n"
-
-    @staticmethod
-    def from_json(text: str) -> Definition:
-        """The inverse of `to_json`. Raises ValueError or TypeError where the text is another."""
-        return Definition(**json.loads(text))
-
-    def difference(self, other: Definition) -> str:
-        """The first thing in which another definition would give other rows, else empty.
-
-        A key that one of them does not name, as it was written before there was such a key, has
-        its default there.
-        """
-        ours, theirs = (_flat(known._completed()._decisive()) for known in (self, other))
-        for key in [*ours, *theirs]:
-            before, now = ours.get(key), theirs.get(key)
-            if before != now:
-                return f"{key} was {show(before)} and is {show(now)}"
-        return ""
-
-    def _completed(self) -> Definition:
-        """The same with today's defaults written out; as it is where it is no longer valid."""
-        try:
-            sweep = Sweep.model_validate(self.sweep).model_dump_json(exclude_none=True)
-            base = without_none(parse_scenario(self.base).model_dump(mode="json"))
-        except (ValidationError, InputError):
-            return self
-        base.pop("expect", None)
-        return replace(self, sweep=json.loads(sweep), base=base)
-
-    def _decisive(self) -> dict[str, Any]:
-        sweep = {key: value for key, value in self.sweep.items() if key not in COSMETIC}
-        base = {key: value for key, value in self.base.items() if key not in COSMETIC}
-        sweep.pop("scenario")  # what it names is in the base
-        return {**sweep, "scenario": base, "versions": self.versions}
-
-
-def _flat(value: Any, key: str = "") -> dict[str, Any]:
-    """Nested tables and lists as one table with dotted keys."""
-    if isinstance(value, dict):
-        parts = [(f"{key}.{name}" if key else name, item) for name, item in value.items()]
-    elif isinstance(value, list) and any(isinstance(item, dict | list) for item in value):
-        parts = [(f"{key}[{position}]", item) for position, item in enumerate(value)]
-    else:
-        return {key: value}
-    return {name: leaf for part, item in parts for name, leaf in _flat(item, part).items()}
-
-
-def load_definition(path: str | Path, overrides: dict[str, Any] | None = None) -> Definition:
-    """Read a sweep file.
-
-    Parameters
-    ----------
-    path
-        A TOML file or the name of a sweep in the library.
-    overrides
-        Values by dotted key of the scenario, on top of the file's ``[set]``.
-
-    Raises
-    ------
-    InputError
-        In one line: the file, the key, the value and what is allowed. The base scenario and every
-        value of every axis are tried.
-    """
-    file = find_scenario_file(path)
-    address = library_name(file)
-    document = read_toml(file)
-    fixed = document.setdefault("set", {})
-    if overrides and isinstance(fixed, dict):
-        document["set"] = dotted(fixed) | overrides
-    if "scenario" not in document and not {"axis", "bisect"} & document.keys():
-        raise InputError(f"{address}: a scenario, not a sweep: it has no [[axis]]; use tiltsim run")
-    try:
-        sweep = Sweep.model_validate(document)
-    except ValidationError as error:
-        raise InputError(f"{address}: {one_line(error, document, Sweep)}") from None
-    for axis in sweep.axis:
-        for tables in axis.cases.values() if isinstance(axis, CasesAxis) else ():
-            anchor_files(tables, file.parent)
-    base = _base(sweep, file.parent, address)
-    definition = Definition(
-        address,
-        json.loads(sweep.model_dump_json(exclude_none=True)),
-        json.loads(json.dumps(base)),
-        {name: version(name) for name in VERSIONS},
-    )
-    Plan(definition).check()
-    return definition
-
-
-def _base(sweep: Sweep, folder: Path, address: str) -> dict[str, Any]:
-    """The base scenario with ``[set]`` and all defaults, without its expectations."""
-    if isinstance(sweep.scenario, str):
-        name, _, variant = sweep.scenario.partition("#")
-        beside = (folder / name) if name else folder
-        path = str(beside) if beside.is_file() else name
-        try:
-            scenario = load_scenario(path + (f"#{variant}" if variant else ""), sweep.set or None)
-        except InputError as error:
-            raise InputError(f"{address}: scenario: {error}") from None
-    else:
-        document = deepcopy(sweep.scenario)
-        anchor_files(document, folder)
-        apply_overrides(document, sweep.set, f"{address}: scenario")
-        scenario = parse_scenario(document, f"{address}: scenario")
-    base: dict[str, Any] = without_none(scenario.model_dump(mode="json"))
-    del base["expect"]
-    return base
 
 
 class Plan:

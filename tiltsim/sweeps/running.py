@@ -7,14 +7,15 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from tiltsim.checking import shared_engine
-from tiltsim.engine import EngineName
+from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
-from tiltsim.parallel import ProcessDiedError, in_processes
-from tiltsim.scenario import Scenario
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.simulation.shared_engine import shared_engine
+from tiltsim.sweeps.definition import Definition
 from tiltsim.sweeps.flying import Part, fly_numbered_chunk
 from tiltsim.sweeps.folder import open_folder
-from tiltsim.sweeps.plan import Definition, Plan
+from tiltsim.sweeps.plan import Plan
+from tiltsim.system.processes import ProcessDiedError, in_processes
 
 MAX_DEATHS: Final = 3
 """So many times in a row may all processes die before a single chunk gets finished."""
@@ -35,7 +36,7 @@ def run_sweep(
     Parameters
     ----------
     definition
-        The sweep, from `tiltsim.sweeps.plan.load_definition`.
+        The sweep, from `tiltsim.sweeps.loading.load_definition`.
     out
         Its folder; see `tiltsim.sweeps.folder`.
     jobs

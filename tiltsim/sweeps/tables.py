@@ -8,10 +8,10 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from tiltsim.expectation_table import Expectation
-from tiltsim.messages import InvalidValueError, choose
-from tiltsim.metrics import METRICS, WALL_CLOCK_METRICS
-from tiltsim.tables import Positive, Table
+from tiltsim.scenario.expectation import Expectation
+from tiltsim.scenario.messages import InvalidValueError, choose
+from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
+from tiltsim.scenario.table import Positive, Table
 
 Keys = Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
 Count = Annotated[int, Field(ge=1, le=10_000_000)]

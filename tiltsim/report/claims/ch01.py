@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from controllers.singularity import torque_free_direction
-from controllers.vehicle import PRESETS
 from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+from tiltsim_controllers.analysis.singularity import torque_free_direction
+from tiltsim_controllers.vehicle.parameters import PRESETS
 
 _PERFECT: Final = "ch01_gust/hover#perfect_gait"
 _QUADROTOR: Final = "ch01_gust/hover#quadrotor"
@@ -33,7 +33,7 @@ def _quadrotor_tilts_more(flights: Mapping[str, Metrics]) -> bool:
 
 def _some_gait_tilts_more_than_the_quadrotor() -> bool:
     """Statics of the mirrored perfect gait, whose force at level attitude helps the gust."""
-    from controllers.balance import even_load_gait
+    from tiltsim_controllers.analysis.balance import even_load_gait
 
     vehicle = PRESETS["ar_drone_2"]
     gait = even_load_gait((-_GUST, 0.0, 0.0), vehicle)
@@ -48,7 +48,7 @@ def _planned_gaits_tilt_less(flights: Mapping[str, Metrics]) -> bool:
 
 
 def _map_enlarges_the_attitudes() -> bool:
-    from controllers.published_gaits import robustness_table
+    from tiltsim_controllers.analysis.published_gaits import robustness_table
 
     return all(row.claim_holds for row in robustness_table() if row.claim_holds is not None)
 

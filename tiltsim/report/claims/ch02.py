@@ -8,16 +8,16 @@ from typing import Final
 
 import numpy as np
 
-from controllers.quadrotor_singularity import (
+from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+from tiltsim_controllers.analysis.quadrotor_singularity import (
     normalized_determinant,
     published_determinant,
     published_singular_curve,
 )
-from controllers.singularity import world_up
-from controllers.stability import is_hurwitz
-from controllers.vehicle import PRESETS
-from controllers.yaw_position import GAIN_SETS, euler_rates
-from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+from tiltsim_controllers.analysis.singularity import world_up
+from tiltsim_controllers.analysis.stability import is_hurwitz
+from tiltsim_controllers.laws.yaw_position import GAIN_SETS, euler_rates
+from tiltsim_controllers.vehicle.parameters import PRESETS
 
 _VEHICLE: Final = PRESETS["ar_drone_2_unrounded"]
 _HOVER: Final = _VEHICLE.mass * _VEHICLE.gravity
@@ -60,7 +60,7 @@ def _position_gains_are_stable() -> bool:
 
 
 def _attitude_altitude_gains_are_stable() -> bool:
-    from controllers.quadrotor_attitude_altitude import GAIN_SETS as SETS
+    from tiltsim_controllers.laws.quadrotor_attitude_altitude import GAIN_SETS as SETS
 
     gains = SETS["ch02"]
     return is_hurwitz((1.0, *gains[:2])) and is_hurwitz((1.0, *gains[2:]))

@@ -8,9 +8,6 @@ from typing import Final
 
 import numpy as np
 
-from controllers.published_gaits import DETERMINANT_CASES, TRIANGLE
-from controllers.singularity import decoupling_matrix, determinant, residuals
-from controllers.vehicle import PRESETS
 from tiltsim.report.measures import (
     PRINTED,
     Coefficients,
@@ -20,6 +17,9 @@ from tiltsim.report.measures import (
     worst_coefficient,
 )
 from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+from tiltsim_controllers.analysis.published_gaits import DETERMINANT_CASES, TRIANGLE
+from tiltsim_controllers.analysis.singularity import decoupling_matrix, determinant, residuals
+from tiltsim_controllers.vehicle.parameters import PRESETS
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
 

@@ -9,11 +9,6 @@ from typing import Final
 
 import numpy as np
 
-from controllers.decouplers import conventional_decoupler, modified_decoupler
-from controllers.decoupling_matrix import sines_and_cosines, torque_entries, torque_free_force
-from controllers.gains import GAIN_SETS
-from controllers.singularity import residuals
-from controllers.vehicle import PRESETS, drag_ratio
 from tiltsim.report.measures import (
     every_flight_completed,
     falls,
@@ -24,6 +19,15 @@ from tiltsim.report.measures import (
     tracking_error,
 )
 from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+from tiltsim_controllers.analysis.singularity import residuals
+from tiltsim_controllers.laws.decouplers import conventional_decoupler, modified_decoupler
+from tiltsim_controllers.laws.gains import GAIN_SETS
+from tiltsim_controllers.vehicle.decoupling_matrix import (
+    sines_and_cosines,
+    torque_entries,
+    torque_free_force,
+)
+from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
 _FORMS: Final = {"instant": "instant switch", "continuous": "continuous switch"}

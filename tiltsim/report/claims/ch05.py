@@ -1,8 +1,8 @@
 """Chapter 5: walk, run and gallops, their scaling, and the unacceptable attitudes.
 
-The keyframes are reconstructed so that these claims hold (`controllers.gaits.cat.SWINGS`). A claim
-that they were fitted to says so: that it holds shows that some gaits do what ch. 5 reports, and not
-that its gaits were these.
+The keyframes are reconstructed so that these claims hold (`tiltsim_controllers.gaits.cat.SWINGS`).
+A claim that they were fitted to says so: that it holds shows that some gaits do what ch. 5 reports,
+and not that its gaits were these.
 """
 
 from __future__ import annotations
@@ -14,11 +14,6 @@ from typing import Final
 
 import numpy as np
 
-from controllers.gaits import plans
-from controllers.gaits.cat import SWINGS
-from controllers.published_gaits import smallest_margin
-from controllers.singularity import determinant
-from controllers.vehicle import PRESETS
 from tiltsim.report.claims.ch03 import EQ_17, EQ_19
 from tiltsim.report.measures import (
     PRINTED,
@@ -30,6 +25,11 @@ from tiltsim.report.measures import (
     worst_coefficient,
 )
 from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+from tiltsim_controllers.analysis.published_gaits import smallest_margin
+from tiltsim_controllers.analysis.singularity import determinant
+from tiltsim_controllers.gaits import plans
+from tiltsim_controllers.gaits.cat import SWINGS
+from tiltsim_controllers.vehicle.parameters import PRESETS
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
 _REFERENCES: Final = {"line": "Sec. 6, Fig. 12", "circle": "Sec. 6, Fig. 13"}

@@ -9,14 +9,25 @@ from typing import Final
 
 import numpy as np
 
-from controllers.published_gaits import PUBLISHED_GAITS, Robustness, robustness, smallest_margin
-from controllers.singularity import residuals
-from controllers.two_color_map import Root, delta, grid_roots, root_classes, root_counts
-from controllers.two_color_planner import check_path, rectangle
-from controllers.vehicle import PRESETS
 from tiltsim.report.claims.ch03 import EQ_17, EQ_19
 from tiltsim.report.measures import is_more_robust, terms_hold
 from tiltsim.report.model import AnalysisClaim
+from tiltsim_controllers.analysis.published_gaits import (
+    PUBLISHED_GAITS,
+    Robustness,
+    robustness,
+    smallest_margin,
+)
+from tiltsim_controllers.analysis.singularity import residuals
+from tiltsim_controllers.analysis.two_color_map import (
+    Root,
+    delta,
+    grid_roots,
+    root_classes,
+    root_counts,
+)
+from tiltsim_controllers.analysis.two_color_planner import check_path, rectangle
+from tiltsim_controllers.vehicle.parameters import PRESETS
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
 _ZERO: Final = 1e-9

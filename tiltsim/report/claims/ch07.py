@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Final
 
-from controllers.published_gaits import PUBLISHED_GAITS, robustness
 from tiltsim.report.claims.ch06 import RANK
 from tiltsim.report.measures import is_more_robust, no_rotor_stops, tracking_error
 from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS, robustness
 
 _SHAPES: Final = "The figures are lost: place and colour as described, size ours. "
 _CIRCLE: Final = "ch07_robust_gaits/circle#"

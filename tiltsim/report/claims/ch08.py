@@ -7,16 +7,16 @@ from typing import Final
 
 import numpy as np
 
-from controllers.gaits.two_color import BLUE, colored_angles
-from controllers.published_gaits import PATHS, PUBLISHED_GAITS, robustness
-from controllers.singularity import residuals
-from controllers.two_color_map import curve_l, delta, point_p, red_residual, region
-from controllers.two_color_planner import Circle, Leg, Path, Polyline, check_path
-from controllers.vehicle import PRESETS, drag_ratio
 from tiltsim.report.claims.ch03 import EQ_19
 from tiltsim.report.claims.ch06 import RANK
 from tiltsim.report.measures import is_more_robust, terms_hold
 from tiltsim.report.model import AnalysisClaim
+from tiltsim_controllers.analysis.published_gaits import PATHS, PUBLISHED_GAITS, robustness
+from tiltsim_controllers.analysis.singularity import residuals
+from tiltsim_controllers.analysis.two_color_map import curve_l, delta, point_p, red_residual, region
+from tiltsim_controllers.analysis.two_color_planner import Circle, Leg, Path, Polyline, check_path
+from tiltsim_controllers.gaits.two_color import BLUE, colored_angles
+from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
 _P: Final = point_p(_VEHICLE)

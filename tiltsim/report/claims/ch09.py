@@ -9,19 +9,19 @@ from typing import Final
 
 import numpy as np
 
-from controllers.attainable import (
+from tiltsim.report.claims.ch03 import EQ_19
+from tiltsim.report.claims.ch06 import RANK
+from tiltsim.report.measures import terms_hold, tracking_error
+from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+from tiltsim_controllers.analysis.attainable import (
     AttainableSet,
     attainable_accelerations,
     attainable_torque_thrust,
     published_speed_limits,
 )
-from controllers.published_gaits import PUBLISHED_GAITS, PublishedGait
-from controllers.singularity import rank
-from controllers.vehicle import PRESETS
-from tiltsim.report.claims.ch03 import EQ_19
-from tiltsim.report.claims.ch06 import RANK
-from tiltsim.report.measures import terms_hold, tracking_error
-from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS, PublishedGait
+from tiltsim_controllers.analysis.singularity import rank
+from tiltsim_controllers.vehicle.parameters import PRESETS
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
 _LIMITS: Final = published_speed_limits(_VEHICLE)

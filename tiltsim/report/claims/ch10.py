@@ -9,10 +9,10 @@ from typing import Final
 
 import numpy as np
 
-from controllers.tilt_car.state_drift import drift_rate, orbit
-from controllers.tilt_car.third_derivative import input_columns
-from controllers.tilt_car.vehicle import THESIS_CAR, turn_share, yaw_share
 from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+from tiltsim_controllers.tilt_car.state_drift import drift_rate, orbit
+from tiltsim_controllers.tilt_car.third_derivative import input_columns
+from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, turn_share, yaw_share
 
 _THIRD: Final = "ch10_state_drift/third_derivative#"
 _PLANNED: Final = "ch10_state_drift/planned_direction"

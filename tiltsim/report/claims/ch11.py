@@ -9,7 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from controllers.tilt_car.penguin_cycle import (
+from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+from tiltsim_controllers.tilt_car.penguin_cycle import (
     LyapunovBound,
     State,
     Swing,
@@ -20,8 +21,7 @@ from controllers.tilt_car.penguin_cycle import (
     lyapunov_gain,
     multipliers,
 )
-from controllers.tilt_car.planned_direction import GAIN_SETS
-from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+from tiltsim_controllers.tilt_car.planned_direction import GAIN_SETS
 
 _GAINS: Final = GAIN_SETS["ch11"]
 _SWING: Final = Swing(half_angle=pi / 6, half_period=1.0, gains=_GAINS)

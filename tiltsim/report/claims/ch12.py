@@ -7,12 +7,19 @@ from typing import Final
 
 import numpy as np
 
-from controllers.singularity import residuals
-from controllers.two_color_map import curve_l, delta, grid_roots, point_p, region, root_counts
-from controllers.vehicle import PRESETS
 from tiltsim.report.claims.ch08 import DIGITS
 from tiltsim.report.measures import determinant_coefficients
 from tiltsim.report.model import AnalysisClaim
+from tiltsim_controllers.analysis.singularity import residuals
+from tiltsim_controllers.analysis.two_color_map import (
+    curve_l,
+    delta,
+    grid_roots,
+    point_p,
+    region,
+    root_counts,
+)
+from tiltsim_controllers.vehicle.parameters import PRESETS
 
 _VEHICLE: Final = PRESETS["luukkonen"]
 _FORMER: Final = PRESETS["ar_drone_2"]

@@ -1,0 +1,1 @@
+"""Analysis of gaits and closed loops: singularities, the Two Color Map, statics, stability."""

@@ -1,0 +1,280 @@
+"""Gaits that hold the vehicle level against a constant acceleration (ch. 1, Sec. 2).
+
+At level attitude the torque-free force ``n(alpha)`` must point along ``(-ax, -ay, g - az)``. With
+``delta = atan(r)``, sums ``E13 = alpha_1 + alpha_3``, ``E24 = alpha_2 + alpha_4`` and differences
+``D13 = alpha_1 - alpha_3``, ``D24 = alpha_2 - alpha_4`` it is, up to a factor,
+
+    ``n_x = A sin D24``, ``n_y = -B sin D13``,
+    ``n_z = A (cos(E24 + delta) / cos(delta) + cos D24) + B (cos(E13 - delta) / cos(delta) + cos
+    D13)``,
+
+with ``A = sin(2 delta - E13) / sin(2 delta)`` and ``B = sin(2 delta + E24) / sin(2 delta)``. Pods
+that tilt opposite ways in pairs, E13 = E24 = 0, load the rotors evenly: `even_load_gait`, in closed
+form. A gait may tilt less by shifting load to the pair that makes the side force, in the end until
+the other pair stands still (A or B zero); and where both are zero, at the point P of the two color
+map, it balances everything and nothing. The decoupling matrix is singular in both cases, so
+`balanced_gait` takes the least tilt among gaits that keep A and B away from zero.
+"""
+
+from __future__ import annotations
+
+from math import asin, atan, cos, hypot, inf, isfinite, pi, radians, sin
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from scipy.optimize import minimize
+
+from tiltsim_controllers.vehicle.decoupling_matrix import (
+    torque_entries,
+    torque_free_force,
+    torque_free_inputs,
+)
+from tiltsim_controllers.vehicle.parameters import SPIN, drag_ratio
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from tiltsim_controllers.mathematics.scalar import Quad, Triple
+    from tiltsim_controllers.vehicle.parameters import Vehicle
+
+    Vector = NDArray[np.float64]
+
+MAX_TILT: Final = radians(60.0)
+MIN_LEVER: Final = 0.5
+_GRID: Final = 61
+_TOLERANCE: Final = 1e-9
+
+
+def side_slopes(acceleration: Triple, gravity: float) -> tuple[float, float]:
+    """Side force over lift, along x and y, that holds against an acceleration (m/s^2).
+
+    Raises ValueError where the vehicle would have to push downwards.
+    """
+    ax, ay, az = acceleration
+    lift = gravity - az
+    if not (isfinite(ax) and isfinite(ay) and isfinite(az)):
+        raise ValueError(f"acceleration {_shown(acceleration)}: must be finite")
+    if lift <= 0.0:
+        raise ValueError(
+            f"acceleration {_shown(acceleration)}: az = {az:g} m/s^2 lifts the vehicle against"
+            f" gravity, {gravity:g}; must be smaller"
+        )
+    return -ax / lift, -ay / lift
+
+
+def even_load_gait(acceleration: Triple, vehicle: Vehicle) -> Quad:
+    """The gait ``(a, b, -a, -b)`` that balances an acceleration, in closed form but for one root.
+
+    ``sin 2b = X N`` and ``-sin 2a = Y N`` with ``N = 2 + cos 2a + cos 2b`` and the `side_slopes` X
+    and Y; it does not depend on the drag ratio. All four rotors make nearly the same thrust.
+
+    Parameters
+    ----------
+    acceleration : tuple
+        Constant acceleration that acts on the vehicle, m/s^2, world axes at yaw 0.
+    vehicle : Vehicle
+        Of which gravity alone matters.
+
+    Returns
+    -------
+    tuple
+        The four tilt angles in rad.
+    """
+    x, y = side_slopes(acceleration, vehicle.gravity)
+    steepest = max(abs(x), abs(y))
+    low, high = 0.0, min(4.0, 1.0 / steepest) if steepest > 0.0 else 4.0
+
+    def excess(n: float) -> float:
+        return float(2.0 + _cosine(x * n) + _cosine(y * n) - n)
+
+    if excess(high) > 0.0:
+        raise ValueError(
+            f"acceleration {_shown(acceleration)}: out of reach of evenly loaded rotors with tilt"
+            " angles up to 45 degrees"
+        )
+    # `excess` falls all the way: bisection to the last bit.
+    while low < (middle := 0.5 * (low + high)) < high:
+        low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
+    a, b = -0.5 * asin(_clipped(y * high)), 0.5 * asin(_clipped(x * high))
+    return a, b, -a, -b
+
+
+def rotor_loads(tilts: Quad, vehicle: Vehicle) -> Quad:
+    """Share of each rotor in ``sum |w_i|`` when torque-free, times four: 1 where evenly loaded.
+
+    Negative where a rotor would have to turn backwards. NaN where the torque matrix has lost rank.
+
+    Parameters
+    ----------
+    tilts : tuple
+        The four tilt angles in rad.
+    vehicle : Vehicle
+        Of which the drag ratio matters.
+    """
+    first, second, third, fourth = _loads(np.array(tilts, dtype=float), drag_ratio(vehicle))
+    return float(first), float(second), float(third), float(fourth)
+
+
+def balanced_gait(
+    acceleration: Triple,
+    vehicle: Vehicle,
+    *,
+    max_tilt: float = MAX_TILT,
+    min_lever: float = MIN_LEVER,
+) -> Quad:
+    """The least tilted gait that hovers level under a constant acceleration.
+
+    Least is the sum of the squared tilt angles.
+
+    Parameters
+    ----------
+    acceleration : tuple
+        Constant acceleration that acts on the vehicle, m/s^2, world axes at yaw 0; a gust along +x
+        is ``(1, 0, 0)``.
+    vehicle : Vehicle
+        The tiltrotor.
+    max_tilt : float
+        Largest tilt angle of a pod, rad.
+    min_lever : float
+        Smallest A and B, the yaw levers of the two pairs of rotors, 1 being those without tilt.
+
+    Returns
+    -------
+    tuple
+        The four tilt angles in rad.
+
+    Raises
+    ------
+    ValueError
+        If no gait within the limits balances the acceleration, naming it and the limits.
+    """
+    if not 0.0 < max_tilt < 0.5 * pi:
+        raise ValueError(f"max_tilt = {max_tilt:g}: must lie between 0 and pi/2 rad")
+    if not 0.0 < min_lever <= 1.0:
+        raise ValueError(f"min_lever = {min_lever:g}: must lie between 0 and 1")
+    x, y = side_slopes(acceleration, vehicle.gravity)
+    if x == 0.0 and y == 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    ratio = drag_ratio(vehicle)
+    # A >= min_lever where E13 is at most this, B >= min_lever where E24 is at least its negative.
+    twist = 2.0 * atan(ratio)
+    max_sum = twist - asin(min_lever * sin(twist))
+    tilts = _best_on_grid(x, y, ratio, max_sum, max_tilt)
+    if tilts is None:
+        raise ValueError(
+            f"acceleration {_shown(acceleration)}: out of reach, needs a side force of"
+            f" {hypot(x, y):.3g} times the lift; no gait makes it with tilt angles up to"
+            f" {max_tilt:.3g} rad and yaw levers of {min_lever:g} or more"
+        )
+    a1, a2, a3, a4 = _least_tilt(tilts, x, y, ratio, max_sum, max_tilt).tolist()
+    return a1, a2, a3, a4
+
+
+def _best_on_grid(
+    x: float, y: float, ratio: float, max_sum: float, max_tilt: float
+) -> Vector | None:
+    """The least tilted balanced gait on a grid of E13 and E24; None where there is none.
+
+    For each grid point one monotonic equation in ``n_z`` gives D13 and D24 up to 90 degrees. The
+    grid finds the right valley; `_least_tilt` then its floor.
+    """
+    delta = atan(ratio)
+    sums = np.linspace(max_sum - 1.5, max_sum, _GRID)
+    e13, e24 = np.meshgrid(np.append(sums, 0.0), np.append(-sums, 0.0))
+    a = np.sin(2.0 * delta - e13) / sin(2.0 * delta)
+    b = np.sin(2.0 * delta + e24) / sin(2.0 * delta)
+    upright = a * np.cos(e24 + delta) / cos(delta) + b * np.cos(e13 - delta) / cos(delta)
+    low = np.zeros_like(a)
+    reach = 1.0 / np.maximum(np.maximum(abs(x) / a, abs(y) / b), 1e-3)
+    high = reach
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        across = a * _cosine(x * middle / a) + b * _cosine(y * middle / b)
+        above = upright + across > middle
+        low, high = np.where(above, middle, low), np.where(above, high, middle)
+    d24, d13 = np.arcsin(_clipped(x * low / a)), np.arcsin(_clipped(-y * low / b))
+    tilts = 0.5 * np.stack([e13 + d13, e24 + d24, e13 - d13, e24 - d24])
+    size = np.sum(tilts**2, axis=0)
+    size[(high >= reach) | (np.abs(tilts).max(axis=0) > max_tilt)] = inf
+    best = np.unravel_index(np.argmin(size), size.shape)
+    return None if size[best] == inf else np.asarray(tilts[:, best[0], best[1]])
+
+
+def _least_tilt(
+    start: Vector, x: float, y: float, ratio: float, max_sum: float, max_tilt: float
+) -> Vector:
+    """Minimise the squared tilt angles subject to balance and limits, from a start near by."""
+
+    def balance(tilts: Any) -> Any:
+        return _imbalance(tilts, x, y, ratio)
+
+    sums = np.array([[-1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 1.0]])
+    found = minimize(
+        lambda tilts: float(tilts @ tilts),
+        start,
+        jac=lambda tilts: 2.0 * tilts,
+        method="SLSQP",
+        bounds=[(-max_tilt, max_tilt)] * 4,
+        constraints=[
+            {"type": "eq", "fun": balance, "jac": lambda tilts: _jacobian(balance, tilts)},
+            {"type": "ineq", "fun": lambda tilts: sums @ tilts + max_sum, "jac": lambda _: sums},
+        ],
+        options={"ftol": 1e-15, "maxiter": 200},
+    )
+    # With so fine a tolerance the optimiser often reports failure for want of further progress, so
+    # its answer is judged by itself; the start is balanced and within the limits.
+    tilts = _onto_balance(np.asarray(found.x, dtype=float), x, y, ratio)
+    kept = (
+        np.abs(balance(tilts)).max() < _TOLERANCE
+        and (sums @ tilts + max_sum).min() > -_TOLERANCE
+        and np.abs(tilts).max() < max_tilt + _TOLERANCE
+    )
+    return tilts if kept and tilts @ tilts <= start @ start else start
+
+
+def _onto_balance(tilts: Vector, x: float, y: float, ratio: float) -> Vector:
+    """Remove the optimiser's last residue by two Newton steps of least length."""
+    for _ in range(2):
+        residue = _imbalance(tilts, x, y, ratio)
+        slopes = _jacobian(lambda point: _imbalance(point, x, y, ratio), tilts)
+        tilts = tilts - np.linalg.pinv(slopes) @ residue
+    return tilts
+
+
+def _imbalance(tilts: Any, x: float, y: float, ratio: float) -> Any:
+    """Zero where ``n`` is parallel to ``(x, y, 1)``; on arrays real or complex."""
+    trig = _trig(tilts)
+    nx, ny, nz = torque_free_force(trig, torque_entries(trig, ratio), ratio)
+    return np.array([nx - x * nz, ny - y * nz])
+
+
+def _loads(tilts: Any, ratio: float) -> Any:
+    inputs = np.array(torque_free_inputs(torque_entries(_trig(tilts), ratio))) * SPIN
+    total = inputs.sum()
+    # Where tau loses rank both pairs stop, and there is no load to share.
+    return 4.0 * inputs / total if total != 0.0 else np.full(4, np.nan)
+
+
+def _trig(tilts: Any) -> Any:
+    """`sines_and_cosines` for real or complex angles."""
+    return tuple(np.stack([np.sin(tilts), np.cos(tilts)], axis=1).ravel())
+
+
+def _jacobian(function: Callable[[Any], Any], point: Vector) -> Vector:
+    """Derivatives by complex steps, exact to rounding."""
+    columns = [function(point + 1e-30j * axis).imag / 1e-30 for axis in np.eye(4)]
+    return np.asarray(np.stack(columns, axis=1), dtype=float)
+
+
+def _cosine(sine: Any) -> Any:
+    return np.sqrt(np.maximum(0.0, 1.0 - sine * sine))
+
+
+def _clipped(sine: Any) -> Any:
+    return np.minimum(1.0, np.maximum(-1.0, sine))
+
+
+def _shown(acceleration: Triple) -> str:
+    return "(" + ", ".join(f"{value:g}" for value in acceleration) + ")"

@@ -1,0 +1,249 @@
+"""Hover after the loss of a rotor, with part of its thrust, or with a stuck tilt servo.
+
+The thesis asks for this and leaves it open. Static hover is zero torque and a force as large as the
+weight; the vehicle may lean so that it points up. In units of ``L K_f`` and with ``r = K_m / (L
+K_f) = tan(delta)`` the torque matrix (ch. 3, Eq. 5) reads, but for the factor ``1 / cos(delta)``,
+
+    rotors 2, 4:  roll ``cos(a2 + delta)``, ``-cos(a4 + delta)``;  yaw ``-sin(ai + delta)``
+    rotors 1, 3:  pitch ``cos(a1 - delta)``, ``-cos(a3 - delta)``;  yaw ``sin(ai - delta)``
+
+Nobody but rotor 3 makes pitch torque once rotor 1 is lost. What holds, then, for the loss of rotor
+1 (for the others turn the vehicle, and mirror it for rotors 2 and 4):
+
+- Rotors 2 and 4 alone hover, at ``a2 = a4 = -delta``, where the drag torque of each is made up for
+  by its tilt; each must carry ``m g / (2 cos(delta))``. No torque about pitch is left then.
+- With rotor 3 turning at ``a3 = delta - pi/2``, where its pitch torque vanishes, a family of hovers
+  opens. Tilting rotor 3 from there makes pitch torque of either sign, and three speeds and three
+  tilts move all six of force and torque: the vehicle stays fully controllable, leaning a little.
+- With fixed tilts, two or three rotors hover only where ``a2 + a4 = -2 delta``. That is what the
+  blue planes of the Two Color Map ask of this pair: the loss that the healthy vehicle must avoid is
+  what hovering on the pair needs. Pitch remains without control.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import asin, atan, atan2, cos, hypot, pi, sin, sqrt
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix
+from tiltsim_controllers.laws.full_pose import pose_rows
+from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines, torque_entries
+from tiltsim_controllers.vehicle.parameters import SPIN, drag_ratio
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tiltsim_controllers.mathematics.scalar import Quad
+    from tiltsim_controllers.vehicle.parameters import Vehicle
+
+    Array = NDArray[np.float64]
+
+ROTORS: Final = (1, 2, 3, 4)
+
+BALANCED: Final = 1e-9
+"""Torque, in units of ``L m g``, that counts as none."""
+
+
+@dataclass(frozen=True)
+class Hover:
+    """A static hover: tilts, rotor speeds and the attitude in which the force points up."""
+
+    tilts: Quad  # rad
+    rotor_speeds: Quad  # rad/s, absolute
+    roll: float  # rad
+    pitch: float  # rad
+    authority: float  # least over greatest singular value of `pose_matrix`; 0: not controllable
+
+    @property
+    def max_rotor_speed(self) -> float:
+        """The speed (rad/s) that the rotors must be able to reach."""
+        return max(self.rotor_speeds)
+
+
+def pose_matrix(tilts: Quad, rotor_speeds: Quad, vehicle: Vehicle, lost: int | None) -> Array:
+    """How speeds and tilts of the sound rotors move force and torque, shape (6, 8 or 6).
+
+    Forces are in units of the weight, torques in units of the weight times the arm's length, inputs
+    are relative changes of thrust and tilts in rad.
+    """
+    w = [spin * speed * speed for spin, speed in zip(SPIN, rotor_speeds, strict=True)]
+    trig = sines_and_cosines(*tilts)
+    torque = torque_entries(trig, drag_ratio(vehicle))
+    weight = vehicle.mass * vehicle.gravity / vehicle.thrust_coefficient
+    rows = np.array(pose_rows(trig, torque, (w[0], w[1], w[2], w[3])))
+    rows[:, :4] *= w
+    sound = [column for column in range(8) if lost is None or column % 4 != lost - 1]
+    return np.asarray(rows[:, sound] / weight)
+
+
+def _hover(tilts: Quad, rotor_speeds: Quad, vehicle: Vehicle, lost: int | None) -> Hover:
+    w = np.array(rotor_speeds) ** 2 * SPIN
+    x, y, z = (force_matrix(np.array(tilts)) @ w).tolist()
+    values = np.linalg.svd(pose_matrix(tilts, rotor_speeds, vehicle, lost), compute_uv=False)
+    # World up in body axes is (-sin pitch, sin roll cos pitch, cos roll cos pitch).
+    roll, pitch = atan2(y, z), -asin(x / hypot(x, y, z))
+    return Hover(tilts, rotor_speeds, roll, pitch, float(values[5] / values[0]))
+
+
+def hover_on_three(lost: int, vehicle: Vehicle, *, opposite_speed: float) -> Hover:
+    """The hover without a rotor in which both rotors beside it share the weight evenly.
+
+    Parameters
+    ----------
+    lost : int
+        The lost rotor, 1 to 4.
+    vehicle : Vehicle
+        The tiltrotor.
+    opposite_speed : float
+        Speed of the rotor opposite the lost one, rad/s; the more, the more authority over the
+        torque that only it can make. At 0 the other two hover alone.
+
+    Raises
+    ------
+    ValueError
+        If there is no such rotor, or the opposite rotor alone would outweigh the vehicle.
+    """
+    if lost not in ROTORS:
+        raise ValueError(f"lost = {lost!r}: must be a rotor, 1 to 4")
+    delta = atan(drag_ratio(vehicle))
+    weight = vehicle.mass * vehicle.gravity / vehicle.thrust_coefficient
+    across = opposite_speed * opposite_speed
+    if opposite_speed < 0.0 or across * cos(delta) >= weight:
+        raise ValueError(
+            f"opposite_speed = {opposite_speed!r}: must lie between 0 and "
+            f"{sqrt(weight / cos(delta)):.4g} rad/s, where this rotor alone outweighs the vehicle"
+        )
+    # Across the lean the opposite rotor pushes; along it all three lift; yaw: sin(beta) w = half.
+    lift = sqrt(weight * weight - (across * cos(delta)) ** 2)
+    upright = (lift - 2.0 * across * sin(delta)) / (2.0 * cos(delta))
+    beside = hypot(upright, 0.5 * across)
+    beta = atan2(0.5 * across, upright)
+    # Rotors 2 and 4 turn the other way and tilt in the mirror.
+    mirror = -SPIN[lost - 1]
+    tilts, speeds = [0.0] * 4, [0.0] * 4
+    for step in (1, 3):
+        tilts[(lost - 1 + step) % 4] = mirror * (beta - delta)
+        speeds[(lost - 1 + step) % 4] = sqrt(beside)
+    tilts[(lost + 1) % 4] = mirror * (delta - 0.5 * pi)
+    speeds[(lost + 1) % 4] = opposite_speed
+    return _hover(_quad(tilts), _quad(speeds), vehicle, lost)
+
+
+def fixed_tilt_imbalance(tilts: Quad, lost: int, vehicle: Vehicle) -> float:
+    """By how much (rad) fixed tilts miss the hover without a rotor: ``a_i + a_k -+ 2 delta``.
+
+    ``i`` and ``k`` are the rotors beside the lost one. Zero where they hover on their own; the
+    opposite rotor then stands still.
+    """
+    delta = atan(drag_ratio(vehicle))
+    beside = tilts[lost % 4] + tilts[(lost + 2) % 4]
+    return beside - 2.0 * SPIN[lost - 1] * delta
+
+
+def fixed_tilt_hover(
+    tilts: Quad, vehicle: Vehicle, *, lost: int | None = None, factors: Quad = (1.0, 1.0, 1.0, 1.0)
+) -> Hover | None:
+    """The hover with given tilts and thrust factors, or without a rotor; None if there is none.
+
+    Rotors do not turn backwards. Without a loss it is the torque-free input of
+    `tiltsim_controllers.vehicle.decoupling_matrix`, unless a rotor would have to reverse.
+    """
+    sound = [index for index in range(4) if lost is None or index != lost - 1]
+    sound = [index for index in sound if factors[index] > 0.0]
+    torque = torque_matrix(np.array(tilts), vehicle)[:, sound] * np.array(SPIN)[sound]
+    _, values, rows = np.linalg.svd(torque, full_matrices=True)
+    for index, row in enumerate(rows):
+        lost_rank = index >= len(values) or values[index] < BALANCED * values[0]
+        thrusts = row * np.sign(row.sum())
+        if not lost_rank or thrusts.min() < -1e-9 * thrusts.max():
+            continue
+        w = np.zeros(4)
+        w[sound] = np.maximum(thrusts, 0.0)
+        force = np.linalg.norm(force_matrix(np.array(tilts)) @ (w * SPIN))
+        if force == 0.0:
+            continue
+        w *= vehicle.mass * vehicle.gravity / (vehicle.thrust_coefficient * force)
+        made = _hover(tilts, _quad(np.sqrt(w)), vehicle, lost)
+        told = np.sqrt(w / np.where(np.array(factors) > 0.0, factors, 1.0))
+        return Hover(tilts, _quad(told), made.roll, made.pitch, made.authority)
+    return None
+
+
+def least_hover_speed(
+    vehicle: Vehicle,
+    *,
+    factors: Quad = (1.0, 1.0, 1.0, 1.0),
+    stuck: tuple[int, float] | None = None,
+) -> float:
+    """The least top speed (rad/s) with which tilts free to choose hover after a fault.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The tiltrotor.
+    factors : tuple
+        What is left of each rotor's thrust and drag torque; 0 for a lost one.
+    stuck : tuple, optional
+        A rotor, 1 to 4, and the angle (rad) its servo holds.
+
+    Returns
+    -------
+    float
+        Of the largest rotor speed; a limit below it means that no hover is possible. The vehicle
+        may lean as it likes, even upside down.
+    """
+    from scipy.optimize import minimize
+
+    weight = vehicle.mass * vehicle.gravity / vehicle.thrust_coefficient
+    scale = np.array(factors) * SPIN
+
+    def tilts_of(x: Array) -> Array:
+        tilts = x[:4].copy()
+        if stuck is not None:
+            tilts[stuck[0] - 1] = stuck[1]
+        return tilts
+
+    def balance(x: Array) -> Array:
+        tilts, w = tilts_of(x), x[4:8] * scale
+        force = force_matrix(tilts) @ w
+        return np.array([*(torque_matrix(tilts, vehicle) @ w), force @ force - 1.0])
+
+    delta = atan(drag_ratio(vehicle))
+    best = np.inf
+    starts = [
+        [0.0, 0.0, 0.0, 0.0, 0.25, 0.25, 0.25, 0.25],  # all four, and each pair on its own
+        [0.0, -delta, 0.0, -delta, 0.0, 0.5, 0.0, 0.5],
+        [delta, 0.0, delta, 0.0, 0.5, 0.0, 0.5, 0.0],
+    ]
+    weak = stuck[0] if stuck is not None else 1 + int(np.argmin(factors))
+    for speed in (0.5, 0.8):  # without the one that is broken
+        three = hover_on_three(weak, vehicle, opposite_speed=speed * vehicle.hover_rotor_speed)
+        starts.append([*three.tilts, *(np.array(three.rotor_speeds) ** 2 / weight)])
+    if stuck is not None:  # with the opposite pod turned alike, or in the mirror
+        for angle in (stuck[1], -stuck[1]):
+            alike = [0.0, 0.0, 0.0, 0.0, 0.25, 0.25, 0.25, 0.25]
+            alike[(stuck[0] + 1) % 4] = angle
+            starts.append(alike)
+    for start in starts:
+        found = minimize(
+            lambda x: float(x[8]),
+            np.array([*start, 0.6]),
+            method="SLSQP",
+            bounds=[(-pi, pi)] * 4 + [(0.0, None)] * 5,
+            constraints=[
+                {"type": "eq", "fun": balance},
+                {"type": "ineq", "fun": lambda x: x[8] - x[4:8]},
+            ],
+            options={"ftol": 1e-12, "maxiter": 300},
+        )
+        if np.abs(balance(found.x)).max() < 1e-8:
+            best = min(best, float(found.x[4:8].max()))
+    return sqrt(weight * best)
+
+
+def _quad(values: object) -> Quad:
+    a, b, c, d = np.asarray(values, dtype=float).tolist()
+    return a, b, c, d

@@ -1,0 +1,146 @@
+"""Routh-Hurwitz stability of the closed loops (ch. 4, Propositions 4 and 5)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tiltsim_controllers.laws.attitude_altitude import Gains
+    from tiltsim_controllers.laws.gains import IntegralGains
+    from tiltsim_controllers.vehicle.parameters import Vehicle
+
+
+class Loop(NamedTuple):
+    """One linear closed loop: its name and its monic characteristic polynomial."""
+
+    name: str
+    polynomial: tuple[float, ...]  # highest power first, leading 1
+    stable: bool
+    condition: str  # the first Routh condition that fails, with its numbers; empty when stable
+
+
+def routh_first_column(polynomial: Sequence[float]) -> list[float]:
+    """First column of the Routh array of a polynomial, highest power first.
+
+    The roots all have negative real parts if and only if every entry is positive. The array is
+    cut short at the first entry that is not positive, which decides the question.
+    """
+    upper = [float(value) for value in polynomial[0::2]]
+    lower = [float(value) for value in polynomial[1::2]]
+    column = [upper[0]]
+    while lower:
+        column.append(lower[0])
+        if lower[0] <= 0.0:
+            break
+        padded = [*lower, 0.0]
+        upper, lower = (
+            lower,
+            [upper[i + 1] - upper[0] * padded[i + 1] / lower[0] for i in range(len(upper) - 1)],
+        )
+    return column
+
+
+def is_hurwitz(polynomial: Sequence[float]) -> bool:
+    """Whether all roots of the polynomial (highest power first) have negative real parts."""
+    if polynomial[0] < 0.0:
+        polynomial = [-value for value in polynomial]
+    return all(value > 0.0 for value in polynomial) and all(
+        value > 0.0 for value in routh_first_column(polynomial)
+    )
+
+
+def third_order_loop(name: str, gains: tuple[float, float, float], loop_gain: float) -> Loop:
+    """The loop ``y''' + N K1 y'' + N K2 y' + N K3 y = 0`` and its verdict (Eqs. 35-38)."""
+    scaled = tuple(loop_gain * gain for gain in gains)
+    k1, k2, k3 = scaled
+    polynomial = (1.0, *scaled)
+    if is_hurwitz(polynomial):
+        return Loop(name, polynomial, True, "")
+    for index, gain in enumerate(gains, start=1):
+        if gain <= 0.0:
+            return Loop(name, polynomial, False, f"{name} K{index} = {gain:g} must be positive")
+    return Loop(name, polynomial, False, f"{name} K1 K2 = {k1 * k2:g} must exceed K3 = {k3:g}")
+
+
+def linear_loop(name: str, gains: Sequence[float]) -> Loop:
+    """The loop with the characteristic polynomial ``s^n + gains[0] s^(n-1) + ...``."""
+    polynomial = (1.0, *gains)
+    if is_hurwitz(polynomial):
+        return Loop(name, polynomial, True, "")
+    for index, gain in enumerate(gains, start=1):
+        if gain <= 0.0:
+            return Loop(name, polynomial, False, f"{name} k{index} = {gain:g} must be positive")
+    column = routh_first_column(polynomial)
+    return Loop(
+        *(name, polynomial, False),
+        f"{name} {list(gains)}: entry {len(column)} of the Routh array's first column is "
+        f"{column[-1]:g}, must be positive",
+    )
+
+
+def closed_loops(gains: Gains, vehicle: Vehicle, decoupling: float) -> list[Loop]:
+    """The closed loops of the attitude-altitude law under the given form of decoupling matrix.
+
+    The published matrix lacks the factor ``2 |varpi|`` in its attitude rows, so the attitude loops
+    run with that factor, taken at hover, as an additional loop gain.
+    """
+    factor = 2.0 * vehicle.hover_rotor_speed if decoupling == PUBLISHED_DECOUPLING else 1.0
+    third_order = [
+        third_order_loop("roll", (gains.roll_1, gains.roll_2, gains.roll_3), factor),
+        third_order_loop("pitch", (gains.pitch_1, gains.pitch_2, gains.pitch_3), factor),
+        third_order_loop("yaw", (gains.yaw_1, gains.yaw_2, gains.yaw_3), factor),
+        third_order_loop("altitude", (gains.altitude_1, gains.altitude_2, gains.altitude_3), 1.0),
+    ]
+    position = (1.0, gains.position_1, gains.position_2)
+    stable = is_hurwitz(position)
+    condition = "" if stable else f"position gains {list(position[1:])} must both be positive"
+    return [*third_order, Loop("position", position, stable, condition)]
+
+
+def longest_lag(gains: Sequence[float]) -> float:
+    """The time constant (s) of a lag in the input at which a third-order loop turns unstable.
+
+    ``s^3 (T s + 1) + K1 s^2 + K2 s + K3`` is Hurwitz, by Routh, while
+    ``T < (K1 K2 - K3) / K2^2``. ``gains`` are K1, K2 and K3.
+    """
+    k1, k2, k3 = gains
+    return (k1 * k2 - k3) / (k2 * k2)
+
+
+def delay_margin(gains: Sequence[float]) -> float:
+    """The delay (s) of the input at which a third-order loop turns unstable, 0 if it is already.
+
+    Where the open loop ``(K1 s^2 + K2 s + K3) / s^3`` has gain one, at up to three frequencies, a
+    delay uses up the phase margin; the least delay counts. A command held for a period delays by
+    half of it.
+    """
+    k1, k2, k3 = gains
+    if not is_hurwitz((1.0, k1, k2, k3)):
+        return 0.0
+    squares = np.roots([1.0, -k1 * k1, 2.0 * k1 * k3 - k2 * k2, -k3 * k3])
+    real = squares[np.abs(squares.imag) < 1e-9 * np.abs(squares)].real
+    crossings = np.sqrt(real[real > 0.0])
+    s = 1j * crossings
+    phases = np.angle((k1 * s * s + k2 * s + k3) / s**3)
+    return float((((np.pi + phases) % (2.0 * np.pi)) / crossings).min())
+
+
+def feedforward_loops(gains: Gains, integral: IntegralGains) -> list[Loop]:
+    """The closed loops of the law that knows its gait's rates, with its integrals."""
+    altitude = (gains.altitude_1, gains.altitude_2, gains.altitude_3)
+    position = (gains.position_1, gains.position_2)
+    with_altitude = (*altitude, integral.altitude) if integral.altitude else altitude
+    with_position = (*position, integral.position) if integral.position else position
+    return [
+        linear_loop("roll", (gains.roll_1, gains.roll_2, gains.roll_3)),
+        linear_loop("pitch", (gains.pitch_1, gains.pitch_2, gains.pitch_3)),
+        linear_loop("yaw", (gains.yaw_1, gains.yaw_2, gains.yaw_3)),
+        linear_loop("altitude", with_altitude),
+        linear_loop("position", with_position),
+    ]

@@ -1,0 +1,223 @@
+"""The Two Color Map in closed form, for any vehicle (ch. 6 to 8, 12).
+
+A gait is robust, says ch. 6, where ``R_phi = R_theta = 0`` and ``R != 0``: small roll and pitch
+then leave the determinant alone. The thesis solves the first two equations numerically, vehicle by
+vehicle. Written with the columns of ``tau``, they factor. Let ``r = K_m / (L K_f)``, ``delta =
+atan(r)`` and ``k = (r + 1/r) / 2``; then
+
+    ``R_theta = k sin(alpha_1 + alpha_3 - 2 delta) sin(alpha_2 - alpha_4)``,
+    ``R_phi = k sin(alpha_2 + alpha_4 + 2 delta) sin(alpha_3 - alpha_1)``,
+
+so the roots are two families of lines and nothing else (but where both meet):
+
+* red: ``alpha_3 = alpha_1``, ``alpha_4 = alpha_2``;
+* blue: ``alpha_3 = 2 delta - alpha_1``, ``alpha_4 = -2 delta - alpha_2``;
+
+each angle up to a multiple of pi. They meet at ``P = (delta, -delta)``.
+
+**Red.** ``n`` is vertical and the margin pi/2, except where ``R`` vanishes too:
+
+    ``R = (2/r) (2 r - tan alpha_1 + tan alpha_2) (1 + r tan alpha_1) (1 - r tan alpha_2)
+    cos^2 alpha_1 cos^2 alpha_2``.
+
+The first bracket is the curve L of ch. 8: ``tan alpha_2 = tan alpha_1 - 2 r``. P lies exactly on
+it; ch. 8 and 12 place it "a little below" because of rounding. The other two vanish only at
+``alpha_1 = delta - pi/2`` and ``alpha_2 = pi/2 - delta``.
+
+**Blue is singular everywhere.** Up to the factor ``hypot(L K_f, K_m)`` the columns of ``tau`` are
+
+    ``(0, cos(alpha_1 - delta), sin(alpha_1 - delta))``,
+    ``(cos(alpha_2 + delta), 0, -sin(alpha_2 + delta))``,
+    ``(0, -cos(alpha_3 - delta), sin(alpha_3 - delta))``,
+    ``(-cos(alpha_4 + delta), 0, -sin(alpha_4 + delta))``.
+
+On blue ``alpha_3 - delta = -(alpha_1 - delta)`` and ``alpha_4 + delta = -(alpha_2 + delta)``, so
+the third column is minus the first and the fourth minus the second: ``tau`` has rank 2 at most,
+whatever the attitude. ``R``, ``R_phi`` and ``R_theta`` vanish together. The blue results of the
+thesis live on the rounding of its coefficients; a blue gait has no margin at all.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from math import acos, atan, atan2, cos, hypot, pi, sin
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+
+from tiltsim_controllers.analysis.singularity import residuals
+from tiltsim_controllers.vehicle.parameters import drag_ratio
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from tiltsim_controllers.vehicle.parameters import Vehicle
+
+    Array = NDArray[np.float64]
+
+Region = Literal["S_U", "S_D", "L"]
+
+GRID_SIZE: Final = 17
+"""Grid points along each axis of ch. 6's search, pi/16 apart."""
+
+_END_TOLERANCE: Final = 1e-9
+
+
+def delta(vehicle: Vehicle) -> float:
+    """``atan(K_m / (L K_f))`` (rad): the tilt that turns a rotor's drag into its thrust arm."""
+    return atan(drag_ratio(vehicle))
+
+
+def point_p(vehicle: Vehicle) -> tuple[float, float]:
+    """P, the only point of the alpha_1-alpha_2 plane that both colours share (ch. 8, Sec. 3.4)."""
+    angle = delta(vehicle)
+    return angle, -angle
+
+
+def red_residual(alpha_1: ArrayLike, alpha_2: ArrayLike, vehicle: Vehicle) -> Array:
+    """``R`` on red (ch. 8, Eq. 7) in factored form; angles in rad, broadcast together."""
+    ratio, angle = drag_ratio(vehicle), delta(vehicle)
+    alpha_1, alpha_2 = np.asarray(alpha_1, float), np.asarray(alpha_2, float)
+    beside_l = 2.0 * ratio * np.cos(alpha_1) * np.cos(alpha_2) - np.sin(alpha_1 - alpha_2)
+    sides = np.cos(alpha_1 - angle) * np.cos(alpha_2 + angle) / np.cos(angle) ** 2
+    return np.asarray(2.0 / ratio * beside_l * sides)
+
+
+def curve_l(alpha_1: ArrayLike, vehicle: Vehicle) -> Array:
+    """The curve L (ch. 8, Eq. 6): ``alpha_2 = atan(tan alpha_1 - 2 r)``, rad, |alpha_1| < pi/2."""
+    return np.asarray(np.arctan(np.tan(np.asarray(alpha_1, float)) - 2.0 * drag_ratio(vehicle)))
+
+
+def region(alpha_1: float, alpha_2: float, vehicle: Vehicle) -> Region:
+    """Where red ``(alpha_1, alpha_2)`` lies: S_U (R > 0), S_D (R < 0) or on L (ch. 8, Eqs. 6-9)."""
+    value = float(red_residual(alpha_1, alpha_2, vehicle))
+    if abs(value) < 1e-12 / drag_ratio(vehicle):
+        return "L"
+    return "S_U" if value > 0.0 else "S_D"
+
+
+@dataclass(frozen=True)
+class Root:
+    """A solution of ``R_phi = R_theta = 0`` for given ``alpha_1`` and ``alpha_2``; rad."""
+
+    alpha_1: float
+    alpha_2: float
+    alpha_3: float
+    alpha_4: float
+    R: float
+    plane_3: Literal["+", "-", "?"]  # alpha_3 grows with alpha_1, falls with it, or where both meet
+    plane_4: Literal["+", "-", "?"]
+
+
+def find_roots(
+    alpha_1: float, alpha_2: float, vehicle: Vehicle, same_plane: float = _END_TOLERANCE
+) -> list[Root]:
+    """All ``(alpha_3, alpha_4)`` in [-pi/2, pi/2] with ``R_phi = R_theta = 0`` (ch. 6, Eqs. 7-8).
+
+    A search that knows nothing of the closed form above, as a check on it: both residuals are
+    bilinear in ``(cos, sin)`` of ``alpha_3`` and of ``alpha_4``, so eliminating ``alpha_4`` leaves
+    one quadratic, and no root can be missed. Planes less than ``same_plane`` (rad) apart count as
+    meeting; ch. 6's "?" need half a grid step, pi/32, as no grid point lies exactly on a crossing.
+
+    Raises
+    ------
+    ValueError
+        If the roots are not isolated: on ``alpha_1 = delta`` or ``alpha_2 = -delta`` every value of
+        one angle is a root.
+    """
+    corner = np.array([[[alpha_1, alpha_2, a, b] for b in (0.0, pi / 2)] for a in (0.0, pi / 2)])
+    _, roll_form, pitch_form = residuals(corner, vehicle)
+    scale = max(np.abs(roll_form).max(), np.abs(pitch_form).max())
+    # (c a0 + s a1) x (c b0 + s b1) = 0 for c, s = cos, sin alpha_3, with rows a of the roll form.
+    square_c = _cross(roll_form[0], pitch_form[0])
+    mixed = _cross(roll_form[0], pitch_form[1]) + _cross(roll_form[1], pitch_form[0])
+    square_s = _cross(roll_form[1], pitch_form[1])
+    mean, wave = 0.5 * (square_c + square_s), hypot(0.5 * (square_c - square_s), 0.5 * mixed)
+    if wave < _END_TOLERANCE * scale**2:
+        raise ValueError(_not_isolated(alpha_1, alpha_2))
+    middle = atan2(0.5 * mixed, 0.5 * (square_c - square_s))
+    spread = acos(min(1.0, max(-1.0, -mean / wave)))
+    roots = []
+    for double_angle in (middle + spread, middle - spread):
+        third = 0.5 * double_angle
+        direction = np.array([cos(third), sin(third)])
+        lines = [direction @ roll_form, direction @ pitch_form]
+        line = max(lines, key=lambda pair: float(np.abs(pair).max()))
+        if np.abs(line).max() < _END_TOLERANCE * scale:
+            raise ValueError(_not_isolated(alpha_1, alpha_2))
+        fourth = atan2(-line[0], line[1])
+        roots += [
+            _classify(alpha_1, alpha_2, a, b, vehicle, same_plane)
+            for a in _representatives(third)
+            for b in _representatives(fourth)
+        ]
+    return sorted(roots, key=lambda root: (root.alpha_3, root.alpha_4))
+
+
+def grid_axis(size: int = GRID_SIZE) -> Array:
+    """Grid of ch. 6 along one axis: ``size`` points from -pi/2 to pi/2 (rad)."""
+    return np.linspace(-pi / 2, pi / 2, size)
+
+
+def grid_roots(vehicle: Vehicle, size: int = GRID_SIZE) -> list[list[list[Root]]]:
+    """The roots at every grid point ``[i][j]`` of ``(alpha_1, alpha_2)`` (ch. 6, Fig. 4).
+
+    Planes count as meeting ("?") within half a grid step.
+    """
+    axis = grid_axis(size).tolist()
+    half_step = 0.5 * pi / (size - 1)
+    return [[find_roots(a, b, vehicle, half_step) for b in axis] for a in axis]
+
+
+def root_counts(roots: list[list[list[Root]]]) -> NDArray[np.int_]:
+    """Number of roots at every grid point; ch. 6 finds 2 inside, 3 on sides, 5 in corners."""
+    return np.array([[len(cell) for cell in row] for row in roots])
+
+
+def root_classes(roots: list[list[list[Root]]]) -> Counter[str]:
+    """How many roots inside the grid belong to each class ``(+,+)``, ``(-,-)``, ``(+,?)``, ..."""
+    inside = [cell for row in roots[1:-1] for cell in row[1:-1]]
+    return Counter(f"({root.plane_3},{root.plane_4})" for cell in inside for root in cell)
+
+
+def _classify(
+    alpha_1: float, alpha_2: float, alpha_3: float, alpha_4: float, vehicle: Vehicle, same: float
+) -> Root:
+    offset = 2.0 * delta(vehicle)
+    R = float(residuals((alpha_1, alpha_2, alpha_3, alpha_4), vehicle).R)
+    return Root(
+        *(alpha_1, alpha_2, alpha_3, alpha_4, R),
+        plane_3=_plane(alpha_3, alpha_1, offset - alpha_1, same),
+        plane_4=_plane(alpha_4, alpha_2, -offset - alpha_2, same),
+    )
+
+
+def _plane(angle: float, growing: float, falling: float, same: float) -> Literal["+", "-", "?"]:
+    if _distance(growing, falling) < same:
+        return "?"
+    return "+" if _distance(angle, growing) <= _distance(angle, falling) else "-"
+
+
+def _distance(angle: float, other: float) -> float:
+    """Distance (rad) of two directions that are the same after half a turn."""
+    return abs((angle - other + pi / 2) % pi - pi / 2)
+
+
+def _representatives(angle: float) -> list[float]:
+    """The values of ``angle`` modulo pi within [-pi/2, pi/2]: both ends, if it is one of them."""
+    wrapped = (angle + pi / 2) % pi - pi / 2
+    if pi / 2 - abs(wrapped) < _END_TOLERANCE:
+        return [-pi / 2, pi / 2]
+    return [wrapped]
+
+
+def _cross(first: Array, second: Array) -> float:
+    return float(first[0] * second[1] - first[1] * second[0])
+
+
+def _not_isolated(alpha_1: float, alpha_2: float) -> str:
+    return (
+        f"(alpha_1, alpha_2) = ({alpha_1:g}, {alpha_2:g}): on alpha_1 = delta or alpha_2 = -delta "
+        "the roots are not isolated"
+    )

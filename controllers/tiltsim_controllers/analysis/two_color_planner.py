@@ -1,0 +1,331 @@
+"""Gaits planned on the Two Color Map: check a path, then give its four angles (ch. 6 and 8).
+
+A path is a closed curve in the alpha_1-alpha_2 plane with a colour on every part. Two published
+theorems judge it:
+
+* the Two Color Map Theorem (ch. 6, Theorem 1): ``alpha_1`` and ``alpha_2`` move one at a time and
+  the colour stays;
+* the generalized theorem (ch. 8, Sec. 3): any continuous path within ``|alpha| <= 1``; red stays on
+  its side of the curve L; the colour changes at P alone.
+
+Both accept blue anywhere. A path that they accept can still be singular, and then `PathReport` says
+so: blue has rank 2 at every attitude (`tiltsim_controllers.analysis.two_color_map`), and P lies on
+L.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from math import hypot, isfinite, pi
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from tiltsim_controllers.analysis.two_color_map import point_p, red_residual
+from tiltsim_controllers.gaits import plans
+from tiltsim_controllers.gaits.two_color import colored_angles
+from tiltsim_controllers.vehicle.parameters import drag_ratio
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tiltsim_controllers.gaits.plans import Gait
+    from tiltsim_controllers.vehicle.parameters import Vehicle
+
+Array: TypeAlias = "NDArray[np.float64]"
+Point: TypeAlias = tuple[float, float]
+Theorem = Literal["two_color", "generalized"]
+
+GENERALIZED_LIMIT: Final = 1.0
+"""The generalized theorem is stated for |alpha_1|, |alpha_2| up to this (rad; ch. 8, Eq. 3)."""
+
+BLUE_WARNING: Final = "blue: tau has rank 2, the decoupling matrix is singular at every attitude"
+SWITCH_WARNING: Final = (
+    "color switch at P: P lies on the curve L, the decoupling matrix is singular there"
+)
+
+_SAMPLES: Final = 257
+_SAME_POINT: Final = 1e-9
+
+
+class Leg(NamedTuple):
+    """A part of a path in one colour: straight lines through vertices (rad)."""
+
+    color: str
+    vertices: tuple[Point, ...]
+
+
+@dataclass(frozen=True)
+class Polyline:
+    """A closed path of legs; each starts where the one before ended."""
+
+    legs: tuple[Leg, ...]
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A circular path in one colour (ch. 8, Sec. 4), counter-clockwise; rad."""
+
+    color: str
+    centre: Point
+    radius: float
+
+
+Path: TypeAlias = Polyline | Circle
+
+
+@dataclass(frozen=True)
+class PathReport:
+    """The verdict on a path."""
+
+    theorem: Theorem | None  # the narrower published theorem that accepts it; None: refused
+    reasons: tuple[str, ...]  # why it is refused
+    crossings: tuple[Point, ...]  # where red leaves its side of L (rad)
+    warnings: tuple[str, ...]  # what the theorems overlook
+
+    @property
+    def accepted(self) -> bool:
+        """Whether a published theorem calls the path robust."""
+        return self.theorem is not None
+
+    @property
+    def sound(self) -> bool:
+        """Whether a published theorem accepts the path, and it is nowhere singular."""
+        return self.accepted and not self.warnings
+
+
+class PathRefusedError(ValueError):
+    """A path that neither published theorem accepts; the message gives the reasons."""
+
+
+def rectangle(alpha_1: Point, alpha_2: Point, color: str) -> Polyline:
+    """The rectangle between two values of ``alpha_1`` and two of ``alpha_2`` (rad; ch. 6, 7)."""
+    (left, right), (lower, upper) = alpha_1, alpha_2
+    corners = ((left, lower), (right, lower), (right, upper), (left, upper), (left, lower))
+    return Polyline((Leg(color, corners),))
+
+
+def polygon(vertices: tuple[Point, ...], color: str) -> Polyline:
+    """A free path through the vertices (rad) and back to the first, in one colour."""
+    return Polyline((Leg(color, (*vertices, vertices[0])),))
+
+
+def check_path(path: Path, vehicle: Vehicle) -> PathReport:
+    """Judge a path by both published theorems, and say what they overlook.
+
+    Raises
+    ------
+    ValueError
+        If the path has no extent, a number is not finite, or a colour is unknown.
+    """
+    pieces = _pieces(path)
+    joints = _joints(path)
+    p = point_p(vehicle)
+    reasons: list[str] = []
+    for end, start, before, after in joints:
+        if not _same(end, start):
+            reasons.append(f"broken at {_show(end)}: the next part starts at {_show(start)}")
+        elif before != after and not _same(start, p):
+            reasons.append(
+                f"color changes at {_show(start)}: the colors meet at P = {_show(p)} alone"
+            )
+    crossings = _distinct(
+        [
+            crossing
+            for color, point in pieces
+            if color == "red"
+            for crossing in _crossings(point, p, vehicle)
+        ]
+    )
+    if crossings:
+        places = ", ".join(map(_show, crossings))
+        reasons.append(f"red crosses the curve L (R = 0) at {places}")
+
+    points = np.concatenate([point(np.linspace(0.0, 1.0, _SAMPLES)) for _, point in pieces])
+    reach = float(np.abs(points).max())
+    if reach >= pi / 2:
+        reasons.append(f"reaches |alpha| = {reach:.3f}: must stay below pi/2")
+    switches = any(before != after for _, _, before, after in joints)
+    theorem: Theorem | None = None
+    if not reasons:
+        if _moves_one_at_a_time(path) and not switches:
+            theorem = "two_color"
+        elif reach <= GENERALIZED_LIMIT:
+            theorem = "generalized"
+        else:
+            reasons.append(
+                f"reaches |alpha| = {reach:.3f}: the generalized theorem holds up to "
+                f"{GENERALIZED_LIMIT:g}, beyond it alpha_1 and alpha_2 must move one at a time"
+            )
+    warnings = [BLUE_WARNING] if any(color == "blue" for color, _ in pieces) else []
+    if switches:
+        warnings.append(SWITCH_WARNING)
+    return PathReport(theorem, tuple(reasons), crossings, tuple(warnings))
+
+
+def plan(
+    path: Path, period: float, vehicle: Vehicle, *, name: str = "two_color", source: str = ""
+) -> Gait:
+    """The four-angle gait of a path that a published theorem accepts.
+
+    The path is run at constant speed in the alpha_1-alpha_2 plane, once a period (s).
+
+    Raises
+    ------
+    PathRefusedError
+        If neither theorem accepts the path.
+    ValueError
+        As `check_path`, or if the period is not positive.
+    """
+    report = check_path(path, vehicle)
+    if not report.accepted:
+        raise PathRefusedError("; ".join(report.reasons))
+    return four_angle_gait(path, period, vehicle, name=name, source=source)
+
+
+def four_angle_gait(
+    path: Path, period: float, vehicle: Vehicle, *, name: str = "two_color", source: str = ""
+) -> Gait:
+    """The four-angle gait of a path, judged or not; see `plan`."""
+    if isinstance(path, Circle):
+        return plans.two_color_circle(
+            path.centre, path.radius, path.color, period, vehicle, name=name, source=source
+        )
+    ratio = drag_ratio(vehicle)
+    lengths = [
+        hypot(end[0] - start[0], end[1] - start[1])
+        for leg in path.legs
+        for start, end in pairwise(leg.vertices)
+    ]
+    total = sum(lengths)
+    if not total > 0.0:
+        raise ValueError("the path has no length: use a fixed gait")
+    covered = 0.0
+    rows: list[tuple[float, ...]] = []
+    steps = iter(lengths)
+    for leg in path.legs:
+        code = plans.color_code(leg.color)
+        for index, (first, second) in enumerate(leg.vertices):
+            if index:
+                covered += next(steps)
+            elif rows:
+                continue  # the leg before ended here, with the same four angles
+            back = colored_angles(first, second, code, ratio)
+            rows.append((covered / total, first, second, *back))
+    rows[-1] = (1.0, *rows[-1][1:])
+    return plans.keyframes(rows, period, name=name, source=source)
+
+
+class _Piece(NamedTuple):
+    color: str
+    point: Callable[[Array], Array]  # shares of the piece (N,) to points (N, 2), rad
+
+
+def _pieces(path: Path) -> list[_Piece]:
+    """The path as smooth pieces; refuses what is no path at all."""
+    if isinstance(path, Circle):
+        plans.color_code(path.color)
+        if not (all(map(isfinite, (*path.centre, path.radius))) and path.radius > 0.0):
+            raise ValueError(
+                f"circle at {path.centre}, radius {path.radius}: the radius must be positive, all "
+                "finite"
+            )
+
+        def around(share: Array) -> Array:
+            turn = 2.0 * pi * share[:, np.newaxis]
+            offset = np.concatenate([np.cos(turn), np.sin(turn)], axis=1)
+            return np.asarray(path.centre + path.radius * offset)
+
+        return [_Piece(path.color, around)]
+
+    pieces = []
+    for leg in path.legs:
+        plans.color_code(leg.color)
+        if len(leg.vertices) < 2 or not np.isfinite(leg.vertices).all():
+            raise ValueError(f"{leg.color} leg {list(leg.vertices)}: needs two finite points")
+        for start, end in pairwise(leg.vertices):
+
+            def along(share: Array, start: Point = start, end: Point = end) -> Array:
+                share = share[:, np.newaxis]
+                return np.asarray((1.0 - share) * np.array(start) + share * np.array(end))
+
+            pieces.append(_Piece(leg.color, along))
+    if not pieces:
+        raise ValueError("the path has no legs")
+    return pieces
+
+
+def _joints(path: Path) -> list[tuple[Point, Point, str, str]]:
+    """``(end, next start, colour, next colour)`` of successive legs, the last one to the first."""
+    if isinstance(path, Circle):
+        return []
+    following = (*path.legs[1:], path.legs[0])
+    return [
+        (leg.vertices[-1], after.vertices[0], leg.color, after.color)
+        for leg, after in zip(path.legs, following, strict=True)
+    ]
+
+
+def _moves_one_at_a_time(path: Path) -> bool:
+    return isinstance(path, Polyline) and all(
+        start[0] == end[0] or start[1] == end[1]
+        for leg in path.legs
+        for start, end in pairwise(leg.vertices)
+    )
+
+
+def _crossings(point: Callable[[Array], Array], p: Point, vehicle: Vehicle) -> list[Point]:
+    """Where ``R`` on red changes sign or touches zero along a piece, P excepted."""
+    from scipy.optimize import brentq, minimize_scalar
+
+    def residual(share: float) -> float:
+        first, second = point(np.array([share]))[0]
+        return float(red_residual(first, second, vehicle))
+
+    shares = np.linspace(0.0, 1.0, _SAMPLES)
+    points = point(shares)
+    values = red_residual(points[:, 0], points[:, 1], vehicle)
+    # Close to zero without a change of sign: the path may dip across between two samples.
+    side = np.sign(values[np.abs(values).argmax()])
+    depth = side * values
+    dips = np.flatnonzero((depth[1:-1] <= depth[:-2]) & (depth[1:-1] <= depth[2:])) + 1
+    for dip in dips:
+        bounds = (shares[dip - 1], shares[dip + 1])
+        lowest = minimize_scalar(
+            lambda share: side * residual(share), bounds=bounds, options={"xatol": 1e-10}
+        )
+        shares = np.append(shares, float(lowest.x))
+    shares = np.unique(shares)
+    values = np.array([residual(share) for share in shares])
+
+    zero = 1e-9 / drag_ratio(vehicle)
+    found = shares[np.abs(values) < zero].tolist()
+    for index in np.flatnonzero(values[1:] * values[:-1] < 0.0):
+        if min(abs(values[index]), abs(values[index + 1])) >= zero:
+            found.append(float(brentq(residual, shares[index], shares[index + 1], xtol=1e-14)))
+    places: list[Point] = []
+    for share in sorted(found):
+        first, second = map(float, point(np.array([share]))[0])
+        # ch. 8 takes P for a point below L and lets red pass there.
+        if not _same((first, second), p):
+            places.append((first, second))
+    return places
+
+
+def _distinct(places: list[Point]) -> tuple[Point, ...]:
+    """Without repeats: a crossing at a vertex belongs to both of its lines."""
+    kept: list[Point] = []
+    for place in places:
+        if not any(hypot(place[0] - k[0], place[1] - k[1]) < 1e-6 for k in kept):
+            kept.append(place)
+    return tuple(kept)
+
+
+def _same(first: Point, second: Point) -> bool:
+    return hypot(first[0] - second[0], first[1] - second[1]) < _SAME_POINT
+
+
+def _show(point: Point) -> str:
+    return f"({point[0]:.6f}, {point[1]:.6f})"

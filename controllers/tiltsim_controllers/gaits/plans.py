@@ -1,0 +1,284 @@
+"""Planned gaits: what a flight evaluates, with what an engineer wants to know of it.
+
+A `Gait` couples the parameters and the keyframe table of `tiltsim_controllers.gaits.tilt_reference`
+with the gait's name and source, and answers for its period, amplitude, continuity and largest rate.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+from math import inf, isfinite, pi
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tiltsim_controllers.gaits import (
+    FIXED,
+    KEYFRAMES,
+    PENGUIN,
+    ROTATING,
+    TROT_CONTINUOUS,
+    TROT_INSTANT,
+    TWO_COLOR_CIRCLE,
+    GaitParameters,
+    tilt_reference,
+)
+from tiltsim_controllers.gaits.cat import FOOTFALLS, cat_keyframes
+from tiltsim_controllers.gaits.keyframes import NO_KEYFRAMES, ROW
+from tiltsim_controllers.gaits.two_color import COLORS
+from tiltsim_controllers.vehicle.parameters import drag_ratio
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from tiltsim_controllers.vehicle.parameters import Vehicle
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Gait:
+    """A gait ready to be flown: pass `parameters` and `table` to `tilt_reference`."""
+
+    name: str
+    parameters: GaitParameters
+    table: tuple[float, ...] = NO_KEYFRAMES
+    source: str = ""
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether the tilt angles never change."""
+        return self.parameters.type == FIXED
+
+    @property
+    def period(self) -> float | None:
+        """Seconds after which the gait repeats; None for a constant gait."""
+        return None if self.is_constant else self.parameters.period
+
+    @property
+    def is_continuous(self) -> bool:
+        """Whether the tilt angles are continuous in time (ch. 6, Definition 1)."""
+        if self.parameters.type in {TROT_INSTANT, PENGUIN}:
+            return self.parameters.amplitude * self.parameters.scale == 0.0
+        rows = self._rows()
+        if rows is None:
+            return True
+        closed = bool(np.array_equal(rows[0, 1:], rows[-1, 1:]))
+        jumps = np.diff(rows[:, 0]) == 0.0
+        return closed and not np.diff(rows[:, 1:], axis=0)[jumps].any()
+
+    @property
+    def amplitude(self) -> float:
+        """The largest magnitude (rad) of any tilt angle."""
+        if self.parameters.type == ROTATING:
+            return inf
+        rows = self._rows()
+        if rows is not None:
+            return float(np.abs(rows[:, 1:]).max())
+        # The other types reach their extremes at quarters of the period.
+        quarters = np.arange(4) / 4.0 * self.parameters.period
+        return float(np.abs(self.angles(quarters)).max())
+
+    @property
+    def max_rate(self) -> float:
+        """The largest magnitude (rad/s) of any tilt rate; infinite where angles jump."""
+        if not self.is_continuous:
+            return inf
+        rows = self._rows()
+        if rows is not None:
+            steps = np.diff(rows, axis=0)
+            steps = steps[steps[:, 0] > 0.0]
+            slopes = steps[:, 1:] / steps[:, :1] / self.parameters.period
+            return float(np.abs(slopes).max())
+        eighths = np.arange(8) / 8.0 * self.parameters.period
+        return float(np.abs(self.rates(eighths)).max())
+
+    @property
+    def shortest_line(self) -> float:
+        """The shortest time (s) between two corners; infinite without corners, 0 with jumps."""
+        if not self.is_continuous:
+            return 0.0
+        rows = self._rows()
+        if rows is not None:
+            return float(np.diff(rows[:, 0]).min()) * self.parameters.period
+        return 0.5 * self.parameters.period if self.parameters.type == TROT_CONTINUOUS else inf
+
+    def angles(self, time: ArrayLike) -> Array:
+        """Tilt angles (rad) at times (s) of shape (...), as an array of shape (..., 4)."""
+        return self._evaluate(time)[..., :4]
+
+    def rates(self, time: ArrayLike) -> Array:
+        """Tilt rates (rad/s) at times (s) of shape (...), as an array of shape (..., 4)."""
+        return self._evaluate(time)[..., 4:]
+
+    def sample_times(self, samples: int = 201) -> Array:
+        """Times (s) over one period, ends and keyframes included; just 0 for a constant gait."""
+        if self.is_constant:
+            return np.zeros(1)
+        phases = np.linspace(0.0, 1.0, samples)
+        rows = self._rows()
+        if rows is not None:
+            phases = np.union1d(phases, rows[:, 0])
+        if not self.is_continuous:
+            # The end of the period belongs to the next one, past the jump.
+            phases = phases[:-1]
+        return np.asarray(phases * self.parameters.period)
+
+    def scaled(self, divisor: float) -> Gait:
+        """All tilt angles divided by ``divisor`` (ch. 5, Eq. 16)."""
+        if not (isfinite(divisor) and divisor > 0.0):
+            raise ValueError(f"scale 1/{divisor}: must be positive and finite")
+        if divisor == 1.0:
+            return self
+        parameters = self.parameters._replace(scale=self.parameters.scale / divisor)
+        return replace(self, name=f"{self.name} / {divisor:g}", parameters=parameters)
+
+    def biased(self, eta: float) -> Gait:
+        """``alpha_3`` and ``alpha_4`` multiplied by ``eta`` (ch. 6, Eqs. 12-15)."""
+        if eta == 1.0:
+            return self
+        parameters = self.parameters._replace(bias=self.parameters.bias * eta)
+        return replace(self, name=f"{self.name}, biased {eta:.0%}", parameters=parameters)
+
+    def _rows(self) -> Array | None:
+        """The keyframes as flown, shape (N, 5); None for gaits without them."""
+        if self.parameters.type != KEYFRAMES:
+            return None
+        rows = np.reshape(self.table, (-1, ROW))[: int(self.parameters.keyframes)].copy()
+        rows[:, 1:] *= self.parameters.scale
+        rows[:, 3:] *= self.parameters.bias
+        return rows
+
+    def _evaluate(self, time: ArrayLike) -> Array:
+        times = np.asarray(time, dtype=float)
+        values = [tilt_reference(t, self.parameters, self.table) for t in times.ravel().tolist()]
+        return np.reshape(np.asarray(values, dtype=float), (*times.shape, 8))
+
+
+def fixed(angles: Sequence[float], *, name: str = "fixed", source: str = "") -> Gait:
+    """Constant tilt angles (rad) (ch. 3; ch. 4, Eq. 32)."""
+    return Gait(name, GaitParameters(FIXED, *map(float, angles)), source=source)
+
+
+def instant_trot(amplitude: float, period: float) -> Gait:
+    """The trot that jumps between plus and minus the amplitude (rad) (ch. 4, Eq. 33)."""
+    parameters = GaitParameters(TROT_INSTANT, amplitude=amplitude, period=_positive(period))
+    return Gait("trot_instant", parameters, source="ch. 4, Sec. 4.2")
+
+
+def continuous_trot(amplitude: float, period: float) -> Gait:
+    """The trot at a constant rate between plus and minus the amplitude (rad) (ch. 4, Eq. 34)."""
+    parameters = GaitParameters(TROT_CONTINUOUS, amplitude=amplitude, period=_positive(period))
+    return Gait("trot_continuous", parameters, source="ch. 4, Sec. 4.3")
+
+
+def penguin(name: str, amplitude: float, period: float) -> Gait:
+    """The tilt-car's swing between minus and plus the amplitude (rad) (ch. 11, Sec. 3)."""
+    parameters = GaitParameters(PENGUIN, amplitude=amplitude, period=_positive(period))
+    return Gait(name, parameters, source="ch. 11, Sec. 3, Figs. 7 and 8")
+
+
+def rotating(start: float, rate: float) -> Gait:
+    """A tilt that turns on at a constant rate (rad/s) from ``start`` (rad) (ch. 10, Eq. 18)."""
+    period = _positive(2.0 * pi / abs(rate)) if rate else 1.0
+    parameters = GaitParameters(ROTATING, angle_1=start, rate=rate, period=period)
+    return Gait("rotating", parameters, source="ch. 10, Eq. (18)")
+
+
+def cat(name: str, amplitude: float, period: float, lean: float = 0.0) -> Gait:
+    """A cat gait by its name in `FOOTFALLS` (ch. 5, Sec. 3.2).
+
+    Its legs swing by ``amplitude`` (rad) to either side of ``lean`` (rad, forward) in ``period``
+    (s); `tiltsim_controllers.gaits.cat.SWINGS` has what ch. 5 was flown with, as far as we can
+    tell.
+    """
+    if name not in FOOTFALLS:
+        raise ValueError(f"{name!r} is no cat gait; choose {', '.join(FOOTFALLS)}")
+    rows = cat_keyframes(FOOTFALLS[name], amplitude, lean)
+    return keyframes(rows, period, name=name, source="ch. 5, Sec. 3.2; keyframes reconstructed")
+
+
+def waypoints(
+    angles: Sequence[Sequence[float]], period: float, phases: Sequence[float] | None = None
+) -> Gait:
+    """A closed gait through the given tilt angles (rad), straight in between.
+
+    Each of ``angles`` is reached at its phase (share of the period); without ``phases`` they are
+    spread evenly. The last one runs back to the first.
+    """
+    count = len(angles)
+    if phases is None:
+        phases = [index / count for index in range(count)] if count else []
+    if len(phases) != count:
+        raise ValueError(f"{count} waypoints but {len(phases)} phases")
+    rows = [(phase, *point) for phase, point in zip(phases, angles, strict=True)]
+    if rows:
+        rows.append((1.0, *rows[0][1:]))
+    return keyframes(rows, period, name="waypoints")
+
+
+def keyframes(
+    rows: Iterable[Sequence[float]], period: float, *, name: str = "keyframes", source: str = ""
+) -> Gait:
+    """A gait through rows of ``(phase, alpha_1, ..., alpha_4)``, phase from 0 to 1, angles in rad.
+
+    Raises
+    ------
+    ValueError
+        If a row has not five finite numbers, or the phases do not run from 0 to 1, or they go back,
+        or three rows share a phase (two make a jump), or the period is not positive.
+    """
+    frames = [tuple(map(float, row)) for row in rows]
+    for frame in frames:
+        if len(frame) != ROW or not all(map(isfinite, frame)):
+            raise ValueError(f"keyframe {list(frame)}: needs a phase and four finite tilt angles")
+    phases = [frame[0] for frame in frames]
+    if len(phases) < 2 or phases[0] != 0.0 or phases[-1] != 1.0:
+        raise ValueError(f"keyframe phases {phases}: must start at 0 and end at 1")
+    if any(later < earlier for earlier, later in itertools.pairwise(phases)):
+        raise ValueError(f"keyframe phases {phases}: must not decrease")
+    if phases[1] == 0.0 or phases[-2] == 1.0:
+        raise ValueError(f"keyframe phases {phases}: only one row may stand at 0, one at 1")
+    if any(third == first for first, third in zip(phases, phases[2:], strict=False)):
+        raise ValueError(f"keyframe phases {phases}: at most two rows may share a phase")
+    parameters = GaitParameters(KEYFRAMES, period=_positive(period), keyframes=float(len(frames)))
+    return Gait(name, parameters, tuple(value for frame in frames for value in frame), source)
+
+
+def two_color_circle(
+    centre: tuple[float, float],
+    radius: float,
+    color: str,
+    period: float,
+    vehicle: Vehicle,
+    *,
+    name: str = "two_color",
+    source: str = "",
+) -> Gait:
+    """A circle in the alpha_1-alpha_2 plane on one colour (ch. 8, Sec. 4); angles in rad."""
+    parameters = GaitParameters(
+        TWO_COLOR_CIRCLE,
+        period=_positive(period),
+        centre_1=centre[0],
+        centre_2=centre[1],
+        radius=radius,
+        color=color_code(color),
+        drag_ratio=drag_ratio(vehicle),
+    )
+    return Gait(name, parameters, source=source)
+
+
+def color_code(color: str) -> float:
+    """The code of a colour's name; ValueError with the choices for any other name."""
+    if color not in COLORS:
+        raise ValueError(f"{color!r} is no color; choose {', '.join(COLORS)}")
+    return COLORS[color]
+
+
+def _positive(period: float) -> float:
+    if not (isfinite(period) and period > 0.0):
+        raise ValueError(f"period = {period}: must be positive and finite")
+    return float(period)

@@ -1,0 +1,1 @@
+"""Control laws and what they are made of: decouplers, gains, allocation, supervisor."""

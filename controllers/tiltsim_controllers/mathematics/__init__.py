@@ -1,0 +1,1 @@
+"""Mathematics in scalar form: rotations, jets, records, noise."""

@@ -1,0 +1,121 @@
+"""Rotations between body and world, ``Rz(yaw) Ry(pitch) Rx(roll)`` (ch. 3, Eq. 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import asin, atan2, cos, floor, pi, sin, sqrt
+
+from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
+
+
+@scalar
+def euler_from_quaternion(w: float, x: float, y: float, z: float) -> Triple:
+    """Roll, pitch and yaw (rad) of a unit quaternion, scalar first."""
+    sin_pitch = 2.0 * (w * y - z * x)
+    # Rounding may carry the sine past one at pitch = +-90 degrees.
+    if not -1.0 <= sin_pitch <= 1.0:
+        sin_pitch = min(1.0, max(-1.0, sin_pitch))
+    return (
+        atan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+        asin(sin_pitch),
+        atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)),
+    )
+
+
+@scalar
+def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> Quad:
+    """The unit quaternion (scalar first) of roll, pitch and yaw (rad)."""
+    cr, sr = cos(0.5 * roll), sin(0.5 * roll)
+    cp, sp = cos(0.5 * pitch), sin(0.5 * pitch)
+    cy, sy = cos(0.5 * yaw), sin(0.5 * yaw)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+@scalar
+def shortest_turn(angle: float) -> float:
+    """The angle (rad) within half a revolution either way that turns to the same direction.
+
+    For differences of yaw: a quaternion tells yaw between -pi and pi, a vehicle may cross there.
+    """
+    if abs(angle) > pi:
+        return angle - 2.0 * pi * floor(angle / (2.0 * pi) + 0.5)
+    return angle
+
+
+@scalar
+def world_up_in_body(roll: float, pitch: float) -> Triple:
+    """World up seen from the body, ``r3``: the third row of the body-to-world rotation."""
+    cos_pitch = cos(pitch)
+    return -sin(pitch), sin(roll) * cos_pitch, cos(roll) * cos_pitch
+
+
+@scalar
+def rotation_from_euler(roll: float, pitch: float, yaw: float) -> tuple[float, ...]:
+    """The nine entries, rows first, of the body-to-world rotation (ch. 3, Eq. 2)."""
+    sr, cr = sin(roll), cos(roll)
+    sp, cp = sin(pitch), cos(pitch)
+    sy, cy = sin(yaw), cos(yaw)
+    return (
+        cp * cy,
+        sr * sp * cy - cr * sy,
+        cr * sp * cy + sr * sy,
+        cp * sy,
+        sr * sp * sy + cr * cy,
+        cr * sp * sy - sr * cy,
+        -sp,
+        sr * cp,
+        cr * cp,
+    )
+
+
+@scalar
+def rotation_from_quaternion(w: float, x: float, y: float, z: float) -> tuple[float, ...]:
+    """The nine entries, rows first, of the body-to-world rotation of a unit quaternion."""
+    return (
+        1.0 - 2.0 * (y * y + z * z),
+        2.0 * (x * y - w * z),
+        2.0 * (x * z + w * y),
+        2.0 * (x * y + w * z),
+        1.0 - 2.0 * (x * x + z * z),
+        2.0 * (y * z - w * x),
+        2.0 * (x * z - w * y),
+        2.0 * (y * z + w * x),
+        1.0 - 2.0 * (x * x + y * y),
+    )
+
+
+@scalar
+def to_world(rotation: Sequence[float], vector: Triple) -> Triple:
+    """A vector in body axes, turned to the world's; ``rotation`` holds nine entries, rows first."""
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
+    x, y, z = vector
+    return (
+        r11 * x + r12 * y + r13 * z,
+        r21 * x + r22 * y + r23 * z,
+        r31 * x + r32 * y + r33 * z,
+    )
+
+
+@scalar
+def quaternion_from_rotation(rotation: tuple[float, ...]) -> Quad:
+    """A unit quaternion (scalar first) of a body-to-world rotation, nine entries, rows first.
+
+    Twice the products of its largest component with all four stand in the rotation; which one is
+    the largest shows on the diagonal. What rounding has added to the rotation's length is left out.
+    """
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
+    if r11 + r22 + r33 >= max(r11, r22, r33):
+        w, x, y, z = 1.0 + r11 + r22 + r33, r32 - r23, r13 - r31, r21 - r12
+    elif r11 >= r22 and r11 >= r33:
+        w, x, y, z = r32 - r23, 1.0 + r11 - r22 - r33, r12 + r21, r13 + r31
+    elif r22 >= r33:
+        w, x, y, z = r13 - r31, r12 + r21, 1.0 - r11 + r22 - r33, r23 + r32
+    else:
+        w, x, y, z = r21 - r12, r13 + r31, r23 + r32, 1.0 - r11 - r22 + r33
+    scale = 1.0 / sqrt(w * w + x * x + y * y + z * z)
+    return scale * w, scale * x, scale * y, scale * z

@@ -1,0 +1,1 @@
+"""Reference trajectories: where the vehicle should be over time."""

@@ -1,0 +1,251 @@
+"""The limit cycle of ch. 11's large penguin swing, half a period at a time.
+
+With ``e_x = 0`` the error along y obeys ``e'' = -K_Y1 e' - K_Y2 e`` while both rotors push, and
+``e'' = -+ tan(Lambda - theta)`` while one has stopped (ch. 11, Eqs. 30-32). The latter, and with it
+Lemma 3, needs ``Lambda + theta = pi / 2``: the rotor that would have to pull then has no part in x,
+and leaving it out leaves ``e_x`` at zero. Over half a period the state ``(e_y, e_y')`` goes through
+a map; the swing to the other side is its mirror image. A fixed point of the map followed by the
+mirror, ``-P(s) = s``, is a limit cycle, stable if the eigenvalues of the map's Jacobian there lie
+within the unit circle.
+
+`half_period` takes the state at the start of a half period with the thrusts' middle at ``+Lambda``.
+Everything is in the frame of that half: for the other one change both signs.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from math import cos, exp, isclose, pi, sin, sqrt, tan
+
+import numpy as np
+import numpy.typing as npt
+
+from tiltsim_controllers.tilt_car.planned_direction import Gains
+
+Array = npt.NDArray[np.float64]
+State = tuple[float, float]
+
+STEPS = 64  # to look for the switch in a half period, which is slow against them
+
+
+@dataclass(frozen=True)
+class Swing:
+    """A penguin swing under ch. 11's law.
+
+    Attributes
+    ----------
+    half_angle
+        ``theta``, rad.
+    half_period
+        ``T / 2``, s.
+    gains
+        The law's.
+    reference_acceleration
+        Along x, m/s^2.
+    """
+
+    half_angle: float
+    half_period: float
+    gains: Gains
+    reference_acceleration: float = 1.0
+
+    @property
+    def direction(self) -> float:
+        """``Lambda``, rad: the one at which one thrust has no part in x."""
+        return 0.5 * pi - self.half_angle
+
+    @property
+    def push(self) -> float:
+        """``e_y''`` (m/s^2) with rotor 2 alone: its thrust, just enough for x, also pushes y."""
+        return -self._side
+
+    @property
+    def _side(self) -> float:
+        """The least acceleration along y that the thrusts make at the wanted one along x."""
+        return self.reference_acceleration * tan(self.direction - self.half_angle)
+
+    def both_push(self, state: State) -> bool:
+        """Whether both rotors push: the wanted acceleration lies between the thrusts (Prop. 4)."""
+        error, rate = state
+        return self.gains.y_velocity * rate + self.gains.y_position * error > self._side
+
+    def free(self, time: float, state: State) -> State:
+        """The state after a time (s) of both rotors pushing (ch. 11, Eq. 42)."""
+        error, rate = state
+        k1, k2 = self.gains.y_velocity, self.gains.y_position
+        discriminant = 0.25 * k1 * k1 - k2
+        decay = exp(-0.5 * k1 * time)
+        if isclose(discriminant, 0.0, abs_tol=1e-12):
+            even, odd = 1.0, time
+        elif discriminant > 0.0:
+            root = sqrt(discriminant)
+            even, odd = float(np.cosh(root * time)), float(np.sinh(root * time)) / root
+        else:
+            root = sqrt(-discriminant)
+            even, odd = cos(root * time), sin(root * time) / root
+        mixed = rate + 0.5 * k1 * error
+        return (
+            decay * (even * error + odd * mixed),
+            decay * (even * rate - odd * (0.5 * k1 * rate + k2 * error)),
+        )
+
+    def pushed(self, time: float, state: State) -> State:
+        """The state after a time (s) of one rotor pushing (ch. 11, Eq. 53)."""
+        error, rate = state
+        return error + rate * time + 0.5 * self.push * time * time, rate + self.push * time
+
+
+@dataclass(frozen=True)
+class Half:
+    """What happened in half a period: the state at its end, and for how long both rotors pushed."""
+
+    end: State
+    free_time: float
+
+
+def half_period(swing: Swing, start: State) -> Half:
+    """Follow a state (e_y in m, e_y' in m/s) through half a period, in closed form.
+
+    While both rotors push the state comes down to the line of Eq. (40); from there on one rotor
+    pushes to the end (Remark 4).
+    """
+    if not swing.both_push(start):
+        return Half(swing.pushed(swing.half_period, start), 0.0)
+    times = np.linspace(0.0, swing.half_period, STEPS + 1).tolist()
+    for low, high in itertools.pairwise(times):
+        if not swing.both_push(swing.free(high, start)):
+            switch = _bisect(swing, start, low, high)
+            between = swing.free(switch, start)
+            return Half(swing.pushed(swing.half_period - switch, between), switch)
+    return Half(swing.free(swing.half_period, start), swing.half_period)
+
+
+def _bisect(swing: Swing, start: State, low: float, high: float) -> float:
+    for _ in range(100):
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            break
+        if swing.both_push(swing.free(middle, start)):
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def mirrored_map(swing: Swing, state: State) -> State:
+    """The half-period Poincaré map followed by the mirror, ``s -> -P(s)``."""
+    error, rate = half_period(swing, state).end
+    return -error, -rate
+
+
+def jacobian(swing: Swing, state: State) -> Array:
+    """The mirrored map's Jacobian at a state, shape (2, 2), by central differences."""
+    columns = []
+    for index in (0, 1):
+        ends = []
+        for side in (1e-6, -1e-6):
+            moved = [*state]
+            moved[index] += side
+            ends.append(np.array(mirrored_map(swing, (moved[0], moved[1]))))
+        columns.append((ends[0] - ends[1]) / 2e-6)
+    return np.stack(columns, axis=1)
+
+
+def limit_cycle(swing: Swing, guess: State = (0.2, 0.7)) -> State:
+    """The fixed point of the mirrored map, by Newton's method.
+
+    Raises
+    ------
+    ValueError
+        If there is none near the guess.
+    """
+    state = np.array(guess)
+    for _ in range(50):
+        at = (float(state[0]), float(state[1]))
+        miss = np.array(mirrored_map(swing, at)) - state
+        if float(np.abs(miss).max()) < 1e-13:
+            return at
+        state = state - np.linalg.solve(jacobian(swing, at) - np.eye(2), miss)
+    raise ValueError(f"no limit cycle near (e_y, e_y') = {guess}")
+
+
+def multipliers(swing: Swing, state: State) -> Array:
+    """Eigenvalues of the mirrored map at its fixed point, largest first, shape (2,).
+
+    The errors of a disturbed cycle shrink by their magnitudes every half period.
+    """
+    values = np.linalg.eigvals(jacobian(swing, state))
+    return np.asarray(values[np.argsort(-np.abs(values))])
+
+
+def lyapunov(swing: Swing, state: State) -> float:
+    """Ch. 11's candidate at a state, m^2/s^2 (Eq. 49)."""
+    error, rate = state
+    return 0.5 * rate * rate + 0.5 * swing.gains.y_position * error * error
+
+
+def lyapunov_gain(swing: Swing, state: State) -> float:
+    """By how much the candidate grows over the half period from a state (Eq. 70)."""
+    return lyapunov(swing, half_period(swing, state).end) - lyapunov(swing, state)
+
+
+@dataclass(frozen=True)
+class LyapunovBound:
+    """Proposition 7 in numbers.
+
+    Attributes
+    ----------
+    critical
+        ``L_critical``: the largest candidate from which the next half period may still raise it.
+    largest_gain
+        The largest growth over a half period; the chapter rounds it up to 3/4 (Eq. 71).
+    at
+        The state of ``L_critical``.
+    """
+
+    critical: float
+    largest_gain: float
+    at: State
+
+    @property
+    def published(self) -> float:
+        """The bound as published, ``L_critical + 3/4`` (Eq. 77)."""
+        return self.critical + 0.75
+
+
+def lyapunov_bound(swing: Swing, points: int = 161) -> LyapunovBound:
+    """``L_critical`` and the largest growth over the zone of Eq. (39).
+
+    On every ray from the origin into the zone's quadrant the growth falls with the distance from
+    where it is positive; its zero is bisected, and the rays are searched for the largest candidate.
+    """
+    angles = np.linspace(0.0, 0.5 * np.pi, points)
+    critical, at, largest = 0.0, (0.0, 0.0), 0.0
+    for angle in angles.tolist():
+        # In the ellipse's coordinates rays are lines through states of proportional errors.
+        unit = (cos(angle) * sqrt(2.0 / swing.gains.y_position), sin(angle) * sqrt(2.0))
+        edge = _edge(swing, unit)
+        gain = lyapunov_gain(swing, (edge * unit[0], edge * unit[1]))
+        largest = max(largest, gain)
+        if gain < 0.0:
+            continue
+        low, high = edge, max(2.0 * edge, 1.0)
+        while lyapunov_gain(swing, (high * unit[0], high * unit[1])) > 0.0:
+            low, high = high, 2.0 * high
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            if lyapunov_gain(swing, (middle * unit[0], middle * unit[1])) > 0.0:
+                low = middle
+            else:
+                high = middle
+        if low * low > critical:
+            critical, at = low * low, (low * unit[0], low * unit[1])
+    return LyapunovBound(critical, largest, at)
+
+
+def _edge(swing: Swing, unit: State) -> float:
+    """How far along a ray the zone of Eq. (39) begins."""
+    gains = swing.gains
+    slope = gains.y_velocity * unit[1] + gains.y_position * unit[0]
+    return -swing.push / slope * (1.0 + 1e-12)

@@ -1,0 +1,81 @@
+"""Control of the tilt-car with the direction of its thrusts planned (ch. 10, Sec. 5; ch. 11).
+
+The gait moves the tilt, the law sets the squares of both rotor speeds: as many inputs as outputs,
+nothing left to drift. A thrust cannot pull, so squares below zero become zero (ch. 11, Eq. 13),
+which ch. 11 writes with the switch matrix ``S_pq``.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from tiltsim_controllers.mathematics.scalar import Pair, scalar
+from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
+from tiltsim_controllers.tilt_car.vehicle import TiltCar, squared_speeds, turned
+
+State = tuple[float, ...]
+
+
+class Gains(NamedTuple):
+    """Gains of both axes, on velocity and on position."""
+
+    x_velocity: float  # [K_X1] 1/s
+    x_position: float  # [K_X2] 1/s^2
+    y_velocity: float  # [K_Y1] 1/s
+    y_position: float  # [K_Y2] 1/s^2
+
+
+class Parameters(NamedTuple):
+    """All that the law needs to know besides time and state."""
+
+    car: TiltCar
+    gains: Gains
+    reference: ReferenceParameters
+
+
+GAIN_SETS: Final = {
+    # Ours, both poles at -2: ch. 10 prints none.
+    "ch10": Gains(4.0, 4.0, 4.0, 4.0),
+    # ch. 11, Sec. 4.2
+    "ch11": Gains(12.0, 6.0, 9.0, 18.0),
+}
+"""Gains by name."""
+
+
+@scalar
+def wanted_acceleration(time: float, state: State, parameters: Parameters) -> Pair:
+    """The acceleration (m/s^2, world) to ask for; ch. 10, Eq. (20) and ch. 11, Eqs. (9), (10)."""
+    gains = parameters.gains
+    reference = reference_derivatives(time, parameters.reference)
+    return (
+        reference[6]
+        + gains.x_velocity * (reference[3] - state[2])
+        + gains.x_position * (reference[0] - state[0]),
+        reference[7]
+        + gains.y_velocity * (reference[4] - state[3])
+        + gains.y_position * (reference[1] - state[1]),
+    )
+
+
+@scalar
+def wanted_squares(time: float, state: State, parameters: Parameters) -> Pair:
+    """The squares of the rotor speeds (rad^2/s^2) to ask for, of any sign; ch. 11, Eq. (12)."""
+    x, y = wanted_acceleration(time, state, parameters)
+    along, across = turned(x, y, -(state[4] + state[5]))
+    return squared_speeds(along, across, parameters.car)
+
+
+@scalar
+def planned_direction_inputs(time: float, state: State, parameters: Parameters) -> Pair:
+    """The squares of the rotor speeds (rad^2/s^2), never below zero; ch. 11, Eqs. (12), (13)."""
+    square_1, square_2 = wanted_squares(time, state, parameters)
+    # Written so that NaN stays NaN.
+    return (
+        0.0 if square_1 < 0.0 else square_1,
+        0.0 if square_2 < 0.0 else square_2,
+    )
+
+
+def lyapunov_candidate(error_y: float, error_rate_y: float, gains: Gains) -> float:
+    """Ch. 11's candidate ``L = e_y'^2 / 2 + K_Y2 e_y^2 / 2`` (Eq. 49), m^2/s^2."""
+    return 0.5 * error_rate_y * error_rate_y + 0.5 * gains.y_position * error_y * error_y

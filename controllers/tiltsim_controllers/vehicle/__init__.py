@@ -1,0 +1,1 @@
+"""Vehicle models: parameters, forces and torques, actuators, air."""

@@ -1,0 +1,286 @@
+"""Forces of the air: drag, wind, discrete gusts, turbulence and ground effect.
+
+Sources: MIL-F-8785C, "Flying qualities of piloted airplanes" (5 November 1980), for gusts and the
+Dryden spectra; Cheeseman and Bennett, "The effect of the ground on a helicopter rotor in forward
+flight", ARC R&M 3021 (September 1955, published 1957). The formulas were checked against others who
+implement them; paragraphs and equations are not cited, as neither print was at hand. Air velocities
+are in world axes, z up.
+"""
+
+from __future__ import annotations
+
+from math import cos, pi, sqrt
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from tiltsim_controllers.mathematics.noise import normal
+from tiltsim_controllers.mathematics.scalar import Triple, scalar
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+FOOT: Final = 0.3048
+"""m; MIL-F-8785C is in feet, and its exponents do not carry over."""
+
+# --- drag --------------------------------------------------------------------------------------
+
+
+class Drag(NamedTuple):
+    """Coefficients of the force against the motion through the air, along each body axis."""
+
+    linear_x: float = 0.0  # N s/m
+    linear_y: float = 0.0
+    linear_z: float = 0.0
+    area_x: float = 0.0  # m^2: drag coefficient times the area seen along the axis
+    area_y: float = 0.0
+    area_z: float = 0.0
+    density: float = 1.225  # kg/m^3, of the standard atmosphere at sea level
+
+
+@scalar
+def drag_force(velocity: Triple, drag: Drag) -> Triple:
+    """Force (N) on a body that moves through the air at a velocity (m/s), body axes.
+
+    ``F_i = -(linear_i + density / 2 area_i |v|) v_i``. The linear part stands for rotors, whose
+    drag grows with speed and thrust alone (their H-force); the quadratic one for the fuselage.
+    """
+    vx, vy, vz = velocity
+    pressure = 0.5 * drag.density * sqrt(vx * vx + vy * vy + vz * vz)
+    return (
+        -(drag.linear_x + drag.area_x * pressure) * vx,
+        -(drag.linear_y + drag.area_y * pressure) * vy,
+        -(drag.linear_z + drag.area_z * pressure) * vz,
+    )
+
+
+# --- gusts -------------------------------------------------------------------------------------
+
+
+class Gust(NamedTuple):
+    """A discrete gust (MIL-F-8785C), given by its rise time instead of its length."""
+
+    start: float = 0.0  # s
+    rise: float = 1.0  # s, d_m over the speed of flight
+    duration: float = 0.0  # s, from start to the end of the fall; 0: it stays
+    x: float = 0.0  # m/s, at its peak
+    y: float = 0.0
+    z: float = 0.0
+
+
+@scalar
+def gust_profile(time: float, gust: Gust) -> float:
+    """Share of the peak: ``(1 - cos(pi t / rise)) / 2`` up, and down again before the end."""
+    since = time - gust.start
+    if since <= 0.0 or (gust.duration > 0.0 and since >= gust.duration):
+        return 0.0
+    if since < gust.rise:
+        return 0.5 * (1.0 - cos(pi * since / gust.rise))
+    left = gust.duration - since
+    if gust.duration > 0.0 and left < gust.rise:
+        return 0.5 * (1.0 - cos(pi * left / gust.rise))
+    return 1.0
+
+
+# --- turbulence --------------------------------------------------------------------------------
+
+
+class Turbulence(NamedTuple):
+    """Dryden turbulence that a vehicle meets at a constant speed; see `dryden_rates`."""
+
+    intensity_u: float = 0.0  # m/s, standard deviation along the mean wind
+    intensity_w: float = 0.0  # m/s, vertical; across the wind it is that of u
+    length_u: float = 1.0  # m, scale; across the wind it is the same
+    length_w: float = 1.0
+    speed: float = 1.0  # m/s, through the turbulence
+    along_x: float = 1.0  # unit vector of the mean wind, horizontal
+    along_y: float = 0.0
+    sample_time: float = 0.01  # s for which a draw of the noise stands
+    seed: float = 0.0
+
+
+DRYDEN_STATES: Final = 5
+"""One for u, two each for v and w."""
+
+
+def low_altitude_turbulence(
+    wind_at_20_ft: float,
+    height: float,
+    *,
+    speed: float,
+    direction: float = 0.0,
+    sample_time: float = 0.01,
+    seed: float = 0.0,
+) -> Turbulence:
+    """The low-altitude model (MIL-F-8785C), 10 to 1000 ft.
+
+    ``L_w = h``, ``L_u = L_v = h / (0.177 + 0.000823 h)^1.2``, ``sigma_w = 0.1 W_20`` and
+    ``sigma_u = sigma_v = sigma_w / (0.177 + 0.000823 h)^0.4``, ``h`` in feet.
+
+    Parameters
+    ----------
+    wind_at_20_ft : float
+        Mean wind 6 m above the ground, m/s.
+    height : float
+        Above the ground, m; what lies outside 10 to 1000 ft is taken at the bound.
+    speed : float
+        Of the vehicle relative to the air, m/s; in hover that of the mean wind.
+    direction : float
+        Where the mean wind blows to, rad from +x towards +y.
+    sample_time : float
+        For which a draw of the noise stands, s.
+    seed : float
+        A whole number.
+    """
+    feet = min(1000.0, max(10.0, height / FOOT))
+    base = 0.177 + 0.000823 * feet
+    intensity_w = 0.1 * wind_at_20_ft
+    return Turbulence(
+        intensity_u=intensity_w / base**0.4,
+        intensity_w=intensity_w,
+        length_u=feet / base**1.2 * FOOT,
+        length_w=feet * FOOT,
+        speed=speed,
+        along_x=float(np.cos(direction)),
+        along_y=float(np.sin(direction)),
+        sample_time=sample_time,
+        seed=seed,
+    )
+
+
+@scalar
+def white_noise(time: float, channel: float, turbulence: Turbulence) -> float:
+    """Noise whose integral has the variance ``time``, but for its sampling; 1/s^0.5."""
+    # An exact multiple may come out a hair below itself; the next draw must not wait for a step.
+    index = float(int(time / turbulence.sample_time + 1e-6))
+    return normal(turbulence.seed, channel, index) / sqrt(turbulence.sample_time)
+
+
+@scalar
+def dryden_rates(
+    time: float, states: tuple[float, ...], turbulence: Turbulence
+) -> tuple[float, float, float, float, float]:
+    """Rates of the shaping filters' states, driven by white noise.
+
+    With ``T = L / V`` the filters are ``sigma sqrt(2 T) / (1 + T s)`` for u and
+    ``sigma sqrt(T) (1 + sqrt(3) T s) / (1 + T s)^2`` for v and w. The states are outputs of lags:
+    one for u, two in a row for v and for w.
+    """
+    u, v1, v2, w1, w2 = states
+    if turbulence.intensity_u == 0.0 and turbulence.intensity_w == 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0  # nobody sees them move
+    rate_u = turbulence.speed / turbulence.length_u
+    rate_w = turbulence.speed / turbulence.length_w
+    return (
+        rate_u * (white_noise(time, 20.0, turbulence) - u),
+        rate_u * (white_noise(time, 21.0, turbulence) - v1),
+        rate_u * (v1 - v2),
+        rate_w * (white_noise(time, 22.0, turbulence) - w1),
+        rate_w * (w1 - w2),
+    )
+
+
+@scalar
+def dryden_velocity(states: tuple[float, ...], turbulence: Turbulence) -> Triple:
+    """The turbulent velocity of the air (m/s, world) from the filters' states.
+
+    ``(1 + sqrt(3) T s)`` after two lags is ``sqrt(3)`` times the first lag's output less
+    ``sqrt(3) - 1`` times the second's.
+    """
+    u, v1, v2, w1, w2 = states
+    root_3 = 1.7320508075688772
+    time_u = turbulence.length_u / turbulence.speed
+    time_w = turbulence.length_w / turbulence.speed
+    along = turbulence.intensity_u * sqrt(2.0 * time_u) * u
+    across = turbulence.intensity_u * sqrt(time_u) * (root_3 * v1 - (root_3 - 1.0) * v2)
+    up = turbulence.intensity_w * sqrt(time_w) * (root_3 * w1 - (root_3 - 1.0) * w2)
+    cx, cy = turbulence.along_x, turbulence.along_y
+    return cx * along - cy * across, cy * along + cx * across, up
+
+
+def dryden_spectrum(omega: ArrayLike, turbulence: Turbulence, axis: str) -> NDArray[np.float64]:
+    """Power spectral density (m^2/s^2 per rad/s, one-sided) of a component: ``u``, ``v`` or ``w``.
+
+    Sec. 3.7.1.2, over time: ``Phi(omega) = Phi(Omega) / V`` with ``Omega = omega / V``. Its
+    integral from zero to infinity is the variance.
+    """
+    w = np.asarray(omega, dtype=float)
+    length, sigma = turbulence.length_u, turbulence.intensity_u
+    if axis == "w":
+        length, sigma = turbulence.length_w, turbulence.intensity_w
+    tau = length / turbulence.speed
+    x = (tau * w) ** 2
+    if axis == "u":
+        return np.asarray(sigma**2 * 2.0 * tau / np.pi / (1.0 + x))
+    return np.asarray(sigma**2 * tau / np.pi * (1.0 + 3.0 * x) / (1.0 + x) ** 2)
+
+
+# --- ground effect -----------------------------------------------------------------------------
+
+
+class Ground(NamedTuple):
+    """The ground under the rotors."""
+
+    rotor_radius: float = 0.0  # m; 0 for no ground effect
+    height: float = 0.0  # m, z of the ground in the world
+
+
+@scalar
+def ground_effect(above: float, rotor_radius: float) -> float:
+    """Thrust of a rotor near the ground over its thrust far away, at equal power.
+
+    ``1 / (1 - (R / 4 h)^2)`` (Cheeseman and Bennett, at rest) with the rotor's height ``h``
+    above the ground, m. Derived for single, level rotors from a source and its image, and good
+    above half a radius; below, the value at half a radius, 4/3, stands.
+    """
+    if rotor_radius == 0.0:
+        return 1.0
+    ratio = rotor_radius / (4.0 * max(above, 0.5 * rotor_radius))
+    return 1.0 / (1.0 - ratio * ratio)
+
+
+# --- all of it ---------------------------------------------------------------------------------
+
+
+class Air(NamedTuple):
+    """The air around a vehicle."""
+
+    wind_x: float = 0.0  # m/s, world: where the air goes
+    wind_y: float = 0.0
+    wind_z: float = 0.0
+    drag: Drag = Drag()
+    gust: Gust = Gust()
+    turbulence: Turbulence = Turbulence()
+    ground: Ground = Ground()
+
+
+@scalar
+def air_velocity(time: float, states: tuple[float, ...], air: Any) -> Triple:
+    """Velocity of the air (m/s, world): wind, gust and turbulence."""
+    share = gust_profile(time, air.gust)
+    x, y, z = dryden_velocity(states, air.turbulence)
+    return (
+        air.wind_x + share * air.gust.x + x,
+        air.wind_y + share * air.gust.y + y,
+        air.wind_z + share * air.gust.z + z,
+    )
+
+
+def stationary_states(turbulence: Turbulence) -> tuple[float, float, float, float, float]:
+    """A draw of the filters' states from their stationary distribution, for the start.
+
+    A lag ``T`` of unit noise has the variance ``1 / 2T``, a second one behind it ``1 / 4T``, and so
+    has their product.
+    """
+    u, v1, v2, w1, w2 = (normal(turbulence.seed, channel, 0.0) for channel in range(25, 30))
+    scale_u = float(np.sqrt(turbulence.speed / turbulence.length_u))
+    scale_w = float(np.sqrt(turbulence.speed / turbulence.length_w))
+    root_2, root_8 = float(np.sqrt(0.5)), float(np.sqrt(0.125))
+    v1, w1 = root_2 * scale_u * v1, root_2 * scale_w * w1
+    return (
+        root_2 * scale_u * u,
+        v1,
+        0.5 * v1 + root_8 * scale_u * v2,
+        w1,
+        0.5 * w1 + root_8 * scale_w * w2,
+    )

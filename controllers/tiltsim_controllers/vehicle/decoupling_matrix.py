@@ -1,0 +1,160 @@
+"""The decoupling matrix of the tiltrotor in factored form (ch. 3, Eqs. 3, 5, 12, 16-18).
+
+Ch. 3 asks when ``[tau(alpha); r3^T F(alpha)]`` is invertible, with ``r3`` the third row of the
+body-to-world rotation (world up seen from the body), and expands the determinant into some thirty
+products. Its geometry is simpler. Rotors 2 and 4 alone make roll torque, rotors 1 and 3 alone
+pitch torque, so the rotor inputs that leave the vehicle free of torque follow pair by pair; the
+force they make has the direction ``n(alpha)``, and
+
+    ``det [tau; r3^T F] = 2 L^2 K_f^3 K_m (n . r3)``,  ``n = (-R_theta, R_phi, R)``.
+
+The matrix is singular exactly where world up is perpendicular to ``n``.
+
+Everything but `sines_and_cosines` is arithmetic on its tuple ``trig`` and on the drag ratio
+``r = K_m / (L K_f)``, so that it runs on floats, in native code and, element by element, on
+arrays. Torques are in units of ``L K_f``, forces in units of ``K_f``.
+"""
+
+from __future__ import annotations
+
+from math import cos, nan, sin
+
+from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
+
+Octet = tuple[float, float, float, float, float, float, float, float]
+
+
+@scalar
+def sines_and_cosines(alpha_1: float, alpha_2: float, alpha_3: float, alpha_4: float) -> Octet:
+    """``(sin alpha_1, cos alpha_1, ..., sin alpha_4, cos alpha_4)`` of tilt angles in rad."""
+    return (
+        sin(alpha_1),
+        cos(alpha_1),
+        sin(alpha_2),
+        cos(alpha_2),
+        sin(alpha_3),
+        cos(alpha_3),
+        sin(alpha_4),
+        cos(alpha_4),
+    )
+
+
+@scalar
+def torque_entries(trig: Octet, drag_ratio: float) -> Octet:
+    """The eight non-zero entries of ``tau(alpha) / (L K_f)`` (ch. 3, Eq. 5).
+
+    Returns ``(x2, x4, y1, y3, z1, z2, z3, z4)``: roll, pitch and yaw torque by rotor.
+    """
+    s1, c1, s2, c2, s3, c3, s4, c4 = trig
+    return (
+        c2 - drag_ratio * s2,
+        -c4 + drag_ratio * s4,
+        c1 + drag_ratio * s1,
+        -c3 - drag_ratio * s3,
+        s1 - drag_ratio * c1,
+        -s2 - drag_ratio * c2,
+        s3 - drag_ratio * c3,
+        -s4 - drag_ratio * c4,
+    )
+
+
+@scalar
+def body_force(trig: Octet, w1: float, w2: float, w3: float, w4: float) -> Triple:
+    """The product ``F(alpha) w / K_f`` in body axes (ch. 3, Eq. 3)."""
+    s1, c1, s2, c2, s3, c3, s4, c4 = trig
+    return (
+        s2 * w2 - s4 * w4,
+        s1 * w1 - s3 * w3,
+        -c1 * w1 + c2 * w2 - c3 * w3 + c4 * w4,
+    )
+
+
+@scalar
+def body_torque(torque: Octet, w1: float, w2: float, w3: float, w4: float) -> Triple:
+    """The product ``tau(alpha) w / (L K_f)`` in body axes (ch. 3, Eq. 5).
+
+    ``torque`` are the `torque_entries`.
+    """
+    x2, x4, y1, y3, z1, z2, z3, z4 = torque
+    return x2 * w2 + x4 * w4, y1 * w1 + y3 * w3, z1 * w1 + z2 * w2 + z3 * w3 + z4 * w4
+
+
+@scalar
+def vertical_force_entries(trig: Octet, ux: float, uy: float, uz: float) -> Quad:
+    """The row ``u^T F(alpha) / K_f``: force along the body-frame direction ``u``, by rotor.
+
+    With ``u = r3`` this is the last row of the decoupling matrix (ch. 3, Eq. 18).
+    """
+    s1, c1, s2, c2, s3, c3, s4, c4 = trig
+    return (
+        s1 * uy - c1 * uz,
+        s2 * ux + c2 * uz,
+        -s3 * uy - c3 * uz,
+        -s4 * ux + c4 * uz,
+    )
+
+
+@scalar
+def torque_free_inputs(torque: Octet) -> Quad:
+    """The inputs ``w`` that span ``ker tau(alpha)`` (where tau has rank 3; else they may vanish).
+
+    ``torque`` are the `torque_entries`.
+
+    Rotors 2 and 4 share a factor that cancels their roll torque, rotors 1 and 3 one that cancels
+    their pitch torque; the ratio of the two factors cancels the yaw torque.
+    """
+    x2, x4, y1, y3, z1, z2, z3, z4 = torque
+    yaw_of_13 = z3 * y1 - z1 * y3
+    yaw_of_24 = z4 * x2 - z2 * x4
+    return (-y3 * yaw_of_24, x4 * yaw_of_13, y1 * yaw_of_24, -x2 * yaw_of_13)
+
+
+@scalar
+def unscaled_torque_free_force(trig: Octet, torque: Octet) -> Triple:
+    """Where the rotors push at zero torque, body axes: along `torque_free_force`, of any length."""
+    w1, w2, w3, w4 = torque_free_inputs(torque)
+    return body_force(trig, w1, w2, w3, w4)
+
+
+@scalar
+def torque_free_force(trig: Octet, torque: Octet, drag_ratio: float) -> Triple:
+    """The force at zero torque, ``n = (-R_theta, R_phi, R)``, body axes.
+
+    Its length carries ch. 3's normalisation: ``R = 4`` for an untilted vehicle. Where ``n = 0`` the
+    decoupling matrix is singular at every attitude: wherever ``tau`` has lost rank, and also where
+    the torque-free inputs of the two pairs push against each other, as red gaits do on the curve L
+    of the Two Color Map.
+    """
+    nx, ny, nz = unscaled_torque_free_force(trig, torque)
+    scale = 0.5 / drag_ratio
+    return nx * scale, ny * scale, nz * scale
+
+
+@scalar
+def solve_by_pairs(
+    torque: Octet, force: Quad, roll: float, pitch: float, yaw: float, lift: float
+) -> Quad:
+    """Solve the 4 x 4 system of the decoupling matrix for the rotor inputs.
+
+    ``torque`` are the `torque_entries`, ``force`` the four entries of the last row. Each opposite
+    pair of rotors splits into the part that makes its torque and the part that does not:
+    ``(v2, v4) = roll (x2, x4) / |(x2, x4)|^2 + mu (-x4, x2)``, likewise ``(v1, v3)`` with pitch and
+    ``nu``; yaw and lift then fix ``mu`` and ``nu``. Returns ``(v1, v2, v3, v4)``, all NaN where the
+    matrix is singular.
+    """
+    x2, x4, y1, y3, z1, z2, z3, z4 = torque
+    h1, h2, h3, h4 = force
+    norm_24 = x2 * x2 + x4 * x4
+    norm_13 = y1 * y1 + y3 * y3
+    yaw_13, yaw_24 = z3 * y1 - z1 * y3, z4 * x2 - z2 * x4
+    lift_13, lift_24 = h3 * y1 - h1 * y3, h4 * x2 - h2 * x4
+    determinant = yaw_13 * lift_24 - yaw_24 * lift_13
+    if norm_24 == 0.0 or norm_13 == 0.0 or determinant == 0.0:
+        return nan, nan, nan, nan
+    roll, pitch = roll / norm_24, pitch / norm_13
+    v1, v2, v3, v4 = pitch * y1, roll * x2, pitch * y3, roll * x4
+    yaw = yaw - (z1 * v1 + z2 * v2 + z3 * v3 + z4 * v4)
+    lift = lift - (h1 * v1 + h2 * v2 + h3 * v3 + h4 * v4)
+    nu = (yaw * lift_24 - yaw_24 * lift) / determinant
+    mu = (yaw_13 * lift - yaw * lift_13) / determinant
+    return v1 - y3 * nu, v2 - x4 * mu, v3 + y1 * nu, v4 + x2 * mu

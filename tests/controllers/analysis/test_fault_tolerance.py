@@ -1,0 +1,162 @@
+"""Hover with a broken vehicle: statics against the matrices, limits against brute force."""
+
+from __future__ import annotations
+
+from math import atan, cos, pi
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tiltsim_controllers.analysis.fault_tolerance import (
+    ROTORS,
+    fixed_tilt_hover,
+    fixed_tilt_imbalance,
+    hover_on_three,
+    least_hover_speed,
+    pose_matrix,
+)
+from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix
+from tiltsim_controllers.analysis.two_color_map import delta
+from tiltsim_controllers.mathematics.rotation import rotation_from_euler
+from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
+
+VEHICLE = PRESETS["ar_drone_2"]
+WEIGHT = VEHICLE.mass * VEHICLE.gravity / VEHICLE.thrust_coefficient
+HOVER = VEHICLE.hover_rotor_speed
+DELTA = atan(drag_ratio(VEHICLE))
+
+each_loss = pytest.mark.parametrize("lost", ROTORS)
+
+
+def wrench(hover, factors=(1.0,) * 4):
+    """Torque and force in units of the weight, the force in world axes."""
+    w = np.array(hover.rotor_speeds) ** 2 * SPIN * factors / WEIGHT
+    tilts = np.array(hover.tilts)
+    turn = np.reshape(rotation_from_euler(hover.roll, hover.pitch, 0.3), (3, 3))
+    return torque_matrix(tilts, VEHICLE) @ w, turn @ force_matrix(tilts) @ w
+
+
+@each_loss
+@given(st.floats(0.0, 1.2))
+@settings(max_examples=20, deadline=None)
+def test_three_rotors_hover(lost, share):
+    hover = hover_on_three(lost, VEHICLE, opposite_speed=share * HOVER)
+    assert hover.rotor_speeds[lost - 1] == 0.0
+    torque, force = wrench(hover)
+    np.testing.assert_allclose(torque, 0.0, atol=1e-12)
+    np.testing.assert_allclose(force, [0.0, 0.0, 1.0], atol=1e-12)
+
+
+@each_loss
+def test_two_rotors_hover_without_authority_and_a_third_brings_it(lost):
+    pair = hover_on_three(lost, VEHICLE, opposite_speed=0.0)
+    assert pair.max_rotor_speed == pytest.approx((WEIGHT / 2.0 / cos(DELTA)) ** 0.5)
+    assert pair.authority == pytest.approx(0.0, abs=1e-12)
+    shares = (0.2, 0.5, 0.9)
+    authority = [
+        hover_on_three(lost, VEHICLE, opposite_speed=share * HOVER).authority for share in shares
+    ]
+    assert 0.01 < authority[0] < authority[1] < authority[2]
+
+
+@each_loss
+def test_the_pose_matrix_is_the_derivative_of_force_and_torque(lost):
+    hover = hover_on_three(lost, VEHICLE, opposite_speed=0.6 * HOVER)
+    tilts, w = np.array(hover.tilts), np.array(hover.rotor_speeds) ** 2 * SPIN
+
+    def made(x):
+        inputs = w * (1.0 + x[:4]) / WEIGHT
+        angles = tilts + x[4:]
+        force, torque = force_matrix(angles) @ inputs, torque_matrix(angles, VEHICLE) @ inputs
+        return np.concatenate([force, torque])
+
+    steps = 1e-6 * np.eye(8)
+    slopes = np.array([(made(step) - made(-step)) / 2e-6 for step in steps]).T
+    sound = [column for column in range(8) if column % 4 != lost - 1]
+    found = pose_matrix(hover.tilts, hover.rotor_speeds, VEHICLE, lost)
+    np.testing.assert_allclose(found, slopes[:, sound], atol=1e-9)
+    assert found.shape == (6, 6)
+
+
+@pytest.mark.parametrize("speed", [-1.0, 1e4])
+def test_speeds_that_outweigh_the_vehicle_are_refused(speed):
+    with pytest.raises(ValueError, match="opposite_speed"):
+        hover_on_three(1, VEHICLE, opposite_speed=speed)
+
+
+def test_an_unknown_rotor_is_refused():
+    with pytest.raises(ValueError, match="lost = 5"):
+        hover_on_three(5, VEHICLE, opposite_speed=100.0)
+
+
+# --- fixed tilts -------------------------------------------------------------------------------
+
+
+@each_loss
+@given(st.floats(-0.6, 0.6), st.tuples(*[st.floats(-0.5, 0.5)] * 2), st.floats(0.02, 0.3))
+@settings(max_examples=20, deadline=None)
+def test_fixed_tilts_hover_without_a_rotor_only_on_its_blue_line(lost, split, others, off):
+    tilts = [others[0], others[1], others[0], others[1]]
+    middle = SPIN[lost - 1] * delta(VEHICLE)
+    tilts[lost % 4], tilts[(lost + 2) % 4] = middle + split, middle - split
+    assert fixed_tilt_imbalance(tuple(tilts), lost, VEHICLE) == pytest.approx(0.0, abs=1e-12)
+    hover = fixed_tilt_hover(tuple(tilts), VEHICLE, lost=lost)
+    torque, force = wrench(hover)
+    np.testing.assert_allclose(torque, 0.0, atol=1e-7)
+    np.testing.assert_allclose(force, [0.0, 0.0, 1.0], atol=1e-7)
+    assert hover.authority < 1e-6
+
+    tilts[lost % 4] += off
+    assert fixed_tilt_hover(tuple(tilts), VEHICLE, lost=lost) is None
+
+
+@given(st.floats(-0.6, 0.33))
+@settings(max_examples=30, deadline=None)
+def test_one_stuck_servo_of_a_level_gait_is_bearable_up_to_two_delta(angle):
+    assert fixed_tilt_hover((angle, 0.0, 0.0, 0.0), VEHICLE) is not None
+    assert fixed_tilt_hover((0.0, -angle, 0.0, 0.0), VEHICLE) is not None
+    beyond = 2.0 * DELTA + 0.001 + abs(angle)
+    assert fixed_tilt_hover((beyond, 0.0, 0.0, 0.0), VEHICLE) is None
+    assert fixed_tilt_hover((0.0, 0.0, 0.0, -beyond), VEHICLE) is None
+
+
+@given(st.tuples(*[st.floats(0.3, 1.0)] * 4))
+@settings(max_examples=20, deadline=None)
+def test_rotors_with_less_thrust_turn_faster(factors):
+    tilts = (0.1, -0.1, 0.1, -0.1)
+    whole = fixed_tilt_hover(tilts, VEHICLE)
+    weak = fixed_tilt_hover(tilts, VEHICLE, factors=factors)
+    np.testing.assert_allclose(
+        weak.rotor_speeds, np.array(whole.rotor_speeds) / np.sqrt(factors), rtol=1e-9
+    )
+    np.testing.assert_allclose(wrench(weak, factors)[0], 0.0, atol=1e-9)
+
+
+# --- free tilts --------------------------------------------------------------------------------
+
+
+def test_a_whole_vehicle_needs_the_speed_of_hover():
+    assert least_hover_speed(VEHICLE) == pytest.approx(HOVER, rel=1e-6)
+
+
+@each_loss
+def test_without_a_rotor_three_at_one_speed_are_best(lost):
+    factors = tuple(0.0 if rotor == lost else 1.0 for rotor in ROTORS)
+    least = least_hover_speed(VEHICLE, factors=factors)
+    assert least / HOVER == pytest.approx(1.3285, abs=1e-4)
+    # Among the symmetric hovers the one at equal speeds is the best, and nothing beats it.
+    equal = hover_on_three(lost, VEHICLE, opposite_speed=least)
+    assert equal.max_rotor_speed == pytest.approx(least, rel=1e-4)
+
+
+def test_more_thrust_never_needs_more_speed():
+    speeds = [least_hover_speed(VEHICLE, factors=(f, 1.0, 1.0, 1.0)) for f in (0.0, 0.3, 0.7, 1.0)]
+    assert sorted(speeds, reverse=True) == speeds
+
+
+@pytest.mark.parametrize("angle", [-pi / 2, 1.0, 3.0])
+def test_a_stuck_servo_is_never_worse_than_a_lost_rotor(angle):
+    least = least_hover_speed(VEHICLE, stuck=(1, angle))
+    assert HOVER < least < 1.3286 * HOVER

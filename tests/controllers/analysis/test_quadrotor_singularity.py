@@ -1,0 +1,142 @@
+"""The published determinant surface, its curve, and where it comes from."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy
+
+from tiltsim_controllers.analysis.quadrotor_singularity import (
+    exact_determinant,
+    normalized_determinant,
+    published_determinant,
+    published_singular_curve,
+)
+from tiltsim_controllers.laws.yaw_position import decoupling_matrix
+from tiltsim_controllers.vehicle.parameters import PRESETS
+
+QUADROTOR = PRESETS["ar_drone_2_unrounded"]
+WEIGHT = QUADROTOR.mass * QUADROTOR.gravity
+
+PHI, THETA, PSI = sympy.symbols("phi theta psi", real=True)
+S_PHI, C_PHI = sympy.sin(PHI), sympy.cos(PHI)
+S_THETA, C_THETA = sympy.sin(THETA), sympy.cos(THETA)
+S_PSI, C_PSI = sympy.sin(PSI), sympy.cos(PSI)
+SURFACE = -1 + C_THETA**2 * C_PHI**2 - C_THETA**2 * C_PHI * S_PHI
+
+
+def printed_delta(slip):
+    """Ch. 2, Eq. (42), with Eqs. (31) and (36) as printed or put right, in units of m, zeta, d, I.
+
+    Those units drop out of ``P Delta Q``.
+    """
+    t_theta = S_THETA / C_THETA
+    turned = S_PHI if slip else C_PHI
+    a = (C_PHI * C_PSI * S_THETA + S_PHI * S_PSI, C_PHI * S_PSI * S_THETA - S_PHI * C_PSI)
+    m = (C_PSI * S_PHI - S_PSI * S_THETA * turned, S_PSI * S_PHI + C_PSI * S_THETA * turned, 0)
+    n = (
+        S_PSI * C_PHI - C_PSI * S_THETA * S_PHI,
+        -C_PSI * C_PHI - S_PSI * S_THETA * S_PHI,
+        -C_THETA * S_PHI,
+    )
+    o = (C_PSI * C_THETA * C_PHI, S_PSI * C_THETA * C_PHI, -S_THETA * C_PHI)
+    rows = [
+        [
+            -ai,
+            -ni,
+            -(mi * S_PHI / C_THETA + ni * S_PHI * t_theta + oi * C_PHI),
+            -(mi * C_PHI / C_THETA + ni * C_PHI * t_theta - oi * S_PHI),
+        ]
+        for ai, mi, ni, oi in zip((*a, C_THETA * C_PHI), m, n, o)
+    ]
+    return sympy.Matrix([*rows, [0, 0, S_PHI / C_THETA, C_PHI / C_THETA]])
+
+
+def printed_factors():
+    """P and Q of Eq. (43), in the same units."""
+    p2, p3, q2 = sympy.eye(4), sympy.eye(4), sympy.eye(4)
+    p2[0, 3] = p2[1, 3] = S_PHI * S_PSI * C_THETA
+    p2[2, 3] = -S_PHI * S_THETA
+    p3[0, 3] = p3[1, 3] = p3[2, 3] = C_THETA
+    p3[3, 3] = -C_THETA
+    q2[3, 2] = -S_PHI / C_PHI
+    q3 = sympy.Matrix(
+        [
+            [1, 0, 0, 0],
+            [1, 1, 0, 0],
+            [0, S_THETA * S_PHI / C_THETA, 1 / C_THETA, 0],
+            [0, 0, 0, 1 / C_PHI],
+        ]
+    )
+    return sympy.diag(1, 1, -C_THETA, 1) * p2 * p3, -sympy.eye(4) * q2 * q3
+
+
+def printed_product():
+    """The right side of Eq. (43)."""
+    d11 = C_PSI * S_THETA * (C_PHI - S_PHI) + S_PSI * (S_PHI + C_PHI)
+    d21 = S_PSI * S_THETA * (C_PHI - S_PHI) - C_PSI * (S_PHI + C_PHI)
+    return sympy.Matrix(
+        [
+            [d11, S_PSI * C_PHI, C_PSI, 0],
+            [d21, -C_PSI * C_PHI, S_PSI, 0],
+            [0, S_PHI, S_THETA, 0],
+            [0, 0, 0, 1],
+        ]
+    )
+
+
+def test_the_surface_is_the_determinant_of_eq_43_as_printed():
+    assert sympy.simplify(printed_product().det() - SURFACE) == 0
+    random = np.random.default_rng(0)
+    roll, pitch = random.uniform(-1.5, 1.5, (2, 20))
+    surface = sympy.lambdify((PHI, THETA), SURFACE)(roll, pitch)
+    np.testing.assert_allclose(published_determinant(roll, pitch), surface, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("slip", [True, False], ids=["as printed", "put right"])
+def test_the_slip_in_eq_31_does_not_touch_the_determinant(slip):
+    assert sympy.simplify(printed_delta(slip).det() + C_PHI / C_THETA) == 0
+
+
+@pytest.mark.parametrize("slip", [True, False], ids=["as printed", "put right"])
+def test_the_surface_comes_from_one_missing_entry_of_eq_43(slip):
+    p, q = printed_factors()
+    missing = -(C_THETA**2) * (C_PHI - S_PHI)
+    expected = printed_product()[:, :3]
+    expected[2, 0] = missing
+    difference = sympy.lambdify((PHI, THETA, PSI), (p * printed_delta(slip) * q)[:, :3] - expected)
+    for attitude in np.random.default_rng(5).uniform(-1.4, 1.4, (20, 3)):
+        np.testing.assert_allclose(difference(*attitude), 0.0, atol=1e-12)
+    put_right = printed_product()
+    put_right[2, 0] = missing
+    assert sympy.simplify(put_right.det()) == -1
+
+
+def test_the_curve_lies_on_the_surface_and_passes_through_level():
+    roll, pitch = published_singular_curve()
+    np.testing.assert_allclose(published_determinant(roll, pitch), 0.0, atol=1e-14)
+    assert (roll[0], pitch[0]) == pytest.approx((0.0, 0.0))
+    assert roll.min() == pytest.approx(-np.pi / 4)
+    assert pitch.max() == pytest.approx(0.427, abs=1e-3)  # where roll is -pi/8
+    np.testing.assert_allclose(pitch[::-1], -pitch, atol=1e-15)
+    # Both ends meet in level attitude: closed, without a jump.
+    assert np.hypot(np.diff(roll), np.diff(pitch)).max() < 0.02
+
+
+def test_the_exact_determinant_is_that_of_the_law():
+    random = np.random.default_rng(1)
+    for _ in range(20):
+        roll, pitch, yaw = random.uniform(-1.5, 1.5, 3)
+        thrust = random.uniform(0.5, 9.0)
+        state = (*[0.0] * 6, roll, pitch, yaw, *random.uniform(-1, 1, 3), thrust, 0.3)
+        matrix = np.reshape(decoupling_matrix(state, QUADROTOR), (4, 4))
+        expected = exact_determinant(roll, pitch, thrust, QUADROTOR)
+        np.testing.assert_allclose(np.linalg.det(matrix), expected, rtol=1e-10)
+
+
+def test_the_exact_determinant_vanishes_nowhere_inside():
+    grid = np.linspace(-1.57, 1.57, 101)
+    roll, pitch = np.meshgrid(grid, grid)
+    determinant = normalized_determinant(roll, pitch, WEIGHT, QUADROTOR)
+    assert determinant.min() > 0.0
+    assert normalized_determinant(0.0, 0.0, WEIGHT, QUADROTOR) == pytest.approx(1.0)

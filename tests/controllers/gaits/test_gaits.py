@@ -1,0 +1,87 @@
+"""Gaits against ch. 4, Eqs. (21)-(24) and (31)-(34)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tiltsim_controllers.gaits import GAIT_TYPES, GaitParameters, tilt_reference
+from tiltsim_controllers.gaits.trot import continuous_trot, instant_trot
+
+RHO, PERIOD = 0.65, 2.0
+
+times = st.floats(0.0, 200.0)
+amplitudes = st.floats(-1.5, 1.5)
+periods = st.floats(0.2, 20.0)
+
+quick = settings(deadline=None, max_examples=60)
+
+
+def trot_angle(tilts):
+    """The angle rho of a trot, after checking that the four tilt angles are a trot's."""
+    alpha_1, alpha_2, alpha_3, alpha_4, *_ = tilts
+    assert alpha_1 == alpha_2 == -alpha_3 == -alpha_4
+    return alpha_3
+
+
+def test_fixed_gait_keeps_its_angles():
+    gait = GaitParameters(GAIT_TYPES["fixed"], 0.1, -0.2, 0.3, -0.4)
+    for time in (0.0, 17.3):
+        assert tilt_reference(time, gait) == (0.1, -0.2, 0.3, -0.4, 0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("time", "rho"),
+    [(0.0, RHO), (0.5, RHO), (1.0, RHO), (1.001, -RHO), (1.999, -RHO), (2.0, RHO), (7.5, -RHO)],
+)
+def test_instant_trot_changes_side_after_each_half_period(time, rho):
+    tilts = instant_trot(time, RHO, PERIOD)
+    assert trot_angle(tilts) == rho
+    assert tilts[4:] == (0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("time", "rho"),
+    [(0.0, RHO), (0.25, RHO / 2), (0.5, 0.0), (1.0, -RHO), (1.5, 0.0), (1.75, RHO / 2), (4.0, RHO)],
+)
+def test_continuous_trot_runs_to_the_other_side_and_back(time, rho):
+    assert trot_angle(continuous_trot(time, RHO, PERIOD)) == pytest.approx(rho, abs=1e-15)
+
+
+@quick
+@given(times, amplitudes, periods)
+def test_continuous_trot_is_a_triangle_wave(time, amplitude, period):
+    # rho / amplitude is 1 - 4 d, with d the distance in periods to the nearest start of a period.
+    cycles = time / period
+    distance = abs(cycles - round(cycles))
+    rho = trot_angle(continuous_trot(time, amplitude, period))
+    assert rho == pytest.approx(amplitude * (1 - 4 * distance), abs=1e-10)
+
+
+@quick
+@given(st.integers(0, 50), st.floats(0.01, 0.49), amplitudes, periods)
+def test_continuous_trot_gives_the_rate_of_its_angles(half_cycle, phase, amplitude, period):
+    time, step = (half_cycle / 2 + phase) * period, 1e-3 * period
+    before, after = (continuous_trot(time + shift, amplitude, period) for shift in (-step, step))
+    slope = (np.array(after) - before)[:4] / (2 * step)
+    rates = continuous_trot(time, amplitude, period)[4:]
+    np.testing.assert_allclose(rates, slope, rtol=0, atol=1e-9 * abs(amplitude) / period)
+
+
+@pytest.mark.parametrize("trot", [instant_trot, continuous_trot])
+@quick
+@given(st.integers(0, 4095), st.integers(0, 20), amplitudes)
+def test_trots_repeat_after_a_period(trot, phase, cycle, amplitude):
+    time = phase / 4096  # binary fractions, exact in floating point
+    assert trot(time + cycle, amplitude, 1.0) == trot(time, amplitude, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "trot"), [("trot_instant", instant_trot), ("trot_continuous", continuous_trot)]
+)
+def test_tilt_reference_picks_the_gait_by_its_type(kind, trot):
+    gait = GaitParameters(GAIT_TYPES[kind], amplitude=0.4, period=3.0)
+    for time in (0.4, 1.9, 2.6):
+        assert tilt_reference(time, gait) == trot(time, 0.4, 3.0)

@@ -1,0 +1,122 @@
+"""Rotor accelerations within limits, against a linear program and against the matrix itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import assume, example, given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
+from tiltsim_controllers.laws.allocation import allocated, largest_share, prioritized
+from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
+
+VEHICLE = PRESETS["ar_drone_2"]
+LIMITS = (200.0, 400.0)
+HORIZON = 0.02
+
+entries = st.integers(-1000, 1000).map(lambda number: number / 100)
+vectors = st.tuples(entries, entries, entries, entries)
+widths = st.tuples(*[st.integers(0, 50).map(lambda number: number / 10)] * 4)
+tilts = st.tuples(*[st.floats(-0.5, 0.5)] * 4)
+speeds = st.tuples(*[st.floats(*LIMITS)] * 4)
+accelerations = st.tuples(*[st.floats(-2e4, 2e4)] * 4)
+
+
+def program(cost, columns, low, high, bounds):
+    """Least cost of factors whose combination of the columns lies in the box."""
+    matrix = np.array(columns).T
+    return linprog(
+        cost,
+        A_ub=np.concatenate([matrix, -matrix]),
+        b_ub=np.concatenate([high, -np.array(low)]),
+        bounds=bounds,
+    )
+
+
+@given(vectors, vectors, widths, widths)
+@settings(max_examples=50, deadline=None)
+def test_the_share_is_that_of_a_linear_program(attitude, direction, below, above):
+    low = -np.array(below)
+    wanted = program([-1.0, 0.0], [attitude, direction], low, above, [(0.0, 1.0), (None, None)])
+    assert largest_share(attitude, direction, tuple(low), above) == pytest.approx(
+        -wanted.fun, abs=1e-6
+    )
+
+
+@given(vectors, vectors, vectors, st.floats(-3.0, 3.0), widths, widths)
+@settings(max_examples=50, deadline=None)
+def test_the_answer_is_in_the_box_and_wanted_where_allowed(
+    tilting, turning, direction, lift, below, above
+):
+    assume(any(direction))
+    low, high = -np.array(below), np.array(above)
+    found = np.array(
+        prioritized(tilting, turning, direction, lift, tuple(low.tolist()), tuple(high.tolist()))
+    )
+    assert (found >= low - 1e-9).all()
+    assert (found <= high + 1e-9).all()
+    wanted = np.array(tilting) + turning + lift * np.array(direction)
+    # Roll and pitch come first, also where yaw alone would bring them within the box.
+    first = largest_share(tilting, direction, tuple(low.tolist()), tuple(high.tolist()))
+    if first == 1.0 and (wanted > low + 1e-9).all() and (wanted < high - 1e-9).all():
+        np.testing.assert_allclose(found, wanted, atol=1e-9)
+
+
+@pytest.mark.parametrize("rounding", [-1e-14, 0.0, 1e-14])
+@pytest.mark.parametrize("room", [-1e-14, 0.0, 1e-14])
+def test_rotors_that_a_share_moves_alike_do_not_bound_it(rounding, room):
+    """The first cannot go below 2, the third not above: rounding alone would leave no share."""
+    wanted = (1.0, -1.0, 1.0 + rounding, -1.0)
+    low, high = (2.0, -9.0, -9.0, -9.0), (9.0, 9.0, 2.0 + room, 9.0)
+    assert largest_share(wanted, (1.0, 1.0, 1.0, 1.0), low, high) == 1.0
+    assert largest_share((1.0, -1.0, 1.1, -1.0), (1.0,) * 4, low, high) < 1e-12
+
+
+def decoupling(angles, rotor_speeds, roll, pitch):
+    """Third derivatives of roll, pitch, yaw and altitude (scaled) per rotor acceleration."""
+    rows = np.vstack(
+        [torque_matrix(angles, VEHICLE), world_up(roll, pitch) @ force_matrix(np.array(angles))]
+    )
+    return rows * 2.0 * np.abs(rotor_speeds)
+
+
+@example((0.0,) * 4, (200.0,) * 4, 0.0, 0.0, (0.0, 0.0, 3.86401735937295e-07, -2770.0))
+@given(tilts, speeds, st.floats(-0.4, 0.4), st.floats(-0.4, 0.4), accelerations)
+@settings(max_examples=50, deadline=None)
+def test_roll_and_pitch_keep_their_direction_and_come_before_yaw(angles, magnitudes, r, p, wanted):
+    signed = tuple(s * m for s, m in zip(SPIN, magnitudes, strict=True))
+    matrix = decoupling(angles, signed, r, p)
+    assume(np.linalg.cond(matrix) < 1e4)
+    found = allocated(wanted, angles, signed, r, p, VEHICLE, LIMITS, HORIZON)
+    asked, got = matrix @ wanted, matrix @ found
+    # What an allocation leaves of one rotor it takes from another: all are good to the largest.
+    scale = np.abs(matrix).sum(axis=1) * np.abs([*wanted, *found]).max() + 1e-9
+
+    # Within the limits, in the spin's sense, over the horizon.
+    along = np.array(magnitudes) + HORIZON * np.array(found) * SPIN
+    assert (along >= LIMITS[0] - 1e-6).all()
+    assert (along <= LIMITS[1] + 1e-6).all()
+
+    cross = got[0] * asked[1] - got[1] * asked[0]
+    assert abs(cross) < 1e-9 * scale.max() ** 2
+    for axis in (0, 1):
+        if abs(asked[axis]) > 1e-3 * scale[axis]:
+            assert -1e-6 < got[axis] / asked[axis] < 1.0 + 1e-6
+
+
+def test_what_the_limits_allow_comes_back_untouched():
+    wanted = (10.0, -20.0, 5.0, 1.0)
+    speeds_now = (-300.0, 300.0, -300.0, 300.0)
+    tilts_now = (0.1, -0.1, 0.2, 0.0)
+    assert allocated(wanted, tilts_now, speeds_now, 0.1, 0.2, VEHICLE, LIMITS, 0.02) == wanted
+
+
+def test_a_climb_beyond_the_limit_costs_no_attitude():
+    speeds_now = (-395.0, 390.0, -395.0, 390.0)
+    wanted = (-9000.0, 9500.0, -8800.0, 9000.0)
+    found = allocated(wanted, (0.0,) * 4, speeds_now, 0.0, 0.0, VEHICLE, LIMITS, HORIZON)
+    matrix = decoupling((0.0,) * 4, speeds_now, 0.0, 0.0)
+    np.testing.assert_allclose((matrix @ found)[:3], (matrix @ wanted)[:3], rtol=1e-9, atol=1e-6)
+    assert (matrix @ found)[3] < (matrix @ wanted)[3]

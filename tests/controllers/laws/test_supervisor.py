@@ -1,0 +1,344 @@
+"""The supervisor against the singularity analysis for arrays, and in flight."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+import tiltsim
+from tiltsim.errors import InputError
+from tiltsim.plants.factory import make_plant
+from tiltsim.simulation.batch import fly_all
+from tiltsim_controllers.analysis.singularity import (
+    determinant,
+    margin_over_gait,
+    torque_free_direction,
+    world_up,
+)
+from tiltsim_controllers.gaits import tilt_reference
+from tiltsim_controllers.gaits.plans import instant_trot as trot_instant
+from tiltsim_controllers.gaits.plans import waypoints
+from tiltsim_controllers.laws.decouplers import exact_decoupler
+from tiltsim_controllers.laws.supervisor import (
+    BAND,
+    LAG,
+    STRATEGIES,
+    Supervisor,
+    allowed_scale,
+    gait_share,
+    governed,
+    room,
+    supervised_tilts,
+)
+from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
+
+VEHICLE = PRESETS["ar_drone_2"]
+RATIO = drag_ratio(VEHICLE)
+WATCH = Supervisor(min_margin=0.3, min_determinant=1.0)
+SCENARIO = "beyond/supervisor#supervised"
+RED = {"controller.supervisor.strategy": "return_to_red"}
+SLOW_LAW = {
+    "controller.decoupling": "exact",
+    "controller.gains": {"attitude": [[9.0] * 3, [27.0] * 3, [27.0] * 3], "altitude": [9, 27, 27]},
+}
+SELDOM = {"simulation.control_timestep": 0.05}
+
+angles = st.tuples(*[st.floats(-1.5, 1.5)] * 4)
+leans = st.floats(-0.5, 0.5)
+
+
+def regular(scales, tilts, roll, pitch):
+    """Whether scaled tilts meet the thresholds, by the array code.
+
+    The sign of a margin is that of a gait that begins without tilt: leaning, it may pass where the
+    level vehicle could not.
+    """
+    scaled = np.multiply.outer([0.0, *scales], tilts)
+    margins = margin_over_gait(scaled, VEHICLE, roll, pitch)
+    allowed = (margins >= WATCH.min_margin) & (
+        determinant(scaled, roll, pitch, VEHICLE) >= WATCH.min_determinant
+    )
+    return allowed[1:]
+
+
+@settings(deadline=None, max_examples=150)
+@example((0.0, 0.0, -1.0, -1.5), 0.0, -0.5)
+@given(angles, leans, leans)
+def test_what_passes_is_regular_and_a_little_more_is_not(tilts, roll, pitch):
+    scale = allowed_scale(tilts, roll, pitch, WATCH, RATIO)
+    assert 0.0 <= scale <= 1.0
+    if scale == 0.0 and not regular([0.0], tilts, roll, pitch)[0]:
+        return  # the vehicle leans too far for any gait
+    assert regular([max(0.0, scale - 1e-9)], tilts, roll, pitch).all()
+    assert regular(np.arange(17)[np.arange(17) / 16 <= scale] / 16, tilts, roll, pitch).all()
+    if scale < 1.0:
+        assert not regular([min(1.0, scale + 1e-6)], tilts, roll, pitch).all()
+
+
+def test_without_thresholds_everything_passes():
+    wild = (3.0, -2.0, 1.0, 2.5, 0.0, 0.0, 0.0, 0.0)
+    assert gait_share(wild, 2.0, 1.0, Supervisor(), VEHICLE) == 1.0
+
+
+def test_a_vehicle_that_leans_too_far_gets_no_tilt():
+    assert allowed_scale((0.2, 0.1, 0.2, 0.1), 1.4, 0.0, WATCH, RATIO) == 0.0
+
+
+def test_a_gait_across_the_curve_l_stops_before_it():
+    """On red the margin is a right angle up to L: the determinant alone sees it come."""
+    across = (0.4, -0.2, 0.4, -0.2)
+    margin_alone = Supervisor(min_margin=0.3)
+    assert determinant(np.array(across), 0.0, 0.0, VEHICLE) < 0.0
+    stopped = allowed_scale(across, 0.0, 0.0, margin_alone, RATIO)
+    at_l = np.array(across) * stopped
+    assert abs(determinant(at_l, 0.0, 0.0, VEHICLE)) < 1e-4
+    kept = allowed_scale(across, 0.0, 0.0, WATCH, RATIO)
+    assert determinant(np.array(across) * kept, 0.0, 0.0, VEHICLE) == pytest.approx(1.0, abs=1e-4)
+
+
+def test_engines_fly_the_same_supervised_flight_and_show_what_passed():
+    short = {"simulation.duration": 1.6}
+    python, native = (
+        tiltsim.simulate(tiltsim.load_scenario(SCENARIO, {**short, "simulation.engine": engine}))
+        for engine in ("python", "native")
+    )
+    np.testing.assert_array_equal(python.samples, native.samples)
+    told = np.stack([python[f"alpha_ref_{rotor}"] for rotor in (1, 2, 3, 4)], axis=-1)
+    reached = determinant(told, python["roll"], python["pitch"], VEHICLE)
+    assert reached.min() == pytest.approx(2.0, abs=1e-4)
+    assert np.abs(told - np.stack([python[f"alpha_{i}"] for i in (1, 2, 3, 4)], -1)).max() < 0.01
+
+
+# --- hold and return to red ----------------------------------------------------------------------
+
+JUMPS = trot_instant(0.8, 2.0).parameters  # at 1 s the torque-free force turns by more than pi/2
+WITH_STATES = ("hold", "return_to_red")
+PLAN = ((0.3, 0.2, 0.1), (-0.4, 0.5, -0.3), (0.6, -0.1, 0.2), (0.2, 0.3, 0.4))
+
+
+def watch(strategy, **changes):
+    settings = Supervisor(0.3, 0.5, STRATEGIES[strategy], 0.5, 2.0, 0.1)
+    return settings._replace(**changes)
+
+
+def asked(time, roll, pitch, state, rate, supervisor, gait=JUMPS):
+    return governed(time, roll, pitch, state, rate, gait, (), supervisor, RATIO)[2]
+
+
+@given(angles, leans, leans)
+def test_room_is_what_is_left_above_the_thresholds(tilts, roll, pitch):
+    supervisor = watch("hold")
+    margin = margin_over_gait(np.array([tilts]), VEHICLE, roll, pitch)[0]
+    value = determinant(np.array(tilts), roll, pitch, VEHICLE)
+    left = room(tilts, tuple(world_up(roll, pitch)), supervisor, RATIO)
+    assert (left >= 0.0) == (value >= 0.5 and np.sign(value) * abs(margin) >= 0.3)
+    assert room((0.0,) * 4, (0.0, 0.0, 1.0), supervisor, RATIO) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("strategy", WITH_STATES)
+def test_supervised_tilts_move_as_their_rates_say(strategy):
+    """Against differences along a motion of plan and supervisor that is given in closed form."""
+    supervisor = watch(strategy)
+
+    def planned(time):
+        return tuple((a + v * time + b * time**2 / 2, v + b * time, b) for a, v, b in PLAN)
+
+    def tilts(time):
+        governor = (0.2 + 0.3 * time + 0.25 * time**2, 0.3 + 0.5 * time, 0.5)
+        clock = time - governor[0] if strategy == "hold" else time
+        return np.array(supervised_tilts(planned(clock), 1.0, governor, supervisor, RATIO))
+
+    step = 1e-4
+    before, now, after = tilts(-step), tilts(0.0), tilts(step)
+    np.testing.assert_allclose(now[:, 1], (after - before)[:, 0] / (2 * step), atol=1e-7)
+    np.testing.assert_allclose(now[:, 2], (after - before)[:, 1] / (2 * step), atol=1e-7)
+
+
+@pytest.mark.parametrize("strategy", WITH_STATES)
+def test_a_supervisor_with_room_to_spare_rests(strategy):
+    assert asked(0.1, 0.0, 0.0, 0.0, 0.0, watch(strategy)) == 0.0
+
+
+@pytest.mark.parametrize("strategy", WITH_STATES)
+def test_it_acts_as_soon_as_the_jump_comes_into_sight(strategy):
+    """In hover before the jump of the trot at 1 s, with the attitude that its tilts need."""
+    n = torque_free_direction(tilt_reference(0.65, JUMPS)[:4], VEHICLE)
+    roll, pitch = exact_decoupler(0.0, 0.0, 0.0, 0.0, 9.8, tuple(n))
+    supervisor = watch(strategy, horizon=0.4, min_margin=0.5)
+    assert asked(0.55, roll, pitch, 0.0, 0.0, supervisor) == 0.0
+    assert asked(0.65, roll, pitch, 0.0, 0.0, supervisor) > 1.0
+    for rate in (0.0, 0.5):
+        wanted = asked(0.65, roll, pitch, 0.0, rate, supervisor) * LAG + rate
+        if strategy == "hold":
+            assert wanted == pytest.approx(1.0)  # the clock is to stand
+        else:
+            assert wanted == pytest.approx(2.0 / 0.8)  # the farthest tilt moves at max_tilt_rate
+
+
+def test_the_clock_slows_down_within_the_band():
+    """A gait towards L, at the instant whose last glance has half the band left."""
+    gait = waypoints([(-0.3, 0.3, -0.3, 0.3), (0.4, -0.2, 0.4, -0.2)], 4.0)
+    supervisor = watch("hold", min_determinant=2.0)
+    state = asked_rates = None
+    for time in np.arange(0.0, 2.0, 1e-3):
+        acceleration = governed(
+            time, 0.0, 0.0, 0.0, 0.0, gait.parameters, gait.table, supervisor, RATIO
+        )[2]
+        ahead = tilt_reference(time + 0.5, gait.parameters, gait.table)[:4]
+        left = room(ahead, (0.0, 0.0, 1.0), supervisor, RATIO)
+        state, asked_rates = left, acceleration * LAG
+        assert asked_rates == pytest.approx(min(1.0, max(0.0, 1.0 - left / BAND)), abs=1e-9)
+        if left < 0.0:
+            break
+    assert state < 0.0
+    assert asked_rates == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("strategy", WITH_STATES)
+def test_a_flight_with_room_is_the_unsupervised_one_bit_for_bit(strategy):
+    tables = tiltrotor(gait={"type": "trot_continuous", "amplitude": 0.3, "period": 1.0})
+    plain = tiltsim.simulate(tiltsim.parse_scenario(tables))
+    tables["controller"] = {**tables["controller"], "supervisor": {"strategy": strategy}}
+    watched = tiltsim.simulate(tiltsim.parse_scenario(tables))
+    assert len(watched) == len(plain) == 131
+    assert not watched["supervision"].any()
+    np.testing.assert_array_equal(watched.samples[:, : plain.samples.shape[1]], plain.samples)
+
+
+def tiltrotor(**tables):
+    simulation = {"duration": 1.3, "timestep": 0.002, "engine": "python"}
+    return {"simulation": simulation, "controller": {}, **tables}
+
+
+FEEDFORWARD = {
+    "decoupling": "exact",
+    "decoupler": "exact",
+    "gait_rate_feedforward": True,
+    "gains": "feedforward",
+}
+EXACT = {"decoupling": "exact", "gains": "exact"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("strategy", WITH_STATES)
+@pytest.mark.parametrize("law", [{}, FEEDFORWARD])
+def test_engines_batches_and_restarts_agree(law, strategy):
+    supervisor = {"strategy": strategy, "min_margin": 0.8}
+    tables = tiltrotor(
+        gait={"type": "trot_instant", "amplitude": 0.7, "period": 0.8},
+        controller={**law, "supervisor": supervisor},
+    )
+    wanted = tiltsim.parse_scenario(tables)
+    python = tiltsim.simulate(wanted)
+    assert python["supervision"].max() > 0.2
+    native = {**tables, "simulation": {**tables["simulation"], "engine": "native"}}
+    compiled = tiltsim.parse_scenario(native)
+    np.testing.assert_array_equal(tiltsim.simulate(compiled).samples, python.samples)
+    (row,) = fly_all([compiled], keep_samples=True)
+    np.testing.assert_array_equal(row.flight.samples, python.samples)
+
+    straight = make_plant(wanted)
+    straight.advance(300)
+    saved = straight.state
+    straight.advance(60)
+    restarted = make_plant(wanted)
+    restarted.state = saved
+    restarted.advance(60)
+    np.testing.assert_array_equal(restarted.state, straight.state)
+
+
+@pytest.mark.parametrize("strategy", ["scale", *WITH_STATES])
+def test_both_plants_fly_it_alike(strategy):
+    tables = tiltrotor(
+        gait={"type": "trot_continuous", "amplitude": 0.6, "period": 1.0},
+        controller={"supervisor": {"strategy": strategy, "min_margin": 1.2}},
+    )
+    flown = {}
+    for plant in ("mujoco", "thesis"):
+        tables["simulation"]["plant"] = plant
+        flown[plant] = tiltsim.simulate(tiltsim.parse_scenario(tables))
+        assert flown[plant]["supervision"].max() > 0.05
+    for column in ("alpha_ref_1", "supervision", "roll", "x"):
+        apart = np.abs(flown["mujoco"][column] - flown["thesis"][column]).max()
+        assert apart < 0.01, (column, apart)
+
+
+@pytest.mark.parametrize("strategy", WITH_STATES)
+def test_it_flies_sampled_and_through_real_actuators(strategy):
+    supervisor = {"strategy": strategy, "min_margin": 0.8}
+    simulation = {"duration": 1.3, "timestep": 0.002, "control_timestep": 0.004}
+    tables = tiltrotor(
+        gait={"type": "trot_instant", "amplitude": 0.7, "period": 0.8},
+        controller={**EXACT, "supervisor": supervisor},
+        vehicle={"rotor_time_constant": 0.02, "tilt_servo": {"max_rate": 30.0}},
+    )
+    tables["simulation"] |= simulation
+    flight = tiltsim.simulate(tiltsim.parse_scenario(tables))
+    assert flight.end.kind == "completed"
+    assert flight["supervision"].max() > 0.2
+    told = flight["alpha_ref_1"]
+    assert np.isfinite(told).all()
+    assert "thrust_factor_1" in flight.columns
+
+
+@pytest.mark.parametrize("address", ["beyond/supervisor#held", "beyond/supervisor#returned_to_red"])
+def test_sampled_as_seldom_as_allowed_it_stays_within_bounds(address):
+    """Under a law that is slow enough itself; from 0.05 s on the states would swing up."""
+    changes = {
+        **{"simulation.control_timestep": 0.045, "simulation.duration": 2.4},
+        **{"simulation.timestep": 0.0025, **SLOW_LAW},
+    }
+    flight = tiltsim.simulate(tiltsim.load_scenario(address, changes))
+    assert flight.end.kind == "completed"
+    assert flight["supervisor_state"].min() >= 0.0
+    if address.endswith("held"):
+        assert flight["supervisor_rate"].max() < 1.2
+    else:
+        assert 0.5 < flight["supervisor_state"].max() <= 1.0
+
+
+def test_the_way_to_red_is_no_faster_than_asked():
+    """A planned gait that rests and is not allowed: the tilts set out for red."""
+    tables = tiltrotor(
+        gait={"type": "fixed", "angles": [-0.8, 0.1, 0.9, -0.2]},
+        controller={
+            "supervisor": {
+                "strategy": "return_to_red",
+                "min_determinant": 2.4,
+                "max_tilt_rate": 0.2,
+            }
+        },
+    )
+    flight = tiltsim.simulate(tiltsim.parse_scenario(tables))
+    assert flight.end.kind == "completed"
+    assert flight.metrics()["max_tilt_rate"] == pytest.approx(0.2, abs=0.002)
+    means = np.array([0.05, -0.05] * 2)
+    told = np.stack([flight[f"alpha_ref_{rotor}"] for rotor in (1, 2, 3, 4)], axis=-1)
+    share = flight["supervision"]
+    gap = np.array([-0.8, 0.1, 0.9, -0.2]) - means
+    np.testing.assert_allclose(told, means + np.outer(1.0 - share, gap), atol=1e-12)
+    assert (np.diff(share) >= 0.0).all()
+    assert (np.diff(flight["determinant"][1:]) >= 0.0).all()
+    assert 2.35 < flight["determinant"][-1] < 2.4  # ever slower, as there is less to gain
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"controller.supervisor.min_margin": 1.6}, "controller.supervisor.min_margin = 1.6"),
+        ({"controller.supervisor.horizon": 1.0}, "strategy = hold or return_to_red"),
+        ({"controller.supervisor.clearance": 0.2}, "strategy = return_to_red"),
+        ({**RED, "controller.supervisor.clearance": 0.2}, "must be below 0.1671"),
+        ({**RED, "controller.supervisor.clearance": 0.07}, "below min_determinant = 2"),
+        ({"controller.supervisor.strategy": "stop"}, "scale, hold or return_to_red"),
+        ({**SELDOM, "controller.supervisor.strategy": "hold"}, "control_timestep = 0.05: too long"),
+        ({**SELDOM, **RED}, "strategy = return_to_red, which moves with a lag of 0.025 s; below"),
+    ],
+)
+def test_mistakes_are_one_line(changes, message):
+    with pytest.raises(InputError) as caught:
+        tiltsim.load_scenario(SCENARIO, changes)
+    assert message in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1

@@ -1,0 +1,288 @@
+"""Yaw-position linearization of the quadrotor: symbols, derivatives, compiled code, flights."""
+
+from __future__ import annotations
+
+from math import cos, hypot, isnan, pi, sin
+
+import numpy as np
+import pytest
+import sympy
+
+from tests.controllers.flights import fly, quadrotor_rates, rk4_step
+from tests.controllers.scalar_sources import as_native, fields, symbolic
+from tiltsim_controllers.analysis.quadrotor_singularity import (
+    normalized_determinant,
+    published_determinant,
+)
+from tiltsim_controllers.analysis.stability import is_hurwitz
+from tiltsim_controllers.laws.yaw_position import (
+    GAIN_SETS,
+    STATE_FIELDS,
+    Parameters,
+    decoupling_matrix,
+    drift,
+    yaw_position_inputs,
+)
+from tiltsim_controllers.mathematics.z_down import state_turned_over
+from tiltsim_controllers.references.trajectories import (
+    REFERENCE_TYPES,
+    ReferenceParameters,
+    reference_derivatives,
+)
+from tiltsim_controllers.vehicle.parameters import PRESETS
+
+QUADROTOR = PRESETS["ar_drone_2_unrounded"]
+WEIGHT = QUADROTOR.mass * QUADROTOR.gravity
+CASES = 20
+
+# x = 1 - cos(t/20), y = -sin(t/20) in ch. 2's axes; y has the other sign in ours.
+CIRCLE = ReferenceParameters(
+    REFERENCE_TYPES["circle"], 1.0, 0.0, 0.0, radius=-1.0, angular_frequency=-1 / 20
+)
+START = (*[0.0] * 6, 0.5, -0.5, 0.0, 0.0, 0.0, 0.0, WEIGHT, 0.0)  # (0.5, 0.5, 0) in ch. 2's axes
+
+
+def random_state(random):
+    return (
+        *random.uniform(-2.0, 2.0, 6).tolist(),
+        *random.uniform(-1.2, 1.2, 3).tolist(),
+        *random.uniform(-3.0, 3.0, 3).tolist(),
+        float(random.uniform(1.0, 9.0)),
+        float(random.uniform(-5.0, 5.0)),
+    )
+
+
+# --- symbols -----------------------------------------------------------------------------------
+
+PHI, THETA, PSI, P, Q, R, ZETA, XI = sympy.symbols("phi theta psi p q r zeta xi", real=True)
+M, G, D, IX, IY, IZ = sympy.symbols("m g d I_x I_y I_z", positive=True)
+U = sympy.symbols("u1:5", real=True)
+POSITION = sympy.symbols("x y z", real=True)
+VELOCITY = sympy.symbols("vx vy vz", real=True)
+SYMBOLS = (*POSITION, *VELOCITY, PHI, THETA, PSI, P, Q, R, ZETA, XI)
+VEHICLE = fields(mass=M, gravity=G, arm_length=D, inertia_xx=IX, inertia_yy=IY, inertia_zz=IZ)
+
+
+def along_the_flow(expression, inputs):
+    """Time derivative of an expression along ch. 2, Eqs. (9)-(18), written out as printed."""
+    s, c, t = sympy.sin, sympy.cos, sympy.tan
+    flow = {
+        **dict(zip(POSITION, VELOCITY)),
+        VELOCITY[0]: -ZETA / M * (c(PHI) * c(PSI) * s(THETA) + s(PHI) * s(PSI)),
+        VELOCITY[1]: -ZETA / M * (c(PHI) * s(PSI) * s(THETA) - s(PHI) * c(PSI)),
+        VELOCITY[2]: -ZETA / M * c(THETA) * c(PHI) + G,
+        PSI: s(PHI) / c(THETA) * Q + c(PHI) / c(THETA) * R,
+        THETA: c(PHI) * Q - s(PHI) * R,
+        PHI: P + s(PHI) * t(THETA) * Q + c(PHI) * t(THETA) * R,
+        ZETA: XI,
+        XI: inputs[0],
+        P: (IY - IZ) / IX * Q * R + D / IX * inputs[1],
+        Q: (IZ - IX) / IY * P * R + D / IY * inputs[2],
+        R: (IX - IY) / IZ * P * Q + D / IZ * inputs[3],
+    }
+    return sum(sympy.diff(expression, symbol) * rate for symbol, rate in flow.items())
+
+
+def output_derivatives():
+    """The fourth derivatives of x, y, z and the second of yaw, with the inputs in them."""
+    still = (0, 0, 0, 0)
+    for output, order in [*((symbol, 4) for symbol in POSITION), (PSI, 2)]:
+        expression = output
+        for _ in range(order - 1):
+            expression = along_the_flow(expression, still)
+        yield sympy.expand(along_the_flow(expression, U))
+
+
+@pytest.fixture(scope="module")
+def derivatives():
+    return list(output_derivatives())
+
+
+@pytest.fixture(scope="module")
+def sources():
+    return symbolic()
+
+
+def test_every_entry_of_delta_is_the_derivative_by_the_input(derivatives, sources):
+    entries = sources[decoupling_matrix](SYMBOLS, VEHICLE)
+    for row, expression in enumerate(derivatives):
+        for column, symbol in enumerate(U):
+            difference = sympy.diff(expression, symbol) - entries[4 * row + column]
+            assert sympy.simplify(difference) == 0, (row + 1, column + 1)
+
+
+def test_ma_is_what_is_left_without_input(derivatives, sources):
+    """To 40 digits at random points; the expressions are too long to simplify quickly."""
+    entries = sources[drift](SYMBOLS, VEHICLE)
+    random = np.random.default_rng(2)
+    for row, expression in enumerate(derivatives):
+        difference = (expression - sympy.nsimplify(entries[row])).subs(dict.fromkeys(U, 0))
+        point = {
+            symbol: sympy.Rational(int(random.integers(1, 90)), 77)
+            for symbol in (*SYMBOLS, M, G, D, IX, IY, IZ)
+        }
+        assert abs(sympy.N(difference.subs(point), 40)) < 1e-35, row + 1
+
+
+def test_the_determinant_is_the_exact_one(sources):
+    entries = sources[decoupling_matrix](SYMBOLS, VEHICLE)
+    determinant = sympy.Matrix(4, 4, entries).det()
+    exact = -(D**3) * ZETA**2 * sympy.cos(PHI) / (IX * IY * IZ * M**3 * sympy.cos(THETA))
+    assert sympy.simplify(determinant - exact) == 0
+
+
+# --- derivatives -------------------------------------------------------------------------------
+
+
+def third_derivatives(state):
+    """Jerk and yaw rate, z-up, from the plant by hand."""
+    rates = quadrotor_rates(state, (state[12], 0.0, 0.0, 0.0, state[13], 0.0), QUADROTOR)
+    return np.array([*rates[3:6], rates[8]])
+
+
+def numerical_derivatives(state, inputs):
+    """Fourth derivatives of the position and second of yaw, by differences along the flight."""
+
+    def rates(_, state):
+        return quadrotor_rates(state, (state[12], *inputs[1:4], state[13], inputs[5]), QUADROTOR)
+
+    h = 2e-3
+    points = {k: third_derivatives(rk4_step(rates, 0.0, state, k * h)) for k in range(-3, 4)}
+    second = (
+        2 * (points[3] + points[-3])
+        - 27 * (points[2] + points[-2])
+        + 270 * (points[1] + points[-1])
+    ) / 180 - 490 * points[0] / 180
+    first = ((points[3] - points[-3]) - 9 * (points[2] - points[-2])) / 60 + 0.75 * (
+        points[1] - points[-1]
+    )
+    return np.array([*(second[:3] / h**2), first[3] / h])
+
+
+def test_ma_is_the_plants_derivative_at_zero_input():
+    random = np.random.default_rng(3)
+    for _ in range(CASES):
+        state = random_state(random)
+        numerical = numerical_derivatives(state, (state[12], 0.0, 0.0, 0.0, state[13], 0.0))
+        ma = np.array(drift(state_turned_over(state), QUADROTOR)) * (1, -1, -1, -1)
+        np.testing.assert_allclose(ma, numerical, rtol=0, atol=1e-6 * (1 + np.abs(ma).max()))
+
+
+@pytest.mark.parametrize("gains", GAIN_SETS)
+def test_the_outputs_move_as_appendix_b_demands(gains):
+    random = np.random.default_rng(4)
+    parameters = Parameters(QUADROTOR, GAIN_SETS[gains], CIRCLE._replace(yaw=0.3))
+    k = GAIN_SETS[gains]
+    time = 2.0
+    reference = np.reshape(reference_derivatives(time, parameters.reference), (5, 3))
+    for _ in range(CASES):
+        state = random_state(random)
+        rates = quadrotor_rates(state, (state[12], 0, 0, 0, 0, 0), QUADROTOR)
+        ahead = rk4_step(
+            lambda _, s: quadrotor_rates(s, (s[12], 0, 0, 0, s[13], 0), QUADROTOR), 0, state, 1e-5
+        )
+        behind = rk4_step(
+            lambda _, s: quadrotor_rates(s, (s[12], 0, 0, 0, s[13], 0), QUADROTOR), 0, state, -1e-5
+        )
+        jerk = (third_derivatives(ahead) - third_derivatives(behind))[:3] / 2e-5
+        errors = reference[:4] - [state[:3], state[3:6], rates[3:6], jerk]
+        wanted = (
+            reference[4]
+            + np.array([k.position_4, k.position_3, k.position_2, k.position_1]) @ errors
+        )
+        wanted_yaw = k.yaw_2 * (0.3 - state[8]) - k.yaw_1 * rates[8]
+        inputs = yaw_position_inputs(time, state, parameters)
+        found = numerical_derivatives(state, inputs)
+        wanted = np.array([*wanted, wanted_yaw])
+        # Seven-point differences of an angular acceleration that may exceed 1e3 rad/s^2.
+        np.testing.assert_allclose(found, wanted, rtol=0, atol=2e-5 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"thrust": 0.0}, {"thrust": float("nan")}],
+    ids=["no thrust", "unknown thrust"],
+)
+def test_inputs_are_nan_where_the_matrix_is_singular(change):
+    state = dict(zip(STATE_FIELDS, START)) | change
+    inputs = yaw_position_inputs(0.0, tuple(state.values()), PARAMETERS["stable"])
+    assert all(isnan(value) for value in inputs[1:4])
+
+
+def test_the_reference_derivatives_are_derivatives():
+    for kind in ("circle", "line", "setpoint"):
+        reference = ReferenceParameters(
+            REFERENCE_TYPES[kind], 0.3, -0.2, 1.0, 0.5, 0.1, -0.3, radius=2.0, angular_frequency=0.7
+        )
+        h = 1e-4
+        before, now, after = (
+            np.reshape(reference_derivatives(1.3 + k * h, reference), (5, 3)) for k in (-1, 0, 1)
+        )
+        np.testing.assert_allclose(now[1:], (after - before)[:-1] / (2 * h), rtol=0, atol=1e-7)
+
+
+# --- flights -----------------------------------------------------------------------------------
+
+PARAMETERS = {name: Parameters(QUADROTOR, gains, CIRCLE) for name, gains in GAIN_SETS.items()}
+
+
+def flight(gains, duration, step):
+    parameters = PARAMETERS[gains]
+    return fly(
+        lambda time, state: yaw_position_inputs(time, state, parameters),
+        quadrotor_rates,
+        QUADROTOR,
+        START,
+        duration,
+        step,
+    )
+
+
+def position_polynomial(gains):
+    return (1.0, gains.position_1, gains.position_2, gains.position_3, gains.position_4)
+
+
+def test_the_published_gains_are_unstable_by_themselves_and_ours_are_not():
+    published = position_polynomial(GAIN_SETS["ch02"])
+    assert not is_hurwitz(published)
+    np.testing.assert_allclose(max(np.roots(published).real), 1.30, atol=5e-3)
+    stable = position_polynomial(GAIN_SETS["stable"])
+    assert is_hurwitz(stable)
+    np.testing.assert_allclose(np.roots(stable), [-2.5] * 4, atol=2e-3)
+
+
+def test_published_gains_leave_the_attitude_region():
+    times, states = flight("ch02", 5.0, 0.002)
+    assert times[-1] == pytest.approx(1.64, abs=0.004)
+    assert np.abs(states[-1, 6:8]).max() > pi / 2
+    determinant = normalized_determinant(states[:-1, 6], states[:-1, 7], states[:-1, 12], QUADROTOR)
+    assert determinant.min() > 0.3
+
+
+def test_stable_gains_fly_the_circle_through_the_published_curve():
+    times, states = flight("stable", 30.0, 0.01)
+    assert times[-1] == pytest.approx(30.0)
+    surface = published_determinant(states[:, 6], states[:, 7])
+    assert surface.min() < -0.5
+    assert surface.max() > 1e-3  # inside of the curve for a while: crossed, and crossed back
+    determinant = normalized_determinant(states[:, 6], states[:, 7], states[:, 12], QUADROTOR)
+    assert determinant.min() > 0.8
+    error = [
+        hypot(x - (1 - cos(t / 20)), y - sin(t / 20)) for t, (x, y) in zip(times, states[:, :2])
+    ]
+    assert max(e for t, e in zip(times, error) if t >= 20.0) < 1e-3
+    assert error[-1] < 3e-5
+    assert abs(states[-1, 2]) < 3e-5
+
+
+# --- compiled ----------------------------------------------------------------------------------
+
+
+def test_compiled_code_gives_the_same_bits(native):
+    law = native[yaw_position_inputs]
+    random = np.random.default_rng(6)
+    parameters = PARAMETERS["stable"]
+    record = as_native(parameters)
+    for _ in range(CASES):
+        state = random_state(random)
+        assert law(1.7, state, record) == yaw_position_inputs(1.7, state, parameters)

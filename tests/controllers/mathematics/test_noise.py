@@ -1,0 +1,52 @@
+"""Random numbers as functions of seed, channel and index."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tiltsim_controllers.mathematics.noise import hashed, normal, uniform
+
+COUNT = 4000
+
+
+def draws(function, seed=1.0, channel=0.0):
+    return np.array([function(seed, channel, float(index)) for index in range(COUNT)])
+
+
+def test_the_hash_permutes_words():
+    words = {hashed(word) for word in range(20_000)}
+    assert len(words) == 20_000
+    assert max(words) < 2**32
+
+
+def test_a_changed_bit_changes_half_of_the_bits():
+    flips = [
+        bin(hashed(word) ^ hashed(word ^ (1 << bit))).count("1")
+        for word in range(100)
+        for bit in range(32)
+    ]
+    assert np.mean(flips) == pytest.approx(16.0, abs=0.2)
+
+
+@pytest.mark.parametrize(("seed", "channel"), [(0.0, 0.0), (1.0, 5.0), (2.0**40 + 1.0, 11.0)])
+def test_draws_have_the_distribution_they_claim(seed, channel):
+    assert stats.kstest(draws(uniform, seed, channel), "uniform").pvalue > 1e-3
+    assert stats.kstest(draws(normal, seed, channel), "norm").pvalue > 1e-3
+
+
+def test_draws_are_functions():
+    assert normal(3.0, 2.0, 7.0) == normal(3.0, 2.0, 7.0)
+
+
+@pytest.mark.parametrize("other", [{"seed": 2.0}, {"channel": 1.0}])
+def test_seeds_and_channels_have_nothing_in_common(other):
+    correlation = np.corrcoef(draws(normal), draws(normal, **other))[0, 1]
+    assert abs(correlation) < 4.0 / np.sqrt(COUNT)
+
+
+def test_successive_draws_are_uncorrelated():
+    x = draws(normal)
+    for lag in (1, 2, 3, 10):
+        assert abs(np.corrcoef(x[:-lag], x[lag:])[0, 1]) < 4.0 / np.sqrt(COUNT)

@@ -1,0 +1,186 @@
+"""References against ch. 4, Eqs. (41)-(44)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tiltsim_controllers.references.trajectories import (
+    REFERENCE_TYPES,
+    ReferenceParameters,
+    position_reference,
+    reference_derivatives,
+)
+from tiltsim_controllers.references.waypoints import minimum_snap_table
+
+CIRCLE = ReferenceParameters(
+    REFERENCE_TYPES["circle"], 1.0, -2.0, 3.0, radius=5.0, angular_frequency=0.1
+)
+LINE = ReferenceParameters(
+    *(REFERENCE_TYPES["line"], 1.0, 2.0, 3.0),
+    velocity_x=1.5,
+    velocity_y=-0.5,
+    velocity_z=0.25,
+)
+
+times = st.floats(0.0, 300.0)
+quick = settings(deadline=None, max_examples=60)
+
+
+def test_setpoint_stays_where_it_is():
+    reference = ReferenceParameters(REFERENCE_TYPES["setpoint"], 1.0, -2.0, 3.0, yaw=0.5)
+    for time in (0.0, 12.5):
+        assert position_reference(time, reference) == (1.0, -2.0, 3.0, *[0.0] * 6)
+
+
+def test_attitude_altitude_reference_holds_its_altitude():
+    reference = ReferenceParameters(
+        REFERENCE_TYPES["attitude_altitude"], z=4.0, roll=0.1, pitch=0.2, yaw=0.3
+    )
+    assert position_reference(7.0, reference) == (0.0, 0.0, 4.0, *[0.0] * 6)
+
+
+def test_line_moves_uniformly_from_its_start():
+    assert position_reference(4.0, LINE) == (7.0, 0.0, 4.0, 1.5, -0.5, 0.25, 0.0, 0.0, 0.0)
+
+
+@quick
+@given(times)
+def test_circle_is_eqs_43_and_44(time):
+    phase = 0.1 * time
+    x, y, z, vx, vy, vz, *acceleration = position_reference(time, CIRCLE)
+    expected = (1 + 5 * np.cos(phase), -2 + 5 * np.sin(phase), 3.0)
+    assert (x, y, z) == pytest.approx(expected, abs=1e-14)
+    assert (vx, vy, vz) == pytest.approx((-0.5 * np.sin(phase), 0.5 * np.cos(phase), 0.0))
+    assert acceleration == [0.0, 0.0, 0.0], "ch. 4 leaves the acceleration out"
+
+
+@quick
+@given(times)
+def test_circle_passes_its_acceleration_on_when_asked(time):
+    *_, ax, ay, az = position_reference(time, CIRCLE._replace(acceleration_feedforward=1.0))
+    expected = (-0.05 * np.cos(0.1 * time), -0.05 * np.sin(0.1 * time), 0.0)
+    assert (ax, ay, az) == pytest.approx(expected, abs=1e-16)
+
+
+@pytest.mark.parametrize("reference", [LINE, CIRCLE], ids=["line", "circle"])
+@quick
+@given(time=times)
+def test_each_derivative_belongs_to_the_one_before(reference, time):
+    reference = reference._replace(acceleration_feedforward=1.0)
+    step = 1e-3
+    before, now, after = (
+        np.array(position_reference(time + shift, reference)) for shift in (-step, 0.0, step)
+    )
+    slope = (after - before) / (2 * step)
+    np.testing.assert_allclose(slope[:6], now[3:], rtol=0, atol=1e-8)
+
+
+# --- beyond ch. 4: derivatives up to snap -----------------------------------------------------
+
+LISSAJOUS = ReferenceParameters(
+    *(REFERENCE_TYPES["lissajous"], 1.0, -2.0, 3.0),
+    **{"amplitude_x": 2.0, "amplitude_y": 1.5, "amplitude_z": 0.5},
+    **{"frequency_x": 0.6, "frequency_y": 1.1, "frequency_z": 0.4},
+    **{"phase_x": 0.3, "phase_y": -1.0, "phase_z": 2.0},
+)
+POINTS = [[0.0, 0.0, 0.0], [2.0, 1.0, 1.0], [3.0, -1.0, 0.5], [0.5, 0.5, 2.0]]
+TIMES = [0.0, 2.0, 5.0, 6.5]
+SNAP_TABLE = minimum_snap_table(POINTS, TIMES)
+BEFORE = (9.0, 8.0, 7.0)  # another table in front of it
+WAYPOINTS = ReferenceParameters(REFERENCE_TYPES["waypoints"], segments=4.0, offset=3.0)
+MOTIONS = {
+    "setpoint": ReferenceParameters(REFERENCE_TYPES["setpoint"], 1.0, -2.0, 3.0, 4.0, 5.0, 6.0),
+    "line": LINE,
+    "circle": CIRCLE,
+    "lissajous": LISSAJOUS,
+    "waypoints": WAYPOINTS,
+}
+
+
+def motion(time, reference):
+    """Five rows: position and its derivatives up to snap."""
+    table = (*BEFORE, *SNAP_TABLE)
+    return np.reshape(reference_derivatives(time, reference, table), (5, 3))
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+@quick
+@given(time=st.floats(0.01, 9.0))
+def test_every_reference_has_its_derivatives_up_to_snap(name, time):
+    if min(abs(time - knot) for knot in TIMES) < 0.005 and name == "waypoints":
+        return  # the snap bends there
+    step = 1e-3
+    f = {k: motion(time + k * step, MOTIONS[name]) for k in (-2, -1, 1, 2)}
+    slope = (f[-2] - 8 * f[-1] + 8 * f[1] - f[2]) / (12 * step)
+    now = motion(time, MOTIONS[name])
+    np.testing.assert_allclose(slope[:4], now[1:], rtol=1e-7, atol=1e-7)
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+@quick
+@given(time=st.floats(0.0, 9.0))
+def test_both_views_of_a_reference_agree(name, time):
+    table = (*BEFORE, *SNAP_TABLE)
+    full = reference_derivatives(time, MOTIONS[name], table)
+    plain = position_reference(time, MOTIONS[name], table)
+    assert plain[:6] == pytest.approx(full[:6], abs=1e-13)
+    assert plain[6:] == (0.0, 0.0, 0.0), "the acceleration is left out unless asked for"
+    told = MOTIONS[name]._replace(acceleration_feedforward=1.0)
+    assert position_reference(time, told, table)[6:] == pytest.approx(full[6:9], abs=1e-13)
+
+
+def test_waypoints_are_passed_at_their_times_from_rest_to_rest():
+    for time, point in zip(TIMES, POINTS):
+        np.testing.assert_allclose(motion(time, WAYPOINTS)[0], point, atol=1e-12)
+    for time in (TIMES[0], TIMES[-1] - 1e-9, TIMES[-1], 100.0):
+        np.testing.assert_allclose(motion(time, WAYPOINTS)[1:4], 0.0, atol=1e-5)
+    np.testing.assert_array_equal(motion(100.0, WAYPOINTS)[0], POINTS[-1])
+
+
+def test_two_waypoints_are_joined_by_the_known_polynomial():
+    """``35 s^4 - 84 s^5 + 70 s^6 - 20 s^7`` of the way, with s the share of the time."""
+    table = minimum_snap_table([[0.0, 1.0, 2.0], [2.0, 1.0, -2.0]], [0.0, 3.0])
+    two = ReferenceParameters(REFERENCE_TYPES["waypoints"], segments=2.0)
+    for time in np.linspace(0.0, 3.0, 13):
+        s = time / 3.0
+        share = 35 * s**4 - 84 * s**5 + 70 * s**6 - 20 * s**7
+        found = reference_derivatives(float(time), two, table)[:3]
+        assert found == pytest.approx((2 * share, 1.0, 2 - 4 * share), abs=1e-12)
+
+
+def snap_cost(shift):
+    """Integral of squared snap of the motion with a middle stretch bent by a bump of its own."""
+    times = np.linspace(0.0, TIMES[-1], 13001)
+    snap = np.array([motion(t, WAYPOINTS)[4, 0] for t in times])
+    # A bump that is zero with three derivatives at the knots 2 and 5: (s (1 - s))^4.
+    s = np.clip((times - 2.0) / 3.0, 0.0, 1.0)
+    bump = np.polynomial.Polynomial([0, 1, -1]) ** 4
+    bent = shift * bump.deriv(4)(s) / 3.0**4 * ((s > 0) & (s < 1))
+    return np.trapezoid((snap + bent) ** 2, times)
+
+
+def test_no_bump_between_waypoints_lowers_the_snap():
+    at_rest = snap_cost(0.0)
+    for shift in (0.3, -0.3):
+        assert snap_cost(shift) > at_rest
+    # To first order nothing changes: the motion is stationary.
+    slope = (snap_cost(1e-3) - snap_cost(-1e-3)) / 2e-3
+    assert abs(slope) < 1e-3 * at_rest
+
+
+@pytest.mark.parametrize(
+    ("points", "times", "message"),
+    [
+        (POINTS[:1], [0.0], "at least 2"),
+        (POINTS, TIMES[:3], "4 waypoints but 3 times"),
+        (POINTS, [0.0, 2.0, 2.0, 3.0], "must start at 0 and increase"),
+        (POINTS, [1.0, 2.0, 3.0, 4.0], "must start at 0"),
+        (POINTS, [0.0, 2.0, 3.0, float("inf")], "finite"),
+    ],
+)
+def test_waypoints_that_make_no_motion_are_refused(points, times, message):
+    with pytest.raises(ValueError, match=message):
+        minimum_snap_table(points, times)

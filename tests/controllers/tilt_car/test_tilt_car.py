@@ -1,0 +1,262 @@
+"""The tilt-car's laws against ch. 10's and 11's printed formulas."""
+
+from __future__ import annotations
+
+from math import cos, isnan, pi, sin
+
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tiltsim_controllers.references.trajectories import (
+    CIRCLE,
+    LINE,
+    ReferenceParameters,
+    reference_derivatives,
+)
+from tiltsim_controllers.tilt_car import fourth_derivative as fourth
+from tiltsim_controllers.tilt_car import planned_direction as planned
+from tiltsim_controllers.tilt_car import third_derivative as third
+from tiltsim_controllers.tilt_car.vehicle import (
+    THESIS_CAR,
+    TiltCar,
+    acceleration,
+    body_acceleration,
+    squared_speeds,
+    turn_share,
+    turned,
+    yaw_share,
+)
+
+CAR = TiltCar(1.3, 0.0012, 0.0007, 0.45, 0.0008)
+CIRCLE_10 = ReferenceParameters(CIRCLE, 10.0, radius=-10.0, angular_frequency=1.0)
+
+angles = st.floats(-4.0, 4.0)
+speeds = st.floats(5.0, 300.0)
+rates = st.floats(-50.0, 50.0)
+
+
+def rotation(angle):
+    return np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
+
+
+def printed_j_theta(car):
+    k = car.thrust_coefficient
+    scale = np.diag([cos(car.half_angle), sin(car.half_angle)])
+    return scale @ np.array([[k, k], [k, -k]])
+
+
+# --- the vehicle -------------------------------------------------------------------------------
+
+
+def test_the_published_share_needs_the_whole_cars_inertia():
+    assert yaw_share(THESIS_CAR) == 0.5  # I_T / I_B = 0.001 / 0.002, Eq. (2)
+    assert turn_share(THESIS_CAR) == 0.5
+    assert yaw_share(THESIS_CAR._replace(bottom_inertia=0.002)) == pytest.approx(1 / 3)
+
+
+@given(angles, speeds, speeds)
+def test_acceleration_is_eq_3(direction, speed_1, speed_2):
+    squares = np.array([speed_1**2, speed_2**2])
+    wanted = rotation(direction) @ printed_j_theta(CAR) @ squares / CAR.mass
+    np.testing.assert_allclose(
+        acceleration(direction, *squares.tolist(), CAR), wanted, rtol=1e-12, atol=1e-10
+    )
+
+
+@given(st.floats(-1e4, 1e4), st.floats(-1e4, 1e4))
+def test_squares_invert_the_acceleration(square_1, square_2):
+    along, across = body_acceleration(square_1, square_2, CAR)
+    np.testing.assert_allclose(
+        squared_speeds(along, across, CAR), (square_1, square_2), rtol=1e-10, atol=1e-8
+    )
+
+
+# --- third and fourth derivative ---------------------------------------------------------------
+
+
+def symbolic():
+    """Eq. (3) as functions of time, with Eq. (2) for the yaw."""
+    t = sp.symbols("t")
+    w1, w2, alpha = (sp.Function(name)(t) for name in ("w1", "w2", "alpha"))
+    share = sp.Rational(7, 19)  # 1 - I_T / I_B of CAR
+    k, m, theta = sp.Float(CAR.thrust_coefficient), sp.Float(CAR.mass), sp.Float(CAR.half_angle)
+    j_theta = sp.diag(sp.cos(theta), sp.sin(theta)) * sp.Matrix([[k, k], [k, -k]])
+    eta = share * alpha
+    j = sp.Matrix([[sp.cos(eta), -sp.sin(eta)], [sp.sin(eta), sp.cos(eta)]])
+    return t, (w1, w2, alpha), j * j_theta * sp.Matrix([w1**2, w2**2]) / m
+
+
+def derivative_values(order, values):
+    """The derivative of Eq. (3) of an order, evaluated at the inputs' derivatives."""
+    t, inputs, force = symbolic()
+    expression = sp.diff(force, t, order)
+    plain = {}
+    for function, derivatives in zip(inputs, values, strict=True):
+        for degree in range(len(derivatives) - 1, 0, -1):
+            expression = expression.subs(sp.Derivative(function, (t, degree)), derivatives[degree])
+        plain[function] = derivatives[0]
+    return np.array(expression.subs(plain).evalf().tolist(), dtype=float).ravel()
+
+
+INPUTS = ((90.0, 4.0, -3.0), (60.0, -7.0, 5.0), (0.8, 1.5, -2.0))
+
+
+def test_the_columns_are_the_third_derivative_of_the_position():
+    wanted = derivative_values(1, [values[:2] for values in INPUTS])
+    (w1, d1, _), (w2, d2, _), (alpha, d3, _) = INPUTS
+    x1, y1, x2, y2, x3, y3 = third.input_columns(w1, w2, CAR)
+    body = x1 * d1 + x2 * d2 + x3 * d3, y1 * d1 + y2 * d2 + y3 * d3
+    np.testing.assert_allclose(turned(*body, turn_share(CAR) * alpha), wanted, rtol=1e-12)
+
+
+def test_the_columns_are_eqs_10_and_11():
+    w1, w2 = 90.0, 60.0
+    j_theta = printed_j_theta(CAR)
+    delta_1 = j_theta @ np.diag([2 * w1, 2 * w2]) / CAR.mass
+    quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
+    delta_2 = turn_share(CAR) * quarter @ j_theta @ np.array([w1**2, w2**2]) / CAR.mass
+    columns = np.reshape(third.input_columns(w1, w2, CAR), (3, 2)).T
+    np.testing.assert_allclose(columns, np.column_stack([delta_1, delta_2]), rtol=1e-12)
+
+
+def test_drift_and_columns_make_the_fourth_derivative():
+    wanted = derivative_values(2, INPUTS)
+    (w1, d1, s1), (w2, d2, s2), (alpha, d3, s3) = INPUTS
+    yaw = -yaw_share(CAR) * alpha
+    state = (0.0, 0.0, 0.0, 0.0, yaw, alpha, w1, w2, d3, d1, d2)
+    *_, drift_along, drift_across = fourth.body_derivatives(state, CAR)
+    x1, y1, x2, y2, x3, y3 = third.input_columns(w1, w2, CAR)
+    body = (
+        drift_along + x1 * s1 + x2 * s2 + x3 * s3,
+        drift_across + y1 * s1 + y2 * s2 + y3 * s3,
+    )
+    np.testing.assert_allclose(turned(*body, yaw + alpha), wanted, rtol=1e-12)
+
+
+@given(speeds, speeds, rates, rates)
+def test_the_inverse_is_numpys(speed_1, speed_2, x, y):
+    columns = third.input_columns(speed_1, speed_2, CAR)
+    matrix = np.reshape(columns, (3, 2)).T
+    wanted = np.linalg.pinv(matrix) @ (x, y)
+    scale = np.abs(wanted).max() + 1e-9
+    np.testing.assert_allclose(third.minimum_norm(columns, (x, y)), wanted, atol=1e-9 * scale)
+
+
+def test_one_rotor_at_rest_leaves_full_rank_two_do_not():
+    one = third.input_columns(80.0, 0.0, CAR)
+    assert np.linalg.matrix_rank(np.reshape(one, (3, 2))) == 2
+    rate_1, rate_2, tilt_rate = third.minimum_norm(one, (1.0, 2.0))
+    assert rate_2 == 0.0
+    np.testing.assert_allclose(one[0] * rate_1 + one[4] * tilt_rate, 1.0)
+    assert all(map(isnan, third.minimum_norm(third.input_columns(0.0, 0.0, CAR), (1.0, 2.0))))
+
+
+@given(speeds, speeds)
+def test_silent_inputs_are_not_felt(speed_1, speed_2):
+    columns = third.input_columns(speed_1, speed_2, CAR)
+    matrix = np.reshape(columns, (3, 2)).T
+    n = np.array(third.silent_input(columns))
+    scale = np.linalg.norm(matrix) * np.linalg.norm(n)
+    np.testing.assert_allclose(matrix @ n, 0.0, atol=1e-12 * scale)
+
+
+@given(speeds, speeds, st.floats(0.1, 5.0))
+def test_restoring_turns_the_middle_and_nothing_else(speed_1, speed_2, rate):
+    columns = third.input_columns(speed_1, speed_2, CAR)
+    along, across = body_acceleration(speed_1**2, speed_2**2, CAR)
+    lean = np.arctan2(across, along)
+    inputs = np.array(third.restoring_inputs(lean, rate, columns, CAR))
+    matrix = np.reshape(columns, (3, 2)).T
+    scale = np.linalg.norm(matrix) * np.linalg.norm(inputs) + 1e-12
+    np.testing.assert_allclose(matrix @ inputs, 0.0, atol=1e-10 * scale)
+    # The acceleration stands still in the world, so the lean changes as the middle turns.
+    np.testing.assert_allclose(-turn_share(CAR) * inputs[2], -rate * lean, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("restoring_rate", [0.0, 2.0])
+def test_the_third_derivative_law_makes_the_jerk_it_wants(restoring_rate):
+    state = (1.0, -2.0, 3.0, -4.0, -0.3, 0.9, 90.0, 70.0)
+    parameters = third.Parameters(CAR, third.GAIN_SETS["ch10"], CIRCLE_10, restoring_rate)
+    inputs = np.array(third.third_derivative_inputs(0.7, state, parameters))
+    matrix = np.reshape(third.input_columns(90.0, 70.0, CAR), (3, 2)).T
+    made = rotation(0.6) @ matrix @ inputs
+    reference = reference_derivatives(0.7, CIRCLE_10)
+    ax, ay = acceleration(0.6, 90.0**2, 70.0**2, CAR)
+    wanted = [
+        reference[9 + i]
+        + 6.0 * (reference[6 + i] - a)
+        + 12.0 * (reference[3 + i] - state[2 + i])
+        + 8.0 * (reference[i] - state[i])
+        for i, a in enumerate((ax, ay))
+    ]
+    np.testing.assert_allclose(made, wanted, rtol=1e-10)
+
+
+def test_the_printed_tilt_column_lacks_the_yaws_answer():
+    state = (0.1, 0.2, 0.3, 0.4, -0.2, 0.5, 90.0, 70.0, 1.0, 2.0, -3.0)
+    gains = fourth.GAIN_SETS["ch10"]
+    inputs = {
+        name: fourth.fourth_derivative_inputs(
+            0.3, state, fourth.Parameters(CAR, gains, CIRCLE_10, code, 0.0)
+        )
+        for name, code in fourth.DECOUPLINGS.items()
+    }
+    x1, y1, x2, y2, x3, y3 = third.input_columns(90.0, 70.0, CAR)
+    share = turn_share(CAR)
+    made = {}
+    for name, (s1, s2, s3) in inputs.items():
+        factor = 1.0 / share if name == "published" else 1.0
+        made[name] = (
+            x1 * s1 + x2 * s2 + factor * x3 * s3,
+            y1 * s1 + y2 * s2 + factor * y3 * s3,
+        )
+    # Each makes the same with its own columns: only the exact one's are the car's.
+    np.testing.assert_allclose(made["published"], made["exact"], rtol=1e-9)
+    assert abs(inputs["published"][2] - inputs["exact"][2]) > 1e-3
+
+
+# --- planned direction -------------------------------------------------------------------------
+
+LINE_1 = ReferenceParameters(LINE, acceleration_x=1.0)
+LAW = planned.Parameters(THESIS_CAR, planned.GAIN_SETS["ch11"], LINE_1)
+
+
+@given(angles, st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-2.0, 2.0))
+def test_the_planned_law_is_eqs_12_and_13(direction, x, y, vy):
+    state = (x, y, 0.3, vy, direction, 0.0, 0.0, 0.0)
+    time = 1.7
+    x_ref, vx_ref = 0.5 * time**2, time
+    wanted = np.array(
+        [
+            1.0 + 12.0 * (vx_ref - 0.3) + 6.0 * (x_ref - x),
+            9.0 * (0.0 - vy) + 18.0 * (0.0 - y),
+        ]
+    )
+    printed = np.linalg.solve(rotation(direction) @ printed_j_theta(THESIS_CAR), wanted)
+    squares = planned.wanted_squares(time, state, LAW)
+    np.testing.assert_allclose(squares, printed, rtol=1e-9, atol=1e-6)
+    inputs = planned.planned_direction_inputs(time, state, LAW)
+    assert inputs == tuple(max(square, 0.0) for square in squares)
+
+
+@given(st.floats(-0.5, 0.5), st.floats(-1.5, 1.5), st.sampled_from([-pi / 3, pi / 3]))
+def test_proposition_4_tells_which_rotors_push(error, error_rate, direction):
+    state = (0.5, -error, 1.0, -error_rate, direction, 0.0, 0.0, 0.0)  # e_x = e_x' = 0 at 1 s
+    square_1, square_2 = planned.wanted_squares(1.0, state, LAW)
+    push = 9.0 * error_rate + 18.0 * error
+    if abs(abs(push) - 3**-0.5) < 1e-6:
+        return
+    if direction < 0.0:  # Eq. (34): S_10 or S_11
+        assert square_1 > 0.0
+        assert (square_2 > 0.0) == (push < -(3**-0.5))
+    else:  # Eq. (35): S_01 or S_11
+        assert square_2 > 0.0
+        assert (square_1 > 0.0) == (push > 3**-0.5)
+
+
+def test_the_lyapunov_candidate_is_eq_74():
+    candidate = planned.lyapunov_candidate(0.2, 0.7, planned.GAIN_SETS["ch11"])
+    assert candidate == pytest.approx(0.5 * 0.7**2 + 9.0 * 0.2**2)

@@ -1,0 +1,62 @@
+"""Sensors, servos and faults as functions."""
+
+from __future__ import annotations
+
+from math import inf
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from tiltsim_controllers.vehicle.actuators import (
+    RotorFault,
+    Sensor,
+    rate_limited_command,
+    reading_error,
+    reading_index,
+    servo_command,
+    thrust_factor,
+    turned_quaternion,
+)
+
+angles = st.floats(-3.0, 3.0)
+
+
+@given(st.floats(1e-4, 1.0), st.integers(0, 10_000))
+def test_a_reading_stands_from_its_own_multiple_on(period, number):
+    assert reading_index(number * period, period) == number
+    assert reading_index((number + 0.99) * period, period) == number
+
+
+def test_readings_have_the_noise_and_bias_given():
+    sensor = Sensor(0.3, 1.0, -2.0, 0.5)
+    errors = np.array([reading_error(sensor, 5.0, 6.0, float(i)) for i in range(4000)])
+    np.testing.assert_allclose(errors.mean(axis=0), [1.0, -2.0, 0.5], atol=0.02)
+    np.testing.assert_allclose(np.cov(errors.T), 0.09 * np.eye(3), atol=0.008)
+
+
+@given(st.tuples(angles, angles, angles), st.tuples(*[st.floats(-0.05, 0.05)] * 3))
+def test_an_attitude_is_turned_about_the_body_axes(attitude, vector):
+    start = Rotation.from_euler("xyz", attitude)
+    quaternion = start.as_quat(scalar_first=True).tolist()
+    found = Rotation.from_quat(turned_quaternion(*quaternion, *vector), scalar_first=True)
+    wanted = start * Rotation.from_rotvec(vector)
+    third_order = np.linalg.norm(vector) ** 3 / 12.0
+    assert (found.inv() * wanted).magnitude() < 1.01 * third_order + 1e-12
+
+
+@given(angles, angles, st.floats(0.01, 1.0))
+def test_a_set_point_leads_the_pod_by_its_reach_at_most(command, angle, reach):
+    point = rate_limited_command(command, angle, reach)
+    assert abs(point - angle) <= reach + 1e-12
+    assert point == command or abs(point - angle) == pytest.approx(reach)
+    assert rate_limited_command(command, angle, inf) == command
+
+
+def test_faults_begin_at_their_time():
+    fault = RotorFault(thrust_time=2.0, thrust_factor=0.3, stuck_time=1.0, stuck_angle=0.2)
+    assert [thrust_factor(t, fault) for t in (0.0, 1.999, 2.0, 9.0)] == [1.0, 1.0, 0.3, 0.3]
+    assert [servo_command(t, 0.5, fault) for t in (0.999, 1.0)] == [0.5, 0.2]
+    assert thrust_factor(1e9, RotorFault()) == 1.0

@@ -1,0 +1,46 @@
+"""The quadrotor's mixer against ch. 3's force and torque matrices without tilt."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.controllers.scalar_sources import as_native
+from tests.thesis import force_matrix, torque_matrix
+from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
+from tiltsim_controllers.vehicle.quadrotor_mixer import speed_along_spin, thrust_controls
+
+WRENCHES = np.random.default_rng(4).uniform(-1.0, 1.0, (20, 4)) * (6.0, 0.5, 0.5, 0.1)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("wrench", WRENCHES)
+def test_the_rotors_make_the_thrust_and_the_torques_asked_for(preset, wrench):
+    vehicle = PRESETS[preset]
+    speeds = [
+        sign * speed_along_spin(control)
+        for sign, control in zip(SPIN, thrust_controls(*wrench, vehicle))
+    ]
+    w = np.array([speed * abs(speed) for speed in speeds])
+    force = force_matrix(vehicle, (0.0, 0.0, 0.0, 0.0)) @ w
+    torque = torque_matrix(vehicle, (0.0, 0.0, 0.0, 0.0)) @ w
+    np.testing.assert_allclose(force, [0.0, 0.0, wrench[0]], atol=1e-12)
+    np.testing.assert_allclose(torque, wrench[1:], atol=1e-13)
+
+
+def test_hover_takes_the_hover_speed():
+    vehicle = PRESETS["ar_drone_2"]
+    controls = thrust_controls(vehicle.mass * vehicle.gravity, 0.0, 0.0, 0.0, vehicle)
+    speeds = [speed_along_spin(control) for control in controls]
+    np.testing.assert_allclose(speeds, vehicle.hover_rotor_speed)
+
+
+def test_a_rotor_that_must_pull_turns_against_its_spin():
+    assert speed_along_spin(-4.0) == -2.0
+
+
+def test_compiled_code_gives_the_same_bits(native):
+    vehicle = PRESETS["ar_drone_2"]
+    for wrench in WRENCHES.tolist():
+        expected = thrust_controls(*wrench, vehicle)
+        assert native[thrust_controls](*wrench, as_native(vehicle)) == expected

@@ -1,0 +1,496 @@
+"""The environments: their interfaces' own checkers, determinism, ends, rewards, randomisation."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import dm_env
+import numpy as np
+import pytest
+from absl.testing import absltest
+from dm_env import test_utils
+
+import tiltsim
+from tiltsim.env.environment import TiltrotorEnv
+from tiltsim.errors import InputError
+from tiltsim.flight.reading import load_flight
+from tiltsim.plants.command import Command, ControllerError
+from tiltsim_controllers.vehicle.parameters import PRESETS
+
+DOCS = Path(__file__).parents[2] / "docs" / "environment.md"
+VEHICLE = PRESETS["ar_drone_2"]
+WEIGHT = VEHICLE.mass * VEHICLE.gravity
+HOVER = np.array([WEIGHT / 4.0] * 4 + [0.0] * 4)
+SHORT = {"duration": 0.2, "timestep": 0.002, "control_timestep": 0.02}
+AXES = [
+    {
+        "keys": ["vehicle.mass", "vehicle.inertia"],
+        "type": "uniform",
+        "low": 0.8,
+        "high": 1.2,
+        "relative": True,
+    },
+    {"key": "initial.position[0]", "type": "normal", "mean": 1.0, "standard_deviation": 0.2},
+    {"key": "initial.rotor_speed", "type": "list", "values": [300.0, 320.0]},
+]
+
+
+def scenario(simulation=None, **tables):
+    simulation = {**SHORT, **(simulation or {})}
+    tables.setdefault("controller", {"law": "python", "function": "test"})
+    return tiltsim.parse_scenario({**tables, "simulation": simulation})
+
+
+def spread(env, seed=0):
+    """Random actions within the bounds, for ever."""
+    spec, generator = env.action_spec(), np.random.default_rng(seed)
+    while True:
+        yield generator.uniform(spec.minimum, spec.maximum)
+
+
+class TestTiltrotor(test_utils.EnvironmentTestMixin, absltest.TestCase):
+    def make_object_under_test(self):
+        return TiltrotorEnv(scenario())
+
+    def make_action_sequence(self):
+        for action, _ in zip(spread(self.environment), range(35)):  # three ends and a bit
+            yield action
+
+
+class TestQuadrotorWithRandomisation(test_utils.EnvironmentTestMixin, absltest.TestCase):
+    def make_object_under_test(self):
+        return TiltrotorEnv(scenario(vehicle={"model": "quadrotor"}), domain=AXES[1:])
+
+    def make_action_sequence(self):
+        for action, _ in zip(spread(self.environment), range(25)):
+            yield action
+
+
+def rollout(env, steps, seed=0):
+    """Everything that an environment says over some random steps."""
+    said = []
+    for action, _ in zip(spread(env, seed), range(steps)):
+        step = env.step(action)
+        arrays = [step.observation[name].copy() for name in sorted(step.observation)]
+        said.append((step.step_type, step.reward, step.discount, np.concatenate(arrays)))
+    return said
+
+
+def assert_same(first, second):
+    for one, other in zip(first, second, strict=True):
+        assert one[:3] == other[:3]
+        np.testing.assert_array_equal(one[3], other[3])
+
+
+def test_the_same_seed_gives_the_same_episodes_bit_for_bit():
+    first, second = (TiltrotorEnv(scenario(), domain=AXES, seed=3) for _ in range(2))
+    assert_same(rollout(first, 25), rollout(second, 25))
+    other = rollout(TiltrotorEnv(scenario(), domain=AXES, seed=4), 2)
+    assert (
+        other[0][3].tolist()
+        != rollout(TiltrotorEnv(scenario(), domain=AXES, seed=3), 2)[0][3].tolist()
+    )
+
+
+REAL = {
+    "simulation": {"control_latency": 0.04},
+    "vehicle": {"rotor_time_constant": 0.03, "tilt_servo": {"max_rate": 2.0}},
+    "sensors": {"position_noise": 0.05, "body_rates_noise": 0.1},
+    "air": {"wind": [2.0, 0.0, 0.0], "drag": {"linear": [0.3, 0.3, 0.1]}},
+}
+ideal_and_real = pytest.mark.parametrize("layers", [{}, REAL], ids=["ideal", "real"])
+
+
+@ideal_and_real
+def test_an_episode_does_not_depend_on_those_before(layers):
+    used = TiltrotorEnv(scenario(**layers))
+    rollout(used, 17)
+    used.reset()
+    fresh = TiltrotorEnv(scenario(**layers))
+    fresh.reset()
+    assert_same(rollout(used, 10, seed=5), rollout(fresh, 10, seed=5))
+
+
+def test_reseeding_starts_the_draws_anew():
+    env = TiltrotorEnv(scenario(), domain=AXES[1:2], seed=1)
+    places = []
+    for _ in range(2):
+        env.reseed(9)
+        places.append([float(env.reset().observation["position"][0]) for _ in range(3)])
+    assert places[0] == places[1]
+    assert len(set(places[0])) == 3
+
+
+def test_hovering_holds_the_place_and_earns_the_whole_reward():
+    env = TiltrotorEnv()
+    step, total = env.reset(), 0.0
+    assert step.reward is None
+    while not step.last():
+        step = env.step(HOVER)
+        total += step.reward
+    assert total == pytest.approx(500.0, abs=1e-6)
+    assert (step.discount, env.end.kind) == (1.0, "completed")
+    np.testing.assert_allclose(step.observation["position"], 0.0, atol=1e-6)
+
+
+@ideal_and_real
+def test_a_step_is_the_flight_of_a_held_command(layers):
+    """Physics, step by step from outside, is that of `tiltsim.simulate`."""
+    this = scenario(initial={"attitude": [0.1, 0.2, 0.3]}, **layers)
+    action = np.array([1.0, 1.1, 0.9, 1.2, 0.1, -0.2, 0.3, 0.0])
+    env = TiltrotorEnv(this)
+    env.reset()
+    for _ in range(10):
+        step = env.step(action)
+    command = Command(thrusts=action[:4], tilt_angles=action[4:])
+    flown = tiltsim.simulate(this, controller=lambda _: command)
+    episode = env.flight()
+    np.testing.assert_array_equal(episode.samples, flown.samples[::2])
+    noise = np.abs(step.observation["position"] - [flown[a][-1] for a in "xyz"]).max()
+    assert bool(noise > 0.0) is ("sensors" in layers)
+    assert len(episode) == 11
+
+
+def test_a_seed_axis_draws_other_noise_every_episode():
+    axis = {"key": "simulation.seed", "type": "seed"}
+    env = TiltrotorEnv(scenario(sensors=REAL["sensors"]), domain=[axis], seed=1)
+    seen = [env.reset().observation["position"][0] for _ in range(3)]
+    assert len(set(map(float, seen))) == 3
+
+
+def test_an_episode_is_lost_where_the_vehicle_is_not_where_it_is_said_to_be():
+    env = TiltrotorEnv(scenario(sensors={"position_bias": [9.0, 9.0, 0.0]}), max_position_error=1.0)
+    env.reset()
+    assert not env.step(HOVER).last()
+
+
+def test_episodes_are_flights_with_files_and_metrics(tmp_path):
+    env = TiltrotorEnv(scenario())
+    with pytest.raises(InputError, match="call reset"):
+        env.flight()
+    env.reset()
+    for _ in range(4):
+        env.step(HOVER)
+    assert env.flight().end.kind == "interrupted"
+    for _ in range(6):
+        env.step(HOVER)
+    env.flight().save(tmp_path)
+    back = load_flight(tmp_path)
+    assert (back.end.kind, back.metrics()["duration"]) == ("completed", pytest.approx(0.2))
+
+
+def test_a_lost_flight_ends_with_no_discount_and_no_reward():
+    env = TiltrotorEnv(scenario({"duration": 5.0}), max_position_error=0.5)
+    step = env.reset()
+    while not step.last():
+        assert env.end is None
+        step = env.step(np.zeros(8))
+    assert (step.reward, step.discount) == (0.0, 0.0)
+    assert env.end.kind == "diverged"
+    assert "m away from the reference" in env.end.cause
+    # Falling half a metre takes sqrt(2 s / g) = 0.32 s.
+    assert env.end.time == pytest.approx(0.32, abs=0.021)
+    assert env.step(HOVER).first()
+    assert env.end is None
+
+
+def test_divergence_leaves_finite_observations():
+    env = TiltrotorEnv(
+        scenario({"duration": 5.0}, initial={"angular_velocity": [990.0, 5.0, 0.0]}),
+        max_position_error=1e9,
+    )
+    spin = np.array([0.0, 2.0, 0.0, 0.0, *[0.0] * 4])
+    step = env.reset()
+    while not step.last():
+        step = env.step(spin)
+    assert step.discount == 0.0
+    assert all(np.isfinite(array).all() for array in step.observation.values())
+    for name, spec in env.observation_spec().items():
+        spec.validate(step.observation[name])
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "low", "high"),
+    [
+        ({}, [0.0] * 4 + [-np.pi / 2] * 4, [WEIGHT / 2.0] * 4 + [np.pi / 2] * 4),
+        (
+            {"min_rotor_speed": 100.0, "max_rotor_speed": 500.0, "tilt_servo": {"max_angle": 0.4}},
+            [8.048e-6 * 1e4] * 4 + [-0.4] * 4,
+            [8.048e-6 * 25e4] * 4 + [0.4] * 4,
+        ),
+        ({"model": "quadrotor"}, [0.0] * 4, [WEIGHT / 2.0] * 4),
+    ],
+)
+def test_actions_have_the_vehicles_bounds_and_are_clipped_there(vehicle, low, high):
+    env = TiltrotorEnv(scenario(vehicle=vehicle, initial={"rotor_speed": 300.0}))
+    spec = env.action_spec()
+    np.testing.assert_allclose(spec.minimum, low)
+    np.testing.assert_allclose(spec.maximum, high)
+    speeds = []
+    for action in (spec.maximum, 10.0 * spec.maximum):
+        env.reset()
+        speeds.append(env.step(action).observation["rotor_speeds"])
+    np.testing.assert_array_equal(*speeds)
+    assert ("tilt_angles" in env.observation_spec()) == (vehicle.get("model") != "quadrotor")
+
+
+@pytest.mark.parametrize(
+    ("action", "words"),
+    [
+        (np.zeros(7), r"action of shape \(7,\); \(8,\) is wanted \(thrusts, tilt_angles\)"),
+        (np.array([0.0] * 7 + [np.nan]), r"action\[7\] = nan; it must be finite"),
+    ],
+)
+def test_actions_that_cannot_be_told_are_refused(action, words):
+    env = TiltrotorEnv(scenario())
+    env.reset()
+    with pytest.raises(ValueError, match=words):
+        env.step(action)
+
+
+def test_the_reward_is_the_users():
+    seen = []
+
+    def reward(observation, action):
+        seen.append((observation["position"].copy(), action.copy()))
+        return -float(action[:4].sum())
+
+    env = TiltrotorEnv(scenario(), reward=reward)
+    env.reset()
+    step = env.step(HOVER)
+    assert step.reward == pytest.approx(-WEIGHT)
+    np.testing.assert_array_equal(seen[0][1], HOVER)
+    np.testing.assert_array_equal(seen[0][0], step.observation["position"])
+
+
+def test_changing_what_was_returned_changes_nothing_else():
+    meddled, calm = TiltrotorEnv(scenario()), TiltrotorEnv(scenario())
+    for env in (meddled, calm):
+        env.reset()
+    step = meddled.step(HOVER)
+    for array in step.observation.values():
+        array[:] = 1e3
+    step.observation.clear()
+    calm.step(HOVER)
+    assert_same(rollout(meddled, 5), rollout(calm, 5))
+
+
+def test_a_controller_written_for_simulate_flies_here():
+    env = TiltrotorEnv(scenario())
+    env.reset()
+    seen = env.observe()
+    assert seen.vehicle == VEHICLE
+    speeds = Command(rotor_speeds=[300.0, 310.0, 320.0, 330.0], tilt_angles=[0.1, 0.2, 0.3, 0.4])
+    action = env.action(speeds)
+    np.testing.assert_allclose(action[:4], 8.048e-6 * np.array([300, 310, 320, 330.0]) ** 2)
+    np.testing.assert_array_equal(action[4:], [0.1, 0.2, 0.3, 0.4])
+    np.testing.assert_allclose(env.step(action).observation["rotor_speeds"], [300, 310, 320, 330])
+    with pytest.raises(ControllerError, match="thrusts or rotor_speeds are wanted"):
+        env.action(Command(rotor_accelerations=[0.0] * 4))
+    with pytest.raises(ControllerError, match=r"thrusts of shape \(3,\)"):
+        env.action(Command(thrusts=[1.0] * 3))
+
+
+# --- scenarios and randomisation -----------------------------------------------------------------
+
+
+def test_any_scenario_of_the_library_will_do():
+    env = TiltrotorEnv("ch04_tracking/circle#continuous_t2_modified", control_timestep=0.02)
+    step = env.reset()
+    np.testing.assert_allclose(step.observation["reference_position"], [5.0, 0.0, 0.0])
+    env.step(HOVER)
+    assert env.observe().time == pytest.approx(0.02)
+    assert env.scenario.controller.law == "python"
+
+
+def test_scenarios_that_take_no_commands_are_refused():
+    thesis = tiltsim.parse_scenario({"simulation": {"plant": "thesis"}})
+    with pytest.raises(InputError, match=r"simulation\.plant"):
+        TiltrotorEnv(thesis)
+
+
+def test_episodes_are_drawn_from_the_axes():
+    env = TiltrotorEnv(scenario(), domain=AXES, seed=0)
+    masses, places, speeds = [], [], set()
+    for _ in range(12):
+        observation = env.reset().observation
+        drawn = env.scenario.rotorcraft
+        masses.append(drawn.mass / VEHICLE.mass)
+        # One draw for both keys.
+        np.testing.assert_allclose(np.array(drawn.inertia) / VEHICLE[1:4], masses[-1])
+        assert env.observe().vehicle.mass == drawn.mass
+        places.append(float(observation["position"][0]))
+        speeds.add(float(observation["rotor_speeds"][0]))
+    assert 0.8 <= min(masses) < 0.95 < 1.05 < max(masses) <= 1.2
+    assert speeds == {300.0, 320.0}
+    assert np.mean(places) == pytest.approx(1.0, abs=0.25)
+    assert len(set(places)) == 12
+
+
+def test_axes_of_a_group_are_drawn_together():
+    axis = {"type": "list", "values": [0.1, 0.2, 0.3], "group": "diagonal"}
+    domain = [{**axis, "key": f"initial.position[{i}]"} for i in range(2)]
+    env = TiltrotorEnv(domain=[*domain, {**axis, "group": "other", "key": "initial.position[2]"}])
+    drawn = set()
+    for _ in range(40):
+        env.reset()
+        drawn.add(env.scenario.initial.position)
+    assert {x for x, _, _ in drawn} == {0.1, 0.2, 0.3}
+    assert all(x == y for x, y, _ in drawn)
+    assert any(x != z for x, _, z in drawn)
+
+
+def test_a_bound_that_is_none_is_refused():
+    for bound in (0.0, float("nan")):
+        with pytest.raises(InputError, match="max_position_error"):
+            TiltrotorEnv(max_position_error=bound)
+
+
+def test_the_drawn_mass_is_the_one_that_flies():
+    axis = {"key": "vehicle.mass", "type": "list", "values": [0.8 * VEHICLE.mass]}
+    env = TiltrotorEnv(scenario(), domain=[axis])
+    env.reset()
+    for _ in range(10):
+        step = env.step(HOVER)
+    fallen = 0.5 * VEHICLE.gravity * (1.0 / 0.8 - 1.0) * 0.2**2
+    assert step.observation["position"][2] == pytest.approx(fallen, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("axis", "words"),
+    [
+        ({"key": "vehicle.mass", "type": "uniform", "low": 2.0, "high": 1.0}, "must be below high"),
+        (
+            {"key": "vehicle.mass", "type": "gaussian"},
+            "choose list, linspace, cases, uniform",
+        ),
+        ({"type": "uniform", "low": 1.0, "high": 2.0}, "give either key or keys"),
+        ({"key": "vehicle.mass", "type": "list", "values": [0.4, -1.0]}, r"mass = -1\.0"),
+        ({"key": "vehicle.mas", "type": "uniform", "low": 0.4, "high": 0.5}, "did you mean mass"),
+    ],
+)
+def test_bad_axes_are_told_when_the_environment_is_made(axis, words):
+    with pytest.raises(InputError, match=words) as caught:
+        TiltrotorEnv(scenario(), domain=[axis])
+    assert "\n" not in str(caught.value)
+
+
+def test_a_draw_that_cannot_fly_is_told_with_its_key():
+    axis = {"key": "vehicle.mass", "type": "uniform", "low": -1.0, "high": 1.0}
+    env = TiltrotorEnv(scenario(), domain=[axis])
+
+    def draw_twenty():
+        for _ in range(20):
+            env.reset()
+
+    with pytest.raises(InputError, match=r"vehicle\.mass = -0\."):
+        draw_twenty()
+
+
+def test_a_sweeps_file_is_a_domain(tmp_path):
+    path = tmp_path / "sweep.toml"
+    path.write_text(
+        "[scenario.simulation]\nduration = 0.1\ncontrol_timestep = 0.002\n"
+        '[[axis]]\nkey = "vehicle.mass"\ntype = "uniform"\nlow = 0.9\nhigh = 1.1\nrelative = true\n'
+        "[sample]\ncount = 4\n",
+        encoding="utf-8",
+    )
+    env = TiltrotorEnv.from_sweep(path, control_timestep=0.01, seed=2)
+    masses = {env.reset() and env.scenario.rotorcraft.mass for _ in range(3)}
+    assert len(masses) == 3
+    assert all(0.9 <= mass / VEHICLE.mass <= 1.1 for mass in masses)
+    steps = 1
+    while not env.step(HOVER).last():
+        steps += 1
+    assert steps == 10
+
+
+# --- documentation and Gymnasium ----------------------------------------------------------------
+
+
+def test_the_documented_examples_run(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("gymnasium")
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"```python\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
+    assert len(blocks) == 3
+    names = {}
+    for block in blocks:
+        exec(compile(block, str(DOCS), "exec"), names)
+    assert names["hovering"] == pytest.approx(500.0, abs=1e-3)
+    assert names["random"] < 200.0
+    assert isinstance(names["terminated"], bool)
+    assert len(load_flight(tmp_path / "flights" / "hovering")) == 501
+    assert capsys.readouterr().out.startswith("hover 500.0, random ")
+
+
+@pytest.mark.parametrize("arguments", [{}, {"domain": AXES[1:]}], ids=["plain", "randomised"])
+def test_gymnasiums_own_checker_passes_without_a_warning(arguments):
+    gymnasium = pytest.importorskip("gymnasium")
+    from gymnasium.utils.env_checker import check_env
+
+    from tiltsim.env.gymnasium import ID
+
+    check_env(gymnasium.make(ID, **arguments).unwrapped)
+
+
+def test_gymnasium_tells_a_loss_from_the_end_of_time():
+    pytest.importorskip("gymnasium")
+    from tiltsim.env.gymnasium import GymnasiumEnv
+
+    env = GymnasiumEnv(scenario=scenario())
+    observation, info = env.reset(seed=0)
+    assert info == {}
+    ends = [env.step(np.zeros(8, np.float32))[2:4] for _ in range(10)]
+    assert ends == [(False, False)] * 9 + [(False, True)]
+    with pytest.raises(RuntimeError, match="call reset"):
+        env.step(np.zeros(8, np.float32))
+    env = GymnasiumEnv(scenario=scenario({"duration": 5.0}), max_position_error=0.2)
+    env.reset()
+    ended = False
+    while not ended:
+        observation, reward, ended, truncated, info = env.step(-np.ones(8, np.float32))
+    assert not truncated
+    assert reward == 0.0
+    assert "away from the reference" in info["cause"]
+    assert observation in env.observation_space
+
+
+def test_gymnasium_refuses_steps_outside_of_an_episode_and_actions_of_other_shapes():
+    pytest.importorskip("gymnasium")
+    from tiltsim.env.gymnasium import GymnasiumEnv
+
+    env = GymnasiumEnv()
+    with pytest.raises(RuntimeError, match="call reset"):
+        env.step(np.zeros(8))
+    env.reset(seed=1)
+    for action in (0.0, [0.0], np.zeros(4)):
+        with pytest.raises(ValueError, match=r"\(8,\) is wanted"):
+            env.step(action)
+    env.step(np.full(8, 5.0))  # clipped
+
+
+def test_zeros_hover_under_gymnasium():
+    pytest.importorskip("gymnasium")
+    from tiltsim.env.gymnasium import GymnasiumEnv
+
+    env = GymnasiumEnv()
+    env.reset(seed=0)
+    for _ in range(50):
+        observation, *_ = env.step(np.zeros(8, np.float32))
+    np.testing.assert_allclose(observation["position"], 0.0, atol=1e-6)
+
+
+def test_without_the_extra_one_line_says_what_to_install():
+    code = "import sys; sys.modules['gymnasium'] = None; import tiltsim.env.gymnasium"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.startswith("ModuleNotFoundError: tiltsim.env.gymnasium needs Gymnasium")
+    assert "pip install 'tiltsim[rl]'" in last
+
+
+def test_a_step_type_is_dm_envs():
+    assert isinstance(TiltrotorEnv(scenario()).reset(), dm_env.TimeStep)

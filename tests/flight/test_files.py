@@ -1,0 +1,230 @@
+"""Flights on disk: each file whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import tomllib
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from tiltsim.errors import InputError
+from tiltsim.flight.end import End
+from tiltsim.flight.flight import SAMPLE_FIELDS, Flight
+from tiltsim.flight.reading import load_flight
+from tiltsim.flight.writing import metrics_json, save_flight
+from tiltsim.scenario.document import scenario_toml, without_none
+from tiltsim.scenario.loading import parse_scenario
+from tiltsim.system import files
+from tiltsim.system.files import prepare_folder
+from tiltsim.vehicles.rotorcraft import COLUMN_UNITS
+
+NAMES = {"flight.parquet", "metrics.json", "scenario.toml"}
+SCENARIO = {"title": "by hand", "simulation": {"duration": 0.5, "seed": 5}}
+
+
+def flight(x=0.0):
+    samples = np.zeros((3, len(SAMPLE_FIELDS)))
+    samples[:, 0] = (0.0, 0.25, 0.5)
+    samples[:, SAMPLE_FIELDS.index("x")] = x
+    samples[:, -8:-4] = (-300.0, 300.0, -300.0, 300.0)
+    end = End("singular", 0.5, "why it ended")
+    return Flight(parse_scenario(SCENARIO, "by/hand"), samples, end, "python", 0.1)
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_saving_writes_three_files_and_nothing_else(tmp_path):
+    folder = tmp_path / "deep" / "down"
+    flight().save(folder)
+    assert set(contents(folder)) == NAMES
+
+
+def test_saving_again_replaces_all_three(tmp_path):
+    save_flight(flight(x=1.0), tmp_path)
+    before = contents(tmp_path)
+    save_flight(flight(x=2.0), tmp_path)
+    after = contents(tmp_path)
+    assert set(after) == NAMES
+    assert json.loads(after["metrics.json"])["final_position_error_x"] == -2.0
+    assert after["flight.parquet"] != before["flight.parquet"]
+
+
+@pytest.mark.parametrize("writer", ["write_table", "metrics_json", "scenario_toml"])
+@pytest.mark.parametrize("failure", [OSError(28, "No space left on device"), KeyboardInterrupt()])
+def test_a_write_that_fails_leaves_the_old_file_whole(tmp_path, monkeypatch, writer, failure):
+    save_flight(flight(x=1.0), tmp_path)
+    before = contents(tmp_path)
+
+    def half_written(_content, path=None, **_options):
+        if path is not None:
+            path.write_bytes(b"half")
+        raise failure
+
+    monkeypatch.setattr(pq if writer == "write_table" else files, writer, half_written)
+    with pytest.raises(type(failure)):
+        save_flight(flight(x=2.0), tmp_path)
+    after = contents(tmp_path)
+    file = {"write_table": "flight.parquet", "metrics_json": "metrics.json"}
+    failed = file.get(writer, "scenario.toml")
+    assert after[failed] == before[failed]
+    assert set(after) == NAMES, "no temporary file is left behind"
+
+
+def test_files_get_the_permissions_that_the_user_asked_for(tmp_path):
+    previous = os.umask(0o027)
+    try:
+        save_flight(flight(), tmp_path)
+    finally:
+        os.umask(previous)
+    modes = {path.name: path.stat().st_mode & 0o777 for path in tmp_path.iterdir()}
+    assert modes == dict.fromkeys(NAMES, 0o640)
+
+
+def test_metrics_json_is_a_flat_object_with_every_digit(tmp_path):
+    this = flight(x=0.1 + 0.2)
+    this.save(tmp_path)
+    text = (tmp_path / "metrics.json").read_text(encoding="utf-8")
+    assert json.loads(text) == this.metrics()
+    assert text == metrics_json(this.metrics())
+    assert text.endswith("}\n")
+
+
+def test_parquet_holds_every_column_with_its_unit(tmp_path):
+    this = flight(x=1.5)
+    this.save(tmp_path)
+    table = pq.read_table(tmp_path / "flight.parquet")
+    units = {field.name: field.metadata[b"unit"].decode() for field in table.schema}
+    assert units == dict(COLUMN_UNITS)
+    assert list(units) == list(COLUMN_UNITS)
+    for name, column in this.columns.items():
+        np.testing.assert_array_equal(table[name].to_numpy(), column)
+
+
+def test_parquet_says_where_the_flight_comes_from(tmp_path):
+    flight().save(tmp_path)
+    metadata = pq.read_schema(tmp_path / "flight.parquet").metadata
+    origin = {key.decode(): value.decode() for key, value in metadata.items()}
+    assert parse_scenario(json.loads(origin["scenario"]), "by/hand") == flight().scenario
+    assert origin["address"] == "by/hand"
+    assert origin["seed"] == "5"
+    assert origin["engine"] == "python"
+    assert (origin["end"], origin["cause"]) == ("singular", "why it ended")
+    assert {"tiltsim_version", "mujoco_version", "numpy_version"} <= set(origin)
+
+
+def test_scenario_toml_writes_out_the_defaults_and_reads_back(tmp_path):
+    flight().save(tmp_path)
+    document = tomllib.loads((tmp_path / "scenario.toml").read_text(encoding="utf-8"))
+    assert document["simulation"]["timestep"] == 0.001
+    assert document["simulation"]["duration"] == 0.5
+    assert parse_scenario(document, "by/hand") == flight().scenario
+    assert "mass" not in document["vehicle"], "TOML has no null"
+
+
+def test_scenario_toml_is_the_same_for_equal_scenarios():
+    assert scenario_toml(parse_scenario(SCENARIO)) == scenario_toml(parse_scenario(SCENARIO))
+
+
+def test_without_none_reaches_into_lists_and_tables():
+    document = {"a": None, "b": {"c": None, "d": 0}, "e": [{"f": None, "g": False}], "h": ()}
+    assert without_none(document) == {"b": {"d": 0}, "e": [{"g": False}], "h": []}
+
+
+def test_prepare_folder_makes_it_with_its_parents(tmp_path):
+    prepare_folder(tmp_path / "a" / "b")
+    prepare_folder(tmp_path / "a" / "b")
+    assert (tmp_path / "a" / "b").is_dir()
+
+
+def test_a_folder_that_cannot_be_made_is_an_input_error(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    for folder in (tmp_path / "file", tmp_path / "file" / "below"):
+        with pytest.raises(InputError) as caught:
+            prepare_folder(folder)
+        line = str(caught.value)
+        assert line.startswith(f"--out {folder}: cannot be created: ")
+        assert len(line.splitlines()) == 1
+
+
+def test_a_folder_that_is_not_writable_is_an_input_error(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda _path, mode: mode != os.W_OK)
+    with pytest.raises(InputError, match="not writable"):
+        prepare_folder(tmp_path)
+
+
+# --- reading back ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", ["", "flight.parquet"])
+def test_a_flight_reads_back_whole(tmp_path, path):
+    written = flight(x=0.1 + 0.2)
+    written.save(tmp_path)
+    read = load_flight(tmp_path / path)
+    np.testing.assert_array_equal(read.samples, written.samples)
+    assert read.scenario == written.scenario
+    assert read.scenario.address == "by/hand"
+    assert (read.end, read.engine, read.wall_time) == (written.end, "python", 0.1)
+    assert read.metrics() == written.metrics()
+
+
+def refused(path):
+    with pytest.raises(InputError) as caught:
+        load_flight(path)
+    line = str(caught.value)
+    assert len(line.splitlines()) == 1
+    assert str(path) in line
+    return line
+
+
+def test_a_missing_flight_is_an_input_error(tmp_path):
+    assert "no flight.parquet in this folder" in refused(tmp_path)
+    assert "no such file" in refused(tmp_path / "nothing.parquet")
+
+
+@pytest.mark.parametrize("content", [b"", b"PAR1 and then noise", b"\0" * 1000])
+def test_a_file_that_is_no_parquet_is_an_input_error(tmp_path, content):
+    (tmp_path / "flight.parquet").write_bytes(content)
+    assert "not a readable Parquet file" in refused(tmp_path)
+
+
+def test_a_truncated_file_is_an_input_error(tmp_path):
+    flight().save(tmp_path)
+    file = tmp_path / "flight.parquet"
+    file.write_bytes(file.read_bytes()[:-100])
+    assert "not a readable Parquet file" in refused(file)
+
+
+def test_a_foreign_parquet_file_is_an_input_error(tmp_path):
+    file = tmp_path / "other.parquet"
+    pq.write_table(pa.table({"time": [0.0]}), file)
+    assert "not a flight" in refused(file)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("scenario", "{", "not a flight"),
+        ("engine", "steam", "engine 'steam' is unknown"),
+        ("end", "bored", "end 'bored' is unknown"),
+        ("end_time", "late", "not a flight"),
+        ("wall_time", None, "lack 'wall_time'"),
+    ],
+)
+def test_wrong_metadata_are_an_input_error(tmp_path, key, value, words):
+    table = flight().to_arrow()
+    metadata = {**table.schema.metadata, key.encode(): (value or "").encode()}
+    if value is None:
+        del metadata[key.encode()]
+    pq.write_table(table.replace_schema_metadata(metadata), tmp_path / "flight.parquet")
+    assert words in refused(tmp_path / "flight.parquet")
+
+
+def test_a_missing_column_is_an_input_error(tmp_path):
+    pq.write_table(flight().to_arrow().drop_columns(["vx"]), tmp_path / "flight.parquet")
+    assert "no column vx" in refused(tmp_path / "flight.parquet")

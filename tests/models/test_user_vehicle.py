@@ -1,0 +1,377 @@
+"""A user's own vehicle by its MJCF file: what is measured, overridden, refused and flown."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import tiltsim
+from tiltsim.cli import main
+from tiltsim.errors import InputError
+from tiltsim.models.user_vehicle import read_own_vehicle
+from tiltsim.plants.command import Command
+from tiltsim.plants.flight_model import build_model
+from tiltsim.resources import shipped_folder
+
+DOCS = Path(__file__).parents[2] / "docs"
+TETRAHEDRON = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+def block(language):
+    """The first code block of a language in the documentation's example."""
+    text = (DOCS / "own_vehicle.md").read_text(encoding="utf-8")
+    return re.search(rf"```{language}\n(.*?)```", text, re.DOTALL)[1]
+
+
+XML = block("xml")
+
+
+@pytest.fixture
+def write(tmp_path):
+    def save(text=XML, **changes):
+        for old, new in changes.items():
+            assert old in text
+            text = text.replace(old, new)
+        path = tmp_path / "my_tiltrotor.xml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return save
+
+
+def changed(old, new, count=1):
+    assert old in XML
+    return XML.replace(old, new, count)
+
+
+def scenario(path, model="tiltrotor", vehicle=None, **tables):
+    vehicle = {"model": model, "mjcf": str(path), **(vehicle or {})}
+    tables.setdefault("simulation", {"duration": 0.2, "timestep": 0.002})
+    return tiltsim.parse_scenario({"vehicle": vehicle, **tables})
+
+
+def total_inertia(model):
+    """Mass and inertia of all that moves, about its centre of mass, world axes, from mj_crb."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    full = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, full)
+    mass = full[0, 0]
+    lever = full[3:6, :3] / mass
+    center = np.array([lever[2, 1], lever[0, 2], lever[1, 0]])
+    return mass, full[3:6, 3:6] - mass * (center @ center * np.eye(3) - np.outer(center, center))
+
+
+def test_the_documented_example_flies_and_meets_its_expectation(write, tmp_path, capsys):
+    write()
+    (tmp_path / "my_flight.toml").write_text(block("toml"), encoding="utf-8")
+    out = tmp_path / "out"
+    film = ["--out", str(out), "--rerun", str(tmp_path / "flight.rrd")]
+    assert main(["run", str(tmp_path / "my_flight.toml"), *film]) == 0
+    assert "ok  final_position_error_x" in capsys.readouterr().out
+    assert main(["plot", str(out), "--out", str(tmp_path / "flight.png")]) == 0
+    short = ["--set", "simulation.duration=0.1", "--set", "expect=[]", "--quiet"]
+    assert main(["run", str(out / "scenario.toml"), *short]) == 0
+
+
+def test_parameters_are_those_of_the_file(write):
+    own = read_own_vehicle(str(write()), "tiltrotor")
+    mass, inertia = total_inertia(mujoco.MjModel.from_xml_string(XML))
+    assert own.vehicle.mass == pytest.approx(mass, rel=1e-12)
+    np.testing.assert_allclose(own.vehicle[1:4], np.diag(inertia), rtol=1e-9)
+    assert own.vehicle[4:] == pytest.approx((0.2, 8e-6, 2.4e-7, 9.81), rel=1e-12)
+    assert own.misfit == ""
+    # A cylinder of 30 g about its diameter, and the armature.
+    pod = 0.03 * (0.015**2 / 4.0 + 0.04**2 / 12.0)
+    assert own.hinge_inertias == pytest.approx([pod + 2e-5] * 4, rel=1e-9)
+
+
+def test_a_file_placed_askew_is_measured_in_the_bodys_own_axes(write):
+    level = read_own_vehicle(str(write()), "tiltrotor")
+    turned = changed('<body name="vehicle">', '<body name="vehicle" pos="1 2 3" euler="1 0.5 2">')
+    askew = read_own_vehicle(str(write(turned)), "tiltrotor")
+    np.testing.assert_allclose(askew.vehicle, level.vehicle, rtol=1e-9)
+    assert askew.misfit == ""
+
+
+@pytest.mark.parametrize(
+    "own",
+    [
+        {},
+        {"mass": 0.9},
+        {"inertia": [4e-3, 5e-3, 8e-3]},
+        {"mass": 0.7, "inertia": [3e-3, 3.2e-3, 6e-3], "thrust_coefficient": 1e-5, "gravity": 1.6},
+    ],
+)
+def test_the_compiled_model_has_the_mass_and_inertia_asked_for(write, own):
+    this = scenario(write(), vehicle=own)
+    wanted = this.rotorcraft.resolve()
+    model = build_model(this)
+    mass, inertia = total_inertia(model)
+    assert mass == pytest.approx(wanted.mass, rel=1e-9)
+    np.testing.assert_allclose(inertia, np.diag(wanted[1:4]), atol=1e-9)
+    assert model.opt.gravity[2] == -wanted.gravity
+    assert model.actuator("thrust_2").gear[2] == wanted.thrust_coefficient
+    pods = [model.body_mass[model.body(f"pod_{i}").id] for i in (1, 2, 3, 4)]
+    assert pods == pytest.approx([0.03] * 4)  # never touched
+
+
+def test_a_centre_of_mass_off_the_origin_stays_where_it_is(write):
+    heavy = '<geom name="camera" type="sphere" size="0.02" pos="0.05 0.02 -0.03" mass="0.1"/>'
+    text = changed('<site name="imu"/>', heavy + '<site name="imu"/>')
+    path = write(text)
+    before, after = (build_model(scenario(path, vehicle=v)) for v in ({}, {"mass": 0.85}))
+    centers = []
+    for model in (before, after):
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        centers.append(data.subtree_com[model.body("vehicle").id])
+    np.testing.assert_allclose(centers[1], centers[0], atol=1e-12)
+    assert np.abs(centers[0]).max() > 1e-3
+    mass, inertia = total_inertia(after)
+    assert mass == pytest.approx(0.85)
+    np.testing.assert_allclose(
+        np.diag(inertia), read_own_vehicle(str(path), "tiltrotor").vehicle[1:4]
+    )
+
+
+SKEW = "".join(
+    f'<geom name="skew_{side}" type="sphere" size="0.01" pos="{x} {x} {z}" mass="0.05"/>'
+    for side, x, z in (("front", 0.05, 0.03), ("back", -0.05, -0.03))
+)
+
+
+@pytest.mark.parametrize("vehicle", [{}, {"mass": 0.9}, {"inertia": [4e-3, 5e-3, 8e-3]}])
+def test_products_of_inertia_stay_the_files(write, vehicle):
+    path = write(changed('<site name="imu"/>', SKEW + '<site name="imu"/>'))
+    _, inertia = total_inertia(build_model(scenario(path, vehicle=vehicle)))
+    products = [inertia[0, 1], inertia[0, 2], inertia[1, 2]]
+    np.testing.assert_allclose(products, [-2.5e-4, -1.5e-4, -1.5e-4], atol=1e-9)
+
+
+def off_centre(x):
+    return f'<geom name="battery" type="sphere" size="0.01" pos="{x} 0 0" mass="0.05"/>'
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ("", None),
+        (off_centre(1e-4), None),  # 7 micrometres: less than what must be aligned may be off
+        (off_centre(0.073), "does not know of its centre of mass at (0.005, 0, 0) m\n"),
+        (
+            SKEW,
+            "does not know of its products of inertia (xy, xz, yz) = "
+            "(-0.00025, -0.00015, -0.00015) kg m^2\n",
+        ),
+        (SKEW + off_centre(0.083), "(0.005, 0, 0) m and its products of inertia"),
+    ],
+)
+def test_what_the_law_does_not_know_is_told(write, tmp_path, capsys, more, words):
+    write(changed('<site name="imu"/>', more + '<site name="imu"/>'))
+    (tmp_path / "my_flight.toml").write_text(block("toml"), encoding="utf-8")
+    command = ["run", str(tmp_path / "my_flight.toml"), "--set", "simulation.duration=0.01"]
+    assert main([*command, "--set", "expect=[]"]) == 0
+    error = capsys.readouterr().err
+    assert (words is None and error == "") or words in error
+    assert error.count("\n") <= 1
+    assert main([*command, "--set", "expect=[]", "--quiet"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_an_own_controller_may_know_more(write, tmp_path, capsys):
+    write(changed('<site name="imu"/>', SKEW + off_centre(0.083) + '<site name="imu"/>'))
+    (tmp_path / "my_flight.toml").write_text(block("toml"), encoding="utf-8")
+    (tmp_path / "law.py").write_text(
+        "import tiltsim\n\ndef law(seen):\n    return tiltsim.Command(rotor_speeds=[470.0] * 4)\n"
+    )
+    command = ["run", str(tmp_path / "my_flight.toml"), "--set", "simulation.duration=0.01"]
+    assert main([*command, "--set", "expect=[]", "--controller", f"{tmp_path}/law.py:law"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_a_centre_of_mass_to_the_side_costs_what_the_documentation_says(write):
+    path = write(changed('<site name="imu"/>', off_centre(0.0073) + '<site name="imu"/>'))
+    flight = tiltsim.simulate(
+        scenario(
+            path,
+            simulation={"duration": 12.0, "timestep": 0.004},
+            initial={"rotor_speed": 470.0},
+            controller={"decoupling": "exact", "decoupler": "exact", "gains": "exact"},
+        )
+    )
+    vehicle = flight.scenario.rotorcraft.resolve()
+    turn = vehicle.mass * vehicle.gravity * 0.0005 / vehicle.inertia_yy
+    expected = -vehicle.gravity * (40.0 / 4000.0) * turn / 1.0
+    measured = flight.metrics()["final_position_error_x"]
+    assert measured == pytest.approx(expected, rel=0.01)
+    assert measured == pytest.approx(-0.093, abs=1e-3)
+
+
+def test_the_servo_is_the_scenarios(write):
+    servo = {"natural_frequency": 40.0, "damping_ratio": 0.7, "max_angle": 0.5}
+    model = build_model(scenario(write(), vehicle={"tilt_servo": servo}))
+    inertia = model.dof_M0[6]
+    assert model.actuator("tilt_1").gainprm[0] == pytest.approx(1600.0 * inertia)
+    assert model.actuator("tilt_1").biasprm[2] == pytest.approx(-2.0 * 0.7 * 40.0 * inertia)
+    np.testing.assert_array_equal(model.actuator("tilt_4").ctrlrange, [-0.5, 0.5])
+    np.testing.assert_array_equal(model.joint("tilt_3").range, [-0.5, 0.5])
+
+
+@pytest.mark.parametrize("model", ["tiltrotor", "quadrotor"])
+def test_a_shipped_file_as_ones_own_flies_the_shipped_flight(model):
+    file = shipped_folder("mjcf") / f"{model}.xml"
+    law = {"quadrotor": {"law": "yaw_position"}, "tiltrotor": {"decoupler": "exact"}}[model]
+    tables = {
+        "simulation": {"duration": 0.5, "timestep": 0.002, "engine": "python"},
+        "controller": law,
+        "initial": {"attitude": [0.05, -0.1, 0.1]},
+    }
+    theirs = tiltsim.simulate(tiltsim.parse_scenario({"vehicle": {"model": model}, **tables}))
+    ours = tiltsim.simulate(scenario(file, model, **tables))
+    np.testing.assert_allclose(ours.samples, theirs.samples, atol=1e-7)
+
+
+def test_meshes_beside_the_file_are_found(write, tmp_path):
+    (tmp_path / "wing.obj").write_text(TETRAHEDRON, encoding="utf-8")
+    text = changed(
+        "<worldbody>", '<asset><mesh name="wing" file="wing.obj"/></asset>\n  <worldbody>'
+    )
+    text = text.replace('<site name="imu"/>', '<site name="imu"/><geom type="mesh" mesh="wing"/>')
+    assert build_model(scenario(write(text))).nmesh == 1
+
+
+def test_an_edited_file_is_read_again(write):
+    path = write()
+    assert scenario(path).rotorcraft.resolve().mass == pytest.approx(0.68)
+    path = write(changed('mass="0.5"', 'mass="0.6"'))
+    assert scenario(path).rotorcraft.resolve().mass == pytest.approx(0.78)
+    assert total_inertia(build_model(scenario(path)))[0] == pytest.approx(0.78)
+
+
+def rename(name):
+    return lambda: XML.replace(f'name="{name}"', 'name="other"')
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (lambda: XML.replace('"vehicle">\n      <free', '"hull_body">\n      <free'), ["no body"]),
+        (lambda: changed('joint name="tilt_2"', 'joint name="hinge"'), ["tilt_2"]),
+        (rename("imu"), ["no site 'imu'", "rotor_4"]),
+        (rename("rotor_3"), ["rotor_3"]),
+        (rename("thrust_4"), ["no actuator 'thrust_4'", "rotor_speed_1"]),
+        (rename("rotor_speed_1"), ["no actuator 'rotor_speed_1'"]),
+        (lambda: changed('position name="tilt_1"', 'position name="tlit_1"'), ["tilt_1"]),
+        (
+            lambda: changed("<actuator>", '<actuator><motor name="fan" site="imu"/>'),
+            ["actuator 'fan' is not one of a tiltrotor"],
+        ),
+        (
+            lambda: changed('joint name="tilt_1" axis', 'joint name="tilt_1" type="slide" axis'),
+            ["joint 'tilt_1' must be a hinge"],
+        ),
+        (
+            lambda: changed('gear="0 0 8e-6 0 0 2.4e-7"', 'gear="0 0 8e-6 0 0 -2.4e-7"'),
+            ["'thrust_1' must be a general one with gear 0 0 Kf 0 0 +Km"],
+        ),
+        (
+            lambda: changed('gear="0 0 8e-6 0 0 2.4e-7"', 'gear="0 0 9e-6 0 0 2.4e-7"'),
+            ["same Kf and Km"],
+        ),
+        (
+            lambda: changed('"thrust_2" site="rotor_2"', '"thrust_2" site="rotor_1"'),
+            ["'thrust_2' must act on the site 'rotor_2'"],
+        ),
+        (
+            lambda: changed('<position name="tilt_3" joint', '<motor name="tilt_3" joint').replace(
+                'joint="tilt_3" class="pod"/>\n    <position name="tilt_4"',
+                'joint="tilt_3"/>\n    <position name="tilt_4"',
+            ),
+            ["'tilt_3' must be a position servo"],
+        ),
+        (lambda: changed('dyntype="integrator"', 'dyntype="none"'), ["dyntype integrator"]),
+        (lambda: changed('gravity="0 0 -9.81"', 'gravity="1 0 -9.81"'), ["must point down z"]),
+        (lambda: "<mujoco", ["MuJoCo says"]),
+        (lambda: "<mujoco><worldbody/></mujoco>", ["no body 'vehicle'"]),
+        (lambda: changed('pos="0 0.2 0"', 'pos="0 0.25 0"'), ["'rotor_2' lies at (0, 0.25, 0)"]),
+        (lambda: changed('axis="0 1 0"', 'axis="0 -1 0"'), ["'tilt_2' turns about (0, -1, 0)"]),
+        (
+            lambda: changed('<site name="rotor_4"/>', '<site name="rotor_4" euler="0.2 0 0"/>'),
+            ["z axis of site 'rotor_4'", "attitude_altitude law is for four equal arms"],
+        ),
+    ],
+)
+def test_what_is_wrong_is_told_by_name(write, text, words):
+    path = write(text())
+    with pytest.raises(InputError) as caught:
+        scenario(path)
+    message = str(caught.value)
+    assert "vehicle.mjcf" in message
+    assert "\n" not in message
+    for word in words:
+        assert word in message
+
+
+def test_the_actuators_order_counts(write):
+    text = changed('    <position name="tilt_1" joint="tilt_1" class="pod"/>\n', "")
+    text = text.replace(
+        '    <general name="thrust_1"',
+        '    <position name="tilt_1" joint="tilt_1" class="pod"/>\n    <general name="thrust_1"',
+    )
+    with pytest.raises(InputError, match="actuators stand in another order than tilt_1, tilt_2"):
+        scenario(write(text))
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "words"),
+    [
+        ({"arm_length": 0.3}, ["vehicle.arm_length", "mjcf has its own"]),
+        ({"pod": {"mass": 0.1, "inertia": 1e-4}}, ["vehicle.pod", "mjcf has its own"]),
+        ({"mjcf": "nowhere.xml"}, ["cannot be read: No such file"]),
+        ({"model": "quadrotor"}, ["no actuator", "joint 'tilt_1' is not one of a quadrotor"]),
+    ],
+)
+def test_scenarios_that_contradict_the_file_are_refused(write, vehicle, words):
+    with pytest.raises(InputError) as caught:
+        scenario(write(), vehicle=vehicle)
+    assert any(word in str(caught.value) for word in words)
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "words"),
+    [
+        ({"mass": 0.1}, "carries have 0.12 kg already"),
+        ({"inertia": [1e-3, 1e-3, 1.5e-3]}, "principal moments"),
+    ],
+)
+def test_a_mass_that_no_body_makes_up_for_is_refused(write, vehicle, words):
+    with pytest.raises(InputError, match=words):
+        build_model(scenario(write(), vehicle=vehicle))
+
+
+def test_ones_own_controller_flies_any_layout(write):
+    text = changed('pos="0 0.2 0"', 'pos="0 0.2 0.05"')
+    flight = tiltsim.simulate(
+        scenario(
+            write(text),
+            controller={"law": "python", "function": "test"},
+            simulation={"duration": 0.3, "timestep": 0.002, "control_timestep": 0.01},
+        ),
+        controller=lambda seen: Command(thrusts=[seen.vehicle.mass * 9.81 / 4.0] * 4),
+    )
+    assert flight.end.kind == "completed"
+    assert abs(flight["z"][-1]) < 1e-6
+
+
+def test_a_ground_needs_geoms_to_touch_it(write):
+    with pytest.raises(InputError, match=r"ground.*needs a geom 'ground', and geoms"):
+        scenario(write(), ground={"height": -1.0})
+    path = write(changed('<geom name="hull" type', '<geom name="hull_collision" type'))
+    model = build_model(scenario(path, ground={"height": -1.0}))
+    assert model.geom("hull_collision").contype[0] == 1
+    assert model.geom("ground").pos[2] == -1.0

@@ -1,0 +1,745 @@
+"""A user's own controller: what it sees and commands, and what is said when it fails."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+import tiltsim
+from tiltsim.cli import main
+from tiltsim.errors import InputError
+from tiltsim.flight.reading import load_flight
+from tiltsim.laws.assembling import control_setup, loop_of
+from tiltsim.laws.commanded import COMMANDED
+from tiltsim.laws.tiltrotor import tiltrotor_state
+from tiltsim.plants.command import Command, checked
+from tiltsim.plants.commanded_plant import CommandedPlant
+from tiltsim_controllers.gaits import tilt_reference
+from tiltsim_controllers.laws.attitude_altitude import Parameters, rotor_accelerations
+from tiltsim_controllers.references.trajectories import reference_derivatives
+from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
+
+HOVER = """
+import numpy as np
+import tiltsim
+
+def law(seen):
+    vehicle, error = seen.vehicle, seen.reference.position - seen.position
+    wanted = 1.0 * error + 1.6 * (seen.reference.velocity - seen.velocity)
+    lean = np.array([-wanted[1], wanted[0], 0.0]) / vehicle.gravity
+    moment = np.array(vehicle[1:4]) * (64 * (lean - seen.attitude) - 16 * seen.body_rates)
+    lift = vehicle.mass * (vehicle.gravity + wanted[2])
+    roll, pitch, yaw = moment
+    drag = vehicle.drag_coefficient / vehicle.thrust_coefficient
+    thrusts = lift / 4 + np.array([-pitch, roll, pitch, -roll]) / (2 * vehicle.arm_length)
+    return tiltsim.Command(thrusts=thrusts + yaw / (4 * drag) * np.array([1, -1, 1, -1]))
+
+class Slow:
+    "Counts what it was asked, and fails when asked twice about one moment."
+    def __init__(self):
+        self.times = []
+    def reset(self, scenario):
+        self.times.clear()
+        self.step = scenario.simulation.control_timestep
+    def __call__(self, seen):
+        assert not self.times or seen.time > self.times[-1]
+        self.times.append(seen.time)
+        return law(seen)
+
+not_callable = 3.0
+"""
+ROOT = Path(__file__).parents[2]
+MODELS = ("tiltrotor", "quadrotor")
+STILL = Command(thrusts=[1.05105] * 4)  # a quarter of the weight each, nearly
+
+each_model = pytest.mark.parametrize("model", MODELS)
+
+
+@pytest.fixture(scope="module")
+def hover_file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("laws") / "my_law.py"
+    path.write_text(HOVER, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def law(hover_file):
+    namespace = {}
+    exec(compile(HOVER, str(hover_file), "exec"), namespace)
+    return namespace["law"]
+
+
+def scenario(simulation=None, **tables):
+    simulation = {"duration": 0.3, "control_timestep": 0.01, **(simulation or {})}
+    tables.setdefault("controller", {"law": "python", "function": "test"})
+    return tiltsim.parse_scenario({**tables, "simulation": simulation})
+
+
+# --- flying ------------------------------------------------------------------------------------
+
+
+@each_model
+def test_a_function_hovers_either_vehicle_at_its_setpoint(law, model):
+    flight = tiltsim.simulate(
+        scenario(
+            {"duration": 12.0, "timestep": 0.002},
+            vehicle={"model": model},
+            initial={"attitude": [0.1, -0.1, 0.3]},
+            reference={"type": "setpoint", "position": [0.5, -0.5, 0.5]},
+        ),
+        controller=law,
+    )
+    metrics = flight.metrics()
+    assert flight.end.kind == "completed"
+    for axis in "xyz":
+        assert abs(metrics[f"final_position_error_{axis}"]) < 1e-3
+    hover = PRESETS["ar_drone_2"].hover_rotor_speed
+    np.testing.assert_allclose(
+        [flight[f"rotor_speed_{i}"][-1] for i in (1, 2, 3, 4)], hover * np.array(SPIN), rtol=1e-3
+    )
+
+
+def test_the_untilted_tiltrotor_flies_as_the_quadrotor_does(law):
+    both = [
+        tiltsim.simulate(
+            scenario(vehicle={"model": model}, initial={"attitude": [0.2, 0.1, -0.3]}),
+            controller=law,
+        )
+        for model in MODELS
+    ]
+    for column in ("x", "z", "roll", "r", "rotor_speed_2", "thrust_3"):
+        np.testing.assert_allclose(both[0][column], both[1][column], atol=1e-9)
+
+
+LATE = {"simulation": {"control_latency": 0.006}}
+LAG = {"vehicle": {"rotor_time_constant": 0.02}}
+SLOW = {"vehicle": {"tilt_servo": {"natural_frequency": 30.0, "max_rate": 0.5}}}
+NOISE = {
+    "sensors": {
+        **{"position_noise": 0.01, "velocity_noise": 0.02, "attitude_noise": 0.005},
+        **{"body_rates_noise": 0.01, "position_bias": [0.1, 0.0, 0.0], "sample_time": 0.004},
+    }
+}
+FAULTS = {
+    "fault": [
+        {"type": "partial_thrust", "rotor": 1, "time": 0.1, "factor": 0.97},
+        {"type": "stuck_servo", "rotor": 2, "time": 0.2},
+    ]
+}
+WIND = {
+    "air": {
+        "drag": {"linear": [0.2, 0.2, 0.1]},
+        "wind": [3.0, 1.0, 0.0],
+        "turbulence": {"wind_at_6m": 4.0},
+    }
+}
+LIMITS = {"vehicle": {"min_rotor_speed": 280.0, "max_rotor_speed": 390.0}}
+LAYERS = {
+    "ideal": [],
+    "late": [LATE],
+    "lag": [LAG],
+    "slow servos": [SLOW],
+    "noise": [NOISE],
+    "faults": [FAULTS],
+    "wind": [WIND],
+    "wrong model": [{"model_error": {"mass": 1.05, "thrust_coefficient": 0.98}}],
+    "everything": [LATE, LAG, SLOW, NOISE, FAULTS, WIND, LIMITS],
+}
+
+
+def merged(base, *layers):
+    """Tables of a scenario with those of layers; the keys of each table side by side."""
+    tables = dict(base)
+    for layer in layers:
+        for name, table in layer.items():
+            tables[name] = tables.get(name, {}) | table if isinstance(table, dict) else table
+    return tables
+
+
+@pytest.mark.parametrize("layers", LAYERS)
+def test_a_shipped_law_flown_as_a_users_own_flies_the_same_flight(layers):
+    """Sampled rotor accelerations and the planned gait are just what a held law of ours does.
+
+    Late commands of ours are handed on by integration, which rounds; all else is the same bits.
+    """
+    tables = {
+        "simulation": {"duration": 0.4, "control_timestep": 0.002, "engine": "python"},
+        "gait": {"type": "trot_continuous", "amplitude": 0.3, "period": 2.0},
+        "controller": {"decoupling": "exact", "gains": "exact"},
+    }
+    ideal = tiltsim.parse_scenario(tables)
+    shipped = tiltsim.parse_scenario(merged(tables, *LAYERS[layers]))
+    parameters = control_setup(shipped).parameters
+    while not isinstance(parameters, Parameters):
+        parameters = parameters.law
+
+    def own(seen):
+        state = tiltrotor_state(
+            [*seen.position, *seen.quaternion, *seen.tilt_angles],
+            [*seen.velocity, *seen.body_rates, *seen.tilt_rates],
+            np.array(SPIN) * seen.rotor_speeds,
+        )
+        rates = rotor_accelerations(seen.time, tuple(map(float, state)), parameters)
+        return Command(rotor_accelerations=np.array(SPIN) * rates)
+
+    ours, theirs = tiltsim.simulate(shipped), tiltsim.simulate(shipped, controller=own)
+    assert theirs.scenario.controller.law == "python"
+    rounding = 1e-9 if shipped.simulation.latency_steps else 0.0
+    # The own law's samples have what the servos were told besides.
+    common = loop_of(shipped).sample_fields
+    places = [loop_of(theirs.scenario).sample_fields.index(field) for field in common]
+    np.testing.assert_allclose(
+        theirs.samples[:, places], ours.samples, rtol=rounding, atol=rounding
+    )
+    if layers != "ideal":
+        apart = np.abs(tiltsim.simulate(ideal)["z"] - theirs["z"]).max()
+        assert apart > 1e-6
+
+
+@pytest.mark.parametrize("command", ["thrusts", "rotor_speeds"])
+def test_lagging_rotors_approach_a_commanded_speed(command):
+    start, told, lag, late = 300.0, 350.0, 0.05, 0.02
+    value = (
+        told if command == "rotor_speeds" else PRESETS["ar_drone_2"].thrust_coefficient * told**2
+    )
+    flight = tiltsim.simulate(
+        scenario({"duration": 0.2, "control_latency": late}, vehicle={"rotor_time_constant": lag}),
+        controller=lambda _: Command(**{command: [value] * 4}),
+    )
+    time = flight["time"]
+    approach = told + (start - told) * np.exp(-(time - late) / lag)
+    for rotor, spin in enumerate(SPIN, start=1):
+        expected = spin * np.where(time <= late, start, approach)
+        np.testing.assert_allclose(flight[f"rotor_speed_{rotor}"], expected, rtol=1e-7)
+
+
+def test_late_speeds_are_taken_at_once_when_they_arrive():
+    def law(seen):
+        return Command(rotor_speeds=[300.0 + 1e3 * seen.time] * 4, tilt_angles=[seen.time] * 4)
+
+    flight = tiltsim.simulate(
+        scenario({"duration": 0.1, "control_latency": 0.03, "record_timestep": 0.005}),
+        controller=law,
+    )
+    time = flight["time"]
+    sampled = 0.01 * np.floor((time - 0.005) / 0.01 + 1e-6)  # the sample in force just before
+    arrived = np.maximum(sampled - 0.03, 0.0)
+    np.testing.assert_allclose(flight["rotor_speed_2"], 300.0 + 1e3 * arrived, atol=1e-6)
+    np.testing.assert_allclose(flight["alpha_ref_3"], arrived, atol=1e-9)
+
+
+def test_sensors_tell_the_controller_and_not_the_log():
+    seen = []
+
+    def look(observation):
+        seen.append(observation)
+        return STILL
+
+    errors = merged(NOISE, {"sensors": {"position_noise": 0.0}})
+    flight = tiltsim.simulate(scenario({"record_timestep": 0.01}, **errors), controller=look)
+    x, roll, p = (
+        [getattr(s, name)[0] for s in seen] for name in ("position", "attitude", "body_rates")
+    )
+    np.testing.assert_allclose(x - flight["x"][:-1], 0.1, atol=1e-12)
+    assert 0.002 < np.std(roll - flight["roll"][:-1]) < 0.01
+    assert 0.004 < np.std(p - flight["p"][:-1]) < 0.02
+    np.testing.assert_array_equal(seen[3].tilt_angles, 0.0)
+
+
+def test_both_vehicles_fly_in_the_wind(law):
+    both = [
+        tiltsim.simulate(
+            scenario({"duration": 1.0}, vehicle={"model": model}, **WIND), controller=law
+        )
+        for model in MODELS
+    ]
+    assert both[0]["air_vx"].mean() == pytest.approx(3.0, abs=1.0)
+    assert both[0]["x"][-1] > 0.05
+    for column in ("x", "z", "roll", "air_vx"):
+        np.testing.assert_allclose(both[0][column], both[1][column], atol=1e-9)
+
+
+def test_what_is_seen_is_the_state_the_reference_and_the_gait():
+    seen = []
+
+    def look(observation):
+        seen.append(observation)
+        return STILL
+
+    flown = tiltsim.simulate(
+        scenario(
+            {"duration": 0.01, "control_timestep": 0.005, "record_timestep": 0.005},
+            initial={
+                "position": [1.0, 2.0, 3.0],
+                "velocity": [0.1, 0.2, 0.3],
+                "attitude": [0.1, 0.2, 0.3],
+                "angular_velocity": [0.01, 0.02, 0.03],
+                "rotor_speed": [310.0, 320.0, 330.0, 340.0],
+            },
+            gait={"type": "trot_continuous", "amplitude": 0.3, "period": 1.0},
+            reference={"type": "circle", "radius": 2.0, "angular_frequency": 0.5, "yaw": 0.2},
+        ),
+        controller=look,
+    )
+    first, second = seen
+    assert (first.time, second.time) == (0.0, pytest.approx(0.005))
+    np.testing.assert_array_equal(first.position, [1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(first.velocity, [0.1, 0.2, 0.3])
+    np.testing.assert_allclose(first.attitude, [0.1, 0.2, 0.3])
+    np.testing.assert_array_equal(first.body_rates, [0.01, 0.02, 0.03])
+    np.testing.assert_array_equal(first.rotor_speeds, [310.0, 320.0, 330.0, 340.0])
+    rotated = np.zeros(3)
+    mujoco.mju_rotVecQuat(rotated, np.array([0.0, 0.0, 1.0]), first.quaternion)
+    assert rotated[2] == pytest.approx(np.cos(0.1) * np.cos(0.2))
+    sample = dict(zip(COMMANDED["tiltrotor"].sample_fields, flown.samples[1], strict=True))
+    assert sample["time"] == pytest.approx(second.time)
+    np.testing.assert_array_equal(second.position, [sample[axis] for axis in "xyz"])
+    np.testing.assert_array_equal(second.body_rates, [sample[axis] for axis in "pqr"])
+    np.testing.assert_array_equal(second.tilt_angles, [sample[f"alpha_{i}"] for i in (1, 2, 3, 4)])
+    wanted = reference_derivatives(second.time, flown.scenario.reference.parameters)
+    np.testing.assert_array_equal(second.reference.position, wanted[:3])
+    np.testing.assert_array_equal(second.reference.velocity, wanted[3:6])
+    np.testing.assert_array_equal(second.reference.acceleration, wanted[6:9])
+    np.testing.assert_array_equal(second.reference.attitude, [0.0, 0.0, 0.2])
+    gait = flown.scenario.gait.plan(flown.scenario.vehicle.resolve())
+    planned = tilt_reference(second.time, gait.parameters, gait.table)
+    np.testing.assert_array_equal(second.reference.tilt_angles, planned[:4])
+    np.testing.assert_array_equal(second.reference.tilt_rates, planned[4:])
+    # The servos keep to the plan, for the command left the tilt angles out.
+    np.testing.assert_allclose(second.tilt_angles, planned[:4], atol=0.01)
+    assert second.vehicle == flown.scenario.vehicle.resolve()
+
+
+def test_changing_an_observation_changes_nothing_else():
+    def meddle(seen):
+        seen.position[:] = 1e6
+        seen.quaternion[:] = 0.0
+        return STILL
+
+    calm = tiltsim.simulate(scenario(), controller=lambda _: STILL)
+    meddled = tiltsim.simulate(scenario(), controller=meddle)
+    np.testing.assert_array_equal(calm.samples, meddled.samples)
+
+
+@pytest.mark.parametrize(
+    ("command", "expected"),
+    [
+        (Command(rotor_speeds=[300.0, 310.0, 320.0, 330.0]), [300.0, 310.0, 320.0, 330.0]),
+        (Command(thrusts=[8.048e-6 * 9e4] * 4), [300.0] * 4),
+        (Command(thrusts=[-8.048e-6 * 9e4] * 4), [-300.0] * 4),
+        (Command(rotor_accelerations=[10.0, -20.0, 0.0, 5.0]), [301.0, 298.0, 300.0, 300.5]),
+    ],
+)
+@each_model
+def test_rotors_do_as_they_are_told(command, expected, model):
+    flight = tiltsim.simulate(
+        scenario({"duration": 0.1}, vehicle={"model": model}), controller=lambda _: command
+    )
+    speeds = [flight[f"rotor_speed_{i}"][-1] for i in (1, 2, 3, 4)]
+    np.testing.assert_allclose(speeds, np.array(SPIN) * expected, rtol=1e-12)
+    thrusts = [flight[f"thrust_{i}"][-1] for i in (1, 2, 3, 4)]
+    np.testing.assert_allclose(thrusts, 8.048e-6 * np.array(expected) * np.abs(expected))
+
+
+@each_model
+def test_commanded_thrust_is_what_lifts_the_vehicle(model):
+    vehicle = PRESETS["ar_drone_2"]
+    thrust = 1.2 * vehicle.mass * vehicle.gravity / 4.0
+    flight = tiltsim.simulate(
+        scenario({"duration": 1.0}, vehicle={"model": model}),
+        controller=lambda _: Command(thrusts=[thrust] * 4),
+    )
+    assert flight["z"][-1] == pytest.approx(0.5 * 0.2 * vehicle.gravity, rel=1e-9)
+
+
+def test_tilt_angles_reach_the_servos_and_the_log():
+    angles = [0.3, -0.2, 0.1, 0.4]
+    flight = tiltsim.simulate(
+        scenario(), controller=lambda _: Command(thrusts=[1.0] * 4, tilt_angles=angles)
+    )
+    for i, angle in enumerate(angles, start=1):
+        assert flight[f"alpha_{i}"][-1] == pytest.approx(angle, abs=1e-6)
+        np.testing.assert_array_equal(flight[f"alpha_ref_{i}"][1:], angle)
+    assert flight["alpha_ref_1"][0] == 0.0
+
+
+@each_model
+def test_rotor_limits_hold(model):
+    def law(seen):
+        return Command(rotor_speeds=[1e3, 1e3, 0.0, -50.0])
+
+    limits = {"model": model, "min_rotor_speed": 100.0, "max_rotor_speed": 500.0}
+    flight = tiltsim.simulate(scenario(vehicle=limits), controller=law)
+    speeds = [spin * flight[f"rotor_speed_{i}"][-1] for i, spin in enumerate(SPIN, start=1)]
+    assert speeds == [500.0, 500.0, 100.0, 100.0]
+
+
+@each_model
+def test_rotors_whose_least_speed_is_0_stop_and_do_not_reverse(model):
+    def law(seen):
+        return Command(rotor_accelerations=[-4e4, 0.0, -4e4, 0.0])
+
+    for limits, stopped in (({"min_rotor_speed": 0.0}, True), ({}, False)):
+        flight = tiltsim.simulate(scenario(vehicle={"model": model, **limits}), controller=law)
+        metrics = flight.metrics()
+        assert (metrics["min_rotor_speed"] == 0.0) == stopped
+        assert (metrics["saturated_fraction"] > 0.5) == stopped
+
+
+@pytest.mark.parametrize(("control_timestep", "calls"), [(0.0, 30), (0.001, 30), (0.005, 6)])
+def test_asked_at_every_control_sample(control_timestep, calls):
+    times = []
+
+    def law(seen):
+        times.append(seen.time)
+        return STILL
+
+    tiltsim.simulate(
+        scenario({"duration": 0.03, "control_timestep": control_timestep}), controller=law
+    )
+    step = control_timestep or 0.001
+    np.testing.assert_allclose(times, step * np.arange(calls), atol=1e-12)
+
+
+# --- memory and repetition -----------------------------------------------------------------------
+
+
+def test_a_class_is_made_anew_and_an_object_is_reset(hover_file):
+    class Integral:
+        made = 0
+
+        def __init__(self):
+            Integral.made += 1
+            self.sum = 0.0
+
+        def reset(self, scenario):
+            self.sum = 0.1 * scenario.simulation.control_timestep
+
+        def __call__(self, seen):
+            self.sum += 0.01
+            return Command(thrusts=[1.0 + self.sum] * 4)
+
+    law = Integral()
+    flights = [tiltsim.simulate(scenario(), controller=law) for _ in range(2)]
+    flights += [tiltsim.simulate(scenario(), controller=Integral)]
+    assert Integral.made == 2
+    for flight in flights[1:]:
+        np.testing.assert_array_equal(flight.samples, flights[0].samples)
+
+
+@pytest.mark.parametrize("latency", [0.0, 0.006])
+def test_a_moment_is_lived_through_once_even_where_the_flight_is_lost(latency):
+    times = []
+
+    def law(seen):
+        assert not times or seen.time > times[-1], "asked twice"
+        times.append(seen.time)
+        return Command(rotor_accelerations=[1e6] * 4)  # 1e5 rad/s after 0.1 s
+
+    flight = tiltsim.simulate(
+        scenario(
+            {
+                **{"duration": 1.0, "record_timestep": 0.05, "control_timestep": 0.003},
+                "control_latency": latency,
+            }
+        ),
+        controller=law,
+    )
+    assert flight.end.kind == "diverged"
+    assert flight.end.time == pytest.approx(0.1 + latency, abs=2e-3)
+    assert "beyond 1e10" in flight.end.cause  # thrust controls are squares of speeds
+
+
+@pytest.mark.parametrize("layers", ["ideal", "everything"])
+def test_a_saved_state_restarts_under_held_accelerations(layers):
+    tables = merged({"simulation": {"control_timestep": 0.002}}, *LAYERS[layers])
+    plant = CommandedPlant(scenario(**tables))
+
+    def tell(speed):
+        told = Command(rotor_speeds=[speed] * 4, tilt_angles=[0.1, 0.0, 0.0, speed / 1e4])
+        plant.apply(checked(told, tilting=True))
+        plant.advance(2)
+        plant.apply(checked(Command(rotor_accelerations=[5.0, -5.0, 3.0, 1.0]), tilting=True))
+        plant.advance(1)
+
+    for speed in (300.0, 310.0, 320.0):
+        tell(speed)
+    state, seen = plant.state, plant.observe()
+    ends = []
+    for _ in range(2):
+        plant.state = state
+        assert plant.observe() == seen
+        for speed in (330.0, 340.0, 350.0):
+            tell(speed)
+        ends.append(plant.observe())
+    assert ends[0] == ends[1]
+    assert ends[0] != seen
+
+
+# --- mistakes ------------------------------------------------------------------------------------
+
+
+def raises(seen):
+    return 1.0 / (0.0 if seen.time > 0.0349 else 1.0) and STILL
+
+
+class MuteError(Exception):
+    def __str__(self):
+        raise ValueError
+
+    __repr__ = __str__
+
+
+def raises_unspeakably(seen):
+    if seen.time > 0.0349:
+        raise MuteError
+    return STILL
+
+
+def leaves(seen):
+    if seen.time > 0.0349:
+        sys.exit(5)
+    return STILL
+
+
+def returning(value):
+    return lambda seen: value if seen.time > 0.0349 else STILL
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        (raises, ["raises raised ZeroDivisionError: float division by zero", "line "]),
+        (returning(None), ["returned None; a tiltsim.Command is wanted"]),
+        (returning([1, 2, 3, 4]), ["returned [1, 2, 3, 4]; a tiltsim.Command"]),
+        (returning(Command()), ["nothing for the rotors; one of thrusts, rotor_speeds"]),
+        (
+            returning(Command(thrusts=[1] * 4, rotor_speeds=[1] * 4)),
+            ["returned thrusts and rotor_speeds; one of"],
+        ),
+        (returning(Command(thrusts=[1.0] * 3)), ["thrusts of shape (3,); (4,) is wanted"]),
+        (returning(Command(thrusts=1.0)), ["thrusts of shape ()"]),
+        (returning(Command(thrusts=["a"] * 4)), ["thrusts = ['a', 'a', 'a', 'a']; 4 numbers"]),
+        (returning(Command(rotor_speeds=[1, 2, np.nan, 4])), ["rotor_speeds[2] = nan; it must"]),
+        (
+            returning(Command(thrusts=[1] * 4, tilt_angles=[0, 0, 0, np.inf])),
+            ["tilt_angles[3] = inf"],
+        ),
+        (returning(Command(thrusts=[10**400] * 4)), ["; 4 numbers are wanted"]),
+        (returning(MuteError()), ["returned a MuteError; a tiltsim.Command is wanted"]),
+        (leaves, ["leaves raised SystemExit: 5"]),
+        (raises_unspeakably, ["raises_unspeakably raised MuteError (test_own_controller.py"]),
+    ],
+)
+def test_a_failing_controller_ends_the_flight_with_one_line_and_a_log(law, words):
+    flight = tiltsim.simulate(scenario({"control_timestep": 0.005}), controller=law)
+    assert (flight.end.kind, flight.end.time) == ("failed", pytest.approx(0.035))
+    assert flight.end.cause.startswith("the controller ")
+    assert "\n" not in flight.end.cause
+    for word in words:
+        assert word in flight.end.cause
+    np.testing.assert_allclose(flight["time"], [0.0, 0.01, 0.02, 0.03, 0.035])
+    assert flight.metrics()["diverged"] is True
+
+
+def test_failing_at_a_recorded_sample_does_not_record_it_twice():
+    def law(seen):
+        raise RuntimeError
+
+    flight = tiltsim.simulate(scenario(), controller=law)
+    assert flight.end.cause.partition(" (")[0].endswith("law raised RuntimeError")
+    assert len(flight) == 1
+    assert flight.metrics()["duration"] == 0.0
+
+
+def test_a_failing_reset_is_told_like_a_failing_law():
+    class Law:
+        def reset(self, scenario):
+            raise KeyError("gain")
+
+        def __call__(self, seen):
+            return STILL
+
+    assert "raised KeyError: 'gain'" in tiltsim.simulate(scenario(), controller=Law()).end.cause
+
+
+def test_the_quadrotor_has_no_tilt_servos():
+    flight = tiltsim.simulate(
+        scenario(vehicle={"model": "quadrotor"}),
+        controller=lambda _: Command(thrusts=[1.0] * 4, tilt_angles=[0.0] * 4),
+    )
+    assert "tilt_angles; this vehicle has no tilt servos" in flight.end.cause
+
+
+def test_an_interrupt_within_the_controller_interrupts_the_flight():
+    def law(seen):
+        if seen.time > 0.1:
+            raise KeyboardInterrupt
+        return STILL
+
+    assert tiltsim.simulate(scenario(), controller=law).end.kind == "interrupted"
+
+
+def test_a_controller_must_be_callable():
+    with pytest.raises(InputError, match="controller = 3: must be callable"):
+        tiltsim.simulate(scenario(), controller=3)
+
+
+@pytest.mark.parametrize(
+    ("tables", "words"),
+    [
+        ({"simulation": {"plant": "thesis"}}, ["simulation.plant", "mujoco alone"]),
+        ({"simulation": {"engine": "native"}}, ["simulation.engine", "python alone"]),
+        ({"controller": {"law": "python"}}, ["controller.function: missing"]),
+        (
+            {
+                "vehicle": {"model": "quadrotor"},
+                "simulation": {"control_timestep": 0.01, "control_latency": 0.02},
+            },
+            ["control_latency", "the quadrotor flies without"],
+        ),
+        (
+            {"vehicle": {"model": "quadrotor"}, "gait": {"type": "fixed", "angles": [0.1] * 4}},
+            ["gait", "quadrotor has no use"],
+        ),
+    ],
+)
+def test_scenarios_that_cannot_be_flown_are_refused(tables, words):
+    document = {"controller": {"law": "python", "function": "a.py:b"}, **tables}
+    with pytest.raises(InputError) as caught:
+        tiltsim.parse_scenario(document)
+    for word in words:
+        assert word in str(caught.value)
+
+
+# --- files and the command line -----------------------------------------------------------------
+
+
+def test_the_command_line_flies_a_file_and_keeps_its_text(hover_file, tmp_path, capsys):
+    law = tmp_path / "edited.py"
+    law.write_text(hover_file.read_text(), encoding="utf-8")
+    options = ["--set", "simulation.duration=0.3", "--set", "expect=[]"]
+    command = ["run", "ch04_tracking/setpoint#rho_065_modified", *options]
+    out, again = tmp_path / "out", tmp_path / "again"
+    assert main([*command, "--controller", f"{law}:law", "--out", str(out)]) == 0
+    assert "final_position_error_x" in capsys.readouterr().out
+    assert (out / "edited.py").read_text() == HOVER
+    resolved = tomllib.loads((out / "scenario.toml").read_text())
+    assert resolved["controller"]["function"] == "edited.py:law"
+    law.write_text("law = None", encoding="utf-8")
+    assert main(["run", str(out / "scenario.toml"), "--quiet", "--out", str(again)]) == 0
+    tables = [pq.read_table(folder / "flight.parquet") for folder in (out, again)]
+    assert tables[0].equals(tables[1])
+    assert load_flight(out).scenario.controller.function == f"{law}:law"
+
+
+def test_a_class_in_a_file_beside_the_scenario(hover_file, monkeypatch, tmp_path):
+    scenario_file = hover_file.parent / "scenario.toml"
+    scenario_file.write_text(
+        "[simulation]\nduration = 0.05\ncontrol_timestep = 0.01\n"
+        '[controller]\nlaw = "python"\nfunction = "my_law.py:Slow"\n',
+        encoding="utf-8",
+    )
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", str(scenario_file), "--quiet"]) == 0
+    assert main(["check", str(scenario_file)]) == 0
+
+
+def test_a_failing_controller_exits_3_and_leaves_its_log(tmp_path, capsys):
+    law = tmp_path / "bad.py"
+    law.write_text(
+        "import tiltsim\n\n\ndef law(seen):\n    thrusts = [1.0] * (4 if seen.time < 0.1 else 3)\n"
+        "    return tiltsim.Command(thrusts=thrusts)\n",
+        encoding="utf-8",
+    )
+    out = tmp_path / "out"
+    command = ["run", "beyond/setpoint_exact_decoupler", "--set", "simulation.duration=1.0"]
+    command += ["--controller", f"{law}:law", "--quiet", "--out", str(out)]
+    assert main(command) == 3
+    error = capsys.readouterr().err
+    assert error == (
+        "tiltsim: flight failed at t = 0.100 s: the controller bad.py:law returned thrusts of "
+        "shape (3,); (4,) is wanted\n"
+    )
+    assert json.loads((out / "metrics.json").read_text())["duration"] == pytest.approx(0.1)
+    assert load_flight(out).end.kind == "failed"
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "words"),
+    [
+        (None, "law", ["no such file"]),
+        (HOVER, "lwa", ["lwa is not in the file; it has law, Slow"]),
+        (HOVER, "not_callable", ["not_callable is not callable; it has law, Slow"]),
+        ("import tiltsim\nlaw = (\n", "law", ["was never closed", "broken.py, line 2"]),
+        ("import nonexistent_module", "law", ["ModuleNotFoundError", "broken.py, line 1"]),
+        ("class Law:\n    def __init__(self, gain): pass", "Law", ["TypeError", "when made"]),
+        ("import sys; sys.exit(3)", "law", ["raised SystemExit: 3", "broken.py, line 1"]),
+        ("\0", "law", ["null bytes (broken.py)"]),
+    ],
+)
+def test_files_that_hold_no_controller_exit_2(tmp_path, capsys, text, name, words):
+    file = tmp_path / "broken.py"
+    if text is not None:
+        file.write_text(text, encoding="utf-8")
+    command = ["run", "beyond/setpoint_exact_decoupler", "--set", "simulation.duration=0.01"]
+    assert main([*command, "--controller", f"{file}:{name}"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    for word in words:
+        assert word in error
+
+
+def test_a_name_without_a_file_exits_2(capsys):
+    command = ["run", "beyond/setpoint_exact_decoupler", "--controller", "my_law"]
+    assert main(command) == 2
+    assert "FILE.py:NAME" in capsys.readouterr().err
+
+
+@each_model
+def test_flights_of_a_users_own_read_back(law, model, tmp_path):
+    flight = tiltsim.simulate(scenario(vehicle={"model": model}), controller=law)
+    flight.save(tmp_path)
+    back = load_flight(tmp_path)
+    np.testing.assert_array_equal(back.samples, flight.samples)
+    assert back.metrics() == flight.metrics()
+    assert main(["plot", str(tmp_path), "--out", str(tmp_path / "flight.png")]) == 0
+
+
+# --- documentation -------------------------------------------------------------------------------
+
+
+def python_blocks(name):
+    text = (ROOT / name).read_text(encoding="utf-8")
+    return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+
+
+def test_the_documented_examples_fly(capsys):
+    names = {}
+    for block in python_blocks("docs/own_controller.md"):
+        exec(compile(block, "own_controller.md", "exec"), names)
+    plain, integral = capsys.readouterr().out.splitlines()
+    end, x, z = plain.split()
+    assert end == "completed"
+    assert (float(x), float(z)) == pytest.approx((2.0, 1.0), abs=1e-3)
+    assert abs(float(integral)) < 1e-3
+    # Without the integral, the wind leaves an error of 0.3 m/s^2 over the gain of 1 / s^2.
+    bare = tiltsim.simulate(names["flight"].scenario, controller=names["law"])
+    assert bare.metrics()["final_position_error_x"] == pytest.approx(-0.3, abs=0.01)
+
+
+def test_the_readmes_law_is_the_documented_one_and_short():
+    (readme,) = (block for block in python_blocks("README.md") if "controller=law" in block)
+    documented = python_blocks("docs/own_controller.md")[0]
+    head, _, tail = readme.partition("\n\n\nscenario = ")
+    assert documented.startswith(head)
+    assert len([line for line in readme.splitlines() if line.strip()]) <= 15
+    assert "controller=law" in tail

@@ -1,0 +1,546 @@
+"""One law, three ways: Python, native, and a row of a batch fly the same flight bit for bit."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+import tiltsim
+import tiltsim.engines.rows
+import tiltsim.plants.mujoco_plant
+from tests.laws.layers.test_actuation import EVERYTHING
+from tests.laws.layers.test_air import STORM
+from tests.laws.test_laws import GUST, LAWS
+from tiltsim.engines.native_engine import compile_callbacks
+from tiltsim.engines.native_stepper import compile_stepper
+from tiltsim.flight.end import End
+from tiltsim.laws.assembling import LOOPS, control_setup, loop_of
+from tiltsim.laws.layers.actuation import with_actuation
+from tiltsim.laws.layers.air import with_air
+from tiltsim.laws.layers.on_equations import on_equations
+from tiltsim.laws.layers.supervision import with_supervisor
+from tiltsim.plants.factory import make_plant
+from tiltsim.plants.flight_model import flight_model, what_decides_the_model
+from tiltsim.resources import shipped_folder
+from tiltsim.scenario.loading import merge
+from tiltsim.simulation.batch import fly_all
+from tiltsim_controllers.gaits import GAIT_TYPES
+
+TROT = {"amplitude": 0.3, "period": 0.8}
+GAITS = {
+    "fixed": {"angles": [-0.3, 0.2, 0.4, 0.1]},
+    "trot_instant": {**TROT, "period": 0.2},
+    "trot_continuous": TROT,
+    "walk": TROT,
+    "run": TROT,
+    "transverse_gallop": TROT,
+    "rotary_gallop": TROT,
+    "two_color": {"period": 1.0, "centre": [0.2, -0.2], "radius": 0.1},
+    "waypoints": {"period": 0.7, "angles": [[0.1, 0.0, 0.1, 0.0], [0.2, -0.1, 0.2, -0.1]]},
+}
+CAR = LAWS["tilt_car_planned_direction"]
+CAR_GAITS = {
+    "penguin_small": {"period": 0.4},
+    "penguin_large": {"period": 0.4},
+    "rotating": {"rate": 0.8},
+}
+ALL_LAWS = {name: {**tables, "disturbance": GUST} for name, tables in LAWS.items()}
+
+# Gains that let the law be sampled at a few milliseconds; the published loops are too fast for it.
+EXACT = {"decoupling": "exact", "gains": "exact"}
+UPSIDE_DOWN = {"initial": {"attitude": [np.pi, 0.0, 0.0]}}
+STOPPING_ROTOR = {
+    "controller": EXACT,
+    "initial": {"rotor_speed": [20.0, 300.0, 300.0, 300.0], "angular_velocity": [0, 20, 0]},
+}
+
+
+def scenario(tables, **simulation):
+    simulation = {"duration": 0.43, "engine": "native", **simulation}
+    return tiltsim.parse_scenario({**tables, "simulation": simulation})
+
+
+def without_speed(metrics):
+    return {name: value for name, value in metrics.items() if name != "realtime_factor"}
+
+
+def three_ways(scenarios):
+    """Assert that every scenario flies the same in Python, natively and in a batch of all."""
+    rows = list(fly_all(scenarios, keep_samples=True, threads=2))
+    assert [row.scenario for row in rows] == scenarios
+    for wanted, row in zip(scenarios, rows, strict=True):
+        for engine in ("python", "native"):
+            simulation = wanted.simulation.model_copy(update={"engine": engine})
+            alone = tiltsim.simulate(wanted.model_copy(update={"simulation": simulation}))
+            assert alone.engine == engine
+            np.testing.assert_array_equal(row.flight.samples, alone.samples)
+            assert row.end == alone.end
+            assert without_speed(row.metrics) == without_speed(alone.metrics())
+        assert row.flight.engine == "native"
+    return rows
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+@pytest.mark.parametrize("law", LOOPS)
+def test_every_law_flies_the_same_three_ways_with_continuous_and_held_control(law, plant):
+    tables = ALL_LAWS[law]
+    rows = three_ways(
+        [
+            scenario(tables, plant=plant),
+            scenario(tables, plant=plant, control_timestep=0.004),
+            # 0.427 s are no whole number of recording intervals
+            scenario(tables, plant=plant, control_timestep=0.007, duration=0.427),
+        ]
+    )
+    assert all(len(row.flight) > 1 for row in rows)
+    assert [row.end.kind for row in rows] == ["completed"] * 3
+    assert [len(row.flight) for row in rows] == [44, 44, 44]
+
+
+def test_every_gait_is_here():
+    assert set(GAITS) | set(CAR_GAITS) == set(GAIT_TYPES)
+
+
+def test_every_gait_flies_the_same_three_ways_with_continuous_and_held_control():
+    scenarios = [
+        scenario({"gait": {"type": name, **table}, "controller": EXACT}, control_timestep=held)
+        for name, table in GAITS.items()
+        for held in (0.0, 0.005)
+    ]
+    scenarios += [
+        scenario({**CAR, "gait": {"type": name, **table}}, control_timestep=held)
+        for name, table in CAR_GAITS.items()
+        for held in (0.0, 0.005)
+    ]
+    # Rows have tables of different lengths, though one layout.
+    assert len({len(control_setup(s).table) for s in scenarios}) > 2
+    three_ways(scenarios)
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "implicitfast", "implicit", "Euler"])
+def test_rows_may_differ_in_vehicle_time_step_recording_and_duration(integrator):
+    gait = {"type": "trot_continuous", **TROT}
+    three_ways(
+        [
+            scenario({"gait": gait}, integrator=integrator),
+            scenario({"vehicle": {"mass": 0.5, "gravity": 9.81}}, integrator=integrator),
+            scenario({"disturbance": GUST}, integrator=integrator, timestep=0.0005, duration=0.2),
+            scenario({"gait": gait}, integrator=integrator, record_timestep=0.001, duration=0.05),
+            scenario({}, integrator=integrator, record_timestep=0.3, duration=1.0),
+            scenario({"vehicle": {"tilt_servo": {"max_angle": 0.3}}, "gait": gait}),
+        ]
+    )
+
+
+WINDING_UP = {
+    "vehicle": {"model": "tilt_car"},
+    "initial": {"rotor_speed": [3.0, 60.0]},  # where it shall stay: both rotors slow down
+}
+FALLING = {"initial": {"position": [0.0, 0.0, 0.1], "rotor_speed": 200.0}, "controller": EXACT}
+LAGGING = {"vehicle": {"rotor_time_constant": 0.004}, "controller": EXACT}
+BREEZE = {"air": {"wind": [1.0, 0.0, 0.0], "drag": {"linear": [0.1, 0.1, 0.1]}}}
+LIKE_BUT_FOR = {
+    "the model's error": [
+        {"initial": {"attitude": [0.2, -0.1, 0.1]}, "model_error": error}
+        for error in ({}, {"mass": 1.1}, {"inertia": [1.2, 1.2, 1.2]})
+    ],
+    "anti-windup": [
+        {**WINDING_UP, "controller": {"law": "tilt_car_fourth_derivative", "anti_windup": held}}
+        for held in (False, True)
+    ],
+    "ground": [FALLING, {**FALLING, "ground": {}}, {**FALLING, "ground": {"height": 0.02}}],
+    "gait rates": [{}, LAWS["gait_feedforward"]],
+    "layers": [{}, LAGGING, BREEZE, {**LAGGING, **BREEZE, "model_error": {"mass": 1.1}}],
+}
+
+
+@pytest.mark.parametrize("what", LIKE_BUT_FOR)
+def test_flights_that_differ_in_one_thing_do_not_share_what_depends_on_it(what):
+    rows = three_ways([scenario(tables) for tables in LIKE_BUT_FOR[what]])
+    assert len({row.flight.samples[:, 1:4].tobytes() for row in rows}) == len(rows), (
+        "they must not fly alike by themselves"
+    )
+
+
+def test_user_files_with_other_bodies_fly_in_batches_of_their_own(tmp_path):
+    shipped = (shipped_folder("mjcf") / "tiltrotor.xml").read_text(encoding="utf-8")
+    scene = (shipped_folder("mjcf") / "scene.xml").read_text(encoding="utf-8")
+    (tmp_path / "scene.xml").write_text(scene, encoding="utf-8")
+    payload = '<body pos="0 0 -0.05"><geom size="0.01" mass="0.05" contype="0"/></body>'
+    files = {
+        "bare.xml": shipped,
+        "loaded.xml": shipped.replace('<site name="imu"/>', payload + '<site name="imu"/>'),
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    three_ways([scenario({"vehicle": {"mjcf": str(tmp_path / name)}}) for name in files])
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_lost_flights_end_on_the_same_step_with_the_same_cause(plant):
+    rows = three_ways(
+        [
+            scenario(tables, duration=3.0, record_timestep=record, plant=plant)
+            for tables in (UPSIDE_DOWN, STOPPING_ROTOR)
+            for record in (0.001, 0.01, 0.25)
+        ]
+    )
+    ends = [row.end for row in rows]
+    assert ends[0].kind in {"diverged", "singular"}
+    assert ends[3].kind == "singular"
+    assert "came to a stop" in ends[3].cause
+    assert ends[0] == ends[1] == ends[2], "recording must not matter"
+
+
+def test_a_lost_row_is_flown_no_further_and_its_place_is_taken():
+    """Hundreds of flights that would last an hour, were they not lost in the first second."""
+    many = [scenario(UPSIDE_DOWN, duration=3600.0, record_timestep=1.0)] * 60
+    results = list(fly_all(many, threads=2))
+    assert len(results) == 60
+    assert {result.end.time for result in results} == {results[0].end.time}
+    assert results[0].end.time < 1.0
+    assert all(result.flight is None for result in results)
+
+
+# --- layers around the laws ---------------------------------------------------------------------
+
+LAYERED = {
+    "initial": {"rotor_speed": 361.0, "attitude": [0.05, -0.03, 0.02]},
+    "controller": {**EXACT, "decoupler": "exact"},
+    "gait": {"type": "trot_continuous", **TROT},
+}
+LATE = {"control_timestep": 0.004, "control_latency": 0.008}
+NOISY = {"sensors": {"attitude_noise": 0.01, "velocity_noise": 0.02, "position_bias": [0.1, 0, 0]}}
+STORMY = {"air": STORM}
+HEAVY = {"model_error": {"mass": 1.07, "inertia": [1.1, 0.9, 1.0], "thrust_coefficient": 0.95}}
+FED_FORWARD = {"controller": {"gait_rate_feedforward": True, "gains": {
+    "attitude": {"bandwidth": 25.0},
+    "altitude": {"bandwidth": 10.0, "integral": 0.5},
+    "position": {"bandwidth": 1.5, "integral": 0.5},
+}}}  # fmt: skip
+
+
+def layered(*changes, seed=1, **simulation):
+    tables = LAYERED
+    for change in changes:
+        tables = merge(tables, change)
+    return scenario(tables, timestep=0.002, duration=0.3, seed=seed, **simulation)
+
+
+@pytest.mark.slow
+def test_rows_with_and_without_layers_fly_the_same_three_ways():
+    rows = three_ways(
+        [
+            layered(),
+            layered(NOISY),
+            layered(NOISY, seed=2),
+            layered(STORMY),
+            layered(STORMY, {"air": {"wind": [-2.0, 0.0, 0.5]}}, seed=3),
+            layered(STORMY, NOISY, HEAVY, seed=4),
+            layered(EVERYTHING),
+            layered(EVERYTHING, **LATE),
+            layered(STORMY, EVERYTHING, seed=5, **LATE),
+            layered({"vehicle": {"rotor_time_constant": 0.03, "tilt_servo": {"max_angle": 0.4}}}),
+            layered(),
+        ]
+    )
+    assert len({id(loop_of(row.scenario)) for row in rows}) == 6
+    paths = [row.flight.samples[:, 1:4].tolist() for row in rows]
+    assert paths[0] == paths[-1]
+    assert all(a != b for i, a in enumerate(paths[:-1]) for b in paths[:i])
+
+
+@pytest.mark.slow
+def test_layers_around_the_law_that_knows_its_gait_fly_the_same_three_ways():
+    rows = three_ways(
+        [
+            layered(FED_FORWARD),
+            layered(),  # the same law by name, and another loop
+            layered(FED_FORWARD, STORMY, NOISY, HEAVY),
+            layered(FED_FORWARD, STORMY, NOISY, HEAVY, seed=2),
+        ]
+    )
+    assert all(row.end.kind == "completed" for row in rows)
+
+
+def test_air_around_quadrotors_flies_the_same_three_ways():
+    quadrotor = LAWS["yaw_position"]
+    three_ways(
+        [
+            scenario(quadrotor, duration=0.2),
+            scenario({**quadrotor, **STORMY}, duration=0.2, seed=1),
+            scenario({**quadrotor, **STORMY}, duration=0.2, seed=2, control_timestep=0.004),
+            scenario({**quadrotor, **STORMY, **HEAVY}, duration=0.2, seed=2),
+        ]
+    )
+
+
+def test_every_row_flies_a_model_of_its_own():
+    """What the law knows nothing of: the true vehicle, and ground to touch."""
+    down = {"initial": {"velocity": [0.0, 0.0, -1.0]}}
+    rows = three_ways(
+        [
+            layered(),
+            layered(HEAVY),
+            layered({"model_error": {"mass": 0.9}}),
+            layered(down),
+            layered(down, {"ground": {"height": -0.1}}),
+            layered(down, {"ground": {"height": -0.15, "friction": 0.4}}),
+        ]
+    )
+    heights = [float(row.flight["z"].min()) for row in rows]
+    assert len(set(heights)) == len(rows)
+    assert heights[3] < heights[5] < heights[4], "ground holds up"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        HEAVY,
+        GUST,
+        {"ground": {"height": -1.0}},
+        {"ground": {"height": -1.0, "friction": 0.4}},
+        {"vehicle": {"mass": 0.5}},
+        {"vehicle": {"max_rotor_speed": 500.0}},
+        {"simulation": {"timestep": 0.001}},
+        {"simulation": {"integrator": "Euler"}},
+        {"initial": {"position": [1.0, 0.0, 0.0]}},
+        {"simulation": {"seed": 3}},
+        {"gait": {"period": 0.9}},
+    ],
+    ids=str,
+)
+def test_what_decides_the_model_tells_models_apart(change):
+    """Rows share a model exactly where MuJoCo would compile the same one."""
+    change = {"disturbance": change} if change is GUST else change
+    tables = {**LAYERED, "simulation": {"timestep": 0.002, "duration": 0.3}}
+    plain, changed = map(tiltsim.parse_scenario, (tables, merge(tables, change)))
+    models = [saved_model(flight_model(wanted, 40)) for wanted in (plain, changed)]
+    same_key = what_decides_the_model(plain) == what_decides_the_model(changed)
+    assert same_key == (models[0] == models[1])
+
+
+def saved_model(model):
+    """A compiled model as bytes."""
+    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return buffer.tobytes()
+
+
+def test_own_controllers_are_flown_one_by_one_among_others(tmp_path):
+    file = tmp_path / "hover.py"
+    file.write_text(
+        "import numpy as np\nimport tiltsim\n\n\n"
+        "def law(seen):\n"
+        "    weight = seen.vehicle.mass * seen.vehicle.gravity\n"
+        "    return tiltsim.Command(thrusts=np.full(4, weight / 4))\n",
+        encoding="utf-8",
+    )
+    own = {"controller": {"law": "python", "function": f"{file}:law"}}
+    wanted = [
+        scenario(
+            {**own, "model_error": {"mass": mass}}, engine="auto", timestep=0.002, duration=0.1
+        )
+        for mass in (0.9, 1.0, 1.1)
+    ]
+    # A sweep tells all scenarios alike to fly natively, those that cannot included.
+    told = wanted[2].simulation.model_copy(update={"engine": "native"})
+    wanted[2] = wanted[2].model_copy(update={"simulation": told})
+    wanted.insert(1, scenario({}, duration=0.1))
+    results = list(fly_all(wanted, keep_samples=True))
+    assert [result.scenario for result in results] == wanted
+    assert [result.flight.engine for result in results] == ["python", "native", "python", "python"]
+    light, _, right, heavy = (float(result.flight["z"][-1]) for result in results)
+    # The law lifts the nominal weight: z = (1 / factor - 1) g t^2 / 2.
+    assert light == pytest.approx((1 / 0.9 - 1) * 9.8 * 0.1**2 / 2, rel=1e-3)
+    assert right == pytest.approx(0.0, abs=1e-9)
+    assert heavy == pytest.approx((1 / 1.1 - 1) * 9.8 * 0.1**2 / 2, rel=1e-3)
+
+
+# --- rows that come and go ----------------------------------------------------------------------
+
+
+def test_more_flights_than_rows_come_in_their_order():
+    wanted = [
+        scenario({"initial": {"position": [0.001 * i, 0.0, 0.0]}}, duration=0.02 + 0.01 * (i % 7))
+        for i in range(150)
+    ]
+    results = list(fly_all(wanted, threads=2, keep_samples=True))
+    assert [result.scenario for result in results] == wanted
+    for i, result in enumerate(results):
+        assert result.flight["x"][0] == 0.001 * i
+        assert result.end.time == pytest.approx(0.02 + 0.01 * (i % 7))
+
+
+def test_all_kinds_of_flights_together():
+    wanted = [
+        scenario({}, engine="python", duration=0.05),
+        scenario({}, plant="thesis", duration=0.05),
+        scenario({}, duration=0.05),
+        scenario(LAWS["yaw_position"], duration=0.05),
+        scenario({}, engine="auto", duration=0.05),
+    ]
+    results = list(fly_all(wanted * 2, keep_samples=True))
+    assert [result.scenario for result in results] == wanted * 2
+    assert results[0].flight.engine == "python"
+    assert results[2].flight.engine == "native"
+    assert mujoco.get_mjcb_control() is None
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_many_short_flights_are_worth_the_native_engine(plant, monkeypatch):
+    wanted = [scenario({}, engine="auto", plant=plant, duration=0.05)] * 6
+    monkeypatch.setattr(tiltsim.plants.mujoco_plant, "STEPS_WORTH_LOADING", 300)
+    monkeypatch.setattr(tiltsim.plants.mujoco_plant, "STEPS_WORTH_COMPILING", 300)
+    results = list(fly_all(wanted, keep_samples=True))
+    assert {result.flight.engine for result in results} == {"native"}
+    assert [result.scenario for result in results] == wanted
+    assert next(fly_all(wanted[:1], keep_samples=True)).flight.engine == "python"
+
+
+def test_no_flights_give_no_results():
+    assert list(fly_all([])) == []
+
+
+# --- what a loop says natively -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", LOOPS)
+def test_native_watching_sees_what_python_watches(law):
+    """Every watched number is there, and what else is there never ends a flight."""
+    wanted = scenario(ALL_LAWS[law], engine="python")
+    plant, loop, setup = make_plant(wanted), LOOPS[law], control_setup(wanted)
+    for _ in range(5):
+        plant.advance(20)
+        values = plant.observe()
+        sample = dict(zip(loop.sample_fields, (plant.time, *values), strict=True))
+        watched = [number.value for number in loop.watched(sample, setup)]
+        numbers = loop.watch(values, setup.parameters)
+        assert list(numbers[: len(watched)]) == watched
+        assert set(numbers[len(watched) :]) <= {1.0}
+
+
+@pytest.mark.parametrize("gait", GAITS)
+@pytest.mark.parametrize("decoupler", ["conventional", "modified", "exact"])
+def test_references_are_the_same_floats_natively(gait, decoupler, monkeypatch):
+    tables = {"gait": {"type": gait, **GAITS[gait]}, "controller": {"decoupler": decoupler}}
+    flight = tiltsim.simulate(scenario(tables, engine="python", duration=0.1))
+    in_python = dict(flight.columns)
+    monkeypatch.setattr(tiltsim.engines.rows, "ROWS_WORTH_COMPILING", 0)
+    del flight.__dict__["columns"]
+    for name, column in flight.columns.items():
+        np.testing.assert_array_equal(column, in_python[name])
+
+
+def test_references_of_the_law_with_gait_rates_are_the_same_floats_natively(monkeypatch):
+    flight = tiltsim.simulate(scenario(LAWS["gait_feedforward"], engine="python", duration=0.1))
+    in_python = dict(flight.columns)
+    monkeypatch.setattr(tiltsim.engines.rows, "ROWS_WORTH_COMPILING", 0)
+    del flight.__dict__["columns"]
+    for name, column in flight.columns.items():
+        np.testing.assert_array_equal(column, in_python[name])
+
+
+def test_columns_beside_a_state_out_of_all_bounds_raise_nothing():
+    """A flight may be lost between two samples by a hundred orders of magnitude."""
+    flight = tiltsim.simulate(scenario(LAWS["gait_feedforward"], engine="python", duration=0.05))
+    samples = flight.samples.copy()
+    samples[-1, 3:] = 1e200  # squares overflow
+    lost = replace(flight, samples=samples, end=End("diverged", 0.05, "test"))
+    columns = lost.columns
+    assert np.isfinite([columns[name][:-1] for name in ("roll_ref", "alpha_ref_1")]).all()
+    assert lost.metrics()["diverged"] is True
+
+
+def test_a_row_without_a_result_is_no_number():
+    setup = control_setup(scenario({}))
+    rows = tiltsim.engines.rows.evaluate_rows(
+        lambda time, state, _parameters, _table: (state[0], time / state[0]),
+        *(2, np.array([1.0, 2.0]), np.array([[0.0], [4.0]]), setup),
+    )
+    np.testing.assert_array_equal(rows, [[np.nan, np.nan], [4.0, 0.5]])
+
+
+def test_what_is_about_to_be_compiled_is_told_and_what_is_cached_is_not(monkeypatch, tmp_path):
+    import tiltsim.engines.cache as cache
+
+    monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
+    told = []
+    monkeypatch.setattr(cache, "before_compiling", [told.append])
+    cache.native_code_is_needed("mujoco.some.law")
+    assert told == ["mujoco.some.law"]
+    cache.native_code_was_compiled("mujoco.some.law")
+    cache.native_code_is_needed("mujoco.some.law")
+    assert told == ["mujoco.some.law"]
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_each_plant_tells_what_it_compiles(monkeypatch, tmp_path, plant):
+    import tiltsim.engines.cache as cache
+
+    class ToldError(Exception):
+        pass
+
+    def stop(name):
+        raise ToldError(name)
+
+    monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
+    monkeypatch.setattr(cache, "before_compiling", [stop])
+    loop = LOOPS["attitude_altitude"]
+    compiling = compile_callbacks if plant == "mujoco" else compile_stepper
+    with pytest.raises(ToldError, match=re.escape(loop.native_name(plant))):
+        compiling.__wrapped__(loop)
+
+
+def test_all_that_processes_fly_with_is_compiled_for_them_once(monkeypatch):
+    import tiltsim.studies.checking as checking
+
+    calls = []
+
+    class Recorded:
+        def __init__(self, wanted):
+            calls.append(wanted.simulation.plant)
+
+        def record(self, samples, steps):
+            calls.append("record")
+
+        def advance(self, steps):
+            calls.append("advance")
+
+    monkeypatch.setattr(checking, "make_plant", Recorded)
+    flights = [scenario({}, plant="thesis", duration=1000.0) for _ in range(2)]
+    assert checking.shared_engine(flights) == "native"
+    assert calls == ["thesis", "record", "advance"]
+
+
+def test_whether_native_code_is_cached_is_known_by_law_and_plant(monkeypatch, tmp_path):
+    import tiltsim.engines.cache as cache
+    from tiltsim.plants.engine_choice import choose_engine
+
+    monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
+    wanted = scenario({}, engine="auto", duration=20.0)  # 20,000 steps: worth loading only
+    assert choose_engine(wanted) == "python"
+    cache.native_code_was_compiled(LOOPS["full_pose"].native_name("mujoco"))
+    cache.native_code_was_compiled(LOOPS["attitude_altitude"].native_name("thesis"))
+    assert choose_engine(wanted) == "python"
+    cache.native_code_was_compiled(LOOPS["attitude_altitude"].native_name("mujoco"))
+    assert choose_engine(wanted) == "native"
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_no_two_control_steps_share_a_name_of_native_code(plant):
+    """Else an automatic engine takes one law for compiled where another is."""
+    tilting = [LOOPS["attitude_altitude"], LOOPS["gait_feedforward"]]
+    laws = [*LOOPS.values(), *(with_supervisor(loop, "hold") for loop in tilting)]
+    tiltrotors = [loop for loop in laws if loop.model == "tiltrotor"]
+    real = [with_actuation(loop, steps) for loop in tiltrotors for steps in (0, 2)]
+    aired = [with_air(loop) for loop in [*laws, *real] if loop.model != "tilt_car"]
+    loops = [*laws, *real, *aired]
+    if plant == "thesis":
+        loops = [*laws[: len(LOOPS)], *map(on_equations, [*laws[len(LOOPS) :], *real, *aired])]
+    names = [loop.native_name(plant) for loop in loops]
+    assert len(set(names)) == len(names) == len(loops) > 30

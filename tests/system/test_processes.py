@@ -1,0 +1,59 @@
+"""Work on several processes: all answers, and nothing left over however it ends."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+
+import pytest
+
+from tiltsim.errors import InputError
+from tiltsim.system.processes import ProcessDiedError, in_processes
+
+MEGABYTES = 1 << 24
+
+
+def work_on(item):
+    if item == "dies":
+        os.kill(os.getpid(), signal.SIGKILL)
+    if item == "raises":
+        raise InputError("no such luck")
+    return item.upper()
+
+
+def much_of(item):
+    return bytes(MEGABYTES)
+
+
+def test_each_item_is_answered_whatever_becomes_of_the_others():
+    items = ["a", "dies", "b", "raises", "c", "d"]
+    found = dict(in_processes(work_on, items, 2))
+    assert sorted(found) == sorted(items)
+    assert {found[item].result() for item in "abcd"} == set("ABCD")
+    with pytest.raises(ProcessDiedError, match="exit code -9"):
+        found["dies"].result()
+    with pytest.raises(InputError, match="no such luck"):
+        found["raises"].result()
+    assert not multiprocessing.active_children()
+
+
+def interrupts_blocked(_item):
+    return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_processes_meet_no_interrupt_while_they_begin():
+    """They would print a traceback: the keyboard's go to all processes of a terminal's job."""
+    found = dict(in_processes(interrupts_blocked, "ab", 2))
+    assert [found[item].result() for item in "ab"] == [True, True]
+    assert not interrupts_blocked(None)
+
+
+def test_leaving_ends_processes_that_are_answering():
+    """More than a pipe holds: the other process is halfway through its answer."""
+    for _item, future in in_processes(much_of, range(6), 2):
+        assert len(future.result()) == MEGABYTES
+        break
+    assert not multiprocessing.active_children()

@@ -1,0 +1,249 @@
+"""Films: frames that show the flight, a file that plays, one line where nothing can draw."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from ctypes.util import find_library
+
+import mujoco
+import numpy as np
+import pytest
+
+from tests.flights import flight, saved
+from tiltsim.cli import main
+from tiltsim.errors import InputError
+from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, torque_free_directions
+from tiltsim.views.video import aspects, has_screen, inset, offscreen
+from tiltsim.views.video.aspects import RotorcraftAspect
+from tiltsim.views.video.film import Format, _Stage, film_flight, frames
+from tiltsim.views.video.inset import PlaneInset, lay_over
+from tiltsim.views.video.offscreen import make_contexts
+from tiltsim_controllers.vehicle.parameters import PRESETS
+
+SMALL = Format(width=320, height=180, fps=10, speed=2.0)
+
+
+NOTHING = mujoco.MjModel.from_xml_string("<mujoco/>")
+
+
+def missing_gl():
+    try:
+        gl, context = make_contexts(NOTHING, 64, 64)
+    except InputError as error:
+        return str(error)
+    context.free()
+    gl.free()
+    return ""
+
+
+needs_gl = pytest.mark.skipif(bool(missing_gl()), reason=missing_gl())
+
+
+# --- the corner --------------------------------------------------------------------------------
+
+
+def plane(angles, attitude=(0.0, 0.0), margin=1.0, size=101):
+    columns = {f"alpha_{i}": np.array([angle]) for i, angle in enumerate(angles, start=1)}
+    n = torque_free_directions(columns, PRESETS["ar_drone_2"])[0]
+    return PlaneInset(size, 1.0).paint(n, np.array([attitude]), margin)
+
+
+def color_at(image, roll, pitch):
+    half = (len(image) - 1) / 2
+    row, column = half * (1 - pitch / (np.pi / 2)), half * (1 + roll / (np.pi / 2))
+    return tuple(image[round(row), round(column)].tolist())
+
+
+def test_the_inset_shades_what_is_out_of_reach():
+    image = plane((-0.65, -0.65, 0.65, 0.65))
+    assert color_at(image, 0.3, -1.45) == inset.FORBIDDEN
+    assert color_at(image, 0.3, 0.6) == inset.GROUND
+    assert color_at(plane((0.0, 0.0, 0.0, 0.0)), 0.3, -1.45) == inset.GROUND
+
+
+def test_the_inset_has_the_attitude_with_pitch_upwards():
+    assert color_at(plane((0.0,) * 4, (0.5, 0.8)), 0.5, 0.8) == inset.ATTITUDE
+    assert color_at(plane((0.0,) * 4, (0.5, 0.8), margin=0.1), 0.5, 0.8) == inset.CURVE
+    beyond = plane((0.0,) * 4, (3.0, 0.0))
+    assert inset.ATTITUDE in {tuple(pixel) for pixel in beyond[50, -5:-1].tolist()}
+
+
+def test_an_inset_covers_its_corner_alone():
+    frame = np.zeros((100, 100, 3), dtype=np.uint8)
+    lay_over(frame, np.full((30, 30, 3), 200, dtype=np.uint8), 5)
+    assert frame[70, 70].min() > 150
+    assert frame[:65].max() == frame[:, :65].max() == frame[95:].max() == 0
+
+
+@pytest.mark.parametrize(("name", "whole"), [("fixed", True), ("trot", False)])
+def test_the_insets_trail_is_short_beside_a_curve_that_moves(name, whole, monkeypatch):
+    this, trails = flight(name), []
+    monkeypatch.setattr(PlaneInset, "paint", lambda _self, _n, trail, _margin: trails.append(trail))
+    monkeypatch.setattr(aspects, "lay_over", lambda *_: None)
+    last = len(this) - 1
+    RotorcraftAspect(this, 180).paint(np.zeros((180, 320, 3), dtype=np.uint8), last)
+    began = 0.0 if whole else this["time"][last] - MOVING_TRAIL_TIME
+    (first,) = np.flatnonzero(np.isclose(this["time"], began))
+    np.testing.assert_array_equal(trails[0][0], [this["roll"][first], this["pitch"][first]])
+
+
+# --- frames and films --------------------------------------------------------------------------
+
+
+@needs_gl
+def test_frames_come_at_the_films_rate_and_show_motion():
+    this = flight("trot")
+    shown = list(frames(this, SMALL))
+    times = [time for time, _ in shown]
+    np.testing.assert_allclose(times, np.arange(0.0, 1.2 + 1e-9, 0.2), atol=0.011)
+    images = [image for _, image in shown]
+    assert {image.shape for image in images} == {(180, 320, 3)}
+    assert all(image.std() > 10.0 for image in images)
+    assert np.abs(images[0].astype(int) - images[-1]).mean() > 1.0
+
+
+@needs_gl
+@pytest.mark.parametrize(
+    ("speed", "clock"), [(1.0, "1.2 s"), (10.0, "1.2 s, 10x"), (0.5, "1.2 s, 0.5x")]
+)
+def test_a_film_faster_or_slower_than_the_flight_says_so(speed, clock):
+    stage = _Stage(flight("fixed"), Format(width=320, height=180, speed=speed))
+    with stage.canvas:
+        names, values = stage._table(-1)
+    assert names.splitlines()[0] == "time"
+    assert values.splitlines()[0] == clock
+
+
+@needs_gl
+def test_every_flight_can_be_filmed():
+    for name in ("fixed", "limited", "free"):
+        _, image = next(frames(flight(name), SMALL))
+        assert image.std() > 10.0
+
+
+@needs_gl
+def test_an_arrow_is_drawn_as_long_as_a_line_between_the_same_ends():
+    """MuJoCo draws arrows at half the length it sets; notice when that changes."""
+    words = ("", "", offscreen.Caption("", 0, 0))
+    camera = mujoco.MjvCamera()
+    camera.distance, camera.elevation = 2.0, 0.0
+    start, end = np.array([0.0, 0.0, -0.3]), np.array([0.0, 0.0, 0.3])
+    heights = []
+    for shape in (mujoco.mjtGeom.mjGEOM_ARROW, mujoco.mjtGeom.mjGEOM_CAPSULE):
+        stage = _Stage(flight("fixed"), Format(width=400, height=400))
+        with stage.canvas as canvas:
+            canvas.compose(stage._data, camera)
+            canvas.scene.ngeom = 0
+            blank = canvas.draw(*words).astype(int)
+            stage._connect(shape, 0.008, start, end, (1.0, 0.0, 0.0, 1.0))
+            drawn = canvas.draw(*words).astype(int)
+        rows = np.flatnonzero(np.abs(drawn - blank).sum(axis=2).any(axis=1))
+        heights.append(rows[-1] - rows[0])
+    assert heights[0] == pytest.approx(heights[1], rel=0.08)
+
+
+@needs_gl
+def test_the_film_plays(tmp_path):
+    import av
+
+    path = tmp_path / "flight.mp4"
+    times = []
+    film_flight(flight("fixed"), path, SMALL, times.append)
+    assert [file.name for file in tmp_path.iterdir()] == ["flight.mp4"]
+    with av.open(str(path)) as film:
+        stream = film.streams.video[0]
+        pictures = [frame.to_ndarray(format="rgb24") for frame in film.decode(stream)]
+        assert (stream.width, stream.height, stream.average_rate) == (320, 180, 10)
+        assert stream.codec_context.name == "h264"
+    assert len(pictures) == len(times) == 7
+    assert pictures[-1].std() > 10.0
+
+
+@needs_gl
+def test_the_command_films_without_a_screen(tmp_path):
+    folder = saved("fixed", tmp_path)
+    options = ["--size", "160x120", "--fps", "5", "--speed", "4"]
+    environment = {"PATH": "", "PYTHONPATH": ":".join(sys.path)}
+    done = subprocess.run(
+        [sys.executable, "-m", "tiltsim", "video", str(folder), *options],
+        env=environment,
+        capture_output=True,
+        text=True,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == f"film written to {folder / 'flight.mp4'}\n"
+    assert b"ftyp" in (folder / "flight.mp4").read_bytes()[:12]
+
+
+# --- what can go wrong -------------------------------------------------------------------------
+
+
+@needs_gl
+def test_a_film_that_is_terminated_leaves_nothing_behind(tmp_path):
+    folder = saved("fixed", tmp_path)
+    before = sorted(folder.iterdir())
+    command = [sys.executable, "-m", "tiltsim", "video", str(folder), "--speed", "0.01"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        deadline = time.monotonic() + 30.0
+        while sorted(folder.iterdir()) == before and time.monotonic() < deadline:
+            time.sleep(0.02)
+        process.terminate()
+        _, error = process.communicate(timeout=30.0)
+    assert (process.returncode, error.splitlines()[-1]) == (143, "tiltsim: interrupted")
+    assert sorted(folder.iterdir()) == before
+
+
+def test_no_way_to_draw_is_one_line_with_the_way_out(monkeypatch):
+    if sys.platform != "linux":
+        pytest.skip("elsewhere the system brings OpenGL")
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    monkeypatch.setattr(offscreen, "MODULES", dict.fromkeys(offscreen.MODULES, "mujoco.no_such"))
+    with pytest.raises(InputError) as caught:
+        make_contexts(NOTHING, 64, 64)
+    line = str(caught.value)
+    assert len(line.splitlines()) == 1
+    assert "apt-get install libegl1" in line
+    assert "MUJOCO_GL=egl" in line
+
+
+def test_a_way_that_only_warns_is_one_line_too(monkeypatch):
+    if sys.platform != "linux" or has_screen():
+        pytest.skip("for Linux without a screen")
+    monkeypatch.setenv("MUJOCO_GL", "glfw")
+    with pytest.raises(InputError, match=r"no OpenGL to draw with \(glfw: .*; install a driver"):
+        make_contexts(NOTHING, 64, 64)
+
+
+@pytest.mark.parametrize("way", ["nonsense", "osmesa"])
+def test_what_mujoco_cannot_be_loaded_with_is_one_line(way, tmp_path):
+    if way == "osmesa" and (sys.platform != "linux" or find_library("OSMesa")):
+        pytest.skip("OSMesa is installed")
+    command = [sys.executable, "-m", "tiltsim", "run", "ch01_gust/hover#quadrotor", "--quiet"]
+    environment = os.environ | {"MUJOCO_GL": way}
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=60)
+    (line,) = done.stderr.splitlines()
+    assert (done.returncode, done.stdout) == (2, "")
+    assert line.startswith(f"tiltsim: MUJOCO_GL = {way!r}: MuJoCo cannot be loaded with it (")
+
+
+@pytest.mark.parametrize(
+    ("out", "words"), [("x.avi", "unknown format '.avi'"), ("no/x.mp4", "does not exist")]
+)
+def test_a_bad_target_is_one_line_and_exit_code_2(out, words, tmp_path, capsys):
+    folder = saved("fixed", tmp_path)
+    assert main(["video", str(folder), "--out", str(tmp_path / out)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert words in line
+
+
+@pytest.mark.parametrize(
+    "option", [["--size", "161x120"], ["--size", "a"], ["--fps", "0"], ["--speed", "0"]]
+)
+def test_options_out_of_range_are_refused(option, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(["video", "x", *option])
+    assert caught.value.code == 2
+    assert option[0] in capsys.readouterr().err

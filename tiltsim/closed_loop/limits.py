@@ -1,0 +1,87 @@
+"""Where a flight counts as lost: bounds so wide that no flight comes back from beyond them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import hypot
+from typing import Final
+
+from tiltsim_controllers.mathematics.scalar import scalar
+from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
+
+MAX_POSITION_ERROR: Final = 1e4  # m
+MAX_BODY_RATE: Final = 1e3  # rad/s, far above what any rotorcraft survives
+MAX_ROTOR_SPEED: Final = 1e5  # rad/s
+
+SINGULAR: Final = 1e-9
+"""What counts as zero, for a determinant of order one and all else that a loop watches."""
+
+WITHIN: Final = 0
+HORIZONTAL_ERROR: Final = 1
+ALTITUDE_ERROR: Final = 2
+BODY_RATE: Final = 3
+"""The code of p; those of q and r follow."""
+ROTOR_SPEED: Final = 6
+"""The code of the first rotor; those of the others follow."""
+
+
+@scalar
+def horizontal_error(
+    time: float, values: Sequence[float], reference: ReferenceParameters, table: Sequence[float]
+) -> float:
+    """Horizontal distance (m) to the reference."""
+    target = position_reference(time, reference, table)
+    return hypot(target[0] - values[0], target[1] - values[1])
+
+
+@scalar
+def altitude_error(
+    time: float, values: Sequence[float], reference: ReferenceParameters, table: Sequence[float]
+) -> float:
+    """Absolute altitude error (m)."""
+    return abs(position_reference(time, reference, table)[2] - values[2])
+
+
+@scalar
+def rotorcraft_limit_exceeded(
+    time: float,
+    values: Sequence[float],
+    reference: ReferenceParameters,
+    table: Sequence[float],
+    follows_position: float,
+) -> int:
+    """The code of the first limit that a sample of a rotorcraft exceeds, `WITHIN` if none.
+
+    ``values`` begin as `tiltsim.vehicles.rotorcraft.OBSERVED_FIELDS`; ``follows_position`` is 0
+    where the horizontal position is free.
+    """
+    away = follows_position * horizontal_error(time, values, reference, table)
+    if away > MAX_POSITION_ERROR:
+        return HORIZONTAL_ERROR
+    if altitude_error(time, values, reference, table) > MAX_POSITION_ERROR:
+        return ALTITUDE_ERROR
+    for axis in range(3):
+        if abs(values[9 + axis]) > MAX_BODY_RATE:
+            return BODY_RATE + axis
+    for rotor in range(4):
+        if abs(values[16 + rotor]) > MAX_ROTOR_SPEED:
+            return ROTOR_SPEED + rotor
+    return WITHIN
+
+
+@scalar
+def tilt_car_limit_exceeded(
+    time: float,
+    values: Sequence[float],
+    reference: ReferenceParameters,
+    table: Sequence[float],
+    follows_position: float,
+) -> int:
+    """As `rotorcraft_limit_exceeded`, for `tiltsim.vehicles.tilt_car.OBSERVED_FIELDS`."""
+    away = follows_position * horizontal_error(time, values, reference, table)
+    if away > MAX_POSITION_ERROR:
+        return HORIZONTAL_ERROR
+    for rotor in range(2):
+        if abs(values[8 + rotor]) > MAX_ROTOR_SPEED:
+            return ROTOR_SPEED + rotor
+    return WITHIN

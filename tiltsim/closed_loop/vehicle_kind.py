@@ -1,0 +1,57 @@
+"""Kinds of vehicles: what all loops around one kind have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from tiltsim.models.parts import ExtraActuators
+    from tiltsim.scenario.scenario import Scenario
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Kind:
+    """What can be told of every vehicle of a kind, and how MuJoCo builds it.
+
+    Attributes
+    ----------
+    name
+        Metrics and screens find theirs by it.
+    observed_fields
+        What every sample of such a vehicle holds after the time.
+    columns
+        Columns of every flight of such a vehicle and their units, in the order of the file.
+    thrusts
+        ``(columns so far, scenario) -> columns``: the rotors' thrusts, N.
+    compile
+        ``(scenario, law_states, extra_actuators, userdata_size, visuals) -> model``. Raises
+        `ValueError` where MuJoCo cannot build it.
+    initial_motion
+        ``(scenario) -> qpos, qvel`` at time zero.
+    limit_exceeded
+        Scalar function ``(time, values, reference, table, follows_position) -> code`` of the first
+        limit of `tiltsim.closed_loop.limits` that a sample exceeds; ``values`` begin with the
+        observed fields.
+    """
+
+    name: str
+    observed_fields: tuple[str, ...]
+    columns: Mapping[str, str]
+    thrusts: Callable[[Mapping[str, Floats], Scenario], dict[str, Floats]]
+    compile: Callable[[Scenario, int, tuple[ExtraActuators, ...], int, bool], mujoco.MjModel]
+    initial_motion: Callable[[Scenario], tuple[Sequence[float], Sequence[float]]]
+    limit_exceeded: Callable[..., int]
+
+    @property
+    def rotors(self) -> tuple[int, ...]:
+        """The numbers of the rotors."""
+        return tuple(i for i in range(1, 9) if f"rotor_speed_{i}" in self.columns)

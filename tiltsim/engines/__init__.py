@@ -1,0 +1,1 @@
+"""Engines that evaluate a control step: Python and compiled code."""

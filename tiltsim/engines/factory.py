@@ -1,0 +1,18 @@
+"""Make the engine of a name."""
+
+from __future__ import annotations
+
+import mujoco
+
+from tiltsim.closed_loop.loop import Loop
+from tiltsim.engines.base import Engine, EngineName
+from tiltsim.engines.python_engine import PythonEngine
+
+
+def make_engine(name: EngineName, loop: Loop, model: mujoco.MjModel, data: mujoco.MjData) -> Engine:
+    """Build an engine for a model whose parameters already lie in ``data.userdata``."""
+    if name == "python":
+        return PythonEngine(loop, model, data)
+    from tiltsim.engines.native_engine import NativeEngine
+
+    return NativeEngine(loop, model, data)

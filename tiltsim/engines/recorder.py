@@ -1,0 +1,154 @@
+"""Memory into which compiled code records samples."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import copysign, isfinite
+from typing import Final, NamedTuple
+
+import numpy as np
+from numba import carray
+from numba.extending import register_jitable
+
+from tiltsim.closed_loop.limits import SINGULAR, WITHIN
+from tiltsim.closed_loop.loop import Floats, Loop
+from tiltsim.engines.native_memory import _bytes_at, _floats_at
+from tiltsim.engines.numba_setup import _INNER
+from tiltsim_controllers.mathematics.records import flatten, record_dtype, record_size
+from tiltsim_controllers.references.trajectories import ReferenceParameters
+
+
+class RecorderHead(NamedTuple):
+    """What the memory of a recorder begins with; `SIDES` floats and the samples follow."""
+
+    left: float  # evaluations to go before the next sample
+    interval: float  # evaluations between samples
+    last_interval: float  # evaluations between the last two samples
+    samples: float  # taken so far
+    capacity: float  # samples that there is room for
+    lost: float  # 1 from the first sample on that ends the flight
+    follows_position: float  # whether the horizontal position counts
+    reference: ReferenceParameters
+
+
+SIDES: Final = 8
+"""How many numbers a law may have watched."""
+
+
+_RECORDER: Final = record_dtype(RecorderHead)
+
+
+_RECORDER_SIZE: Final = record_size(RecorderHead)
+
+
+@register_jitable(**_INNER)
+def _sample_is_due(recorder):  # type: ignore[no-untyped-def]
+    """Count an evaluation."""
+    head = carray(_bytes_at(recorder), (1,), _RECORDER)
+    left = head[0].left
+    head[0].left = left - 1.0
+    return left == 0.0
+
+
+@register_jitable(**_INNER)
+def _record(recorder, time, values, watched, limit_exceeded, table):  # type: ignore[no-untyped-def]
+    """Keep a sample and judge it as `tiltsim.simulation.monitor.Watch` does."""
+    head = carray(_bytes_at(recorder), (1,), _RECORDER)
+    samples = int(head[0].samples)
+    capacity = int(head[0].capacity)
+    if samples >= capacity or head[0].lost != 0.0:
+        return
+    width = 1 + len(values)
+    rest = carray(_floats_at(recorder + 8 * _RECORDER_SIZE), (SIDES + capacity * width,))
+    start = SIDES + samples * width
+    rest[start] = time
+    finite = True
+    for index in range(len(values)):
+        rest[start + 1 + index] = values[index]
+        finite = finite and isfinite(values[index])
+    lost = not finite
+    if finite:
+        reference, follows_position = head[0].reference, head[0].follows_position
+        lost = limit_exceeded(time, values, reference, table, follows_position) != WITHIN
+    for index in range(len(watched)):
+        side = 0.0 if abs(watched[index]) < SINGULAR else copysign(1.0, watched[index])
+        if side == 0.0 or side != rest[index]:
+            lost = True
+    if lost:
+        head[0].lost = 1.0
+    head[0].samples = samples + 1.0
+    interval = head[0].interval if samples + 2 < capacity else head[0].last_interval
+    head[0].left = interval - 1.0
+
+
+@register_jitable(**_INNER)
+def _recording_is_over(recorder):  # type: ignore[no-untyped-def]
+    head = carray(_bytes_at(recorder), (1,), _RECORDER)
+    return head[0].lost != 0.0 or head[0].samples == head[0].capacity
+
+
+class Recorder:
+    """Memory for the samples of one flight, to which the callback writes by itself.
+
+    The callback takes a sample before every so many steps, the first after a full interval. Once
+    there is no room for more, or a sample shows that the flight is lost, it asks for controls that
+    are no numbers: MuJoCo warns of them and a batch stops there.
+
+    Parameters
+    ----------
+    loop
+        What flies.
+    samples
+        How many to take.
+    interval, last_interval
+        Evaluations of the control step between samples, and between the last two.
+    reference, follows_position
+        For the limits; see `tiltsim.closed_loop.vehicle_kind.Kind`.
+    watched
+        The numbers that the loop watches as they are now: each must keep its sign.
+    """
+
+    def __init__(
+        self,
+        loop: Loop,
+        samples: int,
+        interval: int,
+        last_interval: int,
+        reference: ReferenceParameters,
+        follows_position: bool,
+        watched: Sequence[float],
+    ) -> None:
+        self._width = len(loop.sample_fields)
+        self._memory = np.zeros(_RECORDER_SIZE + SIDES + samples * self._width)
+        self._head = self._memory[:_RECORDER_SIZE].view(_RECORDER)
+        first = interval if samples > 1 else last_interval
+        head = RecorderHead(
+            *(first, interval, last_interval, 0.0, samples, 0.0, follows_position, reference)
+        )
+        self._memory[:_RECORDER_SIZE] = list(flatten(head))
+        if len(watched) > SIDES:
+            raise ValueError(f"{loop.model}: {len(watched)} numbers watched, at most {SIDES}")
+        for index, value in enumerate(watched):
+            self._memory[_RECORDER_SIZE + index] = copysign(1.0, value)
+
+    @property
+    def address(self) -> float:
+        """For the `Header` in `userdata`; exact, since addresses are below 2^53."""
+        return float(self._memory.ctypes.data)
+
+    @property
+    def samples(self) -> Floats:
+        """The samples taken so far, shape (N, len(loop.sample_fields))."""
+        taken = int(self._head["samples"][0])
+        start = _RECORDER_SIZE + SIDES
+        return self._memory[start : start + taken * self._width].reshape(taken, self._width)
+
+    @property
+    def lost(self) -> bool:
+        """Whether the last sample ends the flight."""
+        return bool(self._head["lost"][0])
+
+    @property
+    def full(self) -> bool:
+        """Whether all samples have been taken."""
+        return bool(self._head["samples"][0] == self._head["capacity"][0])

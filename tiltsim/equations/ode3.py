@@ -1,0 +1,74 @@
+"""The thesis' fixed-step solver, ode3, for the equations of motion of any loop.
+
+The equations are those that the thesis prints (`tiltsim.equations`): they leave out what the thesis
+leaves out. The same law runs here and in MuJoCo: the difference between the two plants is a result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from tiltsim.closed_loop.loop import Equations
+from tiltsim_controllers.mathematics.scalar import Triple, scalar
+
+Stepper = Callable[..., tuple[list[float], tuple[float, ...]]]
+
+
+@scalar
+def stage(state: Sequence[float], step: float, rates: Sequence[float]) -> list[float]:
+    """The state one explicit stage further: ``state + step * rates``."""
+    return [value + step * rate for value, rate in zip(state, rates)]
+
+
+@scalar
+def as_it_is(state: list[float], parameters: Any) -> list[float]:
+    """For equations in which nothing stops."""
+    return state
+
+
+def stepper_of(equations: Equations) -> Stepper:
+    """The solver around a loop's equations, as scalar code.
+
+    The stepper integrates ``steps`` fixed steps with ode3, the third-order method of Bogacki and
+    Shampine. ``control_steps`` is the number of steps for which the law's output is held, 0 to
+    evaluate it at every stage. It returns the new state and the inputs held since the last control
+    sample; the caller counts the steps.
+    """
+    inputs, rates, settled = equations.inputs, equations.rates, equations.settled or as_it_is
+
+    def advance(
+        step_index: int,
+        state: list[float],
+        held: tuple[float, ...],
+        timestep: float,
+        steps: int,
+        control_steps: int,
+        parameters: Any,
+        table: Sequence[float],
+        disturbance: Triple,
+    ) -> tuple[list[float], tuple[float, ...]]:
+        continuous = control_steps == 0
+        for index in range(step_index, step_index + steps):
+            time = index * timestep
+            if continuous or index % control_steps == 0:
+                held = inputs(time, state, parameters, table)
+            k1 = rates(time, state, held, parameters, table, disturbance)
+            half = stage(state, 0.5 * timestep, k1)
+            half_time = time + 0.5 * timestep
+            if continuous:
+                held = inputs(half_time, half, parameters, table)
+            k2 = rates(half_time, half, held, parameters, table, disturbance)
+            late = stage(state, 0.75 * timestep, k2)
+            late_time = time + 0.75 * timestep
+            if continuous:
+                held = inputs(late_time, late, parameters, table)
+            k3 = rates(late_time, late, held, parameters, table, disturbance)
+            state = [
+                value + timestep * (2.0 / 9.0 * a + 1.0 / 3.0 * b + 4.0 / 9.0 * c)
+                for value, a, b, c in zip(state, k1, k2, k3)
+            ]
+            state = settled(state, parameters)
+        return state, held
+
+    return advance

@@ -1,0 +1,110 @@
+"""Read a flight back from flight.parquet."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+from tiltsim.errors import InputError
+
+if TYPE_CHECKING:
+    import pyarrow
+
+    from tiltsim.flight.end import End
+    from tiltsim.flight.flight import Flight
+from tiltsim.scenario.document import without_none
+
+
+def load_flight(path: str | Path) -> Flight:
+    """Read a flight back: samples, scenario, engine, end and wall time.
+
+    Parameters
+    ----------
+    path
+        A folder of results or a ``flight.parquet``.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is not a whole flight of tiltsim's.
+    """
+    import numpy as np
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    from tiltsim.flight.flight import Flight
+    from tiltsim.laws.assembling import loop_of
+    from tiltsim.scenario.loading import parse_scenario
+
+    file = _flight_file(Path(path))
+    try:
+        table = pq.read_table(file)
+    except (OSError, pa.ArrowException) as error:
+        raise InputError(f"{file}: not a readable Parquet file: {_first_line(error)}") from error
+    origin = _origin(file, table)
+    try:
+        document = json.loads(origin["scenario"])
+        engine, end = _engine_and_end(origin)
+        wall_time = float(origin["wall_time"])
+    except (KeyError, ValueError, TypeError) as error:
+        raise InputError(f"{file}: not a flight of tiltsim's: {_first_line(error)}") from error
+    try:
+        scenario = parse_scenario(without_none(document), origin.get("address", ""))
+    except InputError as error:
+        raise InputError(f"{file}: its scenario is not valid: {error}") from error
+    fields = loop_of(scenario).sample_fields
+    missing = [name for name in fields if name not in table.column_names]
+    if missing:
+        raise InputError(f"{file}: not a flight of tiltsim's: no column {', '.join(missing)}")
+    if len(table) == 0:
+        raise InputError(f"{file}: the flight has no samples")
+    try:
+        samples = np.column_stack(
+            [np.asarray(table[name].to_numpy(), dtype=np.float64) for name in fields]
+        )
+    except (ValueError, TypeError) as error:
+        raise InputError(f"{file}: not a flight of tiltsim's: {_first_line(error)}") from error
+    for name, values in zip(fields, samples.T, strict=True):
+        if not np.isfinite(values).all():
+            raise InputError(f"{file}: damaged: {name} has values that are no finite numbers")
+    if (np.diff(samples[:, 0]) <= 0.0).any():
+        raise InputError(f"{file}: damaged: its times do not increase")
+    return Flight(scenario, samples, end, engine, wall_time)
+
+
+def _flight_file(path: Path) -> Path:
+    """The Parquet file that a path given by the user means."""
+    file = path / "flight.parquet" if path.is_dir() else path
+    if file.is_file():
+        return file
+    missing = "no flight.parquet in this folder" if path.is_dir() else "no such file"
+    raise InputError(
+        f"{path}: {missing}; give a folder that tiltsim run --out wrote, or a flight.parquet"
+    )
+
+
+def _origin(file: Path, table: pyarrow.Table) -> dict[str, str]:
+    metadata = table.schema.metadata or {}
+    if b"scenario" not in metadata:
+        raise InputError(f"{file}: not a flight of tiltsim's: its metadata name no scenario")
+    return {key.decode(): value.decode(errors="replace") for key, value in metadata.items()}
+
+
+def _engine_and_end(origin: dict[str, str]) -> tuple[Any, End]:
+    """Engine and end from the metadata. Raises `ValueError` where they are unknown."""
+    from tiltsim.engines.base import EngineName
+    from tiltsim.flight.end import End, EndKind
+
+    if origin["engine"] not in get_args(EngineName):
+        raise ValueError(f"engine {origin['engine']!r} is unknown")
+    kind: Any = origin["end"]
+    if kind not in get_args(EndKind):
+        raise ValueError(f"end {kind!r} is unknown")
+    return origin["engine"], End(kind, float(origin["end_time"]), origin["cause"])
+
+
+def _first_line(error: Exception) -> str:
+    if isinstance(error, KeyError):
+        return f"its metadata lack {error.args[0]!r}"
+    return str(error).partition("\n")[0]

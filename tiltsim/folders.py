@@ -1,0 +1,47 @@
+"""The order of the folders: each imports from itself and from those before it, never later ones."""
+
+from __future__ import annotations
+
+from typing import Final
+
+CONTROLLERS: Final = (
+    "mathematics",
+    "vehicle",
+    "gaits",
+    "references",
+    "laws",
+    "analysis",
+    "tilt_car",
+)
+"""Folders of `tiltsim_controllers`, which knows neither tiltsim nor MuJoCo."""
+
+FLYING: Final = (
+    "system",
+    "models",
+    "scenario",
+    "closed_loop",
+    "vehicles",
+    "equations",
+    "engines",
+    "laws",
+    "plants",
+    "flight",
+    "simulation",
+)
+"""Folders of `tiltsim` that a flight and its metrics depend on."""
+
+SHOWING: Final = (
+    "sweeps",
+    "studies",
+    "env",
+    "views",
+    "report",
+    "commands",
+)
+"""Folders of `tiltsim` that use flights; none of them changes one."""
+
+FOUNDATION: Final = ("errors", "exit_codes", "resources", "folders")
+"""Modules directly in `tiltsim` that every folder may import."""
+
+ENTRANCE: Final = ("cli", "__main__", "__init__")
+"""Modules directly in `tiltsim` that may import every folder."""

@@ -1,0 +1,1 @@
+"""Control laws in closed loops with the vehicles, one module per law."""

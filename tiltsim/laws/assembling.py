@@ -1,0 +1,64 @@
+"""The closed loops that can be flown: one module a law, found by the name of the law."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from tiltsim.laws.attitude_altitude import TILTROTOR
+from tiltsim.laws.commanded import COMMANDED
+from tiltsim.laws.full_pose import FULL_POSE
+from tiltsim.laws.gait_feedforward import GAIT_FEEDFORWARD
+from tiltsim.laws.layers.actuation import with_actuation
+from tiltsim.laws.layers.air import with_air
+from tiltsim.laws.layers.on_equations import on_equations
+from tiltsim.laws.layers.supervision import with_supervisor
+from tiltsim.laws.quadrotor_attitude_altitude import QUADROTOR_ATTITUDE_ALTITUDE
+from tiltsim.laws.switching import SWITCHING
+from tiltsim.laws.tilt_car_fourth_derivative import FOURTH_DERIVATIVE
+from tiltsim.laws.tilt_car_planned_direction import PLANNED_DIRECTION
+from tiltsim.laws.tilt_car_third_derivative import THIRD_DERIVATIVE
+from tiltsim.laws.yaw_position import YAW_POSITION
+
+if TYPE_CHECKING:
+    from tiltsim.closed_loop.loop import ControlSetup, Loop
+    from tiltsim.scenario.scenario import Scenario
+
+LOOPS: Final[dict[str, Loop]] = {
+    "attitude_altitude": TILTROTOR,
+    "gait_feedforward": GAIT_FEEDFORWARD,  # the same law with gait_rate_feedforward = true
+    "full_pose": FULL_POSE,
+    "yaw_position": YAW_POSITION,
+    "switching": SWITCHING,
+    "quadrotor_attitude_altitude": QUADROTOR_ATTITUDE_ALTITUDE,
+    "tilt_car_third_derivative": THIRD_DERIVATIVE,
+    "tilt_car_fourth_derivative": FOURTH_DERIVATIVE,
+    "tilt_car_planned_direction": PLANNED_DIRECTION,
+}
+"""Loops by the name of their law; see `tiltsim.scenario.law_table.LawTable.loop_name`."""
+
+
+def loop_of(scenario: Scenario) -> Loop:
+    """The loop that a scenario flies: its law, within layers for what is not ideal."""
+    own, latency = scenario.controller.law == "python", scenario.simulation.latency_steps
+    loop = COMMANDED[scenario.vehicle.model] if own else LOOPS[scenario.controller.loop_name]
+    supervisor = getattr(scenario.controller, "supervisor", None)
+    if supervisor is not None:
+        loop = with_supervisor(loop, supervisor.strategy)
+    if scenario.has_real_actuators:
+        # Commands from outside are under way in their plant, `tiltsim.plants.commanded_plant`.
+        loop = with_actuation(loop, 0 if own else latency)
+    if scenario.has_air:
+        loop = with_air(loop)
+    by_controls = scenario.simulation.plant == "thesis" and not scenario.does_as_told
+    return on_equations(loop) if by_controls else loop
+
+
+def control_setup(scenario: Scenario) -> ControlSetup:
+    """Everything the control step of a scenario needs to know."""
+    loop = loop_of(scenario)
+    return loop.setup(scenario, loop.signature)
+
+
+def follows_position(scenario: Scenario) -> bool:
+    """Whether the law of a scenario follows the reference's horizontal position."""
+    return loop_of(scenario).follows_position(scenario)

@@ -1,0 +1,242 @@
+"""The attitude-altitude controller in a closed loop with the tiltrotor (ch. 3 and 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from tiltsim.closed_loop.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
+from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
+from tiltsim.scenario.tiltrotor_laws import AttitudeAltitudeController
+from tiltsim.vehicles.rotorcraft import ROTORCRAFT
+from tiltsim_controllers.gaits import tilt_reference
+from tiltsim_controllers.laws.attitude_altitude import (
+    DECOUPLINGS,
+    EXACT_DECOUPLING,
+    STATE_FIELDS,
+    Parameters,
+    State,
+    attitude_reference,
+    rotor_accelerations,
+)
+from tiltsim_controllers.laws.decouplers import DECOUPLERS
+from tiltsim_controllers.laws.supervisor import Supervisor
+from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
+from tiltsim_controllers.references.trajectories import position_reference
+from tiltsim_controllers.vehicle.decoupling_matrix import (
+    sines_and_cosines,
+    torque_entries,
+)
+from tiltsim_controllers.vehicle.parameters import drag_ratio
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import Scenario
+from tiltsim.laws.tiltrotor import (
+    gait_singularity,
+    initial_rotor_speeds,
+    observe_tiltrotor,
+    planned_servo_commands,
+    reference_columns,
+    refreshed_controls,
+    regularity,
+    rotor_spins,
+    rotor_stops,
+    rotor_thrust_controls,
+    servo_lead,
+    singular_matrix,
+    tiltrotor_state,
+)
+
+
+class ControlParameters(NamedTuple):
+    """The head of `userdata`: what the control step of a flight needs to know."""
+
+    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
+    law: Parameters
+    supervisor: Supervisor = Supervisor()
+
+
+@scalar
+def tiltrotor_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All twelve controls of the tiltrotor: tilt servos, thrusts, rotor accelerations.
+
+    The servo commands lead the planned angles by the servo's own lag, so that a stiff servo
+    follows a moving gait and not only a resting one.
+    """
+    law = parameters.law
+    state = tiltrotor_state(qpos, qvel, act)
+    return (
+        *planned_servo_commands(time, parameters.servo_lead, law.gait, table),
+        *rotor_thrust_controls(act),
+        *rotor_accelerations(time, state, law, table),
+    )
+
+
+@scalar
+def law_rates(
+    time: float,
+    state: State,
+    qvel: Sequence[float],
+    act: Sequence[float],
+    governor: Triple,
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> Quad:
+    """Rotor accelerations alone, for `tiltsim.laws.layers.supervision`."""
+    return rotor_accelerations(time, state, parameters.law, table)
+
+
+def _setup(scenario: Scenario, signature: float) -> ControlSetup:
+    controller = scenario.controller
+    assert isinstance(controller, AttitudeAltitudeController)
+    vehicle = scenario.rotorcraft.resolve()
+    gait = scenario.gait.plan(vehicle)
+    reference, table = scenario.reference_and_table()
+    parameters = ControlParameters(
+        signature,
+        servo_lead(scenario.rotorcraft.tilt_servo),
+        law=Parameters(
+            vehicle=vehicle,
+            gains=controller.resolve_gains(),
+            gait=gait.parameters,
+            reference=reference,
+            decoupler=DECOUPLERS[controller.decoupler],
+            decoupling=DECOUPLINGS[controller.decoupling],
+        ),
+        supervisor=controller.resolve_supervisor(vehicle),
+    )
+    return ControlSetup(parameters, table)
+
+
+@scalar
+def references_in_force(
+    time: float, state: State, parameters: ControlParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """`REFERENCE_COLUMNS` and `TILT_REFERENCE_COLUMNS` at a time and state of the law."""
+    law = parameters.law
+    ratio = drag_ratio(law.vehicle)
+    trig = sines_and_cosines(state[12], state[13], state[14], state[15])
+    torque = torque_entries(trig, ratio)
+    x, y, z, _, _, _, _, _, _ = position_reference(time, law.reference, table)
+    roll, pitch, yaw, _, _, _ = attitude_reference(time, state, trig, torque, law, table)
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, table)
+    return x, y, z, roll, pitch, yaw, a1, a2, a3, a4
+
+
+@scalar
+def references_under(
+    time: float,
+    state: State,
+    governor: Triple,
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """`REFERENCE_COLUMNS`, for `tiltsim.laws.layers.supervision`."""
+    return references_in_force(time, state, parameters, table)[:6]
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    columns = reference_columns(references_in_force, STATE_FIELDS, samples, setup)
+    return columns | gait_singularity(samples, setup.parameters.law.vehicle)
+
+
+@scalar
+def watch_tiltrotor(
+    values: Sequence[float], parameters: ControlParameters
+) -> tuple[float, float, float, float, float]:
+    """The determinant of the decoupling matrix, and the rotor speeds where it vanishes with them.
+
+    As published, the factor ``2 |varpi|`` stands in one row alone, and a rotor at rest is harmless.
+    """
+    law = parameters.law
+    matrix = regularity(values, law.vehicle)
+    if law.decoupling == EXACT_DECOUPLING:
+        spin_1, spin_2, spin_3, spin_4 = rotor_spins(values)
+        return matrix, spin_1, spin_2, spin_3, spin_4
+    return matrix, 1.0, 1.0, 1.0, 1.0
+
+
+def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Watched, ...]:
+    law = setup.parameters.law
+    matrix = singular_matrix(sample, law.vehicle)
+    return (matrix, *rotor_stops(sample)) if law.decoupling == EXACT_DECOUPLING else (matrix,)
+
+
+@scalar
+def equation_inputs(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> Quad:
+    """The law's rotor accelerations (rad/s^2) on the thesis' equations."""
+    law = parameters.law
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, table)
+    return rotor_accelerations(time, law_state(state, (a1, a2, a3, a4)), law, table)
+
+
+@scalar
+def equation_rates(
+    time: float,
+    state: Sequence[float],
+    inputs: Quad,
+    parameters: ControlParameters,
+    table: Sequence[float],
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """The thesis' equations with tilt angles that follow the gait exactly."""
+    law = parameters.law
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, table)
+    return equations_of_motion(state, (a1, a2, a3, a4), inputs, law.vehicle, disturbance)
+
+
+@scalar
+def observe_equations(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """What a sample holds, from the state of ch. 3's equations; the tilts are the gait's."""
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(
+        time, parameters.law.gait, table
+    )
+    return (*law_state(state, (a1, a2, a3, a4)), rate_1, rate_2, rate_3, rate_4)
+
+
+def follows_position(scenario: Scenario) -> bool:
+    """Whether a decoupler steers the vehicle to the reference's horizontal position."""
+    controller = scenario.controller
+    assert isinstance(controller, AttitudeAltitudeController)
+    return controller.decoupler != "none"
+
+
+TILTROTOR: Final = Loop(
+    kind=ROTORCRAFT,
+    model="tiltrotor",
+    sizes=Sizes(qpos=11, qvel=10, act=4, ctrl=12),
+    parameters=ControlParameters,
+    controls=tiltrotor_controls,
+    refresh=refreshed_controls,
+    setup=_setup,
+    initial_activations=lambda scenario, _setup: initial_rotor_speeds(scenario),
+    observe=observe_tiltrotor,
+    derive=_derive,
+    watched=_watched,
+    watch=watch_tiltrotor,
+    follows_position=follows_position,
+    equations=Equations(
+        inputs=equation_inputs,
+        inputs_size=4,
+        rates=equation_rates,
+        initial=lambda s, _setup: initial_state(s, initial_rotor_speeds(s)),
+        observe=observe_equations,
+    ),
+)
+"""The attitude-altitude law around the tiltrotor."""

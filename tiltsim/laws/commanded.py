@@ -1,0 +1,212 @@
+"""Vehicles that do what they are told from outside: by a user's controller, or an environment.
+
+Their law is to do what `Told` says; layers around it make of that what they make of any law's
+commands. Both vehicles have the speeds of their rotors as states here, so that they can be told
+speeds, thrusts or accelerations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from tiltsim.closed_loop.loop import ControlSetup, Floats, Loop, Sizes
+from tiltsim.laws.full_pose import TILT_COMMANDS
+from tiltsim.laws.quadrotor import references, rigid_body_state, upright_margin
+from tiltsim.laws.tiltrotor import (
+    TILT_REFERENCE_COLUMNS,
+    gait_singularity,
+    initial_rotor_speeds,
+    observe_tiltrotor,
+    planned_servo_commands,
+    refreshed_controls,
+    rotor_thrust_controls,
+    servo_lead,
+)
+from tiltsim.vehicles.rotorcraft import ROTORCRAFT
+from tiltsim_controllers.gaits import GaitParameters
+from tiltsim_controllers.mathematics.scalar import scalar
+from tiltsim_controllers.references.trajectories import ReferenceParameters
+from tiltsim_controllers.vehicle.parameters import Vehicle
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import Scenario
+
+
+class Told(NamedTuple):
+    """What the vehicle was told last."""
+
+    tilt_1: float = 0.0  # rad, for the servos
+    tilt_2: float = 0.0
+    tilt_3: float = 0.0
+    tilt_4: float = 0.0
+    acceleration_1: float = 0.0  # rad/s^2, of the rotors, with their signs
+    acceleration_2: float = 0.0
+    acceleration_3: float = 0.0
+    acceleration_4: float = 0.0
+
+
+class ControlParameters(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
+    vehicle: Vehicle
+    gait: GaitParameters
+    reference: ReferenceParameters
+    told: Told = Told()  # changes with every command, in the plant's copy of the parameters
+
+
+@scalar
+def commanded_tiltrotor_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All twelve controls of the tiltrotor."""
+    told = parameters.told
+    return (
+        *(told.tilt_1, told.tilt_2, told.tilt_3, told.tilt_4),
+        *rotor_thrust_controls(act),
+        *(told.acceleration_1, told.acceleration_2, told.acceleration_3, told.acceleration_4),
+    )
+
+
+@scalar
+def commanded_quadrotor_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All eight controls of the quadrotor."""
+    told = parameters.told
+    return (
+        *rotor_thrust_controls(act),
+        *(told.acceleration_1, told.acceleration_2, told.acceleration_3, told.acceleration_4),
+    )
+
+
+@scalar
+def refreshed_quadrotor_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
+    """Held controls with the thrusts that belong to the present rotor speeds."""
+    return (*rotor_thrust_controls(act), ctrl[4], ctrl[5], ctrl[6], ctrl[7])
+
+
+def _setup(scenario: Scenario, signature: float) -> ControlSetup:
+    vehicle = scenario.rotorcraft.resolve()
+    gait = scenario.gait.plan(vehicle)
+    reference, table = scenario.reference_and_table()
+    lead = servo_lead(scenario.rotorcraft.tilt_servo)
+    tilts = planned_servo_commands(0.0, lead, gait.parameters, table)
+    told = Told(*tilts)
+    return ControlSetup(
+        ControlParameters(signature, lead, vehicle, gait.parameters, reference, told), table
+    )
+
+
+def with_told(parameters: Any, told: Told) -> Any:
+    """Parameters of a vehicle under commands, whatever the layers around it, told otherwise."""
+    if isinstance(parameters, ControlParameters):
+        return parameters._replace(told=told)
+    return parameters._replace(law=with_told(parameters.law, told))
+
+
+def commanded_parameters(parameters: Any) -> ControlParameters:
+    """The parameters of the vehicle under commands within those of its layers."""
+    while not isinstance(parameters, ControlParameters):
+        parameters = parameters.law
+    return parameters
+
+
+@scalar
+def observe_commanded_quadrotor(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+) -> tuple[float, ...]:
+    """The rigid body, no tilt, the rotor speeds, which are states here, no tilt rates."""
+    return (
+        *rigid_body_state(qpos, qvel, 0.0, 0.0)[:12],
+        *(0.0, 0.0, 0.0, 0.0, act[0], act[1], act[2], act[3], 0.0, 0.0, 0.0, 0.0),
+    )
+
+
+@scalar
+def observe_commanded_tiltrotor(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+) -> tuple[float, ...]:
+    """As of any tiltrotor, and what its servos are told."""
+    return (*observe_tiltrotor(qpos, qvel, act, ctrl), ctrl[0], ctrl[1], ctrl[2], ctrl[3])
+
+
+def _references(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    reference = setup.parameters.reference
+    return references(
+        samples, reference, setup.table, (reference.roll, reference.pitch, reference.yaw)
+    )
+
+
+def _derive_tiltrotor(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    told = zip(TILT_REFERENCE_COLUMNS, TILT_COMMANDS, strict=True)
+    return {
+        **_references(samples, setup),
+        **{column: samples[name] for column, name in told},
+        **gait_singularity(samples, setup.parameters.vehicle),
+    }
+
+
+def _derive_quadrotor(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    return {
+        **_references(samples, setup),
+        "determinant": np.cos(samples["roll"]),  # of the attitude-altitude law
+        "singularity_margin": upright_margin(samples),
+    }
+
+
+def _follows_position(scenario: Scenario) -> bool:
+    return scenario.reference.kind != "attitude_altitude"
+
+
+TILTROTOR: Final = Loop(
+    kind=ROTORCRAFT,
+    model="tiltrotor",
+    sizes=Sizes(qpos=11, qvel=10, act=4, ctrl=12),
+    parameters=ControlParameters,
+    controls=commanded_tiltrotor_controls,
+    refresh=refreshed_controls,
+    setup=_setup,
+    initial_activations=lambda scenario, _setup: initial_rotor_speeds(scenario),
+    observe=observe_commanded_tiltrotor,
+    derive=_derive_tiltrotor,
+    watched=lambda _sample, _setup: (),
+    law_fields=TILT_COMMANDS,
+    extra_columns=dict.fromkeys(TILT_COMMANDS, "rad"),
+    follows_position=_follows_position,
+)
+"""The tiltrotor under commands; what its servos are told is part of a sample."""
+
+QUADROTOR: Final = Loop(
+    kind=ROTORCRAFT,
+    model="quadrotor",
+    sizes=Sizes(qpos=7, qvel=6, act=4, ctrl=8),
+    parameters=ControlParameters,
+    controls=commanded_quadrotor_controls,
+    refresh=refreshed_quadrotor_controls,
+    setup=_setup,
+    initial_activations=lambda scenario, _setup: initial_rotor_speeds(scenario),
+    observe=observe_commanded_quadrotor,
+    derive=_derive_quadrotor,
+    watched=lambda _sample, _setup: (),
+    follows_position=_follows_position,
+    flies_gait=False,
+)
+"""The quadrotor under commands."""
+
+COMMANDED: Final[dict[str, Loop]] = {"tiltrotor": TILTROTOR, "quadrotor": QUADROTOR}
+"""Loops under commands, by the vehicle's model."""

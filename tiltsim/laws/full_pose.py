@@ -1,0 +1,188 @@
+"""Full-pose control around the tiltrotor: the tilt angles are inputs, too (ch. 3, Sec. 6.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from tiltsim.closed_loop.loop import ControlSetup, Equations, Floats, Loop, Sizes
+from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
+from tiltsim.laws.quadrotor import references
+from tiltsim.laws.tiltrotor import (
+    gait_singularity,
+    initial_rotor_speeds,
+    observe_tiltrotor,
+    refreshed_controls,
+    rotor_spins,
+    rotor_stops,
+    rotor_thrust_controls,
+    servo_lead,
+    tiltrotor_state,
+)
+from tiltsim.scenario.tiltrotor_laws import FullPoseController
+from tiltsim.vehicles.rotorcraft import ROTORCRAFT, initial_tilts
+from tiltsim_controllers.laws.full_pose import Parameters, full_pose_inputs, limited_tilt_rate
+from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import Scenario
+
+TILT_COMMANDS: Final = tuple(f"tilt_command_{rotor}" for rotor in (1, 2, 3, 4))
+"""The law's own states: the tilt angles that the servos are told, but for their lead."""
+
+
+class ControlParameters(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
+    law: Parameters
+
+
+@scalar
+def full_pose_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All sixteen controls: tilt servos, thrusts, rotor accelerations, tilt rates.
+
+    The law gives tilt rates. Its own four states integrate them to the angles that the servos are
+    told, with the rate fed forward as for a planned gait.
+    """
+    lead = parameters.servo_lead
+    state = tiltrotor_state(qpos, qvel, act)
+    u1, u2, u3, u4, rate_1, rate_2, rate_3, rate_4 = full_pose_inputs(
+        time, state, parameters.law, table
+    )
+    # A pod at the stop of its servo is within the law's limit for good: what it is told is not.
+    limits = parameters.law.limits
+    rate_1 = limited_tilt_rate(rate_1, act[4], limits)
+    rate_2 = limited_tilt_rate(rate_2, act[5], limits)
+    rate_3 = limited_tilt_rate(rate_3, act[6], limits)
+    rate_4 = limited_tilt_rate(rate_4, act[7], limits)
+    return (
+        *(act[4] + lead * rate_1, act[5] + lead * rate_2),
+        *(act[6] + lead * rate_3, act[7] + lead * rate_4),
+        *rotor_thrust_controls(act),
+        *(u1, u2, u3, u4, rate_1, rate_2, rate_3, rate_4),
+    )
+
+
+@scalar
+def observe_full_pose(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+) -> tuple[float, ...]:
+    """The tiltrotor and the law's own states."""
+    return (*observe_tiltrotor(qpos, qvel, act, ctrl), act[4], act[5], act[6], act[7])
+
+
+@scalar
+def watch_rotor_stops(values: Sequence[float], parameters: ControlParameters) -> Quad:
+    """The rotor speeds along their spin."""
+    return rotor_spins(values)
+
+
+def _setup(scenario: Scenario, signature: float) -> ControlSetup:
+    controller = scenario.controller
+    assert isinstance(controller, FullPoseController)
+    vehicle = scenario.rotorcraft.resolve()
+    reference, table = scenario.reference_and_table()
+    law = Parameters(
+        vehicle,
+        controller.resolve_gains(),
+        reference,
+        controller.resolve_limits(),
+        controller.resolve_tilt_weight(vehicle),
+        controller.resolve_failure(),
+    )
+    lead = servo_lead(scenario.rotorcraft.tilt_servo)
+    return ControlSetup(ControlParameters(signature, lead, law), table)
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    law = setup.parameters.law
+    wanted = law.reference
+    attitude = (wanted.roll, wanted.pitch, wanted.yaw)
+    return {
+        **references(samples, wanted, setup.table, attitude),
+        **{f"alpha_ref_{i}": samples[f"tilt_command_{i}"] for i in (1, 2, 3, 4)},
+        **gait_singularity(samples, law.vehicle),
+    }
+
+
+@scalar
+def equation_inputs(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """The law's rotor accelerations and tilt rates on the thesis' equations."""
+    tilts = state[22], state[23], state[24], state[25]
+    return full_pose_inputs(time, law_state(state, tilts), parameters.law, table)
+
+
+@scalar
+def equation_rates(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """The thesis' equations, the tilt angles being states whose rates are inputs."""
+    tilts = state[22], state[23], state[24], state[25]
+    accelerations = inputs[0], inputs[1], inputs[2], inputs[3]
+    vehicle = parameters.law.vehicle
+    return (
+        *equations_of_motion(state, tilts, accelerations, vehicle, disturbance),
+        *(inputs[4], inputs[5], inputs[6], inputs[7]),
+    )
+
+
+@scalar
+def observe_equations(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """What a sample holds, from the state of ch. 3's equations and the tilt rates in force."""
+    return (
+        *law_state(state, (state[22], state[23], state[24], state[25])),
+        *(inputs[4], inputs[5], inputs[6], inputs[7]),
+        *(state[22], state[23], state[24], state[25]),
+    )
+
+
+FULL_POSE: Final = Loop(
+    kind=ROTORCRAFT,
+    model="tiltrotor",
+    sizes=Sizes(qpos=11, qvel=10, act=8, ctrl=16),
+    parameters=ControlParameters,
+    controls=full_pose_controls,
+    refresh=refreshed_controls,
+    setup=_setup,
+    initial_activations=lambda s, _setup: (*initial_rotor_speeds(s), *initial_tilts(s)[0]),
+    observe=observe_full_pose,
+    derive=_derive,
+    watched=lambda sample, _setup: rotor_stops(sample),
+    watch=watch_rotor_stops,
+    equations=Equations(
+        inputs=equation_inputs,
+        inputs_size=8,
+        rates=equation_rates,
+        initial=lambda s, _setup: (
+            *initial_state(s, initial_rotor_speeds(s)),
+            *initial_tilts(s)[0],
+        ),
+        observe=observe_equations,
+    ),
+    law_states=4,
+    law_fields=TILT_COMMANDS,
+    extra_columns=dict.fromkeys(TILT_COMMANDS, "rad"),
+)
+"""Full-pose control around the tiltrotor."""

@@ -1,0 +1,258 @@
+"""The attitude-altitude law that counts its gait's rates in, around the tiltrotor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from tiltsim.closed_loop.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
+from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
+from tiltsim.laws.attitude_altitude import follows_position
+from tiltsim.laws.tiltrotor import (
+    gait_singularity,
+    initial_rotor_speeds,
+    observe_tiltrotor,
+    planned_servo_commands,
+    reference_columns,
+    refreshed_controls,
+    regularity,
+    rotor_spins,
+    rotor_stops,
+    rotor_thrust_controls,
+    servo_lead,
+    singular_matrix,
+    tiltrotor_state,
+)
+from tiltsim.scenario.tiltrotor_laws import AttitudeAltitudeController
+from tiltsim.vehicles.rotorcraft import ROTORCRAFT
+from tiltsim_controllers.gaits import tilt_reference
+from tiltsim_controllers.laws.attitude_altitude import STATE_FIELDS, State
+from tiltsim_controllers.laws.decouplers import DECOUPLERS
+from tiltsim_controllers.laws.gait_feedforward import INTEGRAL_FIELDS, Parameters, tracking_inputs
+from tiltsim_controllers.laws.supervisor import AT_REST
+from tiltsim_controllers.mathematics.scalar import Triple, scalar
+from tiltsim_controllers.references.trajectories import position_reference
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import Scenario
+
+TILT_RATE_COLUMNS: Final = tuple(f"alpha_rate_{rotor}" for rotor in (1, 2, 3, 4))
+
+
+class ControlParameters(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
+    law: Parameters
+
+
+@scalar
+def law_rates(
+    time: float,
+    state: State,
+    qvel: Sequence[float],
+    act: Sequence[float],
+    governor: Triple,
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """The law's part of the controls: rotor accelerations, rates of the integrals."""
+    tilt_rates, integrals = (qvel[6], qvel[7], qvel[8], qvel[9]), (act[4], act[5], act[6])
+    return tracking_inputs(*(time, state, tilt_rates, integrals, parameters.law, table, governor))[
+        :7
+    ]
+
+
+@scalar
+def gait_feedforward_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All fifteen controls: tilt servos, thrusts, rotor accelerations, rates of the integrals."""
+    law = parameters.law
+    state = tiltrotor_state(qpos, qvel, act)
+    return (
+        *planned_servo_commands(time, parameters.servo_lead, law.gait, table),
+        *rotor_thrust_controls(act),
+        *law_rates(time, state, qvel, act, AT_REST, parameters, table),
+    )
+
+
+def _setup(scenario: Scenario, signature: float) -> ControlSetup:
+    controller = scenario.controller
+    assert isinstance(controller, AttitudeAltitudeController)
+    vehicle = scenario.rotorcraft.resolve()
+    gait = scenario.gait.plan(vehicle)
+    reference, table = scenario.reference_and_table()
+    law = Parameters(
+        vehicle=vehicle,
+        gains=controller.resolve_gains(),
+        integral=controller.resolve_integral_gains(),
+        max_acceleration=controller.max_acceleration,
+        max_angular_acceleration=controller.max_angular_acceleration,
+        anticipation=min(controller.anticipation, 0.5 * gait.shortest_line),
+        # The thesis' own equations leave the gyroscopic torque out.
+        ingredients=controller.resolve_ingredients(
+            gyroscopic_torque=scenario.simulation.plant != "thesis"
+        ),
+        gait=gait.parameters,
+        reference=reference,
+        decoupler=DECOUPLERS[controller.decoupler],
+        supervisor=controller.resolve_supervisor(vehicle),
+    )
+    lead = servo_lead(scenario.rotorcraft.tilt_servo)
+    return ControlSetup(ControlParameters(signature, lead, law), table)
+
+
+@scalar
+def references_under(
+    time: float,
+    state: Sequence[float],
+    governor: Triple,
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, float, float, float, float, float]:
+    """Position (m) and attitude (rad) to track at a time: the state is `SEEN`."""
+    law = parameters.law
+    x, y, z, _, _, _, _, _, _ = position_reference(time, law.reference, table)
+    _, _, _, _, _, _, _, roll, pitch, yaw = tracking_inputs(
+        time,
+        (
+            *(state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7]),
+            *(state[8], state[9], state[10], state[11], state[12], state[13], state[14]),
+            *(state[15], state[16], state[17], state[18], state[19]),
+        ),
+        (state[20], state[21], state[22], state[23]),
+        (state[24], state[25], state[26]),
+        law,
+        table,
+        governor,
+    )
+    return x, y, z, roll, pitch, yaw
+
+
+@scalar
+def references_in_force(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """Columns of references at a time: the state is `SEEN`."""
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, parameters.law.gait, table)
+    return (*references_under(time, state, AT_REST, parameters, table), a1, a2, a3, a4)
+
+
+SEEN: Final = (*STATE_FIELDS, *TILT_RATE_COLUMNS, *INTEGRAL_FIELDS)
+"""Of a sample, what references are made from."""
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    columns = reference_columns(references_in_force, SEEN, samples, setup)
+    return columns | gait_singularity(samples, setup.parameters.law.vehicle)
+
+
+@scalar
+def observe_gait_feedforward(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+) -> tuple[float, ...]:
+    """The tiltrotor and the law's own states."""
+    return (*observe_tiltrotor(qpos, qvel, act, ctrl), act[4], act[5], act[6])
+
+
+@scalar
+def watch_gait_feedforward(
+    values: Sequence[float], parameters: ControlParameters
+) -> tuple[float, float, float, float, float]:
+    """The determinant of the decoupling matrix, and the rotor speeds with which it vanishes."""
+    spin_1, spin_2, spin_3, spin_4 = rotor_spins(values)
+    return regularity(values, parameters.law.vehicle), spin_1, spin_2, spin_3, spin_4
+
+
+def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Watched, ...]:
+    return (singular_matrix(sample, setup.parameters.law.vehicle), *rotor_stops(sample))
+
+
+@scalar
+def equation_inputs(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """The law's rotor accelerations and the rates of its integrals on the thesis' equations."""
+    law = parameters.law
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, law.gait, table)
+    u1, u2, u3, u4, x_rate, y_rate, z_rate, _roll, _pitch, _yaw = tracking_inputs(
+        time,
+        law_state(state, (a1, a2, a3, a4)),
+        (rate_1, rate_2, rate_3, rate_4),
+        (state[22], state[23], state[24]),
+        law,
+        table,
+    )
+    return u1, u2, u3, u4, x_rate, y_rate, z_rate
+
+
+@scalar
+def equation_rates(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """The thesis' equations with tilt angles that follow the gait exactly, and the integrals."""
+    law = parameters.law
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, table)
+    accelerations = inputs[0], inputs[1], inputs[2], inputs[3]
+    return (
+        *equations_of_motion(state, (a1, a2, a3, a4), accelerations, law.vehicle, disturbance),
+        *(inputs[4], inputs[5], inputs[6]),
+    )
+
+
+@scalar
+def observe_equations(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """What a sample holds, from the state of ch. 3's equations; the tilts are the gait's."""
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(
+        time, parameters.law.gait, table
+    )
+    return (
+        *law_state(state, (a1, a2, a3, a4)),
+        *(rate_1, rate_2, rate_3, rate_4, state[22], state[23], state[24]),
+    )
+
+
+GAIT_FEEDFORWARD: Final = Loop(
+    kind=ROTORCRAFT,
+    model="tiltrotor",
+    sizes=Sizes(qpos=11, qvel=10, act=7, ctrl=15),
+    parameters=ControlParameters,
+    controls=gait_feedforward_controls,
+    refresh=refreshed_controls,
+    setup=_setup,
+    initial_activations=lambda s, _setup: (*initial_rotor_speeds(s), 0.0, 0.0, 0.0),
+    observe=observe_gait_feedforward,
+    derive=_derive,
+    watched=_watched,
+    watch=watch_gait_feedforward,
+    equations=Equations(
+        inputs=equation_inputs,
+        inputs_size=7,
+        rates=equation_rates,
+        initial=lambda s, _setup: (*initial_state(s, initial_rotor_speeds(s)), 0.0, 0.0, 0.0),
+        observe=observe_equations,
+    ),
+    law_states=3,
+    law_fields=INTEGRAL_FIELDS,
+    extra_columns=dict.fromkeys(INTEGRAL_FIELDS, "m s"),
+    follows_position=follows_position,
+)
+"""The attitude-altitude law with gait-rate feed-forward around the tiltrotor."""

@@ -1,0 +1,1 @@
+"""Layers around a closed loop: actuators, air, supervisor, actuator-level equations."""

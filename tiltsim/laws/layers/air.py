@@ -1,0 +1,234 @@
+"""The air around any vehicle: a layer that adds its forces to what a law makes the vehicle do.
+
+MuJoCo's own fluid forces know boxes and ellipsoids in a constant wind. These act through six
+actuators on the body instead, force and torque in body axes, which only models with air have. The
+filters of turbulence are activations, so a flight restarts anywhere, gusts and all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from math import atan2, hypot
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from tiltsim.closed_loop.loop import ControlSetup, Floats, Loop
+from tiltsim.laws.layers.layer import around
+from tiltsim.models.parts import ExtraActuators
+from tiltsim_controllers.mathematics.rotation import rotation_from_quaternion
+from tiltsim_controllers.mathematics.scalar import Quad, scalar
+from tiltsim_controllers.vehicle.air import (
+    DRYDEN_STATES,
+    Air,
+    Drag,
+    Ground,
+    Gust,
+    Turbulence,
+    air_velocity,
+    drag_force,
+    dryden_rates,
+    ground_effect,
+    low_altitude_turbulence,
+    stationary_states,
+)
+from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines
+from tiltsim_controllers.vehicle.parameters import Vehicle
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import Scenario
+
+WRENCH: Final = 6
+AIR_COLUMNS: Final = ("air_vx", "air_vy", "air_vz")
+DRYDEN_FIELDS: Final = tuple(f"dryden_{index}" for index in range(1, DRYDEN_STATES + 1))
+
+
+class Surroundings(NamedTuple):
+    """The parameters of the layer."""
+
+    air: Air
+    vehicle: Vehicle
+
+
+@scalar
+def pod_tilts(qpos: Sequence[float]) -> Quad:
+    """Tilt angles of the tiltrotor."""
+    return qpos[7], qpos[8], qpos[9], qpos[10]
+
+
+@scalar
+def no_tilts(qpos: Sequence[float]) -> Quad:
+    """Tilt angles of a vehicle whose rotors do not tilt."""
+    return 0.0, 0.0, 0.0, 0.0
+
+
+@scalar
+def air_wrench(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    states: tuple[float, ...],
+    tilts: Quad,
+    thrusts: Quad,
+    surroundings: Surroundings,
+) -> tuple[float, ...]:
+    """Force (N) and torque (N m) of the air, body axes: drag, and what the ground adds to thrust.
+
+    ``thrusts`` are the controls of the thrust actuators, (rad/s)^2; ``states`` those of the
+    turbulence.
+    """
+    air, vehicle = surroundings.air, surroundings.vehicle
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_from_quaternion(
+        qpos[3], qpos[4], qpos[5], qpos[6]
+    )
+    ax, ay, az = air_velocity(time, states, air)
+    vx, vy, vz = qvel[0] - ax, qvel[1] - ay, qvel[2] - az
+    through = (
+        r11 * vx + r21 * vy + r31 * vz,
+        r12 * vx + r22 * vy + r32 * vz,
+        r13 * vx + r23 * vy + r33 * vz,
+    )
+    fx, fy, fz = drag_force(through, air.drag)
+    radius = air.ground.rotor_radius
+    if radius == 0.0:
+        return fx, fy, fz, 0.0, 0.0, 0.0
+
+    # Each rotor by its own height; the drag torque about its axis stays (equal power).
+    arm, per_thrust = vehicle.arm_length, vehicle.thrust_coefficient
+    above = qpos[2] - air.ground.height
+    t1 = per_thrust * thrusts[0] * (ground_effect(above + arm * r31, radius) - 1.0)
+    t2 = per_thrust * thrusts[1] * (ground_effect(above + arm * r32, radius) - 1.0)
+    t3 = per_thrust * thrusts[2] * (ground_effect(above - arm * r31, radius) - 1.0)
+    t4 = per_thrust * thrusts[3] * (ground_effect(above - arm * r32, radius) - 1.0)
+    s1, c1, s2, c2, s3, c3, s4, c4 = sines_and_cosines(tilts[0], tilts[1], tilts[2], tilts[3])
+    return (
+        fx + t2 * s2 - t4 * s4,
+        fy - t1 * s1 + t3 * s3,
+        fz + t1 * c1 + t2 * c2 + t3 * c3 + t4 * c4,
+        arm * (t2 * c2 - t4 * c4),
+        arm * (t3 * c3 - t1 * c1),
+        -arm * (t1 * s1 + t2 * s2 + t3 * s3 + t4 * s4),
+    )
+
+
+@cache
+def with_air(loop: Loop) -> Loop:
+    """A loop in air that moves, drags and feels the ground."""
+    layered = around(loop, Surroundings, _surroundings)
+    inner_controls, inner_hold, inner_observe = loop.controls, loop.held, loop.observe
+    first, inner_ctrl = loop.sizes.act, loop.sizes.ctrl
+    tilting = loop.model == "tiltrotor"
+    tilts_of: Callable[..., Quad] = pod_tilts if tilting else no_tilts
+    thrust = 4 if tilting else 0  # the first of the thrust actuators
+    extra = ExtraActuators(states=DRYDEN_STATES, wrench=True)
+    sizes = loop.sizes._replace(act=first + DRYDEN_STATES, ctrl=inner_ctrl + DRYDEN_STATES + WRENCH)
+
+    @scalar
+    def air_controls(
+        time: float,
+        qpos: Sequence[float],
+        qvel: Sequence[float],
+        act: Sequence[float],
+        ctrl: Sequence[float],
+        surroundings: Surroundings,
+    ) -> tuple[float, ...]:
+        states = (act[first], act[first + 1], act[first + 2], act[first + 3], act[first + 4])
+        thrusts = (ctrl[thrust], ctrl[thrust + 1], ctrl[thrust + 2], ctrl[thrust + 3])
+        return (
+            *dryden_rates(time, states, surroundings.air.turbulence),
+            *air_wrench(time, qpos, qvel, states, tilts_of(qpos), thrusts, surroundings),
+        )
+
+    @scalar
+    def controls(
+        time: float,
+        qpos: Sequence[float],
+        qvel: Sequence[float],
+        act: Sequence[float],
+        parameters: Any,
+        table: Sequence[float],
+    ) -> tuple[float, ...]:
+        inner = inner_controls(time, qpos, qvel, act, parameters.law, table)
+        return (*inner, *air_controls(time, qpos, qvel, act, inner, parameters.layer))
+
+    @scalar
+    def hold(
+        time: float,
+        qpos: Sequence[float],
+        qvel: Sequence[float],
+        act: Sequence[float],
+        ctrl: Sequence[float],
+        parameters: Any,
+    ) -> tuple[float, ...]:
+        inner = inner_hold(time, qpos, qvel, act, ctrl[:inner_ctrl], parameters.law)
+        return (*inner, *air_controls(time, qpos, qvel, act, inner, parameters.layer))
+
+    @scalar
+    def observe(
+        qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+    ) -> tuple[float, ...]:
+        seen = inner_observe(qpos, qvel, act[:first], ctrl[:inner_ctrl])
+        return (
+            *seen,
+            *(act[first], act[first + 1], act[first + 2], act[first + 3], act[first + 4]),
+        )
+
+    controls.__qualname__ = f"with_air.{loop.controls.__qualname__}"
+
+    def initial_activations(scenario: Scenario, setup: ControlSetup) -> Sequence[float]:
+        turbulence = setup.parameters.layer.air.turbulence
+        return (*layered.initial_activations(scenario, setup), *stationary_states(turbulence))
+
+    def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+        columns = layered.derive(samples, setup)
+        air = setup.parameters.layer.air
+        states = np.stack([samples[name] for name in DRYDEN_FIELDS], axis=-1)
+        velocity = np.array(
+            [
+                air_velocity(time, tuple(state), air)
+                for time, state in zip(samples["time"].tolist(), states.tolist(), strict=True)
+            ]
+        )
+        return columns | dict(zip(AIR_COLUMNS, velocity.T, strict=True))
+
+    return replace(
+        layered,
+        sizes=sizes,
+        controls=controls,
+        hold=hold,
+        initial_activations=initial_activations,
+        observe=observe,
+        derive=derive,
+        extra_actuators=(*loop.extra_actuators, extra),
+        law_fields=(*loop.law_fields, *DRYDEN_FIELDS),
+        extra_columns={
+            **loop.extra_columns,
+            **dict.fromkeys(AIR_COLUMNS, "m/s"),
+            **dict.fromkeys(DRYDEN_FIELDS, "1/s^0.5"),
+        },
+    )
+
+
+def _surroundings(scenario: Scenario) -> Surroundings:
+    table = scenario.air
+    turbulence = Turbulence()
+    if table.turbulence is not None:
+        x, y, _ = table.wind
+        turbulence = low_altitude_turbulence(
+            table.turbulence.wind_at_6m,
+            table.turbulence.height,
+            speed=hypot(x, y) or table.turbulence.wind_at_6m,
+            direction=atan2(y, x),
+            sample_time=table.turbulence.sample_time,
+            seed=float(scenario.simulation.seed),
+        )
+    gust, ground = Gust(), Ground()
+    if table.gust is not None:
+        times = table.gust.start, table.gust.rise, table.gust.duration
+        gust = Gust(*times, *table.gust.velocity)
+    if table.ground_effect is not None:
+        ground = Ground(table.ground_effect.rotor_radius, table.ground_effect.height)
+    drag = Drag(*table.drag.linear, *table.drag.area, table.density)
+    return Surroundings(Air(*table.wind, drag, gust, turbulence, ground), scenario.true_rotorcraft)

@@ -1,0 +1,94 @@
+"""What all layers around a loop have in common: parameters of their own, all else as within."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from tiltsim.closed_loop.loop import ControlSetup, Floats, Loop, Watched
+from tiltsim_controllers.mathematics.records import make_record_type
+from tiltsim_controllers.mathematics.scalar import scalar
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import Scenario
+
+
+def around(loop: Loop, record: type[tuple[Any, ...]], read: Callable[[Scenario], Any]) -> Loop:
+    """A loop whose parameters hold those of a layer, too: the fields ``layer`` and ``law``.
+
+    It flies as the loop within does until the layer replaces the functions that it is about. It has
+    no equations: those of the loop within know nothing of the layer.
+
+    Parameters
+    ----------
+    loop
+        The loop within; its parameters become the field ``law``.
+    record
+        The type of the field ``layer``.
+    read
+        ``(scenario) -> layer``.
+    """
+    parameters_type = make_record_type(
+        f"{record.__name__}Parameters", signature=float, layer=record, law=loop.parameters
+    )
+    inner_controls, inner_hold = loop.controls, loop.held
+    inner_watch: Any = loop.watch
+
+    @scalar
+    def controls(
+        time: float,
+        qpos: Sequence[float],
+        qvel: Sequence[float],
+        act: Sequence[float],
+        parameters: Any,
+        table: Sequence[float],
+    ) -> tuple[float, ...]:
+        return inner_controls(time, qpos, qvel, act, parameters.law, table)
+
+    @scalar
+    def hold(
+        time: float,
+        qpos: Sequence[float],
+        qvel: Sequence[float],
+        act: Sequence[float],
+        ctrl: Sequence[float],
+        parameters: Any,
+    ) -> tuple[float, ...]:
+        return inner_hold(time, qpos, qvel, act, ctrl, parameters.law)
+
+    @scalar
+    def watch(values: Sequence[float], parameters: Any) -> tuple[float, ...]:
+        watched: tuple[float, ...] = inner_watch(values, parameters.law)
+        return watched
+
+    def setup(scenario: Scenario, signature: float) -> ControlSetup:
+        inner = loop.setup(scenario, loop.signature)
+        return ControlSetup(
+            parameters_type(signature, read(scenario), inner.parameters), inner.table
+        )
+
+    def within(setup: ControlSetup) -> ControlSetup:
+        return ControlSetup(setup.parameters.law, setup.table)
+
+    def initial_activations(scenario: Scenario, setup: ControlSetup) -> Sequence[float]:
+        return loop.initial_activations(scenario, within(setup))
+
+    def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+        return loop.derive(samples, within(setup))
+
+    def watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Watched, ...]:
+        return loop.watched(sample, within(setup))
+
+    return replace(
+        loop,
+        parameters=parameters_type,
+        controls=controls,
+        hold=hold,
+        setup=setup,
+        initial_activations=initial_activations,
+        derive=derive,
+        watched=watched,
+        watch=None if inner_watch is None else watch,
+        equations=None,
+    )

@@ -1,0 +1,142 @@
+"""The attitude-altitude law around the quadrotor (ch. 2, Appendix B)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from tiltsim.closed_loop.loop import ControlSetup, Floats, Loop, Sizes
+from tiltsim.equations.quadrotor import equations_of_motion, rigid_body
+from tiltsim.laws.quadrotor import (
+    attitude_watched,
+    equations,
+    observe_equations,
+    observe_quadrotor,
+    references,
+    rigid_body_state,
+    upright_margin,
+    watch_attitude,
+)
+from tiltsim.scenario.quadrotor_laws import QuadrotorAttitudeAltitudeController
+from tiltsim.vehicles.rotorcraft import ROTORCRAFT
+from tiltsim_controllers.laws.quadrotor_attitude_altitude import Gains, attitude_altitude_inputs
+from tiltsim_controllers.mathematics.scalar import Triple, scalar
+from tiltsim_controllers.references.trajectories import ReferenceParameters
+from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.quadrotor_mixer import thrust_controls
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import Scenario
+
+
+class ControlParameters(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    vehicle: Vehicle
+    gains: Gains
+    reference: ReferenceParameters
+
+
+@scalar
+def attitude_altitude_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All eight controls: thrusts, idle rotor states."""
+    vehicle = parameters.vehicle
+    thrust, roll_torque, pitch_torque, yaw_torque = attitude_altitude_inputs(
+        *(time, rigid_body_state(qpos, qvel, 0.0, 0.0), vehicle),
+        *(parameters.gains, parameters.reference),
+    )
+    return (
+        *thrust_controls(thrust, roll_torque, pitch_torque, yaw_torque, vehicle),
+        *(0.0, 0.0, 0.0, 0.0),
+    )
+
+
+@scalar
+def held_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
+    """Controls as they were sampled."""
+    return ctrl[0], ctrl[1], ctrl[2], ctrl[3], ctrl[4], ctrl[5], ctrl[6], ctrl[7]
+
+
+def _setup(scenario: Scenario, signature: float) -> ControlSetup:
+    controller = scenario.controller
+    assert isinstance(controller, QuadrotorAttitudeAltitudeController)
+    vehicle, gains = scenario.rotorcraft.resolve(), controller.resolve_gains()
+    return ControlSetup(ControlParameters(signature, vehicle, gains, scenario.reference.parameters))
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    reference = setup.parameters.reference
+    attitude = (reference.roll, reference.pitch, reference.yaw)
+    return {
+        **references(samples, reference, setup.table, attitude),
+        # cos(roll) cos(pitch) of the altitude times 1 / cos(pitch) of the Euler angles
+        "determinant": np.cos(samples["roll"]),
+        "singularity_margin": upright_margin(samples),
+    }
+
+
+@scalar
+def equation_inputs(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """The law on the thesis' equations."""
+    return attitude_altitude_inputs(
+        *(time, rigid_body(state), parameters.vehicle),
+        *(parameters.gains, parameters.reference),
+    )
+
+
+@scalar
+def equation_rates(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """The thesis' equations under this law."""
+    return equations_of_motion(state, inputs, parameters.vehicle, disturbance)
+
+
+@scalar
+def observe_in_equations(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """What a sample holds, from the state of the thesis' equations."""
+    return observe_equations(state, inputs, parameters.vehicle)
+
+
+QUADROTOR_ATTITUDE_ALTITUDE: Final = Loop(
+    kind=ROTORCRAFT,
+    model="quadrotor",
+    sizes=Sizes(qpos=7, qvel=6, act=4, ctrl=8),
+    parameters=ControlParameters,
+    controls=attitude_altitude_controls,
+    refresh=held_controls,
+    setup=_setup,
+    initial_activations=lambda _scenario, _setup: (0.0, 0.0, 0.0, 0.0),
+    observe=observe_quadrotor,
+    observes_controls=True,
+    derive=_derive,
+    watched=lambda sample, _setup: (attitude_watched(sample),),
+    watch=watch_attitude,
+    follows_position=lambda _scenario: False,
+    equations=equations(equation_inputs, 4, equation_rates, observe_in_equations),
+    flies_gait=False,
+)
+"""The attitude-altitude law around the quadrotor."""

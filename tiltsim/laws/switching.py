@@ -1,0 +1,143 @@
+"""Switching between two laws around the quadrotor (ch. 2, Sec. 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+import tiltsim_controllers.laws.yaw_position as yaw_position
+from tiltsim.closed_loop.loop import ControlSetup, Floats, Watched
+from tiltsim.equations.quadrotor import extended_equations_of_motion, law_state
+from tiltsim.laws.quadrotor import (
+    attitude_watched,
+    equations,
+    extended_controls,
+    extended_loop,
+    extended_singularity,
+    observe_extended_equations,
+    references,
+    rigid_body_state,
+    watch_attitude,
+)
+from tiltsim.scenario.quadrotor_laws import SwitchingController
+from tiltsim_controllers.laws.switching import (
+    EXTENSIONS,
+    Parameters,
+    Zone,
+    in_attitude_zone,
+    switching_inputs,
+)
+from tiltsim_controllers.mathematics.scalar import Triple, scalar
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import Scenario
+
+
+class ControlParameters(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    law: Parameters
+
+
+@scalar
+def switching_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All ten controls: thrusts, idle rotor states, the law's own states."""
+    law = parameters.law
+    state = rigid_body_state(qpos, qvel, act[4], act[5])
+    return extended_controls(switching_inputs(time, state, law, table), law.yaw_position.vehicle)
+
+
+def _setup(scenario: Scenario, signature: float) -> ControlSetup:
+    controller = scenario.controller
+    assert isinstance(controller, SwitchingController)
+    reference, table = scenario.reference_and_table()
+    law = Parameters(
+        yaw_position.Parameters(
+            scenario.rotorcraft.resolve(), controller.resolve_gains(), reference
+        ),
+        controller.resolve_attitude_gains(),
+        Zone(*controller.zone.roll, *controller.zone.pitch),
+        EXTENSIONS[controller.extension],
+        controller.extension_rate,
+    )
+    return ControlSetup(ControlParameters(signature, law), table)
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    law = setup.parameters.law
+    reference = law.yaw_position.reference
+    attitudes = zip(samples["roll"].tolist(), samples["pitch"].tolist(), strict=True)
+    inside = np.array([in_attitude_zone(*attitude, law.zone) for attitude in attitudes], float)
+    # Outside of the zone roll and pitch are no outputs: they are what the position takes.
+    roll = np.where(inside > 0.0, reference.roll, samples["roll"])
+    pitch = np.where(inside > 0.0, reference.pitch, samples["pitch"])
+    return {
+        **references(samples, reference, setup.table, (roll, pitch, reference.yaw)),
+        **extended_singularity(samples, law.yaw_position.vehicle),
+        "attitude_zone": inside,
+    }
+
+
+def _watched(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[Watched, ...]:
+    # Not the extension's thrust: while the other law flies it may be anything.
+    return (attitude_watched(sample),)
+
+
+@scalar
+def equation_inputs(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """The law on the thesis' equations."""
+    return switching_inputs(time, law_state(state), parameters.law, table)
+
+
+@scalar
+def equation_rates(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """The thesis' equations under this law."""
+    return extended_equations_of_motion(
+        state, inputs, parameters.law.yaw_position.vehicle, disturbance
+    )
+
+
+@scalar
+def observe_in_equations(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """What a sample holds, from the state of the thesis' equations."""
+    return observe_extended_equations(state, inputs, parameters.law.yaw_position.vehicle)
+
+
+SWITCHING: Final = extended_loop(
+    ControlParameters,
+    switching_controls,
+    equations(equation_inputs, 6, equation_rates, observe_in_equations),
+    setup=_setup,
+    derive=_derive,
+    watched=_watched,
+    watch=watch_attitude,
+    own_columns={"attitude_zone": "1"},
+    # In the zone, where the law is meant to end up, the position is free.
+    follows_position=False,
+)
+"""Switching between yaw-position and attitude-altitude control of the quadrotor."""

@@ -1,0 +1,168 @@
+"""What the loops around the tilt-car share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from tiltsim.closed_loop.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
+from tiltsim.laws.tiltrotor import servo_lead
+from tiltsim.vehicles.tilt_car import TILT_CAR, initial_tilt
+from tiltsim_controllers.mathematics.scalar import Pair, scalar
+from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
+from tiltsim_controllers.tilt_car.vehicle import TiltCar
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import Scenario
+
+CarState = tuple[float, float, float, float, float, float, float, float]
+
+REFERENCE_COLUMNS: Final = ("x_ref", "y_ref", "vx_ref", "vy_ref")
+
+
+@scalar
+def running_speed(speed: float) -> float:
+    """A rotor speed (rad/s) that an integrator's stage may have carried below zero."""
+    return 0.0 if speed < 0.0 else speed
+
+
+@scalar
+def car_state(
+    qpos: Sequence[float], qvel: Sequence[float], speed_1: float, speed_2: float
+) -> CarState:
+    """The laws' state (`tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`) from MuJoCo's."""
+    return (
+        *(qpos[0], qpos[1], qvel[0], qvel[1], qpos[2], qpos[3]),
+        *(running_speed(speed_1), running_speed(speed_2)),
+    )
+
+
+@scalar
+def speed_squares(act: Sequence[float]) -> Pair:
+    """Controls of the thrust actuators, the squares of the rotor speeds."""
+    speed_1, speed_2 = running_speed(act[0]), running_speed(act[1])
+    return speed_1 * speed_1, speed_2 * speed_2
+
+
+def reference_columns(samples: Mapping[str, Floats], reference: ReferenceParameters) -> Floats:
+    """The reference and its derivatives at the samples' times, shape (15, N)."""
+    time = samples["time"]
+    rows = [reference_derivatives(t, reference) for t in time.tolist()]
+    return np.array(rows).reshape(len(time), 15).T
+
+
+def derived_columns(
+    samples: Mapping[str, Floats], reference: Floats, wanted: tuple[Floats, Floats], car: TiltCar
+) -> dict[str, Floats]:
+    """Reference, directions and the split of the inputs.
+
+    ``reference`` are `reference_columns`, ``wanted`` the acceleration whose direction the thrusts
+    are to bracket.
+    """
+    direction = samples["yaw"] + samples["alpha"]
+    away = np.arctan2(wanted[1], wanted[0]) - direction
+    return {
+        **dict(zip(REFERENCE_COLUMNS, reference[[0, 1, 3, 4]], strict=True)),
+        "direction": direction,
+        "direction_lower": direction - car.half_angle,
+        "direction_upper": direction + car.half_angle,
+        "direction_ref": direction + np.arctan2(np.sin(away), np.cos(away)),
+        "input_split": samples["rotor_speed_1"] ** 2 - samples["rotor_speed_2"] ** 2,
+    }
+
+
+def rotors_at_rest(sample: Mapping[str, float]) -> tuple[Watched, ...]:
+    """Both rotors' squares: the inputs' matrix loses its rank where both are at rest."""
+    squares = sample["rotor_speed_1"] ** 2 + sample["rotor_speed_2"] ** 2
+    return (Watched(squares, "the decoupling matrix became singular: both rotors came to rest"),)
+
+
+@scalar
+def squares_of_speeds(values: Sequence[float], parameters: object) -> tuple[float]:
+    """What `rotors_at_rest` watches, from what a loop around the car observes."""
+    return (values[8] * values[8] + values[9] * values[9],)
+
+
+def initial_motion(scenario: Scenario) -> tuple[float, float, float, float]:
+    """Position (m) and velocity (m/s) on the plane at time zero."""
+    x, y, _ = scenario.initial.position
+    vx, vy, _ = scenario.initial.velocity
+    return x, y, vx, vy
+
+
+def car_setup(
+    parameters: Callable[..., Any], scenario: Scenario, signature: float, **own: Any
+) -> ControlSetup:
+    """What every loop around the car begins with, and its ``own`` fields by name."""
+    lead = servo_lead(scenario.tilt_car.tilt_servo)
+    heading = float(scenario.initial.attitude[2])
+    return ControlSetup(parameters(signature, servo_lead=lead, heading=heading, **own))
+
+
+def integrating_loop(
+    parameters: type[tuple[Any, ...]],
+    controls: Callable[..., tuple[float, ...]],
+    refresh: Callable[..., tuple[float, ...]],
+    observe: Callable[..., tuple[float, ...]],
+    *,
+    setup: Callable[[Scenario, float], ControlSetup],
+    law_states: int,
+    law_fields: tuple[str, ...],
+    own_columns: Mapping[str, str] | None = None,
+    equations: tuple[Callable[..., tuple[float, ...]], ...],
+) -> Loop:
+    """A loop whose law integrates both rotor speeds and the tilt angle that the servo is told.
+
+    The angle is the first of its ``law_states``, which start at zero but for it. ``equations`` are
+    the functions of inputs, rates and what to observe of `tiltsim.closed_loop.loop.Equations`;
+    their state is position, velocity, tilt angle, rotor speeds and the further law states. The rest
+    is as `tiltsim.closed_loop.loop.Loop` says.
+    """
+    further = (0.0,) * (law_states - 1)
+    inputs, rates, observe_equations = equations
+    return Loop(
+        model="tilt_car",
+        sizes=Sizes(qpos=4, qvel=4, act=2 + law_states, ctrl=5 + law_states),
+        parameters=parameters,
+        controls=controls,
+        refresh=refresh,
+        setup=setup,
+        initial_activations=lambda s, _setup: (
+            *_initial_rotor_speeds(s),
+            *(initial_tilt(s)[0], *further),
+        ),
+        observe=observe,
+        derive=_derive,
+        watched=lambda sample, _setup: rotors_at_rest(sample),
+        watch=squares_of_speeds,
+        equations=Equations(
+            inputs=inputs,
+            inputs_size=3,
+            rates=rates,
+            initial=lambda s, _setup: (
+                *initial_motion(s),
+                initial_tilt(s)[0],
+                *_initial_rotor_speeds(s),
+                *further,
+            ),
+            observe=observe_equations,
+        ),
+        law_states=law_states,
+        law_fields=law_fields,
+        extra_columns=own_columns or {},
+        kind=TILT_CAR,
+        flies_gait=False,
+    )
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    law = setup.parameters.law
+    reference = reference_columns(samples, law.reference)
+    return derived_columns(samples, reference, (reference[6], reference[7]), law.car)
+
+
+def _initial_rotor_speeds(scenario: Scenario) -> tuple[float, float]:
+    speed_1, speed_2 = scenario.initial.rotor_speeds(2)
+    return speed_1, speed_2

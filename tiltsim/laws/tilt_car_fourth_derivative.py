@@ -1,0 +1,204 @@
+"""Fourth-derivative feedback linearization around the tilt-car (ch. 10, Sec. 6.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from tiltsim.closed_loop.loop import ControlSetup
+from tiltsim.equations.tilt_car import equations_of_motion, limited_rate, yaw_of
+from tiltsim.laws.tilt_car import (
+    car_setup,
+    car_state,
+    integrating_loop,
+    running_speed,
+    speed_squares,
+)
+from tiltsim.scenario.tilt_car_laws import FourthDerivativeController
+from tiltsim_controllers.mathematics.scalar import Triple, scalar
+from tiltsim_controllers.tilt_car.fourth_derivative import (
+    DECOUPLINGS,
+    Parameters,
+    fourth_derivative_inputs,
+)
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import Scenario
+
+ACCELERATIONS: Final = ("rotor_acceleration_1", "rotor_acceleration_2")
+SPEEDS: Final = ("law_speed_1", "law_speed_2")
+"""The rotor speeds that the law integrates; those that turn are never below zero."""
+
+
+class ControlParameters(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    servo_lead: float  # s, rate feed-forward of the tilt servo, 2 zeta / omega_n
+    heading: float  # rad, yaw at zero tilt, for the thesis' equations
+    law: Parameters
+
+
+@scalar
+def law_speed(speed: float, anti_windup: float) -> float:
+    """A rotor speed (rad/s) as the law integrates it: below zero only without anti-windup."""
+    return 0.0 if anti_windup == 1.0 and speed < 0.0 else speed
+
+
+@scalar
+def fourth_derivative_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All nine controls: tilt servo, thrusts, then the rates of rotor speeds and law states.
+
+    The law's own states are the tilt angle that the servo is told, its rate, and the rotor
+    accelerations.
+    """
+    tilt, tilt_rate, rate_1, rate_2 = act[2], act[3], act[4], act[5]
+    speed_1 = law_speed(act[0], parameters.law.anti_windup)
+    speed_2 = law_speed(act[1], parameters.law.anti_windup)
+    state = (
+        *(qpos[0], qpos[1], qvel[0], qvel[1], qpos[2], qpos[3]),
+        *(speed_1, speed_2, tilt_rate, rate_1, rate_2),
+    )
+    second_1, second_2, second_tilt = fourth_derivative_inputs(time, state, parameters.law)
+    return (
+        tilt + parameters.servo_lead * tilt_rate,
+        *speed_squares(act),
+        *(rate_1, rate_2, tilt_rate, second_tilt, second_1, second_2),
+    )
+
+
+@scalar
+def refreshed_fourth_derivative_controls(
+    ctrl: Sequence[float], act: Sequence[float]
+) -> tuple[float, ...]:
+    """Held second derivatives; what integrates them goes on."""
+    return (
+        ctrl[0],
+        *speed_squares(act),
+        *(act[4], act[5], act[3], ctrl[6], ctrl[7], ctrl[8]),
+    )
+
+
+@scalar
+def fourth_derivative_law_state(
+    state: Sequence[float], parameters: ControlParameters
+) -> tuple[float, ...]:
+    """The law's state from that of the thesis' equations."""
+    return (
+        *(state[0], state[1], state[2], state[3]),
+        *(yaw_of(state[4], parameters.heading, parameters.law.car), state[4]),
+        law_speed(state[5], parameters.law.anti_windup),
+        law_speed(state[6], parameters.law.anti_windup),
+        *(state[7], state[8], state[9]),
+    )
+
+
+@scalar
+def fourth_derivative_equation_inputs(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> Triple:
+    """The law on the thesis' equations."""
+    law_state = fourth_derivative_law_state(state, parameters)
+    return fourth_derivative_inputs(time, law_state, parameters.law)
+
+
+@scalar
+def integrated_rate(speed: float, rate: float, anti_windup: float) -> float:
+    """The rate (rad/s^2) at which the law's rotor speed changes."""
+    return limited_rate(speed, rate) if anti_windup == 1.0 else rate
+
+
+@scalar
+def fourth_derivative_equation_rates(
+    time: float,
+    state: Sequence[float],
+    inputs: Triple,
+    parameters: ControlParameters,
+    table: Sequence[float],
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """The thesis' equations with the inputs integrated twice."""
+    law_state = fourth_derivative_law_state(state, parameters)
+    speed_1, speed_2 = running_speed(state[5]), running_speed(state[6])
+    square_1, square_2 = speed_1 * speed_1, speed_2 * speed_2
+    direction = law_state[4] + law_state[5]
+    second_1, second_2, second_tilt = inputs
+    return (
+        *equations_of_motion(state, direction, square_1, square_2, parameters.law.car, disturbance),
+        state[7],
+        integrated_rate(state[5], state[8], parameters.law.anti_windup),
+        integrated_rate(state[6], state[9], parameters.law.anti_windup),
+        *(second_tilt, second_1, second_2),
+    )
+
+
+def _setup(scenario: Scenario, signature: float) -> ControlSetup:
+    controller = scenario.controller
+    assert isinstance(controller, FourthDerivativeController)
+    law = Parameters(
+        scenario.tilt_car.resolve(),
+        controller.resolve_gains(),
+        scenario.reference.parameters,
+        DECOUPLINGS[controller.decoupling],
+        float(controller.anti_windup),
+    )
+    return car_setup(ControlParameters, scenario, signature, law=law)
+
+
+@scalar
+def observe_fourth_derivative(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+) -> tuple[float, ...]:
+    """The car and the law's own states."""
+    x, y, vx, vy, yaw, alpha, speed_1, speed_2 = car_state(qpos, qvel, act[0], act[1])
+    return (
+        *(x, y, vx, vy, yaw, qvel[2], alpha, qvel[3], speed_1, speed_2),
+        *(act[2], act[3], act[4], act[5], act[0], act[1]),
+    )
+
+
+@scalar
+def observe_fourth_derivative_equations(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """The same of the thesis' equations."""
+    law_state = fourth_derivative_law_state(state, parameters)
+    x, y, vx, vy, yaw, alpha, speed_1, speed_2, tilt_rate, rate_1, rate_2 = law_state
+    r = yaw_of(tilt_rate, 0.0, parameters.law.car)
+    return (
+        *(x, y, vx, vy, yaw, r, alpha, tilt_rate, running_speed(speed_1), running_speed(speed_2)),
+        *(alpha, tilt_rate, rate_1, rate_2, speed_1, speed_2),
+    )
+
+
+FOURTH_DERIVATIVE: Final = integrating_loop(
+    ControlParameters,
+    fourth_derivative_controls,
+    refreshed_fourth_derivative_controls,
+    observe_fourth_derivative,
+    setup=_setup,
+    law_states=4,
+    law_fields=("alpha_ref", "alpha_ref_rate", *ACCELERATIONS, *SPEEDS),
+    own_columns={
+        "alpha_ref_rate": "rad/s",
+        **dict.fromkeys(ACCELERATIONS, "rad/s^2"),
+        **dict.fromkeys(SPEEDS, "rad/s"),
+    },
+    equations=(
+        fourth_derivative_equation_inputs,
+        fourth_derivative_equation_rates,
+        observe_fourth_derivative_equations,
+    ),
+)
+"""Fourth-derivative feedback linearization around the tilt-car."""

@@ -1,0 +1,213 @@
+"""The tilt-car with its thrusts' direction planned (ch. 10, Sec. 5; ch. 11)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import nan, sqrt
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from tiltsim.closed_loop.loop import ControlSetup, Equations, Floats, Loop, Sizes
+from tiltsim.equations.tilt_car import equations_of_motion, yaw_of
+from tiltsim.laws.tilt_car import (
+    CarState,
+    car_setup,
+    car_state,
+    derived_columns,
+    initial_motion,
+    reference_columns,
+)
+from tiltsim.scenario.tilt_car_laws import PlannedDirectionController
+from tiltsim.vehicles.tilt_car import ROTORS, TILT_CAR
+from tiltsim_controllers.gaits import GaitParameters, tilt_reference
+from tiltsim_controllers.mathematics.scalar import Pair, Triple, scalar
+from tiltsim_controllers.tilt_car.planned_direction import (
+    Parameters,
+    lyapunov_candidate,
+    planned_direction_inputs,
+    wanted_acceleration,
+    wanted_squares,
+)
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import Scenario
+
+
+class ControlParameters(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    servo_lead: float  # s, rate feed-forward of the tilt servo, 2 zeta / omega_n
+    heading: float  # rad, yaw at zero tilt, for the thesis' equations
+    gait: GaitParameters
+    law: Parameters
+
+
+@scalar
+def planned_direction_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All five controls: tilt servo, thrusts, idle rotor states.
+
+    The law reads the direction in which the thrusts do point, which lags behind the gait's jumps.
+    """
+    tilt, _, _, _, tilt_rate, _, _, _ = tilt_reference(time, parameters.gait, table)
+    state = car_state(qpos, qvel, 0.0, 0.0)
+    square_1, square_2 = planned_direction_inputs(time, state, parameters.law)
+    return tilt + parameters.servo_lead * tilt_rate, square_1, square_2, 0.0, 0.0
+
+
+@scalar
+def held_planned_direction_controls(
+    ctrl: Sequence[float], act: Sequence[float]
+) -> tuple[float, ...]:
+    """Controls as they were sampled."""
+    return ctrl[0], ctrl[1], ctrl[2], ctrl[3], ctrl[4]
+
+
+@scalar
+def planned_direction_law_state(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> CarState:
+    """The law's state from that of the thesis' equations, the tilt as planned."""
+    alpha, _, _, _, _, _, _, _ = tilt_reference(time, parameters.gait, table)
+    yaw = yaw_of(alpha, parameters.heading, parameters.law.car)
+    return state[0], state[1], state[2], state[3], yaw, alpha, 0.0, 0.0
+
+
+@scalar
+def planned_direction_equation_inputs(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> Pair:
+    """The law on the thesis' equations: the squares of the rotor speeds."""
+    law_state = planned_direction_law_state(time, state, parameters, table)
+    return planned_direction_inputs(time, law_state, parameters.law)
+
+
+@scalar
+def planned_direction_equation_rates(
+    time: float,
+    state: Sequence[float],
+    inputs: Pair,
+    parameters: ControlParameters,
+    table: Sequence[float],
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """The thesis' equations with a tilt that follows the gait exactly."""
+    law_state = planned_direction_law_state(time, state, parameters, table)
+    direction = law_state[4] + law_state[5]
+    car = parameters.law.car
+    return equations_of_motion(state, direction, inputs[0], inputs[1], car, disturbance)
+
+
+def _setup(scenario: Scenario, signature: float) -> ControlSetup:
+    controller = scenario.controller
+    assert isinstance(controller, PlannedDirectionController)
+    car = scenario.tilt_car.resolve()
+    gait = scenario.gait.plan(car).parameters
+    law = Parameters(car, controller.resolve_gains(), scenario.reference.parameters)
+    return car_setup(ControlParameters, scenario, signature, gait=gait, law=law)
+
+
+@scalar
+def speed_of_square(square: float) -> float:
+    """The rotor speed (rad/s) of a control, NaN where the law gave none."""
+    return sqrt(square) if square >= 0.0 else nan
+
+
+@scalar
+def observe_planned_direction(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+) -> tuple[float, ...]:
+    """The car, its rotor speeds from the controls in force."""
+    x, y, vx, vy, yaw, alpha, _, _ = car_state(qpos, qvel, 0.0, 0.0)
+    return (
+        *(x, y, vx, vy, yaw, qvel[2], alpha, qvel[3]),
+        *(speed_of_square(ctrl[1]), speed_of_square(ctrl[2])),
+    )
+
+
+@scalar
+def observe_planned_direction_equations(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """The same of the thesis' equations."""
+    x, y, vx, vy, yaw, alpha, _, _ = planned_direction_law_state(time, state, parameters, table)
+    tilt_rate = tilt_reference(time, parameters.gait, table)[4]
+    r = yaw_of(tilt_rate, 0.0, parameters.law.car)
+    return (
+        *(x, y, vx, vy, yaw, r, alpha, tilt_rate),
+        *(speed_of_square(inputs[0]), speed_of_square(inputs[1])),
+    )
+
+
+@scalar
+def nothing_to_watch(values: Sequence[float], parameters: ControlParameters) -> tuple[float]:
+    """The law ends nowhere."""
+    return (1.0,)
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    parameters, table = setup
+    law = parameters.law
+    time = samples["time"].tolist()
+    names = ("x", "y", "vx", "vy", "yaw", "alpha", "rotor_speed_1", "rotor_speed_2")
+    states = np.stack([samples[name] for name in names], axis=-1).tolist()
+    wanted = [wanted_acceleration(*row, law) for row in zip(time, states, strict=True)]
+    squares = [wanted_squares(*row, law) for row in zip(time, states, strict=True)]
+    tilts = [tilt_reference(t, parameters.gait, table)[0] for t in time]
+    reference = reference_columns(samples, law.reference)
+    ax, ay = np.array(wanted).reshape(len(time), 2).T
+    columns = derived_columns(samples, reference, (ax, ay), law.car) | {
+        "alpha_ref": np.array(tilts)
+    }
+    for rotor, values in zip(ROTORS, np.array(squares).reshape(len(time), 2).T, strict=True):
+        columns[f"wanted_square_{rotor}"] = values
+        columns[f"switch_{rotor}"] = (values > 0.0).astype(float)
+    error_y = columns["y_ref"] - samples["y"]
+    error_rate_y = columns["vy_ref"] - samples["vy"]
+    return columns | {"lyapunov": lyapunov_candidate(error_y, error_rate_y, law.gains)}
+
+
+PLANNED_DIRECTION: Final = Loop(
+    model="tilt_car",
+    sizes=Sizes(qpos=4, qvel=4, act=2, ctrl=5),
+    parameters=ControlParameters,
+    controls=planned_direction_controls,
+    refresh=held_planned_direction_controls,
+    setup=_setup,
+    initial_activations=lambda _scenario, _setup: (0.0, 0.0),
+    observe=observe_planned_direction,
+    observes_controls=True,
+    derive=_derive,
+    watched=lambda _sample, _setup: (),
+    watch=nothing_to_watch,
+    equations=Equations(
+        inputs=planned_direction_equation_inputs,
+        inputs_size=2,
+        rates=planned_direction_equation_rates,
+        initial=lambda s, _setup: initial_motion(s),
+        observe=observe_planned_direction_equations,
+    ),
+    extra_columns={
+        **{f"wanted_square_{rotor}": "rad^2/s^2" for rotor in ROTORS},
+        **{f"switch_{rotor}": "1" for rotor in ROTORS},
+        "lyapunov": "m^2/s^2",
+    },
+    kind=TILT_CAR,
+)
+"""The tilt-car with its thrusts' direction planned.
+
+``switch_1`` and ``switch_2`` are ``p`` and ``q`` of ch. 11's switch matrix (Eqs. 22-24), 0 where a
+rotor's thrust is saturated at zero; ``wanted_square_i`` what the law would set without the limit.
+"""

@@ -1,0 +1,155 @@
+"""Third-derivative feedback linearization around the tilt-car (ch. 10, Sec. 3.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from tiltsim.closed_loop.loop import ControlSetup
+from tiltsim.equations.tilt_car import equations_of_motion, limited_rate, yaw_of
+from tiltsim.laws.tilt_car import (
+    CarState,
+    car_setup,
+    car_state,
+    integrating_loop,
+    running_speed,
+    speed_squares,
+)
+from tiltsim.scenario.tilt_car_laws import ThirdDerivativeController
+from tiltsim_controllers.mathematics.scalar import Triple, scalar
+from tiltsim_controllers.tilt_car.third_derivative import Parameters, third_derivative_inputs
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import Scenario
+
+
+class ControlParameters(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    servo_lead: float  # s, rate feed-forward of the tilt servo, 2 zeta / omega_n
+    heading: float  # rad, yaw at zero tilt, for the thesis' equations
+    law: Parameters
+
+
+@scalar
+def third_derivative_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All six controls: tilt servo, thrusts, rotor accelerations, tilt rate.
+
+    The law's own state integrates the tilt rate to the angle that the servo is told.
+    """
+    state = car_state(qpos, qvel, act[0], act[1])
+    rate_1, rate_2, tilt_rate = third_derivative_inputs(time, state, parameters.law)
+    return (
+        act[2] + parameters.servo_lead * tilt_rate,
+        *speed_squares(act),
+        *(rate_1, rate_2, tilt_rate),
+    )
+
+
+@scalar
+def refreshed_third_derivative_controls(
+    ctrl: Sequence[float], act: Sequence[float]
+) -> tuple[float, ...]:
+    """Held controls with the thrusts that belong to the present rotor speeds."""
+    return (ctrl[0], *speed_squares(act), ctrl[3], ctrl[4], ctrl[5])
+
+
+@scalar
+def third_derivative_law_state(state: Sequence[float], parameters: ControlParameters) -> CarState:
+    """The law's state from that of the thesis' equations."""
+    return (
+        *(state[0], state[1], state[2], state[3]),
+        *(yaw_of(state[4], parameters.heading, parameters.law.car), state[4]),
+        *(running_speed(state[5]), running_speed(state[6])),
+    )
+
+
+@scalar
+def third_derivative_equation_inputs(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> Triple:
+    """The law on the thesis' equations: rotor accelerations and tilt rate."""
+    law_state = third_derivative_law_state(state, parameters)
+    return third_derivative_inputs(time, law_state, parameters.law)
+
+
+@scalar
+def third_derivative_equation_rates(
+    time: float,
+    state: Sequence[float],
+    inputs: Triple,
+    parameters: ControlParameters,
+    table: Sequence[float],
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """The thesis' equations with the inputs integrated."""
+    _, _, _, _, yaw, alpha, speed_1, speed_2 = third_derivative_law_state(state, parameters)
+    squares = speed_1 * speed_1, speed_2 * speed_2
+    rate_1, rate_2, tilt_rate = inputs
+    return (
+        *equations_of_motion(
+            state, yaw + alpha, squares[0], squares[1], parameters.law.car, disturbance
+        ),
+        *(tilt_rate, limited_rate(state[5], rate_1), limited_rate(state[6], rate_2)),
+    )
+
+
+def _setup(scenario: Scenario, signature: float) -> ControlSetup:
+    controller = scenario.controller
+    assert isinstance(controller, ThirdDerivativeController)
+    law = Parameters(
+        scenario.tilt_car.resolve(),
+        controller.resolve_gains(),
+        scenario.reference.parameters,
+        controller.restoring_rate,
+    )
+    return car_setup(ControlParameters, scenario, signature, law=law)
+
+
+@scalar
+def observe_third_derivative(
+    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
+) -> tuple[float, ...]:
+    """The car and the tilt angle that its servo is told."""
+    x, y, vx, vy, yaw, alpha, speed_1, speed_2 = car_state(qpos, qvel, act[0], act[1])
+    return x, y, vx, vy, yaw, qvel[2], alpha, qvel[3], speed_1, speed_2, act[2]
+
+
+@scalar
+def observe_third_derivative_equations(
+    time: float,
+    state: Sequence[float],
+    inputs: Triple,
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """The same of the thesis' equations."""
+    x, y, vx, vy, yaw, alpha, speed_1, speed_2 = third_derivative_law_state(state, parameters)
+    tilt_rate = inputs[2]
+    r = yaw_of(tilt_rate, 0.0, parameters.law.car)
+    return x, y, vx, vy, yaw, r, alpha, tilt_rate, speed_1, speed_2, alpha
+
+
+THIRD_DERIVATIVE: Final = integrating_loop(
+    ControlParameters,
+    third_derivative_controls,
+    refreshed_third_derivative_controls,
+    observe_third_derivative,
+    setup=_setup,
+    law_states=1,
+    law_fields=("alpha_ref",),
+    equations=(
+        third_derivative_equation_inputs,
+        third_derivative_equation_rates,
+        observe_third_derivative_equations,
+    ),
+)
+"""Third-derivative feedback linearization around the tilt-car."""

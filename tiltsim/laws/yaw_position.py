@@ -1,0 +1,123 @@
+"""The yaw-position law around the quadrotor (ch. 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from tiltsim.closed_loop.loop import ControlSetup, Floats, Watched
+from tiltsim.equations.quadrotor import extended_equations_of_motion, law_state
+from tiltsim.laws.quadrotor import (
+    attitude_watched,
+    equations,
+    extended_controls,
+    extended_loop,
+    extended_singularity,
+    level_thrust,
+    observe_extended_equations,
+    references,
+    rigid_body_state,
+)
+from tiltsim.scenario.quadrotor_laws import YawPositionController
+from tiltsim_controllers.laws.yaw_position import Parameters, yaw_position_inputs
+from tiltsim_controllers.mathematics.scalar import Triple, scalar
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import Scenario
+
+
+class ControlParameters(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    law: Parameters
+
+
+@scalar
+def yaw_position_controls(
+    time: float,
+    qpos: Sequence[float],
+    qvel: Sequence[float],
+    act: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """All ten controls: thrusts, idle rotor states, the law's own states."""
+    law = parameters.law
+    state = rigid_body_state(qpos, qvel, act[4], act[5])
+    return extended_controls(yaw_position_inputs(time, state, law, table), law.vehicle)
+
+
+def _setup(scenario: Scenario, signature: float) -> ControlSetup:
+    controller = scenario.controller
+    assert isinstance(controller, YawPositionController)
+    reference, table = scenario.reference_and_table()
+    law = Parameters(scenario.rotorcraft.resolve(), controller.resolve_gains(), reference)
+    return ControlSetup(ControlParameters(signature, law), table)
+
+
+def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    law = setup.parameters.law
+    # Roll and pitch are no outputs: they are what the position takes.
+    attitude = (samples["roll"], samples["pitch"], law.reference.yaw)
+    columns = references(samples, law.reference, setup.table, attitude)
+    return columns | extended_singularity(samples, law.vehicle)
+
+
+@scalar
+def watch_attitude_and_extension(
+    values: Sequence[float], parameters: ControlParameters
+) -> tuple[float, float]:
+    """The cosine of the thrust axis' tilt and the extension's thrust."""
+    return level_thrust(values), values[24]
+
+
+def extension_watched(sample: Mapping[str, float]) -> Watched:
+    """The thrust of the extension: without thrust the decoupling matrix is singular."""
+    thrust = sample["extension_thrust"]
+    return Watched(thrust, "the decoupling matrix became singular: the thrust came to zero")
+
+
+@scalar
+def equation_inputs(
+    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+) -> tuple[float, ...]:
+    """The law on the thesis' equations."""
+    return yaw_position_inputs(time, law_state(state), parameters.law, table)
+
+
+@scalar
+def equation_rates(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+    disturbance: Triple,
+) -> tuple[float, ...]:
+    """The thesis' equations under this law."""
+    return extended_equations_of_motion(state, inputs, parameters.law.vehicle, disturbance)
+
+
+@scalar
+def observe_in_equations(
+    time: float,
+    state: Sequence[float],
+    inputs: Sequence[float],
+    parameters: ControlParameters,
+    table: Sequence[float],
+) -> tuple[float, ...]:
+    """What a sample holds, from the state of the thesis' equations."""
+    return observe_extended_equations(state, inputs, parameters.law.vehicle)
+
+
+YAW_POSITION: Final = extended_loop(
+    ControlParameters,
+    yaw_position_controls,
+    equations(equation_inputs, 6, equation_rates, observe_in_equations),
+    setup=_setup,
+    derive=_derive,
+    watched=lambda sample, _setup: (attitude_watched(sample), extension_watched(sample)),
+    watch=watch_attitude_and_extension,
+)
+"""The yaw-position law around the quadrotor."""

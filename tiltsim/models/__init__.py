@@ -1,0 +1,1 @@
+"""MJCF to compiled MuJoCo models; knows no scenarios."""

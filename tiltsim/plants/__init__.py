@@ -1,0 +1,1 @@
+"""Plants: vehicles under control that can be advanced, observed and restarted."""

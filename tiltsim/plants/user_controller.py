@@ -1,0 +1,169 @@
+"""A user's own controller: what it sees, what it commands, and what is said when it fails.
+
+A controller is anything that takes an `Observation` and returns a `Command`: a function, or an
+object with ``__call__`` for one with a memory. It is asked at every control sample, and its command
+is held until the next.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+import traceback
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tiltsim.errors import InputError
+from tiltsim.plants.command import (
+    Controller,
+    ControllerError,
+    Observation,
+    Orders,
+    _short,
+    checked,
+)
+from tiltsim.scenario.controller import PythonController
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import Scenario
+
+
+class OwnController:
+    """A user's controller in a flight: every mistake of it becomes a `ControllerError`."""
+
+    def __init__(self, controller: Controller, name: str) -> None:
+        self._controller, self._name = controller, name
+
+    def reset(self, scenario: Scenario) -> None:
+        """Call the controller's own ``reset``, if it has one. Raises `ControllerError`."""
+        reset = getattr(self._controller, "reset", None)
+        if reset is not None:
+            self._call(reset, scenario)
+
+    def orders(self, observation: Observation, *, tilting: bool) -> Orders:
+        """Ask for a command. Raises `ControllerError`."""
+        command = self._call(self._controller, observation)
+        try:
+            return checked(command, tilting=tilting)
+        except ControllerError as error:
+            raise ControllerError(f"the controller {self._name} {error}") from None
+
+    def _call(self, function: Callable[[Any], Any], argument: object) -> Any:
+        try:
+            return function(argument)
+        except (Exception, SystemExit) as error:
+            raise ControllerError(f"the controller {self._name} raised {_said(error)}") from error
+
+
+def _said(error: BaseException) -> str:
+    """An error in one line: its type, what it says, and where it came from."""
+    try:
+        text = " ".join(str(error).split())[:200]
+    except Exception:
+        text = ""
+    return f"{type(error).__name__}{f': {text}' if text else ''}{_place(error)}"
+
+
+def _place(error: BaseException) -> str:
+    """File and line of the controller's own code that an error went through last."""
+    frames = traceback.extract_tb(error.__traceback__)[1:]  # without our own call
+    if not frames:
+        return ""
+    last = [frame for frame in frames if frame.filename == frames[0].filename][-1]
+    return f" ({Path(last.filename).name}, line {last.lineno})"
+
+
+def with_controller(scenario: Scenario, controller: object) -> Scenario:
+    """The scenario with a controller given in Python in place of its own law.
+
+    Raises `InputError` where it is not callable, or the scenario is one that no controller of a
+    user's can fly.
+    """
+    if not callable(controller):
+        raise InputError(f"controller = {_short(controller)}: must be callable")
+    return commanded_scenario(scenario, _name_of(controller))
+
+
+def commanded_scenario(
+    scenario: Scenario, name: str, simulation: Mapping[str, Any] | None = None
+) -> Scenario:
+    """The scenario with commands from outside in place of its law.
+
+    ``name`` tells from where they come; ``simulation`` has keys to replace in that table.
+
+    Raises `InputError` where the scenario is one that takes none.
+    """
+    from tiltsim.scenario.document import without_none
+    from tiltsim.scenario.loading import parse_scenario
+
+    table = scenario.controller
+    if isinstance(table, PythonController) and table.function == name and not simulation:
+        return scenario
+    document = without_none(scenario.model_dump(mode="json"))
+    document["controller"] = {"law": "python", "function": name}
+    document["simulation"] |= simulation or {}
+    return parse_scenario(document, scenario.address or "scenario")
+
+
+def _name_of(controller: object) -> str:
+    named = controller if hasattr(controller, "__qualname__") else type(controller)
+    return f"{named.__module__}.{named.__qualname__}"
+
+
+def own_controller(scenario: Scenario, controller: Any = None) -> OwnController:
+    """The controller that flies a scenario: the one given, else the one that its table names.
+
+    A class is called without arguments to make one. Raises `InputError` where there is none.
+    """
+    table = scenario.controller
+    assert isinstance(table, PythonController)
+    name = table.function
+    if controller is None:
+        controller = _load(scenario.address or "scenario", table)
+        name = f"{table.file.name}:{table.attribute}" if table.file is not None else name
+    if isinstance(controller, type):
+        try:
+            controller = controller()
+        except (Exception, SystemExit) as error:
+            raise InputError(f"controller {name}: when made raised {_said(error)}") from error
+    return OwnController(controller, name)
+
+
+def _load(address: str, table: PythonController) -> Any:
+    """What a file defines under a name."""
+    start = f'{address}: controller.function = "{table.function}"'
+    if table.file is None:
+        raise InputError(
+            f"{start}: names no file; write FILE.py:NAME, or pass controller= to tiltsim.simulate"
+        )
+    if not table.file.is_file():
+        raise InputError(f"{start}: no such file")
+    module = _run_file(start, table.file)
+    found = getattr(module, table.attribute, None)
+    if not callable(found):
+        own = [
+            name
+            for name, value in vars(module).items()
+            if callable(value) and getattr(value, "__module__", "") == module.__name__
+        ]
+        what = "is not callable" if hasattr(module, table.attribute) else "is not in the file"
+        raise InputError(f"{start}: {table.attribute} {what}; it has {', '.join(own) or 'none'}")
+    return found
+
+
+def _run_file(start: str, file: Path) -> Any:
+    """A module of a file's own, made anew for every flight."""
+    spec = importlib.util.spec_from_file_location(f"tiltsim_controller_{file.stem}", file)
+    assert spec is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses and pickles look their module up
+    try:
+        # Compiled from its text, for a cached compilation may be older than a quick edit.
+        exec(compile(file.read_bytes(), str(file), "exec"), module.__dict__)
+    except SyntaxError as error:
+        line = f", line {error.lineno}" if error.lineno else ""
+        raise InputError(f"{start}: {error.msg} ({file.name}{line})") from None
+    except (Exception, SystemExit) as error:
+        raise InputError(f"{start}: raised {_said(error)}") from error
+    return module

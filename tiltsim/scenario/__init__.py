@@ -1,0 +1,1 @@
+"""Scenario files: their tables, checks and the library."""

@@ -1,0 +1,80 @@
+"""The ``[[expect]]`` tables of a scenario: bounds on metrics, and the thesis' claims."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from tiltsim.scenario.messages import InvalidValueError, choose
+from tiltsim.scenario.metric_names import BOOLEAN_METRICS, METRICS
+from tiltsim.scenario.table import NonNegative, Range, Table
+
+
+class Expectation(Table):
+    """A bound on a metric, judged after the flight."""
+
+    # An editor completes the names; the message on an unknown one is ours.
+    metric: str = Field(json_schema_extra={"enum": list(METRICS)})
+    claim: str = Field("", description="what the thesis states, in our words, for the report")
+    published: float | bool | None = Field(
+        None,
+        description="the thesis' figure, shown beside ours; true or false: does the metric, or the "
+        "statement that it lies within the bounds, hold in the thesis",
+    )
+    published_tolerance: NonNegative | None = Field(
+        None, description="how near counts as reproduced; default: half a unit of the last digit"
+    )
+    in_kind: Range | None = Field(
+        None, description="where the claim still holds though the number differs"
+    )
+    wrong: bool = Field(False, description="the claim is refuted, not merely not seen; needs why")
+    why: str = Field("", description="the reason where the claim does not come out")
+    min: float | None = None
+    max: float | None = None
+    equals: bool | None = Field(None, description="for metrics that are true or false")
+    plant: Literal["mujoco", "thesis"] | None = Field(
+        None, description="judge on this plant alone; default: on either"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.metric not in METRICS:
+            raise InvalidValueError("expect.metric", self.metric, choose(self.metric, METRICS))
+        boolean = self.metric in BOOLEAN_METRICS
+        bounded = self.min is not None or self.max is not None
+        if boolean and (bounded or self.equals is None):
+            raise InvalidValueError(
+                "expect.metric", self.metric, "true or false: give equals alone"
+            )
+        if not boolean and (self.equals is not None or not bounded):
+            raise InvalidValueError("expect.metric", self.metric, "a number: give min, max or both")
+        if self.min is not None and self.max is not None and self.min > self.max:
+            raise InvalidValueError("expect.min", self.min, f"must not exceed max = {self.max}")
+        self._check_claim(boolean)
+        return self
+
+    def _check_claim(self, boolean: bool) -> None:
+        published = self.published
+        if boolean and published is not None and not isinstance(published, bool):
+            raise InvalidValueError(
+                "expect.published", published, f"{self.metric} is true or false"
+            )
+        if published is None:
+            for key in ("claim", "why", "wrong"):
+                if getattr(self, key):
+                    raise InvalidValueError(
+                        f"expect.{key}",
+                        getattr(self, key),
+                        "needs published: a number, true, false",
+                    )
+        if published is None or isinstance(published, bool):
+            for key in ("published_tolerance", "in_kind"):
+                if getattr(self, key) is not None:
+                    raise InvalidValueError(
+                        f"expect.{key}", getattr(self, key), "needs a published number"
+                    )
+        if self.wrong and not self.why:
+            raise InvalidValueError("expect.wrong", True, "needs why")
+        if self.in_kind is not None and not self.in_kind[0] <= self.in_kind[1]:
+            raise InvalidValueError("expect.in_kind", self.in_kind, "write [low, high]")

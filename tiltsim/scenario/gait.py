@@ -1,0 +1,245 @@
+"""The ``[gait]`` table of a scenario: one model a type, each of which plans its gait."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from math import pi
+from typing import Annotated, Final, Literal, Self
+
+from pydantic import Field, model_validator
+
+from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.table import Angle, Angles2, Angles4, Factor, Period, Positive, Table
+from tiltsim_controllers.analysis.two_color_planner import (
+    Circle,
+    Leg,
+    Path,
+    Polyline,
+    four_angle_gait,
+    rectangle,
+)
+from tiltsim_controllers.gaits import plans
+from tiltsim_controllers.gaits.plans import Gait as PlannedGait
+from tiltsim_controllers.tilt_car.vehicle import TiltCar, turn_share
+from tiltsim_controllers.vehicle.parameters import Vehicle
+
+
+class GaitTable(Table, ABC):
+    """What every gait can be told: a common scale, and a bias on the two rear angles."""
+
+    scale: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(
+        1.0, description="multiplies all angles (ch. 5: 1/n)"
+    )
+    bias: Factor = Field(1.0, description="eta, multiplies alpha_3 and alpha_4 (ch. 6)")
+
+    def plan(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+        """The gait, ready to be flown. Raises ValueError where the numbers make none."""
+        return self.unscaled(vehicle).scaled(1.0 / self.scale).biased(self.bias)
+
+    @abstractmethod
+    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+        """The gait before scale and bias."""
+
+    @property
+    @abstractmethod
+    def size(self) -> tuple[str, object]:
+        """The key that sets how far the gait tilts, and its value."""
+
+
+class FixedGait(GaitTable):
+    """Constant tilt angles."""
+
+    type: Literal["fixed"] = "fixed"
+    angles: Angles4 = Field((0.0, 0.0, 0.0, 0.0), description="alpha_1..4, rad")
+
+    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+        """See `GaitTable.unscaled`."""
+        return plans.fixed(self.angles)
+
+    @property
+    def size(self) -> tuple[str, object]:
+        """See `GaitTable.size`."""
+        return "angles", self.angles
+
+
+class TrotGait(GaitTable):
+    """The cat trots of ch. 4, which differ in how they change sides."""
+
+    type: Literal["trot_instant", "trot_continuous"]
+    amplitude: Angle = Field(description="rho, rad")
+    period: Period = Field(description="T, s")
+
+    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+        """See `GaitTable.unscaled`."""
+        trot = plans.instant_trot if self.type == "trot_instant" else plans.continuous_trot
+        return trot(self.amplitude, self.period)
+
+    @property
+    def size(self) -> tuple[str, object]:
+        """See `GaitTable.size`."""
+        return "amplitude", self.amplitude
+
+
+class CatGait(GaitTable):
+    """The cat gaits of ch. 5, reconstructed from published footfalls and what ch. 5 reports."""
+
+    type: Literal["walk", "run", "transverse_gallop", "rotary_gallop"]
+    amplitude: Angle = Field(description="of a leg about its lean, rad")
+    lean: Angle = Field(0.0, description="mean angle of the legs, forward, rad")
+    period: Period = Field(description="T, s")
+
+    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+        """See `GaitTable.unscaled`."""
+        return plans.cat(self.type, self.amplitude, self.period, self.lean)
+
+    @property
+    def size(self) -> tuple[str, object]:
+        """See `GaitTable.size`."""
+        return "amplitude", self.amplitude
+
+
+class WaypointGait(GaitTable):
+    """A closed gait through given angles, straight in between."""
+
+    type: Literal["waypoints"]
+    angles: Annotated[tuple[Angles4, ...], Field(min_length=2, strict=False)] = Field(
+        description="alpha_1..4 of each waypoint, rad"
+    )
+    period: Period = Field(description="s")
+    phases: Annotated[tuple[float, ...], Field(strict=False)] | None = Field(
+        None, description="share of the period of each waypoint, from 0; default: evenly spread"
+    )
+
+    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+        """See `GaitTable.unscaled`."""
+        return plans.waypoints(self.angles, self.period, self.phases)
+
+    @property
+    def size(self) -> tuple[str, object]:
+        """See `GaitTable.size`."""
+        return "angles", self.angles
+
+
+class TwoColorLeg(Table):
+    """A part of a two-colour path: straight lines in one colour."""
+
+    color: Literal["red", "blue"]
+    vertices: Annotated[tuple[Angles2, ...], Field(min_length=2, strict=False)] = Field(
+        description="points (alpha_1, alpha_2), rad"
+    )
+
+
+class TwoColorGait(GaitTable):
+    """A path on the Two Color Map (ch. 6 to 8): a rectangle, a circle, or a path of legs.
+
+    The colour gives alpha_3 and alpha_4, on the exact lines of the vehicle at hand.
+    """
+
+    type: Literal["two_color"]
+    period: Period = Field(description="s")
+    color: Literal["red", "blue"] = "red"
+    rectangle: Annotated[tuple[Angles2, Angles2], Field(strict=False)] | None = Field(
+        None, description="ranges of alpha_1 and of alpha_2, rad"
+    )
+    centre: Angles2 | None = Field(None, description="of a circle, rad; goes with radius")
+    radius: Positive | None = Field(None, description="rad")
+    path: Annotated[tuple[TwoColorLeg, ...], Field(strict=False)] = Field(
+        (), description="legs of one colour each, closed; a colour switch belongs at P"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        circle = (self.centre is not None) + (self.radius is not None)
+        given = (self.rectangle is not None, circle > 0, bool(self.path))
+        if sum(given) != 1 or circle == 1:
+            raise InvalidValueError(
+                "gait.type", "two_color", "give one of rectangle, centre with radius, and path"
+            )
+        return self
+
+    @property
+    def curve(self) -> Path:
+        """The closed curve in the alpha_1-alpha_2 plane."""
+        if self.rectangle is not None:
+            return rectangle(*self.rectangle, self.color)
+        if self.centre is not None and self.radius is not None:
+            return Circle(self.color, self.centre, self.radius)
+        return Polyline(tuple(Leg(leg.color, leg.vertices) for leg in self.path))
+
+    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+        """See `GaitTable.unscaled`."""
+        if not isinstance(vehicle, Vehicle):
+            raise ValueError("a gait of four tilt angles; the tilt_car has one")
+        return four_angle_gait(self.curve, self.period, vehicle)
+
+    @property
+    def size(self) -> tuple[str, object]:
+        """See `GaitTable.size`."""
+        if self.rectangle is not None:
+            return "rectangle", self.rectangle
+        return ("radius", self.radius) if self.radius is not None else ("path", len(self.path))
+
+
+class TiltCarGait(GaitTable):
+    """What the tilt-car's gaits share: they plan the direction of the thrusts."""
+
+    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+        """See `GaitTable.unscaled`."""
+        if not isinstance(vehicle, TiltCar):
+            raise ValueError("a gait of the tilt_car's; this vehicle has four tilt angles")
+        # The bottom disc turns back, so that the tilt must go further than the thrusts.
+        return self.tilt(1.0 / turn_share(vehicle))
+
+    @abstractmethod
+    def tilt(self, per_direction: float) -> PlannedGait:
+        """The gait of the tilt angle, given how far it turns for a thrust direction of 1 rad."""
+
+
+PENGUIN_SWINGS: Final = {"penguin_small": pi / 8, "penguin_large": pi / 3}
+"""Directions of the thrusts (rad) between which the penguins swing (ch. 11, Figs. 7 and 8)."""
+
+
+class PenguinGait(TiltCarGait):
+    """The penguin-inspired swings of ch. 11: to one side for half a period, then to the other."""
+
+    type: Literal["penguin_small", "penguin_large"]
+    amplitude: Angle | None = Field(
+        None, description="of the thrusts' direction, rad; default: pi/8 (small), pi/3 (large)"
+    )
+    period: Period = Field(2.0, description="T, s")
+
+    def tilt(self, per_direction: float) -> PlannedGait:
+        """See `TiltCarGait.tilt`."""
+        swing = PENGUIN_SWINGS[self.type] if self.amplitude is None else self.amplitude
+        return plans.penguin(self.type, swing * per_direction, self.period)
+
+    @property
+    def size(self) -> tuple[str, object]:
+        """See `GaitTable.size`."""
+        return "amplitude", self.amplitude
+
+
+class RotatingGait(TiltCarGait):
+    """Thrusts that turn at a constant rate (ch. 10, Eq. 18)."""
+
+    type: Literal["rotating"]
+    rate: Annotated[float, Field(ge=-1e3, le=1e3)] = Field(
+        description="of the thrusts' direction, rad/s"
+    )
+    start: Angle = Field(0.0, description="direction at time zero, rad")
+
+    def tilt(self, per_direction: float) -> PlannedGait:
+        """See `TiltCarGait.tilt`."""
+        return plans.rotating(self.start * per_direction, self.rate * per_direction)
+
+    @property
+    def size(self) -> tuple[str, object]:
+        """See `GaitTable.size`."""
+        return "rate", self.rate
+
+
+Gait = Annotated[
+    FixedGait | TrotGait | CatGait | WaypointGait | TwoColorGait | PenguinGait | RotatingGait,
+    Field(discriminator="type"),
+]
+"""The ``[gait]`` table, told apart by its type."""

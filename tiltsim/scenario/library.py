@@ -1,0 +1,160 @@
+"""The shipped files: the scenario library and the MJCF models."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from tiltsim.errors import InputError
+from tiltsim.resources import shipped_folder
+from tiltsim.scenario.messages import did_you_mean
+
+_SWEEP: Final = re.compile(r"^\s*\[\[?\s*(axis|bisect)\s*\]", re.MULTILINE)
+"""The tables that tell a sweep from a scenario."""
+
+
+def find_scenario_file(path: str | Path) -> Path:
+    """The scenario file that a user means: a path as given, or a name from the library.
+
+    Raises `InputError` where neither is a file.
+    """
+    if not str(path):
+        raise InputError("no scenario named; see tiltsim list")
+    given = Path(path)
+    if given.is_file():
+        return given
+    if not given.is_absolute():
+        library = shipped_folder("scenarios")
+        for candidate in (library / given, library / f"{given}.toml"):
+            if candidate.is_file():
+                return candidate
+    if given.is_dir():
+        raise InputError(f"{path}: a folder, not a scenario file; tiltsim check takes folders")
+    hint = closest_in_library(path)
+    raise InputError(
+        f"{path}: no such file, nor a scenario of the library ({hint}see tiltsim list)"
+    )
+
+
+def closest_in_library(path: str | Path) -> str:
+    """A question with the file or folder of the library that is called most like a path, if any."""
+    library = shipped_folder("scenarios")
+    places = (place.relative_to(library) for place in library.rglob("*"))
+    names = [place.with_suffix("").as_posix() for place in places]
+    return did_you_mean(Path(path).with_suffix("").as_posix(), names)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The document in a TOML file. Raises `InputError` with the file and the reason."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not UTF-8 text (byte {error.start}: {error.reason})") from error
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError
+        raise InputError(f"{path}: not valid TOML: {error}") from error
+
+
+def scenario_files(path: Path) -> list[Path]:
+    """All scenario files under a folder, sorted, sweeps left out; a file stands for itself."""
+    if not path.is_dir():
+        return [path]
+    # What is no ordinary file is none of ours, but a broken link is told of.
+    files = (file for file in path.rglob("*.toml") if file.is_file() or file.is_symlink())
+    return sorted(file for file in files if not is_sweep(file))
+
+
+def is_sweep(file: Path) -> bool:
+    """Whether a TOML file defines a sweep: it has ``[[axis]]`` or ``[bisect]`` tables."""
+    try:
+        return _SWEEP.search(file.read_text(encoding="utf-8-sig")) is not None
+    except (OSError, UnicodeDecodeError):
+        return False  # whoever reads it will say what is wrong
+
+
+def library_name(path: Path) -> str:
+    """How a user addresses a file: without folder and suffix when it is in the library."""
+    library = shipped_folder("scenarios")
+    resolved = path.resolve()
+    if resolved.is_relative_to(library.resolve()):
+        return resolved.relative_to(library.resolve()).with_suffix("").as_posix()
+    return str(path)
+
+
+class Entry(NamedTuple):
+    """A scenario of the library."""
+
+    address: str
+    title: str
+    source: str
+
+
+class Family(NamedTuple):
+    """A file of the library, and what its members add to it."""
+
+    entry: Entry
+    members: tuple[Entry, ...]  # "#name", own title or else what differs, source where it differs
+
+
+def library_entries() -> Iterator[Entry]:
+    """Address, title and source of every scenario of the library, variants included."""
+    for name, document in _documents():
+        variants = document.get("variant", [])
+        for variant in variants or [{}]:
+            address = f"{name}#{variant['name']}" if "name" in variant else name
+            title = document.get("title", "")
+            if variant:
+                title = variant.get("title") or f"{title}: {_differences(document, variant)}"
+            yield Entry(address, title, variant.get("source", document.get("source", "")))
+
+
+def library_families() -> Iterator[Family]:
+    """The files of the library; a file without variants has no members."""
+    for name, document in _documents():
+        title, source = document.get("title", ""), document.get("source", "")
+        members = tuple(
+            Entry(
+                f"#{variant['name']}",
+                variant.get("title", "") or _differences(document, variant),
+                _shorter(variant.get("source", source), source),
+            )
+            for variant in document.get("variant", [])
+        )
+        yield Family(Entry(name, title, source), members)
+
+
+def _documents() -> Iterator[tuple[str, dict[str, Any]]]:
+    for path in scenario_files(shipped_folder("scenarios")):
+        yield library_name(path), read_toml(path)
+
+
+def _differences(document: dict[str, Any], variant: dict[str, Any]) -> str:
+    """The keys that a variant sets otherwise than its family, with their values."""
+    changes: dict[str, Any] = {}
+    for table, values in variant.items():
+        if isinstance(values, dict):
+            base = document.get(table, {})
+            changes |= {key: value for key, value in values.items() if base.get(key) != value}
+    return ", ".join(f"{key} = {value}" for key, value in changes.items()) or "as the family"
+
+
+def _shorter(source: str, family: str) -> str:
+    """A member's source without the chapter and section that it shares with its family."""
+    if source == family:
+        return ""
+    parts, shared = source.split(", "), family.split(", ")
+    while len(parts) > 1 and shared and parts[0] == shared[0]:
+        parts, shared = parts[1:], shared[1:]
+    return ", ".join(parts)
+
+
+def library_sweeps() -> Iterator[Entry]:
+    """Every sweep of the library."""
+    for path in sorted(shipped_folder("scenarios").rglob("*.toml")):
+        if is_sweep(path):
+            document = read_toml(path)
+            yield Entry(library_name(path), document.get("title", ""), document.get("source", ""))

@@ -1,0 +1,206 @@
+"""Reading scenarios: files, variants and overrides merged into one validated `Scenario`."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import ValidationError
+
+from tiltsim.errors import InputError
+from tiltsim.scenario.controller import DEFAULT_LAW
+from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
+from tiltsim.scenario.messages import choose, did_you_mean, one_line, show
+from tiltsim.scenario.scenario import Scenario, Variant
+
+KIND_KEYS: Final = {"type": None, "law": DEFAULT_LAW}
+"""Keys that decide which others a table may have, with their defaults."""
+
+FILE_KEYS: Final = (("controller", "function", ".py:"), ("vehicle", "mjcf", ""))
+"""Keys that name files: table, key, and what a name of a file has in it."""
+
+
+def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Scenario:
+    """Read a scenario.
+
+    Parameters
+    ----------
+    path
+        A TOML file or the name of a scenario in the library, with ``#variant`` for a member of a
+        family, for example ``ch04_tracking/setpoint#rho_065_modified``.
+    overrides
+        Values by dotted key, for example ``{"controller.decoupler": "exact"}``. A family without
+        ``#variant`` is only flown with overrides: they change its base.
+
+    Raises
+    ------
+    InputError
+        In one line: the file, the key, the value and what is allowed.
+    """
+    name, _, variant = str(path).partition("#")
+    file = find_scenario_file(name)
+    document = read_toml(file)
+    address = library_name(file) + (f"#{variant}" if variant else "")
+    if {"axis", "bisect"} & document.keys():
+        raise InputError(f"{address}: this is a sweep: tiltsim sweep {library_name(file)}")
+    names = variant_names(file, document)
+    if variant:
+        document = _select_variant(file, document, variant)
+    elif names and not overrides:
+        raise InputError(f"{address}: choose a variant with #: {', '.join(names)}")
+    document.pop("variant", None)
+    anchor_files(document, file.parent)
+    apply_overrides(document, overrides or {}, address)
+    anchor_files(document, Path())
+    return parse_scenario(document, address)
+
+
+def anchor_files(document: Mapping[str, Any], folder: Path) -> None:
+    """Write out where the files lie that a scenario names: those without a folder in this one."""
+    for table, key, mark in FILE_KEYS:
+        keys = document.get(table)
+        name = keys.get(key) if isinstance(keys, dict) else None
+        if isinstance(keys, dict) and isinstance(name, str) and mark in name:
+            keys[key] = str((folder / name).absolute())
+
+
+def apply_overrides(document: dict[str, Any], overrides: Mapping[str, Any], address: str) -> None:
+    """Put values in a document by dotted key, entries of lists as ``gait.angles[0]``.
+
+    Raises `InputError` where a key leads nowhere; ``address`` names the document in messages.
+    """
+    for key, value in _kinds_first(overrides):
+        _override(address, document, key, value)
+
+
+def parse_scenario(document: Mapping[str, Any], address: str = "scenario") -> Scenario:
+    """Validate a document of plain dicts and lists; ``address`` names it in messages.
+
+    Raises `InputError` as `load_scenario` does.
+    """
+    try:
+        scenario = Scenario.model_validate(document)
+    except ValidationError as error:
+        raise InputError(f"{address}: {one_line(error, document, Scenario)}") from None
+    scenario._address = address
+    return scenario
+
+
+def variant_names(file: Path, document: Mapping[str, Any]) -> list[str]:
+    """The names of a file's variants, in order. Raises `InputError` where one is bad or double."""
+    names: list[str] = []
+    variants = document.get("variant", [])
+    if not isinstance(variants, list):
+        raise InputError(f"{file}: variant = {show(variants)}: write [[variant]] tables")
+    for table in variants:
+        try:
+            names.append(Variant.model_validate(table).name)
+        except ValidationError as error:
+            raise InputError(f"{file}: variant: {one_line(error, table, Variant)}") from None
+        if names[-1] in names[:-1]:
+            raise InputError(f"{file}: variant.name = {names[-1]!r}: used twice")
+    return names
+
+
+def _select_variant(file: Path, document: dict[str, Any], name: str) -> dict[str, Any]:
+    names = variant_names(file, document)
+    if name not in names:
+        allowed = choose(name, names) if names else "the file has no variants"
+        raise InputError(f"{library_name(file)}#{name}: no such variant; {allowed}")
+    base = {key: value for key, value in document.items() if key != "variant"}
+    chosen = dict(document["variant"][names.index(name)])
+    del chosen["name"]
+    expectations = [base.pop("expect", []), chosen.pop("expect", [])]
+    merged = merge(base, chosen)
+    # Whatever is no list goes on as it is and is refused with its own name.
+    wrong = [value for value in expectations if not isinstance(value, list)]
+    merged["expect"] = wrong[0] if wrong else [*expectations[0], *expectations[1]]
+    return merged
+
+
+def merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Base with changes on top, table by table; a table of another kind replaces the whole."""
+    merged = dict(base)
+    for key, value in changes.items():
+        old = merged.get(key)
+        if isinstance(old, dict) and isinstance(value, dict):
+            other_kind = any(
+                tag in value and value[tag] != old.get(tag, default)
+                for tag, default in KIND_KEYS.items()
+            )
+            merged[key] = value if other_kind else merge(old, value)
+        else:
+            merged[key] = value
+    return merged
+
+
+def _kinds_first(overrides: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """Overrides with those of `KIND_KEYS` first: a new kind empties its table."""
+    return sorted(overrides.items(), key=lambda item: item[0].rpartition(".")[2] not in KIND_KEYS)
+
+
+def _override(address: str, document: dict[str, Any], key: str, value: object) -> None:
+    *path, last = key_steps(key)
+    target: Any = document
+    for step in path:
+        target = _enter(target, step)
+    if isinstance(last, int):
+        if not isinstance(target, list) or last >= len(target):
+            hint = _other_list(document, path)
+            raise InputError(
+                f"{address}: {key} = {show(value)}: there is no such entry; {hint}give the whole "
+                f"list {key.rpartition('[')[0]}"
+            )
+    elif not isinstance(target, dict):
+        raise InputError(f"{address}: {key} = {show(value)}: {key.rpartition('.')[0]} is no table")
+    elif last in KIND_KEYS and target.get(last, KIND_KEYS[last]) != value:
+        target.clear()
+    target[last] = value
+
+
+def _other_list(document: dict[str, Any], path: list[str | int]) -> str:
+    """Whether a list that is not there may be another, misspelt."""
+    *above, name = path
+    table: Any = document
+    for step in above:
+        table = _enter(table, step)
+    lists = table.items() if isinstance(table, dict) else ()
+    return did_you_mean(name, (key for key, value in lists if isinstance(value, list)))
+
+
+def _enter(target: object, step: str | int) -> object:
+    """What lies under one step of a key; a table that is not there yet begins empty."""
+    if isinstance(step, int):
+        return target[step] if isinstance(target, list) and step < len(target) else None
+    return target.setdefault(step, {}) if isinstance(target, dict) else None
+
+
+def key_steps(key: str) -> list[str | int]:
+    """A dotted key as names and positions: ``gait.angles[1]`` is ``gait``, ``angles``, ``1``."""
+    steps: list[str | int] = []
+    for name in key.split("."):
+        plain, *positions = name.split("[")
+        steps.append(plain)
+        for position in positions:
+            closed = position.endswith("]") and position[:-1].isdecimal()
+            if not closed:
+                raise InputError(f"{key}: entries of lists are written NAME[0], NAME[1], ...")
+            steps.append(int(position[:-1]))
+    return steps
+
+
+def parse_override(text: str) -> tuple[str, Any]:
+    """Split ``KEY=VALUE``; the value is read as TOML, or taken as a string where it is none.
+
+    Raises `InputError` where the text has no key or no equals sign.
+    """
+    key, equals, value = text.partition("=")
+    key, value = key.strip(), value.strip()
+    if not equals or not key:
+        raise InputError(f"--set {text}: write KEY=VALUE, for example controller.decoupler=exact")
+    try:
+        return key, tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key, value

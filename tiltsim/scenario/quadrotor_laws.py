@@ -1,0 +1,155 @@
+"""Controller tables of the quadrotor's laws."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+import tiltsim_controllers.laws.quadrotor_attitude_altitude as quadrotor_attitude_altitude
+import tiltsim_controllers.laws.yaw_position as yaw_position
+from tiltsim.scenario.law_table import LawTable, _gain_kind
+from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.table import Gains2, Positive, Table
+from tiltsim_controllers.analysis.stability import (
+    Loop,
+    linear_loop,
+)
+from tiltsim_controllers.laws.switching import PUBLISHED_ZONE
+from tiltsim_controllers.vehicle.parameters import Vehicle
+
+
+class YawPositionGainTable(Table):
+    """Gains of yaw-position control written out."""
+
+    position: Annotated[tuple[float, float, float, float], Field(strict=False)] = Field(
+        description="k_1 to k_4, on jerk, acceleration, velocity and position"
+    )
+    yaw: Gains2 = Field((5.0, 5.0), description="on the rate and on yaw")
+
+
+YawPositionGains = Annotated[
+    Annotated[Literal["ch02", "stable"], Tag("named")]
+    | Annotated[YawPositionGainTable, Tag("table")],
+    Discriminator(_gain_kind),
+]
+
+
+class YawPositionController(LawTable):
+    """Yaw-position control of the quadrotor with dynamic extension (ch. 2)."""
+
+    vehicle_model = "quadrotor"
+    reference_kinds = ("position",)
+
+    law: Literal["yaw_position"]
+    gains: YawPositionGains = "stable"
+
+    def resolve_gains(self) -> yaw_position.Gains:
+        """The numbers behind a named set or a table."""
+        return _yaw_position_gains(self.gains)
+
+    def closed_loops(self, vehicle: Vehicle) -> list[Loop]:
+        """See `LawTable.closed_loops`."""
+        return _yaw_position_loops(self.resolve_gains())
+
+
+class QuadrotorAttitudeGainTable(Table):
+    """Gains of the quadrotor's attitude-altitude control written out."""
+
+    altitude: Gains2 = Field(description="on the rate and on the altitude")
+    attitude: Gains2 = Field(description="on the rates and on roll, pitch and yaw")
+
+
+QuadrotorAttitudeGains = Annotated[
+    Annotated[Literal["ch02"], Tag("named")] | Annotated[QuadrotorAttitudeGainTable, Tag("table")],
+    Discriminator(_gain_kind),
+]
+
+
+class QuadrotorAttitudeAltitudeController(LawTable):
+    """Attitude-altitude control of the quadrotor (ch. 2, Appendix B)."""
+
+    vehicle_model = "quadrotor"
+    reference_kinds = ("attitude_altitude",)
+
+    law: Literal["quadrotor_attitude_altitude"]
+    gains: QuadrotorAttitudeGains = "ch02"
+
+    def resolve_gains(self) -> quadrotor_attitude_altitude.Gains:
+        """The numbers behind a named set or a table."""
+        return _attitude_gains(self.gains)
+
+    def closed_loops(self, vehicle: Vehicle) -> list[Loop]:
+        """See `LawTable.closed_loops`."""
+        return _attitude_loops(self.resolve_gains())
+
+
+class ZoneTable(Table):
+    """Attitudes at which the attitude-altitude law flies, edges included; Eq. (47)."""
+
+    roll: Gains2 = Field((PUBLISHED_ZONE.roll_min, PUBLISHED_ZONE.roll_max), description="rad")
+    pitch: Gains2 = Field((PUBLISHED_ZONE.pitch_min, PUBLISHED_ZONE.pitch_max), description="rad")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for key in ("roll", "pitch"):
+            low, high = getattr(self, key)
+            if low > high:
+                raise InvalidValueError(
+                    f"controller.zone.{key}", [low, high], "the first must not exceed the second"
+                )
+        return self
+
+
+class SwitchingController(LawTable):
+    """Yaw-position control that hands over to attitude-altitude control in a zone (ch. 2)."""
+
+    vehicle_model = "quadrotor"
+    reference_kinds = ("pose",)
+
+    law: Literal["switching"]
+    gains: YawPositionGains = Field("stable", description="of the yaw-position law")
+    attitude_gains: QuadrotorAttitudeGains = "ch02"
+    zone: ZoneTable = ZoneTable()
+    extension: Literal["bumpless", "held", "running"] = Field(
+        "bumpless",
+        description="what the yaw-position law's own states do while the other law flies",
+    )
+    extension_rate: Positive = Field(
+        100.0, description="1/s, how fast bumpless states reach the flown thrust"
+    )
+
+    def resolve_gains(self) -> yaw_position.Gains:
+        """The yaw-position law's numbers."""
+        return _yaw_position_gains(self.gains)
+
+    def resolve_attitude_gains(self) -> quadrotor_attitude_altitude.Gains:
+        """The attitude-altitude law's numbers."""
+        return _attitude_gains(self.attitude_gains)
+
+    def closed_loops(self, vehicle: Vehicle) -> list[Loop]:
+        """See `LawTable.closed_loops`."""
+        return [
+            *_yaw_position_loops(self.resolve_gains()),
+            *_attitude_loops(self.resolve_attitude_gains()),
+        ]
+
+
+def _yaw_position_gains(gains: str | YawPositionGainTable) -> yaw_position.Gains:
+    if isinstance(gains, YawPositionGainTable):
+        return yaw_position.Gains(*gains.position, *gains.yaw)
+    return yaw_position.GAIN_SETS[gains]
+
+
+def _yaw_position_loops(gains: yaw_position.Gains) -> list[Loop]:
+    return [linear_loop("position", gains[:4]), linear_loop("yaw", gains[4:])]
+
+
+def _attitude_gains(gains: str | QuadrotorAttitudeGainTable) -> quadrotor_attitude_altitude.Gains:
+    if isinstance(gains, QuadrotorAttitudeGainTable):
+        return quadrotor_attitude_altitude.Gains(*gains.altitude, *gains.attitude)
+    return quadrotor_attitude_altitude.GAIN_SETS[gains]
+
+
+def _attitude_loops(gains: quadrotor_attitude_altitude.Gains) -> list[Loop]:
+    return [linear_loop("altitude", gains[:2]), linear_loop("attitude", gains[2:])]

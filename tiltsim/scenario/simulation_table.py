@@ -1,0 +1,123 @@
+"""The tables [simulation] and [initial]."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal, Self
+
+from pydantic import Field, model_validator
+
+from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.table import (
+    Angles3,
+    NonNegative,
+    Positive,
+    Positive2,
+    Positive4,
+    Table,
+    Vector3,
+)
+
+MAX_STEPS: Final = 100_000_000
+"""Physics steps of a flight, more than a day at one millisecond."""
+
+
+MAX_LATENCY_STEPS: Final = 20
+"""Control samples on their way at once; each is eight states of the simulation."""
+
+
+class SimulationTable(Table):
+    """How the flight is computed."""
+
+    duration: Positive = Field(40.0, description="s")
+    timestep: Annotated[float, Field(ge=1e-6, le=0.1)] = Field(0.001, description="s, physics")
+    control_timestep: NonNegative = Field(
+        0.0, description="s; 0 evaluates the law at every integrator stage, else sample and hold"
+    )
+    control_latency: NonNegative = Field(
+        0.0, description="s from a reading to its command; a multiple of control_timestep"
+    )
+    record_timestep: Positive | None = Field(
+        None, description="s between recorded samples; default: the multiple of timestep near 0.01"
+    )
+    engine: Literal["auto", "python", "native"] = "auto"
+    plant: Literal["mujoco", "thesis"] = "mujoco"
+    integrator: Literal["RK4", "implicitfast", "implicit", "Euler"] = "RK4"
+    seed: Annotated[int, Field(ge=0)] = 0
+
+    @property
+    def steps(self) -> int:
+        """Number of physics steps of the flight."""
+        return round(self.duration / self.timestep)
+
+    @property
+    def control_steps(self) -> int:
+        """Physics steps between control samples; 0 where control is continuous."""
+        return round(self.control_timestep / self.timestep)
+
+    @property
+    def latency_steps(self) -> int:
+        """Control samples between a reading and its command; 0 where there is no latency."""
+        return round(self.control_latency / self.control_timestep) if self.control_latency else 0
+
+    @property
+    def record_steps(self) -> int:
+        """Physics steps between recorded samples."""
+        wanted = 0.01 if self.record_timestep is None else self.record_timestep
+        return max(1, round(wanted / self.timestep))
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for key in ("duration", "control_timestep", "record_timestep"):
+            value = getattr(self, key)
+            if value is None or value == 0.0:
+                continue
+            steps = value / self.timestep
+            if steps > MAX_STEPS:
+                raise InvalidValueError(
+                    f"simulation.{key}", value, f"more than {MAX_STEPS:.0e} steps of timestep"
+                )
+            if value > self.duration:
+                raise InvalidValueError(
+                    f"simulation.{key}", value, f"longer than the flight, {self.duration} s"
+                )
+            if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
+                raise InvalidValueError(
+                    f"simulation.{key}", value, f"must be a multiple of timestep = {self.timestep}"
+                )
+        self._check_latency()
+        return self
+
+    def _check_latency(self) -> None:
+        latency, period = self.control_latency, self.control_timestep
+        if latency == 0.0:
+            return
+        if period == 0.0:
+            raise InvalidValueError(
+                "simulation.control_latency",
+                latency,
+                "needs a control_timestep, of which it is a multiple",
+            )
+        steps = latency / period
+        if abs(steps - round(steps)) > 1e-6 * steps or not 1 <= round(steps) <= MAX_LATENCY_STEPS:
+            raise InvalidValueError(
+                "simulation.control_latency",
+                latency,
+                f"must be 1 to {MAX_LATENCY_STEPS} times control_timestep = {period}",
+            )
+
+
+class InitialTable(Table):
+    """The state at time zero; the tilt angles and their rates are the gait's."""
+
+    position: Vector3 = Field((0.0, 0.0, 0.0), description="m, world")
+    velocity: Vector3 = Field((0.0, 0.0, 0.0), description="m/s, world")
+    attitude: Angles3 = Field((0.0, 0.0, 0.0), description="roll, pitch, yaw, rad")
+    angular_velocity: Vector3 = Field((0.0, 0.0, 0.0), description="p, q, r, rad/s, body")
+    rotor_speed: Positive | Positive4 | Positive2 = Field(
+        300.0, description="absolute value, rad/s; one for all rotors, or one each"
+    )
+
+    def rotor_speeds(self, rotors: int) -> tuple[float, ...]:
+        """Absolute rotor speeds of so many rotors, one each."""
+        speed = self.rotor_speed
+        return speed if isinstance(speed, tuple) else (speed,) * rotors

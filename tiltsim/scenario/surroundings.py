@@ -1,0 +1,156 @@
+"""What a scenario puts around and into the vehicle: ground, air, disturbances, sensors, faults."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from tiltsim.models.parts import Ground
+from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.table import Angle, Coordinate, NonNegative, Positive, Table, Vector3
+
+
+class GroundTable(Table):
+    """Ground to take off from and land on; without the table nothing touches."""
+
+    height: float = Field(Ground.height, description="m, world")
+    friction: Positive = Field(Ground.friction, description="coefficient of sliding friction")
+
+
+class Disturbance(Table):
+    """What pushes the vehicle without the control law knowing."""
+
+    type: Literal["acceleration"]
+    value: Vector3 = Field(description="m/s^2, world; acts on all that has mass, as gravity does")
+
+
+class SensorTable(Table):
+    """What the law is told of its vehicle's motion; the truth by default.
+
+    Every reading has its own zero-mean normal error of the given standard deviation on each axis,
+    drawn from ``simulation.seed``, and stands until the next. Tilts and rotor speeds are known.
+    """
+
+    position_noise: NonNegative = Field(0.0, description="m")
+    position_bias: Vector3 = Field((0.0, 0.0, 0.0), description="m, world")
+    velocity_noise: NonNegative = Field(0.0, description="m/s")
+    velocity_bias: Vector3 = Field((0.0, 0.0, 0.0), description="m/s, world")
+    attitude_noise: NonNegative = Field(0.0, description="rad, about each body axis")
+    attitude_bias: Vector3 = Field((0.0, 0.0, 0.0), description="rad, about the body axes")
+    body_rates_noise: NonNegative = Field(0.0, description="rad/s")
+    body_rates_bias: Vector3 = Field((0.0, 0.0, 0.0), description="rad/s, body")
+    sample_time: Positive | None = Field(
+        None, description="s between readings; default: control_timestep, 0.01 if continuous"
+    )
+
+    @property
+    def are_imperfect(self) -> bool:
+        """Whether any reading differs from the truth."""
+        return self.model_copy(update={"sample_time": None}) != SensorTable()
+
+
+Rotor = Annotated[int, Field(ge=1, le=4)]
+
+
+class RotorLoss(Table):
+    """A rotor that makes neither thrust nor torque any more; its motor turns on."""
+
+    type: Literal["rotor_loss"]
+    rotor: Rotor
+    time: NonNegative = Field(description="s")
+
+
+class PartialThrust(Table):
+    """A rotor that makes only part of its thrust and drag torque."""
+
+    type: Literal["partial_thrust"]
+    rotor: Rotor
+    time: NonNegative = Field(description="s")
+    factor: Annotated[float, Field(ge=0.0, le=2.0)] = Field(description="what is left, 1 for all")
+
+
+class StuckServo(Table):
+    """A tilt servo that holds one angle whatever it is told."""
+
+    type: Literal["stuck_servo"]
+    rotor: Rotor
+    time: NonNegative = Field(description="s")
+    angle: Angle | None = Field(None, description="rad; default: what the gait plans at the time")
+
+
+Fault = Annotated[RotorLoss | PartialThrust | StuckServo, Field(discriminator="type")]
+
+
+NonNegative3 = Annotated[tuple[NonNegative, NonNegative, NonNegative], Field(strict=False)]
+
+
+class DragTable(Table):
+    """The force against the motion through the air, along each body axis."""
+
+    linear: NonNegative3 = Field((0.0, 0.0, 0.0), description="N s/m")
+    area: NonNegative3 = Field(
+        (0.0, 0.0, 0.0), description="m^2, drag coefficient times the area seen along the axis"
+    )
+
+
+class GustTable(Table):
+    """A discrete gust, one minus cosine (MIL-F-8785C)."""
+
+    velocity: Vector3 = Field(description="m/s, world, at its peak")
+    start: NonNegative = Field(0.0, description="s")
+    rise: Positive = Field(description="s, up to the peak and down again")
+    duration: NonNegative = Field(0.0, description="s, from start to end; 0: it stays")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if 0.0 < self.duration < 2.0 * self.rise:
+            raise InvalidValueError(
+                "air.gust.duration",
+                self.duration,
+                f"must be 0 or at least twice rise = {self.rise}",
+            )
+        return self
+
+
+class TurbulenceTable(Table):
+    """Dryden turbulence, low-altitude model (MIL-F-8785C), drawn from ``simulation.seed``."""
+
+    wind_at_6m: Positive = Field(description="m/s, mean wind 20 ft above the ground")
+    height: Annotated[float, Field(ge=3.048, le=304.8)] = Field(
+        10.0, description="m above the ground, for intensity and scale"
+    )
+    sample_time: Positive = Field(0.01, description="s for which a draw of the noise stands")
+
+
+class GroundEffectTable(Table):
+    """Ground effect on each rotor (Cheeseman and Bennett)."""
+
+    rotor_radius: Positive = Field(0.1, description="m")
+    height: Coordinate = Field(description="m, z of the ground in the world")
+
+
+class AirTable(Table):
+    """The air around the vehicle; none by default."""
+
+    density: Positive = Field(1.225, description="kg/m^3")
+    wind: Vector3 = Field((0.0, 0.0, 0.0), description="m/s, world: where the air goes")
+    drag: DragTable = DragTable()
+    gust: GustTable | None = None
+    turbulence: TurbulenceTable | None = None
+    ground_effect: GroundEffectTable | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if any(self.drag.linear) or any(self.drag.area):
+            return self
+        for key, moves in (
+            ("wind", any(self.wind)),
+            ("gust", self.gust),
+            ("turbulence", self.turbulence),
+        ):
+            if moves:
+                raise InvalidValueError(
+                    f"air.{key}", getattr(self, key), "acts through drag; give air.drag"
+                )
+        return self

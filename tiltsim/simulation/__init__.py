@@ -1,0 +1,1 @@
+"""Fly scenarios: one at a time and in batches."""

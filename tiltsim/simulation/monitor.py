@@ -1,0 +1,83 @@
+"""Decide from the samples whether a flight has to end."""
+
+from __future__ import annotations
+
+from math import copysign, isfinite
+
+from tiltsim.closed_loop.limits import (
+    ALTITUDE_ERROR,
+    BODY_RATE,
+    HORIZONTAL_ERROR,
+    ROTOR_SPEED,
+    SINGULAR,
+    WITHIN,
+    altitude_error,
+    horizontal_error,
+)
+from tiltsim.closed_loop.loop import Floats
+from tiltsim.flight.end import End
+from tiltsim.laws.assembling import control_setup, loop_of
+from tiltsim.plants.plant import Plant
+from tiltsim.scenario.scenario import Scenario
+
+
+class Watch:
+    """Decides from the samples of one flight whether it is lost, and why."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._loop, self._setup = loop_of(scenario), control_setup(scenario)
+        self._reference, self._table = scenario.reference_and_table()
+        self._follows_position = self._loop.follows_position(scenario)
+        self._sides: dict[int, float] = {}
+
+    def judge(self, plant: Plant, sample: Floats) -> End | None:
+        """The end that a sample spells, None while the flight goes on."""
+        state = dict(zip(self._loop.sample_fields, sample.tolist(), strict=True))
+        time = state["time"]
+        finite = all(map(isfinite, state.values()))
+        fault = plant.fault()
+        if fault:
+            singular = self._judge_singularity(time, state) if finite else None
+            return singular or End("diverged", time, fault)
+        if not finite:
+            name = next(name for name, value in state.items() if not isfinite(value))
+            return End("diverged", time, f"{name} is no longer a finite number")
+        return self._judge_limits(time, state) or self._judge_singularity(time, state)
+
+    def finds_nothing(self, plant: Plant, samples: Floats) -> bool:
+        """Whether the flight goes on after samples that the plant found sound when recording them.
+
+        A plant that records natively has judged all but the last; see
+        `tiltsim.engines.recorder.Recorder`.
+        """
+        if plant.engine == "native" and self._loop.watch is not None:
+            samples = samples[-1:]
+        return all(self.judge(plant, sample) is None for sample in samples)
+
+    def _judge_limits(self, time: float, state: dict[str, float]) -> End | None:
+        values = list(state.values())[1:]
+        limits = self._reference, self._table, self._follows_position
+        code = self._loop.kind.limit_exceeded(time, values, *limits)
+        if code == WITHIN:
+            return None
+        if code == HORIZONTAL_ERROR:
+            error = horizontal_error(time, values, self._reference, self._table)
+            cause = f"{error:.3g} m away from the reference"
+        elif code == ALTITUDE_ERROR:
+            error = altitude_error(time, values, self._reference, self._table)
+            cause = f"{error:.3g} m away from the reference altitude"
+        elif code < ROTOR_SPEED:
+            name = "pqr"[code - BODY_RATE]
+            cause = f"body rate {name} = {state[name]:.3g} rad/s"
+        else:
+            rotor = code - ROTOR_SPEED + 1
+            cause = f"rotor {rotor} at {state[f'rotor_speed_{rotor}']:.3g} rad/s"
+        return End("diverged", time, cause)
+
+    def _judge_singularity(self, time: float, state: dict[str, float]) -> End | None:
+        for index, (value, cause) in enumerate(self._loop.watched(state, self._setup)):
+            # What changes its sign between two samples was zero in between.
+            side = 0.0 if abs(value) < SINGULAR else copysign(1.0, value)
+            if side == 0.0 or side != self._sides.setdefault(index, side):
+                return End("singular", time, cause)
+        return None

@@ -1,0 +1,147 @@
+"""Simulate a scenario: advance the plant, record samples, notice when the flight is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from time import perf_counter
+from typing import Final
+
+import numpy as np
+
+from tiltsim.closed_loop.loop import Floats
+from tiltsim.flight.end import End
+from tiltsim.flight.flight import Flight
+from tiltsim.plants.command import Controller, ControllerError
+from tiltsim.plants.factory import make_plant
+from tiltsim.plants.plant import Plant
+from tiltsim.plants.user_controller import with_controller
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.simulation.monitor import Watch
+from tiltsim.system.interrupts import interrupts_kept
+
+CHUNK_TIME: Final = 0.1
+"""How long (s) native code flies before Python looks at the samples and at the keyboard."""
+
+FIRST_CHUNK: Final = 8  # samples
+LARGEST_CHUNK: Final = 100_000
+
+Observer = Callable[[Floats], None]
+
+
+def simulate(
+    scenario: Scenario,
+    observer: Observer | None = None,
+    *,
+    controller: Controller | type | None = None,
+) -> Flight:
+    """Fly a scenario from start to end.
+
+    Parameters
+    ----------
+    scenario
+        What to fly; see `tiltsim.load_scenario`.
+    observer
+        Called with every sample (floats in the order of `Loop.sample_fields`) as it is recorded.
+    controller
+        A controller of your own in place of the scenario's law: a function from
+        `tiltsim.Observation` to `tiltsim.Command`, an object with ``__call__`` and, if it has a
+        memory, ``reset(scenario)``, or a class of such objects.
+
+    Returns
+    -------
+    Flight
+        All samples up to the end. A flight that diverges or meets a singular decoupling matrix
+        is a result, not an error: its log is complete up to there, and ``flight.end`` names the
+        cause and, to one physics step, the time. So is a flight interrupted from outside, or
+        by a controller of your own that raises or returns what is no command. An interrupt before
+        the first sample raises KeyboardInterrupt.
+    """
+    if controller is not None:
+        scenario = with_controller(scenario, controller)
+    simulation = scenario.simulation
+    plant = make_plant(scenario, controller)
+    watch = Watch(scenario)
+    samples: list[Floats] = []
+
+    def keep(sample: Floats) -> None:
+        samples.append(sample)
+        if observer is not None:
+            observer(sample)
+
+    start = perf_counter()
+    try:
+        keep(_sample(plant))
+        end = watch.judge(plant, samples[0])
+        steps_left, chunk = simulation.steps, FIRST_CHUNK if plant.engine == "native" else 1
+        while steps_left > 0 and end is None:
+            steps = min(simulation.record_steps, steps_left)
+            count = max(1, min(chunk, steps_left // steps))
+            began = perf_counter()
+            with interrupts_kept():
+                flown, end = fly_chunk(plant, watch, count, steps)
+            for sample in flown:
+                keep(sample)
+            steps_left -= count * steps
+            if plant.engine == "native":
+                pace = CHUNK_TIME / max(perf_counter() - began, 1e-9)
+                chunk = max(1, min(int(count * pace), 2 * count, LARGEST_CHUNK))
+    except KeyboardInterrupt:
+        if not samples:
+            raise
+        end = End("interrupted", float(samples[-1][0]), "interrupted from outside")
+    except ControllerError as error:
+        sample = _sample(plant)
+        end = watch.judge(plant, sample) or End("failed", plant.time, str(error))
+        if sample[0] > samples[-1][0] and np.isfinite(sample).all():
+            keep(sample)
+    wall_time = perf_counter() - start
+    if end is None:
+        end = End("completed", plant.time)
+    return Flight(scenario, np.array(samples), end, plant.engine, wall_time)
+
+
+def _sample(plant: Plant) -> Floats:
+    return np.array([plant.time, *plant.observe()])
+
+
+def fly_chunk(
+    plant: Plant, watch: Watch, samples: int, steps: int
+) -> tuple[Iterable[Floats], End | None]:
+    """Fly ``samples`` intervals of ``steps`` steps; the samples, and the end if it came.
+
+    Where something goes wrong on the way the flight is repeated, sample by sample and in the end
+    step by step, to find the very step.
+    """
+    before = plant.state
+    if samples > 1:
+        flown = plant.record(samples, steps)
+        if flown is not None and watch.finds_nothing(plant, flown):
+            return flown, None
+        plant.state = before
+    kept = []
+    for _ in range(samples):
+        before = plant.state
+        plant.advance(steps)
+        sample = _sample(plant)
+        end = watch.judge(plant, sample)
+        if end is not None:
+            plant.state = before
+            sample, end = _first_bad_step(plant, watch, steps, sample, end)
+        if np.isfinite(sample).all():
+            kept.append(sample)
+        if end is not None:
+            return kept, end
+    return kept, None
+
+
+def _first_bad_step(
+    plant: Plant, watch: Watch, steps: int, sample: Floats, end: End
+) -> tuple[Floats, End]:
+    """Repeat a recording interval step by step to find the very step on which it went wrong."""
+    for _ in range(steps):
+        plant.advance(1)
+        this = _sample(plant)
+        verdict = watch.judge(plant, this)
+        if verdict is not None:
+            return this, verdict
+    return sample, end

@@ -1,0 +1,1 @@
+"""Studies that fly or analyse many cases: checks of the library, benchmark, gait analysis."""

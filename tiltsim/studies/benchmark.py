@@ -1,0 +1,281 @@
+"""How fast the closed loop runs, as a share of bare MuJoCo on the same model in the same run.
+
+Every figure comes from turns: in each turn the variants are timed one after the other from the same
+state, and the ratio of a variant is the median over the turns of bare time over its time. So a
+machine that is busy, or changes its clock, spoils all variants of a turn alike.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import sys
+from collections.abc import Callable, Mapping
+from statistics import median
+from time import perf_counter
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+
+from tiltsim.engines.base import EngineName
+from tiltsim.engines.callback import control_callback
+from tiltsim.engines.factory import make_engine
+from tiltsim.engines.native_engine import compile_empty
+from tiltsim.laws.attitude_altitude import TILTROTOR
+from tiltsim.plants.mujoco_plant import MujocoPlant
+from tiltsim.scenario.loading import parse_scenario
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.simulation.batch import fly_all
+from tiltsim.simulation.simulate import simulate
+
+INTEGRATORS: Final = ("RK4", "implicitfast", "Euler")
+ROUNDS: Final = 15
+ENGINES: Final[tuple[EngineName, ...]] = ("python", "native")
+STEPS: Final = 3000
+PYTHON_STEPS: Final = 400
+"""Steps of one timing, long enough for the clock and short enough to take turns."""
+
+RECORD_STEPS: Final = 10
+BATCH_ROWS: Final = 64
+BATCH_STEPS: Final = 200
+BATCH_ROUNDS: Final = 9
+
+ACCURACY_STEPS: Final = (0.008, 0.004, 0.002, 0.001, 0.0005)
+REFERENCE_STEP: Final = 0.0001
+ACCURACY_DURATION: Final = 8.0
+
+Rows = list[dict[str, Any]]
+
+
+def flying_plant(integrator: str) -> MujocoPlant:
+    """A tiltrotor in steady flight with tilted rotors: every part of the loop has work to do."""
+    plant = MujocoPlant(
+        parse_scenario(
+            {
+                "simulation": {"integrator": integrator, "engine": "native"},
+                "gait": {"type": "fixed", "angles": [-0.65, -0.65, 0.65, 0.65]},
+            }
+        )
+    )
+    plant.advance(10_000)
+    return plant
+
+
+def bench_single(integrator: str, rounds: int = ROUNDS) -> Rows:
+    """Time one vehicle: bare ``mj_step`` with frozen controls, then each engine, in turns.
+
+    ``empty`` is a native callback that does nothing: bare MuJoCo without its timers, which stand
+    still under native callbacks. What a law costs is the way from there to ``native``. ``recorded``
+    takes a sample every tenth step. Rows as in ``tiltsim bench --json``.
+    """
+    plant = flying_plant(integrator)
+    model, data, state = plant.model, plant.data, plant.state
+    callbacks = {"bare": None, "empty": compile_empty().ctypes} | {
+        name: make_engine(name, TILTROTOR, model, data).callback() for name in ENGINES
+    }
+
+    def stepping(callback: Any, steps: int) -> Callable[[], float]:
+        def run() -> float:
+            plant.state = state
+            with control_callback(callback):
+                return _seconds(lambda: mujoco.mj_step(model, data, nstep=steps)) / steps
+
+        return run
+
+    def recording() -> float:
+        plant.state = state
+        seconds = _seconds(lambda: plant.record(STEPS // RECORD_STEPS, RECORD_STEPS))
+        return seconds / STEPS
+
+    variants: dict[tuple[str, str], Callable[[], float]] = {
+        ("single", name): stepping(callback, PYTHON_STEPS if name == "python" else STEPS)
+        for name, callback in callbacks.items()
+    }
+    variants["recorded", "native"] = recording
+    seconds = _take_turns(variants, rounds)
+    return _rows(seconds, ("single", "bare"), integrator, model, vehicles=1, threads=1)
+
+
+def bench_batch(integrator: str, threads: int, rounds: int = BATCH_ROUNDS) -> Rows:
+    """Time a batch of vehicles: open loop with frozen controls, and the native engine, in turns."""
+    from mujoco.batch import Batch
+
+    plant = flying_plant(integrator)
+    batch = Batch(plant.model, BATCH_ROWS, threads)
+    state, steps = plant.state, BATCH_ROWS * BATCH_STEPS
+
+    def stepping(callback: Any) -> Callable[[], float]:
+        def run() -> float:
+            batch.state[:] = state
+            with control_callback(callback):
+                return _seconds(lambda: batch.step(nstep=BATCH_STEPS)) / steps
+
+        return run
+
+    variants = {
+        ("batch", "bare"): stepping(None),
+        ("batch", "native"): stepping(plant.callback),
+    }
+    seconds = _take_turns(variants, rounds)
+    return _rows(
+        seconds, ("batch", "bare"), integrator, plant.model, vehicles=BATCH_ROWS, threads=threads
+    )
+
+
+def bench_flights(vehicles: int, duration: float, integrator: str, timestep: float) -> Rows:
+    """Fly whole flights with samples, judgement and metrics; one row, its ratio left open.
+
+    ``memory`` is the largest the process has ever been, bytes.
+    """
+    scenarios = [_trotting(index, duration, integrator, timestep) for index in range(vehicles)]
+    for _ in fly_all(scenarios[:1]):
+        pass  # native code is compiled or loaded before the clock starts
+    threads = os.cpu_count() or 1
+    start = perf_counter()
+    kinds = [result.end.kind for result in fly_all(scenarios)]
+    seconds = perf_counter() - start
+    # Linux counts in KiB, macOS in bytes.
+    largest = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return [
+        {
+            "case": "flights",
+            "engine": "native",
+            "integrator": integrator,
+            "vehicles": vehicles,
+            "threads": threads,
+            "steps_per_second": vehicles * scenarios[0].simulation.steps / seconds,
+            "ratio": None,
+            "realtime_factor": vehicles * duration / seconds,
+            "timestep": timestep,
+            "seconds": seconds,
+            "memory": largest if sys.platform == "darwin" else largest * 1024,
+            "completed": kinds.count("completed"),
+        }
+    ]
+
+
+def bench_accuracy(vehicles: int = BATCH_ROWS) -> Rows:
+    """Position error of RK4 against the step, and what all cores fly of it together.
+
+    The error (m) is the largest difference of any coordinate from the flight with the reference
+    step, over the samples of the flight.
+    """
+    reference = _positions(REFERENCE_STEP)
+    rows = []
+    for timestep in ACCURACY_STEPS:
+        error = float(np.abs(_positions(timestep) - reference).max())
+        scenarios = [_circling(timestep)] * vehicles
+        start = perf_counter()
+        for _ in fly_all(scenarios):
+            pass
+        seconds = perf_counter() - start
+        steps = vehicles * scenarios[0].simulation.steps
+        rows.append(
+            {
+                "case": "accuracy",
+                "engine": "native",
+                "integrator": "RK4",
+                "vehicles": vehicles,
+                "threads": os.cpu_count() or 1,
+                "steps_per_second": steps / seconds,
+                "ratio": None,
+                "realtime_factor": vehicles * ACCURACY_DURATION / seconds,
+                "timestep": timestep,
+                "position_error": error,
+            }
+        )
+    return rows
+
+
+def _trotting(index: int, duration: float, integrator: str, timestep: float) -> Scenario:
+    """One vehicle of many, each with another mass and start."""
+    return parse_scenario(
+        {
+            "simulation": {
+                "integrator": integrator,
+                "engine": "native",
+                "duration": duration,
+                "timestep": timestep,
+            },
+            "vehicle": {"mass": 0.429 * (1.0 + 1e-5 * index)},
+            "gait": {"type": "fixed", "angles": [-0.65, -0.65, 0.65, 0.65]},
+            "initial": {"position": [1e-3 * index, 0.0, 0.0]},
+        }
+    )
+
+
+def _circling(timestep: float) -> Scenario:
+    """Ch. 4's circle with the exact law; the servo is slow enough for steps of 8 ms."""
+    return parse_scenario(
+        {
+            "simulation": {
+                "engine": "native",
+                "duration": ACCURACY_DURATION,
+                "timestep": timestep,
+                "record_timestep": 0.2,
+            },
+            "vehicle": {"tilt_servo": {"natural_frequency": 150.0}},
+            "controller": {"decoupling": "exact", "gains": "exact", "decoupler": "exact"},
+            "gait": {"type": "fixed", "angles": [-0.3, -0.3, 0.3, 0.3]},
+            "reference": {"type": "circle", "radius": 5.0, "angular_frequency": 0.1},
+            "initial": {"position": [5.0, 0.0, 0.0]},
+        }
+    )
+
+
+def _positions(timestep: float) -> np.ndarray[Any, Any]:
+    flight = simulate(_circling(timestep))
+    return np.stack([flight[axis] for axis in ("x", "y", "z")])
+
+
+def _seconds(action: Callable[[], object]) -> float:
+    start = perf_counter()
+    action()
+    return perf_counter() - start
+
+
+def _take_turns(
+    variants: Mapping[tuple[str, str], Callable[[], float]], rounds: int
+) -> dict[tuple[str, str], list[float]]:
+    """Seconds a step of each variant in each turn."""
+    seconds: dict[tuple[str, str], list[float]] = {name: [] for name in variants}
+    for turn in range(rounds + 1):
+        for name, run in variants.items():
+            per_step = run()
+            if turn > 0:  # the first turn warms caches
+                seconds[name].append(per_step)
+    return seconds
+
+
+def _rows(
+    seconds: Mapping[tuple[str, str], list[float]],
+    bare: tuple[str, str],
+    integrator: str,
+    model: mujoco.MjModel,
+    *,
+    vehicles: int,
+    threads: int,
+) -> Rows:
+    return [
+        {
+            "case": case,
+            "engine": engine,
+            "integrator": integrator,
+            "vehicles": vehicles,
+            "threads": threads,
+            "steps_per_second": 1.0 / median(values),
+            "ratio": median(b / v for b, v in zip(seconds[bare], values, strict=True)),
+            "realtime_factor": float(model.opt.timestep) / median(values),
+        }
+        for (case, engine), values in seconds.items()
+    ]
+
+
+def run_benchmark() -> Rows:
+    """All rows of ``tiltsim bench``."""
+    rows = [row for integrator in INTEGRATORS for row in bench_single(integrator)]
+    for integrator in INTEGRATORS:
+        for threads in sorted({1, os.cpu_count() or 1}):
+            rows += bench_batch(integrator, threads)
+    return rows

@@ -1,0 +1,191 @@
+"""Headless checks: fly many scenarios, judge each, report for people and for CI machines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Future
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+from typing import Any, Literal
+from xml.etree import ElementTree
+
+from tiltsim.engines.base import EngineName
+from tiltsim.errors import InputError
+from tiltsim.flight.verdicts import Verdict, judge
+from tiltsim.plants.engine_choice import with_engine
+from tiltsim.resources import shipped_folder
+from tiltsim.scenario.library import closest_in_library, library_name, read_toml, scenario_files
+from tiltsim.scenario.loading import load_scenario, variant_names
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.simulation.shared_engine import shared_engine
+from tiltsim.simulation.simulate import simulate
+from tiltsim.system.processes import in_processes
+
+Status = Literal["passed", "failed", "lost", "invalid", "crashed", "interrupted"]
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """The outcome of one scenario."""
+
+    address: str
+    status: Status
+    message: str  # why it is not passed, in one line; empty when passed
+    verdicts: tuple[Verdict, ...] = ()
+    wall_time: float = 0.0  # s
+
+
+def collect(paths: Iterable[str]) -> list[str]:
+    """Addresses of all scenarios under files and folders, families spread into variants.
+
+    A path that does not exist is looked up in the library. Raises `InputError` where it is not
+    there either, or where a folder holds no scenario.
+    """
+    addresses: list[str] = []
+    for path in paths:
+        name, _, variant = path.partition("#")
+        place = _find(name)
+        if variant:
+            addresses.append(path)
+            continue
+        files = scenario_files(place)
+        if not files:
+            raise InputError(f"{path}: no scenario file (*.toml) in this folder")
+        for file in files:
+            base = library_name(file)
+            try:
+                names = variant_names(file, read_toml(file))
+            except InputError:
+                names = []  # the file stays on the list and fails there, by itself
+            addresses += [f"{base}#{member}" for member in names] or [base]
+    return list(dict.fromkeys(addresses))
+
+
+def _find(name: str) -> Path:
+    if not name:
+        raise InputError("no scenario named; see tiltsim list")
+    library = shipped_folder("scenarios")
+    for place in (Path(name), library / name, library / f"{name}.toml"):
+        if place.exists():
+            return place
+    hint = closest_in_library(name)
+    raise InputError(
+        f"{name}: no such file or folder, nor one of the library ({hint}see tiltsim list)"
+    )
+
+
+def check_one(
+    address: str, overrides: Mapping[str, Any], engine: EngineName | None = None
+) -> CheckResult:
+    """Fly and judge one scenario; everything that goes wrong becomes part of the result."""
+    start = perf_counter()
+    try:
+        scenario = load_scenario(address, overrides)
+        if engine is not None and scenario.simulation.engine == "auto":
+            scenario = with_engine(scenario, engine)
+        flight = simulate(scenario)
+    except InputError as error:
+        return CheckResult(address, "invalid", str(error))
+    if flight.end.kind == "interrupted":
+        raise KeyboardInterrupt
+    verdicts = tuple(judge(scenario, flight.metrics()))
+    wall_time = perf_counter() - start
+    # A scenario may be about a loss: then it says what it expects of `diverged`.
+    loss_expected = any(v.expectation.metric == "diverged" for v in verdicts)
+    if flight.end.kind != "completed" and not loss_expected:
+        message = f"flight {flight.end.kind} at t = {flight.end.time:.3f} s: {flight.end.cause}"
+        return CheckResult(address, "lost", message, verdicts, wall_time)
+    failed = [v for v in verdicts if not v.holds]
+    message = "; ".join(
+        f"{v.expectation.metric} = {_number(v.measured)}, expected {v.bounds}" for v in failed
+    )
+    return CheckResult(address, "failed" if failed else "passed", message, verdicts, wall_time)
+
+
+def _number(value: float | bool | None) -> str:
+    if value is None:
+        return "missing"
+    return str(value).lower() if isinstance(value, bool) else f"{value:.6g}"
+
+
+def check_all(
+    addresses: list[str],
+    jobs: int,
+    overrides: Mapping[str, Any],
+    report: Callable[[CheckResult], None],
+) -> list[CheckResult]:
+    """Check scenarios on several processes; ``report`` sees each result as it comes.
+
+    Returns the results in the order of the addresses. A process that dies takes only the
+    scenarios down that it was working on, and they are reported as crashed. An interrupt from the
+    keyboard ends all processes at once.
+    """
+    scenarios = _valid(addresses, overrides)
+    engine = shared_engine(list(scenarios.values()))
+    if jobs == 1 or len(addresses) == 1:
+        results = []
+        for address in addresses:
+            results.append(check_one(address, overrides, engine))
+            report(results[-1])
+        return results
+    by_address: dict[str, CheckResult] = {}
+    work = partial(check_one, overrides=overrides, engine=engine)
+    # The longest first, so that no process ends up alone with one of them.
+    steps = {address: scenario.simulation.steps for address, scenario in scenarios.items()}
+    by_length = sorted(addresses, key=lambda address: -steps.get(address, 0))
+    for address, future in in_processes(work, by_length, jobs):
+        by_address[address] = _result(address, future)
+        report(by_address[address])
+    return [by_address[address] for address in addresses]
+
+
+def _result(address: str, future: Future[CheckResult]) -> CheckResult:
+    error = future.exception()
+    if error is not None:
+        return CheckResult(address, "crashed", f"{type(error).__name__}: {error}")
+    return future.result()
+
+
+def _valid(addresses: list[str], overrides: Mapping[str, Any]) -> dict[str, Scenario]:
+    scenarios = {}
+    for address in addresses:
+        try:
+            scenarios[address] = load_scenario(address, overrides)
+        except InputError:
+            continue  # it is reported when its turn comes
+    return scenarios
+
+
+def not_flown(address: str) -> CheckResult:
+    """What stands for a scenario that an interrupt left without an outcome."""
+    return CheckResult(address, "interrupted", "not flown: interrupted")
+
+
+def write_junit(results: list[CheckResult], path: Path) -> None:
+    """Write results as JUnit XML, which CI services read."""
+    failures = sum(result.status in {"failed", "lost"} for result in results)
+    errors = sum(result.status in {"invalid", "crashed", "interrupted"} for result in results)
+    suite = ElementTree.Element(
+        "testsuite",
+        name="tiltsim check",
+        tests=str(len(results)),
+        failures=str(failures),
+        errors=str(errors),
+        time=f"{sum(result.wall_time for result in results):.3f}",
+    )
+    for result in results:
+        folder, _, name = result.address.rpartition("/")
+        case = ElementTree.SubElement(
+            suite, "testcase", classname=folder, name=name, time=f"{result.wall_time:.3f}"
+        )
+        if result.status in {"failed", "lost"}:
+            ElementTree.SubElement(case, "failure", type=result.status, message=result.message)
+        elif result.status != "passed":
+            ElementTree.SubElement(case, "error", type=result.status, message=result.message)
+    root = ElementTree.Element("testsuites")
+    root.append(suite)
+    tree = ElementTree.ElementTree(root)
+    ElementTree.indent(tree)
+    tree.write(path, encoding="utf-8", xml_declaration=True)

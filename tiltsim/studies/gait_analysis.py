@@ -1,0 +1,323 @@
+"""Reports on gaits and on the Two Color Map, as plain dicts ready for JSON.
+
+Angles are in rad, everything else in SI units; NaN becomes null.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from tiltsim_controllers.analysis import two_color_map
+from tiltsim_controllers.analysis.fault_tolerance import (
+    ROTORS,
+    fixed_tilt_hover,
+    fixed_tilt_imbalance,
+    hover_on_three,
+    least_hover_speed,
+)
+from tiltsim_controllers.analysis.published_gaits import DETERMINANT_CASES, TRIANGLE
+from tiltsim_controllers.analysis.singularity import (
+    determinant,
+    margin_over_gait,
+    rank,
+    residuals,
+    singular_values,
+    singularity_margin,
+    torque_free_direction,
+)
+from tiltsim_controllers.analysis.statics import hover_rotor_speeds
+from tiltsim_controllers.analysis.two_color_planner import check_path
+from tiltsim_controllers.analysis.unacceptable_attitudes import (
+    acceptable_share,
+    unacceptable_attitudes,
+)
+from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tiltsim_controllers.analysis.two_color_planner import Path
+    from tiltsim_controllers.gaits.plans import Gait
+    from tiltsim_controllers.mathematics.scalar import Quad
+    from tiltsim_controllers.vehicle.parameters import Vehicle
+
+    Array = NDArray[np.float64]
+
+
+NEARLY_SINGULAR: Final = 1e-3
+"""Smallest over largest singular value of tau below which a gait has its rank by rounding alone.
+
+Blue gaits with angles rounded as in the thesis stay below 3e-4, sound gaits above 1e-2.
+"""
+
+
+STANDS_STILL: Final = 1e-6
+"""Share of the fastest rotor's speed below which a rotor stands still."""
+
+
+def gait_report(
+    gait: Gait,
+    vehicle: Vehicle,
+    *,
+    roll: float | None = None,
+    pitch: float | None = None,
+    samples: int = 201,
+) -> dict[str, Any]:
+    """Everything about the singularities of a gait (``tiltsim gait --json``).
+
+    The values at the top are those at time zero. A gait that moves adds ``time``, a table of arrays
+    over one period, and ``min_singularity_margin`` over it. With ``roll`` or ``pitch`` (rad) the
+    margins and the determinant are taken at that attitude, else margins at level. Fixed angles have
+    ``hover_rotor_speeds`` (rad/s, along the spins), null where they cannot hover.
+    """
+    at_attitude = roll is not None or pitch is not None
+    roll, pitch = roll or 0.0, pitch or 0.0
+    start = gait.angles(0.0)
+    report: dict[str, Any] = {
+        "gait": gait.name,
+        "source": gait.source,
+        "vehicle": vehicle_name(vehicle),
+        "drag_ratio": drag_ratio(vehicle),
+        **_instant(start, vehicle, roll, pitch),
+        "acceptable_share": acceptable_share(start, vehicle),
+    }
+    curve = unacceptable_attitudes(start, vehicle)
+    report["unacceptable_attitudes"] = {
+        "kind": curve.kind,
+        "roll": curve.roll.tolist(),
+        "pitch": curve.pitch.tolist(),
+    }
+    if at_attitude:
+        report |= {"roll": roll, "pitch": pitch}
+        report["determinant"] = float(determinant(start, roll, pitch, vehicle))
+    times = gait.sample_times(samples)
+    angles = gait.angles(times)
+    if not gait.is_constant:
+        table = _instant(angles, vehicle, roll, pitch)
+        table["singularity_margin"] = margin_over_gait(angles, vehicle, roll, pitch).tolist()
+        table |= {"time": times.tolist(), "rates": gait.rates(times).tolist()}
+        if at_attitude:
+            table["determinant"] = determinant(angles, roll, pitch, vehicle).tolist()
+        report |= {
+            "period": gait.period,
+            "amplitude": gait.amplitude,
+            "max_rate": gait.max_rate if isfinite(gait.max_rate) else None,
+            "continuous": gait.is_continuous,
+            "min_rank": min(table["rank"]),
+            "min_singularity_margin": min(table["singularity_margin"]),
+            "time": table,
+        }
+    report["warnings"] = gait_warnings(gait, vehicle, samples)
+    report["hover_rotor_speeds"] = None
+    if gait.is_constant:
+        a1, a2, a3, a4 = start.tolist()
+        speeds = hover_rotor_speeds((a1, a2, a3, a4), vehicle)
+        report["hover_rotor_speeds"] = speeds
+        report["warnings"] += _backward_rotors(speeds)
+    return report
+
+
+def gait_warnings(gait: Gait, vehicle: Vehicle, samples: int = 201) -> list[str]:
+    """What makes a gait unfit for flight, in one line each; empty for a sound gait."""
+    times = gait.sample_times(samples)
+    angles = gait.angles(times)
+    lost = rank(angles, vehicle) < 3
+    values = singular_values(angles, vehicle)
+    conditioning = values[:, 2] / values[:, 0]
+    by_rounding = (conditioning < NEARLY_SINGULAR) & ~lost
+    directionless = np.isnan(torque_free_direction(angles, vehicle)).any(axis=-1) & ~lost
+    warnings = []
+    if lost.any():
+        warnings.append(
+            f"rank of tau is {int(rank(angles, vehicle).min())}{_when(lost, times, gait)}: the "
+            "decoupling matrix is singular at every attitude"
+        )
+    if by_rounding.any():
+        warnings.append(
+            f"tau is nearly singular{_when(by_rounding, times, gait)}: its smallest singular value "
+            f"is {conditioning[by_rounding].min():.2g} of the largest; the margin means little"
+        )
+    if directionless.any():
+        warnings.append(
+            f"R = R_phi = R_theta = 0 (curve L){_when(directionless, times, gait)}: the decoupling "
+            "matrix is singular at every attitude"
+        )
+    R = np.where(lost | directionless, 0.0, residuals(angles, vehicle).R)
+    signs = R[R != 0.0]
+    if (signs > 0.0).any() and (signs < 0.0).any():
+        turned = (np.sign(R) == -np.sign(signs[0])) & (R != 0.0)
+        warnings.append(
+            f"R changes sign before t = {times[turned][0]:.3f} s: the decoupling matrix is "
+            "singular on the way"
+        )
+    return warnings
+
+
+def _backward_rotors(speeds: Quad | None) -> list[str]:
+    """The warning on hover speeds along the spins, if some are negative."""
+    if speeds is None:
+        return []
+    # A rotor at rest may have either sign by rounding.
+    still = STANDS_STILL * max(map(abs, speeds))
+    backward = [str(rotor) for rotor, speed in zip(ROTORS, speeds, strict=True) if speed < -still]
+    if not backward:
+        return []
+    names = ("rotors " if len(backward) > 1 else "rotor ") + " and ".join(backward)
+    return [f"{names} would have to turn backwards to hover"]
+
+
+def fault_report(tilts: Quad, vehicle: Vehicle, opposite_speed: float) -> dict[str, Any]:
+    """What a vehicle survives hovering (``tiltsim gait --faults``).
+
+    For the loss of each rotor: by how much (rad) the given tilts miss a hover on the rotors that
+    are left, and the hover on three rotors with free tilts, the opposite one at a speed (rad/s).
+    ``least_speed`` is the top speed that the rotors must reach after a loss with tilts free.
+    """
+    losses = []
+    for lost in ROTORS:
+        free = hover_on_three(lost, vehicle, opposite_speed=opposite_speed)
+        factors = [0.0 if rotor == lost else 1.0 for rotor in ROTORS]
+        losses.append(
+            {
+                "rotor": lost,
+                "fixed_tilts_miss": fixed_tilt_imbalance(tilts, lost, vehicle),
+                "hovers_with_fixed_tilts": fixed_tilt_hover(tilts, vehicle, lost=lost) is not None,
+                "least_speed": least_hover_speed(
+                    vehicle, factors=(factors[0], factors[1], factors[2], factors[3])
+                ),
+                "free_tilts": {
+                    "angles": list(free.tilts),
+                    "rotor_speeds": list(free.rotor_speeds),
+                    "roll": free.roll,
+                    "pitch": free.pitch,
+                    "authority": free.authority,
+                },
+            }
+        )
+    return {
+        "hover_speed": vehicle.hover_rotor_speed,
+        "opposite_speed": opposite_speed,
+        "rotor_loss": losses,
+    }
+
+
+def map_report(vehicle: Vehicle, path: Path | None = None) -> dict[str, Any]:
+    """The Two Color Map of a vehicle, and the verdict on a path (``tiltsim map --json``).
+
+    ``red`` and ``blue`` give ``alpha_3 = slope * alpha_1 + offset`` and likewise ``alpha_4`` from
+    ``alpha_2``. ``roots`` is the 17 x 17 search of ch. 6, done numerically.
+    """
+    offset = 2.0 * two_color_map.delta(vehicle)
+    grid = two_color_map.grid_roots(vehicle)
+    alpha_1 = np.linspace(-np.pi / 2, np.pi / 2, 182)[1:-1]
+    report: dict[str, Any] = {
+        "vehicle": vehicle_name(vehicle),
+        "drag_ratio": drag_ratio(vehicle),
+        "delta": two_color_map.delta(vehicle),
+        "P": list(two_color_map.point_p(vehicle)),
+        "red": _lines(1.0, 0.0),
+        "blue": _lines(-1.0, offset),
+        "rank": {"red": 3, "blue": 2},
+        "L": {
+            "alpha_1": alpha_1.tolist(),
+            "alpha_2": two_color_map.curve_l(alpha_1, vehicle).tolist(),
+        },
+        "roots": {
+            "grid": two_color_map.grid_axis().tolist(),
+            "count": two_color_map.root_counts(grid).tolist(),
+            "classes": dict(sorted(two_color_map.root_classes(grid).items())),
+            "list": [
+                {
+                    "alpha": [root.alpha_1, root.alpha_2, root.alpha_3, root.alpha_4],
+                    "R": root.R,
+                    "class": f"({root.plane_3},{root.plane_4})",
+                }
+                for row in grid
+                for cell in row
+                for root in cell
+            ],
+        },
+        "warnings": ["blue: tau has rank 2, the decoupling matrix is singular at every attitude"],
+    }
+    if path is not None:
+        verdict = check_path(path, vehicle)
+        report["path"] = {
+            "accepted": verdict.accepted,
+            "sound": verdict.sound,
+            "theorem": verdict.theorem,
+            "reasons": list(verdict.reasons),
+            "crossings": [list(crossing) for crossing in verdict.crossings],
+            "warnings": list(verdict.warnings),
+        }
+    return report
+
+
+def determinant_report(case: str, vehicle: Vehicle, samples: int = 101) -> dict[str, Any]:
+    """How far a restriction of ch. 3 stays from singular (``tiltsim gait --figure determinant``).
+
+    For each pair ``(alpha_1, alpha_3)`` the least ``R`` over the region of interest of
+    ``(alpha_2, alpha_4)``, the triangle U V M with its edges.
+    """
+    corners = np.array(TRIANGLE)
+    share = np.linspace(0.0, 1.0, samples)
+    first, second = np.meshgrid(share, share)
+    weights = np.stack([1.0 - first, first * (1.0 - second), first * second], axis=-1)
+    points = weights.reshape(-1, 3) @ corners
+    pairs = []
+    for alpha_1, alpha_3 in DETERMINANT_CASES[case].pairs:
+        angles = np.insert(points, [0, 1], [alpha_1, alpha_3], axis=1)
+        least = float(residuals(angles, vehicle).R.min())
+        pairs.append({"alpha_1": alpha_1, "alpha_3": alpha_3, "least_R": least})
+    return {
+        "case": case,
+        "restriction": DETERMINANT_CASES[case].restriction,
+        "vehicle": vehicle_name(vehicle),
+        "triangle": [list(corner) for corner in TRIANGLE],
+        "pairs": pairs,
+    }
+
+
+def vehicle_name(vehicle: Vehicle) -> str | dict[str, float]:
+    """The preset's name, or the parameters of a vehicle that is none."""
+    for name, preset in PRESETS.items():
+        if preset == vehicle:
+            return name
+    return dict(vehicle._asdict())
+
+
+def _instant(angles: Array, vehicle: Vehicle, roll: float, pitch: float) -> dict[str, Any]:
+    """The singularity analysis of tilt angles of shape (4,) or (N, 4)."""
+    R, R_phi, R_theta = residuals(angles, vehicle)
+    return {
+        "angles": angles.tolist(),
+        "rank": rank(angles, vehicle).tolist(),
+        "singular_values": singular_values(angles, vehicle).tolist(),
+        "R": R.tolist(),
+        "R_phi": R_phi.tolist(),
+        "R_theta": R_theta.tolist(),
+        "torque_free_direction": _vectors(torque_free_direction(angles, vehicle)),
+        "singularity_margin": singularity_margin(angles, vehicle, roll, pitch).tolist(),
+    }
+
+
+def _vectors(directions: Array) -> Any:
+    """Vectors as lists, null for those that do not exist."""
+    if directions.ndim > 1:
+        return [_vectors(direction) for direction in directions]
+    return None if np.isnan(directions).any() else directions.tolist()
+
+
+def _when(chosen: NDArray[np.bool_], times: Array, gait: Gait) -> str:
+    if gait.is_constant or chosen.all():
+        return ""
+    return f" at t = {times[chosen][0]:.3f} s"
+
+
+def _lines(slope: float, offset: float) -> dict[str, dict[str, float]]:
+    return {
+        "alpha_3": {"slope": slope, "offset": offset},
+        "alpha_4": {"slope": slope, "offset": -offset if offset else 0.0},
+    }

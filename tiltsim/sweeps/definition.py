@@ -1,0 +1,96 @@
+"""A sweep as it is resolved before it is flown."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from pydantic import ValidationError
+
+from tiltsim.errors import InputError
+from tiltsim.scenario.document import without_none
+from tiltsim.scenario.loading import (
+    parse_scenario,
+)
+from tiltsim.scenario.messages import show
+from tiltsim.sweeps.tables import (
+    Sweep,
+)
+
+VERSIONS: Final = ("tiltsim", "mujoco", "numpy", "scipy")
+
+
+COSMETIC: Final = ("title", "source", "without", "plot")
+"""Keys of a sweep file that change no flight."""
+
+
+@dataclass(frozen=True)
+class Definition:
+    """All that decides the rows of a sweep, in plain dicts and lists.
+
+    Attributes
+    ----------
+    address
+        How the sweep is called on the command line.
+    sweep
+        The validated file.
+    base
+        The base scenario with every default written out.
+    versions
+        Of the packages whose arithmetic the rows depend on.
+    """
+
+    address: str
+    sweep: dict[str, Any]
+    base: dict[str, Any]
+    versions: dict[str, str]
+
+    def to_json(self) -> str:
+        """The definition as text, for a file."""
+        return json.dumps(vars(self), indent=2) + "\n"
+
+    @staticmethod
+    def from_json(text: str) -> Definition:
+        """The inverse of `to_json`. Raises ValueError or TypeError where the text is another."""
+        return Definition(**json.loads(text))
+
+    def difference(self, other: Definition) -> str:
+        """The first thing in which another definition would give other rows, else empty.
+
+        A key that one of them does not name, as it was written before there was such a key, has
+        its default there.
+        """
+        ours, theirs = (_flat(known._completed()._decisive()) for known in (self, other))
+        for key in [*ours, *theirs]:
+            before, now = ours.get(key), theirs.get(key)
+            if before != now:
+                return f"{key} was {show(before)} and is {show(now)}"
+        return ""
+
+    def _completed(self) -> Definition:
+        """The same with today's defaults written out; as it is where it is no longer valid."""
+        try:
+            sweep = Sweep.model_validate(self.sweep).model_dump_json(exclude_none=True)
+            base = without_none(parse_scenario(self.base).model_dump(mode="json"))
+        except (ValidationError, InputError):
+            return self
+        base.pop("expect", None)
+        return replace(self, sweep=json.loads(sweep), base=base)
+
+    def _decisive(self) -> dict[str, Any]:
+        sweep = {key: value for key, value in self.sweep.items() if key not in COSMETIC}
+        base = {key: value for key, value in self.base.items() if key not in COSMETIC}
+        sweep.pop("scenario")  # what it names is in the base
+        return {**sweep, "scenario": base, "versions": self.versions}
+
+
+def _flat(value: Any, key: str = "") -> dict[str, Any]:
+    """Nested tables and lists as one table with dotted keys."""
+    if isinstance(value, dict):
+        parts = [(f"{key}.{name}" if key else name, item) for name, item in value.items()]
+    elif isinstance(value, list) and any(isinstance(item, dict | list) for item in value):
+        parts = [(f"{key}[{position}]", item) for position, item in enumerate(value)]
+    else:
+        return {key: value}
+    return {name: leaf for part, item in parts for name, leaf in _flat(item, part).items()}

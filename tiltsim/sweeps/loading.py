@@ -1,0 +1,91 @@
+"""Load a sweep file."""
+
+from __future__ import annotations
+
+import json
+from copy import deepcopy
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from tiltsim.errors import InputError
+from tiltsim.scenario.document import without_none
+from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
+from tiltsim.scenario.loading import (
+    anchor_files,
+    apply_overrides,
+    load_scenario,
+    parse_scenario,
+)
+from tiltsim.scenario.messages import one_line
+from tiltsim.sweeps.definition import VERSIONS, Definition
+from tiltsim.sweeps.plan import Plan
+from tiltsim.sweeps.tables import (
+    CasesAxis,
+    Sweep,
+    dotted,
+)
+
+
+def load_definition(path: str | Path, overrides: dict[str, Any] | None = None) -> Definition:
+    """Read a sweep file.
+
+    Parameters
+    ----------
+    path
+        A TOML file or the name of a sweep in the library.
+    overrides
+        Values by dotted key of the scenario, on top of the file's ``[set]``.
+
+    Raises
+    ------
+    InputError
+        In one line: the file, the key, the value and what is allowed. The base scenario and every
+        value of every axis are tried.
+    """
+    file = find_scenario_file(path)
+    address = library_name(file)
+    document = read_toml(file)
+    fixed = document.setdefault("set", {})
+    if overrides and isinstance(fixed, dict):
+        document["set"] = dotted(fixed) | overrides
+    if "scenario" not in document and not {"axis", "bisect"} & document.keys():
+        raise InputError(f"{address}: a scenario, not a sweep: it has no [[axis]]; use tiltsim run")
+    try:
+        sweep = Sweep.model_validate(document)
+    except ValidationError as error:
+        raise InputError(f"{address}: {one_line(error, document, Sweep)}") from None
+    for axis in sweep.axis:
+        for tables in axis.cases.values() if isinstance(axis, CasesAxis) else ():
+            anchor_files(tables, file.parent)
+    base = _base(sweep, file.parent, address)
+    definition = Definition(
+        address,
+        json.loads(sweep.model_dump_json(exclude_none=True)),
+        json.loads(json.dumps(base)),
+        {name: version(name) for name in VERSIONS},
+    )
+    Plan(definition).check()
+    return definition
+
+
+def _base(sweep: Sweep, folder: Path, address: str) -> dict[str, Any]:
+    """The base scenario with ``[set]`` and all defaults, without its expectations."""
+    if isinstance(sweep.scenario, str):
+        name, _, variant = sweep.scenario.partition("#")
+        beside = (folder / name) if name else folder
+        path = str(beside) if beside.is_file() else name
+        try:
+            scenario = load_scenario(path + (f"#{variant}" if variant else ""), sweep.set or None)
+        except InputError as error:
+            raise InputError(f"{address}: scenario: {error}") from None
+    else:
+        document = deepcopy(sweep.scenario)
+        anchor_files(document, folder)
+        apply_overrides(document, sweep.set, f"{address}: scenario")
+        scenario = parse_scenario(document, f"{address}: scenario")
+    base: dict[str, Any] = without_none(scenario.model_dump(mode="json"))
+    del base["expect"]
+    return base

@@ -1,0 +1,1 @@
+"""Kinds of vehicles: what all closed loops around one kind share."""

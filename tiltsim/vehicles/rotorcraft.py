@@ -1,0 +1,135 @@
+"""Tiltrotor and quadrotor: a free body with four rotors, tilted or not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import inf
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from tiltsim.closed_loop.limits import rotorcraft_limit_exceeded
+from tiltsim.closed_loop.vehicle_kind import Floats, Kind
+from tiltsim_controllers.gaits import tilt_reference
+from tiltsim_controllers.laws.attitude_altitude import STATE_FIELDS
+from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
+from tiltsim_controllers.mathematics.scalar import Quad, clipped
+from tiltsim_controllers.vehicle.parameters import SPIN
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from tiltsim.models.parts import ExtraActuators
+    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.vehicle import VehicleTable
+
+_FOUR: Final = (1, 2, 3, 4)
+
+OBSERVED_FIELDS: Final = (*STATE_FIELDS, *(f"alpha_rate_{rotor}" for rotor in _FOUR))
+"""What every loop can tell of its rotorcraft: rigid body, tilts, rotor speeds, tilt rates."""
+
+COLUMN_UNITS: Final = {
+    "time": "s",
+    **dict.fromkeys(("x", "y", "z"), "m"),
+    **dict.fromkeys(("vx", "vy", "vz"), "m/s"),
+    **dict.fromkeys(("roll", "pitch", "yaw"), "rad"),
+    **dict.fromkeys(("p", "q", "r"), "rad/s"),
+    **{f"alpha_{i}": "rad" for i in _FOUR},
+    **{f"alpha_ref_{i}": "rad" for i in _FOUR},
+    **{f"alpha_rate_{i}": "rad/s" for i in _FOUR},
+    **{f"rotor_speed_{i}": "rad/s" for i in _FOUR},
+    **{f"thrust_{i}": "N" for i in _FOUR},
+    **dict.fromkeys(("x_ref", "y_ref", "z_ref"), "m"),
+    **dict.fromkeys(("roll_ref", "pitch_ref", "yaw_ref"), "rad"),
+    "singularity_margin": "rad",
+    "determinant": "1",
+}
+
+
+def rotor_thrusts(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str, Floats]:
+    """Thrusts (N) of the four rotors, negative where one turns against its spin."""
+    coefficient = scenario.true_rotorcraft.thrust_coefficient
+    return {
+        f"thrust_{i}": coefficient
+        * sign
+        * columns[f"rotor_speed_{i}"]
+        * np.abs(columns[f"rotor_speed_{i}"])
+        * columns.get(f"thrust_factor_{i}", 1.0)  # of a fault
+        for i, sign in zip(_FOUR, SPIN, strict=True)
+    }
+
+
+def _thrust_factors(scenario: Scenario) -> tuple[float, float]:
+    factors = [1.0]
+    for fault in scenario.fault:
+        if fault.type == "rotor_loss":
+            factors.append(0.0)
+        elif fault.type == "partial_thrust":
+            factors.append(fault.factor)
+    return min(factors), max(factors)
+
+
+def _compile(
+    scenario: Scenario,
+    law_states: int,
+    extra_actuators: tuple[ExtraActuators, ...],
+    userdata_size: int,
+    visuals: bool,
+) -> mujoco.MjModel:
+    from tiltsim.models.parts import Ground, Pod, RotorLimits, TiltServo
+    from tiltsim.models.rotorcraft import compile_model
+
+    vehicle: VehicleTable = scenario.rotorcraft
+    simulation, ground = scenario.simulation, scenario.ground
+    return compile_model(
+        vehicle.model,
+        scenario.true_rotorcraft,
+        timestep=simulation.timestep,
+        integrator=simulation.integrator,
+        userdata_size=userdata_size,
+        tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump(exclude={"max_rate"})),
+        pod=Pod(**vehicle.pod.model_dump()),
+        rotor_limits=RotorLimits(
+            vehicle.min_rotor_speed, vehicle.max_rotor_speed, _thrust_factors(scenario)
+        ),
+        law_states=law_states,
+        extra_actuators=extra_actuators,
+        ground=None if ground is None else Ground(ground.height, ground.friction),
+        visuals=visuals,
+        own=vehicle.own,
+    )
+
+
+def initial_tilts(scenario: Scenario) -> tuple[Quad, Quad]:
+    """Tilt angles (rad) and tilt rates (rad/s) of a tiltrotor at time zero: its gait's.
+
+    A flight begins in the midst of its gait, as the thesis has it, whose angles follow the plan
+    exactly. So nothing swings in, and no pod is faster than its servo can be.
+    """
+    gait = scenario.gait.plan(scenario.rotorcraft.resolve())
+    a1, a2, a3, a4, *planned = tilt_reference(0.0, gait.parameters, gait.table)
+    fastest = scenario.rotorcraft.tilt_servo.max_rate or inf
+    rate_1, rate_2, rate_3, rate_4 = (clipped(rate, -fastest, fastest) for rate in planned)
+    return (a1, a2, a3, a4), (rate_1, rate_2, rate_3, rate_4)
+
+
+def _initial_motion(scenario: Scenario) -> tuple[Sequence[float], Sequence[float]]:
+    initial = scenario.initial
+    tilting = scenario.rotorcraft.model == "tiltrotor"
+    angles, rates = initial_tilts(scenario) if tilting else ((), ())
+    return (
+        (*initial.position, *quaternion_from_euler(*initial.attitude), *angles),
+        (*initial.velocity, *initial.angular_velocity, *rates),
+    )
+
+
+ROTORCRAFT: Final = Kind(
+    name="rotorcraft",
+    observed_fields=OBSERVED_FIELDS,
+    columns=COLUMN_UNITS,
+    thrusts=rotor_thrusts,
+    compile=_compile,
+    initial_motion=_initial_motion,
+    limit_exceeded=rotorcraft_limit_exceeded,
+)
+"""Tiltrotor and quadrotor."""

@@ -1,0 +1,108 @@
+"""The tilt-car: two discs on a plane, two rotors that push and cannot pull."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final
+
+from tiltsim.closed_loop.limits import tilt_car_limit_exceeded
+from tiltsim.closed_loop.vehicle_kind import Floats, Kind
+from tiltsim_controllers.gaits import tilt_reference
+from tiltsim_controllers.tilt_car.vehicle import yaw_share
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from tiltsim.models.parts import ExtraActuators
+    from tiltsim.scenario.scenario import Scenario
+
+ROTORS: Final = (1, 2)
+
+OBSERVED_FIELDS: Final = (
+    *("x", "y", "vx", "vy", "yaw", "r"),
+    *("alpha", "alpha_rate", "rotor_speed_1", "rotor_speed_2"),
+)
+"""What every loop can tell of its car: both discs and the rotor speeds."""
+
+COLUMN_UNITS: Final = {
+    "time": "s",
+    **dict.fromkeys(("x", "y"), "m"),
+    **dict.fromkeys(("vx", "vy"), "m/s"),
+    "yaw": "rad",
+    "r": "rad/s",
+    **dict.fromkeys(("alpha", "alpha_ref"), "rad"),
+    "alpha_rate": "rad/s",
+    **{f"rotor_speed_{i}": "rad/s" for i in ROTORS},
+    **{f"thrust_{i}": "N" for i in ROTORS},
+    **dict.fromkeys(("x_ref", "y_ref"), "m"),
+    **dict.fromkeys(("vx_ref", "vy_ref"), "m/s"),
+    **dict.fromkeys(("direction", "direction_lower", "direction_upper", "direction_ref"), "rad"),
+    "input_split": "rad^2/s^2",
+}
+"""Columns of every flight of a car and their units.
+
+``direction`` is that of the middle of the thrusts, ``yaw + alpha``; ``direction_lower`` and
+``direction_upper`` bound the directions of what both thrusts can make; ``direction_ref`` is the
+direction of the acceleration that the law wants or the reference has, each written as the angle
+nearest to ``direction``. ``input_split`` is ``omega_1^2 - omega_2^2``.
+"""
+
+
+def _thrusts(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str, Floats]:
+    coefficient = scenario.tilt_car.thrust_coefficient
+    return {f"thrust_{i}": coefficient * columns[f"rotor_speed_{i}"] ** 2 for i in ROTORS}
+
+
+def _compile(
+    scenario: Scenario,
+    law_states: int,
+    extra_actuators: tuple[ExtraActuators, ...],
+    userdata_size: int,
+    visuals: bool,
+) -> mujoco.MjModel:
+    from tiltsim.models.parts import TiltServo
+    from tiltsim.models.tilt_car import compile_tilt_car
+
+    car, simulation = scenario.tilt_car, scenario.simulation
+    if extra_actuators:
+        raise ValueError("the tilt-car takes no actuators beyond its own")
+    return compile_tilt_car(
+        car.resolve(),
+        timestep=simulation.timestep,
+        integrator=simulation.integrator,
+        userdata_size=userdata_size,
+        tilt_servo=TiltServo(car.tilt_servo.natural_frequency, car.tilt_servo.damping_ratio),
+        law_states=law_states,
+        rotor_floor=getattr(scenario.controller, "anti_windup", True),
+        visuals=visuals,
+    )
+
+
+def initial_tilt(scenario: Scenario) -> tuple[float, float]:
+    """Tilt angle (rad) and its rate (rad/s) at time zero: the gait's."""
+    gait = scenario.gait.plan(scenario.tilt_car.resolve())
+    angles = tilt_reference(0.0, gait.parameters, gait.table)
+    return angles[0], angles[4]
+
+
+def _initial_motion(scenario: Scenario) -> tuple[Sequence[float], Sequence[float]]:
+    """The car turned out of zero tilt at ``initial.attitude``'s yaw, angular momentum conserved."""
+    initial = scenario.initial
+    share = yaw_share(scenario.tilt_car.resolve())
+    tilt, rate = initial_tilt(scenario)
+    x, y, _ = initial.position
+    vx, vy, _ = initial.velocity
+    yaw, r = initial.attitude[2], initial.angular_velocity[2]
+    return (x, y, yaw - share * tilt, tilt), (vx, vy, r - share * rate, rate)
+
+
+TILT_CAR: Final = Kind(
+    name="tilt_car",
+    observed_fields=OBSERVED_FIELDS,
+    columns=COLUMN_UNITS,
+    thrusts=_thrusts,
+    compile=_compile,
+    initial_motion=_initial_motion,
+    limit_exceeded=tilt_car_limit_exceeded,
+)
+"""The tilt-car."""

@@ -1,0 +1,199 @@
+"""Figures of one gait: roll-pitch diagram (ch. 5 to 8), tilt angles and margin over a period."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tiltsim.studies.gait_analysis import NEARLY_SINGULAR
+from tiltsim.views.attitude_plane import ON_THE_FRAME
+from tiltsim.views.figures import style
+from tiltsim_controllers.analysis.singularity import (
+    determinant,
+    margin_over_gait,
+    singular_values,
+    torque_free_direction,
+)
+from tiltsim_controllers.analysis.unacceptable_attitudes import unacceptable_attitudes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from tiltsim_controllers.gaits.plans import Gait
+    from tiltsim_controllers.vehicle.parameters import Vehicle
+
+_CURVES = 24
+"""Instants of a period at which the unacceptable-attitude curve is drawn."""
+
+AREA, CURVE = "area", "curve"
+"""What a roll-pitch diagram may show besides the level attitude."""
+
+_LAST_SHADE = 0.92
+"""Share of the colour map in use; beyond it, lines fade on white."""
+
+
+def gait_figure(gait: Gait, vehicle: Vehicle) -> Figure:
+    """Roll-pitch diagram of a gait, with its angles and margin over a period if it moves."""
+    with style.paper_style():
+        if gait.is_constant:
+            figure = style.new_figure(4.2, 4.2)
+            axes: Any = figure.subplots()
+            _roll_pitch_legend(figure, _roll_pitch(axes, gait, vehicle), constant=True)
+            return figure
+        figure = style.new_figure(8.6, 4.2)
+        grid = figure.add_gridspec(2, 2, width_ratios=[1.05, 1.0])
+        diagram = figure.add_subplot(grid[:, 0])
+        shown = _roll_pitch(diagram, gait, vehicle)
+        if CURVE in shown:
+            _time_bar(figure, [diagram], gait)
+        _roll_pitch_legend(figure, shown)
+        upper = figure.add_subplot(grid[0, 1])
+        lower = figure.add_subplot(grid[1, 1], sharex=upper)
+        _angles(upper, gait)
+        _margin(lower, [(gait, "")], vehicle)
+        upper.tick_params(labelbottom=False)
+        return figure
+
+
+def comparison_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure:
+    """Roll-pitch diagrams of gaits side by side, such as a gait and its biased twin.
+
+    ``gaits`` are pairs of title and gait (ch. 6, Figs. 21-28; ch. 8, Figs. 10-14).
+    """
+    with style.paper_style():
+        figure = style.new_figure(3.5 * len(gaits) + 0.8, 4.2)
+        row = figure.subplots(1, len(gaits), squeeze=False, sharey=True)[0]
+        shown: set[str] = set()
+        for axes, (title, gait) in zip(row, gaits, strict=True):
+            shown |= _roll_pitch(axes, gait, vehicle)
+            axes.set_title(title)
+            if axes is not row[0]:
+                axes.set_ylabel("")
+        if CURVE in shown:
+            _time_bar(figure, list(row), gaits[-1][1])
+        _roll_pitch_legend(figure, shown)
+        return figure
+
+
+def margin_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure:
+    """Singularity margin over a period for several gaits, as pairs of label and gait."""
+    with style.paper_style():
+        figure = style.new_figure(5.4, 3.2)
+        axes: Any = figure.subplots()
+        _margin(axes, [(gait, label) for label, gait in gaits], vehicle)
+        axes.legend(ncols=len(gaits), loc="lower left", bbox_to_anchor=(0.0, 1.0))
+        return figure
+
+
+def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> set[str]:
+    """Unacceptable-attitude curves at instants of a period; shaded where no instant forbids.
+
+    Tells which of `AREA` and `CURVE` the legend must explain.
+    """
+    from matplotlib import colormaps
+
+    period = gait.period or 1.0
+    times = np.zeros(1) if gait.is_constant else np.arange(_CURVES) / _CURVES * period
+    angles = gait.angles(times)
+    side = np.linspace(-pi / 2, pi / 2, 301)
+    roll, pitch = np.meshgrid(side, side)
+    level = determinant(angles[0], 0.0, 0.0, vehicle)
+    allowed = np.ones_like(roll, dtype=bool)
+    for instant in angles:
+        allowed &= determinant(instant, roll, pitch, vehicle) * level > 0.0
+    curves = [unacceptable_attitudes(instant, vehicle, 721) for instant in angles]
+    singular = sum(curve.kind == "everywhere" for curve in curves)
+
+    if not singular:
+        axes.contourf(roll, pitch, allowed, levels=[0.5, 1.5], colors=[style.PALE])
+    colors = colormaps[style.SEQUENTIAL](np.arange(len(curves)) / len(curves) * _LAST_SHADE)
+    n = np.nan_to_num(torque_free_direction(angles, vehicle))
+    drawn = np.hypot(n[:, 0], n[:, 1]) > ON_THE_FRAME
+    for curve, color, is_drawn in zip(curves, colors, drawn, strict=True):
+        if is_drawn:
+            line = style.RED if len(curves) == 1 else color
+            axes.plot(curve.roll, curve.pitch, color=line, lw=1.3)
+    values = singular_values(angles, vehicle)
+    conditioning = float((values[:, 2] / values[:, 0]).min())
+    if not singular and conditioning < NEARLY_SINGULAR:
+        ratio = f"{conditioning:.0e}".replace("e-0", "e−")
+        _note(axes, 0.75, f"nearly singular at every attitude:\nσ₃/σ₁ of τ is {ratio}")
+    elif not singular and not drawn.any():
+        _note(axes, 0.35, "no attitude is out of reach")
+    if singular:
+        share = "at every attitude"
+        if singular < len(curves):
+            share += f",\nat {singular} of {len(curves)} instants"
+        axes.set_facecolor("#F3F3F3")
+        _note(axes, 0.75 if singular < len(curves) else 0.35, f"singular {share}")
+    axes.plot(0.0, 0.0, "+", color=style.INK, ms=8, mew=1.2)
+    style.angle_axis(axes, "x", pi / 2)
+    style.angle_axis(axes, "y", pi / 2)
+    axes.set_aspect("equal")
+    axes.set_xlabel("roll φ (rad)")
+    axes.set_ylabel("pitch θ (rad)")
+    axes.set_title(f"Unacceptable attitudes, {gait.name}")
+    shown = {CURVE} if drawn.any() else set()
+    return shown | ({AREA} if allowed.any() and not singular else set())
+
+
+def _note(axes: Axes, height: float, text: str) -> None:
+    box = {"facecolor": "white", "edgecolor": style.GREY, "linewidth": 0.6}
+    axes.text(0.0, height, text, ha="center", va="center", color=style.INK, bbox=box, zorder=8)
+
+
+def _time_bar(figure: Figure, diagrams: list[Axes], gait: Gait) -> None:
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    if gait.period is None:
+        return
+    mapping = ScalarMappable(Normalize(0.0, gait.period / _LAST_SHADE), style.SEQUENTIAL)
+    bar: Any = figure.colorbar(mapping, ax=diagrams, shrink=0.8, pad=0.02, label="time (s)")
+    bar.ax.set_ylim(0.0, gait.period)
+    bar.outline.set_linewidth(0.5)
+
+
+def _roll_pitch_legend(figure: Figure, shown: set[str], *, constant: bool = False) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    line = style.RED if constant else style.GREY
+    always = "acceptable" if constant else "acceptable at all times"
+    marks = {
+        AREA: Patch(facecolor=style.PALE, edgecolor=style.GREY, linewidth=0.4, label=always),
+        CURVE: Line2D([], [], color=line, lw=1.3, label="unacceptable"),
+    }
+    handles = [mark for name, mark in marks.items() if name in shown]
+    handles.append(Line2D([], [], color=style.INK, marker="+", ls="", ms=8, mew=1.2, label="level"))
+    figure.legend(handles=handles, loc="outside lower left", ncols=3)
+
+
+def _angles(axes: Axes, gait: Gait) -> None:
+    times = gait.sample_times(401)
+    for name, angle, line in zip("₁₂₃₄", gait.angles(times).T, style.ROTOR_LINES, strict=True):
+        axes.plot(times, angle, label=f"α{name}", **line)
+    axes.set_ylabel("tilt angle (rad)")
+    axes.legend(ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
+
+
+def _margin(axes: Axes, gaits: list[tuple[Gait, str]], vehicle: Vehicle) -> None:
+    looks = ["-", "--", "-.", ":"]
+    longest = 0.0
+    for index, (gait, label) in enumerate(gaits):
+        period = gait.period or 1.0
+        times = np.array([0.0, 1.0]) if gait.is_constant else gait.sample_times(401)
+        margin = margin_over_gait(gait.angles(times), vehicle)
+        longest = max(longest, period)
+        axes.plot(times, margin, looks[index % 4], label=label)
+    axes.axhline(0.0, color=style.INK, lw=0.8)
+    style.angle_axis(axes, "y", pi / 2)
+    low, _ = axes.get_ylim()
+    lowest = min((float(np.min(line.get_ydata())) for line in axes.get_lines()), default=0.0)
+    axes.set_ylim(low * 1.05 if lowest < -0.05 else -0.12, pi / 2 * 1.05)
+    axes.set_xlim(0.0, longest)
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel("singularity margin (rad)")

@@ -1,0 +1,83 @@
+"""What figures of sweeps say of their columns: groups, labels, units, losses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from tiltsim.scenario.metric_names import METRICS, unit_of
+from tiltsim.sweeps.dataset import Column, SweepResults
+from tiltsim.sweeps.tables import NormalAxis, UniformAxis
+from tiltsim.views.figures.style import verbatim
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_KEY_UNITS: Final = {
+    "gait.period": "s",
+    "gait.amplitude": "rad",
+    "gait.angles": "rad",
+    "initial.attitude": "rad",
+    "initial.position": "m",
+    "simulation.duration": "s",
+    "simulation.control_timestep": "s",
+    "simulation.control_latency": "s",
+    "sensors.attitude_noise": "rad",
+    "vehicle.mass": "kg",
+    "vehicle.rotor_time_constant": "s",
+    "vehicle.tilt_servo.natural_frequency": "rad/s",
+    "vehicle.tilt_servo.max_rate": "rad/s",
+    "wind": "m/s",
+    "wind_direction": "rad",
+}
+
+
+def drawn_keys(results: SweepResults) -> list[str]:
+    """The first key of every axis that is drawn from a distribution."""
+    axes = results.plan.sweep.axis
+    return [a.targets[0] for a in axes if isinstance(a, UniformAxis | NormalAxis)]
+
+
+def is_wide(values: Column) -> bool:
+    """Whether values are all above zero and range over more than a decade or two."""
+    known = values[~np.isnan(values)]
+    return bool(known.size) and 0.0 < 50.0 * float(known.min()) < float(known.max())
+
+
+def are_completed(results: SweepResults) -> Column:
+    """Which rows are flights that came to their end."""
+    return np.array(results.columns["end"] == "completed")
+
+
+def groups_of(results: SweepResults, key: str | None, mask: Column) -> Iterator[tuple[str, Column]]:
+    """The values of a column among some rows, as text, each with its rows."""
+    if key is None:
+        yield "", mask
+        return
+    column = results.values(key)
+    texts = np.array([text_of(value) for value in column], dtype=object)
+    for text in dict.fromkeys(texts[mask].tolist()):
+        yield text, mask & (texts == text)
+
+
+def text_of(value: Any) -> str:
+    """A value as figures write it."""
+    if isinstance(value, list):
+        return "(" + ", ".join(map(text_of, value)) + ")"
+    return f"{value:g}" if isinstance(value, float | int) else verbatim(str(value))
+
+
+def label_of(name: str) -> str:
+    """A column's name with its unit, where it is known."""
+    key = name.partition("[")[0]
+    unit = unit_of(name) if name in METRICS else _KEY_UNITS.get(key, "")
+    return f"{name} ({unit})" if unit else name
+
+
+def add_legend(axes: Axes, title: str | None) -> None:
+    """A legend where there is anything to tell apart."""
+    handles, labels = axes.get_legend_handles_labels()
+    if any(labels):
+        axes.legend(handles, labels, title=title, title_fontsize=8, alignment="left")

@@ -1,0 +1,124 @@
+"""One flight of a tilt-car on a page, in the panels of ch. 10 and 11."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from tiltsim.views.figures import style
+from tiltsim.views.figures.page import SIZE, add_headings, label, plan_view, widen
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tiltsim.flight.flight import Flight
+
+LAST: Final = 10.0
+"""Seconds at the end that the direction is drawn for where a flight lasts over twice as long."""
+
+
+def tilt_car_figure(flight: Flight) -> Figure:
+    """Errors, inputs, directions, and the path over the ground on one page."""
+    with style.paper_style():
+        figure = style.new_figure(*SIZE)
+        add_headings(figure, flight)
+        halves: Any = figure.subfigures(1, 2, width_ratios=[1.75, 1.0])
+        left, right = halves
+        series: Any = left.subplots(4, 1)
+        last = _lean if "lyapunov" not in flight.columns else _lyapunov
+        for axes, panel in zip(series, (_errors, _inputs, _direction, last), strict=True):
+            panel(axes, flight)
+        series[-1].set_xlabel("time (s)")
+        above, below = right.subplots(2, 1)
+        plan_view(above, flight)
+        _portrait(below, flight)
+        return figure
+
+
+def _errors(axes: Any, flight: Flight) -> None:
+    axes.axhline(0.0, color=style.GREY, lw=0.7)
+    for axis, look in zip("xy", style.AXIS_LINES):
+        error = flight[f"{axis}_ref"] - flight[axis]
+        axes.plot(flight["time"], error, label=axis, **look)
+    _whole(axes, flight)
+    widen(axes, 1e-6)
+    label(axes, "Dynamic state error, reference minus actual", "m")
+
+
+def _inputs(axes: Any, flight: Flight) -> None:
+    time = flight["time"]
+    lines = ((1, style.AMBER, "-", 2.4), (2, style.BLUE, "-", 1.2))
+    for rotor, color, dash, width in lines:
+        square = flight[f"rotor_speed_{rotor}"] ** 2
+        axes.plot(time, square, color=color, ls=dash, lw=width, label=f"ω{'₁₂'[rotor - 1]}²")
+    axes.axhline(0.0, color=style.GREY, lw=0.7)
+    settled = time >= min(2.0, 0.5 * time[-1])  # the start may be far above all that follows
+    top = max(float((flight[f"rotor_speed_{rotor}"] ** 2)[settled].max()) for rotor in (1, 2))
+    axes.set_ylim(-0.04 * top, 1.6 * top)
+    _whole(axes, flight)
+    label(axes, "Inputs squared", "rad²/s²")
+
+
+def _direction(axes: Any, flight: Flight) -> None:
+    time = flight["time"]
+    begin = time[-1] - LAST if time[-1] > 2.0 * LAST else 0.0
+    shown = time >= begin
+    middle, lower, upper, wanted = (
+        flight[f"direction{name}"][shown] for name in ("", "_lower", "_upper", "_ref")
+    )
+    axes.fill_between(time[shown], lower, upper, color=style.PALE, lw=0.0, label="admissible")
+    axes.plot(time[shown], middle, color=style.AMBER, lw=2.2, label="middle")
+    axes.plot(
+        time[shown], wanted, color=style.INK, lw=1.1, ls=(0, (4, 2)), label="acceleration wanted"
+    )
+    axes.set_xlim(begin, time[-1])
+    label(axes, "Direction of the thrusts", "rad")
+
+
+def _lean(axes: Any, flight: Flight) -> None:
+    time = flight["time"]
+    half = flight.scenario.tilt_car.half_angle
+    lean = flight["direction_ref"] - flight["direction"]
+    axes.fill_between(time, -half, half, color=style.PALE, lw=0.0)
+    axes.axhline(0.0, color=style.GREY, lw=0.7)
+    axes.plot(time, lean, color=style.GREEN)
+    settled = time >= min(2.0, 0.5 * time[-1])
+    reach = max(1.15 * half, 1.1 * float(np.abs(lean[settled]).max()))
+    axes.set_ylim(-reach, reach)
+    _whole(axes, flight)
+    label(axes, "Wanted acceleration against the middle of the thrusts; shaded: admissible", "rad")
+
+
+def _lyapunov(axes: Any, flight: Flight) -> None:
+    axes.plot(flight["time"], flight["lyapunov"], color=style.GREEN)
+    _whole(axes, flight)
+    widen(axes, 1e-6)
+    label(axes, "Lyapunov candidate, ½ ė² + ½ K e², along y", "m²/s²")
+
+
+def _whole(axes: Any, flight: Flight) -> None:
+    style.time_axis(axes, flight["time"][-1])
+
+
+def _portrait(axes: Any, flight: Flight) -> None:
+    """The error along y and its rate."""
+    error = flight["y_ref"] - flight["y"]
+    rate = flight["vy_ref"] - flight["vy"]
+    axes.axhline(0.0, color=style.GREY, lw=0.7)
+    axes.axvline(0.0, color=style.GREY, lw=0.7)
+    axes.plot(error, rate, color=style.BLUE, lw=1.0, label="path")
+    gait = flight.scenario.gait
+    period = getattr(gait, "period", None)
+    if period is not None:
+        half = flight["time"] / (0.5 * period)
+        at = (np.abs(half - np.round(half)) < 1e-6) & (half > 0.5)
+        axes.plot(error[at], rate[at], "o", color=style.RED, ms=4.5, zorder=4, label="at n T/2")
+    axes.plot(error[0], rate[0], "o", color=style.INK, mfc="white", ms=5, label="start")
+    axes.plot(error[-1], rate[-1], "s", color=style.INK, ms=4, label="end")
+    widen(axes, 1e-6)
+    axes.margins(0.08)
+    axes.set_xlabel("error e_y (m)")
+    axes.set_ylabel("rate of the error (m/s)")
+    axes.set_title("Error along y and its rate")
+    axes.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, -0.16), handlelength=1.4)

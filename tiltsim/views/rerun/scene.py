@@ -1,0 +1,224 @@
+"""The scene: the moving vehicle with its thrust, the reference, and the trails of both."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import mujoco
+import numpy as np
+
+from tiltsim.laws.assembling import follows_position
+from tiltsim.views.replay import (
+    first_free_body,
+    joint_positions,
+    poses_in_parents,
+    reference_positions,
+    rotate,
+    thrust_scale,
+    thrust_sites,
+    vehicle_radius,
+    world_poses,
+)
+from tiltsim.views.rerun import palette
+from tiltsim.views.rerun.geometry import body_paths, ground_height, log_geometry, xyzw
+from tiltsim.views.rerun.rows import Floats, Ticks, send_rows
+from tiltsim_controllers.references.trajectories import position_reference
+
+if TYPE_CHECKING:
+    import rerun as rr
+
+    from tiltsim.flight.flight import Flight
+    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.views.rerun.palette import Color
+
+TRAIL_INTERVAL: Final = 0.1  # s between the corners of a trail
+REFERENCE_POINTS: Final = 400
+TRAIL_WIDTH: Final = -1.5  # negative: in points of the screen, whatever the distance
+REFERENCE_WIDTH: Final = -1.0
+DOT: Final = -4.0  # vehicle and reference, to be seen from however far
+FLOOR_CELL: Final = 1.0  # m
+FLOOR_CELLS: Final = 12  # either way of the vehicle
+
+
+class Scene:
+    """The entities below ``world`` for one flight."""
+
+    def __init__(
+        self,
+        recording: rr.RecordingStream,
+        scenario: Scenario,
+        model: mujoco.MjModel,
+        root: str,
+        color: Color,
+        name: str = "",
+    ) -> None:
+        self._recording = recording
+        self._name = name
+        self._scenario = scenario
+        self._model = model
+        self._color = color
+        self.root = root
+        self._paths = body_paths(model, root)
+        self._ticks = Ticks(TRAIL_INTERVAL)
+        self._trail_end: Floats | None = None
+        self._thrust = thrust_sites(model)
+        self._thrust_scale = thrust_scale(model)
+        self._floor_cell: Floats | None = None
+        self._follows = follows_position(scenario)
+
+    @property
+    def vehicle(self) -> str:
+        """The entity of the first body that is free to move."""
+        return self._paths[first_free_body(self._model)]
+
+    @property
+    def camera(self) -> str:
+        """The entity that goes with the vehicle without turning, for a camera to stand on."""
+        return f"{self.root}/camera"
+
+    @property
+    def floor(self) -> str:
+        """The entity of the ground's grid, of which a piece goes with the vehicle."""
+        return f"{self.root}/floor"
+
+    def begin(self) -> list[str]:
+        """Log all that does not move.
+
+        Returns the names of geoms that could not be drawn.
+        """
+        import rerun as rr
+
+        self._log(self.root.partition("/")[0], rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+        left_out = log_geometry(self._recording, self._model, self.root)
+        model = self._model
+        for body in range(1, model.nbody):
+            if not model.body_dofnum[body]:
+                pose = {
+                    "translation": model.body_pos[body],
+                    "quaternion": xyzw(model.body_quat[body]),
+                }
+                self._log(self._paths[body], rr.Transform3D(**pose))
+        self._log(
+            f"{self.root}/trail",
+            rr.LineStrips3D.from_fields(colors=[self._color], radii=[TRAIL_WIDTH]),
+        )
+        self._begin_thrust()
+        self._begin_floor()
+        dot = rr.Points3D(
+            [(0.0, 0.0, 0.0)],
+            radii=[DOT],
+            colors=[self._color],
+            labels=[self._name] if self._name else None,
+            show_labels=True,
+        )
+        self._log(f"{self.camera}/dot", dot)
+        return left_out
+
+    def append(self, piece: Flight) -> None:
+        """Log the rows of a piece of the flight that follows on from the last."""
+        import rerun as rr
+
+        model, columns, time = self._model, piece.columns, piece["time"]
+        world = world_poses(model, joint_positions(model, columns))
+        local = poses_in_parents(model, world)
+        for body in range(1, model.nbody):
+            if model.body_dofnum[body]:
+                pose = rr.Transform3D.columns(
+                    translation=local.position[:, body].astype(np.float32),
+                    quaternion=xyzw(local.quaternion[:, body]),
+                )
+                send_rows(self._recording, self._paths[body], time, pose)
+        for site, column in self._thrust.items():
+            axis = _axis_in_body(model, site)
+            vectors = np.outer(columns[column] * self._thrust_scale, axis).astype(np.float32)
+            arrow = rr.Arrows3D.columns(vectors=vectors)
+            send_rows(self._recording, self._thrust_path(site), time, arrow)
+        position = world.position[:, first_free_body(model)]
+        follow = rr.Transform3D.columns(translation=position.astype(np.float32))
+        send_rows(self._recording, self.camera, time, follow)
+        self._append_trail(time, position)
+        self._append_floor(time, position)
+        if self._follows:
+            reference = reference_positions(columns)
+            point = rr.Points3D.columns(positions=reference.astype(np.float32))
+            send_rows(self._recording, f"{self.root}/reference/now", time, point)
+
+    def _log(self, path: str, *archetypes: Any) -> None:
+        self._recording.log(path, *archetypes, static=True)
+
+    def _thrust_path(self, site: int) -> str:
+        body = self._model.site_bodyid[site]
+        alone = [self._model.site_bodyid[other] for other in self._thrust].count(body) == 1
+        # Several on one body are told apart by their columns, such as thrust_1.
+        return f"{self._paths[body]}/{'thrust' if alone else self._thrust[site]}"
+
+    def _begin_thrust(self) -> None:
+        import rerun as rr
+
+        for site in self._thrust:
+            arrow = rr.Arrows3D.from_fields(
+                origins=[self._model.site_pos[site]],
+                colors=[palette.YELLOW],
+                radii=[0.02 * vehicle_radius(self._model)],
+            )
+            self._log(self._thrust_path(site), arrow)
+
+    def draw_reference(self, until: float) -> None:
+        """Log the whole path that the vehicle is to follow until a time (s), if it follows one."""
+        import rerun as rr
+
+        if not self._follows:
+            return
+        path = reference_path(self._scenario, until)
+        now = rr.Points3D.from_fields(colors=[palette.WHITE], radii=[DOT])
+        self._log(f"{self.root}/reference/now", now)
+        if np.ptp(path, axis=0).max() > 0.0:
+            line = rr.LineStrips3D([path], colors=[palette.GREY], radii=[REFERENCE_WIDTH])
+            self._log(f"{self.root}/reference/path", line)
+
+    def _begin_floor(self) -> None:
+        """Log the grid around the origin, at the height of the model's ground."""
+        import rerun as rr
+
+        reach = FLOOR_CELL * FLOOR_CELLS
+        height = ground_height(self._model)
+        across = np.linspace(-reach, reach, 2 * FLOOR_CELLS + 1)
+        lines = [[(c, -reach, height), (c, reach, height)] for c in across]
+        lines += [[(-reach, c, height), (reach, c, height)] for c in across]
+        self._log(self.floor, rr.LineStrips3D(lines, colors=[palette.FAINT], radii=[-0.5]))
+
+    def _append_floor(self, time: Floats, position: Floats) -> None:
+        """Move the grid by whole cells, so that it seems to stand still and has no end."""
+        import rerun as rr
+
+        cells = FLOOR_CELL * np.round(position * (1.0, 1.0, 0.0) / FLOOR_CELL)
+        before = cells[:1] + 1.0 if self._floor_cell is None else self._floor_cell[np.newaxis]
+        moved = np.any(cells != np.concatenate([before, cells[:-1]]), axis=1)
+        move = rr.Transform3D.columns(translation=cells[moved].astype(np.float32))
+        send_rows(self._recording, self.floor, time[moved], move)
+        self._floor_cell = cells[-1]
+
+    def _append_trail(self, time: Floats, position: Floats) -> None:
+        """Log the next stretches of the trail, each at the time at which its end is reached."""
+        import rerun as rr
+
+        picked = self._ticks.pick(time)
+        if len(picked) == 0:
+            return
+        ends = position[picked]
+        start = ends[:1] if self._trail_end is None else self._trail_end[np.newaxis]
+        stretches = np.stack([np.concatenate([start, ends[:-1]]), ends], axis=1)
+        strips = rr.LineStrips3D.columns(strips=stretches.astype(np.float32))
+        send_rows(self._recording, f"{self.root}/trail", time[picked], strips)
+        self._trail_end = ends[-1]
+
+
+def reference_path(scenario: Scenario, until: float) -> Floats:
+    """Points of the reference from the start to a time (s), shape (N, 3)."""
+    reference, table = scenario.reference.parameters, scenario.reference.table
+    times = np.linspace(0.0, until, REFERENCE_POINTS).tolist()
+    return np.array([position_reference(time, reference, table)[:3] for time in times])
+
+
+def _axis_in_body(model: mujoco.MjModel, site: int) -> Floats:
+    return rotate(model.site_quat[site], np.array([0.0, 0.0, 1.0]))

@@ -1,0 +1,98 @@
+"""The roll-pitch plane as a small picture: what is out of reach, and where the attitude is."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from tiltsim.views.attitude_plane import HALF_WIDTH, MARGIN_THRESHOLD
+from tiltsim_controllers.analysis.singularity import world_up
+
+Floats = npt.NDArray[np.float64]
+Image = npt.NDArray[np.uint8]
+
+GROUND: Final = (250, 250, 250)
+FORBIDDEN: Final = (240, 190, 165)
+CURVE: Final = (213, 94, 0)
+GRID: Final = (212, 216, 220)
+FRAME: Final = (70, 78, 86)
+TRAIL: Final = (90, 160, 210)
+ATTITUDE: Final = (0, 90, 150)
+OPACITY: Final = 0.88
+
+
+class PlaneInset:
+    """Paints the plane for one instant after another.
+
+    Parameters
+    ----------
+    size
+        Width and height, pixels.
+    side
+        Sign of ``n . r3`` within reach: that at the start of the flight.
+    """
+
+    def __init__(self, size: int, side: float) -> None:
+        self.size = size
+        self._side = side
+        roll = np.linspace(-HALF_WIDTH, HALF_WIDTH, size)
+        self._up = world_up(*np.meshgrid(roll, -roll))  # pitch upwards
+        blank = np.full((size, size, 3), GROUND, dtype=np.uint8)
+        for share in (0.25, 0.5, 0.75):
+            line = round(share * (size - 1))
+            blank[line], blank[:, line] = GRID, GRID
+        self._blank = blank
+
+    def paint(self, n: Floats, trail: Floats, margin: float) -> Image:
+        """The plane at an instant, shape (size, size, 3).
+
+        Parameters
+        ----------
+        n
+            The unit vector along the torque-free force, shape (3,).
+        trail
+            Attitudes (roll, pitch) so far, rad, shape (N, 2), the present one last.
+        margin
+            Singularity margin, rad.
+        """
+        image = self._blank.copy()
+        reach = self._up @ n * self._side
+        out = reach <= 0.0
+        image[out] = np.minimum(image[out], FORBIDDEN)
+        border = out ^ np.roll(out, 1, axis=0) | out ^ np.roll(out, 1, axis=1)
+        border[0], border[:, 0] = False, False
+        self._dots(image, np.argwhere(border)[:, ::-1], 1.2, CURVE)
+        self._dots(image, self._pixels(trail), 0.8, TRAIL)
+        color = CURVE if abs(margin) < MARGIN_THRESHOLD else ATTITUDE
+        self._dots(image, self._pixels(trail[-1:]), self.size / 36, color)
+        image[[0, -1]], image[:, [0, -1]] = FRAME, FRAME
+        return image
+
+    def _pixels(self, attitude: Floats) -> npt.NDArray[np.intp]:
+        """Columns and rows of attitudes, those beyond the plane at its edge."""
+        shares = 0.5 + 0.5 * np.clip(attitude / HALF_WIDTH, -1.0, 1.0) * (1.0, -1.0)
+        return np.asarray((shares * (self.size - 1)).round(), dtype=np.intp)
+
+    def _dots(
+        self,
+        image: Image,
+        places: npt.NDArray[np.intp],
+        radius: float,
+        color: tuple[int, int, int],
+    ) -> None:
+        reach = int(np.ceil(radius))
+        offsets = np.arange(-reach, reach + 1)
+        dx, dy = (part.ravel() for part in np.meshgrid(offsets, offsets))
+        disc = np.hypot(dx, dy) <= radius
+        for x, y in zip(dx[disc], dy[disc], strict=True):
+            at = np.clip(places + (x, y), 0, self.size - 1)  # noqa: RUF005
+            image[at[:, 1], at[:, 0]] = color
+
+
+def lay_over(frame: Image, inset: Image, gap: int) -> None:
+    """Lay an inset over the lower right corner of a frame, in place."""
+    height, width = inset.shape[:2]
+    corner = frame[-gap - height : -gap, -gap - width : -gap]
+    corner[:] = (OPACITY * inset + (1.0 - OPACITY) * corner).astype(np.uint8)
