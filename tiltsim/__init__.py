@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from tiltsim.plants.command import Command, Observation
     from tiltsim.scenario.loading import load_scenario, parse_scenario
     from tiltsim.scenario.scenario import Scenario
+    from tiltsim.simulation.batch import fly
     from tiltsim.simulation.simulate import simulate
 
 _HOMES = {
@@ -31,6 +32,7 @@ _HOMES = {
     "Observation": "plants.command",
     "Scenario": "scenario.scenario",
     "TiltsimError": "errors",
+    "fly": "simulation.batch",
     "load_flight": "flight.reading",
     "load_scenario": "scenario.loading",
     "parse_scenario": "scenario.loading",
@@ -45,6 +47,7 @@ __all__ = [
     "Observation",
     "Scenario",
     "TiltsimError",
+    "fly",
     "load_flight",
     "load_scenario",
     "parse_scenario",

@@ -7,6 +7,6 @@ from typing import Final
 DONE: Final = 0
 EXPECTATION_FAILED: Final = 1
 INVALID_INPUT: Final = 2
-FLIGHT_LOST: Final = 3
+VEHICLE_LOST: Final = 3
 INTERRUPTED: Final = 130
 TERMINATED: Final = 143

@@ -21,7 +21,7 @@ import pytest
 
 from tiltsim.cli import main
 from tiltsim.commands import run as run_command
-from tiltsim.commands.progress import compiling_told
+from tiltsim.commands.progress import announce_compilation
 from tiltsim.engines.cache import before_compiling
 from tiltsim.engines.native_engine import compile_callbacks
 from tiltsim.laws.attitude_altitude import TILTROTOR
@@ -390,12 +390,12 @@ def test_long_lines_are_wrapped_on_a_terminal_alone(capsys, monkeypatch):
 
 def test_a_terminal_is_told_what_is_being_compiled(capsys, monkeypatch):
     name = TILTROTOR.native_name("thesis")
-    with compiling_told(shown=True):
+    with announce_compilation(shown=True):
         assert before_compiling == []  # standard error is no terminal here
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    with compiling_told(shown=False):
+    with announce_compilation(shown=False):
         assert before_compiling == []
-    with compiling_told(shown=True):
+    with announce_compilation(shown=True):
         (tell,) = before_compiling
         tell(name)
     assert before_compiling == []

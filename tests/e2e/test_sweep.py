@@ -14,7 +14,7 @@ from tiltsim.cli import main
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.library import library_sweeps, scenario_files
 from tiltsim.sweeps.dataset import load_results
-from tiltsim.sweeps.loading import load_definition
+from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.plan import Plan
 from tiltsim.views.figures.distributions import wilson_interval
 from tiltsim.views.figures.sweep import sweep_figure
@@ -122,7 +122,7 @@ def test_mistakes_are_one_line_and_exit_2(arguments, words, capsys):
 
 @pytest.mark.parametrize("address", SHIPPED)
 def test_every_shipped_sweep_is_valid(address):
-    definition = load_definition(address)
+    definition = load_sweep(address)
     assert len(Plan(definition)) > 1
     assert definition.sweep["title"]
     assert definition.sweep["source"]

@@ -7,15 +7,15 @@ import pytest
 
 import tiltsim
 from tiltsim.errors import InputError
-from tiltsim.scenario.tiltrotor_laws import Ingredient
-from tiltsim_controllers.laws.gait_feedforward import Ingredients
+from tiltsim.scenario.tiltrotor_laws import FeedforwardTerm
+from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms
 
 SCENARIO = "beyond/gait_feedforward#t2"
 PUBLISHED = "ch04_tracking/circle#continuous_t2_modified"
 
 
 def test_what_can_be_left_out_is_what_the_law_counts_in():
-    assert set(Ingredient.__args__) == set(Ingredients._fields)
+    assert set(FeedforwardTerm.__args__) == set(FeedforwardTerms._fields)
 
 
 @pytest.mark.parametrize(
@@ -43,7 +43,7 @@ def test_poles_are_gains_of_the_plain_law_too():
         SCENARIO, {"controller": {"decoupling": "exact", "decoupler": "exact", "gains": poles}}
     )
     loops = {
-        loop.name: loop for loop in scenario.controller.closed_loops(scenario.vehicle.resolve())
+        loop.name: loop for loop in scenario.controller.error_loops(scenario.vehicle.resolve())
     }
     np.testing.assert_allclose(np.roots(loops["roll"].polynomial), -12.0, rtol=1e-4)
     np.testing.assert_allclose(np.roots(loops["altitude"].polynomial), -6.0, rtol=1e-4)

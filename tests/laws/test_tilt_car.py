@@ -23,7 +23,7 @@ from tiltsim_controllers.gaits import tilt_reference
 from tiltsim_controllers.tilt_car.penguin_cycle import Swing, limit_cycle, lyapunov, lyapunov_bound
 from tiltsim_controllers.tilt_car.planned_direction import GAIN_SETS
 from tiltsim_controllers.tilt_car.state_drift import lean_after, lean_of, orbit, restored_lean
-from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, acceleration, yaw_share
+from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, acceleration, counter_yaw_per_tilt
 
 CIRCLE = {
     "type": "circle",
@@ -101,7 +101,7 @@ def test_a_model_that_cannot_be_is_refused(mistake, message):
 def test_the_bottom_disc_turns_back_by_angular_momentum_alone(bottom, share):
     # The published factor, I_T / I_B = 1/2, is there for I_B = I_T + I_bottom alone.
     car = THESIS_CAR._replace(bottom_inertia=bottom)
-    assert yaw_share(car) == pytest.approx(share)
+    assert counter_yaw_per_tilt(car) == pytest.approx(share)
     model = compile_tilt_car(car)
     data = mujoco.MjData(model)
     data.ctrl[:3] = 1.5, 5000.0, 9000.0

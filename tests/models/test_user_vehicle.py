@@ -12,7 +12,7 @@ import pytest
 import tiltsim
 from tiltsim.cli import main
 from tiltsim.errors import InputError
-from tiltsim.models.user_vehicle import read_own_vehicle
+from tiltsim.models.user_vehicle import read_user_vehicle
 from tiltsim.plants.command import Command
 from tiltsim.plants.flight_model import build_model
 from tiltsim.resources import shipped_folder
@@ -79,23 +79,23 @@ def test_the_documented_example_flies_and_meets_its_expectation(write, tmp_path,
 
 
 def test_parameters_are_those_of_the_file(write):
-    own = read_own_vehicle(str(write()), "tiltrotor")
+    own = read_user_vehicle(str(write()), "tiltrotor")
     mass, inertia = total_inertia(mujoco.MjModel.from_xml_string(XML))
     assert own.vehicle.mass == pytest.approx(mass, rel=1e-12)
     np.testing.assert_allclose(own.vehicle[1:4], np.diag(inertia), rtol=1e-9)
     assert own.vehicle[4:] == pytest.approx((0.2, 8e-6, 2.4e-7, 9.81), rel=1e-12)
-    assert own.misfit == ""
+    assert own.layout_mismatch == ""
     # A cylinder of 30 g about its diameter, and the armature.
     pod = 0.03 * (0.015**2 / 4.0 + 0.04**2 / 12.0)
     assert own.hinge_inertias == pytest.approx([pod + 2e-5] * 4, rel=1e-9)
 
 
 def test_a_file_placed_askew_is_measured_in_the_bodys_own_axes(write):
-    level = read_own_vehicle(str(write()), "tiltrotor")
+    level = read_user_vehicle(str(write()), "tiltrotor")
     turned = changed('<body name="vehicle">', '<body name="vehicle" pos="1 2 3" euler="1 0.5 2">')
-    askew = read_own_vehicle(str(write(turned)), "tiltrotor")
+    askew = read_user_vehicle(str(write(turned)), "tiltrotor")
     np.testing.assert_allclose(askew.vehicle, level.vehicle, rtol=1e-9)
-    assert askew.misfit == ""
+    assert askew.layout_mismatch == ""
 
 
 @pytest.mark.parametrize(
@@ -135,7 +135,7 @@ def test_a_centre_of_mass_off_the_origin_stays_where_it_is(write):
     mass, inertia = total_inertia(after)
     assert mass == pytest.approx(0.85)
     np.testing.assert_allclose(
-        np.diag(inertia), read_own_vehicle(str(path), "tiltrotor").vehicle[1:4]
+        np.diag(inertia), read_user_vehicle(str(path), "tiltrotor").vehicle[1:4]
     )
 
 

@@ -18,7 +18,7 @@ from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.flight.reading import load_flight
 from tiltsim.laws.assembling import control_setup, loop_of
-from tiltsim.laws.commanded import COMMANDED
+from tiltsim.laws.commanded import COMMANDED_LOOPS
 from tiltsim.laws.tiltrotor import tiltrotor_state
 from tiltsim.plants.command import Command, checked
 from tiltsim.plants.commanded_plant import CommandedPlant
@@ -299,7 +299,7 @@ def test_what_is_seen_is_the_state_the_reference_and_the_gait():
     rotated = np.zeros(3)
     mujoco.mju_rotVecQuat(rotated, np.array([0.0, 0.0, 1.0]), first.quaternion)
     assert rotated[2] == pytest.approx(np.cos(0.1) * np.cos(0.2))
-    sample = dict(zip(COMMANDED["tiltrotor"].sample_fields, flown.samples[1], strict=True))
+    sample = dict(zip(COMMANDED_LOOPS["tiltrotor"].sample_fields, flown.samples[1], strict=True))
     assert sample["time"] == pytest.approx(second.time)
     np.testing.assert_array_equal(second.position, [sample[axis] for axis in "xyz"])
     np.testing.assert_array_equal(second.body_rates, [sample[axis] for axis in "pqr"])

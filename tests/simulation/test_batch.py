@@ -24,10 +24,10 @@ from tiltsim.laws.layers.air import with_air
 from tiltsim.laws.layers.on_equations import on_equations
 from tiltsim.laws.layers.supervision import with_supervisor
 from tiltsim.plants.factory import make_plant
-from tiltsim.plants.flight_model import flight_model, what_decides_the_model
+from tiltsim.plants.flight_model import flight_model, model_cache_key
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import merge
-from tiltsim.simulation.batch import fly_all
+from tiltsim.simulation.batch import fly
 from tiltsim_controllers.gaits import GAIT_TYPES
 
 TROT = {"amplitude": 0.3, "period": 0.8}
@@ -70,7 +70,7 @@ def without_speed(metrics):
 
 def three_ways(scenarios):
     """Assert that every scenario flies the same in Python, natively and in a batch of all."""
-    rows = list(fly_all(scenarios, keep_samples=True, threads=2))
+    rows = list(fly(scenarios, keep_samples=True, threads=2))
     assert [row.scenario for row in rows] == scenarios
     for wanted, row in zip(scenarios, rows, strict=True):
         for engine in ("python", "native"):
@@ -199,7 +199,7 @@ def test_lost_flights_end_on_the_same_step_with_the_same_cause(plant):
 def test_a_lost_row_is_flown_no_further_and_its_place_is_taken():
     """Hundreds of flights that would last an hour, were they not lost in the first second."""
     many = [scenario(UPSIDE_DOWN, duration=3600.0, record_timestep=1.0)] * 60
-    results = list(fly_all(many, threads=2))
+    results = list(fly(many, threads=2))
     assert len(results) == 60
     assert {result.end.time for result in results} == {results[0].end.time}
     assert results[0].end.time < 1.0
@@ -320,7 +320,7 @@ def test_what_decides_the_model_tells_models_apart(change):
     tables = {**LAYERED, "simulation": {"timestep": 0.002, "duration": 0.3}}
     plain, changed = map(tiltsim.parse_scenario, (tables, merge(tables, change)))
     models = [saved_model(flight_model(wanted, 40)) for wanted in (plain, changed)]
-    same_key = what_decides_the_model(plain) == what_decides_the_model(changed)
+    same_key = model_cache_key(plain) == model_cache_key(changed)
     assert same_key == (models[0] == models[1])
 
 
@@ -351,7 +351,7 @@ def test_own_controllers_are_flown_one_by_one_among_others(tmp_path):
     told = wanted[2].simulation.model_copy(update={"engine": "native"})
     wanted[2] = wanted[2].model_copy(update={"simulation": told})
     wanted.insert(1, scenario({}, duration=0.1))
-    results = list(fly_all(wanted, keep_samples=True))
+    results = list(fly(wanted, keep_samples=True))
     assert [result.scenario for result in results] == wanted
     assert [result.flight.engine for result in results] == ["python", "native", "python", "python"]
     light, _, right, heavy = (float(result.flight["z"][-1]) for result in results)
@@ -369,7 +369,7 @@ def test_more_flights_than_rows_come_in_their_order():
         scenario({"initial": {"position": [0.001 * i, 0.0, 0.0]}}, duration=0.02 + 0.01 * (i % 7))
         for i in range(150)
     ]
-    results = list(fly_all(wanted, threads=2, keep_samples=True))
+    results = list(fly(wanted, threads=2, keep_samples=True))
     assert [result.scenario for result in results] == wanted
     for i, result in enumerate(results):
         assert result.flight["x"][0] == 0.001 * i
@@ -384,7 +384,7 @@ def test_all_kinds_of_flights_together():
         scenario(LAWS["yaw_position"], duration=0.05),
         scenario({}, engine="auto", duration=0.05),
     ]
-    results = list(fly_all(wanted * 2, keep_samples=True))
+    results = list(fly(wanted * 2, keep_samples=True))
     assert [result.scenario for result in results] == wanted * 2
     assert results[0].flight.engine == "python"
     assert results[2].flight.engine == "native"
@@ -394,16 +394,16 @@ def test_all_kinds_of_flights_together():
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
 def test_many_short_flights_are_worth_the_native_engine(plant, monkeypatch):
     wanted = [scenario({}, engine="auto", plant=plant, duration=0.05)] * 6
-    monkeypatch.setattr(tiltsim.plants.mujoco_plant, "STEPS_WORTH_LOADING", 300)
-    monkeypatch.setattr(tiltsim.plants.mujoco_plant, "STEPS_WORTH_COMPILING", 300)
-    results = list(fly_all(wanted, keep_samples=True))
+    monkeypatch.setattr(tiltsim.plants.mujoco_plant, "MIN_STEPS_TO_LOAD", 300)
+    monkeypatch.setattr(tiltsim.plants.mujoco_plant, "MIN_STEPS_TO_COMPILE", 300)
+    results = list(fly(wanted, keep_samples=True))
     assert {result.flight.engine for result in results} == {"native"}
     assert [result.scenario for result in results] == wanted
-    assert next(fly_all(wanted[:1], keep_samples=True)).flight.engine == "python"
+    assert next(fly(wanted[:1], keep_samples=True)).flight.engine == "python"
 
 
 def test_no_flights_give_no_results():
-    assert list(fly_all([])) == []
+    assert list(fly([])) == []
 
 
 # --- what a loop says natively -----------------------------------------------------------------
@@ -430,7 +430,7 @@ def test_references_are_the_same_floats_natively(gait, decoupler, monkeypatch):
     tables = {"gait": {"type": gait, **GAITS[gait]}, "controller": {"decoupler": decoupler}}
     flight = tiltsim.simulate(scenario(tables, engine="python", duration=0.1))
     in_python = dict(flight.columns)
-    monkeypatch.setattr(tiltsim.engines.rows, "ROWS_WORTH_COMPILING", 0)
+    monkeypatch.setattr(tiltsim.engines.rows, "MIN_ROWS_TO_COMPILE", 0)
     del flight.__dict__["columns"]
     for name, column in flight.columns.items():
         np.testing.assert_array_equal(column, in_python[name])
@@ -439,7 +439,7 @@ def test_references_are_the_same_floats_natively(gait, decoupler, monkeypatch):
 def test_references_of_the_law_with_gait_rates_are_the_same_floats_natively(monkeypatch):
     flight = tiltsim.simulate(scenario(LAWS["gait_feedforward"], engine="python", duration=0.1))
     in_python = dict(flight.columns)
-    monkeypatch.setattr(tiltsim.engines.rows, "ROWS_WORTH_COMPILING", 0)
+    monkeypatch.setattr(tiltsim.engines.rows, "MIN_ROWS_TO_COMPILE", 0)
     del flight.__dict__["columns"]
     for name, column in flight.columns.items():
         np.testing.assert_array_equal(column, in_python[name])
@@ -458,7 +458,7 @@ def test_columns_beside_a_state_out_of_all_bounds_raise_nothing():
 
 def test_a_row_without_a_result_is_no_number():
     setup = control_setup(scenario({}))
-    rows = tiltsim.engines.rows.evaluate_rows(
+    rows = tiltsim.engines.rows.evaluate_over_samples(
         lambda time, state, _parameters, _table: (state[0], time / state[0]),
         *(2, np.array([1.0, 2.0]), np.array([[0.0], [4.0]]), setup),
     )
@@ -471,10 +471,10 @@ def test_what_is_about_to_be_compiled_is_told_and_what_is_cached_is_not(monkeypa
     monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
     told = []
     monkeypatch.setattr(cache, "before_compiling", [told.append])
-    cache.native_code_is_needed("mujoco.some.law")
+    cache.announce_native_code("mujoco.some.law")
     assert told == ["mujoco.some.law"]
-    cache.native_code_was_compiled("mujoco.some.law")
-    cache.native_code_is_needed("mujoco.some.law")
+    cache.mark_native_code_compiled("mujoco.some.law")
+    cache.announce_native_code("mujoco.some.law")
     assert told == ["mujoco.some.law"]
 
 
@@ -524,10 +524,10 @@ def test_whether_native_code_is_cached_is_known_by_law_and_plant(monkeypatch, tm
     monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
     wanted = scenario({}, engine="auto", duration=20.0)  # 20,000 steps: worth loading only
     assert choose_engine(wanted) == "python"
-    cache.native_code_was_compiled(LOOPS["full_pose"].native_name("mujoco"))
-    cache.native_code_was_compiled(LOOPS["attitude_altitude"].native_name("thesis"))
+    cache.mark_native_code_compiled(LOOPS["full_pose"].native_name("mujoco"))
+    cache.mark_native_code_compiled(LOOPS["attitude_altitude"].native_name("thesis"))
     assert choose_engine(wanted) == "python"
-    cache.native_code_was_compiled(LOOPS["attitude_altitude"].native_name("mujoco"))
+    cache.mark_native_code_compiled(LOOPS["attitude_altitude"].native_name("mujoco"))
     assert choose_engine(wanted) == "native"
 
 

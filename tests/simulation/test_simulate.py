@@ -402,10 +402,10 @@ def test_compiled_callbacks_are_loaded_by_the_next_process():
     import subprocess
     import sys
 
-    from tiltsim.engines.cache import native_code_can_be_kept
+    from tiltsim.engines.cache import native_code_is_cacheable
     from tiltsim.engines.native_engine import compile_callbacks
 
-    if not native_code_can_be_kept():
+    if not native_code_is_cacheable():
         pytest.skip("the cache folder is not writable")
     compile_callbacks(TILTROTOR)
     program = (

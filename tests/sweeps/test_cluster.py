@@ -14,7 +14,7 @@ import pytest
 
 from tests.sweeps.files import short_sweep
 from tiltsim.cli import main
-from tiltsim.sweeps.loading import load_definition
+from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.running import run_sweep
 
 pytest.importorskip("distributed", reason="needs the extra tiltsim[cluster]")
@@ -55,7 +55,7 @@ def wait_for_workers(address, count):
 @pytest.mark.filterwarnings("ignore")
 def test_a_cluster_that_loses_a_worker_gives_the_local_dataset(tmp_path):
     file = short_sweep(tmp_path / "sweep.toml", count=60, chunk_size=3)
-    definition = load_definition(file)
+    definition = load_sweep(file)
     local = run_sweep(definition, tmp_path / "local")
     port = free_port()
     address = f"tcp://127.0.0.1:{port}"

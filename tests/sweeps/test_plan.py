@@ -11,7 +11,7 @@ import pytest
 
 from tiltsim.errors import InputError
 from tiltsim.sweeps.definition import Definition
-from tiltsim.sweeps.loading import load_definition
+from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.plan import VALUES_TRIED, Plan
 
 HEAD = """
@@ -55,7 +55,7 @@ def plan_of(tmp_path):
     def make(text, overrides=None):
         path = tmp_path / "sweep.toml"
         path.write_text(HEAD + text if "scenario" not in text else text, encoding="utf-8")
-        return Plan(load_definition(path, overrides))
+        return Plan(load_sweep(path, overrides))
 
     return make
 
@@ -322,7 +322,7 @@ def test_documented_sweeps_are_valid_and_end_soon(tmp_path):
     for number, block in enumerate(sweeps):
         file = tmp_path / f"{number}.toml"
         file.write_text(block, encoding="utf-8")
-        plan = Plan(load_definition(file))
+        plan = Plan(load_sweep(file))
         flights = len(plan)
         if (bisect := plan.sweep.bisect) is not None:
             steps = (plan.stop(plan.point(i)) - bisect.start for i in range(len(plan)))

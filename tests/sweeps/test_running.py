@@ -22,8 +22,8 @@ from tiltsim.simulation import batch
 from tiltsim.simulation.simulate import simulate
 from tiltsim.sweeps import flying, running
 from tiltsim.sweeps.dataset import load_results
-from tiltsim.sweeps.folder import open_folder, write_durably
-from tiltsim.sweeps.loading import load_definition
+from tiltsim.sweeps.folder import open_sweep_folder, write_durably
+from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.plan import Plan
 from tiltsim.sweeps.running import run_sweep
 from tiltsim.system.processes import ProcessDiedError
@@ -62,7 +62,7 @@ def fly_until_killed(arguments, folder, moment, parts=0):
 
 
 def test_rows_hold_what_was_flown(tmp_path):
-    definition = load_definition(short_sweep(tmp_path / "sweep.toml"))
+    definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
     plan = Plan(definition)
     assert run_sweep(definition, tmp_path / "out") == tmp_path / "out" / "sweep.parquet"
     table = rows(tmp_path / "out")
@@ -81,14 +81,14 @@ def test_rows_hold_what_was_flown(tmp_path):
 
 
 def test_processes_make_the_same_dataset_bit_for_bit(tmp_path):
-    definition = load_definition(short_sweep(tmp_path / "sweep.toml"))
+    definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
     one = run_sweep(definition, tmp_path / "one", jobs=1)
     two = run_sweep(definition, tmp_path / "two", jobs=2)
     assert one.read_bytes() == two.read_bytes()
 
 
 def test_a_sweep_continues_where_it_stopped(tmp_path, monkeypatch):
-    definition = load_definition(short_sweep(tmp_path / "sweep.toml"))
+    definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
     whole = run_sweep(definition, tmp_path / "whole")
     flown = []
     original = flying.fly_points
@@ -115,14 +115,14 @@ def test_a_sweep_continues_where_it_stopped(tmp_path, monkeypatch):
 
 
 def test_another_definition_is_refused_with_the_difference(tmp_path):
-    run_sweep(load_definition(short_sweep(tmp_path / "sweep.toml", count=2)), tmp_path / "out")
-    other = load_definition(short_sweep(tmp_path / "sweep.toml", count=3))
+    run_sweep(load_sweep(short_sweep(tmp_path / "sweep.toml", count=2)), tmp_path / "out")
+    other = load_sweep(short_sweep(tmp_path / "sweep.toml", count=3))
     with pytest.raises(InputError, match=r"sample.count was 2 and is 3"):
         run_sweep(other, tmp_path / "out")
 
 
 def test_other_results_are_not_written_over(tmp_path):
-    definition = load_definition(short_sweep(tmp_path / "sweep.toml"))
+    definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "flight.parquet").touch()
     with pytest.raises(InputError, match="other results"):
@@ -130,9 +130,9 @@ def test_other_results_are_not_written_over(tmp_path):
 
 
 def test_two_sweeps_do_not_share_a_folder(tmp_path):
-    definition = load_definition(short_sweep(tmp_path / "sweep.toml"))
+    definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
     with (
-        open_folder(tmp_path / "out", Plan(definition)),
+        open_sweep_folder(tmp_path / "out", Plan(definition)),
         pytest.raises(InputError, match="another tiltsim sweep"),
     ):
         run_sweep(definition, tmp_path / "out")
@@ -159,7 +159,7 @@ def test_a_bad_flight_becomes_a_row(tmp_path, monkeypatch):
 
     monkeypatch.setattr(flying, "simulate", simulate)
     monkeypatch.setattr(batch, "simulate", simulate)
-    run_sweep(load_definition(short_sweep(tmp_path / "sweep.toml")), tmp_path / "out")
+    run_sweep(load_sweep(short_sweep(tmp_path / "sweep.toml")), tmp_path / "out")
     for row in rows(tmp_path / "out"):
         bad = row["initial.attitude[0]"] > 0.0
         assert row["end"] == ("crashed" if bad else "completed")
@@ -171,7 +171,7 @@ def test_points_that_make_no_scenario_become_rows(tmp_path):
     file = short_sweep(tmp_path / "sweep.toml", count=32)
     text = file.read_text().replace("0.1", "0.2").replace("mean = 0.0", "mean = 2.9")
     file.write_text(text.replace("seed = 3", "seed = 5"))
-    run_sweep(load_definition(file), tmp_path / "out")
+    run_sweep(load_sweep(file), tmp_path / "out")
     ends = {row["end"] for row in rows(tmp_path / "out")}
     for row in rows(tmp_path / "out"):
         assert (row["end"] == "invalid") == (abs(row["initial.attitude[0]"]) > 3.141592653589793)
@@ -181,7 +181,7 @@ def test_points_that_make_no_scenario_become_rows(tmp_path):
 def test_flights_are_kept_where_asked(tmp_path):
     file = short_sweep(tmp_path / "sweep.toml", count=2)
     file.write_text("keep_flights = true\n" + file.read_text())
-    run_sweep(load_definition(file), tmp_path / "out")
+    run_sweep(load_sweep(file), tmp_path / "out")
     files = sorted((tmp_path / "out" / "flights").iterdir())
     assert [file.name for file in files] == [f"{index:07d}.parquet" for index in range(4)]
     table = rows(tmp_path / "out")
@@ -190,7 +190,7 @@ def test_flights_are_kept_where_asked(tmp_path):
 
 
 def test_boundaries_are_found_to_their_tolerance(tmp_path):
-    run_sweep(load_definition(boundary_sweep(tmp_path / "sweep.toml")), tmp_path / "out")
+    run_sweep(load_sweep(boundary_sweep(tmp_path / "sweep.toml")), tmp_path / "out")
     for row in rows(tmp_path / "out"):
         assert row["roll"] < 0.2345 < row["roll_beyond"] + 0.002
         assert 0.0 < row["roll_beyond"] - row["roll"] <= 0.001
@@ -202,7 +202,7 @@ def test_boundaries_are_found_to_their_tolerance(tmp_path):
 @pytest.mark.slow
 def test_killed_at_random_moments_it_continues_to_the_same_dataset(tmp_path):
     file = short_sweep(tmp_path / "sweep.toml", count=40, chunk_size=2)
-    whole = run_sweep(load_definition(file), tmp_path / "whole")
+    whole = run_sweep(load_sweep(file), tmp_path / "whole")
     folder = tmp_path / "killed"
     for moment in (1.4, 2.4):
         fly_until_killed(command(file, folder, "--jobs=2"), folder, moment)
@@ -213,7 +213,7 @@ def test_killed_at_random_moments_it_continues_to_the_same_dataset(tmp_path):
 @pytest.mark.slow
 def test_two_thousand_flights_killed_twenty_times(tmp_path):
     file = short_sweep(tmp_path / "sweep.toml", count=1000, chunk_size=20)
-    whole = run_sweep(load_definition(file), tmp_path / "whole", jobs=2)
+    whole = run_sweep(load_sweep(file), tmp_path / "whole", jobs=2)
     chance, folder, progress = random.Random(2000), tmp_path / "killed", []
     for parts in sorted(chance.sample(range(85), 20)):
         moment = chance.uniform(0.0, 0.3)
@@ -283,13 +283,13 @@ def test_a_terminated_sweep_cleans_up_and_continues(tmp_path):
     kept = parts_in(folder)
     assert 0 < kept < 60
     reports = []
-    run_sweep(load_definition(file), folder, report=reports.append)
+    run_sweep(load_sweep(file), folder, report=reports.append)
     assert reports[0] == 2 * kept
     assert [row["index"] for row in rows(folder)] == list(range(120))
 
 
 def test_a_damaged_folder_is_told_of_or_mended(tmp_path):
-    definition = load_definition(short_sweep(tmp_path / "sweep.toml"))
+    definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
     dataset = run_sweep(definition, tmp_path / "out")
     whole = dataset.read_bytes()
     dataset.write_bytes(whole[:100])  # follows from the parts
@@ -301,7 +301,7 @@ def test_a_damaged_folder_is_told_of_or_mended(tmp_path):
 
 
 def test_parts_with_other_columns_are_refused(tmp_path, monkeypatch):
-    definition = load_definition(short_sweep(tmp_path / "sweep.toml"))
+    definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
     run_sweep(definition, tmp_path / "out")
     monkeypatch.setitem(METRICS, "a_metric_of_tomorrow", "of no use, m")
     with pytest.raises(InputError, match=r"made by another tiltsim: .* a_metric_of_tomorrow"):
@@ -310,7 +310,7 @@ def test_parts_with_other_columns_are_refused(tmp_path, monkeypatch):
 
 
 def test_a_definition_that_is_none_is_refused(tmp_path):
-    definition = load_definition(short_sweep(tmp_path / "sweep.toml"))
+    definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
     run_sweep(definition, tmp_path / "out")
     file = tmp_path / "out" / "sweep.json"
     for text, words in (

@@ -17,8 +17,8 @@ from tests.flights import flight as flight_named
 from tiltsim.cli import main
 from tiltsim.flight.reading import load_flight
 from tiltsim.system.interrupts import (
-    interrupts_deferred,
-    interrupts_kept,
+    defer_interrupts,
+    reraise_swallowed_interrupts,
     terminations_as_interrupts,
 )
 
@@ -52,7 +52,7 @@ def test_an_interrupt_that_c_dropped_is_raised_after_the_block():
     seen = []
 
     def work():
-        with interrupts_kept():
+        with reraise_swallowed_interrupts():
             call_from_c(raises)
             seen.append("goes on")
 
@@ -67,7 +67,7 @@ def test_other_exceptions_that_c_dropped_are_reported_as_ever(monkeypatch):
 
     reported = []
     monkeypatch.setattr(sys, "unraisablehook", lambda found: reported.append(found.exc_type))
-    with interrupts_kept():
+    with reraise_swallowed_interrupts():
         call_from_c(raises)
     call_from_c(raises)
     assert reported == [LookupError, LookupError]
@@ -77,7 +77,7 @@ def test_an_interrupt_waits_for_the_block_and_is_raised_after_it():
     done = []
 
     def work():
-        with interrupts_deferred():
+        with defer_interrupts():
             interrupt()
             done.append("finished")
 
@@ -89,7 +89,7 @@ def test_an_interrupt_waits_for_the_block_and_is_raised_after_it():
 
 def test_a_second_interrupt_does_not_wait():
     def work():
-        with interrupts_deferred():
+        with defer_interrupts():
             interrupt()
             interrupt()
             pytest.fail("still running")
@@ -103,7 +103,7 @@ def test_other_threads_run_as_ever():
     ran = []
 
     def work():
-        with interrupts_deferred(), interrupts_kept():
+        with defer_interrupts(), reraise_swallowed_interrupts():
             ran.append(True)
 
     thread = threading.Thread(target=work)
@@ -154,8 +154,8 @@ def test_a_termination_waits_for_what_must_not_be_lost(keyboard):
     done = []
 
     def work():
-        with terminations_as_interrupts(), interrupts_deferred():
-            with interrupts_deferred():
+        with terminations_as_interrupts(), defer_interrupts():
+            with defer_interrupts():
                 terminate()
                 done.append("inner")
             done.append("outer")

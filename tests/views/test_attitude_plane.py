@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from tiltsim.views.attitude_plane import (
     HALF_WIDTH,
     attitude_of,
-    forbidden_pitch,
     nearest_singular,
     singular_curves,
     torque_free_directions,
+    unreachable_pitch,
 )
 from tiltsim_controllers.analysis.singularity import (
     determinant,
@@ -80,7 +80,7 @@ def test_there_is_no_curve_where_none_or_all_attitudes_are_singular(n):
 def test_out_of_reach_is_where_the_determinant_has_the_other_sign(angles, side):
     n = normals(angles)
     roll = np.linspace(-1.5, 1.5, 13)
-    intervals = forbidden_pitch(n, side, roll)[0]
+    intervals = unreachable_pitch(n, side, roll)[0]
     for at, (low, high) in zip(roll, intervals, strict=True):
         pitch = np.linspace(-1.55, 1.55, 41)
         sign = world_up(at, pitch) @ n[0] * side
@@ -91,9 +91,9 @@ def test_out_of_reach_is_where_the_determinant_has_the_other_sign(angles, side):
 
 def test_all_is_out_of_reach_where_tau_has_lost_rank_and_nothing_where_n_is_vertical():
     roll = np.linspace(-1.0, 1.0, 5)
-    everything = forbidden_pitch(np.zeros((1, 3)), 1.0, roll)[0]
+    everything = unreachable_pitch(np.zeros((1, 3)), 1.0, roll)[0]
     np.testing.assert_array_equal(everything, np.tile([-HALF_WIDTH, HALF_WIDTH], (5, 1)))
-    nothing = forbidden_pitch(normals(LEVEL), 1.0, roll)[0]
+    nothing = unreachable_pitch(normals(LEVEL), 1.0, roll)[0]
     np.testing.assert_array_equal(nothing[:, 0], nothing[:, 1])
 
 

@@ -11,7 +11,7 @@ from tests.flights import flight
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import SAMPLE_FIELDS
 from tiltsim.scenario.loading import load_scenario
-from tiltsim.views.events import EventWatch, flight_events
+from tiltsim.views.events import EventDetector, flight_events
 
 
 def texts(events):
@@ -29,7 +29,7 @@ def test_a_quiet_flight_tells_what_it_is_how_close_it_came_and_that_it_ended():
 
 def test_no_gait_is_told_of_a_quadrotor():
     scenario = load_scenario("ch01_gust/hover#quadrotor")
-    assert EventWatch(scenario).opening().text == "Quadrotor: yaw-position law, mujoco plant"
+    assert EventDetector(scenario).opening().text == "Quadrotor: yaw-position law, mujoco plant"
 
 
 def test_saturation_is_told_when_it_sets_in():
@@ -74,7 +74,7 @@ def test_a_lost_flight_ends_with_its_cause():
 
 def test_a_flight_in_pieces_tells_the_same_as_a_whole_one():
     this = flight("limited")
-    watch = EventWatch(this.scenario)
+    watch = EventDetector(this.scenario)
     pieces = [replace(this, samples=this.samples[at : at + 7]) for at in range(0, len(this), 7)]
     told = [watch.opening(), *(e for piece in pieces for e in watch.observe(piece))]
     assert [*told, *watch.closing(this.end)] == flight_events(this)

@@ -616,7 +616,7 @@ def stream_to(recorder, url, monkeypatch, farewell=30.0):
     from tiltsim.views.rerun import live
 
     monkeypatch.setattr(live, "attach_viewer", lambda *_: None)
-    monkeypatch.setattr(live, "FAREWELL", farewell)
+    monkeypatch.setattr(live, "SHUTDOWN_TIMEOUT", farewell)
     stream = LiveStream(flight("fixed").scenario, url)
     monkeypatch.setattr(stream, "_recorder", recorder)
     return stream

@@ -16,10 +16,10 @@ from tests.flights import flight, saved
 from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, torque_free_directions
-from tiltsim.views.video import aspects, has_screen, inset, offscreen
+from tiltsim.views.video import aspects, has_display, inset, offscreen
 from tiltsim.views.video.aspects import RotorcraftAspect
-from tiltsim.views.video.film import Format, _Stage, film_flight, frames
-from tiltsim.views.video.inset import PlaneInset, lay_over
+from tiltsim.views.video.film import Format, _Stage, frames, write_video
+from tiltsim.views.video.inset import PlaneInset, overlay_inset
 from tiltsim.views.video.offscreen import make_contexts
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
@@ -73,7 +73,7 @@ def test_the_inset_has_the_attitude_with_pitch_upwards():
 
 def test_an_inset_covers_its_corner_alone():
     frame = np.zeros((100, 100, 3), dtype=np.uint8)
-    lay_over(frame, np.full((30, 30, 3), 200, dtype=np.uint8), 5)
+    overlay_inset(frame, np.full((30, 30, 3), 200, dtype=np.uint8), 5)
     assert frame[70, 70].min() > 150
     assert frame[:65].max() == frame[:, :65].max() == frame[95:].max() == 0
 
@@ -82,7 +82,7 @@ def test_an_inset_covers_its_corner_alone():
 def test_the_insets_trail_is_short_beside_a_curve_that_moves(name, whole, monkeypatch):
     this, trails = flight(name), []
     monkeypatch.setattr(PlaneInset, "paint", lambda _self, _n, trail, _margin: trails.append(trail))
-    monkeypatch.setattr(aspects, "lay_over", lambda *_: None)
+    monkeypatch.setattr(aspects, "overlay_inset", lambda *_: None)
     last = len(this) - 1
     RotorcraftAspect(this, 180).paint(np.zeros((180, 320, 3), dtype=np.uint8), last)
     began = 0.0 if whole else this["time"][last] - MOVING_TRAIL_TIME
@@ -151,7 +151,7 @@ def test_the_film_plays(tmp_path):
 
     path = tmp_path / "flight.mp4"
     times = []
-    film_flight(flight("fixed"), path, SMALL, times.append)
+    write_video(flight("fixed"), path, SMALL, times.append)
     assert [file.name for file in tmp_path.iterdir()] == ["flight.mp4"]
     with av.open(str(path)) as film:
         stream = film.streams.video[0]
@@ -210,7 +210,7 @@ def test_no_way_to_draw_is_one_line_with_the_way_out(monkeypatch):
 
 
 def test_a_way_that_only_warns_is_one_line_too(monkeypatch):
-    if sys.platform != "linux" or has_screen():
+    if sys.platform != "linux" or has_display():
         pytest.skip("for Linux without a screen")
     monkeypatch.setenv("MUJOCO_GL", "glfw")
     with pytest.raises(InputError, match=r"no OpenGL to draw with \(glfw: .*; install a driver"):

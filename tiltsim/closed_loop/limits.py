@@ -16,7 +16,7 @@ MAX_ROTOR_SPEED: Final = 1e5  # rad/s
 SINGULAR: Final = 1e-9
 """What counts as zero, for a determinant of order one and all else that a loop watches."""
 
-WITHIN: Final = 0
+WITHIN_LIMITS: Final = 0
 HORIZONTAL_ERROR: Final = 1
 ALTITUDE_ERROR: Final = 2
 BODY_RATE: Final = 3
@@ -50,7 +50,7 @@ def rotorcraft_limit_exceeded(
     table: Sequence[float],
     follows_position: float,
 ) -> int:
-    """The code of the first limit that a sample of a rotorcraft exceeds, `WITHIN` if none.
+    """The code of the first limit that a sample of a rotorcraft exceeds, `WITHIN_LIMITS` if none.
 
     ``values`` begin as `tiltsim.vehicles.rotorcraft.OBSERVED_FIELDS`; ``follows_position`` is 0
     where the horizontal position is free.
@@ -66,7 +66,7 @@ def rotorcraft_limit_exceeded(
     for rotor in range(4):
         if abs(values[16 + rotor]) > MAX_ROTOR_SPEED:
             return ROTOR_SPEED + rotor
-    return WITHIN
+    return WITHIN_LIMITS
 
 
 @scalar
@@ -84,4 +84,4 @@ def tilt_car_limit_exceeded(
     for rotor in range(2):
         if abs(values[8 + rotor]) > MAX_ROTOR_SPEED:
             return ROTOR_SPEED + rotor
-    return WITHIN
+    return WITHIN_LIMITS

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from tiltsim.closed_loop.vehicle_kind import Kind
+from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.parts import ExtraActuators
 from tiltsim_controllers.mathematics.records import flatten, record_dtype, record_size
 from tiltsim_controllers.mathematics.scalar import scalar
@@ -43,7 +43,7 @@ class ControlSetup(NamedTuple):
         return np.array([*flatten(self.parameters), *self.table])
 
 
-class Watched(NamedTuple):
+class SignCheck(NamedTuple):
     """A number that must keep its sign, or the flight is over, and what to say if it does not."""
 
     value: float
@@ -82,7 +82,7 @@ class Equations:
 
 
 @dataclass(frozen=True, eq=False)
-class Loop:
+class ClosedLoop:
     """A law around a model, for all that is the same whichever law flies.
 
     Scalar functions, for the engines:
@@ -114,7 +114,7 @@ class Loop:
         ``(samples by field, setup) -> columns``: references, determinant, margin and
         ``extra_columns``.
     watched
-        ``(sample by field, setup) -> Watched, ...``: where the law ends.
+        ``(sample by field, setup) -> SignCheck, ...``: where the law ends.
     watch
         Scalar function ``(values, parameters) -> numbers``: at least the numbers of ``watched``,
         from ``values`` as ``observe`` gives them. None leaves watching to Python.
@@ -135,7 +135,7 @@ class Loop:
         layer around it, by `tiltsim.laws.layers.on_equations`.
     kind
         What holds for all loops around such a vehicle.
-    flies_gait
+    uses_gait
         Whether the scenario's gait has a part in the flight.
     """
 
@@ -148,8 +148,8 @@ class Loop:
     initial_activations: Callable[[Scenario, ControlSetup], Sequence[float]]
     observe: Callable[..., tuple[float, ...]]
     derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
-    watched: Callable[[Mapping[str, float], ControlSetup], tuple[Watched, ...]]
-    kind: Kind
+    watched: Callable[[Mapping[str, float], ControlSetup], tuple[SignCheck, ...]]
+    kind: VehicleKind
     equations: Equations | None = None
     watch: Callable[..., tuple[float, ...]] | None = None
     observes_controls: bool = False
@@ -159,7 +159,7 @@ class Loop:
     extra_columns: Mapping[str, str] = field(default_factory=dict)
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
     hold: Callable[..., tuple[float, ...]] | None = None
-    flies_gait: bool = True
+    uses_gait: bool = True
 
     @cached_property
     def signature(self) -> float:

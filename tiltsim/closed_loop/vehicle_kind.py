@@ -19,7 +19,7 @@ Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Kind:
+class VehicleKind:
     """What can be told of every vehicle of a kind, and how MuJoCo builds it.
 
     Attributes

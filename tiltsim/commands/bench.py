@@ -6,7 +6,7 @@ import argparse
 import json
 from typing import Any
 
-from tiltsim.commands.progress import compiling_told
+from tiltsim.commands.progress import announce_compilation
 from tiltsim.errors import InputError
 
 
@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from tiltsim.studies.benchmark import bench_accuracy, bench_flights, run_benchmark
 
-    with compiling_told(shown=True):
+    with announce_compilation(shown=True):
         if arguments.vehicles is not None:
             rows = bench_flights(
                 arguments.vehicles, arguments.duration, arguments.integrator, arguments.timestep

@@ -8,10 +8,10 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tiltsim.commands.progress import compiling_told
+from tiltsim.commands.progress import announce_compilation
 from tiltsim.commands.text import counted
-from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, FLIGHT_LOST, INVALID_INPUT
-from tiltsim.system.interrupts import interrupts_deferred
+from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INVALID_INPUT, VEHICLE_LOST
+from tiltsim.system.interrupts import defer_interrupts
 
 if TYPE_CHECKING:
     from tiltsim.studies.checking import CheckResult
@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.errors import InputError
     from tiltsim.resources import shipped_folder
     from tiltsim.scenario.loading import parse_override
-    from tiltsim.studies.checking import check_all, collect, not_flown, write_junit
+    from tiltsim.studies.checking import check_all, collect, interrupted_result, write_junit
 
     junit: Path | None = arguments.junit
     if junit is not None and (junit.is_dir() or not junit.absolute().parent.is_dir()):
@@ -81,12 +81,14 @@ def run(arguments: argparse.Namespace) -> int:
         _print_result(result, width)
 
     try:
-        with compiling_told(shown=True):
+        with announce_compilation(shown=True):
             results = check_all(addresses, arguments.jobs, overrides, report)
     except KeyboardInterrupt:
         if junit is not None:
-            with interrupts_deferred():
-                write_junit([finished.get(name) or not_flown(name) for name in addresses], junit)
+            with defer_interrupts():
+                write_junit(
+                    [finished.get(name) or interrupted_result(name) for name in addresses], junit
+                )
         raise
     if junit is not None:
         write_junit(results, junit)
@@ -99,7 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
     if counts["invalid"] or counts["crashed"]:
         return INVALID_INPUT
     if counts["lost"]:
-        return FLIGHT_LOST
+        return VEHICLE_LOST
     return EXPECTATION_FAILED if counts["failed"] else DONE
 
 

@@ -15,7 +15,7 @@ from tiltsim.commands.angles import (
     parse_vehicle,
     vehicle_text,
 )
-from tiltsim.commands.text import aligned, json_text, number, numbers, table, tell_of_figure
+from tiltsim.commands.text import aligned, json_text, number, numbers, print_figure_path, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -144,7 +144,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.figure == "attainable":
         report["warnings"] += _attainable_warnings(arguments, chosen)
     _print(arguments, report, _summary)
-    tell_of_figure(arguments)
+    print_figure_path(arguments)
     return 0
 
 
@@ -279,7 +279,7 @@ def _run_determinant(arguments: argparse.Namespace) -> int:
     vehicle, case = parse_vehicle(arguments.vehicle), arguments.case or "equal"
     save(determinant_figure(case, vehicle), arguments.plot)
     _print(arguments, determinant_report(case, vehicle), _determinant_text)
-    tell_of_figure(arguments)
+    print_figure_path(arguments)
     return 0
 
 

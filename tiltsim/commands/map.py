@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.angles import allow_negative_lists, parse_angles, parse_vehicle, vehicle_text
-from tiltsim.commands.text import aligned, json_text, tell_of_figure
+from tiltsim.commands.text import aligned, json_text, print_figure_path
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
 
         save(map_figure(vehicle, [("path", path)] if path else None), arguments.plot)
     print(json_text(report) if arguments.json else _summary(report))
-    tell_of_figure(arguments)
+    print_figure_path(arguments)
     return DONE if path is None or report["path"]["sound"] else EXPECTATION_FAILED
 
 

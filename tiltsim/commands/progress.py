@@ -14,7 +14,7 @@ TICK: Final = 1.0
 
 
 @contextmanager
-def compiling_told(*, shown: bool) -> Iterator[None]:
+def announce_compilation(*, shown: bool) -> Iterator[None]:
     """Meanwhile, a line on standard error, if that is a terminal, tells what is being compiled."""
     if not shown or not sys.stderr.isatty():
         yield
@@ -48,7 +48,7 @@ def progress_bar(total: float, unit: str, *, shown: bool) -> Iterator[Callable[[
         yield lambda value: None
         return
     layout = "{l_bar}{bar}| {n:.1f}/{total:g} {unit} [{elapsed}<{remaining}]"
-    with _bar(total, unit, layout) as bar, compiling_told(shown=True):
+    with _bar(total, unit, layout) as bar, announce_compilation(shown=True):
 
         def move(value: float) -> None:
             bar.update(value - bar.n)
@@ -83,7 +83,7 @@ def counting_bar(total: int, unit: str, *, shown: bool) -> Iterator[Callable[[in
             ticking.start()
         bar.update(value - bar.n)
 
-    with compiling_told(shown=True):
+    with announce_compilation(shown=True):
         try:
             yield move
         finally:

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.progress import progress_bar
-from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, FLIGHT_LOST, INTERRUPTED
-from tiltsim.system.interrupts import interrupts_deferred
+from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INTERRUPTED, VEHICLE_LOST
+from tiltsim.system.interrupts import defer_interrupts
 
 if TYPE_CHECKING:
     from tiltsim.closed_loop.loop import Floats
@@ -94,7 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
 
         with RecordingProcess(scenario) as recording:
             flight = fly(scenario, arguments)
-            with interrupts_deferred():
+            with defer_interrupts():
                 recording.start(flight, arguments.rerun)
                 _save(flight, arguments)
                 recording.finish()
@@ -119,7 +119,7 @@ def run(arguments: argparse.Namespace) -> int:
             print(f"recording written to {arguments.rerun}; see: tiltsim view {arguments.rerun}")
     if flight.end.kind != "completed":
         print(f"tiltsim: {lost(flight)}", file=sys.stderr)
-        return FLIGHT_LOST
+        return VEHICLE_LOST
     failed = [verdict for verdict in verdicts if not verdict.holds]
     if arguments.quiet:
         for verdict in failed:
@@ -134,18 +134,18 @@ def run(arguments: argparse.Namespace) -> int:
 def _tell_what_the_law_does_not_know(scenario: Scenario) -> None:
     """A line on what a law of ours has wrong of a user's own vehicle."""
     own = scenario.rotorcraft.own
-    if own is not None and own.unknown_to_laws and scenario.controller.law != "python":
+    if own is not None and own.unmodeled_properties and scenario.controller.law != "python":
         print(
             f"tiltsim: warning: vehicle.mjcf: the {scenario.controller.law} law, which takes the "
             "centre of mass for the body's origin and the inertia for diagonal, does not know of "
-            f"{own.unknown_to_laws}",
+            f"{own.unmodeled_properties}",
             file=sys.stderr,
         )
 
 
 def _save(flight: Flight, arguments: argparse.Namespace) -> None:
     if arguments.out is not None:
-        with interrupts_deferred():
+        with defer_interrupts():
             flight.save(arguments.out)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.angles import allow_negative_lists, parse_angle, parse_vehicle
-from tiltsim.commands.text import aligned, tell_of_figure
+from tiltsim.commands.text import aligned, print_figure_path
 
 if TYPE_CHECKING:
     from tiltsim_controllers.vehicle.parameters import Vehicle
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
 
         save(singularity_figure(vehicle), arguments.plot)
     print(json.dumps(report, indent=2) if arguments.json else _summary(report))
-    tell_of_figure(arguments)
+    print_figure_path(arguments)
     return 0
 
 

@@ -60,12 +60,12 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Fly what is not yet finished, and sum up."""
     from tiltsim.scenario.loading import parse_override
-    from tiltsim.sweeps.loading import load_definition
+    from tiltsim.sweeps.loading import load_sweep
     from tiltsim.sweeps.plan import Plan
     from tiltsim.sweeps.running import run_sweep
 
     overrides = dict(parse_override(text) for text in arguments.overrides)
-    definition = load_definition(arguments.sweep, overrides)
+    definition = load_sweep(arguments.sweep, overrides)
     plan = Plan(definition)
     out = arguments.out or Path("sweeps") / Path(definition.address).stem
     shown = not arguments.quiet

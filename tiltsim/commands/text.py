@@ -27,7 +27,7 @@ def counted(count: int, one: str, many: str) -> str:
     return f"{count} {one if count == 1 else many}"
 
 
-def tell_of_figure(arguments: argparse.Namespace) -> None:
+def print_figure_path(arguments: argparse.Namespace) -> None:
     """Say where ``--plot`` went, as `tiltsim plot` does, unless the output is JSON."""
     if arguments.plot is not None and not arguments.json:
         print(f"figure written to {arguments.plot}")

@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.views.video import prefer_offscreen_gl
 
     prefer_offscreen_gl()  # before anything imports MuJoCo
-    from tiltsim.views.video.film import Format, film_flight, moments
+    from tiltsim.views.video.film import Format, moments, write_video
 
     width, height = arguments.size
     form = Format(width, height, arguments.fps, arguments.speed)
@@ -95,7 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
     with counting_bar(count, "frames", shown=not arguments.quiet) as move:
         move(0)
         drawn = iter(range(1, count + 1))
-        film_flight(flight, out, form, lambda _time: move(next(drawn)))
+        write_video(flight, out, form, lambda _time: move(next(drawn)))
     if not arguments.quiet:
         print(f"film written to {out}")
     return 0

@@ -13,7 +13,7 @@ from typing import Any, Literal, Protocol
 
 import mujoco
 
-from tiltsim.closed_loop.loop import Loop, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, Sizes
 from tiltsim.closed_loop.userdata import HEADER_SIZE
 
 EngineName = Literal["python", "native"]
@@ -34,7 +34,7 @@ class Engine(Protocol):
         """
 
 
-def check_model(loop: Loop, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+def check_model(loop: ClosedLoop, model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Raise ValueError unless model and data are those of a flight of this loop."""
     sizes = Sizes(model.nq, model.nv, model.na, model.nu)
     head = HEADER_SIZE + loop.record_size

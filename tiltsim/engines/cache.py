@@ -42,16 +42,16 @@ before_compiling: Final[list[Callable[[str], None]]] = []
 """Called with a name before its code is compiled, which takes seconds, for a screen to say so."""
 
 
-def native_code_is_needed(name: str) -> None:
+def announce_native_code(name: str) -> None:
     """Say that native code of this name will be loaded or, where there is none yet, compiled."""
     if before_compiling and not native_code_is_cached(name):
         for tell in before_compiling:
             tell(name)
 
 
-def native_code_was_compiled(name: str) -> None:
+def mark_native_code_compiled(name: str) -> None:
     """Remember that native code of this name is on disk now, if it can be kept."""
-    if native_code_can_be_kept():
+    if native_code_is_cacheable():
         _mark(name).touch()
 
 
@@ -60,7 +60,7 @@ def _mark(name: str) -> Path:
     return native_code_folder() / f"{name}.compiled"
 
 
-def native_code_can_be_kept() -> bool:
+def native_code_is_cacheable() -> bool:
     """Whether compiled code can be written for the next run."""
     folder = native_code_folder()
     try:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import mujoco
 
-from tiltsim.closed_loop.loop import Loop
+from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.engines.base import Engine, EngineName
 from tiltsim.engines.python_engine import PythonEngine
 
 
-def make_engine(name: EngineName, loop: Loop, model: mujoco.MjModel, data: mujoco.MjData) -> Engine:
+def make_engine(
+    name: EngineName, loop: ClosedLoop, model: mujoco.MjModel, data: mujoco.MjData
+) -> Engine:
     """Build an engine for a model whose parameters already lie in ``data.userdata``."""
     if name == "python":
         return PythonEngine(loop, model, data)

@@ -20,13 +20,13 @@ from numba import carray, cfunc, types
 from numba.core.caching import IndexDataCacheFile
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
-from tiltsim.closed_loop.loop import Loop
+from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.closed_loop.userdata import CONTROL_PERIOD, EVALUATIONS, HEADER_SIZE, RECORDER
 from tiltsim.engines.base import EngineName, check_model
 from tiltsim.engines.cache import (
+    announce_native_code,
+    mark_native_code_compiled,
     native_code_folder,
-    native_code_is_needed,
-    native_code_was_compiled,
 )
 from tiltsim.engines.mjdata_layout import mjdata_layout
 from tiltsim.engines.native_memory import _addresses_at, _array, _bytes_at, _floats_at, _integers_at
@@ -47,13 +47,13 @@ class Callbacks(NamedTuple):
 
 
 @cache
-def compile_callbacks(loop: Loop) -> Callbacks:
+def compile_callbacks(loop: ClosedLoop) -> Callbacks:
     """Compile a loop's control step as a C callback, or load it from the cache on disk.
 
     The cache knows the callback by the values it closes over, so these must pickle to the same
     bytes in every process: module-level functions, numbers and dtypes do.
     """
-    native_code_is_needed(loop.native_name("mujoco"))
+    announce_native_code(loop.native_name("mujoco"))
     controls, hold, signature = loop.controls, loop.held, loop.signature
     observe, watch = loop.observe, loop.watch or watch_nothing
     _register_scalar_functions()
@@ -99,7 +99,7 @@ def compile_callbacks(loop: Loop) -> Callbacks:
                 for index in range(nu):
                     ctrl[index] = nan
 
-    native_code_was_compiled(loop.native_name("mujoco"))
+    mark_native_code_compiled(loop.native_name("mujoco"))
     return Callbacks(control)
 
 
@@ -108,7 +108,7 @@ class NativeEngine:
 
     name: EngineName = "native"
 
-    def __init__(self, loop: Loop, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    def __init__(self, loop: ClosedLoop, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         check_model(loop, model, data)
         self._callbacks = compile_callbacks(loop)
 

@@ -9,32 +9,32 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from tiltsim.closed_loop.loop import Floats, Loop
+from tiltsim.closed_loop.loop import ClosedLoop, Floats
 from tiltsim.engines.cache import (
-    native_code_is_needed,
+    announce_native_code,
 )
 from tiltsim.engines.numba_setup import _INNER, _OPTIONS, _register_scalar_functions, watch_nothing
 from tiltsim.engines.recorder import _record, _recording_is_over
-from tiltsim.equations.ode3 import stepper_of
+from tiltsim.equations.ode3 import make_stepper
 from tiltsim_controllers.mathematics.records import record_dtype
 
 
 @cache
-def compile_stepper(loop: Loop) -> tuple[Any, Any]:
+def compile_stepper(loop: ClosedLoop) -> tuple[Any, Any]:
     """Compile the thesis plant's solver for a loop, or load it from the cache on disk.
 
     Returns ``(advance, record)``. The first takes and returns what
-    `tiltsim.equations.ode3.stepper_of` says, but for the state, which is an array. The second takes
-    in front of that the address of a `Recorder` and a number of samples; it stops where recording
-    is over. Neither holds Python's lock.
+    `tiltsim.equations.ode3.make_stepper` says, but for the state, which is an array. The second
+    takes in front of that the address of a `Recorder` and a number of samples; it stops where
+    recording is over. Neither holds Python's lock.
     """
-    native_code_is_needed(loop.native_name("thesis"))
+    announce_native_code(loop.native_name("thesis"))
     _register_scalar_functions()
     assert loop.equations is not None
     inputs, observe = loop.equations.inputs, loop.equations.observe
     watch = loop.watch or watch_nothing
     limit_exceeded = loop.kind.limit_exceeded
-    stepper = register_jitable(**_INNER)(stepper_of(loop.equations))
+    stepper = register_jitable(**_INNER)(make_stepper(loop.equations))
 
     @njit(nogil=True, **_OPTIONS)
     def advance(  # type: ignore[no-untyped-def]
@@ -81,7 +81,7 @@ def compile_stepper(loop: Loop) -> tuple[Any, Any]:
     return advance, record
 
 
-def native_record(loop: Loop, userdata: Floats) -> tuple[Any, Floats]:
+def native_record(loop: ClosedLoop, userdata: Floats) -> tuple[Any, Floats]:
     """The parameter record and the table of a flight as compiled code reads them."""
     head = loop.record_size
     return userdata[:head].view(record_dtype(loop.parameters))[0], userdata[head:]

@@ -10,13 +10,13 @@ from typing import Any, Final
 from numba.extending import register_jitable
 
 from tiltsim.engines.cache import (
-    native_code_can_be_kept,
+    native_code_is_cacheable,
 )
 from tiltsim.system.locks import locked
 from tiltsim_controllers.mathematics.scalar import scalar, scalar_functions
 
 # Division by zero gives infinity or NaN, as in C; MuJoCo then reports a bad control.
-_OPTIONS: Final = {"error_model": "numpy", "cache": native_code_can_be_kept()}
+_OPTIONS: Final = {"error_model": "numpy", "cache": native_code_is_cacheable()}
 
 
 # What only compiled code calls needs no ways in from Python and C: a sixth less to compile.

@@ -7,7 +7,7 @@ from struct import Struct
 
 import mujoco
 
-from tiltsim.closed_loop.loop import Loop
+from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.closed_loop.userdata import CONTROL_PERIOD, EVALUATIONS, HEADER_SIZE
 from tiltsim.engines.base import Callback, EngineName, check_model
 from tiltsim_controllers.mathematics.records import slotted, unflatten
@@ -18,7 +18,7 @@ class PythonEngine:
 
     name: EngineName = "python"
 
-    def __init__(self, loop: Loop, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    def __init__(self, loop: ClosedLoop, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         check_model(loop, model, data)
         controls, refresh = loop.controls, loop.refresh
         # Parameters never change during a flight: read once what native code reads at every call.

@@ -10,8 +10,8 @@ import numpy as np
 from numba import carray
 from numba.extending import register_jitable
 
-from tiltsim.closed_loop.limits import SINGULAR, WITHIN
-from tiltsim.closed_loop.loop import Floats, Loop
+from tiltsim.closed_loop.limits import SINGULAR, WITHIN_LIMITS
+from tiltsim.closed_loop.loop import ClosedLoop, Floats
 from tiltsim.engines.native_memory import _bytes_at, _floats_at
 from tiltsim.engines.numba_setup import _INNER
 from tiltsim_controllers.mathematics.records import flatten, record_dtype, record_size
@@ -52,7 +52,7 @@ def _sample_is_due(recorder):  # type: ignore[no-untyped-def]
 
 @register_jitable(**_INNER)
 def _record(recorder, time, values, watched, limit_exceeded, table):  # type: ignore[no-untyped-def]
-    """Keep a sample and judge it as `tiltsim.simulation.monitor.Watch` does."""
+    """Keep a sample and judge it as `tiltsim.simulation.monitor.TerminationMonitor` does."""
     head = carray(_bytes_at(recorder), (1,), _RECORDER)
     samples = int(head[0].samples)
     capacity = int(head[0].capacity)
@@ -69,7 +69,7 @@ def _record(recorder, time, values, watched, limit_exceeded, table):  # type: ig
     lost = not finite
     if finite:
         reference, follows_position = head[0].reference, head[0].follows_position
-        lost = limit_exceeded(time, values, reference, table, follows_position) != WITHIN
+        lost = limit_exceeded(time, values, reference, table, follows_position) != WITHIN_LIMITS
     for index in range(len(watched)):
         side = 0.0 if abs(watched[index]) < SINGULAR else copysign(1.0, watched[index])
         if side == 0.0 or side != rest[index]:
@@ -103,14 +103,14 @@ class Recorder:
     interval, last_interval
         Evaluations of the control step between samples, and between the last two.
     reference, follows_position
-        For the limits; see `tiltsim.closed_loop.vehicle_kind.Kind`.
+        For the limits; see `tiltsim.closed_loop.vehicle_kind.VehicleKind`.
     watched
         The numbers that the loop watches as they are now: each must keep its sign.
     """
 
     def __init__(
         self,
-        loop: Loop,
+        loop: ClosedLoop,
         samples: int,
         interval: int,
         last_interval: int,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltsim.system.interrupts import interrupts_kept
+from tiltsim.system.interrupts import reraise_swallowed_interrupts
 
 if TYPE_CHECKING:
     from tiltsim.closed_loop.loop import ControlSetup, Floats
@@ -22,13 +22,13 @@ from tiltsim.closed_loop.loop import ControlSetup, Floats
 from tiltsim.engines.numba_setup import _OPTIONS, _register_scalar_functions
 from tiltsim_controllers.mathematics.records import record_dtype, record_size
 
-ROWS_WORTH_COMPILING: Final = 20_000
+MIN_ROWS_TO_COMPILE: Final = 20_000
 """Rows that one process evaluates in Python before it loads or compiles native code for them."""
 
 _evaluated: dict[Callable[..., tuple[float, ...]], int] = {}
 
 
-def evaluate_rows(
+def evaluate_over_samples(
     function: Callable[..., tuple[float, ...]],
     width: int,
     time: Floats,
@@ -41,11 +41,11 @@ def evaluate_rows(
     on floats has no result, as beside a state of a lost flight, Python's whole row is NaN.
     """
     evaluated = _evaluated[function] = _evaluated.get(function, 0) + len(time)
-    if evaluated >= ROWS_WORTH_COMPILING and len(time):
+    if evaluated >= MIN_ROWS_TO_COMPILE and len(time):
         pass
 
-        with interrupts_kept():
-            return evaluate_natively(function, time, states, setup)
+        with reraise_swallowed_interrupts():
+            return evaluate_samples_natively(function, time, states, setup)
     parameters, table = setup.parameters, setup.table
     rows = np.full((len(time), width), nan)
     for row, t, state in zip(rows, time.tolist(), states.tolist()):
@@ -71,10 +71,10 @@ def _compile_rows(function: Callable[..., tuple[float, ...]]) -> Any:
     return rows
 
 
-def evaluate_natively(
+def evaluate_samples_natively(
     function: Callable[..., tuple[float, ...]], time: Floats, states: Floats, setup: ControlSetup
 ) -> Floats:
-    """See `tiltsim.engines.rows.evaluate_rows`, which takes at least one row to here."""
+    """See `tiltsim.engines.rows.evaluate_over_samples`, which takes at least one row to here."""
     record: Any = type(setup.parameters)
     head = record_size(record)
     parameters = setup.userdata[:head].view(record_dtype(record))[0]

@@ -12,9 +12,9 @@ from pydantic import ValidationError
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.document import without_none
-from tiltsim.scenario.messages import one_line
+from tiltsim.scenario.messages import one_line_message
 from tiltsim.sweeps.definition import Definition
-from tiltsim.sweeps.loading import load_definition
+from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.plan import Plan
 from tiltsim.sweeps.tables import NormalAxis, SeedAxis, Sweep, UniformAxis
 
@@ -44,7 +44,7 @@ class Domain:
         try:
             sweep = Sweep.model_validate(document)
         except ValidationError as error:
-            raise InputError(f"domain: {one_line(error, document, Sweep)}") from None
+            raise InputError(f"domain: {one_line_message(error, document, Sweep)}") from None
         base = without_none(scenario.model_dump(mode="json"))
         base.pop("expect", None)
         self._plan = _plan(sweep, base)
@@ -56,7 +56,7 @@ class Domain:
 
         Raises `InputError` where the file is no sweep along axes.
         """
-        definition = load_definition(path)
+        definition = load_sweep(path)
         sweep = Sweep.model_validate(definition.sweep)
         if sweep.bisect is not None:
             raise InputError(f"{definition.address}: bisect: a search is nothing to draw from")

@@ -22,12 +22,12 @@ from tiltsim.env.domain import Domain
 from tiltsim.errors import InputError
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
-from tiltsim.plants.command import Command, Observation, Orders, checked
+from tiltsim.plants.command import CheckedCommand, Command, Observation, checked
 from tiltsim.plants.commanded_plant import CommandedPlant
-from tiltsim.plants.user_controller import commanded_scenario
+from tiltsim.plants.user_controller import with_external_commands
 from tiltsim.scenario.loading import load_scenario, parse_scenario
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.simulation.monitor import Watch
+from tiltsim.simulation.monitor import TerminationMonitor
 
 Observed = dict[str, Floats]
 Reward = Callable[[Mapping[str, Floats], Floats], float]
@@ -153,9 +153,9 @@ class TiltrotorEnv(dm_env.Environment):  # type: ignore[misc]
     def _commanded(scenario: Scenario, control_timestep: float | None) -> Scenario:
         name = "tiltsim.env.TiltrotorEnv"
         if control_timestep is None:
-            return commanded_scenario(scenario, name)
+            return with_external_commands(scenario, name)
         simulation = {"control_timestep": control_timestep}
-        return commanded_scenario(scenario, name, simulation)
+        return with_external_commands(scenario, name, simulation)
 
     def _start(
         self, base: Scenario, domain: Domain | None, reward: Reward, max_position_error: float
@@ -216,7 +216,7 @@ class TiltrotorEnv(dm_env.Environment):  # type: ignore[misc]
         simulation = self._scenario.simulation
         self._steps_left = simulation.steps
         self._steps_each = max(1, simulation.control_steps)
-        self._watch = Watch(self._scenario)
+        self._watch = TerminationMonitor(self._scenario)
         self._end = None
         self._samples = [self._sample(self._plant)]
         self._wall_time = 0.0
@@ -234,7 +234,7 @@ class TiltrotorEnv(dm_env.Environment):  # type: ignore[misc]
         rotors, tilts = told[:4].tolist(), told[4:].tolist()
         steps = min(self._steps_each, self._steps_left)
         start = perf_counter()
-        self._plant.apply(Orders("thrusts", tuple(rotors), tuple(tilts) if tilts else None))
+        self._plant.apply(CheckedCommand("thrusts", tuple(rotors), tuple(tilts) if tilts else None))
         self._plant.advance(steps)
         self._wall_time += perf_counter() - start
         self._steps_left -= steps

@@ -224,7 +224,7 @@ def settled_quadrotor(state: list[float], mechanics: Mechanics) -> list[float]:
     return state
 
 
-DRIVEN: Final[dict[str, Driven]] = {
+ACTUATOR_PLANTS: Final[dict[str, Driven]] = {
     "tiltrotor": Driven(
         motion=26,
         rotor_states=8,

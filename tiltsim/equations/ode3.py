@@ -27,7 +27,7 @@ def as_it_is(state: list[float], parameters: Any) -> list[float]:
     return state
 
 
-def stepper_of(equations: Equations) -> Stepper:
+def make_stepper(equations: Equations) -> Stepper:
     """The solver around a loop's equations, as scalar code.
 
     The stepper integrates ``steps`` fixed steps with ode3, the third-order method of Bogacki and

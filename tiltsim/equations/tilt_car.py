@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tiltsim_controllers.mathematics.scalar import Triple, scalar
-from tiltsim_controllers.tilt_car.vehicle import TiltCar, acceleration, yaw_share
+from tiltsim_controllers.tilt_car.vehicle import TiltCar, acceleration, counter_yaw_per_tilt
 
 
 @scalar
 def yaw_of(alpha: float, heading: float, car: TiltCar) -> float:
     """Yaw (rad) at a tilt angle, ``heading`` at zero tilt; Eq. (2)."""
-    return heading - yaw_share(car) * alpha
+    return heading - counter_yaw_per_tilt(car) * alpha
 
 
 @scalar

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.laws.attitude_altitude import TILTROTOR
-from tiltsim.laws.commanded import COMMANDED
+from tiltsim.laws.commanded import COMMANDED_LOOPS
 from tiltsim.laws.full_pose import FULL_POSE
 from tiltsim.laws.gait_feedforward import GAIT_FEEDFORWARD
 from tiltsim.laws.layers.actuation import with_actuation
@@ -20,10 +20,10 @@ from tiltsim.laws.tilt_car_third_derivative import THIRD_DERIVATIVE
 from tiltsim.laws.yaw_position import YAW_POSITION
 
 if TYPE_CHECKING:
-    from tiltsim.closed_loop.loop import ControlSetup, Loop
+    from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
     from tiltsim.scenario.scenario import Scenario
 
-LOOPS: Final[dict[str, Loop]] = {
+LOOPS: Final[dict[str, ClosedLoop]] = {
     "attitude_altitude": TILTROTOR,
     "gait_feedforward": GAIT_FEEDFORWARD,  # the same law with gait_rate_feedforward = true
     "full_pose": FULL_POSE,
@@ -34,13 +34,13 @@ LOOPS: Final[dict[str, Loop]] = {
     "tilt_car_fourth_derivative": FOURTH_DERIVATIVE,
     "tilt_car_planned_direction": PLANNED_DIRECTION,
 }
-"""Loops by the name of their law; see `tiltsim.scenario.law_table.LawTable.loop_name`."""
+"""Loops by the name of their law; see `tiltsim.scenario.law_table.ControllerTable.loop_name`."""
 
 
-def loop_of(scenario: Scenario) -> Loop:
+def loop_of(scenario: Scenario) -> ClosedLoop:
     """The loop that a scenario flies: its law, within layers for what is not ideal."""
     own, latency = scenario.controller.law == "python", scenario.simulation.latency_steps
-    loop = COMMANDED[scenario.vehicle.model] if own else LOOPS[scenario.controller.loop_name]
+    loop = COMMANDED_LOOPS[scenario.vehicle.model] if own else LOOPS[scenario.controller.loop_name]
     supervisor = getattr(scenario.controller, "supervisor", None)
     if supervisor is not None:
         loop = with_supervisor(loop, supervisor.strategy)
@@ -49,7 +49,9 @@ def loop_of(scenario: Scenario) -> Loop:
         loop = with_actuation(loop, 0 if own else latency)
     if scenario.has_air:
         loop = with_air(loop)
-    by_controls = scenario.simulation.plant == "thesis" and not scenario.does_as_told
+    by_controls = (
+        scenario.simulation.plant == "thesis" and not scenario.has_ideal_actuators_in_still_air
+    )
     return on_equations(loop) if by_controls else loop
 
 

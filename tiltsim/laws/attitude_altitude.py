@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tiltsim.closed_loop.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Floats, SignCheck, Sizes
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.scenario.tiltrotor_laws import AttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
@@ -32,18 +32,18 @@ from tiltsim_controllers.vehicle.parameters import drag_ratio
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
 from tiltsim.laws.tiltrotor import (
-    gait_singularity,
-    initial_rotor_speeds,
+    determinant_check,
+    gait_servo_commands,
+    initial_signed_rotor_speeds,
     observe_tiltrotor,
-    planned_servo_commands,
     reference_columns,
     refreshed_controls,
-    regularity,
-    rotor_spins,
-    rotor_stops,
+    rotor_speed_checks,
+    rotor_speeds_along_spin,
     rotor_thrust_controls,
+    scaled_determinant,
     servo_lead,
-    singular_matrix,
+    singularity_columns,
     tiltrotor_state,
 )
 
@@ -51,7 +51,7 @@ from tiltsim.laws.tiltrotor import (
 class ControlParameters(NamedTuple):
     """The head of `userdata`: what the control step of a flight needs to know."""
 
-    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
     servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
     law: Parameters
     supervisor: Supervisor = Supervisor()
@@ -74,7 +74,7 @@ def tiltrotor_controls(
     law = parameters.law
     state = tiltrotor_state(qpos, qvel, act)
     return (
-        *planned_servo_commands(time, parameters.servo_lead, law.gait, table),
+        *gait_servo_commands(time, parameters.servo_lead, law.gait, table),
         *rotor_thrust_controls(act),
         *rotor_accelerations(time, state, law, table),
     )
@@ -86,7 +86,7 @@ def law_rates(
     state: State,
     qvel: Sequence[float],
     act: Sequence[float],
-    governor: Triple,
+    supervisor_motion: Triple,
     parameters: ControlParameters,
     table: Sequence[float],
 ) -> Quad:
@@ -99,7 +99,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     assert isinstance(controller, AttitudeAltitudeController)
     vehicle = scenario.rotorcraft.resolve()
     gait = scenario.gait.plan(vehicle)
-    reference, table = scenario.reference_and_table()
+    reference, table = scenario.reference_and_knots()
     parameters = ControlParameters(
         signature,
         servo_lead(scenario.rotorcraft.tilt_servo),
@@ -117,7 +117,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
 
 
 @scalar
-def references_in_force(
+def reference_values(
     time: float, state: State, parameters: ControlParameters, table: Sequence[float]
 ) -> tuple[float, ...]:
     """`REFERENCE_COLUMNS` and `TILT_REFERENCE_COLUMNS` at a time and state of the law."""
@@ -132,20 +132,20 @@ def references_in_force(
 
 
 @scalar
-def references_under(
+def supervised_reference_values(
     time: float,
     state: State,
-    governor: Triple,
+    supervisor_motion: Triple,
     parameters: ControlParameters,
     table: Sequence[float],
 ) -> tuple[float, ...]:
     """`REFERENCE_COLUMNS`, for `tiltsim.laws.layers.supervision`."""
-    return references_in_force(time, state, parameters, table)[:6]
+    return reference_values(time, state, parameters, table)[:6]
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    columns = reference_columns(references_in_force, STATE_FIELDS, samples, setup)
-    return columns | gait_singularity(samples, setup.parameters.law.vehicle)
+    columns = reference_columns(reference_values, STATE_FIELDS, samples, setup)
+    return columns | singularity_columns(samples, setup.parameters.law.vehicle)
 
 
 @scalar
@@ -157,17 +157,19 @@ def watch_tiltrotor(
     As published, the factor ``2 |varpi|`` stands in one row alone, and a rotor at rest is harmless.
     """
     law = parameters.law
-    matrix = regularity(values, law.vehicle)
+    matrix = scaled_determinant(values, law.vehicle)
     if law.decoupling == EXACT_DECOUPLING:
-        spin_1, spin_2, spin_3, spin_4 = rotor_spins(values)
+        spin_1, spin_2, spin_3, spin_4 = rotor_speeds_along_spin(values)
         return matrix, spin_1, spin_2, spin_3, spin_4
     return matrix, 1.0, 1.0, 1.0, 1.0
 
 
-def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Watched, ...]:
+def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[SignCheck, ...]:
     law = setup.parameters.law
-    matrix = singular_matrix(sample, law.vehicle)
-    return (matrix, *rotor_stops(sample)) if law.decoupling == EXACT_DECOUPLING else (matrix,)
+    matrix = determinant_check(sample, law.vehicle)
+    return (
+        (matrix, *rotor_speed_checks(sample)) if law.decoupling == EXACT_DECOUPLING else (matrix,)
+    )
 
 
 @scalar
@@ -217,7 +219,7 @@ def follows_position(scenario: Scenario) -> bool:
     return controller.decoupler != "none"
 
 
-TILTROTOR: Final = Loop(
+TILTROTOR: Final = ClosedLoop(
     kind=ROTORCRAFT,
     model="tiltrotor",
     sizes=Sizes(qpos=11, qvel=10, act=4, ctrl=12),
@@ -225,7 +227,7 @@ TILTROTOR: Final = Loop(
     controls=tiltrotor_controls,
     refresh=refreshed_controls,
     setup=_setup,
-    initial_activations=lambda scenario, _setup: initial_rotor_speeds(scenario),
+    initial_activations=lambda scenario, _setup: initial_signed_rotor_speeds(scenario),
     observe=observe_tiltrotor,
     derive=_derive,
     watched=_watched,
@@ -235,7 +237,7 @@ TILTROTOR: Final = Loop(
         inputs=equation_inputs,
         inputs_size=4,
         rates=equation_rates,
-        initial=lambda s, _setup: initial_state(s, initial_rotor_speeds(s)),
+        initial=lambda s, _setup: initial_state(s, initial_signed_rotor_speeds(s)),
         observe=observe_equations,
     ),
 )

@@ -1,8 +1,8 @@
 """Vehicles that do what they are told from outside: by a user's controller, or an environment.
 
-Their law is to do what `Told` says; layers around it make of that what they make of any law's
-commands. Both vehicles have the speeds of their rotors as states here, so that they can be told
-speeds, thrusts or accelerations.
+Their law is to do what `HeldCommand` says; layers around it make of that what they make of any
+law's commands. Both vehicles have the speeds of their rotors as states here, so that they can be
+told speeds, thrusts or accelerations.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ControlSetup, Floats, Loop, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Floats, Sizes
 from tiltsim.laws.full_pose import TILT_COMMANDS
 from tiltsim.laws.quadrotor import references, rigid_body_state, upright_margin
 from tiltsim.laws.tiltrotor import (
     TILT_REFERENCE_COLUMNS,
-    gait_singularity,
-    initial_rotor_speeds,
+    gait_servo_commands,
+    initial_signed_rotor_speeds,
     observe_tiltrotor,
-    planned_servo_commands,
     refreshed_controls,
     rotor_thrust_controls,
     servo_lead,
+    singularity_columns,
 )
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.gaits import GaitParameters
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
 
 
-class Told(NamedTuple):
+class HeldCommand(NamedTuple):
     """What the vehicle was told last."""
 
     tilt_1: float = 0.0  # rad, for the servos
@@ -51,12 +51,14 @@ class Told(NamedTuple):
 class ControlParameters(NamedTuple):
     """The head of `userdata`."""
 
-    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
     servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
     vehicle: Vehicle
     gait: GaitParameters
     reference: ReferenceParameters
-    told: Told = Told()  # changes with every command, in the plant's copy of the parameters
+    told: HeldCommand = (
+        HeldCommand()
+    )  # changes with every command, in the plant's copy of the parameters
 
 
 @scalar
@@ -103,20 +105,20 @@ def refreshed_quadrotor_controls(ctrl: Sequence[float], act: Sequence[float]) ->
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     vehicle = scenario.rotorcraft.resolve()
     gait = scenario.gait.plan(vehicle)
-    reference, table = scenario.reference_and_table()
+    reference, table = scenario.reference_and_knots()
     lead = servo_lead(scenario.rotorcraft.tilt_servo)
-    tilts = planned_servo_commands(0.0, lead, gait.parameters, table)
-    told = Told(*tilts)
+    tilts = gait_servo_commands(0.0, lead, gait.parameters, table)
+    told = HeldCommand(*tilts)
     return ControlSetup(
         ControlParameters(signature, lead, vehicle, gait.parameters, reference, told), table
     )
 
 
-def with_told(parameters: Any, told: Told) -> Any:
+def with_command(parameters: Any, told: HeldCommand) -> Any:
     """Parameters of a vehicle under commands, whatever the layers around it, told otherwise."""
     if isinstance(parameters, ControlParameters):
         return parameters._replace(told=told)
-    return parameters._replace(law=with_told(parameters.law, told))
+    return parameters._replace(law=with_command(parameters.law, told))
 
 
 def commanded_parameters(parameters: Any) -> ControlParameters:
@@ -157,7 +159,7 @@ def _derive_tiltrotor(samples: Mapping[str, Floats], setup: ControlSetup) -> dic
     return {
         **_references(samples, setup),
         **{column: samples[name] for column, name in told},
-        **gait_singularity(samples, setup.parameters.vehicle),
+        **singularity_columns(samples, setup.parameters.vehicle),
     }
 
 
@@ -173,7 +175,7 @@ def _follows_position(scenario: Scenario) -> bool:
     return scenario.reference.kind != "attitude_altitude"
 
 
-TILTROTOR: Final = Loop(
+TILTROTOR: Final = ClosedLoop(
     kind=ROTORCRAFT,
     model="tiltrotor",
     sizes=Sizes(qpos=11, qvel=10, act=4, ctrl=12),
@@ -181,7 +183,7 @@ TILTROTOR: Final = Loop(
     controls=commanded_tiltrotor_controls,
     refresh=refreshed_controls,
     setup=_setup,
-    initial_activations=lambda scenario, _setup: initial_rotor_speeds(scenario),
+    initial_activations=lambda scenario, _setup: initial_signed_rotor_speeds(scenario),
     observe=observe_commanded_tiltrotor,
     derive=_derive_tiltrotor,
     watched=lambda _sample, _setup: (),
@@ -191,7 +193,7 @@ TILTROTOR: Final = Loop(
 )
 """The tiltrotor under commands; what its servos are told is part of a sample."""
 
-QUADROTOR: Final = Loop(
+QUADROTOR: Final = ClosedLoop(
     kind=ROTORCRAFT,
     model="quadrotor",
     sizes=Sizes(qpos=7, qvel=6, act=4, ctrl=8),
@@ -199,14 +201,14 @@ QUADROTOR: Final = Loop(
     controls=commanded_quadrotor_controls,
     refresh=refreshed_quadrotor_controls,
     setup=_setup,
-    initial_activations=lambda scenario, _setup: initial_rotor_speeds(scenario),
+    initial_activations=lambda scenario, _setup: initial_signed_rotor_speeds(scenario),
     observe=observe_commanded_quadrotor,
     derive=_derive_quadrotor,
     watched=lambda _sample, _setup: (),
     follows_position=_follows_position,
-    flies_gait=False,
+    uses_gait=False,
 )
 """The quadrotor under commands."""
 
-COMMANDED: Final[dict[str, Loop]] = {"tiltrotor": TILTROTOR, "quadrotor": QUADROTOR}
+COMMANDED_LOOPS: Final[dict[str, ClosedLoop]] = {"tiltrotor": TILTROTOR, "quadrotor": QUADROTOR}
 """Loops under commands, by the vehicle's model."""

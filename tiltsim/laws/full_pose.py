@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tiltsim.closed_loop.loop import ControlSetup, Equations, Floats, Loop, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Floats, Sizes
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.laws.quadrotor import references
 from tiltsim.laws.tiltrotor import (
-    gait_singularity,
-    initial_rotor_speeds,
+    initial_signed_rotor_speeds,
     observe_tiltrotor,
     refreshed_controls,
-    rotor_spins,
-    rotor_stops,
+    rotor_speed_checks,
+    rotor_speeds_along_spin,
     rotor_thrust_controls,
     servo_lead,
+    singularity_columns,
     tiltrotor_state,
 )
 from tiltsim.scenario.tiltrotor_laws import FullPoseController
@@ -34,7 +34,7 @@ TILT_COMMANDS: Final = tuple(f"tilt_command_{rotor}" for rotor in (1, 2, 3, 4))
 class ControlParameters(NamedTuple):
     """The head of `userdata`."""
 
-    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
     servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
     law: Parameters
 
@@ -83,14 +83,14 @@ def observe_full_pose(
 @scalar
 def watch_rotor_stops(values: Sequence[float], parameters: ControlParameters) -> Quad:
     """The rotor speeds along their spin."""
-    return rotor_spins(values)
+    return rotor_speeds_along_spin(values)
 
 
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, FullPoseController)
     vehicle = scenario.rotorcraft.resolve()
-    reference, table = scenario.reference_and_table()
+    reference, table = scenario.reference_and_knots()
     law = Parameters(
         vehicle,
         controller.resolve_gains(),
@@ -110,7 +110,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     return {
         **references(samples, wanted, setup.table, attitude),
         **{f"alpha_ref_{i}": samples[f"tilt_command_{i}"] for i in (1, 2, 3, 4)},
-        **gait_singularity(samples, law.vehicle),
+        **singularity_columns(samples, law.vehicle),
     }
 
 
@@ -158,7 +158,7 @@ def observe_equations(
     )
 
 
-FULL_POSE: Final = Loop(
+FULL_POSE: Final = ClosedLoop(
     kind=ROTORCRAFT,
     model="tiltrotor",
     sizes=Sizes(qpos=11, qvel=10, act=8, ctrl=16),
@@ -166,17 +166,17 @@ FULL_POSE: Final = Loop(
     controls=full_pose_controls,
     refresh=refreshed_controls,
     setup=_setup,
-    initial_activations=lambda s, _setup: (*initial_rotor_speeds(s), *initial_tilts(s)[0]),
+    initial_activations=lambda s, _setup: (*initial_signed_rotor_speeds(s), *initial_tilts(s)[0]),
     observe=observe_full_pose,
     derive=_derive,
-    watched=lambda sample, _setup: rotor_stops(sample),
+    watched=lambda sample, _setup: rotor_speed_checks(sample),
     watch=watch_rotor_stops,
     equations=Equations(
         inputs=equation_inputs,
         inputs_size=8,
         rates=equation_rates,
         initial=lambda s, _setup: (
-            *initial_state(s, initial_rotor_speeds(s)),
+            *initial_state(s, initial_signed_rotor_speeds(s)),
             *initial_tilts(s)[0],
         ),
         observe=observe_equations,

@@ -5,22 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tiltsim.closed_loop.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Floats, SignCheck, Sizes
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.laws.attitude_altitude import follows_position
 from tiltsim.laws.tiltrotor import (
-    gait_singularity,
-    initial_rotor_speeds,
+    determinant_check,
+    gait_servo_commands,
+    initial_signed_rotor_speeds,
     observe_tiltrotor,
-    planned_servo_commands,
     reference_columns,
     refreshed_controls,
-    regularity,
-    rotor_spins,
-    rotor_stops,
+    rotor_speed_checks,
+    rotor_speeds_along_spin,
     rotor_thrust_controls,
+    scaled_determinant,
     servo_lead,
-    singular_matrix,
+    singularity_columns,
     tiltrotor_state,
 )
 from tiltsim.scenario.tiltrotor_laws import AttitudeAltitudeController
@@ -29,7 +29,7 @@ from tiltsim_controllers.gaits import tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import STATE_FIELDS, State
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.gait_feedforward import INTEGRAL_FIELDS, Parameters, tracking_inputs
-from tiltsim_controllers.laws.supervisor import AT_REST
+from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST
 from tiltsim_controllers.mathematics.scalar import Triple, scalar
 from tiltsim_controllers.references.trajectories import position_reference
 
@@ -42,7 +42,7 @@ TILT_RATE_COLUMNS: Final = tuple(f"alpha_rate_{rotor}" for rotor in (1, 2, 3, 4)
 class ControlParameters(NamedTuple):
     """The head of `userdata`."""
 
-    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
     servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
     law: Parameters
 
@@ -53,15 +53,15 @@ def law_rates(
     state: State,
     qvel: Sequence[float],
     act: Sequence[float],
-    governor: Triple,
+    supervisor_motion: Triple,
     parameters: ControlParameters,
     table: Sequence[float],
 ) -> tuple[float, ...]:
     """The law's part of the controls: rotor accelerations, rates of the integrals."""
     tilt_rates, integrals = (qvel[6], qvel[7], qvel[8], qvel[9]), (act[4], act[5], act[6])
-    return tracking_inputs(*(time, state, tilt_rates, integrals, parameters.law, table, governor))[
-        :7
-    ]
+    return tracking_inputs(
+        *(time, state, tilt_rates, integrals, parameters.law, table, supervisor_motion)
+    )[:7]
 
 
 @scalar
@@ -77,9 +77,9 @@ def gait_feedforward_controls(
     law = parameters.law
     state = tiltrotor_state(qpos, qvel, act)
     return (
-        *planned_servo_commands(time, parameters.servo_lead, law.gait, table),
+        *gait_servo_commands(time, parameters.servo_lead, law.gait, table),
         *rotor_thrust_controls(act),
-        *law_rates(time, state, qvel, act, AT_REST, parameters, table),
+        *law_rates(time, state, qvel, act, SUPERVISOR_AT_REST, parameters, table),
     )
 
 
@@ -88,7 +88,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     assert isinstance(controller, AttitudeAltitudeController)
     vehicle = scenario.rotorcraft.resolve()
     gait = scenario.gait.plan(vehicle)
-    reference, table = scenario.reference_and_table()
+    reference, table = scenario.reference_and_knots()
     law = Parameters(
         vehicle=vehicle,
         gains=controller.resolve_gains(),
@@ -97,7 +97,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
         max_angular_acceleration=controller.max_angular_acceleration,
         anticipation=min(controller.anticipation, 0.5 * gait.shortest_line),
         # The thesis' own equations leave the gyroscopic torque out.
-        ingredients=controller.resolve_ingredients(
+        ingredients=controller.resolve_feedforward_terms(
             gyroscopic_torque=scenario.simulation.plant != "thesis"
         ),
         gait=gait.parameters,
@@ -110,10 +110,10 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
 
 
 @scalar
-def references_under(
+def supervised_reference_values(
     time: float,
     state: Sequence[float],
-    governor: Triple,
+    supervisor_motion: Triple,
     parameters: ControlParameters,
     table: Sequence[float],
 ) -> tuple[float, float, float, float, float, float]:
@@ -131,18 +131,24 @@ def references_under(
         (state[24], state[25], state[26]),
         law,
         table,
-        governor,
+        supervisor_motion,
     )
     return x, y, z, roll, pitch, yaw
 
 
 @scalar
-def references_in_force(
+def reference_values(
     time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
 ) -> tuple[float, ...]:
     """Columns of references at a time: the state is `SEEN`."""
     a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, parameters.law.gait, table)
-    return (*references_under(time, state, AT_REST, parameters, table), a1, a2, a3, a4)
+    return (
+        *supervised_reference_values(time, state, SUPERVISOR_AT_REST, parameters, table),
+        a1,
+        a2,
+        a3,
+        a4,
+    )
 
 
 SEEN: Final = (*STATE_FIELDS, *TILT_RATE_COLUMNS, *INTEGRAL_FIELDS)
@@ -150,8 +156,8 @@ SEEN: Final = (*STATE_FIELDS, *TILT_RATE_COLUMNS, *INTEGRAL_FIELDS)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    columns = reference_columns(references_in_force, SEEN, samples, setup)
-    return columns | gait_singularity(samples, setup.parameters.law.vehicle)
+    columns = reference_columns(reference_values, SEEN, samples, setup)
+    return columns | singularity_columns(samples, setup.parameters.law.vehicle)
 
 
 @scalar
@@ -167,12 +173,12 @@ def watch_gait_feedforward(
     values: Sequence[float], parameters: ControlParameters
 ) -> tuple[float, float, float, float, float]:
     """The determinant of the decoupling matrix, and the rotor speeds with which it vanishes."""
-    spin_1, spin_2, spin_3, spin_4 = rotor_spins(values)
-    return regularity(values, parameters.law.vehicle), spin_1, spin_2, spin_3, spin_4
+    spin_1, spin_2, spin_3, spin_4 = rotor_speeds_along_spin(values)
+    return scaled_determinant(values, parameters.law.vehicle), spin_1, spin_2, spin_3, spin_4
 
 
-def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Watched, ...]:
-    return (singular_matrix(sample, setup.parameters.law.vehicle), *rotor_stops(sample))
+def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[SignCheck, ...]:
+    return (determinant_check(sample, setup.parameters.law.vehicle), *rotor_speed_checks(sample))
 
 
 @scalar
@@ -230,7 +236,7 @@ def observe_equations(
     )
 
 
-GAIT_FEEDFORWARD: Final = Loop(
+GAIT_FEEDFORWARD: Final = ClosedLoop(
     kind=ROTORCRAFT,
     model="tiltrotor",
     sizes=Sizes(qpos=11, qvel=10, act=7, ctrl=15),
@@ -238,7 +244,7 @@ GAIT_FEEDFORWARD: Final = Loop(
     controls=gait_feedforward_controls,
     refresh=refreshed_controls,
     setup=_setup,
-    initial_activations=lambda s, _setup: (*initial_rotor_speeds(s), 0.0, 0.0, 0.0),
+    initial_activations=lambda s, _setup: (*initial_signed_rotor_speeds(s), 0.0, 0.0, 0.0),
     observe=observe_gait_feedforward,
     derive=_derive,
     watched=_watched,
@@ -247,7 +253,12 @@ GAIT_FEEDFORWARD: Final = Loop(
         inputs=equation_inputs,
         inputs_size=7,
         rates=equation_rates,
-        initial=lambda s, _setup: (*initial_state(s, initial_rotor_speeds(s)), 0.0, 0.0, 0.0),
+        initial=lambda s, _setup: (
+            *initial_state(s, initial_signed_rotor_speeds(s)),
+            0.0,
+            0.0,
+            0.0,
+        ),
         observe=observe_equations,
     ),
     law_states=3,

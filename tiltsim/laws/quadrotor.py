@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Floats, SignCheck, Sizes
 from tiltsim.equations.quadrotor import initial_state
 from tiltsim.laws.tiltrotor import REFERENCE_COLUMNS, TILT_REFERENCE_COLUMNS
 from tiltsim.vehicles.rotorcraft import OBSERVED_FIELDS, ROTORCRAFT
@@ -129,7 +129,7 @@ def observe_extended_quadrotor(
 
 
 @scalar
-def level_thrust(values: Sequence[float]) -> float:
+def thrust_tilt_cosine(values: Sequence[float]) -> float:
     """The cosine of the thrust axis' tilt, from what `observe_quadrotor` gives."""
     return cos(values[6]) * cos(values[7])
 
@@ -155,9 +155,9 @@ def equations(
 
 
 @scalar
-def watch_attitude(values: Sequence[float], parameters: object) -> tuple[float]:
-    """What `attitude_watched` watches, from what `observe_quadrotor` gives."""
-    return (level_thrust(values),)
+def thrust_axis_value(values: Sequence[float], parameters: object) -> tuple[float]:
+    """What `thrust_axis_check` watches, from what `observe_quadrotor` gives."""
+    return (thrust_tilt_cosine(values),)
 
 
 def extended_loop(
@@ -167,16 +167,16 @@ def extended_loop(
     *,
     setup: Callable[[Scenario, float], ControlSetup],
     derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]],
-    watched: Callable[[Mapping[str, float], ControlSetup], tuple[Watched, ...]],
+    watched: Callable[[Mapping[str, float], ControlSetup], tuple[SignCheck, ...]],
     watch: Callable[..., tuple[float, ...]],
     own_columns: Mapping[str, str] | None = None,
     follows_position: bool = True,
-) -> Loop:
-    """A loop around a law that integrates its thrust twice; see `tiltsim.closed_loop.loop.Loop`.
+) -> ClosedLoop:
+    """Close the loop around a law that integrates its thrust twice.
 
     ``own_columns`` are those beyond the `EXTENSION_COLUMNS`, with their units.
     """
-    return Loop(
+    return ClosedLoop(
         kind=ROTORCRAFT,
         model="quadrotor",
         sizes=SIZES,
@@ -190,7 +190,7 @@ def extended_loop(
         derive=derive,
         watched=watched,
         watch=watch,
-        flies_gait=False,
+        uses_gait=False,
         law_states=2,
         law_fields=LAW_FIELDS,
         extra_columns={**EXTENSION_COLUMNS, **(own_columns or {})},
@@ -223,7 +223,9 @@ def upright_margin(samples: Mapping[str, Floats]) -> Floats:
     return np.asarray(np.arcsin(np.clip(upright, -1.0, 1.0)))
 
 
-def extended_singularity(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict[str, Floats]:
+def extended_singularity_columns(
+    samples: Mapping[str, Floats], vehicle: Vehicle
+) -> dict[str, Floats]:
     """Exact and published determinant of the yaw-position law, and the margin to the exact one."""
     attitude = samples["roll"], samples["pitch"]
     exact = normalized_determinant(*attitude, samples["extension_thrust"], vehicle)
@@ -235,11 +237,11 @@ def extended_singularity(samples: Mapping[str, Floats], vehicle: Vehicle) -> dic
     }
 
 
-def attitude_watched(sample: Mapping[str, float]) -> Watched:
+def thrust_axis_check(sample: Mapping[str, float]) -> SignCheck:
     """The cosine of the thrust axis' tilt, zero at a roll or pitch of 90 degrees."""
     roll, pitch = sample["roll"], sample["pitch"]
-    return Watched(
-        level_thrust([sample[name] for name in OBSERVED_FIELDS]),
+    return SignCheck(
+        thrust_tilt_cosine([sample[name] for name in OBSERVED_FIELDS]),
         "the decoupling matrix became singular: the thrust axis came level, "
         f"at roll = {roll:.3g} rad, pitch = {pitch:.3g} rad",
     )

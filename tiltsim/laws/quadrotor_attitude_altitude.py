@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ControlSetup, Floats, Loop, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Floats, Sizes
 from tiltsim.equations.quadrotor import equations_of_motion, rigid_body
 from tiltsim.laws.quadrotor import (
-    attitude_watched,
     equations,
     observe_equations,
     observe_quadrotor,
     references,
     rigid_body_state,
+    thrust_axis_check,
+    thrust_axis_value,
     upright_margin,
-    watch_attitude,
 )
 from tiltsim.scenario.quadrotor_laws import QuadrotorAttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 class ControlParameters(NamedTuple):
     """The head of `userdata`."""
 
-    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
     vehicle: Vehicle
     gains: Gains
     reference: ReferenceParameters
@@ -121,7 +121,7 @@ def observe_in_equations(
     return observe_equations(state, inputs, parameters.vehicle)
 
 
-QUADROTOR_ATTITUDE_ALTITUDE: Final = Loop(
+QUADROTOR_ATTITUDE_ALTITUDE: Final = ClosedLoop(
     kind=ROTORCRAFT,
     model="quadrotor",
     sizes=Sizes(qpos=7, qvel=6, act=4, ctrl=8),
@@ -133,10 +133,10 @@ QUADROTOR_ATTITUDE_ALTITUDE: Final = Loop(
     observe=observe_quadrotor,
     observes_controls=True,
     derive=_derive,
-    watched=lambda sample, _setup: (attitude_watched(sample),),
-    watch=watch_attitude,
+    watched=lambda sample, _setup: (thrust_axis_check(sample),),
+    watch=thrust_axis_value,
     follows_position=lambda _scenario: False,
     equations=equations(equation_inputs, 4, equation_rates, observe_in_equations),
-    flies_gait=False,
+    uses_gait=False,
 )
 """The attitude-altitude law around the quadrotor."""

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 import tiltsim_controllers.laws.yaw_position as yaw_position
-from tiltsim.closed_loop.loop import ControlSetup, Floats, Watched
+from tiltsim.closed_loop.loop import ControlSetup, Floats, SignCheck
 from tiltsim.equations.quadrotor import extended_equations_of_motion, law_state
 from tiltsim.laws.quadrotor import (
-    attitude_watched,
     equations,
     extended_controls,
     extended_loop,
-    extended_singularity,
+    extended_singularity_columns,
     observe_extended_equations,
     references,
     rigid_body_state,
-    watch_attitude,
+    thrust_axis_check,
+    thrust_axis_value,
 )
 from tiltsim.scenario.quadrotor_laws import SwitchingController
 from tiltsim_controllers.laws.switching import (
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 class ControlParameters(NamedTuple):
     """The head of `userdata`."""
 
-    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
     law: Parameters
 
 
@@ -60,7 +60,7 @@ def switching_controls(
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, SwitchingController)
-    reference, table = scenario.reference_and_table()
+    reference, table = scenario.reference_and_knots()
     law = Parameters(
         yaw_position.Parameters(
             scenario.rotorcraft.resolve(), controller.resolve_gains(), reference
@@ -83,14 +83,14 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     pitch = np.where(inside > 0.0, reference.pitch, samples["pitch"])
     return {
         **references(samples, reference, setup.table, (roll, pitch, reference.yaw)),
-        **extended_singularity(samples, law.yaw_position.vehicle),
+        **extended_singularity_columns(samples, law.yaw_position.vehicle),
         "attitude_zone": inside,
     }
 
 
-def _watched(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[Watched, ...]:
+def _watched(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[SignCheck, ...]:
     # Not the extension's thrust: while the other law flies it may be anything.
-    return (attitude_watched(sample),)
+    return (thrust_axis_check(sample),)
 
 
 @scalar
@@ -135,7 +135,7 @@ SWITCHING: Final = extended_loop(
     setup=_setup,
     derive=_derive,
     watched=_watched,
-    watch=watch_attitude,
+    watch=thrust_axis_value,
     own_columns={"attitude_zone": "1"},
     # In the zone, where the law is meant to end up, the position is free.
     follows_position=False,

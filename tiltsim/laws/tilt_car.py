@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ControlSetup, Equations, Floats, Loop, Sizes, Watched
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Floats, SignCheck, Sizes
 from tiltsim.laws.tiltrotor import servo_lead
 from tiltsim.vehicles.tilt_car import TILT_CAR, initial_tilt
 from tiltsim_controllers.mathematics.scalar import Pair, scalar
@@ -73,10 +73,10 @@ def derived_columns(
     }
 
 
-def rotors_at_rest(sample: Mapping[str, float]) -> tuple[Watched, ...]:
+def rotors_at_rest(sample: Mapping[str, float]) -> tuple[SignCheck, ...]:
     """Both rotors' squares: the inputs' matrix loses its rank where both are at rest."""
     squares = sample["rotor_speed_1"] ** 2 + sample["rotor_speed_2"] ** 2
-    return (Watched(squares, "the decoupling matrix became singular: both rotors came to rest"),)
+    return (SignCheck(squares, "the decoupling matrix became singular: both rotors came to rest"),)
 
 
 @scalar
@@ -112,17 +112,17 @@ def integrating_loop(
     law_fields: tuple[str, ...],
     own_columns: Mapping[str, str] | None = None,
     equations: tuple[Callable[..., tuple[float, ...]], ...],
-) -> Loop:
+) -> ClosedLoop:
     """A loop whose law integrates both rotor speeds and the tilt angle that the servo is told.
 
     The angle is the first of its ``law_states``, which start at zero but for it. ``equations`` are
     the functions of inputs, rates and what to observe of `tiltsim.closed_loop.loop.Equations`;
     their state is position, velocity, tilt angle, rotor speeds and the further law states. The rest
-    is as `tiltsim.closed_loop.loop.Loop` says.
+    is as `tiltsim.closed_loop.loop.ClosedLoop` says.
     """
     further = (0.0,) * (law_states - 1)
     inputs, rates, observe_equations = equations
-    return Loop(
+    return ClosedLoop(
         model="tilt_car",
         sizes=Sizes(qpos=4, qvel=4, act=2 + law_states, ctrl=5 + law_states),
         parameters=parameters,
@@ -153,7 +153,7 @@ def integrating_loop(
         law_fields=law_fields,
         extra_columns=own_columns or {},
         kind=TILT_CAR,
-        flies_gait=False,
+        uses_gait=False,
     )
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ControlSetup, Equations, Floats, Loop, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Floats, Sizes
 from tiltsim.equations.tilt_car import equations_of_motion, yaw_of
 from tiltsim.laws.tilt_car import (
     CarState,
@@ -24,10 +24,10 @@ from tiltsim_controllers.gaits import GaitParameters, tilt_reference
 from tiltsim_controllers.mathematics.scalar import Pair, Triple, scalar
 from tiltsim_controllers.tilt_car.planned_direction import (
     Parameters,
+    demanded_acceleration,
+    demanded_squared_speeds,
     lyapunov_candidate,
     planned_direction_inputs,
-    wanted_acceleration,
-    wanted_squares,
 )
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 class ControlParameters(NamedTuple):
     """The head of `userdata`."""
 
-    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
     servo_lead: float  # s, rate feed-forward of the tilt servo, 2 zeta / omega_n
     heading: float  # rad, yaw at zero tilt, for the thesis' equations
     gait: GaitParameters
@@ -163,8 +163,8 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     time = samples["time"].tolist()
     names = ("x", "y", "vx", "vy", "yaw", "alpha", "rotor_speed_1", "rotor_speed_2")
     states = np.stack([samples[name] for name in names], axis=-1).tolist()
-    wanted = [wanted_acceleration(*row, law) for row in zip(time, states, strict=True)]
-    squares = [wanted_squares(*row, law) for row in zip(time, states, strict=True)]
+    wanted = [demanded_acceleration(*row, law) for row in zip(time, states, strict=True)]
+    squares = [demanded_squared_speeds(*row, law) for row in zip(time, states, strict=True)]
     tilts = [tilt_reference(t, parameters.gait, table)[0] for t in time]
     reference = reference_columns(samples, law.reference)
     ax, ay = np.array(wanted).reshape(len(time), 2).T
@@ -179,7 +179,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     return columns | {"lyapunov": lyapunov_candidate(error_y, error_rate_y, law.gains)}
 
 
-PLANNED_DIRECTION: Final = Loop(
+PLANNED_DIRECTION: Final = ClosedLoop(
     model="tilt_car",
     sizes=Sizes(qpos=4, qvel=4, act=2, ctrl=5),
     parameters=ControlParameters,

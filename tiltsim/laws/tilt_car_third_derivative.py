@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 class ControlParameters(NamedTuple):
     """The head of `userdata`."""
 
-    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
     servo_lead: float  # s, rate feed-forward of the tilt servo, 2 zeta / omega_n
     heading: float  # rad, yaw at zero tilt, for the thesis' equations
     law: Parameters

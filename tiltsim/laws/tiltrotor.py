@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ControlSetup, Floats, Watched
-from tiltsim.engines.rows import evaluate_rows
+from tiltsim.closed_loop.loop import ControlSetup, Floats, SignCheck
+from tiltsim.engines.rows import evaluate_over_samples
 from tiltsim.vehicles.rotorcraft import OBSERVED_FIELDS
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
 from tiltsim_controllers.gaits import GaitParameters, tilt_reference
@@ -68,7 +68,7 @@ def rotor_thrust_controls(act: Sequence[float]) -> Quad:
 
 
 @scalar
-def planned_servo_commands(
+def gait_servo_commands(
     time: float, lead: float, gait: GaitParameters, table: Sequence[float]
 ) -> Quad:
     """What the tilt servos are told (rad) to follow the planned gait, their lag allowed for."""
@@ -87,7 +87,7 @@ def servo_lead(servo: ServoTable) -> float:
     return 2.0 * servo.damping_ratio / servo.natural_frequency
 
 
-def initial_rotor_speeds(scenario: Scenario) -> tuple[float, ...]:
+def initial_signed_rotor_speeds(scenario: Scenario) -> tuple[float, ...]:
     """The signed rotor speeds (rad/s) at time zero."""
     return tuple(s * speed for s, speed in zip(SPIN, scenario.initial.rotor_speeds(4), strict=True))
 
@@ -100,7 +100,7 @@ def observe_tiltrotor(
     return (*tiltrotor_state(qpos, qvel, act), qvel[6], qvel[7], qvel[8], qvel[9])
 
 
-def gait_singularity(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict[str, Floats]:
+def singularity_columns(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict[str, Floats]:
     """Determinant of the attitude-altitude law at the present tilts, and the margin to zero."""
     tilts = np.stack([samples[name] for name in TILT_COLUMNS], axis=-1)
     attitude = samples["roll"], samples["pitch"]
@@ -116,17 +116,17 @@ def reference_columns(
     samples: Mapping[str, Floats],
     setup: ControlSetup,
 ) -> dict[str, Floats]:
-    """The columns that a function such as `references_in_force` tells of samples' ``fields``."""
+    """The columns that a function such as `reference_values` tells of samples' ``fields``."""
     states = np.stack([samples[name] for name in fields], axis=-1)
     names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)
-    rows = evaluate_rows(in_force, len(names), samples["time"], states, setup)
+    rows = evaluate_over_samples(in_force, len(names), samples["time"], states, setup)
     return dict(zip(names, rows.T, strict=True))
 
 
-def rotor_stops(sample: Mapping[str, float]) -> tuple[Watched, ...]:
+def rotor_speed_checks(sample: Mapping[str, float]) -> tuple[SignCheck, ...]:
     """Rotor speeds along their spin: a matrix with the factor ``2 |varpi|`` is singular at zero."""
     return tuple(
-        Watched(
+        SignCheck(
             sign * sample[f"rotor_speed_{rotor}"],
             f"the decoupling matrix became singular: rotor {rotor} came to a stop",
         )
@@ -135,13 +135,13 @@ def rotor_stops(sample: Mapping[str, float]) -> tuple[Watched, ...]:
 
 
 @scalar
-def rotor_spins(values: Sequence[float]) -> Quad:
+def rotor_speeds_along_spin(values: Sequence[float]) -> Quad:
     """Rotor speeds along their spin, from what `observe_tiltrotor` gives."""
     return -values[16], values[17], -values[18], values[19]
 
 
 @scalar
-def regularity(values: Sequence[float], vehicle: Vehicle) -> float:
+def scaled_determinant(values: Sequence[float], vehicle: Vehicle) -> float:
     """The determinant of the decoupling matrix but for the rotor speeds, of a sample's values."""
     ratio = drag_ratio(vehicle)
     trig = sines_and_cosines(values[12], values[13], values[14], values[15])
@@ -150,11 +150,11 @@ def regularity(values: Sequence[float], vehicle: Vehicle) -> float:
     return nx * ux + ny * uy + nz * uz
 
 
-def singular_matrix(sample: Mapping[str, float], vehicle: Vehicle) -> Watched:
+def determinant_check(sample: Mapping[str, float], vehicle: Vehicle) -> SignCheck:
     """The determinant of the attitude-altitude law at the present tilts and attitude."""
     angles = ", ".join(f"{sample[name]:.3g}" for name in TILT_COLUMNS)
-    return Watched(
-        regularity([sample[name] for name in OBSERVED_FIELDS], vehicle),
+    return SignCheck(
+        scaled_determinant([sample[name] for name in OBSERVED_FIELDS], vehicle),
         f"the decoupling matrix became singular at roll = {sample['roll']:.3g} rad, "
         f"pitch = {sample['pitch']:.3g} rad, tilt angles ({angles}) rad",
     )

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tiltsim.closed_loop.loop import ControlSetup, Floats, Watched
+from tiltsim.closed_loop.loop import ControlSetup, Floats, SignCheck
 from tiltsim.equations.quadrotor import extended_equations_of_motion, law_state
 from tiltsim.laws.quadrotor import (
-    attitude_watched,
     equations,
     extended_controls,
     extended_loop,
-    extended_singularity,
-    level_thrust,
+    extended_singularity_columns,
     observe_extended_equations,
     references,
     rigid_body_state,
+    thrust_axis_check,
+    thrust_tilt_cosine,
 )
 from tiltsim.scenario.quadrotor_laws import YawPositionController
 from tiltsim_controllers.laws.yaw_position import Parameters, yaw_position_inputs
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 class ControlParameters(NamedTuple):
     """The head of `userdata`."""
 
-    signature: float  # see `tiltsim.closed_loop.loop.Loop.signature`
+    signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
     law: Parameters
 
 
@@ -51,7 +51,7 @@ def yaw_position_controls(
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, YawPositionController)
-    reference, table = scenario.reference_and_table()
+    reference, table = scenario.reference_and_knots()
     law = Parameters(scenario.rotorcraft.resolve(), controller.resolve_gains(), reference)
     return ControlSetup(ControlParameters(signature, law), table)
 
@@ -61,7 +61,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     # Roll and pitch are no outputs: they are what the position takes.
     attitude = (samples["roll"], samples["pitch"], law.reference.yaw)
     columns = references(samples, law.reference, setup.table, attitude)
-    return columns | extended_singularity(samples, law.vehicle)
+    return columns | extended_singularity_columns(samples, law.vehicle)
 
 
 @scalar
@@ -69,13 +69,13 @@ def watch_attitude_and_extension(
     values: Sequence[float], parameters: ControlParameters
 ) -> tuple[float, float]:
     """The cosine of the thrust axis' tilt and the extension's thrust."""
-    return level_thrust(values), values[24]
+    return thrust_tilt_cosine(values), values[24]
 
 
-def extension_watched(sample: Mapping[str, float]) -> Watched:
+def extension_thrust_check(sample: Mapping[str, float]) -> SignCheck:
     """The thrust of the extension: without thrust the decoupling matrix is singular."""
     thrust = sample["extension_thrust"]
-    return Watched(thrust, "the decoupling matrix became singular: the thrust came to zero")
+    return SignCheck(thrust, "the decoupling matrix became singular: the thrust came to zero")
 
 
 @scalar
@@ -117,7 +117,7 @@ YAW_POSITION: Final = extended_loop(
     equations(equation_inputs, 6, equation_rates, observe_in_equations),
     setup=_setup,
     derive=_derive,
-    watched=lambda sample, _setup: (attitude_watched(sample), extension_watched(sample)),
+    watched=lambda sample, _setup: (thrust_axis_check(sample), extension_thrust_check(sample)),
     watch=watch_attitude_and_extension,
 )
 """The yaw-position law around the quadrotor."""

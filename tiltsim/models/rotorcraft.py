@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import mujoco
 
     from tiltsim.models.parts import ExtraActuators
-    from tiltsim.models.user_vehicle import OwnVehicle
+    from tiltsim.models.user_vehicle import UserVehicle
 
 MODELS: Final = ("tiltrotor", "quadrotor")
 ROTORS: Final = (1, 2, 3, 4)
@@ -73,7 +73,7 @@ def compile_model(
     extra_actuators: tuple[ExtraActuators, ...] = (),
     ground: Ground | None = None,
     visuals: bool = True,
-    own: OwnVehicle | None = None,
+    own: UserVehicle | None = None,
 ) -> mujoco.MjModel:
     """Compile the MuJoCo model of a vehicle.
 
@@ -108,7 +108,7 @@ def compile_model(
     visuals : bool, default=True
         Whether there is anything to see or to measure: geoms, cameras, lights and sensors. They do
         not touch the physics, but keeping them up to date takes a third of a step.
-    own : OwnVehicle, optional
+    own : UserVehicle, optional
         A user's own file in place of the shipped one, with its own arms and pods; its geoms may
         have mass and always stay.
 
@@ -199,7 +199,7 @@ def _compose(
     law_states: int,
     extra_actuators: tuple[ExtraActuators, ...],
     ground: Ground | None,
-    own: OwnVehicle | None,
+    own: UserVehicle | None,
 ) -> tuple[str, str, dict[str, bytes]]:
     """The vehicle's complete MJCF, the same without what is only drawn, and the files they name.
 

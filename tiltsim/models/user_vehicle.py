@@ -1,6 +1,6 @@
 """A user's own vehicle: an MJCF file with the names that the shipped ones have.
 
-`read_own_vehicle` compiles the file as it is, checks the names, and measures what control laws and
+`read_user_vehicle` compiles the file as it is, checks the names, and measures what control laws and
 the scenario need to know. `tiltsim.models.rotorcraft` then puts a scenario's own numbers in their
 place, as it does with the shipped files. docs/own_vehicle.md tells users the same.
 """
@@ -44,7 +44,7 @@ SMALL_PRODUCT: Final = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class OwnVehicle:
+class UserVehicle:
     """An MJCF file of a user's, as measured.
 
     Attributes
@@ -55,7 +55,7 @@ class OwnVehicle:
         When it was last changed, ns, to tell one version of it from another.
     vehicle
         Its parameters, untilted: inertia about the centre of mass along the body's axes.
-    misfit
+    layout_mismatch
         In what it differs from the layout that the shipped laws assume; empty where it does not.
     hinge_inertias
         About each tilt hinge, armature included, kg m^2.
@@ -69,24 +69,24 @@ class OwnVehicle:
         The whole vehicle's centre of mass, m, body axes.
     products
         The entries xy, xz and yz of its inertia about the centre of mass, kg m^2, body axes.
-    can_touch
+    has_contact_geoms
         Whether it has the geoms by which a scenario's ground is touched.
     """
 
     path: str
     modified: int
     vehicle: Vehicle
-    misfit: str
+    layout_mismatch: str
     hinge_inertias: tuple[float, ...]
     rest_mass: float
     rest_moment: Floats
     rest_inertia: Floats
     center: Floats
     products: tuple[float, float, float]
-    can_touch: bool
+    has_contact_geoms: bool
 
     @property
-    def unknown_to_laws(self) -> str:
+    def unmodeled_properties(self) -> str:
         """In what the shipped laws take it for another vehicle, in words; empty where in nothing.
 
         They fly all the same, with a model error. docs/own_vehicle.md says what it costs.
@@ -154,7 +154,7 @@ class OwnVehicle:
                 joint.solimplimit = (0.99, 0.99, 0.001, 0.5, 2.0)
 
 
-def read_own_vehicle(path: str, model: str) -> OwnVehicle:
+def read_user_vehicle(path: str, model: str) -> UserVehicle:
     """Check and measure an MJCF file.
 
     Parameters
@@ -179,7 +179,7 @@ def read_own_vehicle(path: str, model: str) -> OwnVehicle:
 
 
 @lru_cache(maxsize=64)
-def _read(path: str, model: str, modified: int) -> OwnVehicle:
+def _read(path: str, model: str, modified: int) -> UserVehicle:
     import mujoco
 
     try:
@@ -212,7 +212,7 @@ def _read(path: str, model: str, modified: int) -> OwnVehicle:
         *(mass, xx, yy, zz, arm, float(thrust.gear[2]), abs(float(thrust.gear[5])), gravity)
     )
     tilts = [compiled.joint(f"tilt_{i}").dofadr[0] for i in ROTORS] if model == "tiltrotor" else []
-    return OwnVehicle(
+    return UserVehicle(
         path,
         modified,
         vehicle,

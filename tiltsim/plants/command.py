@@ -89,7 +89,7 @@ class ControllerError(TiltsimError):
 
 
 @dataclass(frozen=True, slots=True)
-class Orders:
+class CheckedCommand:
     """A command found valid: floats, and which of `ROTOR_COMMANDS` the four rotor values are."""
 
     kind: str
@@ -97,7 +97,7 @@ class Orders:
     tilt_angles: Quad | None
 
 
-def checked(command: object, *, tilting: bool) -> Orders:
+def checked(command: object, *, tilting: bool) -> CheckedCommand:
     """The numbers of a command.
 
     Raises
@@ -115,7 +115,7 @@ def checked(command: object, *, tilting: bool) -> Orders:
     if command.tilt_angles is not None and not tilting:
         raise ControllerError("returned tilt_angles; this vehicle has no tilt servos")
     tilts = None if command.tilt_angles is None else _four("tilt_angles", command.tilt_angles)
-    return Orders(given[0], _four(given[0], getattr(command, given[0])), tilts)
+    return CheckedCommand(given[0], _four(given[0], getattr(command, given[0])), tilts)
 
 
 def _four(name: str, value: Any) -> Quad:

@@ -17,10 +17,16 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import Floats
 from tiltsim.engines.callback import control_callback
-from tiltsim.laws.commanded import COMMANDED, Told, commanded_parameters, with_told
-from tiltsim.laws.layers.actuation import measured_position, measured_velocity, sensors_of
-from tiltsim.laws.tiltrotor import planned_servo_commands
-from tiltsim.plants.command import ControllerError, Observation, Orders, Reference, observation
+from tiltsim.laws.commanded import COMMANDED_LOOPS, HeldCommand, commanded_parameters, with_command
+from tiltsim.laws.layers.actuation import measured_qpos, measured_qvel, sensor_parameters
+from tiltsim.laws.tiltrotor import gait_servo_commands
+from tiltsim.plants.command import (
+    CheckedCommand,
+    ControllerError,
+    Observation,
+    Reference,
+    observation,
+)
 from tiltsim.plants.mujoco_plant import MujocoPlant, quiet_warnings
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.rotorcraft import initial_tilts
@@ -53,9 +59,9 @@ class CommandedPlant(MujocoPlant):
         self.tilting = vehicle.model == "tiltrotor"
         self._slowest, self._fastest = vehicle.speeds_along_spin
         self._commanded = commanded_parameters(self._setup.parameters)
-        self._sensors = sensors_of(scenario)
+        self._sensors = sensor_parameters(scenario)
         self._slotted = slotted(self._setup.parameters)
-        self._layered = self._loop is not COMMANDED[vehicle.model]
+        self._layered = self._loop is not COMMANDED_LOOPS[vehicle.model]
         first = 8 if self.tilting else 4  # after servos and thrusts
         self._rates = slice(first, first + 4)
         # The activations that a commanded speed is written to: where rotors lag behind it, the one
@@ -83,7 +89,7 @@ class CommandedPlant(MujocoPlant):
             for speeds, r1, r2, r3, r4, a1, a2, a3, a4 in value[length:].reshape(-1, 9).tolist()
         ]
 
-    def apply(self, orders: Orders) -> None:
+    def apply(self, orders: CheckedCommand) -> None:
         """Send a command, once a control sample, and obey the one that arrives until the next.
 
         Rotors take a commanded speed at once, unless they lag: the plant's observed state has it.
@@ -94,9 +100,9 @@ class CommandedPlant(MujocoPlant):
         if arrived.speeds:
             self.data.act[self._speeds] = arrived.rotors
             rates = (0.0, 0.0, 0.0, 0.0)
-        self._write_controls(Told(*arrived.tilts, *rates))
+        self._write_controls(HeldCommand(*arrived.tilts, *rates))
 
-    def _sent(self, orders: Orders) -> _Sent:
+    def _sent(self, orders: CheckedCommand) -> _Sent:
         tilts = orders.tilt_angles
         if tilts is None:
             tilts = self._planned_servo_commands() if self.tilting else (0.0, 0.0, 0.0, 0.0)
@@ -104,16 +110,16 @@ class CommandedPlant(MujocoPlant):
             return _Sent(0.0, _signed(orders.rotors), tilts)
         return _Sent(1.0, _signed(self._along_spin(orders)), tilts)
 
-    def _write_controls(self, told: Told) -> None:
+    def _write_controls(self, told: HeldCommand) -> None:
         data, table = self.data, self._setup.table
         state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
-        parameters = with_told(self._setup.parameters, told)
+        parameters = with_command(self._setup.parameters, told)
         try:
             data.ctrl[:] = self._loop.controls(float(data.time), *state, parameters, table)
         except (ArithmeticError, ValueError):
             data.ctrl[:] = nan  # as the engines do; MuJoCo reports it
 
-    def thrusts_and_tilts(self, orders: Orders) -> Floats:
+    def thrusts_and_tilts(self, orders: CheckedCommand) -> Floats:
         """What orders come to as thrusts (N) and tilt angles (rad), shape (8,) or (4,).
 
         Raises `ControllerError` for accelerations, which are no thrust yet.
@@ -130,9 +136,9 @@ class CommandedPlant(MujocoPlant):
 
     def _planned_servo_commands(self) -> Quad:
         lead, gait = self._commanded.servo_lead, self._commanded.gait
-        return planned_servo_commands(float(self.data.time), lead, gait, self._setup.table)
+        return gait_servo_commands(float(self.data.time), lead, gait, self._setup.table)
 
-    def _along_spin(self, orders: Orders) -> Quad:
+    def _along_spin(self, orders: CheckedCommand) -> Quad:
         """Commanded speeds, within the rotors' limits."""
         first, second, third, fourth = orders.rotors
         if orders.kind == "thrusts":
@@ -178,8 +184,8 @@ class CommandedPlant(MujocoPlant):
         data, parameters = self.data, self._commanded
         time, qpos, qvel = float(data.time), data.qpos, data.qvel
         if self._sensors.active:
-            qpos = np.array(measured_position(time, qpos.tolist(), self._sensors))
-            qvel = np.array(measured_velocity(time, qvel.tolist(), self._sensors))
+            qpos = np.array(measured_qpos(time, qpos.tolist(), self._sensors))
+            qvel = np.array(measured_qvel(time, qvel.tolist(), self._sensors))
         motion = np.array(reference_derivatives(time, parameters.reference, self._setup.table)[:9])
         wanted = parameters.reference
         planned = np.zeros(8)

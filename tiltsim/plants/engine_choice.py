@@ -19,11 +19,11 @@ def with_engine(scenario: Scenario, engine: EngineName) -> Scenario:
     return scenario.model_copy(update={"simulation": simulation})
 
 
-STEPS_WORTH_LOADING: Final = 15_000
+MIN_STEPS_TO_LOAD: Final = 15_000
 """Flights of at least this many steps repay loading the native engine, once it is compiled."""
 
 
-STEPS_WORTH_COMPILING: Final = 100_000
+MIN_STEPS_TO_COMPILE: Final = 100_000
 """Flights of at least this many steps repay compiling it first."""
 
 
@@ -36,14 +36,14 @@ def choose_engine(scenario: Scenario) -> EngineName:
         return "python"
     if scenario.simulation.engine != "auto":
         return scenario.simulation.engine
-    return "native" if worth_native([scenario]) else "python"
+    return "native" if native_pays_off([scenario]) else "python"
 
 
-def worth_native(scenarios: Iterable[Scenario]) -> bool:
+def native_pays_off(scenarios: Iterable[Scenario]) -> bool:
     """Whether flights are together long enough for the native engine."""
     steps, names = 0, set()
     for scenario in scenarios:
         steps += scenario.simulation.steps
         names.add(loop_of(scenario).native_name(scenario.simulation.plant))
     cached = all(map(native_code_is_cached, names))
-    return steps >= (STEPS_WORTH_LOADING if cached else STEPS_WORTH_COMPILING)
+    return steps >= (MIN_STEPS_TO_LOAD if cached else MIN_STEPS_TO_COMPILE)

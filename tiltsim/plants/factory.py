@@ -8,7 +8,7 @@ from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.plant import Plant
 from tiltsim.plants.thesis_plant import ThesisPlant
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.system.interrupts import interrupts_kept
+from tiltsim.system.interrupts import reraise_swallowed_interrupts
 
 
 def make_plant(scenario: Scenario, controller: Any = None) -> Plant:
@@ -17,9 +17,9 @@ def make_plant(scenario: Scenario, controller: Any = None) -> Plant:
     ``controller`` is a user's own, for scenarios whose law is ``python``.
     """
     if scenario.controller.law == "python":
-        from tiltsim.plants.user_controlled_plant import ControlledPlant
+        from tiltsim.plants.user_controlled_plant import UserControlledPlant
 
-        return ControlledPlant(scenario, controller)
+        return UserControlledPlant(scenario, controller)
     thesis = scenario.simulation.plant == "thesis"
-    with interrupts_kept():  # it may compile
+    with reraise_swallowed_interrupts():  # it may compile
         return ThesisPlant(scenario) if thesis else MujocoPlant(scenario)

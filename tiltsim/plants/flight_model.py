@@ -33,7 +33,7 @@ _FLOWN_IN_ANY_MODEL: Final = frozenset(
 """Tables of a scenario that are parameters or initial state of a flight, or no part of it."""
 
 
-def what_decides_the_model(scenario: Scenario) -> str:
+def model_cache_key(scenario: Scenario) -> str:
     """Equal only for scenarios that `flight_model` builds equal models for, if one loop flies."""
     simulation = scenario.simulation
     tables = [value for name, value in scenario if name not in _FLOWN_IN_ANY_MODEL]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import mujoco
 import numpy as np
 
-from tiltsim.closed_loop.loop import ControlSetup, Floats, Loop
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Floats
 from tiltsim.closed_loop.userdata import EVALUATIONS, HEADER_SIZE, RECORDER, Header
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.callback import control_callback
@@ -34,7 +34,7 @@ class MujocoPlant:
             model = flight_model(scenario, len(self._setup.userdata))
         self.model = model
         self.data = mujoco.MjData(self.model)
-        self._reference, _ = scenario.reference_and_table()
+        self._reference, _ = scenario.reference_and_knots()
         self._follows_position = self._loop.follows_position(scenario)
         self._set_initial_state(scenario, self._setup)
         self.engine: EngineName = choose_engine(scenario)
@@ -91,7 +91,7 @@ class MujocoPlant:
         return self._engine.callback()
 
     @property
-    def header_at(self) -> int:
+    def header_offset(self) -> int:
         """Where in `state` the `tiltsim.closed_loop.userdata.Header` begins."""
         before = int(mujoco.mjtState.mjSTATE_USERDATA) - 1
         return int(mujoco.mj_stateSize(self.model, _INTEGRATION & before))
@@ -146,7 +146,9 @@ class MujocoPlant:
         return ""
 
 
-def watched_now(loop: Loop, setup: ControlSetup, values: Sequence[float]) -> tuple[float, ...]:
+def watched_now(
+    loop: ClosedLoop, setup: ControlSetup, values: Sequence[float]
+) -> tuple[float, ...]:
     """The numbers that a loop watches natively; none where it leaves that to Python."""
     return () if loop.watch is None else loop.watch(values, setup.parameters)
 

@@ -35,7 +35,7 @@ class Plant(Protocol):
         """
 
     def observe(self) -> tuple[float, ...]:
-        """What a sample holds after the time; see `tiltsim.closed_loop.loop.Loop.sample_fields`."""
+        """The values of a sample after its time; see `ClosedLoop.sample_fields`."""
 
     def fault(self) -> str:
         """What the physics engine has found wrong so far, in a few words; else empty."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import Floats
 from tiltsim.engines.base import EngineName
-from tiltsim.engines.cache import native_code_was_compiled
+from tiltsim.engines.cache import mark_native_code_compiled
 from tiltsim.equations import ode3 as thesis_plant
 from tiltsim.laws.assembling import control_setup, loop_of
 from tiltsim.plants.engine_choice import choose_engine
@@ -28,7 +28,7 @@ class ThesisPlant:
         loop, setup = loop_of(scenario), control_setup(scenario)
         assert loop.equations is not None  # scenarios that ask for others are refused
         self._loop, self._equations, self._setup = loop, loop.equations, setup
-        self._reference, _ = scenario.reference_and_table()
+        self._reference, _ = scenario.reference_and_knots()
         self._follows_position = loop.follows_position(scenario)
         self._disturbance = disturbing_acceleration(scenario)
         self._timestep = simulation.timestep
@@ -46,7 +46,7 @@ class ThesisPlant:
             self._advance, self._record = compile_stepper(loop)
             self._law = native_record(loop, setup.userdata)
         else:
-            self._advance = thesis_plant.stepper_of(self._equations)
+            self._advance = thesis_plant.make_stepper(self._equations)
             self._law = slotted(setup.parameters), setup.table
 
     @property
@@ -108,7 +108,7 @@ class ThesisPlant:
             *(self._control_steps, *self._law, self._disturbance),
         )
         self._state = state.tolist()
-        native_code_was_compiled(self._loop.native_name("thesis"))
+        mark_native_code_compiled(self._loop.native_name("thesis"))
         self._step_index += samples * steps
         return None if recorder.lost else recorder.samples
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from tiltsim.plants.command import Orders
+from tiltsim.plants.command import CheckedCommand
 from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.plants.user_controller import own_controller
 from tiltsim.scenario.scenario import Scenario
 
 
-class ControlledPlant(CommandedPlant):
+class UserControlledPlant(CommandedPlant):
     """A vehicle under a user's own controller, which is asked at every control sample.
 
     An interval may be repeated from a saved state, to find the step on which a flight was lost.
@@ -23,7 +23,7 @@ class ControlledPlant(CommandedPlant):
         self._scenario = scenario
         self._asked = False
         self._every = max(1, scenario.simulation.control_steps)
-        self._answers: dict[int, Orders] = {}
+        self._answers: dict[int, CheckedCommand] = {}
 
     def advance(self, steps: int) -> None:
         """See `Plant.advance`. Raises `ControllerError` at the time the controller fails."""
@@ -37,7 +37,7 @@ class ControlledPlant(CommandedPlant):
             super().advance(chunk)
             step += chunk
 
-    def _answer(self, step: int) -> Orders:
+    def _answer(self, step: int) -> CheckedCommand:
         if not self._asked:
             self._asked = True
             self._controller.reset(self._scenario)

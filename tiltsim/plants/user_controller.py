@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 
 from tiltsim.errors import InputError
 from tiltsim.plants.command import (
+    CheckedCommand,
     Controller,
     ControllerError,
     Observation,
-    Orders,
     _short,
     checked,
 )
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
 
 
-class OwnController:
+class UserController:
     """A user's controller in a flight: every mistake of it becomes a `ControllerError`."""
 
     def __init__(self, controller: Controller, name: str) -> None:
@@ -41,7 +41,7 @@ class OwnController:
         if reset is not None:
             self._call(reset, scenario)
 
-    def orders(self, observation: Observation, *, tilting: bool) -> Orders:
+    def orders(self, observation: Observation, *, tilting: bool) -> CheckedCommand:
         """Ask for a command. Raises `ControllerError`."""
         command = self._call(self._controller, observation)
         try:
@@ -82,10 +82,10 @@ def with_controller(scenario: Scenario, controller: object) -> Scenario:
     """
     if not callable(controller):
         raise InputError(f"controller = {_short(controller)}: must be callable")
-    return commanded_scenario(scenario, _name_of(controller))
+    return with_external_commands(scenario, _name_of(controller))
 
 
-def commanded_scenario(
+def with_external_commands(
     scenario: Scenario, name: str, simulation: Mapping[str, Any] | None = None
 ) -> Scenario:
     """The scenario with commands from outside in place of its law.
@@ -111,7 +111,7 @@ def _name_of(controller: object) -> str:
     return f"{named.__module__}.{named.__qualname__}"
 
 
-def own_controller(scenario: Scenario, controller: Any = None) -> OwnController:
+def own_controller(scenario: Scenario, controller: Any = None) -> UserController:
     """The controller that flies a scenario: the one given, else the one that its table names.
 
     A class is called without arguments to make one. Raises `InputError` where there is none.
@@ -127,7 +127,7 @@ def own_controller(scenario: Scenario, controller: Any = None) -> OwnController:
             controller = controller()
         except (Exception, SystemExit) as error:
             raise InputError(f"controller {name}: when made raised {_said(error)}") from error
-    return OwnController(controller, name)
+    return UserController(controller, name)
 
 
 def _load(address: str, table: PythonController) -> Any:

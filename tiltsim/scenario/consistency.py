@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Final, get_args
 
 from tiltsim.scenario.controller import Controller
 from tiltsim.scenario.gait import FixedGait
-from tiltsim.scenario.law_table import ANY_ROTORCRAFT, LawTable
+from tiltsim.scenario.law_table import ANY_ROTORCRAFT, ControllerTable
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.tiltrotor_laws import AttitudeAltitudeController
-from tiltsim.scenario.time_steps import check_steps
+from tiltsim.scenario.time_steps import check_time_steps
 from tiltsim.scenario.vehicle import ModelErrorTable, PodTable, TiltServoTable, VehicleTable
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def check_scenario(scenario: Scenario) -> None:
     _check_reference(scenario)
     _check_rotor_limits(scenario)
     _check_ground(scenario)
-    check_steps(scenario)
+    check_time_steps(scenario)
 
 
 def _check_law(scenario: Scenario) -> None:
@@ -114,12 +114,12 @@ def _check_actuators(scenario: Scenario) -> None:
 
 def _check_layout(scenario: Scenario) -> None:
     own = scenario.rotorcraft.own
-    if own is not None and own.misfit:
+    if own is not None and own.layout_mismatch:
         raise InvalidValueError(
             "vehicle.mjcf",
             scenario.rotorcraft.mjcf,
-            f"{own.misfit}; the {scenario.controller.law} law is for four equal arms at right "
-            "angles, a controller of your own flies any",
+            f"{own.layout_mismatch}; the {scenario.controller.law} law is for four equal "
+            "arms at right angles; a controller of your own flies any",
         )
 
 
@@ -290,7 +290,7 @@ def _check_ground(scenario: Scenario) -> None:
             "its equations know no contact with ground; use mujoco",
         )
     own = scenario.rotorcraft.own
-    if own is not None and not own.can_touch:
+    if own is not None and not own.has_contact_geoms:
         raise InvalidValueError(
             "ground",
             scenario.ground.model_dump(),
@@ -323,6 +323,6 @@ def _laws_of(model: str) -> list[str]:
     return [get_args(t.model_fields["law"].annotation)[0] for t in tables if _flies(t, model)]
 
 
-def _flies(law: LawTable | type[LawTable], model: str) -> bool:
+def _flies(law: ControllerTable | type[ControllerTable], model: str) -> bool:
     either = law.vehicle_model == ANY_ROTORCRAFT and model in {"tiltrotor", "quadrotor"}
     return either or law.vehicle_model == model

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from tiltsim.scenario.law_table import ANY_ROTORCRAFT, LawTable
+from tiltsim.scenario.law_table import ANY_ROTORCRAFT, ControllerTable
 from tiltsim.scenario.quadrotor_laws import (
     QuadrotorAttitudeAltitudeController,
     SwitchingController,
@@ -20,7 +20,7 @@ from tiltsim.scenario.tilt_car_laws import (
 )
 from tiltsim.scenario.tiltrotor_laws import AttitudeAltitudeController, FullPoseController
 from tiltsim_controllers.analysis.stability import (
-    Loop,
+    ErrorLoop,
 )
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
@@ -36,7 +36,7 @@ DEFAULT_LAW: Final = "attitude_altitude"
 # --- a user's own ------------------------------------------------------------------------------
 
 
-class PythonController(LawTable):
+class PythonController(ControllerTable):
     """A user's own controller in Python; see `tiltsim.plants.user_controller`."""
 
     vehicle_model = ANY_ROTORCRAFT
@@ -59,8 +59,8 @@ class PythonController(LawTable):
         """The name within the file."""
         return self.function.rpartition(":")[2]
 
-    def closed_loops(self, vehicle: Vehicle) -> list[Loop]:
-        """See `LawTable.closed_loops`: none is known."""
+    def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
+        """See `ControllerTable.error_loops`: none is known."""
         return []
 
 
@@ -71,7 +71,7 @@ class PythonController(LawTable):
 
 
 def _law(value: Any) -> str:
-    if isinstance(value, LawTable):
+    if isinstance(value, ControllerTable):
         return str(getattr(value, "law"))  # noqa: B009
     law = value.get("law", DEFAULT_LAW) if isinstance(value, dict) else DEFAULT_LAW
     return law if isinstance(law, str) else ""

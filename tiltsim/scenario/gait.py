@@ -20,7 +20,7 @@ from tiltsim_controllers.analysis.two_color_planner import (
 )
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.gaits.plans import Gait as PlannedGait
-from tiltsim_controllers.tilt_car.vehicle import TiltCar, turn_share
+from tiltsim_controllers.tilt_car.vehicle import TiltCar, turn_per_tilt
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
@@ -188,7 +188,7 @@ class TiltCarGait(GaitTable):
         if not isinstance(vehicle, TiltCar):
             raise ValueError("a gait of the tilt_car's; this vehicle has four tilt angles")
         # The bottom disc turns back, so that the tilt must go further than the thrusts.
-        return self.tilt(1.0 / turn_share(vehicle))
+        return self.tilt(1.0 / turn_per_tilt(vehicle))
 
     @abstractmethod
     def tilt(self, per_direction: float) -> PlannedGait:

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from tiltsim.scenario.table import Table
 from tiltsim_controllers.analysis.stability import (
-    Loop,
+    ErrorLoop,
 )
 
 ANY_ROTORCRAFT: Final = "tiltrotor or quadrotor"
@@ -20,7 +20,7 @@ ReferenceKind = Literal["position", "attitude_altitude", "pose"]
 """What a law can follow: position and yaw, attitude and altitude, or position and attitude."""
 
 
-class LawTable(Table, ABC):
+class ControllerTable(Table, ABC):
     """What every law can be told."""
 
     vehicle_model: ClassVar[str]
@@ -30,7 +30,7 @@ class LawTable(Table, ABC):
     allow_unstable: bool = Field(False, description="fly gains that fail the Routh condition")
 
     @abstractmethod
-    def closed_loops(self, vehicle: Any) -> list[Loop]:
+    def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
         """The linear closed loops that the gains make."""
 
     @property

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from tiltsim.errors import InputError
 from tiltsim.scenario.controller import DEFAULT_LAW
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
-from tiltsim.scenario.messages import choose, did_you_mean, one_line, show
+from tiltsim.scenario.messages import choose, did_you_mean, one_line_message, show
 from tiltsim.scenario.scenario import Scenario, Variant
 
 KIND_KEYS: Final = {"type": None, "law": DEFAULT_LAW}
@@ -51,13 +51,13 @@ def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) 
     elif names and not overrides:
         raise InputError(f"{address}: choose a variant with #: {', '.join(names)}")
     document.pop("variant", None)
-    anchor_files(document, file.parent)
+    locate_named_files(document, file.parent)
     apply_overrides(document, overrides or {}, address)
-    anchor_files(document, Path())
+    locate_named_files(document, Path())
     return parse_scenario(document, address)
 
 
-def anchor_files(document: Mapping[str, Any], folder: Path) -> None:
+def locate_named_files(document: Mapping[str, Any], folder: Path) -> None:
     """Write out where the files lie that a scenario names: those without a folder in this one."""
     for table, key, mark in FILE_KEYS:
         keys = document.get(table)
@@ -83,7 +83,7 @@ def parse_scenario(document: Mapping[str, Any], address: str = "scenario") -> Sc
     try:
         scenario = Scenario.model_validate(document)
     except ValidationError as error:
-        raise InputError(f"{address}: {one_line(error, document, Scenario)}") from None
+        raise InputError(f"{address}: {one_line_message(error, document, Scenario)}") from None
     scenario._address = address
     return scenario
 
@@ -98,7 +98,9 @@ def variant_names(file: Path, document: Mapping[str, Any]) -> list[str]:
         try:
             names.append(Variant.model_validate(table).name)
         except ValidationError as error:
-            raise InputError(f"{file}: variant: {one_line(error, table, Variant)}") from None
+            raise InputError(
+                f"{file}: variant: {one_line_message(error, table, Variant)}"
+            ) from None
         if names[-1] in names[:-1]:
             raise InputError(f"{file}: variant.name = {names[-1]!r}: used twice")
     return names
@@ -142,7 +144,7 @@ def _kinds_first(overrides: Mapping[str, Any]) -> list[tuple[str, Any]]:
 
 
 def _override(address: str, document: dict[str, Any], key: str, value: object) -> None:
-    *path, last = key_steps(key)
+    *path, last = split_key(key)
     target: Any = document
     for step in path:
         target = _enter(target, step)
@@ -177,7 +179,7 @@ def _enter(target: object, step: str | int) -> object:
     return target.setdefault(step, {}) if isinstance(target, dict) else None
 
 
-def key_steps(key: str) -> list[str | int]:
+def split_key(key: str) -> list[str | int]:
     """A dotted key as names and positions: ``gait.angles[1]`` is ``gait``, ``angles``, ``1``."""
     steps: list[str | int] = []
     for name in key.split("."):

@@ -50,7 +50,9 @@ def choose(name: object, names: Iterable[str]) -> str:
     return f"{did_you_mean(name, names)}choose {', '.join(names)}"
 
 
-def one_line(error: ValidationError, document: Mapping[str, Any], schema: type[BaseModel]) -> str:
+def one_line_message(
+    error: ValidationError, document: Mapping[str, Any], schema: type[BaseModel]
+) -> str:
     """The first mistake in one line, and how many more there are."""
     details = error.errors(include_url=False)
     # A key misspelt is often a key missing, too: the unknown one tells the user more.

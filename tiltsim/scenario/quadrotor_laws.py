@@ -8,11 +8,11 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 import tiltsim_controllers.laws.quadrotor_attitude_altitude as quadrotor_attitude_altitude
 import tiltsim_controllers.laws.yaw_position as yaw_position
-from tiltsim.scenario.law_table import LawTable, _gain_kind
+from tiltsim.scenario.law_table import ControllerTable, _gain_kind
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import Gains2, Positive, Table
 from tiltsim_controllers.analysis.stability import (
-    Loop,
+    ErrorLoop,
     linear_loop,
 )
 from tiltsim_controllers.laws.switching import PUBLISHED_ZONE
@@ -35,7 +35,7 @@ YawPositionGains = Annotated[
 ]
 
 
-class YawPositionController(LawTable):
+class YawPositionController(ControllerTable):
     """Yaw-position control of the quadrotor with dynamic extension (ch. 2)."""
 
     vehicle_model = "quadrotor"
@@ -48,8 +48,8 @@ class YawPositionController(LawTable):
         """The numbers behind a named set or a table."""
         return _yaw_position_gains(self.gains)
 
-    def closed_loops(self, vehicle: Vehicle) -> list[Loop]:
-        """See `LawTable.closed_loops`."""
+    def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
+        """See `ControllerTable.error_loops`."""
         return _yaw_position_loops(self.resolve_gains())
 
 
@@ -66,7 +66,7 @@ QuadrotorAttitudeGains = Annotated[
 ]
 
 
-class QuadrotorAttitudeAltitudeController(LawTable):
+class QuadrotorAttitudeAltitudeController(ControllerTable):
     """Attitude-altitude control of the quadrotor (ch. 2, Appendix B)."""
 
     vehicle_model = "quadrotor"
@@ -79,8 +79,8 @@ class QuadrotorAttitudeAltitudeController(LawTable):
         """The numbers behind a named set or a table."""
         return _attitude_gains(self.gains)
 
-    def closed_loops(self, vehicle: Vehicle) -> list[Loop]:
-        """See `LawTable.closed_loops`."""
+    def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
+        """See `ControllerTable.error_loops`."""
         return _attitude_loops(self.resolve_gains())
 
 
@@ -101,7 +101,7 @@ class ZoneTable(Table):
         return self
 
 
-class SwitchingController(LawTable):
+class SwitchingController(ControllerTable):
     """Yaw-position control that hands over to attitude-altitude control in a zone (ch. 2)."""
 
     vehicle_model = "quadrotor"
@@ -127,8 +127,8 @@ class SwitchingController(LawTable):
         """The attitude-altitude law's numbers."""
         return _attitude_gains(self.attitude_gains)
 
-    def closed_loops(self, vehicle: Vehicle) -> list[Loop]:
-        """See `LawTable.closed_loops`."""
+    def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
+        """See `ControllerTable.error_loops`."""
         return [
             *_yaw_position_loops(self.resolve_gains()),
             *_attitude_loops(self.resolve_attitude_gains()),
@@ -141,7 +141,7 @@ def _yaw_position_gains(gains: str | YawPositionGainTable) -> yaw_position.Gains
     return yaw_position.GAIN_SETS[gains]
 
 
-def _yaw_position_loops(gains: yaw_position.Gains) -> list[Loop]:
+def _yaw_position_loops(gains: yaw_position.Gains) -> list[ErrorLoop]:
     return [linear_loop("position", gains[:4]), linear_loop("yaw", gains[4:])]
 
 
@@ -151,5 +151,5 @@ def _attitude_gains(gains: str | QuadrotorAttitudeGainTable) -> quadrotor_attitu
     return quadrotor_attitude_altitude.GAIN_SETS[gains]
 
 
-def _attitude_loops(gains: quadrotor_attitude_altitude.Gains) -> list[Loop]:
+def _attitude_loops(gains: quadrotor_attitude_altitude.Gains) -> list[ErrorLoop]:
     return [linear_loop("altitude", gains[:2]), linear_loop("attitude", gains[2:])]

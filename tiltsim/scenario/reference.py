@@ -12,9 +12,9 @@ from pydantic import Field, model_validator
 from tiltsim.scenario.law_table import ReferenceKind
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import Angle, Angles3, Positive, Table, Vector3
-from tiltsim_controllers.gaits.keyframes import NO_KEYFRAMES
+from tiltsim_controllers.gaits.keyframes import NO_KNOTS
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
-from tiltsim_controllers.references.waypoints import minimum_snap_table
+from tiltsim_controllers.references.waypoints import minimum_snap_knots
 
 Tilt = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
 
@@ -30,11 +30,11 @@ class _Reference(Table, ABC):
     @property
     def table(self) -> tuple[float, ...]:
         """The numbers beside the record, for references of any length."""
-        return NO_KEYFRAMES
+        return NO_KNOTS
 
     def placed(self, table: tuple[float, ...]) -> tuple[ReferenceParameters, tuple[float, ...]]:
         """Record and table where a gait's table lies before the reference's own."""
-        if self.table == NO_KEYFRAMES:
+        if self.table == NO_KNOTS:
             return self.parameters, table
         return self.parameters._replace(offset=float(len(table))), (*table, *self.table)
 
@@ -176,7 +176,7 @@ class WaypointReference(_PositionReference):
 
     @property
     def table(self) -> tuple[float, ...]:
-        """Polynomials; see `tiltsim_controllers.references.waypoints.minimum_snap_table`."""
+        """Polynomials; see `tiltsim_controllers.references.waypoints.minimum_snap_knots`."""
         return _minimum_snap_table(self.positions, self.times)
 
     @model_validator(mode="after")
@@ -188,7 +188,7 @@ class WaypointReference(_PositionReference):
         return self
 
 
-_minimum_snap_table = lru_cache(maxsize=64)(minimum_snap_table)
+_minimum_snap_table = lru_cache(maxsize=64)(minimum_snap_knots)
 
 
 def _by_axis(name: str, values: tuple[float, float, float]) -> dict[str, float]:

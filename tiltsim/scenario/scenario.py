@@ -80,7 +80,7 @@ class Scenario(Table):
         return self.air != AirTable()
 
     @property
-    def does_as_told(self) -> bool:
+    def has_ideal_actuators_in_still_air(self) -> bool:
         """Whether pods and rotors do what they are told and no air acts, as in the thesis.
 
         Else `tiltsim.laws.layers.on_equations` flies the scenario on the thesis plant.
@@ -110,7 +110,7 @@ class Scenario(Table):
             ),
             ("vehicle.tilt_servo.max_rate", getattr(servo, "max_rate", None), None),
             ("simulation.control_latency", self.simulation.control_latency, 0.0),
-            ("sensors", self.sensors.are_imperfect, False),
+            ("sensors", self.sensors.have_errors, False),
             ("fault", [fault.type for fault in self.fault], []),
             ("controller.allocation", getattr(controller, "allocation", "inversion"), "inversion"),
         ]
@@ -139,7 +139,7 @@ class Scenario(Table):
         check_scenario(self)
         return self
 
-    def reference_and_table(self) -> tuple[ReferenceParameters, tuple[float, ...]]:
+    def reference_and_knots(self) -> tuple[ReferenceParameters, tuple[float, ...]]:
         """The reference's record, and the table of the flight: the gait's and the reference's."""
         gait = self.gait.plan(self.vehicle.resolve())
         return self.reference.placed(gait.table)

@@ -45,7 +45,7 @@ class SensorTable(Table):
     )
 
     @property
-    def are_imperfect(self) -> bool:
+    def have_errors(self) -> bool:
         """Whether any reading differs from the truth."""
         return self.model_copy(update={"sample_time": None}) != SensorTable()
 

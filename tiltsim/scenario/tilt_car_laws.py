@@ -9,15 +9,15 @@ from pydantic import Discriminator, Field, Tag
 import tiltsim_controllers.tilt_car.fourth_derivative as fourth_derivative
 import tiltsim_controllers.tilt_car.planned_direction as planned_direction
 import tiltsim_controllers.tilt_car.third_derivative as third_derivative
-from tiltsim.scenario.law_table import LawTable, _gain_kind
+from tiltsim.scenario.law_table import ControllerTable, _gain_kind
 from tiltsim.scenario.table import Gains2, Gains4, NonNegative, Table, Vector3
 from tiltsim_controllers.analysis.stability import (
-    Loop,
+    ErrorLoop,
     linear_loop,
 )
 
 
-class ThirdDerivativeController(LawTable):
+class ThirdDerivativeController(ControllerTable):
     """Third-derivative feedback linearization of the tilt-car (ch. 10, Sec. 3.1)."""
 
     vehicle_model = "tilt_car"
@@ -38,12 +38,12 @@ class ThirdDerivativeController(LawTable):
             return third_derivative.GAIN_SETS[self.gains]
         return third_derivative.Gains(*self.gains)
 
-    def closed_loops(self, vehicle: Any) -> list[Loop]:
-        """See `LawTable.closed_loops`."""
+    def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
+        """See `ControllerTable.error_loops`."""
         return [linear_loop("position", self.resolve_gains())]
 
 
-class FourthDerivativeController(LawTable):
+class FourthDerivativeController(ControllerTable):
     """Fourth-derivative feedback linearization of the tilt-car (ch. 10, Sec. 6.1)."""
 
     vehicle_model = "tilt_car"
@@ -69,8 +69,8 @@ class FourthDerivativeController(LawTable):
             return fourth_derivative.GAIN_SETS[self.gains]
         return fourth_derivative.Gains(*self.gains)
 
-    def closed_loops(self, vehicle: Any) -> list[Loop]:
-        """See `LawTable.closed_loops`."""
+    def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
+        """See `ControllerTable.error_loops`."""
         return [linear_loop("position", self.resolve_gains())]
 
 
@@ -81,7 +81,7 @@ class PlannedDirectionGainTable(Table):
     y: Gains2 = Field(description="K_Y1, K_Y2, on velocity and position")
 
 
-class PlannedDirectionController(LawTable):
+class PlannedDirectionController(ControllerTable):
     """Control of the tilt-car with its thrusts' direction planned (ch. 10, Sec. 5; ch. 11)."""
 
     vehicle_model = "tilt_car"
@@ -101,7 +101,7 @@ class PlannedDirectionController(LawTable):
             return planned_direction.Gains(*self.gains.x, *self.gains.y)
         return planned_direction.GAIN_SETS[self.gains]
 
-    def closed_loops(self, vehicle: Any) -> list[Loop]:
-        """See `LawTable.closed_loops`."""
+    def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
+        """See `ControllerTable.error_loops`."""
         gains = self.resolve_gains()
         return [linear_loop("x", gains[:2]), linear_loop("y", gains[2:])]

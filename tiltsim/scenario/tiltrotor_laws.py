@@ -8,12 +8,12 @@ from typing import Annotated, Literal, Self
 from pydantic import Discriminator, Field, Tag, model_validator
 
 import tiltsim_controllers.laws.full_pose as full_pose
-from tiltsim.scenario.law_table import LawTable, _gain_kind
+from tiltsim.scenario.law_table import ControllerTable, _gain_kind
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import Gains2, NonNegative, Positive, Table, Vector3
 from tiltsim_controllers.analysis.stability import (
-    Loop,
-    closed_loops,
+    ErrorLoop,
+    error_loops,
     feedforward_loops,
     linear_loop,
 )
@@ -26,7 +26,7 @@ from tiltsim_controllers.laws.gains import (
     gains_from_poles,
     gains_from_rows,
 )
-from tiltsim_controllers.laws.gait_feedforward import Ingredients
+from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms
 from tiltsim_controllers.laws.supervisor import STRATEGIES, Supervisor
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
@@ -84,7 +84,7 @@ class PolePlacementTable(Table):
         )
 
 
-Ingredient = Literal[
+FeedforwardTerm = Literal[
     "gait_rates",
     "attitude_rates",
     "reference_derivatives",
@@ -164,7 +164,7 @@ class SupervisorTable(Table):
         )
 
 
-class AttitudeAltitudeController(LawTable):
+class AttitudeAltitudeController(ControllerTable):
     """Attitude-altitude control of the tiltrotor, the gait planned (ch. 3 to 9)."""
 
     vehicle_model = "tiltrotor"
@@ -209,7 +209,7 @@ class AttitudeAltitudeController(LawTable):
         description="s before and after a corner of the gait in which the body turns, at most half "
         "of the gait's shortest line; needs gait_rate_feedforward",
     )
-    leave_out: Annotated[tuple[Ingredient, ...], Field(strict=False)] = Field(
+    leave_out: Annotated[tuple[FeedforwardTerm, ...], Field(strict=False)] = Field(
         (), description="ingredients of gait_rate_feedforward to fly without, for comparison"
     )
 
@@ -259,25 +259,25 @@ class AttitudeAltitudeController(LawTable):
         """The numbers of the supervisor, thresholds of zero without one."""
         return self.supervisor.resolve(vehicle) if self.supervisor else Supervisor()
 
-    def resolve_ingredients(self, *, gyroscopic_torque: bool) -> Ingredients:
+    def resolve_feedforward_terms(self, *, gyroscopic_torque: bool) -> FeedforwardTerms:
         """What the law counts in, on a plant with or without gyroscopic torque."""
-        ingredients = Ingredients(gyroscopic_torque=float(gyroscopic_torque))
+        ingredients = FeedforwardTerms(gyroscopic_torque=float(gyroscopic_torque))
         return ingredients._replace(**dict.fromkeys(self.leave_out, 0.0))
 
-    def closed_loops(self, vehicle: Vehicle) -> list[Loop]:
-        """See `LawTable.closed_loops`."""
+    def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
+        """See `ControllerTable.error_loops`."""
         if self.gait_rate_feedforward:
             return feedforward_loops(self.resolve_gains(), self.resolve_integral_gains())
-        return closed_loops(self.resolve_gains(), vehicle, DECOUPLINGS[self.decoupling])
+        return error_loops(self.resolve_gains(), vehicle, DECOUPLINGS[self.decoupling])
 
     @property
     def loop_name(self) -> str:
-        """See `LawTable.loop_name`."""
+        """See `ControllerTable.loop_name`."""
         return "gait_feedforward" if self.gait_rate_feedforward else self.law
 
     @property
     def linearization(self) -> str:
-        """See `LawTable.linearization`."""
+        """See `ControllerTable.linearization`."""
         return f"the {self.decoupling} decoupling matrix"
 
 
@@ -288,7 +288,7 @@ class FullPoseGainTable(Table):
     attitude: Vector3 = Field(description="on angular acceleration, body rates and attitude")
 
 
-class FullPoseController(LawTable):
+class FullPoseController(ControllerTable):
     """Position and attitude of the tiltrotor at once, the tilt angles inputs, too (ch. 3)."""
 
     vehicle_model = "tiltrotor"
@@ -322,7 +322,7 @@ class FullPoseController(LawTable):
         """The number behind a weight's name, (rad/s)^2/rad."""
         if self.tilt_weight == "published":
             return full_pose.PUBLISHED_TILT_WEIGHT
-        return full_pose.even_tilt_weight(vehicle)
+        return full_pose.force_balanced_tilt_weight(vehicle)
 
     def resolve_failure(self) -> full_pose.Failure:
         """What the law knows of a lost rotor."""
@@ -338,7 +338,7 @@ class FullPoseController(LawTable):
             inf if angle is None else angle,
         )
 
-    def closed_loops(self, vehicle: Vehicle) -> list[Loop]:
-        """See `LawTable.closed_loops`."""
+    def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
+        """See `ControllerTable.error_loops`."""
         gains = self.resolve_gains()
         return [linear_loop("position", gains[:3]), linear_loop("attitude", gains[3:])]

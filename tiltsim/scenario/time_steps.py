@@ -8,7 +8,7 @@ import numpy as np
 
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.tiltrotor_laws import AttitudeAltitudeController
-from tiltsim_controllers.analysis.stability import Loop
+from tiltsim_controllers.analysis.stability import ErrorLoop
 from tiltsim_controllers.laws.supervisor import LAG
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ MAX_UNDAMPED_SERVO_STEP: Final = 1.7
 """On the thesis plant: ode3 turns unstable at 1.73 on the imaginary axis."""
 
 
-def check_steps(scenario: Scenario) -> None:
+def check_time_steps(scenario: Scenario) -> None:
     """Refuse servos, supervisors and laws that a scenario's time steps make unstable.
 
     Raises `InvalidValueError`, also for gains that are unstable at any step.
@@ -50,7 +50,9 @@ def _check_servo(scenario: Scenario) -> None:
     if plant == "thesis" and servo.damping_ratio < 0.3:
         limit = MAX_UNDAMPED_SERVO_STEP
     tilts = scenario.vehicle.model != "quadrotor"
-    moves = plant == "mujoco" or not scenario.does_as_told  # else pods follow the gait exactly
+    moves = (
+        plant == "mujoco" or not scenario.has_ideal_actuators_in_still_air
+    )  # else pods follow the gait exactly
     if tilts and moves and fastest * timestep > limit:
         raise InvalidValueError(
             "simulation.timestep",
@@ -82,7 +84,7 @@ def _check_stability(scenario: Scenario) -> None:
     if controller.allow_unstable:
         return
     vehicle: Any = scenario.vehicle.resolve()  # each law's table takes its own vehicle's
-    for loop in controller.closed_loops(vehicle):
+    for loop in controller.error_loops(vehicle):
         if not loop.stable:
             raise InvalidValueError(
                 "controller.gains",
@@ -93,7 +95,7 @@ def _check_stability(scenario: Scenario) -> None:
         _check_speed(scenario, loop)
 
 
-def _check_speed(scenario: Scenario, loop: Loop) -> None:
+def _check_speed(scenario: Scenario, loop: ErrorLoop) -> None:
     """Refuse a loop whose fastest pole the time steps cannot follow.
 
     The published decoupling matrix speeds the attitude loops up some 700 times, so that

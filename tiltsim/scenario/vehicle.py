@@ -14,7 +14,7 @@ from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, TiltCar
 from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle
 
 if TYPE_CHECKING:
-    from tiltsim.models.user_vehicle import OwnVehicle
+    from tiltsim.models.user_vehicle import UserVehicle
 
 
 class ServoTable(Table):
@@ -104,14 +104,14 @@ class VehicleTable(Table):
         return -greatest if low is None else low, greatest
 
     @property
-    def own(self) -> OwnVehicle | None:
+    def own(self) -> UserVehicle | None:
         """The user's own file as measured; None for the shipped vehicles."""
         if self.mjcf is None:
             return None
-        from tiltsim.models.user_vehicle import read_own_vehicle
+        from tiltsim.models.user_vehicle import read_user_vehicle
 
         try:
-            return read_own_vehicle(self.mjcf, self.model)
+            return read_user_vehicle(self.mjcf, self.model)
         except ValueError as error:
             raise InvalidValueError("vehicle.mjcf", self.mjcf, str(error)) from None
 

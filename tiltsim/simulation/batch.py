@@ -25,11 +25,11 @@ from tiltsim.engines.callback import control_callback
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import control_setup, loop_of
-from tiltsim.plants.engine_choice import worth_native
+from tiltsim.plants.engine_choice import native_pays_off
 from tiltsim.plants.factory import make_plant
-from tiltsim.plants.flight_model import flight_model, what_decides_the_model
+from tiltsim.plants.flight_model import flight_model, model_cache_key
 from tiltsim.plants.mujoco_plant import MujocoPlant, quiet_warnings
-from tiltsim.simulation.monitor import Watch
+from tiltsim.simulation.monitor import TerminationMonitor
 from tiltsim.simulation.simulate import fly_chunk, simulate
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class FlightResult:
     flight: Flight | None = None
 
 
-def fly_all(
+def fly(
     scenarios: Sequence[Scenario], *, threads: int | None = None, keep_samples: bool = False
 ) -> Iterator[FlightResult]:
     """Fly scenarios and yield their results, in their order, as they become known.
@@ -98,7 +98,7 @@ def fly_all(
         When interrupted from the keyboard; results yielded before are complete.
     """
     threads = threads or os.cpu_count() or 1
-    native = worth_native(scenarios)
+    native = native_pays_off(scenarios)
     with ThreadPoolExecutor(threads) as pool:
         for start in range(0, len(scenarios), WINDOW):
             window = scenarios[start : start + WINDOW]
@@ -189,7 +189,7 @@ class _Row:
 
     def __init__(self, index: int, scenario: Scenario, plant: MujocoPlant) -> None:
         self.index, self.scenario, self.plant = index, scenario, plant
-        self.watch = Watch(scenario)
+        self.watch = TerminationMonitor(scenario)
         self.first = np.array([plant.time, *plant.observe()])
         self.end = self.watch.judge(plant, self.first)
         simulation = scenario.simulation
@@ -227,7 +227,7 @@ class _Row:
     def _look_for_the_end(self, samples: list[Floats]) -> list[Floats]:
         steps, state = self.saved[0]
         plant = self.plant
-        header = plant.header_at
+        header = plant.header_offset
         state = state.copy()
         state[header + RECORDER] = 0.0
         plant.state = state
@@ -278,7 +278,7 @@ class _BatchFlight:
                         batch = Batch(new.plant.model, self._size, self._threads)
                     rows[place] = new
                     batch.state[place] = new.saved[-1][1]
-                    batch.state[place, new.plant.header_at + RECORDER] = new.recorder.address
+                    batch.state[place, new.plant.header_offset + RECORDER] = new.recorder.address
             flying = {place: row for place, row in enumerate(rows) if row is not None}
             if flying:
                 steps = self._fly(batch, flying, steps)
@@ -304,7 +304,7 @@ class _BatchFlight:
 
     def _take_next(self) -> _Row:
         index, scenario = self._waiting.popleft()
-        native, key = _natively(scenario), what_decides_the_model(scenario)
+        native, key = _natively(scenario), model_cache_key(scenario)
         model = self._models.get(key)
         if model is None:
             if len(self._models) > 2 * self._size:

@@ -10,7 +10,7 @@ from tiltsim.closed_loop.limits import (
     HORIZONTAL_ERROR,
     ROTOR_SPEED,
     SINGULAR,
-    WITHIN,
+    WITHIN_LIMITS,
     altitude_error,
     horizontal_error,
 )
@@ -21,12 +21,12 @@ from tiltsim.plants.plant import Plant
 from tiltsim.scenario.scenario import Scenario
 
 
-class Watch:
+class TerminationMonitor:
     """Decides from the samples of one flight whether it is lost, and why."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._loop, self._setup = loop_of(scenario), control_setup(scenario)
-        self._reference, self._table = scenario.reference_and_table()
+        self._reference, self._table = scenario.reference_and_knots()
         self._follows_position = self._loop.follows_position(scenario)
         self._sides: dict[int, float] = {}
 
@@ -58,7 +58,7 @@ class Watch:
         values = list(state.values())[1:]
         limits = self._reference, self._table, self._follows_position
         code = self._loop.kind.limit_exceeded(time, values, *limits)
-        if code == WITHIN:
+        if code == WITHIN_LIMITS:
             return None
         if code == HORIZONTAL_ERROR:
             error = horizontal_error(time, values, self._reference, self._table)

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from tiltsim.engines.base import EngineName
 from tiltsim.laws.assembling import loop_of
-from tiltsim.plants.engine_choice import STEPS_WORTH_COMPILING, with_engine
+from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE, with_engine
 from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.system.interrupts import interrupts_kept
+from tiltsim.system.interrupts import reraise_swallowed_interrupts
 
 
 def shared_engine(scenarios: Sequence[Scenario], steps: int | None = None) -> EngineName | None:
@@ -20,13 +20,13 @@ def shared_engine(scenarios: Sequence[Scenario], steps: int | None = None) -> En
     """
     if steps is None:
         steps = sum(scenario.simulation.steps for scenario in scenarios)
-    if steps < STEPS_WORTH_COMPILING:
+    if steps < MIN_STEPS_TO_COMPILE:
         return None
     ready: set[tuple[object, str]] = set()
     for scenario in scenarios:
         kind = (loop_of(scenario), scenario.simulation.plant)
         if kind not in ready and scenario.controller.law != "python":
-            with interrupts_kept():
+            with reraise_swallowed_interrupts():
                 plant = make_plant(with_engine(scenario, "native"))
                 plant.record(1, 1)  # on the thesis plant compiled apart from `advance`
                 plant.advance(1)

@@ -16,8 +16,8 @@ from tiltsim.plants.factory import make_plant
 from tiltsim.plants.plant import Plant
 from tiltsim.plants.user_controller import with_controller
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.simulation.monitor import Watch
-from tiltsim.system.interrupts import interrupts_kept
+from tiltsim.simulation.monitor import TerminationMonitor
+from tiltsim.system.interrupts import reraise_swallowed_interrupts
 
 CHUNK_TIME: Final = 0.1
 """How long (s) native code flies before Python looks at the samples and at the keyboard."""
@@ -41,7 +41,8 @@ def simulate(
     scenario
         What to fly; see `tiltsim.load_scenario`.
     observer
-        Called with every sample (floats in the order of `Loop.sample_fields`) as it is recorded.
+        Called with every sample (floats in the order of `ClosedLoop.sample_fields`) as it is
+        recorded.
     controller
         A controller of your own in place of the scenario's law: a function from
         `tiltsim.Observation` to `tiltsim.Command`, an object with ``__call__`` and, if it has a
@@ -60,7 +61,7 @@ def simulate(
         scenario = with_controller(scenario, controller)
     simulation = scenario.simulation
     plant = make_plant(scenario, controller)
-    watch = Watch(scenario)
+    watch = TerminationMonitor(scenario)
     samples: list[Floats] = []
 
     def keep(sample: Floats) -> None:
@@ -77,7 +78,7 @@ def simulate(
             steps = min(simulation.record_steps, steps_left)
             count = max(1, min(chunk, steps_left // steps))
             began = perf_counter()
-            with interrupts_kept():
+            with reraise_swallowed_interrupts():
                 flown, end = fly_chunk(plant, watch, count, steps)
             for sample in flown:
                 keep(sample)
@@ -105,7 +106,7 @@ def _sample(plant: Plant) -> Floats:
 
 
 def fly_chunk(
-    plant: Plant, watch: Watch, samples: int, steps: int
+    plant: Plant, watch: TerminationMonitor, samples: int, steps: int
 ) -> tuple[Iterable[Floats], End | None]:
     """Fly ``samples`` intervals of ``steps`` steps; the samples, and the end if it came.
 
@@ -135,7 +136,7 @@ def fly_chunk(
 
 
 def _first_bad_step(
-    plant: Plant, watch: Watch, steps: int, sample: Floats, end: End
+    plant: Plant, watch: TerminationMonitor, steps: int, sample: Floats, end: End
 ) -> tuple[Floats, End]:
     """Repeat a recording interval step by step to find the very step on which it went wrong."""
     for _ in range(steps):

@@ -26,7 +26,7 @@ from tiltsim.laws.attitude_altitude import TILTROTOR
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.loading import parse_scenario
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.simulation.batch import fly_all
+from tiltsim.simulation.batch import fly
 from tiltsim.simulation.simulate import simulate
 
 INTEGRATORS: Final = ("RK4", "implicitfast", "Euler")
@@ -129,11 +129,11 @@ def bench_flights(vehicles: int, duration: float, integrator: str, timestep: flo
     ``memory`` is the largest the process has ever been, bytes.
     """
     scenarios = [_trotting(index, duration, integrator, timestep) for index in range(vehicles)]
-    for _ in fly_all(scenarios[:1]):
+    for _ in fly(scenarios[:1]):
         pass  # native code is compiled or loaded before the clock starts
     threads = os.cpu_count() or 1
     start = perf_counter()
-    kinds = [result.end.kind for result in fly_all(scenarios)]
+    kinds = [result.end.kind for result in fly(scenarios)]
     seconds = perf_counter() - start
     # Linux counts in KiB, macOS in bytes.
     largest = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -167,7 +167,7 @@ def bench_accuracy(vehicles: int = BATCH_ROWS) -> Rows:
         error = float(np.abs(_positions(timestep) - reference).max())
         scenarios = [_circling(timestep)] * vehicles
         start = perf_counter()
-        for _ in fly_all(scenarios):
+        for _ in fly(scenarios):
             pass
         seconds = perf_counter() - start
         steps = vehicles * scenarios[0].simulation.steps

@@ -158,7 +158,7 @@ def _valid(addresses: list[str], overrides: Mapping[str, Any]) -> dict[str, Scen
     return scenarios
 
 
-def not_flown(address: str) -> CheckResult:
+def interrupted_result(address: str) -> CheckResult:
     """What stands for a scenario that an interrupt left without an outcome."""
     return CheckResult(address, "interrupted", "not flown: interrupted")
 

@@ -15,8 +15,8 @@ from tiltsim_controllers.analysis.fault_tolerance import (
     ROTORS,
     fixed_tilt_hover,
     fixed_tilt_imbalance,
-    hover_on_three,
-    least_hover_speed,
+    minimum_hover_speed,
+    three_rotor_hover,
 )
 from tiltsim_controllers.analysis.published_gaits import DETERMINANT_CASES, TRIANGLE
 from tiltsim_controllers.analysis.singularity import (
@@ -178,14 +178,14 @@ def fault_report(tilts: Quad, vehicle: Vehicle, opposite_speed: float) -> dict[s
     """
     losses = []
     for lost in ROTORS:
-        free = hover_on_three(lost, vehicle, opposite_speed=opposite_speed)
+        free = three_rotor_hover(lost, vehicle, opposite_speed=opposite_speed)
         factors = [0.0 if rotor == lost else 1.0 for rotor in ROTORS]
         losses.append(
             {
                 "rotor": lost,
                 "fixed_tilts_miss": fixed_tilt_imbalance(tilts, lost, vehicle),
                 "hovers_with_fixed_tilts": fixed_tilt_hover(tilts, vehicle, lost=lost) is not None,
-                "least_speed": least_hover_speed(
+                "least_speed": minimum_hover_speed(
                     vehicle, factors=(factors[0], factors[1], factors[2], factors[3])
                 ),
                 "free_tilts": {

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
-from tiltsim.sweeps.flying import Part, fly_numbered_chunk, installed_versions
+from tiltsim.sweeps.flying import Part, fly_sweep_chunk, installed_versions
 
 CONNECT_TIMEOUT: Final = 10.0  # s
 
@@ -64,7 +64,7 @@ def _fly(
     def submit() -> Any:
         number = waiting.pop()
         return client.submit(
-            *(fly_numbered_chunk, definition, number, engine),
+            *(fly_sweep_chunk, definition, number, engine),
             key=f"tiltsim-{digest}-{number}",
         )
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from pydantic import ValidationError
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.messages import one_line, show
+from tiltsim.scenario.messages import one_line_message, show
 from tiltsim.sweeps.expressions import evaluate
 from tiltsim.sweeps.folder import DATASET, DEFINITION, read_definition
 from tiltsim.sweeps.plan import Plan
@@ -75,7 +75,7 @@ def load_results(folder: Path) -> SweepResults:
     try:
         plan = Plan(definition)
     except ValidationError as error:
-        mistake = one_line(error, definition.sweep, Sweep)
+        mistake = one_line_message(error, definition.sweep, Sweep)
         raise InputError(f"{folder / DEFINITION}: {mistake}") from None
     finished = folder / DATASET
     files = [finished] if finished.exists() else sorted(folder.glob("parts/[0-9]*.parquet"))

@@ -22,7 +22,7 @@ from tiltsim.plants.engine_choice import with_engine
 from tiltsim.scenario.document import without_none
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.simulation.batch import fly_all
+from tiltsim.simulation.batch import fly
 from tiltsim.simulation.simulate import simulate
 from tiltsim.sweeps.definition import VERSIONS, Definition
 from tiltsim.sweeps.plan import Plan
@@ -81,7 +81,7 @@ def fly_chunk(scenarios: Sequence[Scenario], *, keep_flights: bool = False) -> l
     """
     with _ONE_FLIGHT_AT_A_TIME:
         try:
-            results = list(fly_all(scenarios, threads=1, keep_samples=keep_flights))
+            results = list(fly(scenarios, threads=1, keep_samples=keep_flights))
         except Exception:
             # One bad flight must not take the others down: find it by flying one at a time.
             return [_fly_alone(scenario, keep_flights) for scenario in scenarios]
@@ -117,7 +117,7 @@ def _flight_file(flight: Flight) -> bytes:
     return buffer.getvalue()
 
 
-def fly_numbered_chunk(definition_json: str, number: int, engine: EngineName | None) -> Part:
+def fly_sweep_chunk(definition_json: str, number: int, engine: EngineName | None) -> Part:
     """Fly one chunk of a sweep.
 
     Parameters

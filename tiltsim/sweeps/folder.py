@@ -30,7 +30,7 @@ ROW_GROUP: Final = 4096
 
 
 class SweepFolder:
-    """Where one sweep keeps its results; make it with `open_folder`."""
+    """Where one sweep keeps its results; make it with `open_sweep_folder`."""
 
     def __init__(self, path: Path, plan: Plan) -> None:
         self.path, self._plan = path, plan
@@ -110,7 +110,7 @@ class SweepFolder:
 
 
 @contextmanager
-def open_folder(path: Path, plan: Plan) -> Iterator[SweepFolder]:
+def open_sweep_folder(path: Path, plan: Plan) -> Iterator[SweepFolder]:
     """Open a sweep's folder for this process alone, a new one or one to continue.
 
     Raises

@@ -14,12 +14,12 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.document import without_none
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.loading import (
-    anchor_files,
     apply_overrides,
     load_scenario,
+    locate_named_files,
     parse_scenario,
 )
-from tiltsim.scenario.messages import one_line
+from tiltsim.scenario.messages import one_line_message
 from tiltsim.sweeps.definition import VERSIONS, Definition
 from tiltsim.sweeps.plan import Plan
 from tiltsim.sweeps.tables import (
@@ -29,7 +29,7 @@ from tiltsim.sweeps.tables import (
 )
 
 
-def load_definition(path: str | Path, overrides: dict[str, Any] | None = None) -> Definition:
+def load_sweep(path: str | Path, overrides: dict[str, Any] | None = None) -> Definition:
     """Read a sweep file.
 
     Parameters
@@ -56,10 +56,10 @@ def load_definition(path: str | Path, overrides: dict[str, Any] | None = None) -
     try:
         sweep = Sweep.model_validate(document)
     except ValidationError as error:
-        raise InputError(f"{address}: {one_line(error, document, Sweep)}") from None
+        raise InputError(f"{address}: {one_line_message(error, document, Sweep)}") from None
     for axis in sweep.axis:
         for tables in axis.cases.values() if isinstance(axis, CasesAxis) else ():
-            anchor_files(tables, file.parent)
+            locate_named_files(tables, file.parent)
     base = _base(sweep, file.parent, address)
     definition = Definition(
         address,
@@ -83,7 +83,7 @@ def _base(sweep: Sweep, folder: Path, address: str) -> dict[str, Any]:
             raise InputError(f"{address}: scenario: {error}") from None
     else:
         document = deepcopy(sweep.scenario)
-        anchor_files(document, folder)
+        locate_named_files(document, folder)
         apply_overrides(document, sweep.set, f"{address}: scenario")
         scenario = parse_scenario(document, f"{address}: scenario")
     base: dict[str, Any] = without_none(scenario.model_dump(mode="json"))

@@ -18,9 +18,9 @@ from tiltsim.closed_loop.loop import Floats
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import (
     apply_overrides,
-    key_steps,
     merge,
     parse_scenario,
+    split_key,
 )
 from tiltsim.scenario.messages import show
 from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
@@ -299,7 +299,7 @@ class Plan:
 
     def _look_up(self, key: str) -> Any:
         value: Any = self._known
-        for step in key_steps(key):
+        for step in split_key(key):
             inside = isinstance(value, dict) and step in value
             listed = isinstance(value, list) and isinstance(step, int) and step < len(value)
             if not (inside or listed):
@@ -310,7 +310,7 @@ class Plan:
     def _write_out(self, document: dict[str, Any], key: str) -> None:
         """Put a list that follows from a preset into the document, to change an entry of it."""
         table: Any = document
-        *path, last = key_steps(key)
+        *path, last = split_key(key)
         for step in path:
             table = table.get(step) if isinstance(table, dict) else None
         if isinstance(table, dict) and last not in table:

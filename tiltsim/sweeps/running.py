@@ -12,8 +12,8 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.shared_engine import shared_engine
 from tiltsim.sweeps.definition import Definition
-from tiltsim.sweeps.flying import Part, fly_numbered_chunk
-from tiltsim.sweeps.folder import open_folder
+from tiltsim.sweeps.flying import Part, fly_sweep_chunk
+from tiltsim.sweeps.folder import open_sweep_folder
 from tiltsim.sweeps.plan import Plan
 from tiltsim.system.processes import ProcessDiedError, in_processes
 
@@ -36,7 +36,7 @@ def run_sweep(
     Parameters
     ----------
     definition
-        The sweep, from `tiltsim.sweeps.loading.load_definition`.
+        The sweep, from `tiltsim.sweeps.loading.load_sweep`.
     out
         Its folder; see `tiltsim.sweeps.folder`.
     jobs
@@ -55,10 +55,10 @@ def run_sweep(
     Raises
     ------
     InputError
-        As `open_folder`, or if the cluster cannot be used or processes keep dying.
+        As `open_sweep_folder`, or if the cluster cannot be used or processes keep dying.
     """
     plan = Plan(definition)
-    with open_folder(out, plan) as folder:
+    with open_sweep_folder(out, plan) as folder:
         done = folder.finished()
         rows = sum(len(plan.chunk(number)) for number in done)
         report(rows)
@@ -84,7 +84,7 @@ def _fly(plan: Plan, numbers: list[int], jobs: int, cluster: str | None) -> Iter
         return fly_on_cluster(definition, numbers, cluster, worthwhile_engine(steps))
     engine = shared_engine(examples, steps)
     if jobs == 1 or len(numbers) == 1:
-        return (fly_numbered_chunk(definition, number, engine) for number in numbers)
+        return (fly_sweep_chunk(definition, number, engine) for number in numbers)
     return fly_on_processes(definition, numbers, jobs, engine)
 
 
@@ -122,4 +122,4 @@ def fly_on_processes(
 
 
 def _fly_chunk(number: int, definition: str, engine: EngineName | None) -> Part:
-    return fly_numbered_chunk(definition, number, engine)
+    return fly_sweep_chunk(definition, number, engine)

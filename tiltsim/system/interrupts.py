@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def interrupts_kept() -> Iterator[None]:
+def reraise_swallowed_interrupts() -> Iterator[None]:
     """Raise KeyboardInterrupt after the block where one was dropped within it.
 
     Where compiled code calls Python back, as LLVM does while it compiles, no exception can pass:
@@ -44,7 +44,7 @@ def interrupts_kept() -> Iterator[None]:
 
 
 @contextmanager
-def interrupts_deferred() -> Iterator[None]:
+def defer_interrupts() -> Iterator[None]:
     """Let the block finish: an interrupt within it is raised at its end, a second one at once.
 
     For what is short and must not be lost, such as writing a flight's files. In threads other than

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from tiltsim.closed_loop.limits import rotorcraft_limit_exceeded
-from tiltsim.closed_loop.vehicle_kind import Floats, Kind
+from tiltsim.closed_loop.vehicle_kind import Floats, VehicleKind
 from tiltsim_controllers.gaits import tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import STATE_FIELDS
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
@@ -123,7 +123,7 @@ def _initial_motion(scenario: Scenario) -> tuple[Sequence[float], Sequence[float
     )
 
 
-ROTORCRAFT: Final = Kind(
+ROTORCRAFT: Final = VehicleKind(
     name="rotorcraft",
     observed_fields=OBSERVED_FIELDS,
     columns=COLUMN_UNITS,

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.closed_loop.limits import tilt_car_limit_exceeded
-from tiltsim.closed_loop.vehicle_kind import Floats, Kind
+from tiltsim.closed_loop.vehicle_kind import Floats, VehicleKind
 from tiltsim_controllers.gaits import tilt_reference
-from tiltsim_controllers.tilt_car.vehicle import yaw_share
+from tiltsim_controllers.tilt_car.vehicle import counter_yaw_per_tilt
 
 if TYPE_CHECKING:
     import mujoco
@@ -88,7 +88,7 @@ def initial_tilt(scenario: Scenario) -> tuple[float, float]:
 def _initial_motion(scenario: Scenario) -> tuple[Sequence[float], Sequence[float]]:
     """The car turned out of zero tilt at ``initial.attitude``'s yaw, angular momentum conserved."""
     initial = scenario.initial
-    share = yaw_share(scenario.tilt_car.resolve())
+    share = counter_yaw_per_tilt(scenario.tilt_car.resolve())
     tilt, rate = initial_tilt(scenario)
     x, y, _ = initial.position
     vx, vy, _ = initial.velocity
@@ -96,7 +96,7 @@ def _initial_motion(scenario: Scenario) -> tuple[Sequence[float], Sequence[float
     return (x, y, yaw - share * tilt, tilt), (vx, vy, r - share * rate, rate)
 
 
-TILT_CAR: Final = Kind(
+TILT_CAR: Final = VehicleKind(
     name="tilt_car",
     observed_fields=OBSERVED_FIELDS,
     columns=COLUMN_UNITS,

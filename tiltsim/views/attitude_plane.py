@@ -30,10 +30,10 @@ HALF_WIDTH: Final = pi / 2
 MARGIN_THRESHOLD: Final = 0.2
 """Singularity margin (rad) below which a flight is called close to singular."""
 
-ACTS: Final = 0.01
+SUPERVISION_THRESHOLD: Final = 0.01
 """From this share on of what it can do a supervisor counts as acting."""
 
-ON_THE_FRAME: Final = 1e-3
+MIN_DIRECTION_TILT: Final = 1e-3
 """Where ``n`` leans by less (rad), the curve is as near to the square's frame: there is none."""
 
 MOVING_TRAIL_TIME: Final = 1.0
@@ -49,7 +49,7 @@ def margin_threshold(scenario: Scenario) -> float:
     return supervisor.min_margin if supervisor is not None else MARGIN_THRESHOLD
 
 
-def curve_stands(scenario: Scenario) -> bool:
+def curve_is_constant(scenario: Scenario) -> bool:
     """Whether the unacceptable-attitude curve is the same throughout a scenario's flights."""
     if scenario.vehicle.model == "quadrotor":
         return True
@@ -70,13 +70,13 @@ def singular_curves(n: Floats, points: int = 61) -> Floats:
 
     Sampled evenly along the great circle, so that a steep or vertical curve (``R_theta = 0``) is
     followed like any other. NaN where there is none within the plane: ``n`` vertical, as it is for
-    red gaits but for what servos and rounding leave (`ON_THE_FRAME`), or ``n = 0`` (singular at
-    every attitude).
+    red gaits but for what servos and rounding leave (`MIN_DIRECTION_TILT`), or ``n = 0`` (singular
+    at every attitude).
     """
     nx, ny, nz = n[:, 0], n[:, 1], n[:, 2]
     lean = np.hypot(nx, ny)
     with np.errstate(invalid="ignore", divide="ignore"):
-        lean = np.where(lean > ON_THE_FRAME, lean, np.nan)
+        lean = np.where(lean > MIN_DIRECTION_TILT, lean, np.nan)
         level = np.stack([-ny, nx, np.zeros_like(nx)], axis=1) / lean[:, np.newaxis]
         upward = np.stack([-nx * nz, -ny * nz, lean * lean], axis=1)
         upward /= np.linalg.norm(upward, axis=1)[:, np.newaxis]
@@ -86,7 +86,7 @@ def singular_curves(n: Floats, points: int = 61) -> Floats:
     )
 
 
-def forbidden_pitch(n: Floats, side: float, roll: Floats) -> Floats:
+def unreachable_pitch(n: Floats, side: float, roll: Floats) -> Floats:
     """The interval of pitch that is out of reach at each roll, shape (N, len(roll), 2).
 
     Out of reach is what lies beyond the curve: where ``n . r3`` has another sign than ``side``,

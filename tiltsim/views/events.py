@@ -10,8 +10,8 @@ import numpy as np
 
 from tiltsim.laws.assembling import loop_of
 from tiltsim.laws.layers.supervision import SUPERVISION
-from tiltsim.views.attitude_plane import ACTS, margin_threshold
-from tiltsim.views.titles import law_in_words
+from tiltsim.views.attitude_plane import SUPERVISION_THRESHOLD, margin_threshold
+from tiltsim.views.titles import describe_controller
 from tiltsim_controllers.vehicle.parameters import SPIN
 
 if TYPE_CHECKING:
@@ -45,11 +45,11 @@ class Event:
 
 def flight_events(flight: Flight) -> list[Event]:
     """All events of a flight, in order of time."""
-    watch = EventWatch(flight.scenario)
+    watch = EventDetector(flight.scenario)
     return [watch.opening(), *watch.observe(flight), *watch.closing(flight.end)]
 
 
-class EventWatch:
+class EventDetector:
     """Finds the events of one flight, which may come in pieces."""
 
     def __init__(self, scenario: Scenario) -> None:
@@ -60,10 +60,10 @@ class EventWatch:
     def opening(self) -> Event:
         """What is flown."""
         scenario = self._scenario
-        gait = f"gait {scenario.gait.type}, " if loop_of(scenario).flies_gait else ""
+        gait = f"gait {scenario.gait.type}, " if loop_of(scenario).uses_gait else ""
         text = (
             f"{scenario.title or scenario.address or 'flight'}: {gait}"
-            f"{', '.join(law_in_words(scenario))}, "
+            f"{', '.join(describe_controller(scenario))}, "
             f"{scenario.simulation.plant} plant"
         )
         return Event(0.0, "INFO", text)
@@ -110,7 +110,11 @@ class EventWatch:
         yield f"singularity margin below {threshold:g} rad", time, near
         if SUPERVISION in piece.columns:
             supervisor = getattr(self._scenario.controller, "supervisor")  # noqa: B009
-            yield _SUPERVISION_IN_WORDS[supervisor.strategy], time, piece[SUPERVISION] > ACTS
+            yield (
+                _SUPERVISION_IN_WORDS[supervisor.strategy],
+                time,
+                piece[SUPERVISION] > SUPERVISION_THRESHOLD,
+            )
         if "attitude_zone" in piece.columns:
             inside = piece["attitude_zone"] > 0.5
             yield "switched to attitude and altitude", time, inside

@@ -69,12 +69,12 @@ def _endings(names: Sequence[str]) -> Iterator[list[str]]:
         yield ["/".join(part[-count:]) for part in parts]
 
 
-def gait_in_words(scenario: Scenario) -> list[str]:
+def describe_gait(scenario: Scenario) -> list[str]:
     """The gait of a scenario for titles; nothing where its law flies none."""
-    return [f"{scenario.gait.type} gait"] if loop_of(scenario).flies_gait else []
+    return [f"{scenario.gait.type} gait"] if loop_of(scenario).uses_gait else []
 
 
-def law_in_words(scenario: Scenario) -> list[str]:
+def describe_controller(scenario: Scenario) -> list[str]:
     """The law of a scenario for titles, most telling first."""
     controller = scenario.controller
     words = [f"{controller.law.replace('_', '-')} law"]

@@ -88,7 +88,7 @@ def _hover(tilts: Quad, rotor_speeds: Quad, vehicle: Vehicle, lost: int | None) 
     return Hover(tilts, rotor_speeds, roll, pitch, float(values[5] / values[0]))
 
 
-def hover_on_three(lost: int, vehicle: Vehicle, *, opposite_speed: float) -> Hover:
+def three_rotor_hover(lost: int, vehicle: Vehicle, *, opposite_speed: float) -> Hover:
     """The hover without a rotor in which both rotors beside it share the weight evenly.
 
     Parameters
@@ -172,7 +172,7 @@ def fixed_tilt_hover(
     return None
 
 
-def least_hover_speed(
+def minimum_hover_speed(
     vehicle: Vehicle,
     *,
     factors: Quad = (1.0, 1.0, 1.0, 1.0),
@@ -220,7 +220,7 @@ def least_hover_speed(
     ]
     weak = stuck[0] if stuck is not None else 1 + int(np.argmin(factors))
     for speed in (0.5, 0.8):  # without the one that is broken
-        three = hover_on_three(weak, vehicle, opposite_speed=speed * vehicle.hover_rotor_speed)
+        three = three_rotor_hover(weak, vehicle, opposite_speed=speed * vehicle.hover_rotor_speed)
         starts.append([*three.tilts, *(np.array(three.rotor_speeds) ** 2 / weight)])
     if stuck is not None:  # with the opposite pod turned alike, or in the mirror
         for angle in (stuck[1], -stuck[1]):

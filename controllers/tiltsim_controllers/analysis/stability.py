@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
-class Loop(NamedTuple):
+class ErrorLoop(NamedTuple):
     """One linear closed loop: its name and its monic characteristic polynomial."""
 
     name: str
@@ -55,36 +55,40 @@ def is_hurwitz(polynomial: Sequence[float]) -> bool:
     )
 
 
-def third_order_loop(name: str, gains: tuple[float, float, float], loop_gain: float) -> Loop:
+def third_order_loop(name: str, gains: tuple[float, float, float], loop_gain: float) -> ErrorLoop:
     """The loop ``y''' + N K1 y'' + N K2 y' + N K3 y = 0`` and its verdict (Eqs. 35-38)."""
     scaled = tuple(loop_gain * gain for gain in gains)
     k1, k2, k3 = scaled
     polynomial = (1.0, *scaled)
     if is_hurwitz(polynomial):
-        return Loop(name, polynomial, True, "")
+        return ErrorLoop(name, polynomial, True, "")
     for index, gain in enumerate(gains, start=1):
         if gain <= 0.0:
-            return Loop(name, polynomial, False, f"{name} K{index} = {gain:g} must be positive")
-    return Loop(name, polynomial, False, f"{name} K1 K2 = {k1 * k2:g} must exceed K3 = {k3:g}")
+            return ErrorLoop(
+                name, polynomial, False, f"{name} K{index} = {gain:g} must be positive"
+            )
+    return ErrorLoop(name, polynomial, False, f"{name} K1 K2 = {k1 * k2:g} must exceed K3 = {k3:g}")
 
 
-def linear_loop(name: str, gains: Sequence[float]) -> Loop:
+def linear_loop(name: str, gains: Sequence[float]) -> ErrorLoop:
     """The loop with the characteristic polynomial ``s^n + gains[0] s^(n-1) + ...``."""
     polynomial = (1.0, *gains)
     if is_hurwitz(polynomial):
-        return Loop(name, polynomial, True, "")
+        return ErrorLoop(name, polynomial, True, "")
     for index, gain in enumerate(gains, start=1):
         if gain <= 0.0:
-            return Loop(name, polynomial, False, f"{name} k{index} = {gain:g} must be positive")
+            return ErrorLoop(
+                name, polynomial, False, f"{name} k{index} = {gain:g} must be positive"
+            )
     column = routh_first_column(polynomial)
-    return Loop(
+    return ErrorLoop(
         *(name, polynomial, False),
         f"{name} {list(gains)}: entry {len(column)} of the Routh array's first column is "
         f"{column[-1]:g}, must be positive",
     )
 
 
-def closed_loops(gains: Gains, vehicle: Vehicle, decoupling: float) -> list[Loop]:
+def error_loops(gains: Gains, vehicle: Vehicle, decoupling: float) -> list[ErrorLoop]:
     """The closed loops of the attitude-altitude law under the given form of decoupling matrix.
 
     The published matrix lacks the factor ``2 |varpi|`` in its attitude rows, so the attitude loops
@@ -100,7 +104,7 @@ def closed_loops(gains: Gains, vehicle: Vehicle, decoupling: float) -> list[Loop
     position = (1.0, gains.position_1, gains.position_2)
     stable = is_hurwitz(position)
     condition = "" if stable else f"position gains {list(position[1:])} must both be positive"
-    return [*third_order, Loop("position", position, stable, condition)]
+    return [*third_order, ErrorLoop("position", position, stable, condition)]
 
 
 def longest_lag(gains: Sequence[float]) -> float:
@@ -131,7 +135,7 @@ def delay_margin(gains: Sequence[float]) -> float:
     return float((((np.pi + phases) % (2.0 * np.pi)) / crossings).min())
 
 
-def feedforward_loops(gains: Gains, integral: IntegralGains) -> list[Loop]:
+def feedforward_loops(gains: Gains, integral: IntegralGains) -> list[ErrorLoop]:
     """The closed loops of the law that knows its gait's rates, with its integrals."""
     altitude = (gains.altitude_1, gains.altitude_2, gains.altitude_3)
     position = (gains.position_1, gains.position_2)

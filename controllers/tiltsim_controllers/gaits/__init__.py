@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from math import cos, pi, sin
 from typing import Final, NamedTuple
 
-from tiltsim_controllers.gaits.keyframes import NO_KEYFRAMES, keyframe_gait
+from tiltsim_controllers.gaits.keyframes import NO_KNOTS, keyframe_gait
 from tiltsim_controllers.gaits.penguin import penguin_swing, rotating
 from tiltsim_controllers.gaits.trot import TiltsAndRates, continuous_trot, instant_trot
 from tiltsim_controllers.gaits.two_color import RED, two_color_circle
@@ -90,7 +90,7 @@ def planned_angles(time: float, gait: GaitParameters, table: Sequence[float]) ->
 
 @scalar
 def tilt_reference(
-    time: float, gait: GaitParameters, table: Sequence[float] = NO_KEYFRAMES
+    time: float, gait: GaitParameters, table: Sequence[float] = NO_KNOTS
 ) -> TiltsAndRates:
     """The planned tilt angles (rad) and their rates (rad/s) at a time (s).
 

@@ -18,7 +18,7 @@ from tiltsim_controllers.mathematics.scalar import scalar
 ROW: Final = 5
 """Floats in a row of the table."""
 
-NO_KEYFRAMES: Final = (0.0, 0.0)
+NO_KNOTS: Final = (0.0, 0.0)
 """The table of gaits without keyframes; not empty, so that native code can give it a type."""
 
 

@@ -25,7 +25,7 @@ from tiltsim_controllers.gaits import (
     tilt_reference,
 )
 from tiltsim_controllers.gaits.cat import FOOTFALLS, cat_keyframes
-from tiltsim_controllers.gaits.keyframes import NO_KEYFRAMES, ROW
+from tiltsim_controllers.gaits.keyframes import NO_KNOTS, ROW
 from tiltsim_controllers.gaits.two_color import COLORS
 from tiltsim_controllers.vehicle.parameters import drag_ratio
 
@@ -45,7 +45,7 @@ class Gait:
 
     name: str
     parameters: GaitParameters
-    table: tuple[float, ...] = NO_KEYFRAMES
+    table: tuple[float, ...] = NO_KNOTS
     source: str = ""
 
     @property

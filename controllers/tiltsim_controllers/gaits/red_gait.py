@@ -40,7 +40,7 @@ def jet_within(x: Jet, low: float, high: float) -> Jet:
 
 
 @scalar
-def nearest_red(tilts: Jets4, drag_ratio: float, clearance: float) -> tuple[Jet, Jet]:
+def nearest_red_angles(tilts: Jets4, drag_ratio: float, clearance: float) -> tuple[Jet, Jet]:
     """``(alpha_1, alpha_2)`` of the red gait nearest to moving tilt angles, with their rates.
 
     ``clearance`` (rad, below ``delta``) is kept from the sides of the quadrant ``u < 0 < v``, where
@@ -65,6 +65,6 @@ def red_determinant(alpha_1: float, alpha_2: float, drag_ratio: float) -> float:
 
 
 def determinant_at_clearance(clearance: float, drag_ratio: float) -> float:
-    """``R`` at the corner next to P of what `nearest_red` allows."""
+    """``R`` at the corner next to P of what `nearest_red_angles` allows."""
     angle = atan(drag_ratio) - clearance
     return red_determinant(angle, -angle, drag_ratio)

@@ -52,7 +52,7 @@ def pair_bound(
 
 
 @scalar
-def largest_share(attitude: Quad, direction: Quad, low: Quad, high: Quad) -> float:
+def largest_feasible_scale(attitude: Quad, direction: Quad, low: Quad, high: Quad) -> float:
     """The largest ``kappa <= 1`` with some ``beta`` that puts ``kappa a + beta d`` into the box.
 
     There must be such a ``beta`` for ``kappa = 0``. A rotor whose entry of ``d`` is zero bounds
@@ -124,22 +124,22 @@ def prioritized(
 
     Wanted are ``kappa = lambda = 1`` and ``beta = lift``. The box must hold zero.
     """
-    share = largest_share(tilting, direction, low, high)
+    share = largest_feasible_scale(tilting, direction, low, high)
     low, high = less(low, share, tilting), less(high, share, tilting)
-    yaw_share = largest_share(turning, direction, low, high)
-    beta = nearest_lift(turning, direction, low, high, yaw_share, lift)
+    counter_yaw_per_tilt = largest_feasible_scale(turning, direction, low, high)
+    beta = nearest_lift(turning, direction, low, high, counter_yaw_per_tilt, lift)
     # Rounding may carry the sum past the limit that it touches.
     inside = (
-        min(high[0], max(low[0], yaw_share * turning[0] + beta * direction[0])),
-        min(high[1], max(low[1], yaw_share * turning[1] + beta * direction[1])),
-        min(high[2], max(low[2], yaw_share * turning[2] + beta * direction[2])),
-        min(high[3], max(low[3], yaw_share * turning[3] + beta * direction[3])),
+        min(high[0], max(low[0], counter_yaw_per_tilt * turning[0] + beta * direction[0])),
+        min(high[1], max(low[1], counter_yaw_per_tilt * turning[1] + beta * direction[1])),
+        min(high[2], max(low[2], counter_yaw_per_tilt * turning[2] + beta * direction[2])),
+        min(high[3], max(low[3], counter_yaw_per_tilt * turning[3] + beta * direction[3])),
     )
     return less(inside, -share, tilting)
 
 
 @scalar
-def allocated(
+def allocate_accelerations(
     wanted: Quad,
     tilts: Quad,
     speeds: Quad,

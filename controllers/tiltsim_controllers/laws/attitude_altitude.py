@@ -13,7 +13,7 @@ from math import nan
 from typing import Final, NamedTuple
 
 from tiltsim_controllers.gaits import GaitParameters
-from tiltsim_controllers.gaits.keyframes import NO_KEYFRAMES
+from tiltsim_controllers.gaits.keyframes import NO_KNOTS
 from tiltsim_controllers.laws.decouplers import (
     CONVENTIONAL,
     EXACT,
@@ -22,7 +22,7 @@ from tiltsim_controllers.laws.decouplers import (
     exact_decoupler,
     modified_decoupler,
 )
-from tiltsim_controllers.mathematics.rotation import shortest_turn, world_up_in_body
+from tiltsim_controllers.mathematics.rotation import world_up_in_body, wrap_angle
 from tiltsim_controllers.mathematics.scalar import Quad, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
 from tiltsim_controllers.vehicle.decoupling_matrix import (
@@ -95,7 +95,7 @@ def attitude_reference(
     trig: Octet,
     torque: Octet,
     parameters: Parameters,
-    table: Sequence[float] = NO_KEYFRAMES,
+    table: Sequence[float] = NO_KNOTS,
 ) -> tuple[float, float, float, float, float, float]:
     """Attitude and altitude to track, with the altitude's derivatives (ch. 4, Eqs. 28-30).
 
@@ -130,7 +130,7 @@ def attitude_reference(
 
 @scalar
 def rotor_accelerations(
-    time: float, state: State, parameters: Parameters, table: Sequence[float] = NO_KEYFRAMES
+    time: float, state: State, parameters: Parameters, table: Sequence[float] = NO_KNOTS
 ) -> Quad:
     """The rotor accelerations (rad/s^2) of the feedback linearization at a time and state.
 
@@ -176,7 +176,7 @@ def rotor_accelerations(
         vehicle.inertia_yy * per_torque * (gains.pitch_3 * (pitch_ref - pitch) - gains.pitch_2 * q)
         - gains.pitch_1 * pitch_torque
     )
-    yaw_error = shortest_turn(yaw_ref - yaw)
+    yaw_error = wrap_angle(yaw_ref - yaw)
     yaw_rate = (
         vehicle.inertia_zz * per_torque * (gains.yaw_3 * yaw_error - gains.yaw_2 * r)
         - gains.yaw_1 * yaw_torque

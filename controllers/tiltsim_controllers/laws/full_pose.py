@@ -7,7 +7,8 @@ tilt angles, and least norm depends on what a tilt rate weighs against a rate of
 published law takes (rad/s)^2/s and rad/s as they are. One rad/s then moves the force as much as
 1e5 (rad/s)^2/s do, so that tilting does nearly all the work, even the vertical force's: of that a
 pod at a small angle changes next to nothing, and its rate grows like 1/sin(alpha) down to angles of
-1e-5 rad, faster than any step can follow. `even_tilt_weight` weighs both by the force they move.
+1e-5 rad, faster than any step can follow. `force_balanced_tilt_weight` weighs both by the force
+they move.
 
 The thesis shows the flights and prints neither the law nor its gains; both are those of its
 author's public model of this vehicle. Like ch. 3's own law, it leaves out the gyroscopic torque.
@@ -19,7 +20,7 @@ from collections.abc import Sequence
 from math import copysign, inf, nan
 from typing import Final, NamedTuple
 
-from tiltsim_controllers.gaits.keyframes import NO_KEYFRAMES
+from tiltsim_controllers.gaits.keyframes import NO_KNOTS
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
@@ -85,7 +86,7 @@ PUBLISHED_TILT_WEIGHT: Final = 1.0
 """Rates of ``w`` and of the tilt angles count alike, number for number."""
 
 
-def even_tilt_weight(vehicle: Vehicle) -> float:
+def force_balanced_tilt_weight(vehicle: Vehicle) -> float:
     """The weight under which thrust and tilt rates count by the force they move in hover."""
     return vehicle.hover_rotor_speed**2
 
@@ -178,7 +179,7 @@ def without_share(vector: Octet, direction: Octet) -> Octet:
 
 
 @scalar
-def least_norm_inputs(
+def minimum_norm_inputs(
     rows: Sextet, wanted: tuple[float, float, float, float, float, float]
 ) -> Octet:
     """The shortest ``x`` with ``rows x = wanted``: the pseudo-inverse of a 6 x 8 matrix, applied.
@@ -250,7 +251,7 @@ def limited_tilt_rate(rate: float, angle: float, limits: Limits) -> float:
 
 @scalar
 def full_pose_inputs(
-    time: float, state: State, parameters: Parameters, table: Sequence[float] = NO_KEYFRAMES
+    time: float, state: State, parameters: Parameters, table: Sequence[float] = NO_KNOTS
 ) -> Octet:
     """The rotor accelerations (rad/s^2) and tilt rates (rad/s), four each, at a time and state.
 
@@ -327,7 +328,7 @@ def full_pose_inputs(
             without_columns(a5, health),
             without_columns(a6, health),
         )
-    u1, u2, u3, u4, turn_1, turn_2, turn_3, turn_4 = least_norm_inputs(rows, wanted)
+    u1, u2, u3, u4, turn_1, turn_2, turn_3, turn_4 = minimum_norm_inputs(rows, wanted)
 
     # w' = 2 |varpi| varpi'.
     factor_1, factor_2 = 2.0 * abs(speed_1), 2.0 * abs(speed_2)

@@ -26,15 +26,15 @@ from typing import Final, NamedTuple
 
 from tiltsim_controllers.gaits import GaitParameters, tilt_reference
 from tiltsim_controllers.gaits.anticipation import anticipated_tilts
-from tiltsim_controllers.gaits.keyframes import NO_KEYFRAMES
+from tiltsim_controllers.gaits.keyframes import NO_KNOTS
 from tiltsim_controllers.laws.attitude_altitude import Gains, State
 from tiltsim_controllers.laws.decouplers import NONE
 from tiltsim_controllers.laws.gains import IntegralGains
 from tiltsim_controllers.laws.supervisor import (
-    AT_REST,
+    SUPERVISOR_AT_REST,
     Supervisor,
-    gait_share,
     gait_time,
+    supervised_gait_scale,
     supervised_tilts,
 )
 from tiltsim_controllers.mathematics.jets import (
@@ -48,7 +48,7 @@ from tiltsim_controllers.mathematics.jets import (
     jet_square_root,
     jet_sum,
 )
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler, shortest_turn, to_world
+from tiltsim_controllers.mathematics.rotation import rotation_from_euler, to_world, wrap_angle
 from tiltsim_controllers.mathematics.scalar import Quad, Triple, clipped, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
 from tiltsim_controllers.vehicle.decoupling_matrix import (
@@ -60,10 +60,15 @@ from tiltsim_controllers.vehicle.decoupling_matrix import (
     vertical_force_entries,
 )
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
-from tiltsim_controllers.vehicle.rigid_body import body_jerk, cross, euler_motion, torque_rate
+from tiltsim_controllers.vehicle.rigid_body import (
+    angular_jerk,
+    cross,
+    euler_derivatives,
+    torque_rate,
+)
 
 
-class Ingredients(NamedTuple):
+class FeedforwardTerms(NamedTuple):
     """What the law counts in: 1 or 0 each."""
 
     gait_rates: float = 1.0  # tilt rates in Ma
@@ -83,7 +88,7 @@ class Parameters(NamedTuple):
     max_acceleration: float  # m/s^2 of the feedback, horizontally; integrators stop there
     max_angular_acceleration: float  # rad/s^2, each axis, asked of the body
     anticipation: float  # s before and after a corner of the gait in which the body turns
-    ingredients: Ingredients
+    ingredients: FeedforwardTerms
     gait: GaitParameters
     reference: ReferenceParameters
     decoupler: float  # NONE or EXACT
@@ -245,24 +250,24 @@ def planned_force(
     time: float,
     roll: float,
     pitch: float,
-    governor: Triple,
+    supervisor_motion: Triple,
     parameters: Parameters,
     table: Sequence[float],
 ) -> tuple[Jet, Jet, Jet]:
     """The torque-free force ``n`` of the gait as it is commanded, with how it moves (body axes).
 
-    That is the planned gait, or what a supervisor makes of it; ``governor`` is the supervisor's
-    state with its rate and acceleration.
+    That is the planned gait, or what a supervisor makes of it; ``supervisor_motion`` is the
+    supervisor's state with its rate and acceleration.
     """
     gait, supervisor = parameters.gait, parameters.supervisor
     ratio = drag_ratio(parameters.vehicle)
-    clock = gait_time(time, governor, supervisor)
-    share = gait_share(
+    clock = gait_time(time, supervisor_motion, supervisor)
+    share = supervised_gait_scale(
         tilt_reference(clock, gait, table), roll, pitch, supervisor, parameters.vehicle
     )
     alpha_1, alpha_2, alpha_3, alpha_4 = supervised_tilts(
         anticipated_tilts(clock, gait, table, parameters.anticipation),
-        *(share, governor, supervisor, ratio),
+        *(share, supervisor_motion, supervisor, ratio),
     )
     return torque_free_force_jet(alpha_1, alpha_2, alpha_3, alpha_4, ratio)
 
@@ -274,14 +279,14 @@ def tracking_inputs(
     tilt_rates: Quad,
     integrals: Triple,
     parameters: Parameters,
-    table: Sequence[float] = NO_KEYFRAMES,
-    governor: Triple = AT_REST,
+    table: Sequence[float] = NO_KNOTS,
+    supervisor_motion: Triple = SUPERVISOR_AT_REST,
 ) -> tuple[float, ...]:
     """Rotor accelerations, rates of the integrators, and the attitude asked for.
 
     ``state`` is `tiltsim_controllers.laws.attitude_altitude.STATE_FIELDS`, ``tilt_rates`` (rad/s)
-    are those of its tilt angles, ``integrals`` the `INTEGRAL_FIELDS`, ``governor`` the supervisor's
-    state with its rate and acceleration. Returns four rotor accelerations
+    are those of its tilt angles, ``integrals`` the `INTEGRAL_FIELDS`, ``supervisor_motion`` the
+    supervisor's state with its rate and acceleration. Returns four rotor accelerations
     (rad/s^2), three rates (m) and the references of roll, pitch and yaw (rad); NaN where the
     decoupling matrix is singular.
     """
@@ -328,7 +333,7 @@ def tracking_inputs(
         pitch_now = (pitch, q, omega_rate[1])
         yaw_now = (yaw, r, omega_rate[2])
     else:
-        d_roll, d_pitch, d_yaw, dd_roll, dd_pitch, dd_yaw = euler_motion(
+        d_roll, d_pitch, d_yaw, dd_roll, dd_pitch, dd_yaw = euler_derivatives(
             roll, pitch, omega, omega_rate
         )
         roll_now, pitch_now = (roll, d_roll, dd_roll), (pitch, d_pitch, dd_pitch)
@@ -361,7 +366,7 @@ def tracking_inputs(
     xi_rate = yi_rate = 0.0
     roll_ref, pitch_ref = (reference.roll, 0.0, 0.0), (reference.pitch, 0.0, 0.0)
     if parameters.decoupler != NONE:
-        nx, ny, nz = planned_force(time, roll, pitch, governor, parameters, table)
+        nx, ny, nz = planned_force(time, roll, pitch, supervisor_motion, parameters, table)
         jx, jy, _ = to_world(rotation, jerk_along(nx, ny, nz, specific, omega, counted))
         k1, k2 = gains.position_1, gains.position_2
         back_x = position_feedback(
@@ -387,7 +392,7 @@ def tracking_inputs(
 
     # Third-order laws on the attitude, as ch. 4, Eq. (26), around references that move.
     most = parameters.max_angular_acceleration
-    yaw_error = shortest_turn(reference.yaw - yaw)
+    yaw_error = wrap_angle(reference.yaw - yaw)
     roll_jerk = attitude_jerk(roll_ref, roll_now, gains.roll_1, gains.roll_2, gains.roll_3, most)
     pitch_jerk = attitude_jerk(
         pitch_ref, pitch_now, gains.pitch_1, gains.pitch_2, gains.pitch_3, most
@@ -396,7 +401,7 @@ def tracking_inputs(
     yaw_jerk = attitude_jerk(yaw_ref, yaw_now, gains.yaw_1, gains.yaw_2, gains.yaw_3, most)
     jerk = (roll_jerk, pitch_jerk, yaw_jerk)
     wanted = (
-        jerk if ingredients.euler_rates == 0.0 else body_jerk(roll_now, pitch_now, yaw_now, jerk)
+        jerk if ingredients.euler_rates == 0.0 else angular_jerk(roll_now, pitch_now, yaw_now, jerk)
     )
 
     # The torques must change so that omega'' comes out; what turns by itself is taken off.

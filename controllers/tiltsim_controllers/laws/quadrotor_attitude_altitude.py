@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from math import cos, nan, sin
 from typing import Final, NamedTuple
 
-from tiltsim_controllers.gaits.keyframes import NO_KEYFRAMES
+from tiltsim_controllers.gaits.keyframes import NO_KNOTS
 from tiltsim_controllers.laws.yaw_position import State, euler_rates, gyroscopic_acceleration
-from tiltsim_controllers.mathematics.rotation import shortest_turn
+from tiltsim_controllers.mathematics.rotation import wrap_angle
 from tiltsim_controllers.mathematics.scalar import Quad, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
 from tiltsim_controllers.vehicle.parameters import Vehicle
@@ -39,7 +39,7 @@ def attitude_altitude_inputs(
     vehicle: Vehicle,
     gains: Gains,
     reference: ReferenceParameters,
-    table: Sequence[float] = NO_KEYFRAMES,
+    table: Sequence[float] = NO_KNOTS,
 ) -> Quad:
     """Thrust (N) and the three torques (N m, body axes) of the law (ch. 2, Eq. A7).
 
@@ -63,7 +63,7 @@ def attitude_altitude_inputs(
     k1, k2 = gains.attitude_1, gains.attitude_2
     roll_acceleration = k2 * (reference.roll - roll) - k1 * roll_rate
     pitch_acceleration = k2 * (reference.pitch - pitch) - k1 * pitch_rate
-    yaw_acceleration = k2 * shortest_turn(reference.yaw - yaw) - k1 * yaw_rate
+    yaw_acceleration = k2 * wrap_angle(reference.yaw - yaw) - k1 * yaw_rate
     forward = cos_pitch * yaw_acceleration - sin_pitch * pitch_rate * yaw_rate
     p_rate = roll_acceleration - sin_pitch * yaw_acceleration - cos_pitch * pitch_rate * yaw_rate
     q_rate = cos_roll * pitch_acceleration + sin_roll * forward + roll_rate * r

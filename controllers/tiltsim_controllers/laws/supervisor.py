@@ -30,7 +30,7 @@ from math import asin, pi, sqrt
 from typing import Final, NamedTuple
 
 from tiltsim_controllers.gaits import GaitParameters, tilt_acceleration, tilt_reference
-from tiltsim_controllers.gaits.red_gait import Jets4, nearest_red
+from tiltsim_controllers.gaits.red_gait import Jets4, nearest_red_angles
 from tiltsim_controllers.gaits.trot import TiltsAndRates
 from tiltsim_controllers.mathematics.jets import Jet, jet_product, jet_scaled, jet_sum
 from tiltsim_controllers.mathematics.rotation import world_up_in_body
@@ -67,7 +67,7 @@ LAG: Final = 0.025
 NEAR: Final = 0.05
 """rad: a planned gait nearer to red than this goes there as if it were this far away."""
 
-AT_REST: Final = (0.0, 0.0, 0.0)
+SUPERVISOR_AT_REST: Final = (0.0, 0.0, 0.0)
 """A supervisor that does nothing: its state, rate and acceleration."""
 
 
@@ -136,7 +136,7 @@ def allowed_scale(
 
 
 @scalar
-def gait_share(
+def supervised_gait_scale(
     planned: TiltsAndRates, roll: float, pitch: float, supervisor: Supervisor, vehicle: Vehicle
 ) -> float:
     """How much of a planned gait passes at an attitude: 1 where nothing is scaled."""
@@ -170,16 +170,16 @@ def planned_tilts(time: float, gait: GaitParameters, table: Sequence[float]) -> 
 
 
 @scalar
-def gait_time(time: float, governor: Triple, supervisor: Supervisor) -> float:
+def gait_time(time: float, supervisor_motion: Triple, supervisor: Supervisor) -> float:
     """The time of the gait's clock, which may have been held."""
-    return time - governor[0] if supervisor.strategy == HOLD else time
+    return time - supervisor_motion[0] if supervisor.strategy == HOLD else time
 
 
 @scalar
-def slowed(tilt: Jet, governor: Triple) -> Jet:
+def slowed(tilt: Jet, supervisor_motion: Triple) -> Jet:
     """A tilt that moves with the gait's clock, by time: the clock runs at one less the rate."""
-    speed = 1.0 - governor[1]
-    return tilt[0], tilt[1] * speed, tilt[2] * speed * speed - tilt[1] * governor[2]
+    speed = 1.0 - supervisor_motion[1]
+    return tilt[0], tilt[1] * speed, tilt[2] * speed * speed - tilt[1] * supervisor_motion[2]
 
 
 @scalar
@@ -190,28 +190,32 @@ def moved(tilt: Jet, red: Jet, share: Jet) -> Jet:
 
 @scalar
 def supervised_tilts(
-    planned: Jets4, share: float, governor: Triple, supervisor: Supervisor, drag_ratio: float
+    planned: Jets4,
+    share: float,
+    supervisor_motion: Triple,
+    supervisor: Supervisor,
+    drag_ratio: float,
 ) -> Jets4:
     """The tilts that the supervisor commands, with rates and accelerations.
 
-    ``planned`` is the gait at its `gait_time`, ``share`` the `gait_share`, and ``governor`` the
-    supervisor's state with its rate and acceleration.
+    ``planned`` is the gait at its `gait_time`, ``share`` the `supervised_gait_scale`, and
+    ``supervisor_motion`` the supervisor's state with its rate and acceleration.
     """
     a1, a2, a3, a4 = planned
     if supervisor.strategy == HOLD:
         return (
-            slowed(a1, governor),
-            slowed(a2, governor),
-            slowed(a3, governor),
-            slowed(a4, governor),
+            slowed(a1, supervisor_motion),
+            slowed(a2, supervisor_motion),
+            slowed(a3, supervisor_motion),
+            slowed(a4, supervisor_motion),
         )
     if supervisor.strategy == RETURN_TO_RED:
-        red_1, red_2 = nearest_red(planned, drag_ratio, supervisor.clearance)
+        red_1, red_2 = nearest_red_angles(planned, drag_ratio, supervisor.clearance)
         return (
-            moved(a1, red_1, governor),
-            moved(a2, red_2, governor),
-            moved(a3, red_1, governor),
-            moved(a4, red_2, governor),
+            moved(a1, red_1, supervisor_motion),
+            moved(a2, red_2, supervisor_motion),
+            moved(a3, red_1, supervisor_motion),
+            moved(a4, red_2, supervisor_motion),
         )
     return (
         jet_scaled(share, a1),
@@ -254,14 +258,14 @@ def return_speed(
 ) -> float:
     """Share of the way to red (1/s) that keeps the fastest tilt at its greatest rate."""
     a1, a2, a3, a4 = planned = planned_tilts(time, gait, table)
-    red_1, red_2 = nearest_red(planned, drag_ratio, supervisor.clearance)
+    red_1, red_2 = nearest_red_angles(planned, drag_ratio, supervisor.clearance)
     front = max(abs(red_1[0] - a1[0]), abs(red_2[0] - a2[0]))
     rear = max(abs(red_1[0] - a3[0]), abs(red_2[0] - a4[0]))
     return supervisor.max_rate / max(front, rear, NEAR)
 
 
 @scalar
-def governed(
+def supervised_derivative(
     time: float,
     roll: float,
     pitch: float,

@@ -17,7 +17,7 @@ from typing import Final, NamedTuple
 
 import tiltsim_controllers.laws.quadrotor_attitude_altitude as attitude_altitude
 import tiltsim_controllers.laws.yaw_position as yaw_position
-from tiltsim_controllers.gaits.keyframes import NO_KEYFRAMES
+from tiltsim_controllers.gaits.keyframes import NO_KNOTS
 from tiltsim_controllers.laws.quadrotor_attitude_altitude import attitude_altitude_inputs
 from tiltsim_controllers.laws.yaw_position import Inputs, State, euler_rates, yaw_position_inputs
 from tiltsim_controllers.mathematics.scalar import scalar
@@ -66,12 +66,12 @@ def in_attitude_zone(roll: float, pitch: float, zone: Zone) -> bool:
 
 
 @scalar
-def flown_thrust_rate(
+def attitude_altitude_thrust_rate(
     time: float,
     state: State,
     thrust: float,
     parameters: Parameters,
-    table: Sequence[float] = NO_KEYFRAMES,
+    table: Sequence[float] = NO_KNOTS,
 ) -> float:
     """Rate (N/s) of the thrust that the attitude-altitude law makes, ``thrust`` in N."""
     vz, roll, pitch = state[5], state[6], state[7]
@@ -91,7 +91,7 @@ def flown_thrust_rate(
 
 @scalar
 def switching_inputs(
-    time: float, state: State, parameters: Parameters, table: Sequence[float] = NO_KEYFRAMES
+    time: float, state: State, parameters: Parameters, table: Sequence[float] = NO_KNOTS
 ) -> Inputs:
     """Thrust, torques and the rates of the extension's states (`INPUT_FIELDS`), world z up."""
     law = parameters.yaw_position
@@ -105,7 +105,7 @@ def switching_inputs(
     if parameters.extension == RUNNING:
         _, _, _, _, zeta_rate, xi_rate = yaw_position_inputs(time, state, law, table)
     elif parameters.extension == BUMPLESS:
-        thrust_rate = flown_thrust_rate(time, state, thrust, parameters, table)
+        thrust_rate = attitude_altitude_thrust_rate(time, state, thrust, parameters, table)
         zeta_rate = thrust_rate + parameters.extension_rate * (thrust - zeta)
         xi_rate = parameters.extension_rate * (thrust_rate - xi)
     return thrust, roll_torque, pitch_torque, yaw_torque, zeta_rate, xi_rate

@@ -17,13 +17,13 @@ from collections.abc import Sequence
 from math import cos, nan, sin
 from typing import Final, NamedTuple
 
-from tiltsim_controllers.gaits.keyframes import NO_KEYFRAMES
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler, shortest_turn
+from tiltsim_controllers.gaits.keyframes import NO_KNOTS
+from tiltsim_controllers.mathematics.rotation import rotation_from_euler, wrap_angle
 from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
 from tiltsim_controllers.mathematics.z_down import (
-    attitude_turned_over,
-    state_turned_over,
-    turned_over,
+    flip_attitude,
+    flip_state,
+    flip_vector,
 )
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
 from tiltsim_controllers.vehicle.parameters import Vehicle
@@ -196,7 +196,7 @@ def solve_decoupling(z_down: State, vehicle: Vehicle, wanted: Quad) -> Quad:
 
 @scalar
 def wanted_derivatives(
-    time: float, z_down: State, parameters: Parameters, table: Sequence[float] = NO_KEYFRAMES
+    time: float, z_down: State, parameters: Parameters, table: Sequence[float] = NO_KNOTS
 ) -> Quad:
     """The fourth derivative of the position and the second of yaw to ask for (Eqs. A2-A6)."""
     x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r, _, _ = z_down
@@ -204,36 +204,36 @@ def wanted_derivatives(
     k1, k2, k3, k4 = gains.position_1, gains.position_2, gains.position_3, gains.position_4
     ax, ay, az, jx, jy, jz = acceleration_and_jerk(z_down, parameters.vehicle)
     reference = reference_derivatives(time, parameters.reference, table)
-    x_ref, y_ref, z_ref = turned_over(reference[0], reference[1], reference[2])
-    vx_ref, vy_ref, vz_ref = turned_over(reference[3], reference[4], reference[5])
-    ax_ref, ay_ref, az_ref = turned_over(reference[6], reference[7], reference[8])
-    jx_ref, jy_ref, jz_ref = turned_over(reference[9], reference[10], reference[11])
-    sx_ref, sy_ref, sz_ref = turned_over(reference[12], reference[13], reference[14])
-    _, _, yaw_ref = attitude_turned_over(0.0, 0.0, parameters.reference.yaw)
+    x_ref, y_ref, z_ref = flip_vector(reference[0], reference[1], reference[2])
+    vx_ref, vy_ref, vz_ref = flip_vector(reference[3], reference[4], reference[5])
+    ax_ref, ay_ref, az_ref = flip_vector(reference[6], reference[7], reference[8])
+    jx_ref, jy_ref, jz_ref = flip_vector(reference[9], reference[10], reference[11])
+    sx_ref, sy_ref, sz_ref = flip_vector(reference[12], reference[13], reference[14])
+    _, _, yaw_ref = flip_attitude(0.0, 0.0, parameters.reference.yaw)
     _, _, yaw_rate = euler_rates(roll, pitch, p, q, r)
     return (
         sx_ref + k1 * (jx_ref - jx) + k2 * (ax_ref - ax) + k3 * (vx_ref - vx) + k4 * (x_ref - x),
         sy_ref + k1 * (jy_ref - jy) + k2 * (ay_ref - ay) + k3 * (vy_ref - vy) + k4 * (y_ref - y),
         sz_ref + k1 * (jz_ref - jz) + k2 * (az_ref - az) + k3 * (vz_ref - vz) + k4 * (z_ref - z),
-        gains.yaw_2 * shortest_turn(yaw_ref - yaw) - gains.yaw_1 * yaw_rate,
+        gains.yaw_2 * wrap_angle(yaw_ref - yaw) - gains.yaw_1 * yaw_rate,
     )
 
 
 @scalar
 def yaw_position_inputs(
-    time: float, state: State, parameters: Parameters, table: Sequence[float] = NO_KEYFRAMES
+    time: float, state: State, parameters: Parameters, table: Sequence[float] = NO_KNOTS
 ) -> Inputs:
     """Thrust, torques and the rates of the law's own states (`INPUT_FIELDS`), world z up.
 
     The inputs of ch. 2, Eqs. (1)-(8), with ``u_2`` to ``u_4`` turned from forces at the arms into
     torques. NaN where the decoupling matrix is singular.
     """
-    z_down = state_turned_over(state)
+    z_down = flip_state(state)
     vehicle = parameters.vehicle
     sx, sy, sz, yaw_acceleration = wanted_derivatives(time, z_down, parameters, table)
     drift_x, drift_y, drift_z, drift_yaw = drift(z_down, vehicle)
     wanted = (sx - drift_x, sy - drift_y, sz - drift_z, yaw_acceleration - drift_yaw)
     u1, u2, u3, u4 = solve_decoupling(z_down, vehicle, wanted)
     arm = vehicle.arm_length
-    roll_torque, pitch_torque, yaw_torque = turned_over(arm * u2, arm * u3, arm * u4)
+    roll_torque, pitch_torque, yaw_torque = flip_vector(arm * u2, arm * u3, arm * u4)
     return state[12], roll_torque, pitch_torque, yaw_torque, state[13], u1

@@ -18,7 +18,7 @@ _WORD: Final = 0xFFFFFFFF
 
 
 @scalar
-def hashed(word: int) -> int:
+def hash_word(word: int) -> int:
     """Permute the 32-bit words so that the bits of neighbours have nothing in common."""
     word = word ^ (word >> 16)
     word = (word * 0x7FEB352D) & _WORD
@@ -33,9 +33,9 @@ def uniform(seed: float, channel: float, index: float) -> float:
 
     The arguments are whole numbers; of each the last 32 bits count.
     """
-    word = hashed(int(seed) & _WORD)
-    word = hashed((word + int(channel)) & _WORD)
-    word = hashed((word + int(index)) & _WORD)
+    word = hash_word(int(seed) & _WORD)
+    word = hash_word((word + int(channel)) & _WORD)
+    word = hash_word((word + int(index)) & _WORD)
     return (word + 0.5) / 4294967296.0
 
 

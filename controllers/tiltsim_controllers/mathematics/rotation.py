@@ -37,7 +37,7 @@ def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> Quad:
 
 
 @scalar
-def shortest_turn(angle: float) -> float:
+def wrap_angle(angle: float) -> float:
     """The angle (rad) within half a revolution either way that turns to the same direction.
 
     For differences of yaw: a quaternion tells yaw between -pi and pi, a vehicle may cross there.

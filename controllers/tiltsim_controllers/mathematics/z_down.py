@@ -11,13 +11,13 @@ from tiltsim_controllers.mathematics.scalar import Triple, scalar
 
 
 @scalar
-def turned_over(x: float, y: float, z: float) -> Triple:
+def flip_vector(x: float, y: float, z: float) -> Triple:
     """A vector of either convention (position, rate, torque; world or body axes) in the other."""
     return x, -y, -z
 
 
 @scalar
-def attitude_turned_over(roll: float, pitch: float, yaw: float) -> Triple:
+def flip_attitude(roll: float, pitch: float, yaw: float) -> Triple:
     """Roll, pitch and yaw (rad) of either convention in the other.
 
     The rotation becomes ``D Rz(yaw) Ry(pitch) Rx(roll) D`` with ``D = diag(1, -1, -1)``, which is
@@ -27,7 +27,7 @@ def attitude_turned_over(roll: float, pitch: float, yaw: float) -> Triple:
 
 
 @scalar
-def state_turned_over(state: tuple[float, ...]) -> tuple[float, ...]:
+def flip_state(state: tuple[float, ...]) -> tuple[float, ...]:
     """A quadrotor's state of either convention in the other.
 
     The state is ``(x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r, thrust, thrust_rate)``; thrust
@@ -35,9 +35,9 @@ def state_turned_over(state: tuple[float, ...]) -> tuple[float, ...]:
     """
     x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r, thrust, thrust_rate = state
     return (
-        *turned_over(x, y, z),
-        *turned_over(vx, vy, vz),
-        *attitude_turned_over(roll, pitch, yaw),
-        *turned_over(p, q, r),
+        *flip_vector(x, y, z),
+        *flip_vector(vx, vy, vz),
+        *flip_attitude(roll, pitch, yaw),
+        *flip_vector(p, q, r),
         *(thrust, thrust_rate),
     )

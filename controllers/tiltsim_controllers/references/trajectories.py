@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import cos, sin
 from typing import Final, NamedTuple
 
-from tiltsim_controllers.gaits.keyframes import NO_KEYFRAMES
+from tiltsim_controllers.gaits.keyframes import NO_KNOTS
 from tiltsim_controllers.mathematics.scalar import scalar
 from tiltsim_controllers.references.waypoints import waypoint_motion
 
@@ -74,7 +74,7 @@ def sine_motion(
 
 @scalar
 def reference_derivatives(
-    time: float, reference: ReferenceParameters, table: Sequence[float] = NO_KEYFRAMES
+    time: float, reference: ReferenceParameters, table: Sequence[float] = NO_KNOTS
 ) -> tuple[float, ...]:
     """A reference and its first four derivatives at a time (s), world axes.
 
@@ -128,7 +128,7 @@ def reference_derivatives(
 
 @scalar
 def position_reference(
-    time: float, reference: ReferenceParameters, table: Sequence[float] = NO_KEYFRAMES
+    time: float, reference: ReferenceParameters, table: Sequence[float] = NO_KNOTS
 ) -> tuple[float, ...]:
     """Position (m), velocity (m/s) and acceleration (m/s^2) to track at a time (s), world axes.
 

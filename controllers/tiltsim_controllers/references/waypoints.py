@@ -44,7 +44,7 @@ def waypoint_motion(
 ) -> tuple[float, ...]:
     """Position, velocity, acceleration, jerk and snap, three floats each, at a time (s).
 
-    ``rows`` of the table, from index ``offset`` on, hold the motion (`minimum_snap_table`).
+    ``rows`` of the table, from index ``offset`` on, hold the motion (`minimum_snap_knots`).
     """
     begin = int(offset)
     low, high = 0, int(rows)
@@ -62,7 +62,7 @@ def waypoint_motion(
     return x0, y0, z0, x1, y1, z1, x2, y2, z2, x3, y3, z3, x4, y4, z4
 
 
-def minimum_snap_table(
+def minimum_snap_knots(
     points: Sequence[Sequence[float]], times: Sequence[float]
 ) -> tuple[float, ...]:
     """The rows of `waypoint_motion` through points (m) at increasing times (s) from 0.

@@ -21,7 +21,7 @@ from tiltsim_controllers.tilt_car.vehicle import (
     STATE_FIELDS,
     TiltCar,
     body_acceleration,
-    turn_share,
+    turn_per_tilt,
     turned,
 )
 
@@ -73,7 +73,7 @@ def body_derivatives(state: State, car: TiltCar) -> tuple[float, ...]:
     of the middle, ``(1 - I_T / I_B) alpha'``, for the products of ``J_psi`` and ``J_alpha``.
     """
     speed_1, speed_2, tilt_rate, rate_1, rate_2 = state[6:11]
-    turn = turn_share(car) * tilt_rate
+    turn = turn_per_tilt(car) * tilt_rate
     along, across = body_acceleration(speed_1 * speed_1, speed_2 * speed_2, car)
     along_1, across_1 = body_acceleration(2.0 * speed_1 * rate_1, 2.0 * speed_2 * rate_2, car)
     along_2, across_2 = body_acceleration(2.0 * rate_1 * rate_1, 2.0 * rate_2 * rate_2, car)

@@ -185,7 +185,7 @@ def lyapunov(swing: Swing, state: State) -> float:
     return 0.5 * rate * rate + 0.5 * swing.gains.y_position * error * error
 
 
-def lyapunov_gain(swing: Swing, state: State) -> float:
+def lyapunov_growth(swing: Swing, state: State) -> float:
     """By how much the candidate grows over the half period from a state (Eq. 70)."""
     return lyapunov(swing, half_period(swing, state).end) - lyapunov(swing, state)
 
@@ -226,16 +226,16 @@ def lyapunov_bound(swing: Swing, points: int = 161) -> LyapunovBound:
         # In the ellipse's coordinates rays are lines through states of proportional errors.
         unit = (cos(angle) * sqrt(2.0 / swing.gains.y_position), sin(angle) * sqrt(2.0))
         edge = _edge(swing, unit)
-        gain = lyapunov_gain(swing, (edge * unit[0], edge * unit[1]))
+        gain = lyapunov_growth(swing, (edge * unit[0], edge * unit[1]))
         largest = max(largest, gain)
         if gain < 0.0:
             continue
         low, high = edge, max(2.0 * edge, 1.0)
-        while lyapunov_gain(swing, (high * unit[0], high * unit[1])) > 0.0:
+        while lyapunov_growth(swing, (high * unit[0], high * unit[1])) > 0.0:
             low, high = high, 2.0 * high
         for _ in range(60):
             middle = 0.5 * (low + high)
-            if lyapunov_gain(swing, (middle * unit[0], middle * unit[1])) > 0.0:
+            if lyapunov_growth(swing, (middle * unit[0], middle * unit[1])) > 0.0:
                 low = middle
             else:
                 high = middle

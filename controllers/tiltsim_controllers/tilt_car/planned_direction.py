@@ -43,7 +43,7 @@ GAIN_SETS: Final = {
 
 
 @scalar
-def wanted_acceleration(time: float, state: State, parameters: Parameters) -> Pair:
+def demanded_acceleration(time: float, state: State, parameters: Parameters) -> Pair:
     """The acceleration (m/s^2, world) to ask for; ch. 10, Eq. (20) and ch. 11, Eqs. (9), (10)."""
     gains = parameters.gains
     reference = reference_derivatives(time, parameters.reference)
@@ -58,9 +58,9 @@ def wanted_acceleration(time: float, state: State, parameters: Parameters) -> Pa
 
 
 @scalar
-def wanted_squares(time: float, state: State, parameters: Parameters) -> Pair:
+def demanded_squared_speeds(time: float, state: State, parameters: Parameters) -> Pair:
     """The squares of the rotor speeds (rad^2/s^2) to ask for, of any sign; ch. 11, Eq. (12)."""
-    x, y = wanted_acceleration(time, state, parameters)
+    x, y = demanded_acceleration(time, state, parameters)
     along, across = turned(x, y, -(state[4] + state[5]))
     return squared_speeds(along, across, parameters.car)
 
@@ -68,7 +68,7 @@ def wanted_squares(time: float, state: State, parameters: Parameters) -> Pair:
 @scalar
 def planned_direction_inputs(time: float, state: State, parameters: Parameters) -> Pair:
     """The squares of the rotor speeds (rad^2/s^2), never below zero; ch. 11, Eqs. (12), (13)."""
-    square_1, square_2 = wanted_squares(time, state, parameters)
+    square_1, square_2 = demanded_squared_speeds(time, state, parameters)
     # Written so that NaN stays NaN.
     return (
         0.0 if square_1 < 0.0 else square_1,

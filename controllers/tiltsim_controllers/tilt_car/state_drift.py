@@ -25,12 +25,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from tiltsim_controllers.tilt_car.third_derivative import input_columns, silent_input
+from tiltsim_controllers.tilt_car.third_derivative import input_columns, null_space_input
 from tiltsim_controllers.tilt_car.vehicle import (
     TiltCar,
     body_acceleration,
     squared_speeds,
-    turn_share,
+    turn_per_tilt,
 )
 
 Array = npt.NDArray[np.float64]
@@ -62,7 +62,7 @@ def _scale(acceleration: float, car: TiltCar) -> float:
 def drift_rate(lean: float, path: Orbit, car: TiltCar) -> float:
     """The rate (rad/s) at which the lean advances under the minimum-norm law."""
     stiffness = lean_stiffness(lean, path.acceleration, car)
-    return path.angular_frequency / (1.0 + turn_share(car) ** 2 * stiffness)
+    return path.angular_frequency / (1.0 + turn_per_tilt(car) ** 2 * stiffness)
 
 
 def holonomy(lean: float, path: Orbit, car: TiltCar) -> float:
@@ -98,7 +98,7 @@ def _turned_by(lean: float, path: Orbit, car: TiltCar) -> float:
     def integral(angle: float) -> float:  # of cos^2 / sin
         return log(tan(0.5 * angle)) + cos(angle)
 
-    weight = turn_share(car) ** 2 * _scale(path.acceleration, car)
+    weight = turn_per_tilt(car) ** 2 * _scale(path.acceleration, car)
     return lean + weight * (integral(theta + lean) - integral(theta - lean))
 
 
@@ -145,7 +145,7 @@ def twist(speed_1: float, speed_2: float, car: TiltCar) -> float:
     steps = 1e-5 * speed_1, 1e-5 * speed_2
 
     def direction(w1: float, w2: float) -> Array:
-        n = np.array(silent_input(input_columns(w1, w2, car)))
+        n = np.array(null_space_input(input_columns(w1, w2, car)))
         return np.asarray(n / np.linalg.norm(n))
 
     by_1 = (direction(speed_1 + steps[0], speed_2) - direction(speed_1 - steps[0], speed_2)) / (

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 from tiltsim_controllers.mathematics.scalar import Pair, Triple, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
-from tiltsim_controllers.tilt_car.vehicle import TiltCar, body_acceleration, turn_share, turned
+from tiltsim_controllers.tilt_car.vehicle import TiltCar, body_acceleration, turn_per_tilt, turned
 
 State = tuple[float, ...]
 
@@ -51,7 +51,7 @@ def input_columns(speed_1: float, speed_2: float, car: TiltCar) -> tuple[float, 
     push_1, side_1 = body_acceleration(2.0 * speed_1, 0.0, car)
     push_2, side_2 = body_acceleration(0.0, 2.0 * speed_2, car)
     along, across = body_acceleration(speed_1 * speed_1, speed_2 * speed_2, car)
-    share = turn_share(car)
+    share = turn_per_tilt(car)
     return push_1, side_1, push_2, side_2, -share * across, share * along
 
 
@@ -75,7 +75,7 @@ def minimum_norm(columns: tuple[float, ...], wanted: Pair) -> Triple:
 
 
 @scalar
-def silent_input(columns: tuple[float, ...]) -> Triple:
+def null_space_input(columns: tuple[float, ...]) -> Triple:
     """The direction of the inputs that the outputs do not feel: the null space of ``Delta``."""
     x1, y1, x2, y2, x3, y3 = columns
     return x2 * y3 - x3 * y2, x3 * y1 - x1 * y3, x1 * y2 - x2 * y1
@@ -88,10 +88,10 @@ def restoring_inputs(lean: float, rate: float, columns: tuple[float, ...], car: 
     The lean is the angle from the thrusts' middle to the acceleration. Zero where a rotor rests:
     no silent input turns the middle then.
     """
-    n1, n2, n3 = silent_input(columns)
+    n1, n2, n3 = null_space_input(columns)
     if n3 == 0.0:
         return 0.0, 0.0, 0.0
-    scale = rate * lean / (turn_share(car) * n3)
+    scale = rate * lean / (turn_per_tilt(car) * n3)
     return scale * n1, scale * n2, scale * n3
 
 

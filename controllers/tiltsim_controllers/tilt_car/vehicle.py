@@ -34,7 +34,7 @@ THESIS_CAR: Final = TiltCar(
 """Ch. 10's car.
 
 The thesis does not give the mass; 1 kg is ours. Its ``I_B = 0.002`` is the whole car's: Eq. (2)
-conserves angular momentum with no other reading (see `turn_share`).
+conserves angular momentum with no other reading (see `turn_per_tilt`).
 """
 
 STATE_FIELDS: Final = (
@@ -46,7 +46,7 @@ STATE_FIELDS: Final = (
 
 
 @scalar
-def yaw_share(car: TiltCar) -> float:
+def counter_yaw_per_tilt(car: TiltCar) -> float:
     """By how much the bottom disc turns back as the top disc tilts: ``-d psi / d alpha``.
 
     Angular momentum is conserved: ``I_T (psi' + alpha') + I_bottom psi' = 0``. That is Eq. (2),
@@ -56,9 +56,9 @@ def yaw_share(car: TiltCar) -> float:
 
 
 @scalar
-def turn_share(car: TiltCar) -> float:
+def turn_per_tilt(car: TiltCar) -> float:
     """By how much the thrusts turn as the top disc tilts: ``1 - I_T / I_B`` of Eqs. (11), (18)."""
-    return 1.0 - yaw_share(car)
+    return 1.0 - counter_yaw_per_tilt(car)
 
 
 @scalar

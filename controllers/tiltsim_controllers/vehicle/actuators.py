@@ -57,7 +57,7 @@ def reading_index(time: float, period: float) -> float:
 
 
 @scalar
-def turned_quaternion(
+def rotate_by_small_angle(
     qw: float, qx: float, qy: float, qz: float, x: float, y: float, z: float
 ) -> Quad:
     """A unit quaternion turned further by a small rotation vector (rad, body axes).
@@ -94,7 +94,9 @@ def rate_limited_command(command: float, angle: float, reach: float) -> float:
 
 
 @scalar
-def told_rate(told: float, rate: float, spin: float, slowest: float, fastest: float) -> float:
+def limited_speed_command_rate(
+    told: float, rate: float, spin: float, slowest: float, fastest: float
+) -> float:
     """The rate (rad/s^2) of the speed that a motor is told, from the one that a law asks for.
 
     Beyond the rotor's limits (rad/s, along its spin) it goes no further: what no rotor can follow

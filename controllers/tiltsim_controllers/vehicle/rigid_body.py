@@ -9,7 +9,7 @@ from tiltsim_controllers.mathematics.scalar import Triple, scalar
 
 
 @scalar
-def euler_motion(
+def euler_derivatives(
     roll: float, pitch: float, omega: Triple, omega_rate: Triple
 ) -> tuple[float, float, float, float, float, float]:
     """First and second derivatives of roll, pitch and yaw from the body rates and their rates.
@@ -38,7 +38,7 @@ def euler_motion(
 
 
 @scalar
-def body_jerk(roll: Jet, pitch: Jet, yaw: Jet, jerk: Triple) -> Triple:
+def angular_jerk(roll: Jet, pitch: Jet, yaw: Jet, jerk: Triple) -> Triple:
     """Second derivatives of the body rates when roll, pitch and yaw have the given ``jerk``.
 
     ``p = roll' - yaw' sin(pitch)``, ``q = pitch' cos(roll) + yaw' sin(roll) cos(pitch)``, ``r =

@@ -13,9 +13,9 @@ from tiltsim_controllers.analysis.fault_tolerance import (
     ROTORS,
     fixed_tilt_hover,
     fixed_tilt_imbalance,
-    hover_on_three,
-    least_hover_speed,
+    minimum_hover_speed,
     pose_matrix,
+    three_rotor_hover,
 )
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix
 from tiltsim_controllers.analysis.two_color_map import delta
@@ -42,7 +42,7 @@ def wrench(hover, factors=(1.0,) * 4):
 @given(st.floats(0.0, 1.2))
 @settings(max_examples=20, deadline=None)
 def test_three_rotors_hover(lost, share):
-    hover = hover_on_three(lost, VEHICLE, opposite_speed=share * HOVER)
+    hover = three_rotor_hover(lost, VEHICLE, opposite_speed=share * HOVER)
     assert hover.rotor_speeds[lost - 1] == 0.0
     torque, force = wrench(hover)
     np.testing.assert_allclose(torque, 0.0, atol=1e-12)
@@ -51,19 +51,19 @@ def test_three_rotors_hover(lost, share):
 
 @each_loss
 def test_two_rotors_hover_without_authority_and_a_third_brings_it(lost):
-    pair = hover_on_three(lost, VEHICLE, opposite_speed=0.0)
+    pair = three_rotor_hover(lost, VEHICLE, opposite_speed=0.0)
     assert pair.max_rotor_speed == pytest.approx((WEIGHT / 2.0 / cos(DELTA)) ** 0.5)
     assert pair.authority == pytest.approx(0.0, abs=1e-12)
     shares = (0.2, 0.5, 0.9)
     authority = [
-        hover_on_three(lost, VEHICLE, opposite_speed=share * HOVER).authority for share in shares
+        three_rotor_hover(lost, VEHICLE, opposite_speed=share * HOVER).authority for share in shares
     ]
     assert 0.01 < authority[0] < authority[1] < authority[2]
 
 
 @each_loss
 def test_the_pose_matrix_is_the_derivative_of_force_and_torque(lost):
-    hover = hover_on_three(lost, VEHICLE, opposite_speed=0.6 * HOVER)
+    hover = three_rotor_hover(lost, VEHICLE, opposite_speed=0.6 * HOVER)
     tilts, w = np.array(hover.tilts), np.array(hover.rotor_speeds) ** 2 * SPIN
 
     def made(x):
@@ -83,12 +83,12 @@ def test_the_pose_matrix_is_the_derivative_of_force_and_torque(lost):
 @pytest.mark.parametrize("speed", [-1.0, 1e4])
 def test_speeds_that_outweigh_the_vehicle_are_refused(speed):
     with pytest.raises(ValueError, match="opposite_speed"):
-        hover_on_three(1, VEHICLE, opposite_speed=speed)
+        three_rotor_hover(1, VEHICLE, opposite_speed=speed)
 
 
 def test_an_unknown_rotor_is_refused():
     with pytest.raises(ValueError, match="lost = 5"):
-        hover_on_three(5, VEHICLE, opposite_speed=100.0)
+        three_rotor_hover(5, VEHICLE, opposite_speed=100.0)
 
 
 # --- fixed tilts -------------------------------------------------------------------------------
@@ -138,25 +138,27 @@ def test_rotors_with_less_thrust_turn_faster(factors):
 
 
 def test_a_whole_vehicle_needs_the_speed_of_hover():
-    assert least_hover_speed(VEHICLE) == pytest.approx(HOVER, rel=1e-6)
+    assert minimum_hover_speed(VEHICLE) == pytest.approx(HOVER, rel=1e-6)
 
 
 @each_loss
 def test_without_a_rotor_three_at_one_speed_are_best(lost):
     factors = tuple(0.0 if rotor == lost else 1.0 for rotor in ROTORS)
-    least = least_hover_speed(VEHICLE, factors=factors)
+    least = minimum_hover_speed(VEHICLE, factors=factors)
     assert least / HOVER == pytest.approx(1.3285, abs=1e-4)
     # Among the symmetric hovers the one at equal speeds is the best, and nothing beats it.
-    equal = hover_on_three(lost, VEHICLE, opposite_speed=least)
+    equal = three_rotor_hover(lost, VEHICLE, opposite_speed=least)
     assert equal.max_rotor_speed == pytest.approx(least, rel=1e-4)
 
 
 def test_more_thrust_never_needs_more_speed():
-    speeds = [least_hover_speed(VEHICLE, factors=(f, 1.0, 1.0, 1.0)) for f in (0.0, 0.3, 0.7, 1.0)]
+    speeds = [
+        minimum_hover_speed(VEHICLE, factors=(f, 1.0, 1.0, 1.0)) for f in (0.0, 0.3, 0.7, 1.0)
+    ]
     assert sorted(speeds, reverse=True) == speeds
 
 
 @pytest.mark.parametrize("angle", [-pi / 2, 1.0, 3.0])
 def test_a_stuck_servo_is_never_worse_than_a_lost_rotor(angle):
-    least = least_hover_speed(VEHICLE, stuck=(1, angle))
+    least = minimum_hover_speed(VEHICLE, stuck=(1, angle))
     assert HOVER < least < 1.3286 * HOVER

@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from tiltsim_controllers.analysis.stability import (
-    closed_loops,
+    error_loops,
     is_hurwitz,
     routh_first_column,
     third_order_loop,
@@ -42,7 +42,7 @@ def largest_real_part(polynomial):
 
 
 def loops(gain_set, decoupling, vehicle=AR_DRONE):
-    found = closed_loops(GAIN_SETS[gain_set], vehicle, DECOUPLINGS[decoupling])
+    found = error_loops(GAIN_SETS[gain_set], vehicle, DECOUPLINGS[decoupling])
     return {loop.name: loop for loop in found}
 
 
@@ -154,6 +154,6 @@ def test_published_matrix_multiplies_the_attitude_loops_by_twice_the_hover_speed
 def test_position_gains_must_both_be_positive(position):
     velocity, place = position
     bad = GAIN_SETS["ch04"]._replace(position_1=velocity, position_2=place)
-    loop = closed_loops(bad, AR_DRONE, DECOUPLINGS["published"])[-1]
+    loop = error_loops(bad, AR_DRONE, DECOUPLINGS["published"])[-1]
     assert not loop.stable
     assert loop.condition == f"position gains [{velocity}, {place}] must both be positive"

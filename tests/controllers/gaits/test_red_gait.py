@@ -13,7 +13,7 @@ from tiltsim_controllers.analysis.singularity import determinant, margin_over_ga
 from tiltsim_controllers.analysis.two_color_map import curve_l, red_residual
 from tiltsim_controllers.gaits.red_gait import (
     determinant_at_clearance,
-    nearest_red,
+    nearest_red_angles,
     red_determinant,
 )
 from tiltsim_controllers.vehicle.decoupling_matrix import (
@@ -34,7 +34,9 @@ tilts = st.tuples(angle, angle, angle, angle)
 
 def red(angles):
     """The nearest red gait of resting tilts, as four angles."""
-    (a, _, _), (b, _, _) = nearest_red(tuple((x, 0.0, 0.0) for x in angles), RATIO, CLEARANCE)
+    (a, _, _), (b, _, _) = nearest_red_angles(
+        tuple((x, 0.0, 0.0) for x in angles), RATIO, CLEARANCE
+    )
     return np.array([a, b, a, b])
 
 
@@ -120,7 +122,9 @@ def test_rates_are_those_of_the_moving_angles():
         )
 
     step = 1e-4
-    before, now, after = (nearest_red(moving(t), RATIO, CLEARANCE) for t in (-step, 0.0, step))
+    before, now, after = (
+        nearest_red_angles(moving(t), RATIO, CLEARANCE) for t in (-step, 0.0, step)
+    )
     for low, middle, high in zip(before, now, after, strict=True):
         assert middle[1] == pytest.approx((high[0] - low[0]) / (2.0 * step), abs=1e-7)
         assert middle[2] == pytest.approx((high[1] - low[1]) / (2.0 * step), abs=1e-7)

@@ -9,7 +9,11 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
-from tiltsim_controllers.laws.allocation import allocated, largest_share, prioritized
+from tiltsim_controllers.laws.allocation import (
+    allocate_accelerations,
+    largest_feasible_scale,
+    prioritized,
+)
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
 
 VEHICLE = PRESETS["ar_drone_2"]
@@ -40,7 +44,7 @@ def program(cost, columns, low, high, bounds):
 def test_the_share_is_that_of_a_linear_program(attitude, direction, below, above):
     low = -np.array(below)
     wanted = program([-1.0, 0.0], [attitude, direction], low, above, [(0.0, 1.0), (None, None)])
-    assert largest_share(attitude, direction, tuple(low), above) == pytest.approx(
+    assert largest_feasible_scale(attitude, direction, tuple(low), above) == pytest.approx(
         -wanted.fun, abs=1e-6
     )
 
@@ -59,7 +63,7 @@ def test_the_answer_is_in_the_box_and_wanted_where_allowed(
     assert (found <= high + 1e-9).all()
     wanted = np.array(tilting) + turning + lift * np.array(direction)
     # Roll and pitch come first, also where yaw alone would bring them within the box.
-    first = largest_share(tilting, direction, tuple(low.tolist()), tuple(high.tolist()))
+    first = largest_feasible_scale(tilting, direction, tuple(low.tolist()), tuple(high.tolist()))
     if first == 1.0 and (wanted > low + 1e-9).all() and (wanted < high - 1e-9).all():
         np.testing.assert_allclose(found, wanted, atol=1e-9)
 
@@ -70,8 +74,8 @@ def test_rotors_that_a_share_moves_alike_do_not_bound_it(rounding, room):
     """The first cannot go below 2, the third not above: rounding alone would leave no share."""
     wanted = (1.0, -1.0, 1.0 + rounding, -1.0)
     low, high = (2.0, -9.0, -9.0, -9.0), (9.0, 9.0, 2.0 + room, 9.0)
-    assert largest_share(wanted, (1.0, 1.0, 1.0, 1.0), low, high) == 1.0
-    assert largest_share((1.0, -1.0, 1.1, -1.0), (1.0,) * 4, low, high) < 1e-12
+    assert largest_feasible_scale(wanted, (1.0, 1.0, 1.0, 1.0), low, high) == 1.0
+    assert largest_feasible_scale((1.0, -1.0, 1.1, -1.0), (1.0,) * 4, low, high) < 1e-12
 
 
 def decoupling(angles, rotor_speeds, roll, pitch):
@@ -89,7 +93,7 @@ def test_roll_and_pitch_keep_their_direction_and_come_before_yaw(angles, magnitu
     signed = tuple(s * m for s, m in zip(SPIN, magnitudes, strict=True))
     matrix = decoupling(angles, signed, r, p)
     assume(np.linalg.cond(matrix) < 1e4)
-    found = allocated(wanted, angles, signed, r, p, VEHICLE, LIMITS, HORIZON)
+    found = allocate_accelerations(wanted, angles, signed, r, p, VEHICLE, LIMITS, HORIZON)
     asked, got = matrix @ wanted, matrix @ found
     # What an allocation leaves of one rotor it takes from another: all are good to the largest.
     scale = np.abs(matrix).sum(axis=1) * np.abs([*wanted, *found]).max() + 1e-9
@@ -110,13 +114,18 @@ def test_what_the_limits_allow_comes_back_untouched():
     wanted = (10.0, -20.0, 5.0, 1.0)
     speeds_now = (-300.0, 300.0, -300.0, 300.0)
     tilts_now = (0.1, -0.1, 0.2, 0.0)
-    assert allocated(wanted, tilts_now, speeds_now, 0.1, 0.2, VEHICLE, LIMITS, 0.02) == wanted
+    assert (
+        allocate_accelerations(wanted, tilts_now, speeds_now, 0.1, 0.2, VEHICLE, LIMITS, 0.02)
+        == wanted
+    )
 
 
 def test_a_climb_beyond_the_limit_costs_no_attitude():
     speeds_now = (-395.0, 390.0, -395.0, 390.0)
     wanted = (-9000.0, 9500.0, -8800.0, 9000.0)
-    found = allocated(wanted, (0.0,) * 4, speeds_now, 0.0, 0.0, VEHICLE, LIMITS, HORIZON)
+    found = allocate_accelerations(
+        wanted, (0.0,) * 4, speeds_now, 0.0, 0.0, VEHICLE, LIMITS, HORIZON
+    )
     matrix = decoupling((0.0,) * 4, speeds_now, 0.0, 0.0)
     np.testing.assert_allclose((matrix @ found)[:3], (matrix @ wanted)[:3], rtol=1e-9, atol=1e-6)
     assert (matrix @ found)[3] < (matrix @ wanted)[3]

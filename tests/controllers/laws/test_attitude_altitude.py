@@ -146,12 +146,12 @@ def demanded_third_derivatives(parameters, state):
     position, velocity, attitude, rates, alpha, speeds = np.split(
         np.array(state), [3, 6, 9, 12, 16]
     )
-    wanted_position, wanted_velocity, wanted_acceleration = reference_motion(reference)
+    wanted_position, wanted_velocity, demanded_acceleration = reference_motion(reference)
     if parameters.decoupler == DECOUPLERS["none"]:
         lean = np.array([reference.roll, reference.pitch])
     else:
         ax, ay = (
-            wanted_acceleration
+            demanded_acceleration
             + gains.position_1 * (wanted_velocity - velocity)
             + gains.position_2 * (wanted_position - position)
         )[:2]
@@ -161,7 +161,7 @@ def demanded_third_derivatives(parameters, state):
     k3 = np.array([gains.roll_3, gains.pitch_3, gains.yaw_3, gains.altitude_3])
     second = second_derivatives(parameters.vehicle, alpha, rotation(*attitude), speeds)
     return (
-        k1 * ([0, 0, 0, wanted_acceleration[2]] - second)
+        k1 * ([0, 0, 0, demanded_acceleration[2]] - second)
         + k2 * ([0, 0, 0, wanted_velocity[2]] - np.array([*rates, velocity[2]]))
         + k3 * ([*lean, reference.yaw, wanted_position[2]] - np.array([*attitude, position[2]]))
     )

@@ -20,10 +20,10 @@ from tiltsim_controllers.laws.full_pose import (
     Limits,
     Parameters,
     attitude_error,
-    even_tilt_weight,
+    force_balanced_tilt_weight,
     full_pose_inputs,
-    least_norm_inputs,
     limited_tilt_rate,
+    minimum_norm_inputs,
     pose_rows,
 )
 from tiltsim_controllers.laws.gains import GAIN_SETS as ATTITUDE_GAINS
@@ -39,7 +39,7 @@ from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
 TILTROTOR = PRESETS["ar_drone_2_unrounded"]
 GAINS = GAIN_SETS["ch03"]
 HERE = ReferenceParameters(REFERENCE_TYPES["setpoint"])
-WEIGHTS = {"published": PUBLISHED_TILT_WEIGHT, "even": even_tilt_weight(TILTROTOR)}
+WEIGHTS = {"published": PUBLISHED_TILT_WEIGHT, "even": force_balanced_tilt_weight(TILTROTOR)}
 GAITS = {1: (-0.1, 0.1, -0.2, 0.1), 2: (-0.15, -0.1, 0.3, -0.1)}
 CASES = 20
 
@@ -70,7 +70,7 @@ def test_the_solve_is_the_pseudo_inverse():
     for _ in range(CASES):
         rows = random.normal(size=(6, 8)) * 10.0 ** random.uniform(-3, 3, (6, 1))
         wanted = random.normal(size=6)
-        found = least_norm_inputs(tuple(map(tuple, rows.tolist())), tuple(wanted.tolist()))
+        found = minimum_norm_inputs(tuple(map(tuple, rows.tolist())), tuple(wanted.tolist()))
         expected = np.linalg.pinv(rows, rcond=1e-14) @ wanted
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
@@ -85,7 +85,7 @@ def test_the_solve_copes_with_the_vehicles_matrix(weight):
         w = tuple(random.uniform(4e4, 2e5, 4) * SPIN / WEIGHTS[weight])
         rows = pose_rows(trig, torque_entries(trig, ratio), w)
         wanted = random.normal(size=6)
-        found = np.array(least_norm_inputs(rows, tuple(wanted)))
+        found = np.array(minimum_norm_inputs(rows, tuple(wanted)))
         np.testing.assert_allclose(np.array(rows) @ found, wanted, rtol=0, atol=1e-9)
         expected = np.linalg.lstsq(np.array(rows), wanted, rcond=1e-15)[0]
         assert np.linalg.norm(found) <= np.linalg.norm(expected) * (1 + 1e-6)
@@ -94,7 +94,7 @@ def test_the_solve_copes_with_the_vehicles_matrix(weight):
 def test_the_solve_is_nan_where_rows_depend_on_each_other():
     rows = np.random.default_rng(2).normal(size=(6, 8))
     rows[4] = rows[0] - 2 * rows[3]
-    found = least_norm_inputs(tuple(map(tuple, rows.tolist())), (1.0,) * 6)
+    found = minimum_norm_inputs(tuple(map(tuple, rows.tolist())), (1.0,) * 6)
     assert all(isnan(value) for value in found)
 
 

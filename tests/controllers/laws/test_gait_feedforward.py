@@ -25,7 +25,7 @@ from tiltsim_controllers.laws.gains import (
     third_order_gains,
 )
 from tiltsim_controllers.laws.gait_feedforward import (
-    Ingredients,
+    FeedforwardTerms,
     Parameters,
     attitude_jerk,
     exact_decoupler_jet,
@@ -41,7 +41,7 @@ from tiltsim_controllers.vehicle.decoupling_matrix import (
     torque_free_force,
 )
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
-from tiltsim_controllers.vehicle.rigid_body import body_jerk, euler_motion
+from tiltsim_controllers.vehicle.rigid_body import angular_jerk, euler_derivatives
 
 VEHICLE = PRESETS["ar_drone_2"]
 INERTIA = np.diag([VEHICLE.inertia_xx, VEHICLE.inertia_yy, VEHICLE.inertia_zz])
@@ -143,7 +143,7 @@ def test_euler_motion_inverts_the_body_rates():
         coefficients, body_rates = attitude_path(random)
         omega, omega_rate, _ = differences(body_rates, 1e-2)
         roll, pitch = coefficients[:2, 0]
-        found = euler_motion(roll, pitch, tuple(omega), tuple(omega_rate))
+        found = euler_derivatives(roll, pitch, tuple(omega), tuple(omega_rate))
         expected = [*coefficients[:, 1], *coefficients[:, 2]]
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
 
@@ -153,7 +153,7 @@ def test_body_jerk_is_the_second_derivative_of_the_body_rates():
     for _ in range(CASES):
         coefficients, body_rates = attitude_path(random)
         jets = [tuple(row[:3]) for row in coefficients]
-        found = body_jerk(*jets, tuple(coefficients[:, 3]))
+        found = angular_jerk(*jets, tuple(coefficients[:, 3]))
         np.testing.assert_allclose(found, differences(body_rates, 1e-2)[2], rtol=0, atol=1e-4)
 
 
@@ -173,7 +173,7 @@ def parameters(**changed):
         max_acceleration=3.0,
         max_angular_acceleration=1e6,
         anticipation=0.1,
-        ingredients=Ingredients(),
+        ingredients=FeedforwardTerms(),
         gait=GaitParameters(GAIT_TYPES["fixed"]),
         reference=HOVER,
         decoupler=DECOUPLERS["none"],
@@ -266,7 +266,7 @@ def test_roll_pitch_yaw_and_altitude_get_the_third_derivatives_that_the_gains_as
 @pytest.mark.parametrize("ingredient", ["gait_rates", "euler_rates", "gyroscopic_torque"])
 def test_each_ingredient_of_the_linearization_is_needed_for_that(ingredient):
     random = np.random.default_rng(6)
-    law = parameters(ingredients=Ingredients()._replace(**{ingredient: 0.0}))
+    law = parameters(ingredients=FeedforwardTerms()._replace(**{ingredient: 0.0}))
     state, tilt_rates = random_state(random), (3.0, -2.0, 1.0, 4.0)
     inputs = tracking_inputs(0.3, state, tilt_rates, (0.0, 0.0, 0.0), law)[:4]
     wanted = demanded(state, parameters(), 0.0)

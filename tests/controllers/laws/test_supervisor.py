@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import tiltsim
 from tiltsim.errors import InputError
 from tiltsim.plants.factory import make_plant
-from tiltsim.simulation.batch import fly_all
+from tiltsim.simulation.batch import fly
 from tiltsim_controllers.analysis.singularity import (
     determinant,
     margin_over_gait,
@@ -27,9 +27,9 @@ from tiltsim_controllers.laws.supervisor import (
     STRATEGIES,
     Supervisor,
     allowed_scale,
-    gait_share,
-    governed,
     room,
+    supervised_derivative,
+    supervised_gait_scale,
     supervised_tilts,
 )
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
@@ -79,7 +79,7 @@ def test_what_passes_is_regular_and_a_little_more_is_not(tilts, roll, pitch):
 
 def test_without_thresholds_everything_passes():
     wild = (3.0, -2.0, 1.0, 2.5, 0.0, 0.0, 0.0, 0.0)
-    assert gait_share(wild, 2.0, 1.0, Supervisor(), VEHICLE) == 1.0
+    assert supervised_gait_scale(wild, 2.0, 1.0, Supervisor(), VEHICLE) == 1.0
 
 
 def test_a_vehicle_that_leans_too_far_gets_no_tilt():
@@ -124,7 +124,7 @@ def watch(strategy, **changes):
 
 
 def asked(time, roll, pitch, state, rate, supervisor, gait=JUMPS):
-    return governed(time, roll, pitch, state, rate, gait, (), supervisor, RATIO)[2]
+    return supervised_derivative(time, roll, pitch, state, rate, gait, (), supervisor, RATIO)[2]
 
 
 @given(angles, leans, leans)
@@ -146,9 +146,9 @@ def test_supervised_tilts_move_as_their_rates_say(strategy):
         return tuple((a + v * time + b * time**2 / 2, v + b * time, b) for a, v, b in PLAN)
 
     def tilts(time):
-        governor = (0.2 + 0.3 * time + 0.25 * time**2, 0.3 + 0.5 * time, 0.5)
-        clock = time - governor[0] if strategy == "hold" else time
-        return np.array(supervised_tilts(planned(clock), 1.0, governor, supervisor, RATIO))
+        supervisor_motion = (0.2 + 0.3 * time + 0.25 * time**2, 0.3 + 0.5 * time, 0.5)
+        clock = time - supervisor_motion[0] if strategy == "hold" else time
+        return np.array(supervised_tilts(planned(clock), 1.0, supervisor_motion, supervisor, RATIO))
 
     step = 1e-4
     before, now, after = tilts(-step), tilts(0.0), tilts(step)
@@ -183,7 +183,7 @@ def test_the_clock_slows_down_within_the_band():
     supervisor = watch("hold", min_determinant=2.0)
     state = asked_rates = None
     for time in np.arange(0.0, 2.0, 1e-3):
-        acceleration = governed(
+        acceleration = supervised_derivative(
             time, 0.0, 0.0, 0.0, 0.0, gait.parameters, gait.table, supervisor, RATIO
         )[2]
         ahead = tilt_reference(time + 0.5, gait.parameters, gait.table)[:4]
@@ -236,7 +236,7 @@ def test_engines_batches_and_restarts_agree(law, strategy):
     native = {**tables, "simulation": {**tables["simulation"], "engine": "native"}}
     compiled = tiltsim.parse_scenario(native)
     np.testing.assert_array_equal(tiltsim.simulate(compiled).samples, python.samples)
-    (row,) = fly_all([compiled], keep_samples=True)
+    (row,) = fly([compiled], keep_samples=True)
     np.testing.assert_array_equal(row.flight.samples, python.samples)
 
     straight = make_plant(wanted)

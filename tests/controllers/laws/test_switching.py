@@ -16,7 +16,7 @@ from tiltsim_controllers.laws.switching import (
     EXTENSIONS,
     PUBLISHED_ZONE,
     Parameters,
-    flown_thrust_rate,
+    attitude_altitude_thrust_rate,
     in_attitude_zone,
     switching_inputs,
 )
@@ -155,7 +155,7 @@ def test_the_flown_thrust_rate_is_the_thrusts_derivative(reference):
         numerical = (
             thrust(h, rk4_step(rates, 0.0, state, h)) - thrust(-h, rk4_step(rates, 0.0, state, -h))
         ) / (2 * h)
-        found = flown_thrust_rate(0.0, state, thrust(0.0, state), law)
+        found = attitude_altitude_thrust_rate(0.0, state, thrust(0.0, state), law)
         assert found == pytest.approx(numerical, abs=1e-6 * (1 + abs(numerical)))
 
 

@@ -23,7 +23,7 @@ from tiltsim_controllers.laws.yaw_position import (
     drift,
     yaw_position_inputs,
 )
-from tiltsim_controllers.mathematics.z_down import state_turned_over
+from tiltsim_controllers.mathematics.z_down import flip_state
 from tiltsim_controllers.references.trajectories import (
     REFERENCE_TYPES,
     ReferenceParameters,
@@ -164,7 +164,7 @@ def test_ma_is_the_plants_derivative_at_zero_input():
     for _ in range(CASES):
         state = random_state(random)
         numerical = numerical_derivatives(state, (state[12], 0.0, 0.0, 0.0, state[13], 0.0))
-        ma = np.array(drift(state_turned_over(state), QUADROTOR)) * (1, -1, -1, -1)
+        ma = np.array(drift(flip_state(state), QUADROTOR)) * (1, -1, -1, -1)
         np.testing.assert_allclose(ma, numerical, rtol=0, atol=1e-6 * (1 + np.abs(ma).max()))
 
 

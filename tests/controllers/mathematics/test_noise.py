@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tiltsim_controllers.mathematics.noise import hashed, normal, uniform
+from tiltsim_controllers.mathematics.noise import hash_word, normal, uniform
 
 COUNT = 4000
 
@@ -16,14 +16,14 @@ def draws(function, seed=1.0, channel=0.0):
 
 
 def test_the_hash_permutes_words():
-    words = {hashed(word) for word in range(20_000)}
+    words = {hash_word(word) for word in range(20_000)}
     assert len(words) == 20_000
     assert max(words) < 2**32
 
 
 def test_a_changed_bit_changes_half_of_the_bits():
     flips = [
-        bin(hashed(word) ^ hashed(word ^ (1 << bit))).count("1")
+        bin(hash_word(word) ^ hash_word(word ^ (1 << bit))).count("1")
         for word in range(100)
         for bit in range(32)
     ]

@@ -14,8 +14,8 @@ from tiltsim_controllers.mathematics.rotation import (
     quaternion_from_euler,
     quaternion_from_rotation,
     rotation_from_euler,
-    shortest_turn,
     world_up_in_body,
+    wrap_angle,
 )
 
 eulers = st.tuples(st.floats(-pi, pi), st.floats(-pi / 2, pi / 2), st.floats(-pi, pi))
@@ -144,7 +144,7 @@ def test_rounding_at_vertical_pitch_does_not_leave_the_domain(sign):
 @quick
 @given(st.floats(-1e3, 1e3))
 def test_the_shortest_turn_leads_to_the_same_direction(angle):
-    turn = shortest_turn(angle)
+    turn = wrap_angle(angle)
     assert abs(turn) <= pi + 1e-12
     assert (cos(turn), sin(turn)) == pytest.approx((cos(angle), sin(angle)), abs=1e-12)
     assert abs(angle) > pi or turn == angle

@@ -13,7 +13,7 @@ from tiltsim_controllers.references.trajectories import (
     position_reference,
     reference_derivatives,
 )
-from tiltsim_controllers.references.waypoints import minimum_snap_table
+from tiltsim_controllers.references.waypoints import minimum_snap_knots
 
 CIRCLE = ReferenceParameters(
     REFERENCE_TYPES["circle"], 1.0, -2.0, 3.0, radius=5.0, angular_frequency=0.1
@@ -88,7 +88,7 @@ LISSAJOUS = ReferenceParameters(
 )
 POINTS = [[0.0, 0.0, 0.0], [2.0, 1.0, 1.0], [3.0, -1.0, 0.5], [0.5, 0.5, 2.0]]
 TIMES = [0.0, 2.0, 5.0, 6.5]
-SNAP_TABLE = minimum_snap_table(POINTS, TIMES)
+SNAP_TABLE = minimum_snap_knots(POINTS, TIMES)
 BEFORE = (9.0, 8.0, 7.0)  # another table in front of it
 WAYPOINTS = ReferenceParameters(REFERENCE_TYPES["waypoints"], segments=4.0, offset=3.0)
 MOTIONS = {
@@ -142,7 +142,7 @@ def test_waypoints_are_passed_at_their_times_from_rest_to_rest():
 
 def test_two_waypoints_are_joined_by_the_known_polynomial():
     """``35 s^4 - 84 s^5 + 70 s^6 - 20 s^7`` of the way, with s the share of the time."""
-    table = minimum_snap_table([[0.0, 1.0, 2.0], [2.0, 1.0, -2.0]], [0.0, 3.0])
+    table = minimum_snap_knots([[0.0, 1.0, 2.0], [2.0, 1.0, -2.0]], [0.0, 3.0])
     two = ReferenceParameters(REFERENCE_TYPES["waypoints"], segments=2.0)
     for time in np.linspace(0.0, 3.0, 13):
         s = time / 3.0
@@ -183,4 +183,4 @@ def test_no_bump_between_waypoints_lowers_the_snap():
 )
 def test_waypoints_that_make_no_motion_are_refused(points, times, message):
     with pytest.raises(ValueError, match=message):
-        minimum_snap_table(points, times)
+        minimum_snap_knots(points, times)

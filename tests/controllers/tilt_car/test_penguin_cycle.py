@@ -18,7 +18,7 @@ from tiltsim_controllers.tilt_car.penguin_cycle import (
     limit_cycle,
     lyapunov,
     lyapunov_bound,
-    lyapunov_gain,
+    lyapunov_growth,
     mirrored_map,
     multipliers,
 )
@@ -101,13 +101,13 @@ def test_from_rest_every_half_period_is_nearer():
 @given(st.floats(0.0, 2.0), st.floats(0.0, 4.0))
 def test_no_half_period_gains_more_than_three_quarters(error, rate):
     if 9.0 * rate + 18.0 * error >= 3**-0.5:  # the zone of Eq. (39)
-        assert lyapunov_gain(CH11, (error, rate)) <= 0.75 + 1e-9
+        assert lyapunov_growth(CH11, (error, rate)) <= 0.75 + 1e-9
 
 
 def test_proposition_7_holds_with_room():
     bound = lyapunov_bound(CH11, 41)
     assert bound.largest_gain == pytest.approx(0.75, abs=1e-6)  # Eq. (71) is sharp
-    assert lyapunov_gain(CH11, bound.at) == pytest.approx(0.0, abs=1e-9)
+    assert lyapunov_growth(CH11, bound.at) == pytest.approx(0.0, abs=1e-9)
     assert bound.published == bound.critical + 0.75
     state, candidates = (0.0, 0.0), []
     for _ in range(40):
@@ -123,4 +123,4 @@ def test_beyond_l_critical_nothing_gains(scale):
     for angle in np.linspace(0.0, pi / 2, 50):
         size = sqrt(bound.critical * scale)
         state = (size / 3.0 * np.cos(angle), size * sqrt(2.0) * np.sin(angle))  # Eq. (75)
-        assert lyapunov_gain(CH11, state) < 0.0
+        assert lyapunov_growth(CH11, state) < 0.0

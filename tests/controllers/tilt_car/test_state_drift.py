@@ -27,15 +27,15 @@ from tiltsim_controllers.tilt_car.state_drift import (
 from tiltsim_controllers.tilt_car.third_derivative import (
     input_columns,
     minimum_norm,
+    null_space_input,
     restoring_inputs,
-    silent_input,
 )
 from tiltsim_controllers.tilt_car.vehicle import (
     THESIS_CAR,
     TiltCar,
     body_acceleration,
     squared_speeds,
-    turn_share,
+    turn_per_tilt,
     turned,
 )
 
@@ -50,7 +50,7 @@ def follow(jerk, inputs, time, steps, car, rate=0.0):
     def slope(at, values):
         w1, w2, alpha = values
         columns = input_columns(w1, w2, car)
-        wanted = turned(*jerk(at), -turn_share(car) * alpha)
+        wanted = turned(*jerk(at), -turn_per_tilt(car) * alpha)
         change = np.array(minimum_norm(columns, wanted))
         if rate:
             along, across = body_acceleration(w1 * w1, w2 * w2, car)
@@ -71,7 +71,7 @@ def follow(jerk, inputs, time, steps, car, rate=0.0):
 def inputs_of(lean, acceleration, car):
     """Inputs that make an acceleration along x at a lean."""
     squares = squared_speeds(acceleration * cos(lean), acceleration * sin(lean), car)
-    return np.array([squares[0] ** 0.5, squares[1] ** 0.5, -lean / turn_share(car)])
+    return np.array([squares[0] ** 0.5, squares[1] ** 0.5, -lean / turn_per_tilt(car)])
 
 
 def lean_at(values, car):
@@ -134,7 +134,7 @@ def test_a_lap_advances_the_lean_by_the_holonomy(omega, lean):
     assert np.sign(advanced) == np.sign(omega)
     # The acceleration is back, the inputs are not.
     along, across = body_acceleration(end[0] ** 2, end[1] ** 2, THESIS_CAR)
-    made = turned(along, across, turn_share(THESIS_CAR) * end[2])
+    made = turned(along, across, turn_per_tilt(THESIS_CAR) * end[2])
     np.testing.assert_allclose(made, (10.0, 0.0), atol=1e-6)
 
 
@@ -164,7 +164,7 @@ def test_small_loops_miss_by_the_twist_times_their_area(lean):
     centre = inputs_of(lean, 10.0, THESIS_CAR)
     size = 0.02
     columns = input_columns(centre[0], centre[1], THESIS_CAR)
-    n = np.array(silent_input(columns))
+    n = np.array(null_space_input(columns))
     # The silent direction's length is the area of accelerations that a unit of inputs spans.
     area_of_inputs = size * size / np.linalg.norm(n)
     missed = small_loop(centre, size, THESIS_CAR) @ n / np.linalg.norm(n)

@@ -24,10 +24,10 @@ from tiltsim_controllers.tilt_car.vehicle import (
     TiltCar,
     acceleration,
     body_acceleration,
+    counter_yaw_per_tilt,
     squared_speeds,
-    turn_share,
+    turn_per_tilt,
     turned,
-    yaw_share,
 )
 
 CAR = TiltCar(1.3, 0.0012, 0.0007, 0.45, 0.0008)
@@ -52,9 +52,9 @@ def printed_j_theta(car):
 
 
 def test_the_published_share_needs_the_whole_cars_inertia():
-    assert yaw_share(THESIS_CAR) == 0.5  # I_T / I_B = 0.001 / 0.002, Eq. (2)
-    assert turn_share(THESIS_CAR) == 0.5
-    assert yaw_share(THESIS_CAR._replace(bottom_inertia=0.002)) == pytest.approx(1 / 3)
+    assert counter_yaw_per_tilt(THESIS_CAR) == 0.5  # I_T / I_B = 0.001 / 0.002, Eq. (2)
+    assert turn_per_tilt(THESIS_CAR) == 0.5
+    assert counter_yaw_per_tilt(THESIS_CAR._replace(bottom_inertia=0.002)) == pytest.approx(1 / 3)
 
 
 @given(angles, speeds, speeds)
@@ -109,7 +109,7 @@ def test_the_columns_are_the_third_derivative_of_the_position():
     (w1, d1, _), (w2, d2, _), (alpha, d3, _) = INPUTS
     x1, y1, x2, y2, x3, y3 = third.input_columns(w1, w2, CAR)
     body = x1 * d1 + x2 * d2 + x3 * d3, y1 * d1 + y2 * d2 + y3 * d3
-    np.testing.assert_allclose(turned(*body, turn_share(CAR) * alpha), wanted, rtol=1e-12)
+    np.testing.assert_allclose(turned(*body, turn_per_tilt(CAR) * alpha), wanted, rtol=1e-12)
 
 
 def test_the_columns_are_eqs_10_and_11():
@@ -117,7 +117,7 @@ def test_the_columns_are_eqs_10_and_11():
     j_theta = printed_j_theta(CAR)
     delta_1 = j_theta @ np.diag([2 * w1, 2 * w2]) / CAR.mass
     quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
-    delta_2 = turn_share(CAR) * quarter @ j_theta @ np.array([w1**2, w2**2]) / CAR.mass
+    delta_2 = turn_per_tilt(CAR) * quarter @ j_theta @ np.array([w1**2, w2**2]) / CAR.mass
     columns = np.reshape(third.input_columns(w1, w2, CAR), (3, 2)).T
     np.testing.assert_allclose(columns, np.column_stack([delta_1, delta_2]), rtol=1e-12)
 
@@ -125,7 +125,7 @@ def test_the_columns_are_eqs_10_and_11():
 def test_drift_and_columns_make_the_fourth_derivative():
     wanted = derivative_values(2, INPUTS)
     (w1, d1, s1), (w2, d2, s2), (alpha, d3, s3) = INPUTS
-    yaw = -yaw_share(CAR) * alpha
+    yaw = -counter_yaw_per_tilt(CAR) * alpha
     state = (0.0, 0.0, 0.0, 0.0, yaw, alpha, w1, w2, d3, d1, d2)
     *_, drift_along, drift_across = fourth.body_derivatives(state, CAR)
     x1, y1, x2, y2, x3, y3 = third.input_columns(w1, w2, CAR)
@@ -158,7 +158,7 @@ def test_one_rotor_at_rest_leaves_full_rank_two_do_not():
 def test_silent_inputs_are_not_felt(speed_1, speed_2):
     columns = third.input_columns(speed_1, speed_2, CAR)
     matrix = np.reshape(columns, (3, 2)).T
-    n = np.array(third.silent_input(columns))
+    n = np.array(third.null_space_input(columns))
     scale = np.linalg.norm(matrix) * np.linalg.norm(n)
     np.testing.assert_allclose(matrix @ n, 0.0, atol=1e-12 * scale)
 
@@ -173,7 +173,7 @@ def test_restoring_turns_the_middle_and_nothing_else(speed_1, speed_2, rate):
     scale = np.linalg.norm(matrix) * np.linalg.norm(inputs) + 1e-12
     np.testing.assert_allclose(matrix @ inputs, 0.0, atol=1e-10 * scale)
     # The acceleration stands still in the world, so the lean changes as the middle turns.
-    np.testing.assert_allclose(-turn_share(CAR) * inputs[2], -rate * lean, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(-turn_per_tilt(CAR) * inputs[2], -rate * lean, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("restoring_rate", [0.0, 2.0])
@@ -205,7 +205,7 @@ def test_the_printed_tilt_column_lacks_the_yaws_answer():
         for name, code in fourth.DECOUPLINGS.items()
     }
     x1, y1, x2, y2, x3, y3 = third.input_columns(90.0, 70.0, CAR)
-    share = turn_share(CAR)
+    share = turn_per_tilt(CAR)
     made = {}
     for name, (s1, s2, s3) in inputs.items():
         factor = 1.0 / share if name == "published" else 1.0
@@ -236,7 +236,7 @@ def test_the_planned_law_is_eqs_12_and_13(direction, x, y, vy):
         ]
     )
     printed = np.linalg.solve(rotation(direction) @ printed_j_theta(THESIS_CAR), wanted)
-    squares = planned.wanted_squares(time, state, LAW)
+    squares = planned.demanded_squared_speeds(time, state, LAW)
     np.testing.assert_allclose(squares, printed, rtol=1e-9, atol=1e-6)
     inputs = planned.planned_direction_inputs(time, state, LAW)
     assert inputs == tuple(max(square, 0.0) for square in squares)
@@ -245,7 +245,7 @@ def test_the_planned_law_is_eqs_12_and_13(direction, x, y, vy):
 @given(st.floats(-0.5, 0.5), st.floats(-1.5, 1.5), st.sampled_from([-pi / 3, pi / 3]))
 def test_proposition_4_tells_which_rotors_push(error, error_rate, direction):
     state = (0.5, -error, 1.0, -error_rate, direction, 0.0, 0.0, 0.0)  # e_x = e_x' = 0 at 1 s
-    square_1, square_2 = planned.wanted_squares(1.0, state, LAW)
+    square_1, square_2 = planned.demanded_squared_speeds(1.0, state, LAW)
     push = 9.0 * error_rate + 18.0 * error
     if abs(abs(push) - 3**-0.5) < 1e-6:
         return

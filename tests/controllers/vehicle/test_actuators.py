@@ -16,9 +16,9 @@ from tiltsim_controllers.vehicle.actuators import (
     rate_limited_command,
     reading_error,
     reading_index,
+    rotate_by_small_angle,
     servo_command,
     thrust_factor,
-    turned_quaternion,
 )
 
 angles = st.floats(-3.0, 3.0)
@@ -41,7 +41,7 @@ def test_readings_have_the_noise_and_bias_given():
 def test_an_attitude_is_turned_about_the_body_axes(attitude, vector):
     start = Rotation.from_euler("xyz", attitude)
     quaternion = start.as_quat(scalar_first=True).tolist()
-    found = Rotation.from_quat(turned_quaternion(*quaternion, *vector), scalar_first=True)
+    found = Rotation.from_quat(rotate_by_small_angle(*quaternion, *vector), scalar_first=True)
     wanted = start * Rotation.from_rotvec(vector)
     third_order = np.linalg.norm(vector) ** 3 / 12.0
     assert (found.inv() * wanted).magnitude() < 1.01 * third_order + 1e-12

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tiltsim
-from tiltsim.equations.driven import DRIVEN
+from tiltsim.equations.driven import ACTUATOR_PLANTS
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, loop_of
 from tiltsim.plants import mujoco_plant as plants
@@ -208,7 +208,10 @@ def test_a_saved_state_restarts_bit_identically(name):
 def test_a_state_that_has_overflowed_is_seen_as_no_number(base):
     """The last addition of a step may give infinity, of which floats have no sine."""
     plant = make_plant(scenario(base, STORM, {"simulation": {"plant": "thesis"}}))
-    state, motion = plant.state, DRIVEN[base.get("vehicle", {}).get("model", "tiltrotor")].motion
+    state, motion = (
+        plant.state,
+        ACTUATOR_PLANTS[base.get("vehicle", {}).get("model", "tiltrotor")].motion,
+    )
     first = 1 + len(plant._held)
     for index in range(motion):
         overflowed = state.copy()

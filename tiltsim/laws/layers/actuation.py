@@ -20,13 +20,13 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ControlSetup, Floats, Loop
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Floats
 from tiltsim.laws.layers.layer import around
 from tiltsim.laws.tiltrotor import rotor_thrust_controls, servo_lead
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim_controllers.gaits import tilt_reference
-from tiltsim_controllers.laws.allocation import allocated
+from tiltsim_controllers.laws.allocation import allocate_accelerations
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import scalar
 from tiltsim_controllers.vehicle.actuators import (
@@ -34,13 +34,13 @@ from tiltsim_controllers.vehicle.actuators import (
     RotorFault,
     Sensor,
     Sensors,
+    limited_speed_command_rate,
     rate_limited_command,
     reading_error,
     reading_index,
+    rotate_by_small_angle,
     servo_command,
     thrust_factor,
-    told_rate,
-    turned_quaternion,
 )
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
@@ -84,7 +84,7 @@ class Actuation(NamedTuple):
 
 
 @scalar
-def measured_position(time: float, qpos: Sequence[float], sensors: Sensors) -> tuple[float, ...]:
+def measured_qpos(time: float, qpos: Sequence[float], sensors: Sensors) -> tuple[float, ...]:
     """MuJoCo's eleven ``qpos`` of the tiltrotor as the law is told them; tilts are exact."""
     x, y, z, qw, qx, qy, qz, alpha_1, alpha_2, alpha_3, alpha_4 = qpos
     if sensors.active == 0.0:
@@ -92,12 +92,12 @@ def measured_position(time: float, qpos: Sequence[float], sensors: Sensors) -> t
     index = reading_index(time, sensors.period)
     ex, ey, ez = reading_error(sensors.position, sensors.seed, 0.0, index)
     roll, pitch, yaw = reading_error(sensors.attitude, sensors.seed, 6.0, index)
-    qw, qx, qy, qz = turned_quaternion(qw, qx, qy, qz, roll, pitch, yaw)
+    qw, qx, qy, qz = rotate_by_small_angle(qw, qx, qy, qz, roll, pitch, yaw)
     return x + ex, y + ey, z + ez, qw, qx, qy, qz, alpha_1, alpha_2, alpha_3, alpha_4
 
 
 @scalar
-def measured_velocity(time: float, qvel: Sequence[float], sensors: Sensors) -> tuple[float, ...]:
+def measured_qvel(time: float, qvel: Sequence[float], sensors: Sensors) -> tuple[float, ...]:
     """MuJoCo's ten ``qvel`` of the tiltrotor as the law is told them; tilt rates are exact."""
     vx, vy, vz, p, q, r, rate_1, rate_2, rate_3, rate_4 = qvel
     if sensors.active == 0.0:
@@ -119,7 +119,7 @@ def allocated_accelerations(
     if allocation.active == 0.0:
         return wanted
     roll, pitch, _yaw = euler_from_quaternion(qpos[3], qpos[4], qpos[5], qpos[6])
-    return allocated(
+    return allocate_accelerations(
         wanted,
         (qpos[7], qpos[8], qpos[9], qpos[10]),
         (act[0], act[1], act[2], act[3]),
@@ -185,10 +185,10 @@ def told_rates(
     """Rates (rad/s^2) of the speeds that the motors are told, activations from ``first`` on."""
     low, high = actuation.slowest, actuation.fastest
     return (
-        told_rate(act[first], commands[4], -1.0, low, high),
-        told_rate(act[first + 1], commands[5], 1.0, low, high),
-        told_rate(act[first + 2], commands[6], -1.0, low, high),
-        told_rate(act[first + 3], commands[7], 1.0, low, high),
+        limited_speed_command_rate(act[first], commands[4], -1.0, low, high),
+        limited_speed_command_rate(act[first + 1], commands[5], 1.0, low, high),
+        limited_speed_command_rate(act[first + 2], commands[6], -1.0, low, high),
+        limited_speed_command_rate(act[first + 3], commands[7], 1.0, low, high),
     )
 
 
@@ -251,7 +251,7 @@ def _delay_line(first: int, steps: int) -> tuple[Callable[..., Any], Callable[..
 
 
 @cache
-def with_actuation(loop: Loop, latency_steps: int) -> Loop:
+def with_actuation(loop: ClosedLoop, latency_steps: int) -> ClosedLoop:
     """A law of the tiltrotor with the layer around it.
 
     ``latency_steps`` is the number of control steps between a reading and its command taking
@@ -280,8 +280,8 @@ def with_actuation(loop: Loop, latency_steps: int) -> Loop:
         table: Sequence[float],
     ) -> tuple[float, ...]:
         actuation = parameters.layer
-        seen_qpos = measured_position(time, qpos, actuation.sensors)
-        seen_qvel = measured_velocity(time, qvel, actuation.sensors)
+        seen_qpos = measured_qpos(time, qpos, actuation.sensors)
+        seen_qvel = measured_qvel(time, qvel, actuation.sensors)
         asked = law_controls(time, seen_qpos, seen_qvel, act, parameters.law, table)
         u1, u2, u3, u4 = allocated_accelerations(
             (asked[8], asked[9], asked[10], asked[11]), seen_qpos, act, actuation.allocation
@@ -358,7 +358,7 @@ def _actuation(scenario: Scenario) -> Actuation:
     allocation = getattr(controller, "allocation", "inversion")
     max_rate, time_constant = vehicle.tilt_servo.max_rate, vehicle.rotor_time_constant
     return Actuation(
-        sensors=sensors_of(scenario),
+        sensors=sensor_parameters(scenario),
         allocation=Allocation(
             active=float(allocation == "prioritized"),
             horizon=getattr(controller, "allocation_horizon", 1.0),
@@ -375,7 +375,7 @@ def _actuation(scenario: Scenario) -> Actuation:
     )
 
 
-def sensors_of(scenario: Scenario) -> Sensors:
+def sensor_parameters(scenario: Scenario) -> Sensors:
     """What a scenario's law is told of the vehicle's motion."""
     table, simulation = scenario.sensors, scenario.simulation
     vectors = {
@@ -383,7 +383,7 @@ def sensors_of(scenario: Scenario) -> Sensors:
         for name in ("position", "velocity", "attitude", "body_rates")
     }
     return Sensors(
-        active=float(table.are_imperfect),
+        active=float(table.have_errors),
         seed=float(simulation.seed),
         period=table.sample_time or simulation.control_timestep or DEFAULT_SAMPLE_TIME,
         **vectors,

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ControlSetup, Floats, Loop
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Floats
 from tiltsim.laws.layers.layer import around
 from tiltsim.models.parts import ExtraActuators
 from tiltsim_controllers.mathematics.rotation import rotation_from_quaternion
@@ -114,7 +114,7 @@ def air_wrench(
 
 
 @cache
-def with_air(loop: Loop) -> Loop:
+def with_air(loop: ClosedLoop) -> ClosedLoop:
     """A loop in air that moves, drags and feels the ground."""
     layered = around(loop, Surroundings, _surroundings)
     inner_controls, inner_hold, inner_observe = loop.controls, loop.held, loop.observe

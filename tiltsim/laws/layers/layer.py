@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from tiltsim.closed_loop.loop import ControlSetup, Floats, Loop, Watched
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Floats, SignCheck
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import scalar
 
@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
 
 
-def around(loop: Loop, record: type[tuple[Any, ...]], read: Callable[[Scenario], Any]) -> Loop:
+def around(
+    loop: ClosedLoop, record: type[tuple[Any, ...]], read: Callable[[Scenario], Any]
+) -> ClosedLoop:
     """A loop whose parameters hold those of a layer, too: the fields ``layer`` and ``law``.
 
     It flies as the loop within does until the layer replaces the functions that it is about. It has
@@ -77,7 +79,7 @@ def around(loop: Loop, record: type[tuple[Any, ...]], read: Callable[[Scenario],
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
         return loop.derive(samples, within(setup))
 
-    def watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Watched, ...]:
+    def watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[SignCheck, ...]:
         return loop.watched(sample, within(setup))
 
     return replace(

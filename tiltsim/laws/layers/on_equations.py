@@ -12,8 +12,8 @@ from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from tiltsim.closed_loop.loop import ControlSetup, Equations, Loop
-from tiltsim.equations.driven import DRIVEN, Mechanics, Wrench, mechanics
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations
+from tiltsim.equations.driven import ACTUATOR_PLANTS, Mechanics, Wrench, mechanics
 from tiltsim.laws.layers.layer import around
 from tiltsim.models.parts import ExtraActuators
 from tiltsim_controllers.mathematics.scalar import Triple, scalar
@@ -69,12 +69,12 @@ def _read_actuators(
 
 
 @cache
-def on_equations(loop: Loop) -> Loop:
+def on_equations(loop: ClosedLoop) -> ClosedLoop:
     """A loop with equations that do what its controls say.
 
     Their inputs are the controls, their state is the vehicle's motion followed by the activations.
     """
-    driven = DRIVEN[loop.model]
+    driven = ACTUATOR_PLANTS[loop.model]
     first, qpos_of, qvel_of = driven.motion, driven.qpos, driven.qvel
     motion_rates, motion_settled = driven.rates, driven.settled
     controls, held, observe = loop.controls, loop.held, loop.observe

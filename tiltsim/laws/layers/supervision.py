@@ -11,14 +11,14 @@ import numpy as np
 
 import tiltsim.laws.attitude_altitude as attitude_altitude
 import tiltsim.laws.gait_feedforward as gait_feedforward
-from tiltsim.closed_loop.loop import ControlSetup, Floats, Loop
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Floats
 from tiltsim.laws.attitude_altitude import TILTROTOR
 from tiltsim.laws.gait_feedforward import GAIT_FEEDFORWARD
 from tiltsim.laws.tiltrotor import (
     TILT_REFERENCE_COLUMNS,
-    gait_singularity,
     reference_columns,
     rotor_thrust_controls,
+    singularity_columns,
     tiltrotor_state,
 )
 from tiltsim_controllers.gaits import GaitParameters, tilt_reference
@@ -26,10 +26,10 @@ from tiltsim_controllers.laws.attitude_altitude import STATE_FIELDS
 from tiltsim_controllers.laws.supervisor import (
     HOLD,
     Supervisor,
-    gait_share,
     gait_time,
-    governed,
     planned_tilts,
+    supervised_derivative,
+    supervised_gait_scale,
     supervised_tilts,
 )
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
@@ -54,16 +54,16 @@ _STATE_UNITS: Final = {"hold": ("s", "1"), "return_to_red": ("1", "1/s")}
 class _Law(NamedTuple):
     """What a supervisor needs to know of a law; the functions are scalar code.
 
-    ``governor`` is the supervisor's state with its rate and acceleration, ``state`` the law's as of
-    `tiltrotor_state`.
+    ``supervisor_motion`` is the supervisor's state with its rate and acceleration, ``state`` the
+    law's as of `tiltrotor_state`.
     """
 
     supervisor: Callable[[Any], Supervisor]  # of the loop's parameters
     rates: Callable[..., tuple[float, ...]]
-    """``(time, state, qvel, act, governor, parameters, table)``: the controls from the rotor
-    accelerations on."""
+    """``(time, state, qvel, act, supervisor_motion, parameters, table)``: the controls from the
+    rotor accelerations on."""
     references: Callable[..., tuple[float, ...]]
-    """``(time, seen, governor, parameters, table)``: `tiltrotor.REFERENCE_COLUMNS`."""
+    """``(time, seen, supervisor_motion, parameters, table)``: `tiltrotor.REFERENCE_COLUMNS`."""
     seen: tuple[str, ...]  # the fields of a sample that the references need
 
 
@@ -81,12 +81,15 @@ def _within_law(parameters: Any) -> Supervisor:
 
 _LAWS: Final = {
     TILTROTOR: _Law(
-        _beside_law, attitude_altitude.law_rates, attitude_altitude.references_under, STATE_FIELDS
+        _beside_law,
+        attitude_altitude.law_rates,
+        attitude_altitude.supervised_reference_values,
+        STATE_FIELDS,
     ),
     GAIT_FEEDFORWARD: _Law(
         _within_law,
         gait_feedforward.law_rates,
-        gait_feedforward.references_under,
+        gait_feedforward.supervised_reference_values,
         gait_feedforward.SEEN,
     ),
 }
@@ -95,7 +98,7 @@ _LAWS: Final = {
 @scalar
 def supervised_commands(
     time: float,
-    governor: Triple,
+    supervisor_motion: Triple,
     gait: GaitParameters,
     table: Sequence[float],
     supervisor: Supervisor,
@@ -104,12 +107,12 @@ def supervised_commands(
 ) -> Quad:
     """Commands (rad) of the tilt servos under a supervisor with states.
 
-    See `tiltsim_controllers.laws.supervisor`; ``governor`` is its state with rate and
+    See `tiltsim_controllers.laws.supervisor`; ``supervisor_motion`` is its state with rate and
     acceleration, ``ratio`` the vehicle's drag ratio.
     """
-    clock = gait_time(time, governor, supervisor)
+    clock = gait_time(time, supervisor_motion, supervisor)
     planned = planned_tilts(clock, gait, table)
-    a1, a2, a3, a4 = supervised_tilts(planned, 1.0, governor, supervisor, ratio)
+    a1, a2, a3, a4 = supervised_tilts(planned, 1.0, supervisor_motion, supervisor, ratio)
     return (
         a1[0] + lead * a1[1],
         a2[0] + lead * a2[1],
@@ -127,13 +130,13 @@ def scaled_share(
     supervisor: Supervisor,
     table: Sequence[float],
 ) -> float:
-    """The `gait_share` of the gait that a ``law`` flies."""
+    """The `supervised_gait_scale` of the gait that a ``law`` flies."""
     planned = tilt_reference(time, law.gait, table)
-    return gait_share(planned, roll, pitch, supervisor, law.vehicle)
+    return supervised_gait_scale(planned, roll, pitch, supervisor, law.vehicle)
 
 
 @cache
-def _scaling(loop: Loop) -> Loop:
+def _scaling(loop: ClosedLoop) -> ClosedLoop:
     """The loop of a law under a supervisor that scales the gait: it has no states."""
     supervisor_of, inner_controls = _LAWS[loop].supervisor, loop.controls
 
@@ -175,7 +178,7 @@ def _shares(samples: Mapping[str, Floats], setup: ControlSetup, supervisor: Supe
 
 
 @cache
-def _with_states(loop: Loop) -> Loop:
+def _with_states(loop: ClosedLoop) -> ClosedLoop:
     """The loop of a law under a supervisor that holds the gait or returns to red.
 
     The supervisor's two states follow those of the law.
@@ -195,15 +198,15 @@ def _with_states(loop: Loop) -> Loop:
         law, supervisor = parameters.law, supervisor_of(parameters)
         state = tiltrotor_state(qpos, qvel, act)
         ratio, lead = drag_ratio(law.vehicle), parameters.servo_lead
-        governor = governed(
+        supervisor_motion = supervised_derivative(
             *(time, state[6], state[7], act[first], act[first + 1]),
             *(law.gait, table, supervisor, ratio),
         )
         return (
-            *supervised_commands(time, governor, law.gait, table, supervisor, ratio, lead),
+            *supervised_commands(time, supervisor_motion, law.gait, table, supervisor, ratio, lead),
             *rotor_thrust_controls(act),
-            *law_rates(time, state, qvel, act, governor, parameters, table),
-            *(governor[1], governor[2]),
+            *law_rates(time, state, qvel, act, supervisor_motion, parameters, table),
+            *(supervisor_motion[1], supervisor_motion[2]),
         )
 
     @scalar
@@ -213,25 +216,25 @@ def _with_states(loop: Loop) -> Loop:
         return (*inner_observe(qpos, qvel, act, ctrl), act[first], act[first + 1])
 
     @scalar
-    def references_in_force(
+    def reference_values(
         time: float, state: Sequence[float], parameters: Any, table: Sequence[float]
     ) -> tuple[float, ...]:
         law, supervisor = parameters.law, supervisor_of(parameters)
-        governor = (state[seen], state[seen + 1], 0.0)
+        supervisor_motion = (state[seen], state[seen + 1], 0.0)
         ratio = drag_ratio(law.vehicle)
         return (
-            *references(time, state, governor, parameters, table),
-            *supervised_commands(time, governor, law.gait, table, supervisor, ratio, 0.0),
+            *references(time, state, supervisor_motion, parameters, table),
+            *supervised_commands(time, supervisor_motion, law.gait, table, supervisor, ratio, 0.0),
         )
 
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
         states = (*fields, *SUPERVISOR_FIELDS)
-        columns = reference_columns(references_in_force, states, samples, setup)
+        columns = reference_columns(reference_values, states, samples, setup)
         held, rate = (samples[name] for name in SUPERVISOR_FIELDS)
         supervision = rate if supervisor_of(setup.parameters).strategy == HOLD else held
         return (
             columns
-            | gait_singularity(samples, setup.parameters.law.vehicle)
+            | singularity_columns(samples, setup.parameters.law.vehicle)
             | {SUPERVISION: supervision}
         )
 
@@ -253,7 +256,7 @@ def _with_states(loop: Loop) -> Loop:
 
 
 @cache
-def with_supervisor(loop: Loop, strategy: str) -> Loop:
+def with_supervisor(loop: ClosedLoop, strategy: str) -> ClosedLoop:
     """The loop of a law under a supervisor with the given strategy.
 
     Raises KeyError where the law flies no planned gait.

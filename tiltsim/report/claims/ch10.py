@@ -12,7 +12,7 @@ import numpy as np
 from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
 from tiltsim_controllers.tilt_car.state_drift import drift_rate, orbit
 from tiltsim_controllers.tilt_car.third_derivative import input_columns
-from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, turn_share, yaw_share
+from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, counter_yaw_per_tilt, turn_per_tilt
 
 _THIRD: Final = "ch10_state_drift/third_derivative#"
 _PLANNED: Final = "ch10_state_drift/planned_direction"
@@ -46,8 +46,8 @@ def _full_rank_unless_both_rest() -> bool:
 
 def _thrust_points_to_the_centre() -> bool:
     """Eq. (18), alpha = t / (1 - I_T / I_B): the thrusts turn with the circle, 1 rad/s."""
-    tilt_rate = 1.0 / turn_share(THESIS_CAR)
-    yaw_rate = -yaw_share(THESIS_CAR) * tilt_rate
+    tilt_rate = 1.0 / turn_per_tilt(THESIS_CAR)
+    yaw_rate = -counter_yaw_per_tilt(THESIS_CAR) * tilt_rate
     return abs(tilt_rate + yaw_rate - _OMEGA) < 1e-12
 
 
@@ -89,7 +89,7 @@ CLAIMS = (
         source="ch. 10, Sec. 2, Eq. (2)",
         statement="Bottom disc over top disc: ψ over α, with I_T = 0.001 and I_B = 0.002",
         published="-0.5",
-        measure=lambda: -yaw_share(THESIS_CAR),
+        measure=lambda: -counter_yaw_per_tilt(THESIS_CAR),
     ),
     AnalysisClaim(
         source="ch. 10, Sec. 2, Eq. (2)",
@@ -99,7 +99,7 @@ CLAIMS = (
         wrong=True,
         why="α is the top disc's angle on the bottom one, so that I_T (ψ' + α') + I_bottom ψ' = 0: "
         "-1/3. Eq. (2) holds where I_B is the inertia of the whole car.",
-        measure=lambda: -yaw_share(THESIS_CAR._replace(bottom_inertia=0.002)),
+        measure=lambda: -counter_yaw_per_tilt(THESIS_CAR._replace(bottom_inertia=0.002)),
     ),
     AnalysisClaim(
         source="ch. 10, Sec. 2, Eq. (6)",

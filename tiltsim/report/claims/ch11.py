@@ -18,7 +18,7 @@ from tiltsim_controllers.tilt_car.penguin_cycle import (
     limit_cycle,
     lyapunov,
     lyapunov_bound,
-    lyapunov_gain,
+    lyapunov_growth,
     multipliers,
 )
 from tiltsim_controllers.tilt_car.planned_direction import GAIN_SETS
@@ -214,7 +214,7 @@ CLAIMS = (
         source="ch. 11, Sec. 6, Remark 10",
         statement="It grows nowhere in the zone by more",
         published=True,
-        measure=lambda: _for_all(lambda state: lyapunov_gain(_SWING, state) <= 0.75 + 1e-12),
+        measure=lambda: _for_all(lambda state: lyapunov_growth(_SWING, state) <= 0.75 + 1e-12),
     ),
     AnalysisClaim(
         source="ch. 11, Sec. 6, Remark 9; Sec. 7",

@@ -52,7 +52,7 @@ def comparison_figure(flights: Sequence[Flight], names: Sequence[str] = ()) -> F
         rows: Any = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (draw, title, unit) in zip(rows, panels, strict=True):
             for number, flight in enumerate(flights):
-                look = style.line_look(number)
+                look = style.line_style(number)
                 line = draw(axes, flight)
                 if line is None:
                     continue
@@ -72,7 +72,7 @@ def comparison_figure(flights: Sequence[Flight], names: Sequence[str] = ()) -> F
         for number, (flight, name) in enumerate(zip(flights, names, strict=True)):
             lost = flight.end.kind != "completed"
             label = style.verbatim(name) + (f", lost at {flight.end.time:.2f} s" if lost else "")
-            rows[0].plot([], [], label=label, **style.line_look(number))
+            rows[0].plot([], [], label=label, **style.line_style(number))
         # As the legend's title the heading keeps clear of it, however many rows that has.
         heading = common_title(scenarios) or f"{len(flights)} flights compared"
         figure.legend(

@@ -11,11 +11,11 @@ from tiltsim.sweeps.dataset import Column, SweepResults
 from tiltsim.sweeps.tables import GridAxis
 from tiltsim.views.figures.style import CYCLE, DASHES, INK, MARKERS, new_figure
 from tiltsim.views.figures.sweep_columns import (
-    are_completed,
-    drawn_keys,
+    completed_mask,
     groups_of,
-    is_wide,
     label_of,
+    sampled_keys,
+    spans_decades,
 )
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def distributions_figure(results: SweepResults, metrics: tuple[str, ...]) -> Fig
     for axes, metric in zip(curves, metrics):
         for number, (_, group) in enumerate(groups):
             _draw_curve(axes, results, metric, group, number % len(CYCLE))
-        if is_wide(results.columns[metric][are_completed(results)]):
+        if spans_decades(results.columns[metric][completed_mask(results)]):
             axes.set_xscale("log")
         axes.margins(x=0.1)  # room for the numbers
         axes.set_ylim(0.0, 1.03)
@@ -64,7 +64,7 @@ def distributions_figure(results: SweepResults, metrics: tuple[str, ...]) -> Fig
     for axes, drawn in zip(panels, keys):
         _draw_scatter(axes, results, drawn, metrics[0], groups)
     panels[0].set_ylabel(label_of(metrics[0]))
-    if not are_completed(results).all():
+    if not completed_mask(results).all():
         panels[0].set_title("× lost", pad=10.0 + 6.0 * len(groups))
     return figure
 
@@ -84,7 +84,7 @@ def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
 
 
 def _draw_shares(axes: Axes, results: SweepResults, groups: list[tuple[str, Column]]) -> None:
-    completed = are_completed(results)
+    completed = completed_mask(results)
     for number, (name, group) in enumerate(groups):
         flown, trials = int((group & completed).sum()), int(group.sum())
         low, high = wilson_interval(flown, trials)
@@ -105,7 +105,7 @@ def _draw_shares(axes: Axes, results: SweepResults, groups: list[tuple[str, Colu
 
 def _draw_curve(axes: Axes, results: SweepResults, metric: str, group: Column, look: int) -> None:
     color, marker = CYCLE[look], MARKERS[look]
-    values = results.columns[metric][group & are_completed(results)]
+    values = results.columns[metric][group & completed_mask(results)]
     values = np.sort(values[~np.isnan(values)])
     total = int(group.sum())
     lost = total - len(values) if metric.startswith("min_") else 0
@@ -131,8 +131,8 @@ def _most_telling(
     results: SweepResults, metric: str, groups: list[tuple[str, Column]]
 ) -> list[str]:
     """The drawn keys that go with the metric most closely, by rank, in the order of the file."""
-    keys = drawn_keys(results)
-    values = np.where(are_completed(results), results.columns[metric], np.inf)
+    keys = sampled_keys(results)
+    values = np.where(completed_mask(results), results.columns[metric], np.inf)
     values = np.where(np.isnan(values), np.inf, values)
 
     def strength(key: str) -> float:
@@ -168,7 +168,11 @@ def _draw_scatter(
     metric: str,
     groups: list[tuple[str, Column]],
 ) -> None:
-    draws, values, completed = results.columns[key], results.columns[metric], are_completed(results)
+    draws, values, completed = (
+        results.columns[key],
+        results.columns[metric],
+        completed_mask(results),
+    )
     many = len(results) > 1000
     for number, (_, group) in enumerate(groups):
         look, flown, lost = number % len(CYCLE), group & completed, group & ~completed
@@ -181,5 +185,5 @@ def _draw_scatter(
         (line,) = axes.plot(draws[lost], height, "x", color=color, transform=above, **crosses)
         line.set_in_layout(False)
     axes.set_xlabel(label_of(key))
-    if is_wide(values[completed]):
+    if spans_decades(values[completed]):
         axes.set_yscale("log")

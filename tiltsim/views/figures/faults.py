@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tiltsim.views.figures.style import AMBER, GREY, RED, angle_axis, new_figure, paper_style
-from tiltsim_controllers.analysis.fault_tolerance import least_hover_speed
+from tiltsim_controllers.analysis.fault_tolerance import minimum_hover_speed
 from tiltsim_controllers.vehicle.parameters import drag_ratio
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def fault_figure(vehicle: Vehicle) -> Figure:
 
 def _draw_stuck(axes: Axes, vehicle: Vehicle) -> None:
     angles = np.linspace(-pi / 2, pi / 2, 41)
-    axes.plot(angles, [least_hover_speed(vehicle, stuck=(1, angle)) for angle in angles.tolist()])
+    axes.plot(angles, [minimum_hover_speed(vehicle, stuck=(1, angle)) for angle in angles.tolist()])
     whole = vehicle.hover_rotor_speed
     axes.axhline(whole, color=GREY, linewidth=0.8)
     axes.annotate(
@@ -58,7 +58,7 @@ def _draw_stuck(axes: Axes, vehicle: Vehicle) -> None:
 
 def _draw_partial(axes: Axes, vehicle: Vehicle) -> None:
     factors = np.linspace(0.0, 1.0, 21)
-    speeds = [least_hover_speed(vehicle, factors=(f, 1.0, 1.0, 1.0)) for f in factors.tolist()]
+    speeds = [minimum_hover_speed(vehicle, factors=(f, 1.0, 1.0, 1.0)) for f in factors.tolist()]
     axes.plot(100.0 * factors, speeds)
     axes.plot([0.0], speeds[:1], "o", markersize=4, color=RED, clip_on=False)
     axes.text(4.0, speeds[0], f"lost rotor, {speeds[0]:.0f}", color=RED, fontsize=8, va="center")

@@ -10,16 +10,23 @@ import numpy as np
 from tiltsim.laws.assembling import follows_position, loop_of
 from tiltsim.laws.layers.supervision import SUPERVISION
 from tiltsim.views.attitude_plane import (
-    ACTS,
     HALF_WIDTH,
-    forbidden_pitch,
+    SUPERVISION_THRESHOLD,
     margin_threshold,
     nearest_singular,
     singular_curves,
     torque_free_directions,
+    unreachable_pitch,
 )
 from tiltsim.views.figures import style
-from tiltsim.views.figures.page import SIZE, add_headings, cut_blow_up, label, plan_view, widen
+from tiltsim.views.figures.page import (
+    SIZE,
+    add_headings,
+    exclude_divergence_from_scale,
+    label,
+    plan_view,
+    widen,
+)
 from tiltsim.views.figures.tilt_car import tilt_car_figure
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 
@@ -61,7 +68,7 @@ def rotorcraft_figure(flight: Flight) -> Figure:
             axes.tick_params(labelbottom=axes in series[-1])
             panel(axes, flight)
             if panel is not _margin:
-                cut_blow_up(axes, flight)
+                exclude_divergence_from_scale(axes, flight)
         for axes in series[-1]:
             axes.set_xlabel("time (s)")
         above, below = right.subplots(2, 1)
@@ -139,7 +146,7 @@ def _margin(axes: Any, flight: Flight) -> None:
     words = f"below {threshold:g} rad"
     axes.text(0.012, 0.03, words, transform=axes.transAxes, fontsize=7.5, color="#7A4A33")
     if SUPERVISION in flight.columns:
-        acts = flight[SUPERVISION] > ACTS
+        acts = flight[SUPERVISION] > SUPERVISION_THRESHOLD
         axes.axhline(threshold, color=style.RED, ls="--", lw=0.9)
         axes.fill_between(
             *(time, 0.0, 1.0),
@@ -193,7 +200,7 @@ def _shade_forbidden(axes: Any, n: np.typing.NDArray[np.float64], side: float) -
     instants = np.unique(np.linspace(0, len(n) - 1, INSTANTS).round().astype(int))
     edges = np.linspace(-HALF_WIDTH, HALF_WIDTH, 361)
     centres = 0.5 * (edges[1:] + edges[:-1])
-    intervals = forbidden_pitch(n[instants], side, centres)[:, np.newaxis]
+    intervals = unreachable_pitch(n[instants], side, centres)[:, np.newaxis]
     pitch = centres[:, np.newaxis]
     inside = (pitch > intervals[..., 0]) & (pitch < intervals[..., 1])
     share = inside.mean(axis=0)

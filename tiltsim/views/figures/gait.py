@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tiltsim.studies.gait_analysis import NEARLY_SINGULAR
-from tiltsim.views.attitude_plane import ON_THE_FRAME
+from tiltsim.views.attitude_plane import MIN_DIRECTION_TILT
 from tiltsim.views.figures import style
 from tiltsim_controllers.analysis.singularity import (
     determinant,
@@ -111,7 +111,7 @@ def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> set[str]:
         axes.contourf(roll, pitch, allowed, levels=[0.5, 1.5], colors=[style.PALE])
     colors = colormaps[style.SEQUENTIAL](np.arange(len(curves)) / len(curves) * _LAST_SHADE)
     n = np.nan_to_num(torque_free_direction(angles, vehicle))
-    drawn = np.hypot(n[:, 0], n[:, 1]) > ON_THE_FRAME
+    drawn = np.hypot(n[:, 0], n[:, 1]) > MIN_DIRECTION_TILT
     for curve, color, is_drawn in zip(curves, colors, drawn, strict=True):
         if is_drawn:
             line = style.RED if len(curves) == 1 else color

@@ -8,7 +8,7 @@ import numpy as np
 
 from tiltsim.laws.assembling import follows_position
 from tiltsim.views.figures import style
-from tiltsim.views.titles import gait_in_words, law_in_words
+from tiltsim.views.titles import describe_controller, describe_gait
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,8 +39,8 @@ def _headings(flight: Flight) -> tuple[str, str]:
     variant = scenario.address.partition("#")[2]
     parts = (
         *([style.verbatim(variant)] if variant else []),
-        *(words.replace("_", " ") for words in gait_in_words(scenario)),
-        *law_in_words(scenario),
+        *(words.replace("_", " ") for words in describe_gait(scenario)),
+        *describe_controller(scenario),
         f"{scenario.simulation.plant} plant",
         outcome,
     )
@@ -99,7 +99,7 @@ def widen(axes: Any, least: float) -> None:
         axes.set_ylim(middle - 0.5 * least, middle + 0.5 * least)
 
 
-def cut_blow_up(axes: Any, flight: Flight) -> None:
+def exclude_divergence_from_scale(axes: Any, flight: Flight) -> None:
     """Scale a panel of a lost flight by what came before its last moments, if these go far beyond.
 
     A loss ends in numbers of any size, next to which all of the flight would be a flat line.

@@ -83,7 +83,7 @@ _SETTINGS: Final = {
 }
 
 
-def line_look(number: int) -> dict[str, Any]:
+def line_style(number: int) -> dict[str, Any]:
     """Colour and dashes of a line among others, by its number."""
     return {"color": CYCLE[number % len(CYCLE)], "ls": DASHES[number % len(DASHES)]}
 

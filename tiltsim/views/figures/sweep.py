@@ -19,17 +19,17 @@ from tiltsim.views.figures.style import (
     PALE,
     RED,
     SEQUENTIAL,
-    line_look,
+    line_style,
     new_figure,
     paper_style,
     verbatim,
 )
 from tiltsim.views.figures.sweep_columns import (
     add_legend,
-    are_completed,
+    completed_mask,
     groups_of,
-    is_wide,
     label_of,
+    spans_decades,
 )
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ def _panel_grid(rows: int, columns: int, width: float, height: float) -> tuple[F
 
 
 def _mark(number: int) -> dict[str, str]:
-    """The marker that goes with `line_look`."""
+    """The marker that goes with `line_style`."""
     return {"marker": MARKERS[number % len(MARKERS)]}
 
 
@@ -147,7 +147,7 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
     columns = list(groups_of(results, panels, everything))
     alone = len(columns) == 1
     figure, grid = _panel_grid(len(metrics), len(columns), *((5.6, 3.0) if alone else (4.2, 2.7)))
-    abscissa, completed = results.values(x), are_completed(results)
+    abscissa, completed = results.values(x), completed_mask(results)
     for row, metric in zip(grid, metrics):
         for axes, (title, mask) in zip(row, columns):
             groups = list(groups_of(results, lines, mask))
@@ -156,7 +156,7 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
                 order = np.argsort(abscissa[group], kind="stable")
                 values = np.where(flown, results.columns[metric], np.nan)[group][order]
                 line = abscissa[group][order]
-                axes.plot(line, values, ms=3.5, label=name, **line_look(number), **_mark(number))
+                axes.plot(line, values, ms=3.5, label=name, **line_style(number), **_mark(number))
                 lost = line[np.isnan(values)]
                 height = 0.03 + 0.04 * (len(groups) - 1 - number)  # in the order of the legend
                 axes.plot(
@@ -208,12 +208,12 @@ def _map_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
     panels = plot.panels or next(iter(_text_axes(results)), None)
     columns = list(groups_of(results, panels, np.ones(len(results), dtype=bool)))
     figure, grid = _panel_grid(len(metrics), len(columns), 4.0, 3.1)
-    abscissa, ordinate, completed = results.values(x), results.values(y), are_completed(results)
+    abscissa, ordinate, completed = results.values(x), results.values(y), completed_mask(results)
     for row, metric in zip(grid, metrics):
         values = np.where(completed, results.columns[metric], np.nan)
         known = values[~np.isnan(values)]
         low, high = (known.min(), known.max()) if known.size else (0.0, 1.0)
-        norm = LogNorm(low, high) if is_wide(values) else Normalize(low, high)
+        norm = LogNorm(low, high) if spans_decades(values) else Normalize(low, high)
         for axes, (title, mask) in zip(row, columns):
             xs, ys = np.unique(abscissa[mask]), np.unique(ordinate[mask])
             cells = np.full((len(ys), len(xs)), np.nan)
@@ -253,7 +253,7 @@ def _boundary_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure
             color = CYCLE[number % MAX_LINES]
             order = np.argsort(abscissa[group], kind="stable")
             line, last, first = (v[group][order] for v in (abscissa, holds, fails))
-            axes.plot(line, last, marker="o", ms=3.5, label=name, **line_look(number))
+            axes.plot(line, last, marker="o", ms=3.5, label=name, **line_style(number))
             axes.fill_between(line, last, first, color=color, alpha=0.25, lw=0)
             whole = np.isnan(first)
             axes.plot(line[whole], last[whole], "^", ms=6, color=color)

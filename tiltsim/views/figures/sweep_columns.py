@@ -34,19 +34,19 @@ _KEY_UNITS: Final = {
 }
 
 
-def drawn_keys(results: SweepResults) -> list[str]:
+def sampled_keys(results: SweepResults) -> list[str]:
     """The first key of every axis that is drawn from a distribution."""
     axes = results.plan.sweep.axis
     return [a.targets[0] for a in axes if isinstance(a, UniformAxis | NormalAxis)]
 
 
-def is_wide(values: Column) -> bool:
+def spans_decades(values: Column) -> bool:
     """Whether values are all above zero and range over more than a decade or two."""
     known = values[~np.isnan(values)]
     return bool(known.size) and 0.0 < 50.0 * float(known.min()) < float(known.max())
 
 
-def are_completed(results: SweepResults) -> Column:
+def completed_mask(results: SweepResults) -> Column:
     """Which rows are flights that came to their end."""
     return np.array(results.columns["end"] == "completed")
 

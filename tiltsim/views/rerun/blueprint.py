@@ -25,7 +25,7 @@ class Shown:
     camera: str
     floor: str
     plane: str  # empty where there is none
-    plane_stands: bool  # whether its curve stays where it is
+    curve_is_constant: bool  # whether its curve stays where it is
     panels: tuple[Panel, ...]
     eye: tuple[float, float, float]  # seen from the vehicle, in radii of it
     up: tuple[float, float, float]
@@ -183,7 +183,7 @@ def _attitude_trail(flight: Shown) -> Any:
     import rerun as rr
     import rerun.blueprint as rrb
 
-    if flight.plane_stands:
+    if flight.curve_is_constant:
         return _from_the_start()
     return rrb.VisibleTimeRanges(
         timeline=TIMELINE,

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from tiltsim.views.rerun.rows import Floats
 
 SEND_INTERVAL: Final = 0.25  # s of wall time between pieces; each costs about 0.04 s
-FAREWELL: Final = 5.0
+SHUTDOWN_TIMEOUT: Final = 5.0
 """How long (s) to wait, after the flight, for the viewer to take what is left."""
 
 
@@ -79,9 +79,9 @@ class LiveStream:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Send what is left and stop, within `FAREWELL` seconds at most."""
+        """Send what is left and stop, within `SHUTDOWN_TIMEOUT` seconds at most."""
         self._over.set()
-        self._thread.join(FAREWELL)
+        self._thread.join(SHUTDOWN_TIMEOUT)
         if self._thread.is_alive():
             _leave_behind()
 

@@ -14,10 +14,10 @@ import numpy.typing as npt
 from tiltsim.views.attitude_plane import (
     HALF_WIDTH,
     MARGIN_THRESHOLD,
-    forbidden_pitch,
     nearest_singular,
     singular_curves,
     torque_free_directions,
+    unreachable_pitch,
 )
 from tiltsim.views.rerun import palette
 from tiltsim.views.rerun.rows import Floats, Ticks, send_rows
@@ -164,7 +164,7 @@ def forbidden_stripes(n: Floats, side: float) -> tuple[Any, npt.NDArray[np.int_]
     width = pi / STRIPES
     roll = np.asarray(width * (np.arange(STRIPES) + 0.5) - HALF_WIDTH, dtype=np.float64)
     # Stripes have round ends, which must not stand out beyond the ground they fill.
-    intervals = forbidden_pitch(n, side, roll) + np.array((STRIPE_RADIUS, -STRIPE_RADIUS))
+    intervals = unreachable_pitch(n, side, roll) + np.array((STRIPE_RADIUS, -STRIPE_RADIUS))
     ends = np.stack([np.broadcast_to(roll[:, np.newaxis], intervals.shape), intervals], axis=-1)
     filled = intervals[..., 1] > intervals[..., 0]
     return on_screen(ends[filled]), np.count_nonzero(filled, axis=1)

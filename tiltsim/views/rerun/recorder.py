@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tiltsim.views.attitude_plane import curve_stands
-from tiltsim.views.events import Event, EventWatch
+from tiltsim.views.attitude_plane import curve_is_constant
+from tiltsim.views.events import Event, EventDetector
 from tiltsim.views.replay import thrust_scale, vehicle_radius, visible_model
 from tiltsim.views.rerun import palette
 from tiltsim.views.rerun.aspects import aspect_of, comparison_series
@@ -66,7 +66,7 @@ class FlightRecorder:
         self._scenario = scenario
         self._name = name
         self._first = first
-        self._events = EventWatch(scenario)
+        self._events = EventDetector(scenario)
         self._event_path = f"events/{part}" if name else "events"
         self._model = visible_model(scenario)
         suffix = f"/{part}" if name else ""
@@ -91,7 +91,7 @@ class FlightRecorder:
             camera=self._scene.camera,
             floor=self._scene.floor,
             plane=self._plane_root if self._plane is not None else "",
-            plane_stands=curve_stands(self._scenario),
+            curve_is_constant=curve_is_constant(self._scenario),
             panels=self._aspect.panels(self._scenario),
             eye=self._aspect.eye,
             up=self._aspect.up,

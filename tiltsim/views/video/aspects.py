@@ -7,8 +7,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 import numpy as np
 
 from tiltsim.laws.assembling import loop_of
-from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, curve_stands, torque_free_directions
-from tiltsim.views.video.inset import PlaneInset, lay_over
+from tiltsim.views.attitude_plane import (
+    MOVING_TRAIL_TIME,
+    curve_is_constant,
+    torque_free_directions,
+)
+from tiltsim.views.video.inset import PlaneInset, overlay_inset
 from tiltsim.views.video.offscreen import Caption, Image
 
 if TYPE_CHECKING:
@@ -50,7 +54,7 @@ class RotorcraftAspect:
         self._attitude = np.stack([flight["roll"], flight["pitch"]], axis=1)
         side = float(np.sign(flight["singularity_margin"][0])) or 1.0
         self._inset = PlaneInset(round(INSET_SHARE * height), side)
-        self._curve_stands = curve_stands(flight.scenario)
+        self._curve_stands = curve_is_constant(flight.scenario)
         self._gap = round(GAP_SHARE * height)
         self.caption = Caption(
             "shaded: attitudes out of reach", self._gap, self._inset.size + self._gap
@@ -69,7 +73,7 @@ class RotorcraftAspect:
         trail = self._attitude[self._trail_start(sample) : sample + 1 : 2]
         trail = np.concatenate([trail, self._attitude[sample : sample + 1]])
         margin = float(self._flight["singularity_margin"][sample])
-        lay_over(image, self._inset.paint(self._n[sample], trail, margin), self._gap)
+        overlay_inset(image, self._inset.paint(self._n[sample], trail, margin), self._gap)
 
     def _trail_start(self, sample: int) -> int:
         """The first sample of the trail, an even one lest the trail crawl from frame to frame."""

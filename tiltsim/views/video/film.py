@@ -53,7 +53,7 @@ class Format:
     speed: float = 1.0
 
 
-def film_flight(
+def write_video(
     flight: Flight,
     path: Path,
     form: Format = Format(),

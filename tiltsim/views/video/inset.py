@@ -91,7 +91,7 @@ class PlaneInset:
             image[at[:, 1], at[:, 0]] = color
 
 
-def lay_over(frame: Image, inset: Image, gap: int) -> None:
+def overlay_inset(frame: Image, inset: Image, gap: int) -> None:
     """Lay an inset over the lower right corner of a frame, in place."""
     height, width = inset.shape[:2]
     corner = frame[-gap - height : -gap, -gap - width : -gap]

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tiltsim.errors import InputError
-from tiltsim.views.video import has_screen
+from tiltsim.views.video import has_display
 
 Image = npt.NDArray[np.uint8]
 
@@ -56,7 +56,7 @@ def _ways() -> dict[str, Callable[[int, int], Any]]:
     if chosen in MODULES:
         names = [chosen]
     else:
-        names = ["glfw", "egl", "osmesa"] if has_screen() else ["egl", "osmesa"]
+        names = ["glfw", "egl", "osmesa"] if has_display() else ["egl", "osmesa"]
     # Imported on the way, for a library that is missing is a failure like any other.
     return {
         name: lambda *size, m=MODULES[name]: import_module(m).GLContext(*size) for name in names
