@@ -732,14 +732,14 @@ def test_the_documented_examples_fly(capsys):
     assert (float(x), float(z)) == pytest.approx((2.0, 1.0), abs=1e-3)
     assert abs(float(integral)) < 1e-3
     # Without the integral, the wind leaves an error of 0.3 m/s^2 over the gain of 1 / s^2.
-    bare = tiltsim.simulate(names["flight"].scenario, controller=names["law"])
+    bare = tiltsim.simulate(names["flight"].scenario, controller=names["hover"])
     assert bare.metrics()["final_position_error_x"] == pytest.approx(-0.3, abs=0.01)
 
 
 def test_the_readmes_law_is_the_documented_one_and_short():
-    (readme,) = (block for block in python_blocks("README.md") if "controller=law" in block)
+    (readme,) = (block for block in python_blocks("README.md") if "controller=hover" in block)
     documented = python_blocks("docs/own_controller.md")[0]
     head, _, tail = readme.partition("\n\n\nscenario = ")
     assert documented.startswith(head)
     assert len([line for line in readme.splitlines() if line.strip()]) <= 15
-    assert "controller=law" in tail
+    assert "controller=hover" in tail
