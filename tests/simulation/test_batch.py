@@ -117,7 +117,7 @@ def test_every_gait_flies_the_same_three_ways_with_continuous_and_held_control()
         for held in (0.0, 0.005)
     ]
     # Rows have tables of different lengths, though one layout.
-    assert len({len(control_setup(s).table) for s in scenarios}) > 2
+    assert len({len(control_setup(s).knots) for s in scenarios}) > 2
     three_ways(scenarios)
 
 

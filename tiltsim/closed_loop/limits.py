@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import hypot
 from typing import Final
 
-from tiltsim_controllers.mathematics.scalar import scalar
+from tiltsim_controllers.mathematics.scalar import Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
 
 MAX_POSITION_ERROR: Final = 1e4  # m
@@ -27,27 +26,27 @@ ROTOR_SPEED: Final = 6
 
 @scalar
 def horizontal_error(
-    time: float, values: Sequence[float], reference: ReferenceParameters, table: Sequence[float]
+    time: float, values: Vector, reference: ReferenceParameters, knots: Vector
 ) -> float:
     """Horizontal distance (m) to the reference."""
-    target = position_reference(time, reference, table)
+    target = position_reference(time, reference, knots)
     return hypot(target[0] - values[0], target[1] - values[1])
 
 
 @scalar
 def altitude_error(
-    time: float, values: Sequence[float], reference: ReferenceParameters, table: Sequence[float]
+    time: float, values: Vector, reference: ReferenceParameters, knots: Vector
 ) -> float:
     """Absolute altitude error (m)."""
-    return abs(position_reference(time, reference, table)[2] - values[2])
+    return abs(position_reference(time, reference, knots)[2] - values[2])
 
 
 @scalar
 def rotorcraft_limit_exceeded(
     time: float,
-    values: Sequence[float],
+    values: Vector,
     reference: ReferenceParameters,
-    table: Sequence[float],
+    knots: Vector,
     follows_position: float,
 ) -> int:
     """The code of the first limit that a sample of a rotorcraft exceeds, `WITHIN_LIMITS` if none.
@@ -55,10 +54,10 @@ def rotorcraft_limit_exceeded(
     ``values`` begin as `tiltsim.vehicles.rotorcraft.OBSERVED_FIELDS`; ``follows_position`` is 0
     where the horizontal position is free.
     """
-    away = follows_position * horizontal_error(time, values, reference, table)
+    away = follows_position * horizontal_error(time, values, reference, knots)
     if away > MAX_POSITION_ERROR:
         return HORIZONTAL_ERROR
-    if altitude_error(time, values, reference, table) > MAX_POSITION_ERROR:
+    if altitude_error(time, values, reference, knots) > MAX_POSITION_ERROR:
         return ALTITUDE_ERROR
     for axis in range(3):
         if abs(values[9 + axis]) > MAX_BODY_RATE:
@@ -72,13 +71,13 @@ def rotorcraft_limit_exceeded(
 @scalar
 def tilt_car_limit_exceeded(
     time: float,
-    values: Sequence[float],
+    values: Vector,
     reference: ReferenceParameters,
-    table: Sequence[float],
+    knots: Vector,
     follows_position: float,
 ) -> int:
     """As `rotorcraft_limit_exceeded`, for `tiltsim.vehicles.tilt_car.OBSERVED_FIELDS`."""
-    away = follows_position * horizontal_error(time, values, reference, table)
+    away = follows_position * horizontal_error(time, values, reference, knots)
     if away > MAX_POSITION_ERROR:
         return HORIZONTAL_ERROR
     for rotor in range(2):

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.parts import ExtraActuators
 from tiltsim_controllers.mathematics.records import flatten, record_dtype, record_size
-from tiltsim_controllers.mathematics.scalar import scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
-
-Floats = npt.NDArray[np.float64]
 
 
 class Sizes(NamedTuple):
@@ -35,12 +32,12 @@ class ControlSetup(NamedTuple):
     """What the control step of one flight reads besides the state."""
 
     parameters: Any  # the loop's record
-    table: tuple[float, ...] = ()  # keyframes of the gait, then waypoints of the reference
+    knots: Values = ()  # keyframes of the gait, then waypoints of the reference
 
     @property
     def userdata(self) -> Floats:
-        """Record and table as MuJoCo's `userdata` holds them after its `Header`."""
-        return np.array([*flatten(self.parameters), *self.table])
+        """Record and knots as MuJoCo's `userdata` holds them after its `Header`."""
+        return np.array([*flatten(self.parameters), *self.knots])
 
 
 class SignCheck(NamedTuple):
@@ -57,27 +54,27 @@ class Equations:
     Attributes
     ----------
     inputs
-        Scalar function ``(time, state, parameters, table) -> inputs``: the law.
+        Scalar function ``(time, state, parameters, knots) -> inputs``: the law.
     inputs_size
         How many inputs there are.
     rates
-        Scalar function ``(time, state, inputs, parameters, table, disturbance) -> derivative`` of
+        Scalar function ``(time, state, inputs, parameters, knots, disturbance) -> derivative`` of
         the state; the disturbance is an acceleration (m/s^2, world).
     initial
         ``(scenario, setup) -> state`` at time zero.
     observe
-        Scalar function ``(time, state, inputs, parameters, table) -> values`` of the loop's
+        Scalar function ``(time, state, inputs, parameters, knots) -> values`` of the loop's
         `sample_fields` after the time; ``inputs`` are those in force.
     settled
         Scalar function ``(state, parameters) -> state`` for the end of each step: what has run
         past a limit is put back. None where there is none.
     """
 
-    inputs: Callable[..., tuple[float, ...]]
+    inputs: Callable[..., Values]
     inputs_size: int
-    rates: Callable[..., tuple[float, ...]]
-    initial: Callable[[Scenario, ControlSetup], Sequence[float]]
-    observe: Callable[..., tuple[float, ...]]
+    rates: Callable[..., Values]
+    initial: Callable[[Scenario, ControlSetup], Vector]
+    observe: Callable[..., Values]
     settled: Callable[..., list[float]] | None = None
 
 
@@ -94,10 +91,10 @@ class ClosedLoop:
     sizes
         Lengths of its vectors, the law's own states among the activations.
     parameters
-        Record at the head of `userdata`; its first field is ``signature``. A table of floats, for
+        Record at the head of `userdata`; its first field is ``signature``. The knots of
         gaits of any length, may follow it.
     controls
-        Scalar function ``(time, qpos, qvel, act, parameters, table) -> ctrl``: the whole step.
+        Scalar function ``(time, qpos, qvel, act, parameters, knots) -> ctrl``: the whole step.
     refresh
         Scalar function ``(ctrl, act) -> ctrl``: what moves between the samples of a held law.
     hold
@@ -131,7 +128,7 @@ class ClosedLoop:
     follows_position
         Whether a scenario has the law follow the reference's horizontal position.
     equations
-        The same law on the thesis' own equations; None where it flies on MuJoCo alone, or, with a
+        The same law on the thesis's own equations; None where it flies on MuJoCo alone, or, with a
         layer around it, by `tiltsim.laws.layers.on_equations`.
     kind
         What holds for all loops around such a vehicle.
@@ -142,23 +139,23 @@ class ClosedLoop:
     model: str
     sizes: Sizes
     parameters: type[tuple[Any, ...]]
-    controls: Callable[..., tuple[float, ...]]
-    refresh: Callable[..., tuple[float, ...]]
+    controls: Callable[..., Values]
+    refresh: Callable[..., Values]
     setup: Callable[[Scenario, float], ControlSetup]
-    initial_activations: Callable[[Scenario, ControlSetup], Sequence[float]]
-    observe: Callable[..., tuple[float, ...]]
+    initial_activations: Callable[[Scenario, ControlSetup], Vector]
+    observe: Callable[..., Values]
     derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
     watched: Callable[[Mapping[str, float], ControlSetup], tuple[SignCheck, ...]]
     kind: VehicleKind
     equations: Equations | None = None
-    watch: Callable[..., tuple[float, ...]] | None = None
+    watch: Callable[..., Values] | None = None
     observes_controls: bool = False
     law_states: int = 0
     extra_actuators: tuple[ExtraActuators, ...] = ()
     law_fields: tuple[str, ...] = ()
     extra_columns: Mapping[str, str] = field(default_factory=dict)
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
-    hold: Callable[..., tuple[float, ...]] | None = None
+    hold: Callable[..., Values] | None = None
     uses_gait: bool = True
 
     @cached_property
@@ -168,7 +165,7 @@ class ClosedLoop:
         return float(zlib.crc32(repr(layout).encode()))
 
     @cached_property
-    def held(self) -> Callable[..., tuple[float, ...]]:
+    def held(self) -> Callable[..., Values]:
         """``hold``, or ``refresh`` in its form."""
         if self.hold is not None:
             return self.hold
@@ -176,13 +173,8 @@ class ClosedLoop:
 
         @scalar
         def only_refresh(
-            time: float,
-            qpos: Sequence[float],
-            qvel: Sequence[float],
-            act: Sequence[float],
-            ctrl: Sequence[float],
-            parameters: Any,
-        ) -> tuple[float, ...]:
+            time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: Any
+        ) -> Values:
             return refresh(ctrl, act)
 
         return only_refresh

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-import numpy.typing as npt
+from tiltsim_controllers.mathematics.scalar import Floats, Vector
 
 if TYPE_CHECKING:
     import mujoco
 
     from tiltsim.models.parts import ExtraActuators
     from tiltsim.scenario.scenario import Scenario
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +35,7 @@ class VehicleKind:
     initial_motion
         ``(scenario) -> qpos, qvel`` at time zero.
     limit_exceeded
-        Scalar function ``(time, values, reference, table, follows_position) -> code`` of the first
+        Scalar function ``(time, values, reference, knots, follows_position) -> code`` of the first
         limit of `tiltsim.closed_loop.limits` that a sample exceeds; ``values`` begin with the
         observed fields.
     """
@@ -48,7 +45,7 @@ class VehicleKind:
     columns: Mapping[str, str]
     thrusts: Callable[[Mapping[str, Floats], Scenario], dict[str, Floats]]
     compile: Callable[[Scenario, int, tuple[ExtraActuators, ...], int, bool], mujoco.MjModel]
-    initial_motion: Callable[[Scenario], tuple[Sequence[float], Sequence[float]]]
+    initial_motion: Callable[[Scenario], tuple[Vector, Vector]]
     limit_exceeded: Callable[..., int]
 
     @property

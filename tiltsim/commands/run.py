@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from tiltsim.commands.progress import progress_bar
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INTERRUPTED, VEHICLE_LOST
 from tiltsim.system.interrupts import defer_interrupts
+from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
-    from tiltsim.closed_loop.loop import Floats
     from tiltsim.flight.flight import Flight
     from tiltsim.flight.verdicts import Verdict
     from tiltsim.scenario.expectation import Expectation

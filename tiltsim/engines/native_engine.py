@@ -78,9 +78,9 @@ def compile_callbacks(loop: ClosedLoop) -> Callbacks:
         ctrl = _array(data + at.ctrl, nu)
         record = _addresses_at(data + at.userdata)[0] + 8 * HEADER_SIZE
         parameters = carray(_bytes_at(record), (1,), layout)[0]
-        table = userdata[head:]
+        knots = userdata[head:]
         if userdata[EVALUATIONS] == 0.0:
-            values = controls(time, positions, velocities, activations, parameters, table)
+            values = controls(time, positions, velocities, activations, parameters, knots)
         else:
             held = to_fixed_tuple(ctrl, nu)
             values = hold(time, positions, velocities, activations, held, parameters)
@@ -94,7 +94,7 @@ def compile_callbacks(loop: ClosedLoop) -> Callbacks:
             if _sample_is_due(recorder):
                 seen = observe(positions, velocities, activations, values)
                 watched = watch(seen, parameters)
-                _record(recorder, time, seen, watched, limit_exceeded, table)
+                _record(recorder, time, seen, watched, limit_exceeded, knots)
             if _recording_is_over(recorder):
                 for index in range(nu):
                     ctrl[index] = nan

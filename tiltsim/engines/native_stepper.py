@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from tiltsim.closed_loop.loop import ClosedLoop, Floats
+from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.engines.cache import (
     announce_native_code,
 )
@@ -17,6 +17,7 @@ from tiltsim.engines.numba_setup import _INNER, _OPTIONS, _register_scalar_funct
 from tiltsim.engines.recorder import _record, _recording_is_over
 from tiltsim.equations.ode3 import make_stepper
 from tiltsim_controllers.mathematics.records import record_dtype
+from tiltsim_controllers.mathematics.scalar import Floats
 
 
 @cache
@@ -38,11 +39,11 @@ def compile_stepper(loop: ClosedLoop) -> tuple[Any, Any]:
 
     @njit(nogil=True, **_OPTIONS)
     def advance(  # type: ignore[no-untyped-def]
-        step_index, state, held, timestep, steps, control_steps, parameters, table, disturbance
+        step_index, state, held, timestep, steps, control_steps, parameters, knots, disturbance
     ):
         values, held = stepper(
             *(step_index, list(state), held, timestep, steps),
-            *(control_steps, parameters, table, disturbance),
+            *(control_steps, parameters, knots, disturbance),
         )
         return np.array(values), held
 
@@ -57,23 +58,23 @@ def compile_stepper(loop: ClosedLoop) -> tuple[Any, Any]:
         steps,
         control_steps,
         parameters,
-        table,
+        knots,
         disturbance,
     ):
         values = list(state)
         for _ in range(samples):
             values, held = stepper(
                 *(step_index, values, held, timestep, steps),
-                *(control_steps, parameters, table, disturbance),
+                *(control_steps, parameters, knots, disturbance),
             )
             step_index += steps
             time = step_index * timestep
             force = held
             if control_steps == 0 or step_index % control_steps == 0:
-                force = inputs(time, values, parameters, table)
-            seen = observe(time, values, force, parameters, table)
+                force = inputs(time, values, parameters, knots)
+            seen = observe(time, values, force, parameters, knots)
             watched = watch(seen, parameters)
-            _record(recorder, time, seen, watched, limit_exceeded, table)
+            _record(recorder, time, seen, watched, limit_exceeded, knots)
             if _recording_is_over(recorder):
                 break
         return np.array(values), held
@@ -82,6 +83,6 @@ def compile_stepper(loop: ClosedLoop) -> tuple[Any, Any]:
 
 
 def native_record(loop: ClosedLoop, userdata: Floats) -> tuple[Any, Floats]:
-    """The parameter record and the table of a flight as compiled code reads them."""
+    """The parameter record and the knots of a flight as compiled code reads them."""
     head = loop.record_size
     return userdata[:head].view(record_dtype(loop.parameters))[0], userdata[head:]

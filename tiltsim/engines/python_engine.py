@@ -24,7 +24,7 @@ class PythonEngine:
         # Parameters never change during a flight: read once what native code reads at every call.
         values = data.userdata[HEADER_SIZE:].tolist()
         parameters = slotted(unflatten(loop.parameters, values))
-        table = tuple(values[loop.record_size :])
+        knots = tuple(values[loop.record_size :])
         # Views of MuJoCo's own memory; looking them up anew would cost a tenth of the callback.
         vectors = data.qpos, data.qvel, data.act, data.ctrl
         qpos, qvel, act, ctrl = (memoryview(vector) for vector in vectors)
@@ -36,7 +36,7 @@ class PythonEngine:
                 return  # some other model of this process is being stepped
             try:
                 positions, velocities = qpos.tolist(), qvel.tolist()
-                values = controls(data.time, positions, velocities, act.tolist(), parameters, table)
+                values = controls(data.time, positions, velocities, act.tolist(), parameters, knots)
                 write_controls(ctrl, 0, *values)
             except (ArithmeticError, ValueError):
                 # Where floats raise (sin of infinity), native code has NaN; MuJoCo reports both.

@@ -11,10 +11,11 @@ from numba import carray
 from numba.extending import register_jitable
 
 from tiltsim.closed_loop.limits import SINGULAR, WITHIN_LIMITS
-from tiltsim.closed_loop.loop import ClosedLoop, Floats
+from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.engines.native_memory import _bytes_at, _floats_at
 from tiltsim.engines.numba_setup import _INNER
 from tiltsim_controllers.mathematics.records import flatten, record_dtype, record_size
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 
 
@@ -51,7 +52,7 @@ def _sample_is_due(recorder):  # type: ignore[no-untyped-def]
 
 
 @register_jitable(**_INNER)
-def _record(recorder, time, values, watched, limit_exceeded, table):  # type: ignore[no-untyped-def]
+def _record(recorder, time, values, watched, limit_exceeded, knots):  # type: ignore[no-untyped-def]
     """Keep a sample and judge it as `tiltsim.simulation.monitor.TerminationMonitor` does."""
     head = carray(_bytes_at(recorder), (1,), _RECORDER)
     samples = int(head[0].samples)
@@ -69,7 +70,7 @@ def _record(recorder, time, values, watched, limit_exceeded, table):  # type: ig
     lost = not finite
     if finite:
         reference, follows_position = head[0].reference, head[0].follows_position
-        lost = limit_exceeded(time, values, reference, table, follows_position) != WITHIN_LIMITS
+        lost = limit_exceeded(time, values, reference, knots, follows_position) != WITHIN_LIMITS
     for index in range(len(watched)):
         side = 0.0 if abs(watched[index]) < SINGULAR else copysign(1.0, watched[index])
         if side == 0.0 or side != rest[index]:

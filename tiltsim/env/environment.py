@@ -17,7 +17,6 @@ import numpy as np
 import numpy.typing as npt
 from dm_env import specs
 
-from tiltsim.closed_loop.loop import Floats
 from tiltsim.env.domain import Domain
 from tiltsim.errors import InputError
 from tiltsim.flight.end import End
@@ -28,6 +27,7 @@ from tiltsim.plants.user_controller import with_external_commands
 from tiltsim.scenario.loading import load_scenario, parse_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.monitor import TerminationMonitor
+from tiltsim_controllers.mathematics.scalar import Floats
 
 Observed = dict[str, Floats]
 Reward = Callable[[Mapping[str, Floats], Floats], float]

@@ -10,8 +10,8 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import Floats
 from tiltsim.env.environment import TiltrotorEnv
+from tiltsim_controllers.mathematics.scalar import Floats
 
 try:
     import gymnasium

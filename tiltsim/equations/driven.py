@@ -1,8 +1,8 @@
-"""The vehicles on the thesis' equations, driven as MuJoCo drives them: by the controls of a model.
+"""The vehicles on the thesis's equations, driven as MuJoCo drives them: by the controls of a model.
 
-The thesis' vehicles do as they are told: pods stand at the gait's angles, rotors take any speed.
+The thesis's vehicles do as they are told: pods stand at the gait's angles, rotors take any speed.
 With a layer around the law (`tiltsim.laws.layers.layer`) they do not, and what the layer says, it
-says as controls and activations of the MuJoCo model. Here these controls act on the thesis' rigid
+says as controls and activations of the MuJoCo model. Here these controls act on the thesis's rigid
 body, on pods without mass that follow the equation of their servo, and on rotors with limits.
 Nothing of MuJoCo is in it but the order of the controls, so that its flights can be checked against
 these.
@@ -10,7 +10,7 @@ these.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from math import inf
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -23,7 +23,7 @@ from tiltsim_controllers.mathematics.rotation import (
     rotation_from_euler,
     to_world,
 )
-from tiltsim_controllers.mathematics.scalar import Quad, Triple, clipped, scalar
+from tiltsim_controllers.mathematics.scalar import Quad, Triple, Values, Vector, clipped, scalar
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def mechanics(scenario: Scenario) -> Mechanics:
 
 
 @scalar
-def pushed(rotation: Sequence[float], wrench: Wrench, mass: float, disturbance: Triple) -> Triple:
+def pushed(rotation: Vector, wrench: Wrench, mass: float, disturbance: Triple) -> Triple:
     """The acceleration (m/s^2, world) by a wrench's force and a disturbance (m/s^2, world)."""
     force_x, force_y, force_z = to_world(rotation, (wrench[0], wrench[1], wrench[2]))
     gust_x, gust_y, gust_z = disturbance
@@ -72,16 +72,14 @@ class Driven(NamedTuple):
 
     motion: int  # how many numbers come before the activations
     rotor_states: int  # which of the controls is the first that an activation integrates
-    qpos: Callable[[Sequence[float]], tuple[float, ...]]  # of the state, as MuJoCo has them
-    qvel: Callable[[Sequence[float]], tuple[float, ...]]
-    rates: Callable[
-        [Sequence[float], Sequence[float], Wrench, Mechanics, Triple], tuple[float, ...]
-    ]
+    qpos: Callable[[Vector], Values]  # of the state, as MuJoCo has them
+    qvel: Callable[[Vector], Values]
+    rates: Callable[[Vector, Vector, Wrench, Mechanics, Triple], Values]
     """Time derivative of the motion: state, controls, wrench, mechanics, disturbance (m/s^2)."""
     settled: Callable[
         [list[float], Mechanics], list[float]
     ]  # see `tiltsim.closed_loop.loop.Equations`
-    initial: Callable[[Scenario], tuple[float, ...]]  # motion
+    initial: Callable[[Scenario], Values]  # motion
 
 
 # --- tiltrotor ---------------------------------------------------------------------------------
@@ -89,7 +87,7 @@ class Driven(NamedTuple):
 
 
 @scalar
-def rotation_of(state: Sequence[float]) -> tuple[float, ...]:
+def rotation_of(state: Vector) -> Values:
     """The nine entries, rows first, of the body-to-world rotation."""
     return (
         *(state[6], state[7], state[8], state[9], state[10], state[11]),
@@ -98,7 +96,7 @@ def rotation_of(state: Sequence[float]) -> tuple[float, ...]:
 
 
 @scalar
-def tiltrotor_qpos(state: Sequence[float]) -> tuple[float, ...]:
+def tiltrotor_qpos(state: Vector) -> Values:
     """Position, quaternion and tilts."""
     qw, qx, qy, qz = quaternion_from_rotation(rotation_of(state))
     return (
@@ -108,7 +106,7 @@ def tiltrotor_qpos(state: Sequence[float]) -> tuple[float, ...]:
 
 
 @scalar
-def tiltrotor_qvel(state: Sequence[float]) -> tuple[float, ...]:
+def tiltrotor_qvel(state: Vector) -> Values:
     """Velocity, body rates and tilt rates."""
     return (
         *(state[3], state[4], state[5], state[15], state[16], state[17]),
@@ -126,12 +124,8 @@ def servo_acceleration(told: float, angle: float, rate: float, mechanics: Mechan
 
 @scalar
 def tiltrotor_rates(
-    state: Sequence[float],
-    ctrl: Sequence[float],
-    wrench: Wrench,
-    mechanics: Mechanics,
-    disturbance: Triple,
-) -> tuple[float, ...]:
+    state: Vector, ctrl: Vector, wrench: Wrench, mechanics: Mechanics, disturbance: Triple
+) -> Values:
     """Chapter 3's rigid body under thrusts, servos and a wrench."""
     vehicle = mechanics.vehicle
     _, _, _, torque_x, torque_y, torque_z = wrench
@@ -169,7 +163,7 @@ def settled_tiltrotor(state: list[float], mechanics: Mechanics) -> list[float]:
     return settled
 
 
-def initial_tiltrotor(scenario: Scenario) -> tuple[float, ...]:
+def initial_tiltrotor(scenario: Scenario) -> Values:
     """The motion at time zero; pods as in MuJoCo."""
     initial = scenario.initial
     tilts, tilt_rates = initial_tilts(scenario)
@@ -183,26 +177,22 @@ def initial_tiltrotor(scenario: Scenario) -> tuple[float, ...]:
 
 
 @scalar
-def quadrotor_qpos(state: Sequence[float]) -> tuple[float, ...]:
+def quadrotor_qpos(state: Vector) -> Values:
     """Position and quaternion."""
     qw, qx, qy, qz = quaternion_from_euler(state[6], state[7], state[8])
     return state[0], state[1], state[2], qw, qx, qy, qz
 
 
 @scalar
-def quadrotor_qvel(state: Sequence[float]) -> tuple[float, ...]:
+def quadrotor_qvel(state: Vector) -> Values:
     """Velocity and body rates."""
     return state[3], state[4], state[5], state[9], state[10], state[11]
 
 
 @scalar
 def quadrotor_rates(
-    state: Sequence[float],
-    ctrl: Sequence[float],
-    wrench: Wrench,
-    mechanics: Mechanics,
-    disturbance: Triple,
-) -> tuple[float, ...]:
+    state: Vector, ctrl: Vector, wrench: Wrench, mechanics: Mechanics, disturbance: Triple
+) -> Values:
     """Chapter 2's rigid body under thrusts and a wrench."""
     vehicle = mechanics.vehicle
     _, _, _, torque_x, torque_y, torque_z = wrench

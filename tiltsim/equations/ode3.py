@@ -1,4 +1,4 @@
-"""The thesis' fixed-step solver, ode3, for the equations of motion of any loop.
+"""The thesis's fixed-step solver, ode3, for the equations of motion of any loop.
 
 The equations are those that the thesis prints (`tiltsim.equations`): they leave out what the thesis
 leaves out. The same law runs here and in MuJoCo: the difference between the two plants is a result.
@@ -6,17 +6,17 @@ leaves out. The same law runs here and in MuJoCo: the difference between the two
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 from tiltsim.closed_loop.loop import Equations
-from tiltsim_controllers.mathematics.scalar import Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 
-Stepper = Callable[..., tuple[list[float], tuple[float, ...]]]
+Stepper = Callable[..., tuple[list[float], Values]]
 
 
 @scalar
-def stage(state: Sequence[float], step: float, rates: Sequence[float]) -> list[float]:
+def stage(state: Vector, step: float, rates: Vector) -> list[float]:
     """The state one explicit stage further: ``state + step * rates``."""
     return [value + step * rate for value, rate in zip(state, rates)]
 
@@ -40,30 +40,30 @@ def make_stepper(equations: Equations) -> Stepper:
     def advance(
         step_index: int,
         state: list[float],
-        held: tuple[float, ...],
+        held: Values,
         timestep: float,
         steps: int,
         control_steps: int,
         parameters: Any,
-        table: Sequence[float],
+        knots: Vector,
         disturbance: Triple,
-    ) -> tuple[list[float], tuple[float, ...]]:
+    ) -> tuple[list[float], Values]:
         continuous = control_steps == 0
         for index in range(step_index, step_index + steps):
             time = index * timestep
             if continuous or index % control_steps == 0:
-                held = inputs(time, state, parameters, table)
-            k1 = rates(time, state, held, parameters, table, disturbance)
+                held = inputs(time, state, parameters, knots)
+            k1 = rates(time, state, held, parameters, knots, disturbance)
             half = stage(state, 0.5 * timestep, k1)
             half_time = time + 0.5 * timestep
             if continuous:
-                held = inputs(half_time, half, parameters, table)
-            k2 = rates(half_time, half, held, parameters, table, disturbance)
+                held = inputs(half_time, half, parameters, knots)
+            k2 = rates(half_time, half, held, parameters, knots, disturbance)
             late = stage(state, 0.75 * timestep, k2)
             late_time = time + 0.75 * timestep
             if continuous:
-                held = inputs(late_time, late, parameters, table)
-            k3 = rates(late_time, late, held, parameters, table, disturbance)
+                held = inputs(late_time, late, parameters, knots)
+            k3 = rates(late_time, late, held, parameters, knots, disturbance)
             state = [
                 value + timestep * (2.0 / 9.0 * a + 1.0 / 3.0 * b + 4.0 / 9.0 * c)
                 for value, a, b, c in zip(state, k1, k2, k3)

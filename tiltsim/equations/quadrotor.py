@@ -7,12 +7,11 @@ come after them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from tiltsim_controllers.laws.yaw_position import State, euler_rates, gyroscopic_acceleration
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
-from tiltsim_controllers.mathematics.scalar import Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @scalar
-def rigid_body(state: Sequence[float]) -> State:
+def rigid_body(state: Vector) -> State:
     """State of laws without states: `tiltsim_controllers.laws.yaw_position.STATE_FIELDS`."""
     return (
         *(state[0], state[1], state[2], state[3], state[4], state[5], state[6]),
@@ -29,7 +28,7 @@ def rigid_body(state: Sequence[float]) -> State:
 
 
 @scalar
-def law_state(state: Sequence[float]) -> State:
+def law_state(state: Vector) -> State:
     """The laws' state as `rigid_body`, for laws with states of their own."""
     return (
         *(state[0], state[1], state[2], state[3], state[4], state[5], state[6]),
@@ -39,8 +38,8 @@ def law_state(state: Sequence[float]) -> State:
 
 @scalar
 def equations_of_motion(
-    state: Sequence[float], inputs: Sequence[float], vehicle: Vehicle, disturbance: Triple
-) -> tuple[float, ...]:
+    state: Vector, inputs: Vector, vehicle: Vehicle, disturbance: Triple
+) -> Values:
     """Time derivative of the rigid body's twelve states.
 
     ``inputs`` are the thrust (N) and the torques (N m, body axes). ``disturbance`` is an
@@ -64,13 +63,13 @@ def equations_of_motion(
 
 @scalar
 def extended_equations_of_motion(
-    state: Sequence[float], inputs: Sequence[float], vehicle: Vehicle, disturbance: Triple
-) -> tuple[float, ...]:
+    state: Vector, inputs: Vector, vehicle: Vehicle, disturbance: Triple
+) -> Values:
     """As `equations_of_motion`, followed by the law's own two states."""
     return (*equations_of_motion(state, inputs, vehicle, disturbance), inputs[4], inputs[5])
 
 
-def initial_state(scenario: Scenario) -> tuple[float, ...]:
+def initial_state(scenario: Scenario) -> Values:
     """The rigid body's states at time zero."""
     initial = scenario.initial
     return (*initial.position, *initial.velocity, *initial.attitude, *initial.angular_velocity)

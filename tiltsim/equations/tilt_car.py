@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from tiltsim_controllers.mathematics.scalar import Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, acceleration, counter_yaw_per_tilt
 
 
@@ -16,13 +14,13 @@ def yaw_of(alpha: float, heading: float, car: TiltCar) -> float:
 
 @scalar
 def equations_of_motion(
-    state: Sequence[float],
+    state: Vector,
     direction: float,
     square_1: float,
     square_2: float,
     car: TiltCar,
     disturbance: Triple,
-) -> tuple[float, ...]:
+) -> Values:
     """Rates of position and velocity, the state's first four numbers; Eq. (3).
 
     ``direction`` (rad) is that of the thrusts' middle, the squares are the rotor speeds', the

@@ -6,13 +6,12 @@ Tilt angles follow the gait exactly, or are states after these where a law moves
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import asin, atan2
 from typing import TYPE_CHECKING
 
 from tiltsim_controllers.laws.attitude_altitude import State
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
-from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     body_force,
     body_torque,
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @scalar
-def law_state(state: Sequence[float], tilts: Quad) -> State:
+def law_state(state: Vector, tilts: Quad) -> State:
     """State of the laws: `tiltsim_controllers.laws.attitude_altitude.STATE_FIELDS`."""
     sin_pitch = min(1.0, max(-1.0, -state[12]))  # rounding may carry the sine past one
     return (
@@ -39,13 +38,8 @@ def law_state(state: Sequence[float], tilts: Quad) -> State:
 
 @scalar
 def rigid_body(
-    state: Sequence[float],
-    tilts: Quad,
-    squares: Quad,
-    vehicle: Vehicle,
-    push: Triple,
-    turn: Triple,
-) -> tuple[float, ...]:
+    state: Vector, tilts: Quad, squares: Quad, vehicle: Vehicle, push: Triple, turn: Triple
+) -> Values:
     """Time derivative of position, velocity, rotation and body rates, the state's first eighteen.
 
     Parameters
@@ -93,8 +87,8 @@ def rigid_body(
 
 @scalar
 def equations_of_motion(
-    state: Sequence[float], tilts: Quad, inputs: Quad, vehicle: Vehicle, disturbance: Triple
-) -> tuple[float, ...]:
+    state: Vector, tilts: Quad, inputs: Quad, vehicle: Vehicle, disturbance: Triple
+) -> Values:
     """Time derivative of the state under the given rotor accelerations (rad/s^2).
 
     ``disturbance`` is an acceleration (m/s^2, world) that the law does not know of.
@@ -106,7 +100,7 @@ def equations_of_motion(
     return (*body, u1, u2, u3, u4)
 
 
-def initial_state(scenario: Scenario, rotor_speeds: Sequence[float]) -> tuple[float, ...]:
+def initial_state(scenario: Scenario, rotor_speeds: Vector) -> Values:
     """The state at time zero, with signed rotor speeds (rad/s)."""
     initial = scenario.initial
     rotation = rotation_from_euler(*initial.attitude)

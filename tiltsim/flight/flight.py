@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.vehicle_kind import Floats
 from tiltsim.flight.end import End
 from tiltsim.laws.assembling import control_setup, loop_of
 from tiltsim.scenario.messages import did_you_mean
 from tiltsim.vehicles.rotorcraft import COLUMN_UNITS as COLUMN_UNITS
 from tiltsim.vehicles.rotorcraft import OBSERVED_FIELDS
+from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     import pyarrow

@@ -9,10 +9,10 @@ import numpy as np
 
 from tiltsim.laws.assembling import loop_of
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import SPIN
 
 if TYPE_CHECKING:
-    from tiltsim.closed_loop.loop import Floats
     from tiltsim.flight.flight import Flight
 
 

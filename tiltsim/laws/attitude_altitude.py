@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Floats, SignCheck, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, SignCheck, Sizes
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.scenario.tiltrotor_laws import AttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
@@ -21,12 +21,9 @@ from tiltsim_controllers.laws.attitude_altitude import (
 )
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.supervisor import Supervisor
-from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import position_reference
-from tiltsim_controllers.vehicle.decoupling_matrix import (
-    sines_and_cosines,
-    torque_entries,
-)
+from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines, torque_entries
 from tiltsim_controllers.vehicle.parameters import drag_ratio
 
 if TYPE_CHECKING:
@@ -48,7 +45,7 @@ from tiltsim.laws.tiltrotor import (
 )
 
 
-class ControlParameters(NamedTuple):
+class LoopParameters(NamedTuple):
     """The head of `userdata`: what the control step of a flight needs to know."""
 
     signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
@@ -59,13 +56,8 @@ class ControlParameters(NamedTuple):
 
 @scalar
 def tiltrotor_controls(
-    time: float,
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
+    time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
     """All twelve controls of the tiltrotor: tilt servos, thrusts, rotor accelerations.
 
     The servo commands lead the planned angles by the servo's own lag, so that a stiff servo
@@ -74,9 +66,9 @@ def tiltrotor_controls(
     law = parameters.law
     state = tiltrotor_state(qpos, qvel, act)
     return (
-        *gait_servo_commands(time, parameters.servo_lead, law.gait, table),
+        *gait_servo_commands(time, parameters.servo_lead, law.gait, knots),
         *rotor_thrust_controls(act),
-        *rotor_accelerations(time, state, law, table),
+        *rotor_accelerations(time, state, law, knots),
     )
 
 
@@ -84,14 +76,14 @@ def tiltrotor_controls(
 def law_rates(
     time: float,
     state: State,
-    qvel: Sequence[float],
-    act: Sequence[float],
+    qvel: Vector,
+    act: Vector,
     supervisor_motion: Triple,
-    parameters: ControlParameters,
-    table: Sequence[float],
+    parameters: LoopParameters,
+    knots: Vector,
 ) -> Quad:
     """Rotor accelerations alone, for `tiltsim.laws.layers.supervision`."""
-    return rotor_accelerations(time, state, parameters.law, table)
+    return rotor_accelerations(time, state, parameters.law, knots)
 
 
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
@@ -99,8 +91,8 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     assert isinstance(controller, AttitudeAltitudeController)
     vehicle = scenario.rotorcraft.resolve()
     gait = scenario.gait.plan(vehicle)
-    reference, table = scenario.reference_and_knots()
-    parameters = ControlParameters(
+    reference, knots = scenario.reference_and_knots()
+    parameters = LoopParameters(
         signature,
         servo_lead(scenario.rotorcraft.tilt_servo),
         law=Parameters(
@@ -113,34 +105,30 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
         ),
         supervisor=controller.resolve_supervisor(vehicle),
     )
-    return ControlSetup(parameters, table)
+    return ControlSetup(parameters, knots)
 
 
 @scalar
 def reference_values(
-    time: float, state: State, parameters: ControlParameters, table: Sequence[float]
-) -> tuple[float, ...]:
+    time: float, state: State, parameters: LoopParameters, knots: Vector
+) -> Values:
     """`REFERENCE_COLUMNS` and `TILT_REFERENCE_COLUMNS` at a time and state of the law."""
     law = parameters.law
     ratio = drag_ratio(law.vehicle)
     trig = sines_and_cosines(state[12], state[13], state[14], state[15])
     torque = torque_entries(trig, ratio)
-    x, y, z, _, _, _, _, _, _ = position_reference(time, law.reference, table)
-    roll, pitch, yaw, _, _, _ = attitude_reference(time, state, trig, torque, law, table)
-    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, table)
+    x, y, z, _, _, _, _, _, _ = position_reference(time, law.reference, knots)
+    roll, pitch, yaw, _, _, _ = attitude_reference(time, state, trig, torque, law, knots)
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, knots)
     return x, y, z, roll, pitch, yaw, a1, a2, a3, a4
 
 
 @scalar
 def supervised_reference_values(
-    time: float,
-    state: State,
-    supervisor_motion: Triple,
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
+    time: float, state: State, supervisor_motion: Triple, parameters: LoopParameters, knots: Vector
+) -> Values:
     """`REFERENCE_COLUMNS`, for `tiltsim.laws.layers.supervision`."""
-    return reference_values(time, state, parameters, table)[:6]
+    return reference_values(time, state, parameters, knots)[:6]
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -150,7 +138,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 
 @scalar
 def watch_tiltrotor(
-    values: Sequence[float], parameters: ControlParameters
+    values: Vector, parameters: LoopParameters
 ) -> tuple[float, float, float, float, float]:
     """The determinant of the decoupling matrix, and the rotor speeds where it vanishes with them.
 
@@ -173,41 +161,35 @@ def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[SignChec
 
 
 @scalar
-def equation_inputs(
-    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
-) -> Quad:
-    """The law's rotor accelerations (rad/s^2) on the thesis' equations."""
+def equation_inputs(time: float, state: Vector, parameters: LoopParameters, knots: Vector) -> Quad:
+    """The law's rotor accelerations (rad/s^2) on the thesis's equations."""
     law = parameters.law
-    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, table)
-    return rotor_accelerations(time, law_state(state, (a1, a2, a3, a4)), law, table)
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, knots)
+    return rotor_accelerations(time, law_state(state, (a1, a2, a3, a4)), law, knots)
 
 
 @scalar
 def equation_rates(
     time: float,
-    state: Sequence[float],
+    state: Vector,
     inputs: Quad,
-    parameters: ControlParameters,
-    table: Sequence[float],
+    parameters: LoopParameters,
+    knots: Vector,
     disturbance: Triple,
-) -> tuple[float, ...]:
-    """The thesis' equations with tilt angles that follow the gait exactly."""
+) -> Values:
+    """The thesis's equations with tilt angles that follow the gait exactly."""
     law = parameters.law
-    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, table)
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, knots)
     return equations_of_motion(state, (a1, a2, a3, a4), inputs, law.vehicle, disturbance)
 
 
 @scalar
 def observe_equations(
-    time: float,
-    state: Sequence[float],
-    inputs: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
+    time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
     """What a sample holds, from the state of ch. 3's equations; the tilts are the gait's."""
     a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(
-        time, parameters.law.gait, table
+        time, parameters.law.gait, knots
     )
     return (*law_state(state, (a1, a2, a3, a4)), rate_1, rate_2, rate_3, rate_4)
 
@@ -223,7 +205,7 @@ TILTROTOR: Final = ClosedLoop(
     kind=ROTORCRAFT,
     model="tiltrotor",
     sizes=Sizes(qpos=11, qvel=10, act=4, ctrl=12),
-    parameters=ControlParameters,
+    parameters=LoopParameters,
     controls=tiltrotor_controls,
     refresh=refreshed_controls,
     setup=_setup,

@@ -7,12 +7,12 @@ told speeds, thrusts or accelerations.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Floats, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Sizes
 from tiltsim.laws.full_pose import TILT_COMMANDS
 from tiltsim.laws.quadrotor import references, rigid_body_state, upright_margin
 from tiltsim.laws.tiltrotor import (
@@ -27,7 +27,7 @@ from tiltsim.laws.tiltrotor import (
 )
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.gaits import GaitParameters
-from tiltsim_controllers.mathematics.scalar import scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
@@ -48,7 +48,7 @@ class HeldCommand(NamedTuple):
     acceleration_4: float = 0.0
 
 
-class ControlParameters(NamedTuple):
+class LoopParameters(NamedTuple):
     """The head of `userdata`."""
 
     signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
@@ -63,13 +63,8 @@ class ControlParameters(NamedTuple):
 
 @scalar
 def commanded_tiltrotor_controls(
-    time: float,
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
+    time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
     """All twelve controls of the tiltrotor."""
     told = parameters.told
     return (
@@ -81,13 +76,8 @@ def commanded_tiltrotor_controls(
 
 @scalar
 def commanded_quadrotor_controls(
-    time: float,
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
+    time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
     """All eight controls of the quadrotor."""
     told = parameters.told
     return (
@@ -97,7 +87,7 @@ def commanded_quadrotor_controls(
 
 
 @scalar
-def refreshed_quadrotor_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
+def refreshed_quadrotor_controls(ctrl: Vector, act: Vector) -> Values:
     """Held controls with the thrusts that belong to the present rotor speeds."""
     return (*rotor_thrust_controls(act), ctrl[4], ctrl[5], ctrl[6], ctrl[7])
 
@@ -105,33 +95,31 @@ def refreshed_quadrotor_controls(ctrl: Sequence[float], act: Sequence[float]) ->
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     vehicle = scenario.rotorcraft.resolve()
     gait = scenario.gait.plan(vehicle)
-    reference, table = scenario.reference_and_knots()
+    reference, knots = scenario.reference_and_knots()
     lead = servo_lead(scenario.rotorcraft.tilt_servo)
-    tilts = gait_servo_commands(0.0, lead, gait.parameters, table)
+    tilts = gait_servo_commands(0.0, lead, gait.parameters, knots)
     told = HeldCommand(*tilts)
     return ControlSetup(
-        ControlParameters(signature, lead, vehicle, gait.parameters, reference, told), table
+        LoopParameters(signature, lead, vehicle, gait.parameters, reference, told), knots
     )
 
 
 def with_command(parameters: Any, told: HeldCommand) -> Any:
     """Parameters of a vehicle under commands, whatever the layers around it, told otherwise."""
-    if isinstance(parameters, ControlParameters):
+    if isinstance(parameters, LoopParameters):
         return parameters._replace(told=told)
     return parameters._replace(law=with_command(parameters.law, told))
 
 
-def commanded_parameters(parameters: Any) -> ControlParameters:
+def commanded_parameters(parameters: Any) -> LoopParameters:
     """The parameters of the vehicle under commands within those of its layers."""
-    while not isinstance(parameters, ControlParameters):
+    while not isinstance(parameters, LoopParameters):
         parameters = parameters.law
     return parameters
 
 
 @scalar
-def observe_commanded_quadrotor(
-    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
-) -> tuple[float, ...]:
+def observe_commanded_quadrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """The rigid body, no tilt, the rotor speeds, which are states here, no tilt rates."""
     return (
         *rigid_body_state(qpos, qvel, 0.0, 0.0)[:12],
@@ -140,9 +128,7 @@ def observe_commanded_quadrotor(
 
 
 @scalar
-def observe_commanded_tiltrotor(
-    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
-) -> tuple[float, ...]:
+def observe_commanded_tiltrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """As of any tiltrotor, and what its servos are told."""
     return (*observe_tiltrotor(qpos, qvel, act, ctrl), ctrl[0], ctrl[1], ctrl[2], ctrl[3])
 
@@ -150,7 +136,7 @@ def observe_commanded_tiltrotor(
 def _references(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     reference = setup.parameters.reference
     return references(
-        samples, reference, setup.table, (reference.roll, reference.pitch, reference.yaw)
+        samples, reference, setup.knots, (reference.roll, reference.pitch, reference.yaw)
     )
 
 
@@ -179,7 +165,7 @@ TILTROTOR: Final = ClosedLoop(
     kind=ROTORCRAFT,
     model="tiltrotor",
     sizes=Sizes(qpos=11, qvel=10, act=4, ctrl=12),
-    parameters=ControlParameters,
+    parameters=LoopParameters,
     controls=commanded_tiltrotor_controls,
     refresh=refreshed_controls,
     setup=_setup,
@@ -197,7 +183,7 @@ QUADROTOR: Final = ClosedLoop(
     kind=ROTORCRAFT,
     model="quadrotor",
     sizes=Sizes(qpos=7, qvel=6, act=4, ctrl=8),
-    parameters=ControlParameters,
+    parameters=LoopParameters,
     controls=commanded_quadrotor_controls,
     refresh=refreshed_quadrotor_controls,
     setup=_setup,

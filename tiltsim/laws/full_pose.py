@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Floats, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Sizes
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.laws.quadrotor import references
 from tiltsim.laws.tiltrotor import (
@@ -22,7 +22,7 @@ from tiltsim.laws.tiltrotor import (
 from tiltsim.scenario.tiltrotor_laws import FullPoseController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT, initial_tilts
 from tiltsim_controllers.laws.full_pose import Parameters, full_pose_inputs, limited_tilt_rate
-from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values, Vector, scalar
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
@@ -31,7 +31,7 @@ TILT_COMMANDS: Final = tuple(f"tilt_command_{rotor}" for rotor in (1, 2, 3, 4))
 """The law's own states: the tilt angles that the servos are told, but for their lead."""
 
 
-class ControlParameters(NamedTuple):
+class LoopParameters(NamedTuple):
     """The head of `userdata`."""
 
     signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
@@ -41,13 +41,8 @@ class ControlParameters(NamedTuple):
 
 @scalar
 def full_pose_controls(
-    time: float,
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
+    time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
     """All sixteen controls: tilt servos, thrusts, rotor accelerations, tilt rates.
 
     The law gives tilt rates. Its own four states integrate them to the angles that the servos are
@@ -56,7 +51,7 @@ def full_pose_controls(
     lead = parameters.servo_lead
     state = tiltrotor_state(qpos, qvel, act)
     u1, u2, u3, u4, rate_1, rate_2, rate_3, rate_4 = full_pose_inputs(
-        time, state, parameters.law, table
+        time, state, parameters.law, knots
     )
     # A pod at the stop of its servo is within the law's limit for good: what it is told is not.
     limits = parameters.law.limits
@@ -73,15 +68,13 @@ def full_pose_controls(
 
 
 @scalar
-def observe_full_pose(
-    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
-) -> tuple[float, ...]:
+def observe_full_pose(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """The tiltrotor and the law's own states."""
     return (*observe_tiltrotor(qpos, qvel, act, ctrl), act[4], act[5], act[6], act[7])
 
 
 @scalar
-def watch_rotor_stops(values: Sequence[float], parameters: ControlParameters) -> Quad:
+def watch_rotor_stops(values: Vector, parameters: LoopParameters) -> Quad:
     """The rotor speeds along their spin."""
     return rotor_speeds_along_spin(values)
 
@@ -90,7 +83,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, FullPoseController)
     vehicle = scenario.rotorcraft.resolve()
-    reference, table = scenario.reference_and_knots()
+    reference, knots = scenario.reference_and_knots()
     law = Parameters(
         vehicle,
         controller.resolve_gains(),
@@ -100,7 +93,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
         controller.resolve_failure(),
     )
     lead = servo_lead(scenario.rotorcraft.tilt_servo)
-    return ControlSetup(ControlParameters(signature, lead, law), table)
+    return ControlSetup(LoopParameters(signature, lead, law), knots)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -108,7 +101,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     wanted = law.reference
     attitude = (wanted.roll, wanted.pitch, wanted.yaw)
     return {
-        **references(samples, wanted, setup.table, attitude),
+        **references(samples, wanted, setup.knots, attitude),
         **{f"alpha_ref_{i}": samples[f"tilt_command_{i}"] for i in (1, 2, 3, 4)},
         **singularity_columns(samples, law.vehicle),
     }
@@ -116,23 +109,23 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 
 @scalar
 def equation_inputs(
-    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
-) -> tuple[float, ...]:
-    """The law's rotor accelerations and tilt rates on the thesis' equations."""
+    time: float, state: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
+    """The law's rotor accelerations and tilt rates on the thesis's equations."""
     tilts = state[22], state[23], state[24], state[25]
-    return full_pose_inputs(time, law_state(state, tilts), parameters.law, table)
+    return full_pose_inputs(time, law_state(state, tilts), parameters.law, knots)
 
 
 @scalar
 def equation_rates(
     time: float,
-    state: Sequence[float],
-    inputs: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
+    state: Vector,
+    inputs: Vector,
+    parameters: LoopParameters,
+    knots: Vector,
     disturbance: Triple,
-) -> tuple[float, ...]:
-    """The thesis' equations, the tilt angles being states whose rates are inputs."""
+) -> Values:
+    """The thesis's equations, the tilt angles being states whose rates are inputs."""
     tilts = state[22], state[23], state[24], state[25]
     accelerations = inputs[0], inputs[1], inputs[2], inputs[3]
     vehicle = parameters.law.vehicle
@@ -144,12 +137,8 @@ def equation_rates(
 
 @scalar
 def observe_equations(
-    time: float,
-    state: Sequence[float],
-    inputs: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
+    time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
     """What a sample holds, from the state of ch. 3's equations and the tilt rates in force."""
     return (
         *law_state(state, (state[22], state[23], state[24], state[25])),
@@ -162,7 +151,7 @@ FULL_POSE: Final = ClosedLoop(
     kind=ROTORCRAFT,
     model="tiltrotor",
     sizes=Sizes(qpos=11, qvel=10, act=8, ctrl=16),
-    parameters=ControlParameters,
+    parameters=LoopParameters,
     controls=full_pose_controls,
     refresh=refreshed_controls,
     setup=_setup,

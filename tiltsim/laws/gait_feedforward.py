@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Floats, SignCheck, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, SignCheck, Sizes
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.laws.attitude_altitude import follows_position
 from tiltsim.laws.tiltrotor import (
@@ -30,7 +30,7 @@ from tiltsim_controllers.laws.attitude_altitude import STATE_FIELDS, State
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.gait_feedforward import INTEGRAL_FIELDS, Parameters, tracking_inputs
 from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST
-from tiltsim_controllers.mathematics.scalar import Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import position_reference
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 TILT_RATE_COLUMNS: Final = tuple(f"alpha_rate_{rotor}" for rotor in (1, 2, 3, 4))
 
 
-class ControlParameters(NamedTuple):
+class LoopParameters(NamedTuple):
     """The head of `userdata`."""
 
     signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
@@ -51,35 +51,30 @@ class ControlParameters(NamedTuple):
 def law_rates(
     time: float,
     state: State,
-    qvel: Sequence[float],
-    act: Sequence[float],
+    qvel: Vector,
+    act: Vector,
     supervisor_motion: Triple,
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
+    parameters: LoopParameters,
+    knots: Vector,
+) -> Values:
     """The law's part of the controls: rotor accelerations, rates of the integrals."""
     tilt_rates, integrals = (qvel[6], qvel[7], qvel[8], qvel[9]), (act[4], act[5], act[6])
     return tracking_inputs(
-        *(time, state, tilt_rates, integrals, parameters.law, table, supervisor_motion)
+        *(time, state, tilt_rates, integrals, parameters.law, knots, supervisor_motion)
     )[:7]
 
 
 @scalar
 def gait_feedforward_controls(
-    time: float,
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
+    time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
     """All fifteen controls: tilt servos, thrusts, rotor accelerations, rates of the integrals."""
     law = parameters.law
     state = tiltrotor_state(qpos, qvel, act)
     return (
-        *gait_servo_commands(time, parameters.servo_lead, law.gait, table),
+        *gait_servo_commands(time, parameters.servo_lead, law.gait, knots),
         *rotor_thrust_controls(act),
-        *law_rates(time, state, qvel, act, SUPERVISOR_AT_REST, parameters, table),
+        *law_rates(time, state, qvel, act, SUPERVISOR_AT_REST, parameters, knots),
     )
 
 
@@ -88,7 +83,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     assert isinstance(controller, AttitudeAltitudeController)
     vehicle = scenario.rotorcraft.resolve()
     gait = scenario.gait.plan(vehicle)
-    reference, table = scenario.reference_and_knots()
+    reference, knots = scenario.reference_and_knots()
     law = Parameters(
         vehicle=vehicle,
         gains=controller.resolve_gains(),
@@ -96,7 +91,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
         max_acceleration=controller.max_acceleration,
         max_angular_acceleration=controller.max_angular_acceleration,
         anticipation=min(controller.anticipation, 0.5 * gait.shortest_line),
-        # The thesis' own equations leave the gyroscopic torque out.
+        # The thesis's own equations leave the gyroscopic torque out.
         ingredients=controller.resolve_feedforward_terms(
             gyroscopic_torque=scenario.simulation.plant != "thesis"
         ),
@@ -106,20 +101,16 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
         supervisor=controller.resolve_supervisor(vehicle),
     )
     lead = servo_lead(scenario.rotorcraft.tilt_servo)
-    return ControlSetup(ControlParameters(signature, lead, law), table)
+    return ControlSetup(LoopParameters(signature, lead, law), knots)
 
 
 @scalar
 def supervised_reference_values(
-    time: float,
-    state: Sequence[float],
-    supervisor_motion: Triple,
-    parameters: ControlParameters,
-    table: Sequence[float],
+    time: float, state: Vector, supervisor_motion: Triple, parameters: LoopParameters, knots: Vector
 ) -> tuple[float, float, float, float, float, float]:
     """Position (m) and attitude (rad) to track at a time: the state is `SEEN`."""
     law = parameters.law
-    x, y, z, _, _, _, _, _, _ = position_reference(time, law.reference, table)
+    x, y, z, _, _, _, _, _, _ = position_reference(time, law.reference, knots)
     _, _, _, _, _, _, _, roll, pitch, yaw = tracking_inputs(
         time,
         (
@@ -130,7 +121,7 @@ def supervised_reference_values(
         (state[20], state[21], state[22], state[23]),
         (state[24], state[25], state[26]),
         law,
-        table,
+        knots,
         supervisor_motion,
     )
     return x, y, z, roll, pitch, yaw
@@ -138,12 +129,12 @@ def supervised_reference_values(
 
 @scalar
 def reference_values(
-    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
-) -> tuple[float, ...]:
+    time: float, state: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
     """Columns of references at a time: the state is `SEEN`."""
-    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, parameters.law.gait, table)
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, parameters.law.gait, knots)
     return (
-        *supervised_reference_values(time, state, SUPERVISOR_AT_REST, parameters, table),
+        *supervised_reference_values(time, state, SUPERVISOR_AT_REST, parameters, knots),
         a1,
         a2,
         a3,
@@ -161,16 +152,14 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 
 
 @scalar
-def observe_gait_feedforward(
-    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
-) -> tuple[float, ...]:
+def observe_gait_feedforward(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """The tiltrotor and the law's own states."""
     return (*observe_tiltrotor(qpos, qvel, act, ctrl), act[4], act[5], act[6])
 
 
 @scalar
 def watch_gait_feedforward(
-    values: Sequence[float], parameters: ControlParameters
+    values: Vector, parameters: LoopParameters
 ) -> tuple[float, float, float, float, float]:
     """The determinant of the decoupling matrix, and the rotor speeds with which it vanishes."""
     spin_1, spin_2, spin_3, spin_4 = rotor_speeds_along_spin(values)
@@ -183,18 +172,18 @@ def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[SignChec
 
 @scalar
 def equation_inputs(
-    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
-) -> tuple[float, ...]:
-    """The law's rotor accelerations and the rates of its integrals on the thesis' equations."""
+    time: float, state: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
+    """The law's rotor accelerations and the rates of its integrals on the thesis's equations."""
     law = parameters.law
-    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, law.gait, table)
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, law.gait, knots)
     u1, u2, u3, u4, x_rate, y_rate, z_rate, _roll, _pitch, _yaw = tracking_inputs(
         time,
         law_state(state, (a1, a2, a3, a4)),
         (rate_1, rate_2, rate_3, rate_4),
         (state[22], state[23], state[24]),
         law,
-        table,
+        knots,
     )
     return u1, u2, u3, u4, x_rate, y_rate, z_rate
 
@@ -202,15 +191,15 @@ def equation_inputs(
 @scalar
 def equation_rates(
     time: float,
-    state: Sequence[float],
-    inputs: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
+    state: Vector,
+    inputs: Vector,
+    parameters: LoopParameters,
+    knots: Vector,
     disturbance: Triple,
-) -> tuple[float, ...]:
-    """The thesis' equations with tilt angles that follow the gait exactly, and the integrals."""
+) -> Values:
+    """The thesis's equations with tilt angles that follow the gait exactly, and the integrals."""
     law = parameters.law
-    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, table)
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, knots)
     accelerations = inputs[0], inputs[1], inputs[2], inputs[3]
     return (
         *equations_of_motion(state, (a1, a2, a3, a4), accelerations, law.vehicle, disturbance),
@@ -220,15 +209,11 @@ def equation_rates(
 
 @scalar
 def observe_equations(
-    time: float,
-    state: Sequence[float],
-    inputs: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
+    time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
     """What a sample holds, from the state of ch. 3's equations; the tilts are the gait's."""
     a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(
-        time, parameters.law.gait, table
+        time, parameters.law.gait, knots
     )
     return (
         *law_state(state, (a1, a2, a3, a4)),
@@ -240,7 +225,7 @@ GAIT_FEEDFORWARD: Final = ClosedLoop(
     kind=ROTORCRAFT,
     model="tiltrotor",
     sizes=Sizes(qpos=11, qvel=10, act=7, ctrl=15),
-    parameters=ControlParameters,
+    parameters=LoopParameters,
     controls=gait_feedforward_controls,
     refresh=refreshed_controls,
     setup=_setup,

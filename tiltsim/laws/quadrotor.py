@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Floats, SignCheck, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, SignCheck, Sizes
 from tiltsim.equations.quadrotor import initial_state
 from tiltsim.laws.tiltrotor import REFERENCE_COLUMNS, TILT_REFERENCE_COLUMNS
 from tiltsim.vehicles.rotorcraft import OBSERVED_FIELDS, ROTORCRAFT
@@ -22,7 +22,7 @@ from tiltsim_controllers.analysis.quadrotor_singularity import (
 )
 from tiltsim_controllers.laws.yaw_position import State
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
-from tiltsim_controllers.mathematics.scalar import scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.quadrotor_mixer import speed_along_spin, thrust_controls
@@ -44,9 +44,7 @@ EXTENSION_COLUMNS: Final = {
 
 
 @scalar
-def rigid_body_state(
-    qpos: Sequence[float], qvel: Sequence[float], thrust: float, thrust_rate: float
-) -> State:
+def rigid_body_state(qpos: Vector, qvel: Vector, thrust: float, thrust_rate: float) -> State:
     """The laws' state (`tiltsim_controllers.laws.yaw_position.STATE_FIELDS`) from MuJoCo's."""
     x, y, z, qw, qx, qy, qz = qpos
     vx, vy, vz, p, q, r = qvel
@@ -55,7 +53,7 @@ def rigid_body_state(
 
 
 @scalar
-def extended_controls(inputs: tuple[float, ...], vehicle: Vehicle) -> tuple[float, ...]:
+def extended_controls(inputs: Values, vehicle: Vehicle) -> Values:
     """The ten controls for a law's `INPUT_FIELDS`: thrusts, idle rotor states, law states."""
     thrust, roll_torque, pitch_torque, yaw_torque, thrust_derivative, thrust_rate_derivative = (
         inputs
@@ -67,7 +65,7 @@ def extended_controls(inputs: tuple[float, ...], vehicle: Vehicle) -> tuple[floa
 
 
 @scalar
-def held_extended_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
+def held_extended_controls(ctrl: Vector, act: Vector) -> Values:
     """Controls as they were sampled: rotors and law states go on with what they were told."""
     return (
         *(ctrl[0], ctrl[1], ctrl[2], ctrl[3], ctrl[4]),
@@ -75,14 +73,14 @@ def held_extended_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple
     )
 
 
-def extended_activations(scenario: Scenario, _setup: ControlSetup) -> tuple[float, ...]:
+def extended_activations(scenario: Scenario, _setup: ControlSetup) -> Values:
     """The extension starts with the thrust of hover, at rest."""
     vehicle = scenario.rotorcraft.resolve()
     return 0.0, 0.0, 0.0, 0.0, vehicle.mass * vehicle.gravity, 0.0
 
 
 @scalar
-def sample_values(body: Sequence[float], thrusts: Sequence[float]) -> tuple[float, ...]:
+def sample_values(body: Vector, thrusts: Vector) -> Values:
     """What a sample holds, from the rigid body's twelve states and the thrust controls."""
     return (
         *(body[0], body[1], body[2], body[3], body[4], body[5]),
@@ -95,17 +93,13 @@ def sample_values(body: Sequence[float], thrusts: Sequence[float]) -> tuple[floa
 
 
 @scalar
-def observe_quadrotor(
-    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
-) -> tuple[float, ...]:
+def observe_quadrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """The rigid body, no tilt, rotor speeds from the thrusts in force."""
     return sample_values(rigid_body_state(qpos, qvel, 0.0, 0.0), ctrl)
 
 
 @scalar
-def observe_equations(
-    state: Sequence[float], inputs: Sequence[float], vehicle: Vehicle
-) -> tuple[float, ...]:
+def observe_equations(state: Vector, inputs: Vector, vehicle: Vehicle) -> Values:
     """The same of ch. 2's equations: thrust and torques in force tell the rotor speeds."""
     return sample_values(
         state, thrust_controls(inputs[0], inputs[1], inputs[2], inputs[3], vehicle)
@@ -113,32 +107,28 @@ def observe_equations(
 
 
 @scalar
-def observe_extended_equations(
-    state: Sequence[float], inputs: Sequence[float], vehicle: Vehicle
-) -> tuple[float, ...]:
+def observe_extended_equations(state: Vector, inputs: Vector, vehicle: Vehicle) -> Values:
     """As `observe_equations`, followed by the law's own states."""
     return (*observe_equations(state, inputs, vehicle), state[12], state[13])
 
 
 @scalar
-def observe_extended_quadrotor(
-    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
-) -> tuple[float, ...]:
+def observe_extended_quadrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """The quadrotor and the law's own states."""
     return (*observe_quadrotor(qpos, qvel, act, ctrl), act[4], act[5])
 
 
 @scalar
-def thrust_tilt_cosine(values: Sequence[float]) -> float:
+def thrust_tilt_cosine(values: Vector) -> float:
     """The cosine of the thrust axis' tilt, from what `observe_quadrotor` gives."""
     return cos(values[6]) * cos(values[7])
 
 
 def equations(
-    inputs: Callable[..., tuple[float, ...]],
+    inputs: Callable[..., Values],
     inputs_size: int,
-    rates: Callable[..., tuple[float, ...]],
-    observe: Callable[..., tuple[float, ...]],
+    rates: Callable[..., Values],
+    observe: Callable[..., Values],
 ) -> Equations:
     """A law on ch. 2's equations; the functions are those of `tiltsim.closed_loop.loop.Equations`.
 
@@ -147,7 +137,7 @@ def equations(
     """
     law_states = inputs_size - 4
 
-    def initial(scenario: Scenario, setup: ControlSetup) -> tuple[float, ...]:
+    def initial(scenario: Scenario, setup: ControlSetup) -> Values:
         extension = extended_activations(scenario, setup)[4:][:law_states]
         return (*initial_state(scenario), *extension)
 
@@ -155,20 +145,20 @@ def equations(
 
 
 @scalar
-def thrust_axis_value(values: Sequence[float], parameters: object) -> tuple[float]:
+def thrust_axis_value(values: Vector, parameters: object) -> tuple[float]:
     """What `thrust_axis_check` watches, from what `observe_quadrotor` gives."""
     return (thrust_tilt_cosine(values),)
 
 
 def extended_loop(
     parameters: type[tuple[Any, ...]],
-    controls: Callable[..., tuple[float, ...]],
+    controls: Callable[..., Values],
     on_equations: Equations,
     *,
     setup: Callable[[Scenario, float], ControlSetup],
     derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]],
     watched: Callable[[Mapping[str, float], ControlSetup], tuple[SignCheck, ...]],
-    watch: Callable[..., tuple[float, ...]],
+    watch: Callable[..., Values],
     own_columns: Mapping[str, str] | None = None,
     follows_position: bool = True,
 ) -> ClosedLoop:
@@ -202,12 +192,12 @@ def extended_loop(
 def references(
     samples: Mapping[str, Floats],
     reference: ReferenceParameters,
-    table: Sequence[float],
+    knots: Vector,
     attitude: Sequence[object],
 ) -> dict[str, Floats]:
     """Reference columns; ``attitude`` are those of roll, pitch and yaw, arrays or constants."""
     time = samples["time"]
-    position = np.array([position_reference(t, reference, table)[:3] for t in time.tolist()])
+    position = np.array([position_reference(t, reference, knots)[:3] for t in time.tolist()])
     columns = [*position.reshape(len(time), 3).T]
     columns += [np.broadcast_to(np.asarray(angle, dtype=float), time.shape) for angle in attitude]
     tilts = dict.fromkeys(TILT_REFERENCE_COLUMNS, np.zeros_like(time))

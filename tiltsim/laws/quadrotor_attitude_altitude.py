@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Floats, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Sizes
 from tiltsim.equations.quadrotor import equations_of_motion, rigid_body
 from tiltsim.laws.quadrotor import (
     equations,
@@ -22,7 +22,7 @@ from tiltsim.laws.quadrotor import (
 from tiltsim.scenario.quadrotor_laws import QuadrotorAttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.laws.quadrotor_attitude_altitude import Gains, attitude_altitude_inputs
-from tiltsim_controllers.mathematics.scalar import Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.quadrotor_mixer import thrust_controls
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
 
 
-class ControlParameters(NamedTuple):
+class LoopParameters(NamedTuple):
     """The head of `userdata`."""
 
     signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
@@ -42,13 +42,8 @@ class ControlParameters(NamedTuple):
 
 @scalar
 def attitude_altitude_controls(
-    time: float,
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
+    time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
     """All eight controls: thrusts, idle rotor states."""
     vehicle = parameters.vehicle
     thrust, roll_torque, pitch_torque, yaw_torque = attitude_altitude_inputs(
@@ -62,7 +57,7 @@ def attitude_altitude_controls(
 
 
 @scalar
-def held_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
+def held_controls(ctrl: Vector, act: Vector) -> Values:
     """Controls as they were sampled."""
     return ctrl[0], ctrl[1], ctrl[2], ctrl[3], ctrl[4], ctrl[5], ctrl[6], ctrl[7]
 
@@ -71,14 +66,14 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, QuadrotorAttitudeAltitudeController)
     vehicle, gains = scenario.rotorcraft.resolve(), controller.resolve_gains()
-    return ControlSetup(ControlParameters(signature, vehicle, gains, scenario.reference.parameters))
+    return ControlSetup(LoopParameters(signature, vehicle, gains, scenario.reference.parameters))
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     reference = setup.parameters.reference
     attitude = (reference.roll, reference.pitch, reference.yaw)
     return {
-        **references(samples, reference, setup.table, attitude),
+        **references(samples, reference, setup.knots, attitude),
         # cos(roll) cos(pitch) of the altitude times 1 / cos(pitch) of the Euler angles
         "determinant": np.cos(samples["roll"]),
         "singularity_margin": upright_margin(samples),
@@ -87,37 +82,32 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 
 @scalar
 def equation_inputs(
-    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
-) -> tuple[float, ...]:
-    """The law on the thesis' equations."""
+    time: float, state: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
+    """The law on the thesis's equations."""
     return attitude_altitude_inputs(
-        *(time, rigid_body(state), parameters.vehicle),
-        *(parameters.gains, parameters.reference),
+        *(time, rigid_body(state), parameters.vehicle), *(parameters.gains, parameters.reference)
     )
 
 
 @scalar
 def equation_rates(
     time: float,
-    state: Sequence[float],
-    inputs: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
+    state: Vector,
+    inputs: Vector,
+    parameters: LoopParameters,
+    knots: Vector,
     disturbance: Triple,
-) -> tuple[float, ...]:
-    """The thesis' equations under this law."""
+) -> Values:
+    """The thesis's equations under this law."""
     return equations_of_motion(state, inputs, parameters.vehicle, disturbance)
 
 
 @scalar
 def observe_in_equations(
-    time: float,
-    state: Sequence[float],
-    inputs: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
-    """What a sample holds, from the state of the thesis' equations."""
+    time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
+    """What a sample holds, from the state of the thesis's equations."""
     return observe_equations(state, inputs, parameters.vehicle)
 
 
@@ -125,7 +115,7 @@ QUADROTOR_ATTITUDE_ALTITUDE: Final = ClosedLoop(
     kind=ROTORCRAFT,
     model="quadrotor",
     sizes=Sizes(qpos=7, qvel=6, act=4, ctrl=8),
-    parameters=ControlParameters,
+    parameters=LoopParameters,
     controls=attitude_altitude_controls,
     refresh=held_controls,
     setup=_setup,

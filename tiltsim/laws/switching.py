@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 import tiltsim_controllers.laws.yaw_position as yaw_position
-from tiltsim.closed_loop.loop import ControlSetup, Floats, SignCheck
+from tiltsim.closed_loop.loop import ControlSetup, SignCheck
 from tiltsim.equations.quadrotor import extended_equations_of_motion, law_state
 from tiltsim.laws.quadrotor import (
     equations,
@@ -29,13 +29,13 @@ from tiltsim_controllers.laws.switching import (
     in_attitude_zone,
     switching_inputs,
 )
-from tiltsim_controllers.mathematics.scalar import Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
 
 
-class ControlParameters(NamedTuple):
+class LoopParameters(NamedTuple):
     """The head of `userdata`."""
 
     signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
@@ -44,23 +44,18 @@ class ControlParameters(NamedTuple):
 
 @scalar
 def switching_controls(
-    time: float,
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
+    time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
     """All ten controls: thrusts, idle rotor states, the law's own states."""
     law = parameters.law
     state = rigid_body_state(qpos, qvel, act[4], act[5])
-    return extended_controls(switching_inputs(time, state, law, table), law.yaw_position.vehicle)
+    return extended_controls(switching_inputs(time, state, law, knots), law.yaw_position.vehicle)
 
 
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, SwitchingController)
-    reference, table = scenario.reference_and_knots()
+    reference, knots = scenario.reference_and_knots()
     law = Parameters(
         yaw_position.Parameters(
             scenario.rotorcraft.resolve(), controller.resolve_gains(), reference
@@ -70,7 +65,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
         EXTENSIONS[controller.extension],
         controller.extension_rate,
     )
-    return ControlSetup(ControlParameters(signature, law), table)
+    return ControlSetup(LoopParameters(signature, law), knots)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -82,7 +77,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     roll = np.where(inside > 0.0, reference.roll, samples["roll"])
     pitch = np.where(inside > 0.0, reference.pitch, samples["pitch"])
     return {
-        **references(samples, reference, setup.table, (roll, pitch, reference.yaw)),
+        **references(samples, reference, setup.knots, (roll, pitch, reference.yaw)),
         **extended_singularity_columns(samples, law.yaw_position.vehicle),
         "attitude_zone": inside,
     }
@@ -95,22 +90,22 @@ def _watched(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[SignChe
 
 @scalar
 def equation_inputs(
-    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
-) -> tuple[float, ...]:
-    """The law on the thesis' equations."""
-    return switching_inputs(time, law_state(state), parameters.law, table)
+    time: float, state: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
+    """The law on the thesis's equations."""
+    return switching_inputs(time, law_state(state), parameters.law, knots)
 
 
 @scalar
 def equation_rates(
     time: float,
-    state: Sequence[float],
-    inputs: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
+    state: Vector,
+    inputs: Vector,
+    parameters: LoopParameters,
+    knots: Vector,
     disturbance: Triple,
-) -> tuple[float, ...]:
-    """The thesis' equations under this law."""
+) -> Values:
+    """The thesis's equations under this law."""
     return extended_equations_of_motion(
         state, inputs, parameters.law.yaw_position.vehicle, disturbance
     )
@@ -118,18 +113,14 @@ def equation_rates(
 
 @scalar
 def observe_in_equations(
-    time: float,
-    state: Sequence[float],
-    inputs: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
-    """What a sample holds, from the state of the thesis' equations."""
+    time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
+    """What a sample holds, from the state of the thesis's equations."""
     return observe_extended_equations(state, inputs, parameters.law.yaw_position.vehicle)
 
 
 SWITCHING: Final = extended_loop(
-    ControlParameters,
+    LoopParameters,
     switching_controls,
     equations(equation_inputs, 6, equation_rates, observe_in_equations),
     setup=_setup,

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Floats, SignCheck, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, SignCheck, Sizes
 from tiltsim.laws.tiltrotor import servo_lead
 from tiltsim.vehicles.tilt_car import TILT_CAR, initial_tilt
-from tiltsim_controllers.mathematics.scalar import Pair, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Pair, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
 from tiltsim_controllers.tilt_car.vehicle import TiltCar
 
@@ -29,9 +29,7 @@ def running_speed(speed: float) -> float:
 
 
 @scalar
-def car_state(
-    qpos: Sequence[float], qvel: Sequence[float], speed_1: float, speed_2: float
-) -> CarState:
+def car_state(qpos: Vector, qvel: Vector, speed_1: float, speed_2: float) -> CarState:
     """The laws' state (`tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`) from MuJoCo's."""
     return (
         *(qpos[0], qpos[1], qvel[0], qvel[1], qpos[2], qpos[3]),
@@ -40,7 +38,7 @@ def car_state(
 
 
 @scalar
-def speed_squares(act: Sequence[float]) -> Pair:
+def speed_squares(act: Vector) -> Pair:
     """Controls of the thrust actuators, the squares of the rotor speeds."""
     speed_1, speed_2 = running_speed(act[0]), running_speed(act[1])
     return speed_1 * speed_1, speed_2 * speed_2
@@ -80,7 +78,7 @@ def rotors_at_rest(sample: Mapping[str, float]) -> tuple[SignCheck, ...]:
 
 
 @scalar
-def squares_of_speeds(values: Sequence[float], parameters: object) -> tuple[float]:
+def squares_of_speeds(values: Vector, parameters: object) -> tuple[float]:
     """What `rotors_at_rest` watches, from what a loop around the car observes."""
     return (values[8] * values[8] + values[9] * values[9],)
 
@@ -103,15 +101,15 @@ def car_setup(
 
 def integrating_loop(
     parameters: type[tuple[Any, ...]],
-    controls: Callable[..., tuple[float, ...]],
-    refresh: Callable[..., tuple[float, ...]],
-    observe: Callable[..., tuple[float, ...]],
+    controls: Callable[..., Values],
+    refresh: Callable[..., Values],
+    observe: Callable[..., Values],
     *,
     setup: Callable[[Scenario, float], ControlSetup],
     law_states: int,
     law_fields: tuple[str, ...],
     own_columns: Mapping[str, str] | None = None,
-    equations: tuple[Callable[..., tuple[float, ...]], ...],
+    equations: tuple[Callable[..., Values], ...],
 ) -> ClosedLoop:
     """A loop whose law integrates both rotor speeds and the tilt angle that the servo is told.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from tiltsim.closed_loop.loop import ControlSetup
@@ -15,7 +14,7 @@ from tiltsim.laws.tilt_car import (
     speed_squares,
 )
 from tiltsim.scenario.tilt_car_laws import FourthDerivativeController
-from tiltsim_controllers.mathematics.scalar import Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.tilt_car.fourth_derivative import (
     DECOUPLINGS,
     Parameters,
@@ -30,12 +29,12 @@ SPEEDS: Final = ("law_speed_1", "law_speed_2")
 """The rotor speeds that the law integrates; those that turn are never below zero."""
 
 
-class ControlParameters(NamedTuple):
+class LoopParameters(NamedTuple):
     """The head of `userdata`."""
 
     signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
     servo_lead: float  # s, rate feed-forward of the tilt servo, 2 zeta / omega_n
-    heading: float  # rad, yaw at zero tilt, for the thesis' equations
+    heading: float  # rad, yaw at zero tilt, for the thesis's equations
     law: Parameters
 
 
@@ -47,13 +46,8 @@ def law_speed(speed: float, anti_windup: float) -> float:
 
 @scalar
 def fourth_derivative_controls(
-    time: float,
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
+    time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
     """All nine controls: tilt servo, thrusts, then the rates of rotor speeds and law states.
 
     The law's own states are the tilt angle that the servo is told, its rate, and the rotor
@@ -75,22 +69,14 @@ def fourth_derivative_controls(
 
 
 @scalar
-def refreshed_fourth_derivative_controls(
-    ctrl: Sequence[float], act: Sequence[float]
-) -> tuple[float, ...]:
+def refreshed_fourth_derivative_controls(ctrl: Vector, act: Vector) -> Values:
     """Held second derivatives; what integrates them goes on."""
-    return (
-        ctrl[0],
-        *speed_squares(act),
-        *(act[4], act[5], act[3], ctrl[6], ctrl[7], ctrl[8]),
-    )
+    return (ctrl[0], *speed_squares(act), *(act[4], act[5], act[3], ctrl[6], ctrl[7], ctrl[8]))
 
 
 @scalar
-def fourth_derivative_law_state(
-    state: Sequence[float], parameters: ControlParameters
-) -> tuple[float, ...]:
-    """The law's state from that of the thesis' equations."""
+def fourth_derivative_law_state(state: Vector, parameters: LoopParameters) -> Values:
+    """The law's state from that of the thesis's equations."""
     return (
         *(state[0], state[1], state[2], state[3]),
         *(yaw_of(state[4], parameters.heading, parameters.law.car), state[4]),
@@ -102,9 +88,9 @@ def fourth_derivative_law_state(
 
 @scalar
 def fourth_derivative_equation_inputs(
-    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+    time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Triple:
-    """The law on the thesis' equations."""
+    """The law on the thesis's equations."""
     law_state = fourth_derivative_law_state(state, parameters)
     return fourth_derivative_inputs(time, law_state, parameters.law)
 
@@ -118,13 +104,13 @@ def integrated_rate(speed: float, rate: float, anti_windup: float) -> float:
 @scalar
 def fourth_derivative_equation_rates(
     time: float,
-    state: Sequence[float],
+    state: Vector,
     inputs: Triple,
-    parameters: ControlParameters,
-    table: Sequence[float],
+    parameters: LoopParameters,
+    knots: Vector,
     disturbance: Triple,
-) -> tuple[float, ...]:
-    """The thesis' equations with the inputs integrated twice."""
+) -> Values:
+    """The thesis's equations with the inputs integrated twice."""
     law_state = fourth_derivative_law_state(state, parameters)
     speed_1, speed_2 = running_speed(state[5]), running_speed(state[6])
     square_1, square_2 = speed_1 * speed_1, speed_2 * speed_2
@@ -149,13 +135,11 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
         DECOUPLINGS[controller.decoupling],
         float(controller.anti_windup),
     )
-    return car_setup(ControlParameters, scenario, signature, law=law)
+    return car_setup(LoopParameters, scenario, signature, law=law)
 
 
 @scalar
-def observe_fourth_derivative(
-    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
-) -> tuple[float, ...]:
+def observe_fourth_derivative(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """The car and the law's own states."""
     x, y, vx, vy, yaw, alpha, speed_1, speed_2 = car_state(qpos, qvel, act[0], act[1])
     return (
@@ -166,13 +150,9 @@ def observe_fourth_derivative(
 
 @scalar
 def observe_fourth_derivative_equations(
-    time: float,
-    state: Sequence[float],
-    inputs: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
-    """The same of the thesis' equations."""
+    time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
+    """The same of the thesis's equations."""
     law_state = fourth_derivative_law_state(state, parameters)
     x, y, vx, vy, yaw, alpha, speed_1, speed_2, tilt_rate, rate_1, rate_2 = law_state
     r = yaw_of(tilt_rate, 0.0, parameters.law.car)
@@ -183,7 +163,7 @@ def observe_fourth_derivative_equations(
 
 
 FOURTH_DERIVATIVE: Final = integrating_loop(
-    ControlParameters,
+    LoopParameters,
     fourth_derivative_controls,
     refreshed_fourth_derivative_controls,
     observe_fourth_derivative,

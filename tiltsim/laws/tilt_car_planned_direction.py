@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import nan, sqrt
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Floats, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Sizes
 from tiltsim.equations.tilt_car import equations_of_motion, yaw_of
 from tiltsim.laws.tilt_car import (
     CarState,
@@ -21,7 +21,7 @@ from tiltsim.laws.tilt_car import (
 from tiltsim.scenario.tilt_car_laws import PlannedDirectionController
 from tiltsim.vehicles.tilt_car import ROTORS, TILT_CAR
 from tiltsim_controllers.gaits import GaitParameters, tilt_reference
-from tiltsim_controllers.mathematics.scalar import Pair, Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Pair, Triple, Values, Vector, scalar
 from tiltsim_controllers.tilt_car.planned_direction import (
     Parameters,
     demanded_acceleration,
@@ -34,73 +34,66 @@ if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
 
 
-class ControlParameters(NamedTuple):
+class LoopParameters(NamedTuple):
     """The head of `userdata`."""
 
     signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
     servo_lead: float  # s, rate feed-forward of the tilt servo, 2 zeta / omega_n
-    heading: float  # rad, yaw at zero tilt, for the thesis' equations
+    heading: float  # rad, yaw at zero tilt, for the thesis's equations
     gait: GaitParameters
     law: Parameters
 
 
 @scalar
 def planned_direction_controls(
-    time: float,
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
+    time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
     """All five controls: tilt servo, thrusts, idle rotor states.
 
     The law reads the direction in which the thrusts do point, which lags behind the gait's jumps.
     """
-    tilt, _, _, _, tilt_rate, _, _, _ = tilt_reference(time, parameters.gait, table)
+    tilt, _, _, _, tilt_rate, _, _, _ = tilt_reference(time, parameters.gait, knots)
     state = car_state(qpos, qvel, 0.0, 0.0)
     square_1, square_2 = planned_direction_inputs(time, state, parameters.law)
     return tilt + parameters.servo_lead * tilt_rate, square_1, square_2, 0.0, 0.0
 
 
 @scalar
-def held_planned_direction_controls(
-    ctrl: Sequence[float], act: Sequence[float]
-) -> tuple[float, ...]:
+def held_planned_direction_controls(ctrl: Vector, act: Vector) -> Values:
     """Controls as they were sampled."""
     return ctrl[0], ctrl[1], ctrl[2], ctrl[3], ctrl[4]
 
 
 @scalar
 def planned_direction_law_state(
-    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+    time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> CarState:
-    """The law's state from that of the thesis' equations, the tilt as planned."""
-    alpha, _, _, _, _, _, _, _ = tilt_reference(time, parameters.gait, table)
+    """The law's state from that of the thesis's equations, the tilt as planned."""
+    alpha, _, _, _, _, _, _, _ = tilt_reference(time, parameters.gait, knots)
     yaw = yaw_of(alpha, parameters.heading, parameters.law.car)
     return state[0], state[1], state[2], state[3], yaw, alpha, 0.0, 0.0
 
 
 @scalar
 def planned_direction_equation_inputs(
-    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+    time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Pair:
-    """The law on the thesis' equations: the squares of the rotor speeds."""
-    law_state = planned_direction_law_state(time, state, parameters, table)
+    """The law on the thesis's equations: the squares of the rotor speeds."""
+    law_state = planned_direction_law_state(time, state, parameters, knots)
     return planned_direction_inputs(time, law_state, parameters.law)
 
 
 @scalar
 def planned_direction_equation_rates(
     time: float,
-    state: Sequence[float],
+    state: Vector,
     inputs: Pair,
-    parameters: ControlParameters,
-    table: Sequence[float],
+    parameters: LoopParameters,
+    knots: Vector,
     disturbance: Triple,
-) -> tuple[float, ...]:
-    """The thesis' equations with a tilt that follows the gait exactly."""
-    law_state = planned_direction_law_state(time, state, parameters, table)
+) -> Values:
+    """The thesis's equations with a tilt that follows the gait exactly."""
+    law_state = planned_direction_law_state(time, state, parameters, knots)
     direction = law_state[4] + law_state[5]
     car = parameters.law.car
     return equations_of_motion(state, direction, inputs[0], inputs[1], car, disturbance)
@@ -112,7 +105,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     car = scenario.tilt_car.resolve()
     gait = scenario.gait.plan(car).parameters
     law = Parameters(car, controller.resolve_gains(), scenario.reference.parameters)
-    return car_setup(ControlParameters, scenario, signature, gait=gait, law=law)
+    return car_setup(LoopParameters, scenario, signature, gait=gait, law=law)
 
 
 @scalar
@@ -122,9 +115,7 @@ def speed_of_square(square: float) -> float:
 
 
 @scalar
-def observe_planned_direction(
-    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
-) -> tuple[float, ...]:
+def observe_planned_direction(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """The car, its rotor speeds from the controls in force."""
     x, y, vx, vy, yaw, alpha, _, _ = car_state(qpos, qvel, 0.0, 0.0)
     return (
@@ -135,15 +126,11 @@ def observe_planned_direction(
 
 @scalar
 def observe_planned_direction_equations(
-    time: float,
-    state: Sequence[float],
-    inputs: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
-    """The same of the thesis' equations."""
-    x, y, vx, vy, yaw, alpha, _, _ = planned_direction_law_state(time, state, parameters, table)
-    tilt_rate = tilt_reference(time, parameters.gait, table)[4]
+    time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
+    """The same of the thesis's equations."""
+    x, y, vx, vy, yaw, alpha, _, _ = planned_direction_law_state(time, state, parameters, knots)
+    tilt_rate = tilt_reference(time, parameters.gait, knots)[4]
     r = yaw_of(tilt_rate, 0.0, parameters.law.car)
     return (
         *(x, y, vx, vy, yaw, r, alpha, tilt_rate),
@@ -152,20 +139,20 @@ def observe_planned_direction_equations(
 
 
 @scalar
-def nothing_to_watch(values: Sequence[float], parameters: ControlParameters) -> tuple[float]:
+def nothing_to_watch(values: Vector, parameters: LoopParameters) -> tuple[float]:
     """The law ends nowhere."""
     return (1.0,)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    parameters, table = setup
+    parameters, knots = setup
     law = parameters.law
     time = samples["time"].tolist()
     names = ("x", "y", "vx", "vy", "yaw", "alpha", "rotor_speed_1", "rotor_speed_2")
     states = np.stack([samples[name] for name in names], axis=-1).tolist()
     wanted = [demanded_acceleration(*row, law) for row in zip(time, states, strict=True)]
     squares = [demanded_squared_speeds(*row, law) for row in zip(time, states, strict=True)]
-    tilts = [tilt_reference(t, parameters.gait, table)[0] for t in time]
+    tilts = [tilt_reference(t, parameters.gait, knots)[0] for t in time]
     reference = reference_columns(samples, law.reference)
     ax, ay = np.array(wanted).reshape(len(time), 2).T
     columns = derived_columns(samples, reference, (ax, ay), law.car) | {
@@ -182,7 +169,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 PLANNED_DIRECTION: Final = ClosedLoop(
     model="tilt_car",
     sizes=Sizes(qpos=4, qvel=4, act=2, ctrl=5),
-    parameters=ControlParameters,
+    parameters=LoopParameters,
     controls=planned_direction_controls,
     refresh=held_planned_direction_controls,
     setup=_setup,

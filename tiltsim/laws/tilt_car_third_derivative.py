@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from tiltsim.closed_loop.loop import ControlSetup
@@ -16,31 +15,26 @@ from tiltsim.laws.tilt_car import (
     speed_squares,
 )
 from tiltsim.scenario.tilt_car_laws import ThirdDerivativeController
-from tiltsim_controllers.mathematics.scalar import Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.tilt_car.third_derivative import Parameters, third_derivative_inputs
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
 
 
-class ControlParameters(NamedTuple):
+class LoopParameters(NamedTuple):
     """The head of `userdata`."""
 
     signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
     servo_lead: float  # s, rate feed-forward of the tilt servo, 2 zeta / omega_n
-    heading: float  # rad, yaw at zero tilt, for the thesis' equations
+    heading: float  # rad, yaw at zero tilt, for the thesis's equations
     law: Parameters
 
 
 @scalar
 def third_derivative_controls(
-    time: float,
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
+    time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
     """All six controls: tilt servo, thrusts, rotor accelerations, tilt rate.
 
     The law's own state integrates the tilt rate to the angle that the servo is told.
@@ -55,16 +49,14 @@ def third_derivative_controls(
 
 
 @scalar
-def refreshed_third_derivative_controls(
-    ctrl: Sequence[float], act: Sequence[float]
-) -> tuple[float, ...]:
+def refreshed_third_derivative_controls(ctrl: Vector, act: Vector) -> Values:
     """Held controls with the thrusts that belong to the present rotor speeds."""
     return (ctrl[0], *speed_squares(act), ctrl[3], ctrl[4], ctrl[5])
 
 
 @scalar
-def third_derivative_law_state(state: Sequence[float], parameters: ControlParameters) -> CarState:
-    """The law's state from that of the thesis' equations."""
+def third_derivative_law_state(state: Vector, parameters: LoopParameters) -> CarState:
+    """The law's state from that of the thesis's equations."""
     return (
         *(state[0], state[1], state[2], state[3]),
         *(yaw_of(state[4], parameters.heading, parameters.law.car), state[4]),
@@ -74,9 +66,9 @@ def third_derivative_law_state(state: Sequence[float], parameters: ControlParame
 
 @scalar
 def third_derivative_equation_inputs(
-    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
+    time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Triple:
-    """The law on the thesis' equations: rotor accelerations and tilt rate."""
+    """The law on the thesis's equations: rotor accelerations and tilt rate."""
     law_state = third_derivative_law_state(state, parameters)
     return third_derivative_inputs(time, law_state, parameters.law)
 
@@ -84,13 +76,13 @@ def third_derivative_equation_inputs(
 @scalar
 def third_derivative_equation_rates(
     time: float,
-    state: Sequence[float],
+    state: Vector,
     inputs: Triple,
-    parameters: ControlParameters,
-    table: Sequence[float],
+    parameters: LoopParameters,
+    knots: Vector,
     disturbance: Triple,
-) -> tuple[float, ...]:
-    """The thesis' equations with the inputs integrated."""
+) -> Values:
+    """The thesis's equations with the inputs integrated."""
     _, _, _, _, yaw, alpha, speed_1, speed_2 = third_derivative_law_state(state, parameters)
     squares = speed_1 * speed_1, speed_2 * speed_2
     rate_1, rate_2, tilt_rate = inputs
@@ -111,13 +103,11 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
         scenario.reference.parameters,
         controller.restoring_rate,
     )
-    return car_setup(ControlParameters, scenario, signature, law=law)
+    return car_setup(LoopParameters, scenario, signature, law=law)
 
 
 @scalar
-def observe_third_derivative(
-    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
-) -> tuple[float, ...]:
+def observe_third_derivative(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """The car and the tilt angle that its servo is told."""
     x, y, vx, vy, yaw, alpha, speed_1, speed_2 = car_state(qpos, qvel, act[0], act[1])
     return x, y, vx, vy, yaw, qvel[2], alpha, qvel[3], speed_1, speed_2, act[2]
@@ -125,13 +115,9 @@ def observe_third_derivative(
 
 @scalar
 def observe_third_derivative_equations(
-    time: float,
-    state: Sequence[float],
-    inputs: Triple,
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
-    """The same of the thesis' equations."""
+    time: float, state: Vector, inputs: Triple, parameters: LoopParameters, knots: Vector
+) -> Values:
+    """The same of the thesis's equations."""
     x, y, vx, vy, yaw, alpha, speed_1, speed_2 = third_derivative_law_state(state, parameters)
     tilt_rate = inputs[2]
     r = yaw_of(tilt_rate, 0.0, parameters.law.car)
@@ -139,7 +125,7 @@ def observe_third_derivative_equations(
 
 
 THIRD_DERIVATIVE: Final = integrating_loop(
-    ControlParameters,
+    LoopParameters,
     third_derivative_controls,
     refreshed_third_derivative_controls,
     observe_third_derivative,

@@ -12,16 +12,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ControlSetup, Floats, SignCheck
+from tiltsim.closed_loop.loop import ControlSetup, SignCheck
 from tiltsim.engines.rows import evaluate_over_samples
 from tiltsim.vehicles.rotorcraft import OBSERVED_FIELDS
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
 from tiltsim_controllers.gaits import GaitParameters, tilt_reference
-from tiltsim_controllers.laws.attitude_altitude import (
-    State,
-)
+from tiltsim_controllers.laws.attitude_altitude import State
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion, world_up_in_body
-from tiltsim_controllers.mathematics.scalar import Quad, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Quad, Values, Vector, scalar
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     sines_and_cosines,
     torque_entries,
@@ -39,7 +37,7 @@ TILT_REFERENCE_COLUMNS: Final = tuple(f"alpha_ref_{rotor}" for rotor in (1, 2, 3
 
 
 @scalar
-def tiltrotor_state(qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float]) -> State:
+def tiltrotor_state(qpos: Vector, qvel: Vector, act: Vector) -> State:
     """The law's state (`tiltsim_controllers.laws.attitude_altitude.STATE_FIELDS`) from MuJoCo's.
 
     MuJoCo gives the body's position, its quaternion and the tilt angles in ``qpos``, the velocity
@@ -56,7 +54,7 @@ def tiltrotor_state(qpos: Sequence[float], qvel: Sequence[float], act: Sequence[
 
 
 @scalar
-def rotor_thrust_controls(act: Sequence[float]) -> Quad:
+def rotor_thrust_controls(act: Vector) -> Quad:
     """Controls of the thrust actuators, ``s_i varpi_i |varpi_i|`` with ``s = (-1, 1, -1, 1)``."""
     speed_1, speed_2, speed_3, speed_4 = act[0], act[1], act[2], act[3]
     return (
@@ -68,16 +66,14 @@ def rotor_thrust_controls(act: Sequence[float]) -> Quad:
 
 
 @scalar
-def gait_servo_commands(
-    time: float, lead: float, gait: GaitParameters, table: Sequence[float]
-) -> Quad:
+def gait_servo_commands(time: float, lead: float, gait: GaitParameters, knots: Vector) -> Quad:
     """What the tilt servos are told (rad) to follow the planned gait, their lag allowed for."""
-    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, gait, table)
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, gait, knots)
     return a1 + lead * rate_1, a2 + lead * rate_2, a3 + lead * rate_3, a4 + lead * rate_4
 
 
 @scalar
-def refreshed_controls(ctrl: Sequence[float], act: Sequence[float]) -> tuple[float, ...]:
+def refreshed_controls(ctrl: Vector, act: Vector) -> Values:
     """Held controls, however many, with the thrusts that belong to the present rotor speeds."""
     return (*ctrl[:4], *rotor_thrust_controls(act), *ctrl[8:])
 
@@ -87,15 +83,13 @@ def servo_lead(servo: ServoTable) -> float:
     return 2.0 * servo.damping_ratio / servo.natural_frequency
 
 
-def initial_signed_rotor_speeds(scenario: Scenario) -> tuple[float, ...]:
+def initial_signed_rotor_speeds(scenario: Scenario) -> Values:
     """The signed rotor speeds (rad/s) at time zero."""
     return tuple(s * speed for s, speed in zip(SPIN, scenario.initial.rotor_speeds(4), strict=True))
 
 
 @scalar
-def observe_tiltrotor(
-    qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
-) -> tuple[float, ...]:
+def observe_tiltrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """Rigid body, tilts, rotor speeds and tilt rates: all of them states of the simulation."""
     return (*tiltrotor_state(qpos, qvel, act), qvel[6], qvel[7], qvel[8], qvel[9])
 
@@ -111,7 +105,7 @@ def singularity_columns(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict
 
 
 def reference_columns(
-    in_force: Callable[..., tuple[float, ...]],
+    in_force: Callable[..., Values],
     fields: Sequence[str],
     samples: Mapping[str, Floats],
     setup: ControlSetup,
@@ -135,13 +129,13 @@ def rotor_speed_checks(sample: Mapping[str, float]) -> tuple[SignCheck, ...]:
 
 
 @scalar
-def rotor_speeds_along_spin(values: Sequence[float]) -> Quad:
+def rotor_speeds_along_spin(values: Vector) -> Quad:
     """Rotor speeds along their spin, from what `observe_tiltrotor` gives."""
     return -values[16], values[17], -values[18], values[19]
 
 
 @scalar
-def scaled_determinant(values: Sequence[float], vehicle: Vehicle) -> float:
+def scaled_determinant(values: Vector, vehicle: Vehicle) -> float:
     """The determinant of the decoupling matrix but for the rotor speeds, of a sample's values."""
     ratio = drag_ratio(vehicle)
     trig = sines_and_cosines(values[12], values[13], values[14], values[15])

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tiltsim.closed_loop.loop import ControlSetup, Floats, SignCheck
+from tiltsim.closed_loop.loop import ControlSetup, SignCheck
 from tiltsim.equations.quadrotor import extended_equations_of_motion, law_state
 from tiltsim.laws.quadrotor import (
     equations,
@@ -20,13 +20,13 @@ from tiltsim.laws.quadrotor import (
 )
 from tiltsim.scenario.quadrotor_laws import YawPositionController
 from tiltsim_controllers.laws.yaw_position import Parameters, yaw_position_inputs
-from tiltsim_controllers.mathematics.scalar import Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
 
 
-class ControlParameters(NamedTuple):
+class LoopParameters(NamedTuple):
     """The head of `userdata`."""
 
     signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
@@ -35,39 +35,32 @@ class ControlParameters(NamedTuple):
 
 @scalar
 def yaw_position_controls(
-    time: float,
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    act: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
+    time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
     """All ten controls: thrusts, idle rotor states, the law's own states."""
     law = parameters.law
     state = rigid_body_state(qpos, qvel, act[4], act[5])
-    return extended_controls(yaw_position_inputs(time, state, law, table), law.vehicle)
+    return extended_controls(yaw_position_inputs(time, state, law, knots), law.vehicle)
 
 
 def _setup(scenario: Scenario, signature: float) -> ControlSetup:
     controller = scenario.controller
     assert isinstance(controller, YawPositionController)
-    reference, table = scenario.reference_and_knots()
+    reference, knots = scenario.reference_and_knots()
     law = Parameters(scenario.rotorcraft.resolve(), controller.resolve_gains(), reference)
-    return ControlSetup(ControlParameters(signature, law), table)
+    return ControlSetup(LoopParameters(signature, law), knots)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     law = setup.parameters.law
     # Roll and pitch are no outputs: they are what the position takes.
     attitude = (samples["roll"], samples["pitch"], law.reference.yaw)
-    columns = references(samples, law.reference, setup.table, attitude)
+    columns = references(samples, law.reference, setup.knots, attitude)
     return columns | extended_singularity_columns(samples, law.vehicle)
 
 
 @scalar
-def watch_attitude_and_extension(
-    values: Sequence[float], parameters: ControlParameters
-) -> tuple[float, float]:
+def watch_attitude_and_extension(values: Vector, parameters: LoopParameters) -> tuple[float, float]:
     """The cosine of the thrust axis' tilt and the extension's thrust."""
     return thrust_tilt_cosine(values), values[24]
 
@@ -80,39 +73,35 @@ def extension_thrust_check(sample: Mapping[str, float]) -> SignCheck:
 
 @scalar
 def equation_inputs(
-    time: float, state: Sequence[float], parameters: ControlParameters, table: Sequence[float]
-) -> tuple[float, ...]:
-    """The law on the thesis' equations."""
-    return yaw_position_inputs(time, law_state(state), parameters.law, table)
+    time: float, state: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
+    """The law on the thesis's equations."""
+    return yaw_position_inputs(time, law_state(state), parameters.law, knots)
 
 
 @scalar
 def equation_rates(
     time: float,
-    state: Sequence[float],
-    inputs: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
+    state: Vector,
+    inputs: Vector,
+    parameters: LoopParameters,
+    knots: Vector,
     disturbance: Triple,
-) -> tuple[float, ...]:
-    """The thesis' equations under this law."""
+) -> Values:
+    """The thesis's equations under this law."""
     return extended_equations_of_motion(state, inputs, parameters.law.vehicle, disturbance)
 
 
 @scalar
 def observe_in_equations(
-    time: float,
-    state: Sequence[float],
-    inputs: Sequence[float],
-    parameters: ControlParameters,
-    table: Sequence[float],
-) -> tuple[float, ...]:
-    """What a sample holds, from the state of the thesis' equations."""
+    time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
+) -> Values:
+    """What a sample holds, from the state of the thesis's equations."""
     return observe_extended_equations(state, inputs, parameters.law.vehicle)
 
 
 YAW_POSITION: Final = extended_loop(
-    ControlParameters,
+    LoopParameters,
     yaw_position_controls,
     equations(equation_inputs, 6, equation_rates, observe_in_equations),
     setup=_setup,

@@ -14,16 +14,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 
 if TYPE_CHECKING:
     import mujoco
 
     from tiltsim.models.parts import TiltServo
-
-Floats = npt.NDArray[np.float64]
 
 ROTORS: Final = (1, 2, 3, 4)
 JOINTS: Final = {

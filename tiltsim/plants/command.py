@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import Floats
 from tiltsim.errors import TiltsimError
-from tiltsim_controllers.mathematics.scalar import Quad
+from tiltsim_controllers.mathematics.scalar import Floats, Quad
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:

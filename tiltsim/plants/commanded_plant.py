@@ -15,7 +15,6 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from tiltsim.closed_loop.loop import Floats
 from tiltsim.engines.callback import control_callback
 from tiltsim.laws.commanded import COMMANDED_LOOPS, HeldCommand, commanded_parameters, with_command
 from tiltsim.laws.layers.actuation import measured_qpos, measured_qvel, sensor_parameters
@@ -33,7 +32,7 @@ from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim_controllers.gaits import tilt_reference
 from tiltsim_controllers.mathematics.records import flatten, slotted
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
-from tiltsim_controllers.mathematics.scalar import Quad, clipped
+from tiltsim_controllers.mathematics.scalar import Floats, Quad, clipped
 from tiltsim_controllers.references.trajectories import reference_derivatives
 from tiltsim_controllers.vehicle.parameters import SPIN
 
@@ -111,11 +110,11 @@ class CommandedPlant(MujocoPlant):
         return _Sent(1.0, _signed(self._along_spin(orders)), tilts)
 
     def _write_controls(self, told: HeldCommand) -> None:
-        data, table = self.data, self._setup.table
+        data, knots = self.data, self._setup.knots
         state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
         parameters = with_command(self._setup.parameters, told)
         try:
-            data.ctrl[:] = self._loop.controls(float(data.time), *state, parameters, table)
+            data.ctrl[:] = self._loop.controls(float(data.time), *state, parameters, knots)
         except (ArithmeticError, ValueError):
             data.ctrl[:] = nan  # as the engines do; MuJoCo reports it
 
@@ -136,7 +135,7 @@ class CommandedPlant(MujocoPlant):
 
     def _planned_servo_commands(self) -> Quad:
         lead, gait = self._commanded.servo_lead, self._commanded.gait
-        return gait_servo_commands(float(self.data.time), lead, gait, self._setup.table)
+        return gait_servo_commands(float(self.data.time), lead, gait, self._setup.knots)
 
     def _along_spin(self, orders: CheckedCommand) -> Quad:
         """Commanded speeds, within the rotors' limits."""
@@ -186,11 +185,11 @@ class CommandedPlant(MujocoPlant):
         if self._sensors.active:
             qpos = np.array(measured_qpos(time, qpos.tolist(), self._sensors))
             qvel = np.array(measured_qvel(time, qvel.tolist(), self._sensors))
-        motion = np.array(reference_derivatives(time, parameters.reference, self._setup.table)[:9])
+        motion = np.array(reference_derivatives(time, parameters.reference, self._setup.knots)[:9])
         wanted = parameters.reference
         planned = np.zeros(8)
         if self.tilting:
-            planned[:] = tilt_reference(time, parameters.gait, self._setup.table)
+            planned[:] = tilt_reference(time, parameters.gait, self._setup.knots)
         reference = Reference(
             position=motion[:3],
             velocity=motion[3:6],

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import mujoco
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Floats
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.closed_loop.userdata import EVALUATIONS, HEADER_SIZE, RECORDER, Header
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.callback import control_callback
@@ -19,6 +19,7 @@ from tiltsim.laws.assembling import control_setup, loop_of
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.flight_model import evaluations_per_step, flight_model
 from tiltsim.scenario.scenario import Scenario
+from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     from tiltsim.engines.recorder import Recorder
@@ -134,7 +135,7 @@ class MujocoPlant:
             return list(data.ctrl.tolist())
         try:
             setup = self._setup
-            return self._loop.controls(data.time, *state, setup.parameters, setup.table)
+            return self._loop.controls(data.time, *state, setup.parameters, setup.knots)
         except (ArithmeticError, ValueError):
             return [nan] * len(data.ctrl)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from tiltsim.closed_loop.loop import Floats
 from tiltsim.engines.base import EngineName
+from tiltsim_controllers.mathematics.scalar import Floats
 
 
 class Plant(Protocol):

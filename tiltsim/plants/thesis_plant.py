@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import Floats
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.cache import mark_native_code_compiled
 from tiltsim.equations import ode3 as thesis_plant
@@ -18,6 +17,7 @@ from tiltsim.plants.flight_model import disturbing_acceleration
 from tiltsim.plants.mujoco_plant import watched_now
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.records import slotted
+from tiltsim_controllers.mathematics.scalar import Floats
 
 
 class ThesisPlant:
@@ -39,7 +39,7 @@ class ThesisPlant:
         self._fault = ""
         self.engine: EngineName = choose_engine(scenario)
         self._advance: thesis_plant.Stepper
-        self._law: tuple[Any, Any]  # parameters and table, as the stepper reads them
+        self._law: tuple[Any, Any]  # parameters and knots, as the stepper reads them
         if self.engine == "native":
             from tiltsim.engines.native_stepper import compile_stepper, native_record
 
@@ -47,7 +47,7 @@ class ThesisPlant:
             self._law = native_record(loop, setup.userdata)
         else:
             self._advance = thesis_plant.make_stepper(self._equations)
-            self._law = slotted(setup.parameters), setup.table
+            self._law = slotted(setup.parameters), setup.knots
 
     @property
     def time(self) -> float:
@@ -117,7 +117,7 @@ class ThesisPlant:
         setup = self._setup
         try:
             return self._equations.observe(
-                self.time, self._state, self._inputs_in_force(), setup.parameters, setup.table
+                self.time, self._state, self._inputs_in_force(), setup.parameters, setup.knots
             )
         except (ArithmeticError, ValueError):
             return (nan,) * (len(self._loop.sample_fields) - 1)
@@ -128,7 +128,7 @@ class ThesisPlant:
             return self._held
         try:
             setup = self._setup
-            return self._equations.inputs(self.time, self._state, setup.parameters, setup.table)
+            return self._equations.inputs(self.time, self._state, setup.parameters, setup.knots)
         except (ArithmeticError, ValueError):
             return [nan] * len(self._held)
 

@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any, Final
 import mujoco
 import numpy as np
 
-from tiltsim.closed_loop.loop import Floats
 from tiltsim.closed_loop.userdata import RECORDER
 from tiltsim.engines.callback import control_callback
 from tiltsim.flight.end import End
@@ -31,6 +30,7 @@ from tiltsim.plants.flight_model import flight_model, model_cache_key
 from tiltsim.plants.mujoco_plant import MujocoPlant, quiet_warnings
 from tiltsim.simulation.monitor import TerminationMonitor
 from tiltsim.simulation.simulate import fly_chunk, simulate
+from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario

@@ -14,11 +14,11 @@ from tiltsim.closed_loop.limits import (
     altitude_error,
     horizontal_error,
 )
-from tiltsim.closed_loop.loop import Floats
 from tiltsim.flight.end import End
 from tiltsim.laws.assembling import control_setup, loop_of
 from tiltsim.plants.plant import Plant
 from tiltsim.scenario.scenario import Scenario
+from tiltsim_controllers.mathematics.scalar import Floats
 
 
 class TerminationMonitor:
@@ -26,7 +26,7 @@ class TerminationMonitor:
 
     def __init__(self, scenario: Scenario) -> None:
         self._loop, self._setup = loop_of(scenario), control_setup(scenario)
-        self._reference, self._table = scenario.reference_and_knots()
+        self._reference, self._knots = scenario.reference_and_knots()
         self._follows_position = self._loop.follows_position(scenario)
         self._sides: dict[int, float] = {}
 
@@ -56,15 +56,15 @@ class TerminationMonitor:
 
     def _judge_limits(self, time: float, state: dict[str, float]) -> End | None:
         values = list(state.values())[1:]
-        limits = self._reference, self._table, self._follows_position
+        limits = self._reference, self._knots, self._follows_position
         code = self._loop.kind.limit_exceeded(time, values, *limits)
         if code == WITHIN_LIMITS:
             return None
         if code == HORIZONTAL_ERROR:
-            error = horizontal_error(time, values, self._reference, self._table)
+            error = horizontal_error(time, values, self._reference, self._knots)
             cause = f"{error:.3g} m away from the reference"
         elif code == ALTITUDE_ERROR:
-            error = altitude_error(time, values, self._reference, self._table)
+            error = altitude_error(time, values, self._reference, self._knots)
             cause = f"{error:.3g} m away from the reference altitude"
         elif code < ROTOR_SPEED:
             name = "pqr"[code - BODY_RATE]

@@ -8,7 +8,6 @@ from typing import Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import Floats
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.plants.command import Controller, ControllerError
@@ -18,6 +17,7 @@ from tiltsim.plants.user_controller import with_controller
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.monitor import TerminationMonitor
 from tiltsim.system.interrupts import reraise_swallowed_interrupts
+from tiltsim_controllers.mathematics.scalar import Floats
 
 CHUNK_TIME: Final = 0.1
 """How long (s) native code flies before Python looks at the samples and at the keyboard."""

@@ -14,7 +14,6 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import Floats
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import (
     apply_overrides,
@@ -38,6 +37,7 @@ from tiltsim.sweeps.tables import (
     Sweep,
     UniformAxis,
 )
+from tiltsim_controllers.mathematics.scalar import Floats
 
 MAX_POINTS: Final = 10_000_000
 MAX_SEARCH: Final = 1_000_000

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import inf
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from tiltsim.closed_loop.limits import rotorcraft_limit_exceeded
-from tiltsim.closed_loop.vehicle_kind import Floats, VehicleKind
+from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim_controllers.gaits import tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import STATE_FIELDS
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
-from tiltsim_controllers.mathematics.scalar import Quad, clipped
+from tiltsim_controllers.mathematics.scalar import Floats, Quad, Vector, clipped
 from tiltsim_controllers.vehicle.parameters import SPIN
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def initial_tilts(scenario: Scenario) -> tuple[Quad, Quad]:
     return (a1, a2, a3, a4), (rate_1, rate_2, rate_3, rate_4)
 
 
-def _initial_motion(scenario: Scenario) -> tuple[Sequence[float], Sequence[float]]:
+def _initial_motion(scenario: Scenario) -> tuple[Vector, Vector]:
     initial = scenario.initial
     tilting = scenario.rotorcraft.model == "tiltrotor"
     angles, rates = initial_tilts(scenario) if tilting else ((), ())

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.closed_loop.limits import tilt_car_limit_exceeded
-from tiltsim.closed_loop.vehicle_kind import Floats, VehicleKind
+from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim_controllers.gaits import tilt_reference
+from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.tilt_car.vehicle import counter_yaw_per_tilt
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ def initial_tilt(scenario: Scenario) -> tuple[float, float]:
     return angles[0], angles[4]
 
 
-def _initial_motion(scenario: Scenario) -> tuple[Sequence[float], Sequence[float]]:
+def _initial_motion(scenario: Scenario) -> tuple[Vector, Vector]:
     """The car turned out of zero tilt at ``initial.attitude``'s yaw, angular momentum conserved."""
     initial = scenario.initial
     share = counter_yaw_per_tilt(scenario.tilt_car.resolve())

@@ -14,15 +14,13 @@ from math import pi
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from tiltsim_controllers.analysis.singularity import torque_free_direction, world_up
+from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
     from tiltsim_controllers.vehicle.parameters import Vehicle
-
-Floats = npt.NDArray[np.float64]
 
 HALF_WIDTH: Final = pi / 2
 """The plane reaches to this roll and pitch (rad) either way."""

@@ -13,17 +13,16 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from tiltsim.closed_loop.userdata import HEADER_SIZE
 from tiltsim.laws.assembling import control_setup
 from tiltsim.plants.flight_model import build_model
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
+from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
 
-Floats = npt.NDArray[np.float64]
 Columns = Mapping[str, Floats]
 
 COLUMN_OF_JOINT: Final = {f"tilt_{i}": f"alpha_{i}" for i in (1, 2, 3, 4)} | {"tilt": "alpha"}

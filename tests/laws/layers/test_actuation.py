@@ -289,7 +289,7 @@ def test_commands_take_effect_after_the_latency():
     for _ in range(30):
         data = plant.data
         state = data.qpos.tolist(), data.qvel.tolist(), data.act[:4].tolist()
-        ctrl = law.controls(plant.time, *state, setup.parameters.law, setup.table)
+        ctrl = law.controls(plant.time, *state, setup.parameters.law, setup.knots)
         asked.append([*ctrl[:4], *ctrl[8:12]])
         plant.advance(1)
         in_force.append(plant.data.ctrl[-8:].copy())

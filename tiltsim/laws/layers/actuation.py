@@ -12,7 +12,7 @@ that restarts anywhere, and a scenario that has none of this flies without the l
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from math import inf
@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Floats
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.laws.layers.layer import around
 from tiltsim.laws.tiltrotor import rotor_thrust_controls, servo_lead
 from tiltsim.models.parts import ExtraActuators
@@ -28,7 +28,7 @@ from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim_controllers.gaits import tilt_reference
 from tiltsim_controllers.laws.allocation import allocate_accelerations
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
-from tiltsim_controllers.mathematics.scalar import scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 from tiltsim_controllers.vehicle.actuators import (
     Faults,
     RotorFault,
@@ -84,7 +84,7 @@ class Actuation(NamedTuple):
 
 
 @scalar
-def measured_qpos(time: float, qpos: Sequence[float], sensors: Sensors) -> tuple[float, ...]:
+def measured_qpos(time: float, qpos: Vector, sensors: Sensors) -> Values:
     """MuJoCo's eleven ``qpos`` of the tiltrotor as the law is told them; tilts are exact."""
     x, y, z, qw, qx, qy, qz, alpha_1, alpha_2, alpha_3, alpha_4 = qpos
     if sensors.active == 0.0:
@@ -97,7 +97,7 @@ def measured_qpos(time: float, qpos: Sequence[float], sensors: Sensors) -> tuple
 
 
 @scalar
-def measured_qvel(time: float, qvel: Sequence[float], sensors: Sensors) -> tuple[float, ...]:
+def measured_qvel(time: float, qvel: Vector, sensors: Sensors) -> Values:
     """MuJoCo's ten ``qvel`` of the tiltrotor as the law is told them; tilt rates are exact."""
     vx, vy, vz, p, q, r, rate_1, rate_2, rate_3, rate_4 = qvel
     if sensors.active == 0.0:
@@ -110,10 +110,7 @@ def measured_qvel(time: float, qvel: Sequence[float], sensors: Sensors) -> tuple
 
 @scalar
 def allocated_accelerations(
-    wanted: tuple[float, float, float, float],
-    qpos: Sequence[float],
-    act: Sequence[float],
-    allocation: Allocation,
+    wanted: tuple[float, float, float, float], qpos: Vector, act: Vector, allocation: Allocation
 ) -> tuple[float, float, float, float]:
     """The law's rotor accelerations (rad/s^2), within the speed limits if asked for."""
     if allocation.active == 0.0:
@@ -133,7 +130,7 @@ def allocated_accelerations(
 
 @scalar
 def servo_controls(
-    time: float, qpos: Sequence[float], commands: Sequence[float], actuation: Actuation
+    time: float, qpos: Vector, commands: Vector, actuation: Actuation
 ) -> tuple[float, float, float, float]:
     """Set points (rad) of the four tilt servos."""
     reach, faults = actuation.servo_reach, actuation.faults
@@ -146,9 +143,7 @@ def servo_controls(
 
 
 @scalar
-def thrust_controls(
-    time: float, act: Sequence[float], faults: Faults
-) -> tuple[float, float, float, float]:
+def thrust_controls(time: float, act: Vector, faults: Faults) -> tuple[float, float, float, float]:
     """Controls of the four thrust actuators, less what is broken."""
     thrust_1, thrust_2, thrust_3, thrust_4 = rotor_thrust_controls(act)
     return (
@@ -161,7 +156,7 @@ def thrust_controls(
 
 @scalar
 def motor_controls(
-    act: Sequence[float], first: int, commands: Sequence[float], actuation: Actuation
+    act: Vector, first: int, commands: Vector, actuation: Actuation
 ) -> tuple[float, float, float, float]:
     """Rotor accelerations (rad/s^2): at once, or the lag's towards the speeds commanded.
 
@@ -180,7 +175,7 @@ def motor_controls(
 
 @scalar
 def told_rates(
-    act: Sequence[float], first: int, commands: Sequence[float], actuation: Actuation
+    act: Vector, first: int, commands: Vector, actuation: Actuation
 ) -> tuple[float, float, float, float]:
     """Rates (rad/s^2) of the speeds that the motors are told, activations from ``first`` on."""
     low, high = actuation.slowest, actuation.fastest
@@ -193,7 +188,7 @@ def told_rates(
 
 
 @scalar
-def first_eight(values: Sequence[float]) -> tuple[float, ...]:
+def first_eight(values: Vector) -> Values:
     """The first eight of some numbers."""
     return (
         *(values[0], values[1], values[2], values[3]),
@@ -212,13 +207,11 @@ def _delay_line(first: int, steps: int) -> tuple[Callable[..., Any], Callable[..
     if steps == 0:
 
         @scalar
-        def at_once(act: Sequence[float], sent: tuple[float, ...]) -> tuple[float, ...]:
+        def at_once(act: Vector, sent: Values) -> Values:
             return sent
 
         @scalar
-        def no_rates(
-            act: Sequence[float], sent: tuple[float, ...], control_timestep: float
-        ) -> tuple[float, ...]:
+        def no_rates(act: Vector, sent: Values, control_timestep: float) -> Values:
             return ()
 
         return at_once, no_rates
@@ -227,13 +220,11 @@ def _delay_line(first: int, steps: int) -> tuple[Callable[..., Any], Callable[..
     _, older_rates = _delay_line(first + COMMANDS, steps - 1)
 
     @scalar
-    def delivered(act: Sequence[float], sent: tuple[float, ...]) -> tuple[float, ...]:
+    def delivered(act: Vector, sent: Values) -> Values:
         return first_eight(act[oldest:])
 
     @scalar
-    def rates(
-        act: Sequence[float], sent: tuple[float, ...], control_timestep: float
-    ) -> tuple[float, ...]:
+    def rates(act: Vector, sent: Values, control_timestep: float) -> Values:
         here = first_eight(act[first:])
         return (
             (sent[0] - here[0]) / control_timestep,
@@ -272,17 +263,12 @@ def with_actuation(loop: ClosedLoop, latency_steps: int) -> ClosedLoop:
 
     @scalar
     def controls(
-        time: float,
-        qpos: Sequence[float],
-        qvel: Sequence[float],
-        act: Sequence[float],
-        parameters: Any,
-        table: Sequence[float],
-    ) -> tuple[float, ...]:
+        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
+    ) -> Values:
         actuation = parameters.layer
         seen_qpos = measured_qpos(time, qpos, actuation.sensors)
         seen_qvel = measured_qvel(time, qvel, actuation.sensors)
-        asked = law_controls(time, seen_qpos, seen_qvel, act, parameters.law, table)
+        asked = law_controls(time, seen_qpos, seen_qvel, act, parameters.law, knots)
         u1, u2, u3, u4 = allocated_accelerations(
             (asked[8], asked[9], asked[10], asked[11]), seen_qpos, act, actuation.allocation
         )
@@ -300,13 +286,8 @@ def with_actuation(loop: ClosedLoop, latency_steps: int) -> ClosedLoop:
 
     @scalar
     def hold(
-        time: float,
-        qpos: Sequence[float],
-        qvel: Sequence[float],
-        act: Sequence[float],
-        ctrl: Sequence[float],
-        parameters: Any,
-    ) -> tuple[float, ...]:
+        time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: Any
+    ) -> Values:
         actuation = parameters.layer
         commands = first_eight(ctrl[memory:])
         return (
@@ -319,14 +300,12 @@ def with_actuation(loop: ClosedLoop, latency_steps: int) -> ClosedLoop:
         )
 
     @scalar
-    def observe(
-        qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
-    ) -> tuple[float, ...]:
+    def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
         return law_observe(qpos, qvel, act[:law_act], ctrl[:law_ctrl])
 
     controls.__qualname__ = f"with_actuation.{latency_steps}.{loop.controls.__qualname__}"
 
-    def initial_activations(scenario: Scenario, setup: ControlSetup) -> Sequence[float]:
+    def initial_activations(scenario: Scenario, setup: ControlSetup) -> Vector:
         law_states = layered.initial_activations(scenario, setup)
         waiting = (*initial_tilts(scenario)[0], 0.0, 0.0, 0.0, 0.0) * latency_steps
         return (*law_states, *law_states[:ROTORS], *waiting)

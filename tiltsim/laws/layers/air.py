@@ -7,7 +7,7 @@ filters of turbulence are activations, so a flight restarts anywhere, gusts and 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from math import atan2, hypot
@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Floats
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.laws.layers.layer import around
 from tiltsim.models.parts import ExtraActuators
 from tiltsim_controllers.mathematics.rotation import rotation_from_quaternion
-from tiltsim_controllers.mathematics.scalar import Quad, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Quad, Values, Vector, scalar
 from tiltsim_controllers.vehicle.air import (
     DRYDEN_STATES,
     Air,
@@ -53,13 +53,13 @@ class Surroundings(NamedTuple):
 
 
 @scalar
-def pod_tilts(qpos: Sequence[float]) -> Quad:
+def pod_tilts(qpos: Vector) -> Quad:
     """Tilt angles of the tiltrotor."""
     return qpos[7], qpos[8], qpos[9], qpos[10]
 
 
 @scalar
-def no_tilts(qpos: Sequence[float]) -> Quad:
+def no_tilts(qpos: Vector) -> Quad:
     """Tilt angles of a vehicle whose rotors do not tilt."""
     return 0.0, 0.0, 0.0, 0.0
 
@@ -67,13 +67,13 @@ def no_tilts(qpos: Sequence[float]) -> Quad:
 @scalar
 def air_wrench(
     time: float,
-    qpos: Sequence[float],
-    qvel: Sequence[float],
-    states: tuple[float, ...],
+    qpos: Vector,
+    qvel: Vector,
+    states: Values,
     tilts: Quad,
     thrusts: Quad,
     surroundings: Surroundings,
-) -> tuple[float, ...]:
+) -> Values:
     """Force (N) and torque (N m) of the air, body axes: drag, and what the ground adds to thrust.
 
     ``thrusts`` are the controls of the thrust actuators, (rad/s)^2; ``states`` those of the
@@ -128,12 +128,12 @@ def with_air(loop: ClosedLoop) -> ClosedLoop:
     @scalar
     def air_controls(
         time: float,
-        qpos: Sequence[float],
-        qvel: Sequence[float],
-        act: Sequence[float],
-        ctrl: Sequence[float],
+        qpos: Vector,
+        qvel: Vector,
+        act: Vector,
+        ctrl: Vector,
         surroundings: Surroundings,
-    ) -> tuple[float, ...]:
+    ) -> Values:
         states = (act[first], act[first + 1], act[first + 2], act[first + 3], act[first + 4])
         thrusts = (ctrl[thrust], ctrl[thrust + 1], ctrl[thrust + 2], ctrl[thrust + 3])
         return (
@@ -143,32 +143,20 @@ def with_air(loop: ClosedLoop) -> ClosedLoop:
 
     @scalar
     def controls(
-        time: float,
-        qpos: Sequence[float],
-        qvel: Sequence[float],
-        act: Sequence[float],
-        parameters: Any,
-        table: Sequence[float],
-    ) -> tuple[float, ...]:
-        inner = inner_controls(time, qpos, qvel, act, parameters.law, table)
+        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
+    ) -> Values:
+        inner = inner_controls(time, qpos, qvel, act, parameters.law, knots)
         return (*inner, *air_controls(time, qpos, qvel, act, inner, parameters.layer))
 
     @scalar
     def hold(
-        time: float,
-        qpos: Sequence[float],
-        qvel: Sequence[float],
-        act: Sequence[float],
-        ctrl: Sequence[float],
-        parameters: Any,
-    ) -> tuple[float, ...]:
+        time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: Any
+    ) -> Values:
         inner = inner_hold(time, qpos, qvel, act, ctrl[:inner_ctrl], parameters.law)
         return (*inner, *air_controls(time, qpos, qvel, act, inner, parameters.layer))
 
     @scalar
-    def observe(
-        qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
-    ) -> tuple[float, ...]:
+    def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
         seen = inner_observe(qpos, qvel, act[:first], ctrl[:inner_ctrl])
         return (
             *seen,
@@ -177,7 +165,7 @@ def with_air(loop: ClosedLoop) -> ClosedLoop:
 
     controls.__qualname__ = f"with_air.{loop.controls.__qualname__}"
 
-    def initial_activations(scenario: Scenario, setup: ControlSetup) -> Sequence[float]:
+    def initial_activations(scenario: Scenario, setup: ControlSetup) -> Vector:
         turbulence = setup.parameters.layer.air.turbulence
         return (*layered.initial_activations(scenario, setup), *stationary_states(turbulence))
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Floats, SignCheck
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, SignCheck
 from tiltsim_controllers.mathematics.records import make_record_type
-from tiltsim_controllers.mathematics.scalar import scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
@@ -39,41 +39,31 @@ def around(
 
     @scalar
     def controls(
-        time: float,
-        qpos: Sequence[float],
-        qvel: Sequence[float],
-        act: Sequence[float],
-        parameters: Any,
-        table: Sequence[float],
-    ) -> tuple[float, ...]:
-        return inner_controls(time, qpos, qvel, act, parameters.law, table)
+        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
+    ) -> Values:
+        return inner_controls(time, qpos, qvel, act, parameters.law, knots)
 
     @scalar
     def hold(
-        time: float,
-        qpos: Sequence[float],
-        qvel: Sequence[float],
-        act: Sequence[float],
-        ctrl: Sequence[float],
-        parameters: Any,
-    ) -> tuple[float, ...]:
+        time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: Any
+    ) -> Values:
         return inner_hold(time, qpos, qvel, act, ctrl, parameters.law)
 
     @scalar
-    def watch(values: Sequence[float], parameters: Any) -> tuple[float, ...]:
-        watched: tuple[float, ...] = inner_watch(values, parameters.law)
+    def watch(values: Vector, parameters: Any) -> Values:
+        watched: Values = inner_watch(values, parameters.law)
         return watched
 
     def setup(scenario: Scenario, signature: float) -> ControlSetup:
         inner = loop.setup(scenario, loop.signature)
         return ControlSetup(
-            parameters_type(signature, read(scenario), inner.parameters), inner.table
+            parameters_type(signature, read(scenario), inner.parameters), inner.knots
         )
 
     def within(setup: ControlSetup) -> ControlSetup:
-        return ControlSetup(setup.parameters.law, setup.table)
+        return ControlSetup(setup.parameters.law, setup.knots)
 
-    def initial_activations(scenario: Scenario, setup: ControlSetup) -> Sequence[float]:
+    def initial_activations(scenario: Scenario, setup: ControlSetup) -> Vector:
         return loop.initial_activations(scenario, within(setup))
 
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:

@@ -1,4 +1,4 @@
-"""Any loop around a rotorcraft, whatever its layers, on the thesis' equations.
+"""Any loop around a rotorcraft, whatever its layers, on the thesis's equations.
 
 The loop stays what it is in MuJoCo, a function from time, `qpos`, `qvel` and `act` to controls, and
 so does the order in which it reads its sensors, draws its noise and hands on its commands. Only
@@ -7,7 +7,7 @@ what the controls act upon is another: `tiltsim.equations.driven`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations
 from tiltsim.equations.driven import ACTUATOR_PLANTS, Mechanics, Wrench, mechanics
 from tiltsim.laws.layers.layer import around
 from tiltsim.models.parts import ExtraActuators
-from tiltsim_controllers.mathematics.scalar import Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
@@ -27,7 +27,7 @@ ROTORS = 4
 @cache
 def _read_actuators(
     actuators: tuple[ExtraActuators, ...], first: int
-) -> tuple[Callable[..., tuple[float, ...]], Callable[..., Wrench]]:
+) -> tuple[Callable[..., Values], Callable[..., Wrench]]:
     """Scalar code that reads what actuators do, from the controls of which theirs begin at one.
 
     Returns ``rates(ctrl)``, those of the activations in their order, and ``wrench(ctrl)``.
@@ -35,11 +35,11 @@ def _read_actuators(
     if not actuators:
 
         @scalar
-        def no_rates(ctrl: Sequence[float]) -> tuple[float, ...]:
+        def no_rates(ctrl: Vector) -> Values:
             return ()
 
         @scalar
-        def no_wrench(ctrl: Sequence[float]) -> Wrench:
+        def no_wrench(ctrl: Vector) -> Wrench:
             return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 
         return no_rates, no_wrench
@@ -51,14 +51,14 @@ def _read_actuators(
     further_rates, further_wrench = _read_actuators(actuators[1:], end)
 
     @scalar
-    def rates(ctrl: Sequence[float]) -> tuple[float, ...]:
+    def rates(ctrl: Vector) -> Values:
         return (*ctrl[first:memories], *further_rates(ctrl))
 
     if not this.wrench:
         return rates, further_wrench
 
     @scalar
-    def wrench(ctrl: Sequence[float]) -> Wrench:
+    def wrench(ctrl: Vector) -> Wrench:
         fx, fy, fz, tx, ty, tz = further_wrench(ctrl)
         return (
             *(fx + ctrl[force], fy + ctrl[force + 1], fz + ctrl[force + 2]),
@@ -82,26 +82,22 @@ def on_equations(loop: ClosedLoop) -> ClosedLoop:
     activation_rates, wrench = _read_actuators((own, *loop.extra_actuators), driven.rotor_states)
 
     @scalar
-    def equation_inputs(
-        time: float, state: Sequence[float], parameters: Any, table: Sequence[float]
-    ) -> tuple[float, ...]:
-        return controls(time, qpos_of(state), qvel_of(state), state[first:], parameters.law, table)
+    def equation_inputs(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
+        return controls(time, qpos_of(state), qvel_of(state), state[first:], parameters.law, knots)
 
     @scalar
-    def controls_in_force(
-        time: float, state: Sequence[float], inputs: Sequence[float], parameters: Any
-    ) -> tuple[float, ...]:
+    def controls_in_force(time: float, state: Vector, inputs: Vector, parameters: Any) -> Values:
         return held(time, qpos_of(state), qvel_of(state), state[first:], inputs, parameters.law)
 
     @scalar
     def equation_rates(
         time: float,
         state: list[float],
-        inputs: Sequence[float],
+        inputs: Vector,
         parameters: Any,
-        table: Sequence[float],
+        knots: Vector,
         disturbance: Triple,
-    ) -> tuple[float, ...]:
+    ) -> Values:
         # A stage may have carried a rotor past its limit by what one step adds.
         state = motion_settled(state, parameters.layer)
         ctrl = controls_in_force(time, state, inputs, parameters)
@@ -112,12 +108,8 @@ def on_equations(loop: ClosedLoop) -> ClosedLoop:
 
     @scalar
     def observe_equations(
-        time: float,
-        state: Sequence[float],
-        inputs: Sequence[float],
-        parameters: Any,
-        table: Sequence[float],
-    ) -> tuple[float, ...]:
+        time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
+    ) -> Values:
         ctrl = controls_in_force(time, state, inputs, parameters)
         return observe(qpos_of(state), qvel_of(state), state[first:], ctrl)
 
@@ -128,7 +120,7 @@ def on_equations(loop: ClosedLoop) -> ClosedLoop:
     equation_inputs.__qualname__ = f"on_equations.{loop.controls.__qualname__}"
     layered = around(loop, Mechanics, mechanics)
 
-    def initial(scenario: Scenario, setup: ControlSetup) -> Sequence[float]:
+    def initial(scenario: Scenario, setup: ControlSetup) -> Vector:
         return (*driven.initial(scenario), *layered.initial_activations(scenario, setup))
 
     return replace(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -11,7 +11,7 @@ import numpy as np
 
 import tiltsim.laws.attitude_altitude as attitude_altitude
 import tiltsim.laws.gait_feedforward as gait_feedforward
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Floats
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.laws.attitude_altitude import TILTROTOR
 from tiltsim.laws.gait_feedforward import GAIT_FEEDFORWARD
 from tiltsim.laws.tiltrotor import (
@@ -33,7 +33,7 @@ from tiltsim_controllers.laws.supervisor import (
     supervised_tilts,
 )
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
-from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.vehicle.parameters import drag_ratio
 
 if TYPE_CHECKING:
@@ -59,11 +59,11 @@ class _Law(NamedTuple):
     """
 
     supervisor: Callable[[Any], Supervisor]  # of the loop's parameters
-    rates: Callable[..., tuple[float, ...]]
-    """``(time, state, qvel, act, supervisor_motion, parameters, table)``: the controls from the
+    rates: Callable[..., Values]
+    """``(time, state, qvel, act, supervisor_motion, parameters, knots)``: the controls from the
     rotor accelerations on."""
-    references: Callable[..., tuple[float, ...]]
-    """``(time, seen, supervisor_motion, parameters, table)``: `tiltrotor.REFERENCE_COLUMNS`."""
+    references: Callable[..., Values]
+    """``(time, seen, supervisor_motion, parameters, knots)``: `tiltrotor.REFERENCE_COLUMNS`."""
     seen: tuple[str, ...]  # the fields of a sample that the references need
 
 
@@ -100,7 +100,7 @@ def supervised_commands(
     time: float,
     supervisor_motion: Triple,
     gait: GaitParameters,
-    table: Sequence[float],
+    knots: Vector,
     supervisor: Supervisor,
     ratio: float,
     lead: float,
@@ -111,27 +111,17 @@ def supervised_commands(
     acceleration, ``ratio`` the vehicle's drag ratio.
     """
     clock = gait_time(time, supervisor_motion, supervisor)
-    planned = planned_tilts(clock, gait, table)
+    planned = planned_tilts(clock, gait, knots)
     a1, a2, a3, a4 = supervised_tilts(planned, 1.0, supervisor_motion, supervisor, ratio)
-    return (
-        a1[0] + lead * a1[1],
-        a2[0] + lead * a2[1],
-        a3[0] + lead * a3[1],
-        a4[0] + lead * a4[1],
-    )
+    return (a1[0] + lead * a1[1], a2[0] + lead * a2[1], a3[0] + lead * a3[1], a4[0] + lead * a4[1])
 
 
 @scalar
 def scaled_share(
-    time: float,
-    roll: float,
-    pitch: float,
-    law: Any,
-    supervisor: Supervisor,
-    table: Sequence[float],
+    time: float, roll: float, pitch: float, law: Any, supervisor: Supervisor, knots: Vector
 ) -> float:
     """The `supervised_gait_scale` of the gait that a ``law`` flies."""
-    planned = tilt_reference(time, law.gait, table)
+    planned = tilt_reference(time, law.gait, knots)
     return supervised_gait_scale(planned, roll, pitch, supervisor, law.vehicle)
 
 
@@ -142,17 +132,12 @@ def _scaling(loop: ClosedLoop) -> ClosedLoop:
 
     @scalar
     def controls(
-        time: float,
-        qpos: Sequence[float],
-        qvel: Sequence[float],
-        act: Sequence[float],
-        parameters: Any,
-        table: Sequence[float],
-    ) -> tuple[float, ...]:
-        planned = inner_controls(time, qpos, qvel, act, parameters, table)
+        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
+    ) -> Values:
+        planned = inner_controls(time, qpos, qvel, act, parameters, knots)
         roll, pitch, _yaw = euler_from_quaternion(qpos[3], qpos[4], qpos[5], qpos[6])
         supervisor = supervisor_of(parameters)
-        share = scaled_share(time, roll, pitch, parameters.law, supervisor, table)
+        share = scaled_share(time, roll, pitch, parameters.law, supervisor, knots)
         return (
             *(share * planned[0], share * planned[1], share * planned[2], share * planned[3]),
             *planned[4:],
@@ -173,8 +158,8 @@ def _scaling(loop: ClosedLoop) -> ClosedLoop:
 
 def _shares(samples: Mapping[str, Floats], setup: ControlSetup, supervisor: Supervisor) -> Floats:
     attitudes = zip(samples["time"].tolist(), samples["roll"].tolist(), samples["pitch"].tolist())
-    law, table = setup.parameters.law, setup.table
-    return np.array([scaled_share(*attitude, law, supervisor, table) for attitude in attitudes])
+    law, knots = setup.parameters.law, setup.knots
+    return np.array([scaled_share(*attitude, law, supervisor, knots) for attitude in attitudes])
 
 
 @cache
@@ -188,43 +173,34 @@ def _with_states(loop: ClosedLoop) -> ClosedLoop:
 
     @scalar
     def controls(
-        time: float,
-        qpos: Sequence[float],
-        qvel: Sequence[float],
-        act: Sequence[float],
-        parameters: Any,
-        table: Sequence[float],
-    ) -> tuple[float, ...]:
+        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
+    ) -> Values:
         law, supervisor = parameters.law, supervisor_of(parameters)
         state = tiltrotor_state(qpos, qvel, act)
         ratio, lead = drag_ratio(law.vehicle), parameters.servo_lead
         supervisor_motion = supervised_derivative(
             *(time, state[6], state[7], act[first], act[first + 1]),
-            *(law.gait, table, supervisor, ratio),
+            *(law.gait, knots, supervisor, ratio),
         )
         return (
-            *supervised_commands(time, supervisor_motion, law.gait, table, supervisor, ratio, lead),
+            *supervised_commands(time, supervisor_motion, law.gait, knots, supervisor, ratio, lead),
             *rotor_thrust_controls(act),
-            *law_rates(time, state, qvel, act, supervisor_motion, parameters, table),
+            *law_rates(time, state, qvel, act, supervisor_motion, parameters, knots),
             *(supervisor_motion[1], supervisor_motion[2]),
         )
 
     @scalar
-    def observe(
-        qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float], ctrl: Sequence[float]
-    ) -> tuple[float, ...]:
+    def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
         return (*inner_observe(qpos, qvel, act, ctrl), act[first], act[first + 1])
 
     @scalar
-    def reference_values(
-        time: float, state: Sequence[float], parameters: Any, table: Sequence[float]
-    ) -> tuple[float, ...]:
+    def reference_values(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
         law, supervisor = parameters.law, supervisor_of(parameters)
         supervisor_motion = (state[seen], state[seen + 1], 0.0)
         ratio = drag_ratio(law.vehicle)
         return (
-            *references(time, state, supervisor_motion, parameters, table),
-            *supervised_commands(time, supervisor_motion, law.gait, table, supervisor, ratio, 0.0),
+            *references(time, state, supervisor_motion, parameters, knots),
+            *supervised_commands(time, supervisor_motion, law.gait, knots, supervisor, ratio, 0.0),
         )
 
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -238,7 +214,7 @@ def _with_states(loop: ClosedLoop) -> ClosedLoop:
             | {SUPERVISION: supervision}
         )
 
-    def initial_activations(scenario: Scenario, setup: ControlSetup) -> Sequence[float]:
+    def initial_activations(scenario: Scenario, setup: ControlSetup) -> Vector:
         return (*loop.initial_activations(scenario, setup), 0.0, 0.0)
 
     controls.__qualname__ = f"supervised.{loop.controls.__qualname__}"

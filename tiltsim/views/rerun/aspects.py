@@ -22,11 +22,11 @@ from tiltsim.views.rerun.series import (
     panels,
     series_values,
 )
+from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
     from tiltsim.scenario.scenario import Scenario
-    from tiltsim.views.rerun.rows import Floats
 
 
 @dataclass(frozen=True)

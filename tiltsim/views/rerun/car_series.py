@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from tiltsim.views.rerun import palette
-from tiltsim.views.rerun.rows import Floats
 from tiltsim.views.rerun.series import LIMIT_WIDTH, REFERENCE_WIDTH, Panel, Series
+from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight

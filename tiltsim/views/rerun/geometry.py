@@ -14,11 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tiltsim.views.replay import rotate
+from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     import rerun as rr
-
-Floats = npt.NDArray[np.float64]
 
 VISIBLE_GROUPS: Final = (0, 1, 2)
 """Geom groups that are drawn; by MuJoCo's habit collision geometry stands in group 3."""

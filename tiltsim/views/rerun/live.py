@@ -17,10 +17,10 @@ from tiltsim.views.rerun.blueprint import flight_blueprint
 from tiltsim.views.rerun.recorder import FlightRecorder
 from tiltsim.views.rerun.recording import new_recording
 from tiltsim.views.rerun.viewer import attach_viewer, require_viewer
+from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
-    from tiltsim.views.rerun.rows import Floats
 
 SEND_INTERVAL: Final = 0.25  # s of wall time between pieces; each costs about 0.04 s
 SHUTDOWN_TIMEOUT: Final = 5.0

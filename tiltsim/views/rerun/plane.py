@@ -20,7 +20,8 @@ from tiltsim.views.attitude_plane import (
     unreachable_pitch,
 )
 from tiltsim.views.rerun import palette
-from tiltsim.views.rerun.rows import Floats, Ticks, send_rows
+from tiltsim.views.rerun.rows import Ticks, send_rows
+from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     import rerun as rr

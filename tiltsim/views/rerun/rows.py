@@ -8,11 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tiltsim.views.rerun.names import TIMELINE
+from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     import rerun as rr
-
-Floats = npt.NDArray[np.float64]
 
 
 def send_rows(recording: rr.RecordingStream, path: str, times: Floats, *columns: Any) -> None:

@@ -21,7 +21,8 @@ from tiltsim.views.replay import (
 )
 from tiltsim.views.rerun import palette
 from tiltsim.views.rerun.geometry import body_paths, ground_height, log_geometry, xyzw
-from tiltsim.views.rerun.rows import Floats, Ticks, send_rows
+from tiltsim.views.rerun.rows import Ticks, send_rows
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import position_reference
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ from tiltsim.laws.assembling import follows_position, loop_of
 from tiltsim.laws.layers.supervision import SUPERVISION
 from tiltsim.views.attitude_plane import margin_threshold
 from tiltsim.views.rerun import palette
-from tiltsim.views.rerun.rows import Floats, send_rows
+from tiltsim.views.rerun.rows import send_rows
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import SPIN
 
 if TYPE_CHECKING:

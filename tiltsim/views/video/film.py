@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Final
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import follows_position
@@ -26,12 +25,11 @@ from tiltsim.views.replay import (
 )
 from tiltsim.views.video.aspects import aspect_of
 from tiltsim.views.video.offscreen import Canvas, Image
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import position_reference
 
 if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
-
-Floats = npt.NDArray[np.float64]
 
 TRAIL_TIME: Final = 20.0  # s of the flight that the trail shows
 TRAIL_INTERVAL: Final = 0.1  # s between its corners

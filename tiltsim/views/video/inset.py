@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from tiltsim.views.attitude_plane import HALF_WIDTH, MARGIN_THRESHOLD
 from tiltsim_controllers.analysis.singularity import world_up
+from tiltsim_controllers.mathematics.scalar import Floats
 
-Floats = npt.NDArray[np.float64]
 Image = npt.NDArray[np.uint8]
 
 GROUND: Final = (250, 250, 250)
