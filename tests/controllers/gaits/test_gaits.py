@@ -13,7 +13,8 @@ from tiltsim_controllers.gaits.trot import continuous_trot, instant_trot
 RHO, PERIOD = 0.65, 2.0
 
 times = st.floats(0.0, 200.0)
-amplitudes = st.floats(-1.5, 1.5)
+# Subnormal numbers have too few digits for differences.
+amplitudes = st.floats(-1.5, 1.5, allow_subnormal=False)
 periods = st.floats(0.2, 20.0)
 
 quick = settings(deadline=None, max_examples=60)
