@@ -13,7 +13,7 @@ import tiltsim
 from tiltsim.errors import InputError
 from tiltsim.flight.reading import load_flight
 from tiltsim.laws.assembling import LOOPS, loop_of
-from tiltsim.models.rotorcraft import compile_model
+from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 from tiltsim.plants.factory import make_plant
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim_controllers.analysis.balance import balanced_gait
@@ -518,8 +518,10 @@ def test_yaw_takes_the_short_way_past_half_a_revolution(law, start, end):
 
 @pytest.mark.parametrize("model", ["tiltrotor", "quadrotor"])
 def test_law_states_integrate_their_controls_and_act_on_nothing(model):
-    compiled = compile_model(model, PRESETS["ar_drone_2"], law_states=2, visuals=False)
-    plain = compile_model(model, PRESETS["ar_drone_2"], visuals=False)
+    compiled = compile_model(
+        RotorcraftSpec(model, PRESETS["ar_drone_2"], law_states=2), visuals=False
+    )
+    plain = compile_model(RotorcraftSpec(model, PRESETS["ar_drone_2"]), visuals=False)
     assert (compiled.na, compiled.nu) == (plain.na + 2, plain.nu + 2)
     data, bare = mujoco.MjData(compiled), mujoco.MjData(plain)
     for this, its in ((compiled, data), (plain, bare)):
@@ -534,7 +536,7 @@ def test_law_states_integrate_their_controls_and_act_on_nothing(model):
 
 def test_a_negative_number_of_law_states_is_refused():
     with pytest.raises(ValueError, match="law_states = -1"):
-        compile_model("quadrotor", PRESETS["ar_drone_2"], law_states=-1)
+        RotorcraftSpec("quadrotor", PRESETS["ar_drone_2"], law_states=-1)
 
 
 def test_the_extension_starts_at_the_weight():

@@ -13,7 +13,7 @@ import pytest
 import tiltsim
 from tests.flights import flight as screen_flight
 from tiltsim.cli import main
-from tiltsim.models.tilt_car import compile_tilt_car
+from tiltsim.models.tilt_car import TiltCarSpec, compile_tilt_car
 from tiltsim.resources import shipped_folder
 from tiltsim.views.figures.flight import flight_figure
 from tiltsim.views.replay import thrust_sites, visible_model
@@ -49,7 +49,7 @@ def fly(address, plant="mujoco", duration=None, **overrides):
 
 def test_the_file_holds_what_compile_tilt_car_makes_of_the_thesis_car():
     plain = mujoco.MjModel.from_xml_path(str(shipped_folder("mjcf") / "tilt_car.xml"))
-    model = compile_tilt_car(THESIS_CAR)
+    model = compile_tilt_car(TiltCarSpec(THESIS_CAR))
     for name in ("body_mass", "body_inertia", "actuator_gear", "actuator_gainprm", "key_act"):
         np.testing.assert_allclose(getattr(plain, name), getattr(model, name), rtol=1e-12)
     np.testing.assert_allclose(plain.actuator_biasprm, model.actuator_biasprm, rtol=1e-12)
@@ -59,7 +59,7 @@ def test_the_file_holds_what_compile_tilt_car_makes_of_the_thesis_car():
 
 def test_mass_and_inertia_are_the_cars():
     car = THESIS_CAR._replace(mass=3.0, top_inertia=0.004, bottom_inertia=0.002)
-    model = compile_tilt_car(car)
+    model = compile_tilt_car(TiltCarSpec(car))
     assert model.body_subtreemass[1] == pytest.approx(3.0)
     assert model.body("vehicle").inertia[2] == pytest.approx(0.002)
     assert model.body("top").inertia[2] == pytest.approx(0.004)
@@ -67,7 +67,7 @@ def test_mass_and_inertia_are_the_cars():
 
 def test_thrusts_pass_through_the_axis_at_the_half_angle():
     car = THESIS_CAR._replace(half_angle=0.4)
-    model = compile_tilt_car(car)
+    model = compile_tilt_car(TiltCarSpec(car))
     data = mujoco.MjData(model)
     data.qpos[2:] = 0.3, 0.9
     data.ctrl[:3] = 0.9, 8000.0, 3000.0  # the servo is where it is told to be
@@ -91,7 +91,7 @@ def test_thrusts_pass_through_the_axis_at_the_half_angle():
 )
 def test_a_model_that_cannot_be_is_refused(mistake, message):
     with pytest.raises(ValueError, match=message):
-        compile_tilt_car(THESIS_CAR, **mistake)
+        TiltCarSpec(THESIS_CAR, **mistake)
 
 
 # --- the yaw answers the tilt ------------------------------------------------------------------
@@ -102,7 +102,7 @@ def test_the_bottom_disc_turns_back_by_angular_momentum_alone(bottom, share):
     # The published factor, I_T / I_B = 1/2, is there for I_B = I_T + I_bottom alone.
     car = THESIS_CAR._replace(bottom_inertia=bottom)
     assert counter_yaw_per_tilt(car) == pytest.approx(share)
-    model = compile_tilt_car(car)
+    model = compile_tilt_car(TiltCarSpec(car))
     data = mujoco.MjData(model)
     data.ctrl[:3] = 1.5, 5000.0, 9000.0
     for _ in range(40):
@@ -114,7 +114,7 @@ def test_the_bottom_disc_turns_back_by_angular_momentum_alone(bottom, share):
 
 
 def test_the_servo_is_as_fast_on_the_free_car_as_it_says():
-    model = compile_tilt_car(THESIS_CAR, timestep=2e-5)
+    model = compile_tilt_car(TiltCarSpec(THESIS_CAR, timestep=2e-5))
     data = mujoco.MjData(model)
     data.ctrl[0] = 1.0
     mujoco.mj_step(model, data, 500)

@@ -9,7 +9,7 @@ import pytest
 import tiltsim
 from tiltsim.errors import InputError
 from tiltsim.models.parts import Ground
-from tiltsim.models.rotorcraft import compile_model
+from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 VEHICLE = PRESETS["ar_drone_2"]
@@ -30,7 +30,7 @@ def normal_force(model, data):
 @pytest.mark.parametrize("visuals", [True, False])
 @pytest.mark.parametrize("vehicle", ["tiltrotor", "quadrotor"])
 def test_a_vehicle_set_down_stands_on_its_skids_and_carries_its_weight(vehicle, visuals):
-    model = compile_model(vehicle, VEHICLE, ground=Ground(0.5), visuals=visuals)
+    model = compile_model(RotorcraftSpec(vehicle, VEHICLE, ground=Ground(0.5)), visuals=visuals)
     data = mujoco.MjData(model)
     data.qpos[2] = 0.5 + ON_SKIDS + 0.01
     mujoco.mj_step(model, data, 2000)
@@ -43,7 +43,9 @@ def test_a_vehicle_set_down_stands_on_its_skids_and_carries_its_weight(vehicle, 
 
 def test_friction_holds_up_to_its_share_of_the_weight():
     def slid(push):
-        model = compile_model("quadrotor", VEHICLE, ground=Ground(0.0, 0.5), visuals=False)
+        model = compile_model(
+            RotorcraftSpec("quadrotor", VEHICLE, ground=Ground(0.0, 0.5)), visuals=False
+        )
         data = mujoco.MjData(model)
         data.qpos[2] = ON_SKIDS
         data.body("vehicle").xfrc_applied[0] = push * WEIGHT
@@ -57,7 +59,7 @@ def test_friction_holds_up_to_its_share_of_the_weight():
 
 
 def test_without_ground_nothing_touches():
-    model = compile_model("tiltrotor", VEHICLE, visuals=False)
+    model = compile_model(RotorcraftSpec("tiltrotor", VEHICLE), visuals=False)
     assert model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT
     assert model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     assert model.ngeom == 0

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from tests.thesis import force_matrix, torque_matrix
 from tiltsim.errors import InputError
 from tiltsim.models.parts import Pod, RotorLimits, TiltServo
-from tiltsim.models.rotorcraft import compile_model
+from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import parse_scenario
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
@@ -50,7 +50,11 @@ attitudes = (
 )
 
 
-compiled = lru_cache(compile_model)  # shared by the tests, which must not change it
+def compile_of(*parameters, visuals=True, **options):
+    return compile_model(RotorcraftSpec(*parameters, **options), visuals=visuals)
+
+
+compiled = lru_cache(compile_of)  # shared by the tests, which must not change it
 
 
 def placed(model, *, alpha=(0.0, 0.0, 0.0, 0.0), attitude=(1.0, 0.0, 0.0, 0.0)):
@@ -157,9 +161,9 @@ def test_quadrotor_has_the_vehicles_mass_and_inertia():
 
 def test_too_heavy_pods_are_refused_with_the_numbers():
     with pytest.raises(ValueError, match=r"vehicle.mass = 0.429.*mass=0.11"):
-        compile_model("tiltrotor", AR_DRONE, pod=Pod(mass=0.11))
+        compile_of("tiltrotor", AR_DRONE, pod=Pod(mass=0.11))
     with pytest.raises(ValueError, match=r"0.00224.*inertia=0.0006"):
-        compile_model("tiltrotor", AR_DRONE, pod=Pod(inertia=6e-4))
+        compile_of("tiltrotor", AR_DRONE, pod=Pod(inertia=6e-4))
 
 
 # ------------------------------------------------------------------------ forces and torques
@@ -401,7 +405,7 @@ def test_thrust_keeps_to_the_limits_of_the_speed(limits, controls):
 
 
 def test_options_reach_the_model():
-    model = compile_model(
+    model = compile_of(
         "quadrotor", LUUKKONEN, timestep=4e-3, integrator="implicitfast", userdata_size=27
     )
     assert model.opt.timestep == 4e-3
@@ -423,7 +427,7 @@ def test_what_is_drawn_grows_with_the_arms():
 def test_flight_without_visuals_is_the_same_flight():
     ends = []
     for visuals in (True, False):
-        model = compile_model("tiltrotor", AR_DRONE, visuals=visuals)
+        model = compile_of("tiltrotor", AR_DRONE, visuals=visuals)
         data = mujoco.MjData(model)
         mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
         data.ctrl[:4] = [0.3, -0.2, 0.1, 0.4]
@@ -434,7 +438,7 @@ def test_flight_without_visuals_is_the_same_flight():
 
 
 def test_models_compiled_alike_are_independent():
-    first, second = (compile_model("quadrotor", AR_DRONE) for _ in range(2))
+    first, second = (compile_of("quadrotor", AR_DRONE) for _ in range(2))
     first.opt.gravity = 0.0
     assert second.opt.gravity[2] == -9.8
 
@@ -442,16 +446,16 @@ def test_models_compiled_alike_are_independent():
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (lambda: compile_model("tricopter", AR_DRONE), "'tricopter'.*tiltrotor, quadrotor"),
-        (lambda: compile_model("tiltrotor", AR_DRONE, integrator="rk4"), "'rk4'.*Euler, RK4"),
-        (lambda: compile_model("tiltrotor", AR_DRONE, timestep=0.0), "timestep = 0.0"),
-        (lambda: compile_model("tiltrotor", AR_DRONE, userdata_size=-1), "userdata_size = -1"),
-        (lambda: compile_model("quadrotor", AR_DRONE._replace(mass=-1.0)), "mass = -1.0"),
+        (lambda: compile_of("tricopter", AR_DRONE), "'tricopter'.*tiltrotor, quadrotor"),
+        (lambda: compile_of("tiltrotor", AR_DRONE, integrator="rk4"), "'rk4'.*Euler, RK4"),
+        (lambda: compile_of("tiltrotor", AR_DRONE, timestep=0.0), "timestep = 0.0"),
+        (lambda: compile_of("tiltrotor", AR_DRONE, userdata_size=-1), "userdata_size = -1"),
+        (lambda: compile_of("quadrotor", AR_DRONE._replace(mass=-1.0)), "mass = -1.0"),
         (
-            lambda: compile_model("quadrotor", AR_DRONE._replace(arm_length=inf)),
+            lambda: compile_of("quadrotor", AR_DRONE._replace(arm_length=inf)),
             "arm_length = inf",
         ),
-        (lambda: compile_model("quadrotor", AR_DRONE._replace(inertia_zz=6e-3)), "0.006"),
+        (lambda: compile_of("quadrotor", AR_DRONE._replace(inertia_zz=6e-3)), "0.006"),
     ],
 )
 def test_bad_arguments_are_refused_by_name_and_value(build, message):
@@ -510,7 +514,7 @@ def test_a_model_made_of_another_is_what_compiling_gives(kind, law_states):
         gravity=9.81,
     )
     heavy = tiltsim.models.parts.Pod(mass=0.01, inertia=1e-6)
-    compile_this = partial(compile_model, kind, law_states=law_states, userdata_size=3, pod=heavy)
+    compile_this = partial(compile_of, kind, law_states=law_states, userdata_size=3, pod=heavy)
     tiltsim.models.rotorcraft._compiled.clear()
     compiled = dict(numbers(compile_this(other)))
     tiltsim.models.rotorcraft._compiled.clear()

@@ -323,7 +323,7 @@ def test_the_actuators_order_counts(write):
         '    <general name="thrust_1"',
         '    <position name="tilt_1" joint="tilt_1" class="pod"/>\n    <general name="thrust_1"',
     )
-    with pytest.raises(InputError, match="actuators stand in another order than tilt_1, tilt_2"):
+    with pytest.raises(InputError, match="actuators must be in the order tilt_1, tilt_2"):
         scenario(write(text))
 
 
@@ -345,7 +345,7 @@ def test_scenarios_that_contradict_the_file_are_refused(write, vehicle, words):
 @pytest.mark.parametrize(
     ("vehicle", "words"),
     [
-        ({"mass": 0.1}, "carries have 0.12 kg already"),
+        ({"mass": 0.1}, "carries already have 0.12 kg"),
         ({"inertia": [1e-3, 1e-3, 1.5e-3]}, "principal moments"),
     ],
 )

@@ -31,7 +31,7 @@ from tests.views.viewer_shot import (
 from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.flight.reading import load_flight
-from tiltsim.models.rotorcraft import MODELS, compile_model
+from tiltsim.models.rotorcraft import MODELS, RotorcraftSpec, compile_model
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.simulation.simulate import simulate
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME
@@ -393,7 +393,7 @@ def test_every_shape_of_any_model_is_drawn_or_named(tmp_path):
 def test_every_vehicle_is_drawn_whole(vehicle, tmp_path):
     import rerun as rr
 
-    model = compile_model(vehicle, PRESETS["ar_drone_2"])
+    model = compile_model(RotorcraftSpec(vehicle, PRESETS["ar_drone_2"]))
     path = tmp_path / "vehicle.rrd"
     with rr.RecordingStream("test") as recording:
         recording.save(path)

@@ -133,7 +133,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _tell_what_the_law_does_not_know(scenario: Scenario) -> None:
     """A line on what a law of ours has wrong of a user's own vehicle."""
-    own = scenario.rotorcraft.own
+    own = scenario.rotorcraft.user_vehicle
     if own is not None and own.unmodeled_properties and scenario.controller.law != "python":
         print(
             f"tiltsim: warning: vehicle.mjcf: the {scenario.controller.law} law, which takes the "

@@ -1,4 +1,4 @@
-"""Edit MJCF before it is compiled."""
+"""Reading MJCF as dm_control's tree, and the edits that every vehicle's model needs."""
 
 from __future__ import annotations
 
@@ -6,9 +6,20 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+from tiltsim.models.parts import TiltServo
 
-def strip(root: Any, contacts: bool) -> None:
-    """Remove what is only drawn or read: geoms without contacts, cameras, lights and sensors.
+
+def parse_mjcf(path: Path) -> Any:
+    """An MJCF file as dm_control's tree."""
+    with warnings.catch_warnings():
+        # dm_control tries its window systems on import; without a screen GLFW complains.
+        warnings.filterwarnings("ignore", module="glfw")
+        from dm_control import mjcf
+    return mjcf.from_path(str(path))
+
+
+def remove_visuals(root: Any, *, contacts: bool) -> None:
+    """Remove geoms (with ``contacts`` only those that never touch), cameras, lights and sensors.
 
     The shipped vehicles have neither springs nor dampers, so that MuJoCo need not look for them.
     """
@@ -25,54 +36,42 @@ def strip(root: Any, contacts: bool) -> None:
             site.remove()
 
 
-def parse_mjcf(path: Path) -> Any:
-    """An MJCF file as dm_control's tree."""
-    with warnings.catch_warnings():
-        # dm_control tries its window systems on import; without a screen GLFW complains.
-        warnings.filterwarnings("ignore", module="glfw")
-        from dm_control import mjcf
-    return mjcf.from_path(str(path))
+def set_servo_gains(position: Any, inertia: float, servo: TiltServo) -> None:
+    """Give a position actuator a servo's frequency and damping on a hinge's inertia (kg m^2)."""
+    position.kp = inertia * servo.natural_frequency**2
+    position.kv = 2.0 * inertia * servo.damping_ratio * servo.natural_frequency
 
 
-def add_law_states(root: Any, count: int) -> None:
-    """Append the states of a law: integrators that act on nothing."""
-    _add_states(root, "law", count)
+def set_stop(joint: Any, position: Any, max_angle: float, timestep: float) -> None:
+    """Limit a hinge and its servo's command to plus and minus an angle (rad)."""
+    joint.range = position.ctrlrange = (-max_angle, max_angle)
+    # As stiff as MuJoCo allows: its usual stop is softer than the servo and would do nothing.
+    joint.solreflimit = (2.0 * timestep, 1.0)
+    joint.solimplimit = (0.99, 0.99, 0.001, 0.5, 2.0)
 
 
-def _add_states(root: Any, name: str, count: int) -> None:
-    """Append integrators that act on nothing; in the keyframes they rest at zero."""
-    joint = _idle_joint(root)
-    for index in range(1, count + 1):
-        root.actuator.add(
-            "general",
-            name=f"{name}_{index}",
-            joint=joint,
-            dyntype="integrator",
-            gainprm=[0.0],
-        )
+def add_states(root: Any, name: str, count: int) -> None:
+    """Append integrators ``name_1``, ... that act on nothing; in the keyframes they are zero."""
+    _add_idle_actuators(root, name, count, dyntype="integrator")
     _extend_keyframes(root, act=count, ctrl=count)
 
 
-def _idle_joint(root: Any) -> Any:
-    """What actuators without gain act on; of all that there is, a joint costs MuJoCo least."""
-    vehicle = root.find("body", "vehicle")
-    return vehicle.freejoint or vehicle.joint[-1]
-
-
-def _add_memories(root: Any, name: str, count: int) -> None:
-    """Append actuators without gain, whose controls remember what a held law has said."""
-    joint = _idle_joint(root)
-    for index in range(1, count + 1):
-        root.actuator.add(
-            "general",
-            name=f"{name}_{index}",
-            joint=joint,
-            gainprm=[0.0],
-        )
+def add_memories(root: Any, name: str, count: int) -> None:
+    """Append actuators ``name_1``, ... without gain, whose controls hold a sampled law's output."""
+    _add_idle_actuators(root, name, count)
     _extend_keyframes(root, ctrl=count)
 
 
-def _add_wrench(root: Any, name: str) -> None:
+def _add_idle_actuators(root: Any, name: str, count: int, **attributes: str) -> None:
+    vehicle = root.find("body", "vehicle")
+    joint = vehicle.freejoint or vehicle.joint[-1]  # acting on a joint costs MuJoCo least
+    for index in range(1, count + 1):
+        root.actuator.add(
+            "general", name=f"{name}_{index}", joint=joint, gainprm=[0.0], **attributes
+        )
+
+
+def add_wrench(root: Any, name: str) -> None:
     """Append a force and a torque on the body at its centre, in body axes."""
     for index, axis in enumerate(
         ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z")

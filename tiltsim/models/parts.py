@@ -1,21 +1,35 @@
-"""Parts of a vehicle that its model is compiled with."""
+"""Parts and options that models of vehicles are compiled from; a scenario's tables fill them in."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import inf
+from dataclasses import dataclass, field
+from math import inf, isfinite
 from typing import Final, NamedTuple
+
+ROTORS: Final = (1, 2, 3, 4)
+"""The rotors of a tiltrotor or quadrotor."""
+
+INTEGRATORS: Final = ("Euler", "RK4", "implicit", "implicitfast")
+
+
+def require_positive(name: str, value: float, unit: str) -> None:
+    """Raise ValueError unless a value, named by its key and unit, is finite and above 0."""
+    if not (isfinite(value) and value > 0.0):
+        raise ValueError(f"{name} = {value!r}: must be finite and above 0 {unit}")
+
+
+def require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
+    """Raise ValueError unless a value, named by its key, is one of the choices."""
+    if value not in choices:
+        raise ValueError(f"{name} = {value!r}: unknown; choose {', '.join(choices)}")
 
 
 class ExtraActuators(NamedTuple):
-    """Actuators that a layer around a law appends to the vehicle's, in this order."""
+    """Actuators that a layer around a control law appends to the vehicle's, in this order."""
 
     states: int = 0  # integrators that act on nothing: ctrl is the rate of an activation
     memories: int = 0  # act on nothing and have no state: a held ctrl is all there is
     wrench: bool = False  # force (N) and torque (N m) on the body, six, in body axes
-
-
-INTEGRATORS: Final = ("Euler", "RK4", "implicit", "implicitfast")
 
 
 @dataclass(frozen=True)
@@ -27,11 +41,11 @@ class TiltServo:
 
     Attributes
     ----------
-    natural_frequency : float
+    natural_frequency
         ``w``, rad/s.
-    damping_ratio : float
+    damping_ratio
         ``zeta``, dimensionless.
-    max_angle : float or None
+    max_angle
         Largest tilt angle either way, rad: the command is clipped there and the hinge has a stop.
         None leaves the pod free to turn around.
     """
@@ -45,15 +59,15 @@ class TiltServo:
 class Pod:
     """The part of a rotor that tilts; its centre of mass lies on the hinge.
 
-    The defaults are as good as nothing, for the thesis gives its pods no inertia: a pod that
-    turns by 1 rad then turns chapter 3's body by less than 5e-11 rad. MuJoCo refuses moving
-    bodies below 1e-15; the armature keeps the hinge's equation well conditioned.
+    The defaults are negligible, because the thesis gives its pods no inertia: a pod that turns by
+    1 rad then turns chapter 3's body by less than 5e-11 rad. MuJoCo refuses moving bodies below
+    1e-15; the armature keeps the hinge's equation well conditioned.
 
     Attributes
     ----------
-    mass : float
+    mass
         kg.
-    inertia : float
+    inertia
         About any axis through the pod's centre of mass, kg m^2; the same for all axes, so that
         the vehicle's inertia does not depend on the tilt.
     """
@@ -64,19 +78,19 @@ class Pod:
 
 @dataclass(frozen=True)
 class RotorLimits:
-    """Limits on a rotor's speed, held by MuJoCo at the end of each step.
+    """Limits on a rotor's speed, enforced by MuJoCo at the end of each step.
 
     Within a step the stages of RK4 may see speeds beyond a limit by what one step adds. The thrust
     stays within the limits there, too.
 
     Attributes
     ----------
-    min_speed : float or None
+    min_speed
         Smallest ``|varpi|``, rad/s: the rotor cannot reverse. None lets it stop and reverse.
-    max_speed : float or None
+    max_speed
         Largest ``|varpi|``, rad/s, in either sense where the rotor may reverse. None is unlimited.
-    thrust_factors : tuple of float
-        The least and the greatest factor on the thrust that the flight brings: faults.
+    thrust_factors
+        The smallest and the largest factor that faults put on the thrust during the flight.
     """
 
     min_speed: float | None = None
@@ -104,15 +118,41 @@ class RotorLimits:
 
 @dataclass(frozen=True)
 class Ground:
-    """Level ground that the vehicle can stand on.
+    """Level ground that the vehicle can stand on."""
+
+    height: float = 0.0  # m, world
+    friction: float = 0.8  # coefficient of sliding friction
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelSpec:
+    """What the models of all vehicles are compiled from. Raises ValueError if out of range.
 
     Attributes
     ----------
-    height : float
-        m, world.
-    friction : float
-        Coefficient of sliding friction.
+    timestep
+        Physics time step, s.
+    integrator
+        MuJoCo's name: ``Euler``, ``RK4``, ``implicit`` or ``implicitfast``.
+    userdata_size
+        Numbers of user data in the simulation's state.
+    tilt_servo
+        The tilt servos. Ignored for a quadrotor; a tilt-car's angle is not limited.
+    law_states
+        Number of the control law's own states: integrators ``law_1``, ``law_2``, ... after the
+        vehicle's actuators, which act on nothing; ctrl is the state's rate.
     """
 
-    height: float = 0.0
-    friction: float = 0.8
+    timestep: float = 1e-3
+    integrator: str = "RK4"
+    userdata_size: int = 0
+    tilt_servo: TiltServo = field(default=TiltServo())
+    law_states: int = 0
+
+    def __post_init__(self) -> None:
+        require_choice("simulation.integrator", self.integrator, INTEGRATORS)
+        require_positive("simulation.timestep", self.timestep, "s")
+        for name in ("userdata_size", "law_states"):
+            size = getattr(self, name)
+            if size < 0:
+                raise ValueError(f"{name} = {size!r}: must be at least 0")

@@ -1,38 +1,45 @@
-"""Composing a vehicle's MuJoCo model from the files in ``mjcf/`` and a `Vehicle`'s parameters.
+"""Compiling a tiltrotor's or quadrotor's MuJoCo model from ``mjcf/`` and a `RotorcraftSpec`.
 
-The files hold chapter 3's vehicle. `compile_model` puts another vehicle's numbers in their place,
-scales what is drawn with the arms, and compiles. The records for it (`TiltServo`, `Pod`,
-`RotorLimits`, `Ground`) hold the defaults; the tables of a scenario check what is put into them.
+The files hold chapter 3's vehicle. `compile_model` replaces its parameters by another vehicle's,
+scales the geometry with the arms, and compiles.
 """
 
 from __future__ import annotations
 
 from copy import copy
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import lru_cache
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.models.mjcf_editing import (
-    _add_memories,
-    _add_states,
-    _add_wrench,
-    add_law_states,
+    add_memories,
+    add_states,
+    add_wrench,
     parse_mjcf,
-    strip,
+    remove_visuals,
+    set_servo_gains,
+    set_stop,
 )
-from tiltsim.models.parts import INTEGRATORS, Ground, Pod, RotorLimits, TiltServo
+from tiltsim.models.parts import (
+    ROTORS,
+    ExtraActuators,
+    Ground,
+    ModelSpec,
+    Pod,
+    RotorLimits,
+    TiltServo,
+    require_choice,
+    require_positive,
+)
+from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.resources import shipped_folder
-from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
+from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
 
 if TYPE_CHECKING:
     import mujoco
 
-    from tiltsim.models.parts import ExtraActuators
-    from tiltsim.models.user_vehicle import UserVehicle
-
 MODELS: Final = ("tiltrotor", "quadrotor")
-ROTORS: Final = (1, 2, 3, 4)
 
 SERVO_ARMATURE: Final = 1e-6
 """Inertia (kg m^2) of a tilt servo behind its gear, as felt at the hinge.
@@ -44,73 +51,74 @@ START_SPEED: Final = 300.0
 """Rotor speed (rad/s) of the keyframe ``start``."""
 
 
-def _require_positive(name: str, value: float, unit: str) -> None:
-    if not (isfinite(value) and value > 0.0):
-        raise ValueError(f"{name} = {value!r}: must be finite and above 0 {unit}")
+@dataclass(frozen=True)
+class RotorcraftSpec(ModelSpec):
+    """What a rotorcraft's model is compiled from. Raises ValueError if a value is out of range.
+
+    Attributes
+    ----------
+    model
+        ``tiltrotor`` or ``quadrotor`` (without hinges; its pods are part of the body).
+    vehicle
+        Physical parameters, the pods' included.
+    pod
+        Mass and inertia of a pod. Ignored for a quadrotor.
+    rotor_limits
+        Limits on the rotor speeds.
+    extra_actuators
+        What layers around the control law append after the law's states.
+    ground
+        Ground to take off from and land on; None disables contacts.
+    user_vehicle
+        A user's file in place of the shipped one, with its own arms and pods; its geoms may have
+        mass and are always kept.
+    """
+
+    model: str
+    vehicle: Vehicle
+    _: KW_ONLY
+    pod: Pod = field(default=Pod())
+    rotor_limits: RotorLimits = field(default=RotorLimits())
+    extra_actuators: tuple[ExtraActuators, ...] = ()
+    ground: Ground | None = None
+    user_vehicle: UserVehicle | None = None
+
+    def __post_init__(self) -> None:
+        require_choice("vehicle.model", self.model, MODELS)
+        super().__post_init__()
+        for name, value in self.vehicle._asdict().items():
+            require_positive(f"vehicle.{name}", value, "(SI)")
+
+    @property
+    def tilts(self) -> bool:
+        """Whether the pods have hinges."""
+        return self.model == "tiltrotor"
+
+    @property
+    def has_stops(self) -> bool:
+        """Whether the hinges have stops."""
+        return self.tilts and self.tilt_servo.max_angle is not None
+
+    @property
+    def structure(self) -> RotorcraftSpec:
+        """The same spec with all parameters that `_with_parameters` sets replaced by a preset's."""
+        preset = PRESETS["ar_drone_2"]._replace(arm_length=self.vehicle.arm_length)
+        return replace(self, vehicle=preset)
 
 
-def _require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise ValueError(f"{name} = {value!r}: unknown; choose {', '.join(choices)}")
+def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjModel:
+    """Compile the MuJoCo model of a rotorcraft.
 
-
-STIFF_SERVO: Final = TiltServo()
-LIGHT_POD: Final = Pod()
-UNLIMITED_ROTORS: Final = RotorLimits()
-
-
-def compile_model(
-    model: str,
-    vehicle: Vehicle,
-    *,
-    timestep: float = 1e-3,
-    integrator: str = "RK4",
-    userdata_size: int = 0,
-    tilt_servo: TiltServo = STIFF_SERVO,
-    pod: Pod = LIGHT_POD,
-    rotor_limits: RotorLimits = UNLIMITED_ROTORS,
-    law_states: int = 0,
-    extra_actuators: tuple[ExtraActuators, ...] = (),
-    ground: Ground | None = None,
-    visuals: bool = True,
-    own: UserVehicle | None = None,
-) -> mujoco.MjModel:
-    """Compile the MuJoCo model of a vehicle.
-
-    Mass and inertia of the compiled model are the vehicle's at any tilt: what the pods weigh is
-    taken from the body. Nothing collides but, if there is ground, the vehicle with it.
+    Mass and inertia of the compiled model are the vehicle's at any tilt: those of the pods are
+    subtracted from the body's. There are no contacts but those between vehicle and ground.
 
     Parameters
     ----------
-    model : str
-        ``tiltrotor`` or ``quadrotor`` (without hinges; its pods are part of the body).
-    vehicle : Vehicle
-        Physical parameters, the pods' included.
-    timestep : float, default=1e-3
-        Physics time step, s.
-    integrator : str, default="RK4"
-        MuJoCo's name: ``Euler``, ``RK4``, ``implicit`` or ``implicitfast``.
-    userdata_size : int, default=0
-        Numbers of user data in the simulation's state.
-    tilt_servo : TiltServo, optional
-        The tilt servos. Without effect on a quadrotor.
-    pod : Pod, optional
-        The pods' own mass and inertia. Without effect on a quadrotor.
-    rotor_limits : RotorLimits, optional
-        Limits on the rotor speeds.
-    law_states : int, default=0
-        Number of states of a control law of its own: integrators ``law_1``, ``law_2``, ... after
-        all other actuators, which act on nothing; ctrl is the state's rate.
-    extra_actuators : tuple, optional
-        What layers around the law append after these; see `tiltsim.models.parts.ExtraActuators`.
-    ground : Ground, optional
-        Ground to take off from and land on; without it there are no contacts to look for.
-    visuals : bool, default=True
-        Whether there is anything to see or to measure: geoms, cameras, lights and sensors. They do
-        not touch the physics, but keeping them up to date takes a third of a step.
-    own : UserVehicle, optional
-        A user's own file in place of the shipped one, with its own arms and pods; its geoms may
-        have mass and always stay.
+    spec
+        What the model is made of.
+    visuals
+        Whether to keep what is drawn or measured only: geoms, cameras, lights and sensors. They do
+        not affect the physics, but updating them takes a third of a step.
 
     Returns
     -------
@@ -120,40 +128,27 @@ def compile_model(
     Raises
     ------
     ValueError
-        If an argument is out of range, or the pods are too heavy for the vehicle.
+        If the pods are too heavy for the vehicle.
     """
     import mujoco
 
-    _require_choice("vehicle.model", model, MODELS)
-    _require_choice("simulation.integrator", integrator, INTEGRATORS)
-    _require_positive("simulation.timestep", timestep, "s")
-    for name, size in (("userdata_size", userdata_size), ("law_states", law_states)):
-        if size < 0:
-            raise ValueError(f"{name} = {size!r}: must be at least 0")
-    for name, value in vehicle._asdict().items():
-        _require_positive(f"vehicle.{name}", value, "(SI)")
-
-    description = (
-        *(timestep, integrator, userdata_size),
-        *(tilt_servo, pod, rotor_limits, law_states, extra_actuators, ground),
-    )
-    likeness = (model, vehicle.arm_length, *description, visuals)
-    if own is None and likeness in _compiled:
-        return _with_parameters(*_compiled[likeness], vehicle, pod)
-    whole, bare, assets = _compose(model, vehicle, *description, own)
-    compiled = mujoco.MjModel.from_xml_string(whole if visuals else bare, assets)
-    if own is None and (model != "tiltrotor" or tilt_servo.max_angle is None):
-        if len(_compiled) >= LIKENESSES:
+    key = spec.structure, visuals
+    if key in _compiled:
+        return _with_parameters(*_compiled[key], spec)
+    complete, bare, assets = _compose(spec)
+    compiled = mujoco.MjModel.from_xml_string(complete if visuals else bare, assets)
+    if spec.user_vehicle is None and not spec.has_stops:
+        if len(_compiled) >= MODEL_CACHE_SIZE:
             _compiled.clear()
-        _compiled[likeness] = copy(compiled), mujoco.MjData(compiled)
+        _compiled[key] = copy(compiled), mujoco.MjData(compiled)
     return compiled
 
 
-LIKENESSES: Final = 32
-"""How many models are kept to make others of them."""
+MODEL_CACHE_SIZE: Final = 32
+"""How many models are kept to derive others from."""
 
-_compiled: dict[tuple[Any, ...], tuple[mujoco.MjModel, mujoco.MjData]] = {}
-"""Compiled models, with data to work in, by all that `_with_parameters` cannot change.
+_compiled: dict[tuple[RotorcraftSpec, bool], tuple[mujoco.MjModel, mujoco.MjData]] = {}
+"""Compiled models, with data to work in, by structure and visuals.
 
 Models with stops are not among them: MuJoCo's solver scales with a mean inertia that only its
 compiler computes.
@@ -161,20 +156,18 @@ compiler computes.
 
 
 def _with_parameters(
-    compiled: mujoco.MjModel, data: mujoco.MjData, vehicle: Vehicle, pod: Pod
+    compiled: mujoco.MjModel, data: mujoco.MjData, spec: RotorcraftSpec
 ) -> mujoco.MjModel:
     """A copy of a model with another vehicle's mass, inertia, coefficients and gravity.
 
-    Bit for bit what compiling gives, a hundred times faster, but for the mean mass and inertia in
+    Bit for bit the compiler's result, a hundred times faster, but for the mean mass and inertia in
     ``stat``, which nothing here reads.
     """
     import mujoco
 
-    model = copy(compiled)
+    model, vehicle = copy(compiled), spec.vehicle
     body = model.body("vehicle").id
-    model.body_mass[body], model.body_inertia[body] = _body_inertia(
-        vehicle, pod if model.njnt > 1 else None
-    )
+    model.body_mass[body], model.body_inertia[body] = _body_inertia(spec)
     for i, spin in zip(ROTORS, SPIN, strict=True):
         model.actuator(f"thrust_{i}").gear[:] = _thrust_gear(vehicle, spin)
     model.opt.gravity[:] = (0.0, 0.0, -vehicle.gravity)
@@ -187,63 +180,50 @@ def _with_parameters(
 
 
 @lru_cache(maxsize=64)  # dm_control takes several times longer than MuJoCo's compiler
-def _compose(
-    model: str,
-    vehicle: Vehicle,
-    timestep: float,
-    integrator: str,
-    userdata_size: int,
-    tilt_servo: TiltServo,
-    pod: Pod,
-    rotor_limits: RotorLimits,
-    law_states: int,
-    extra_actuators: tuple[ExtraActuators, ...],
-    ground: Ground | None,
-    own: UserVehicle | None,
-) -> tuple[str, str, dict[str, bytes]]:
-    """The vehicle's complete MJCF, the same without what is only drawn, and the files they name.
+def _compose(spec: RotorcraftSpec) -> tuple[str, str, dict[str, bytes]]:
+    """The vehicle's complete MJCF, the same without visuals, and the files that they name.
 
-    The arguments are `compile_model`'s, found valid. A flight is flown on the one and shown on the
-    other, so both are made at once.
+    A flight is simulated with the one and shown with the other, so both are made at once.
     """
-    root = parse_mjcf(shipped_folder("mjcf") / f"{model}.xml" if own is None else Path(own.path))
-    tilting = model == "tiltrotor"
-    stops = tilting and tilt_servo.max_angle is not None
+    vehicle, servo, user_vehicle = spec.vehicle, spec.tilt_servo, spec.user_vehicle
+    shipped = shipped_folder("mjcf") / f"{spec.model}.xml"
+    root = parse_mjcf(shipped if user_vehicle is None else Path(user_vehicle.path))
+    contacts = spec.ground is not None
 
-    root.option.timestep = timestep
-    root.option.integrator = integrator
+    root.option.timestep = spec.timestep
+    root.option.integrator = spec.integrator
     root.option.gravity = (0.0, 0.0, -vehicle.gravity)
-    root.option.flag.contact = "disable" if ground is None else "enable"
-    root.option.flag.constraint = "disable" if ground is None and not stops else "enable"
-    root.size.nuserdata = userdata_size
+    root.option.flag.contact = "enable" if contacts else "disable"
+    root.option.flag.constraint = "enable" if contacts or spec.has_stops else "disable"
+    root.size.nuserdata = spec.userdata_size
 
-    if own is None:
+    if user_vehicle is None:
         _scale_lengths(root, vehicle.arm_length)
-        _set_inertia(root, vehicle, pod if tilting else None)
+        _set_inertia(root, spec)
     else:
-        own.set_inertia(root, vehicle)
-    _set_rotors(root, vehicle, rotor_limits)
-    if tilting and own is None:
-        _set_servos(root, tilt_servo, pod)
-    elif tilting and own is not None:
-        own.set_servos(root, tilt_servo)
+        user_vehicle.set_inertia(root, vehicle)
+    _set_rotors(root, vehicle, spec.rotor_limits)
+    if spec.tilts and user_vehicle is None:
+        _set_servos(root, servo, spec.pod)
+    elif spec.tilts and user_vehicle is not None:
+        user_vehicle.set_servos(root, servo)
     for name, speed in (("hover", vehicle.hover_rotor_speed), ("start", START_SPEED)):
         key = root.find("key", name)
         if key is not None:
             _set_keyframe(key, speed)
-    add_law_states(root, law_states)
-    for index, extra in enumerate(extra_actuators, start=1):
-        _add_states(root, f"layer_{index}_state", extra.states)
-        _add_memories(root, f"layer_{index}_memory", extra.memories)
+    add_states(root, "law", spec.law_states)
+    for index, extra in enumerate(spec.extra_actuators, start=1):
+        add_states(root, f"layer_{index}_state", extra.states)
+        add_memories(root, f"layer_{index}_memory", extra.memories)
         if extra.wrench:
-            _add_wrench(root, f"layer_{index}")
-    if ground is not None:
-        _set_ground(root, ground)
-    whole = str(root.to_xml_string())
-    if own is not None:
-        return whole, whole, dict(root.get_assets())
-    strip(root, contacts=ground is not None)
-    return whole, str(root.to_xml_string()), {}
+            add_wrench(root, f"layer_{index}")
+    if spec.ground is not None:
+        _set_ground(root, spec.ground)
+    complete = str(root.to_xml_string())
+    if user_vehicle is not None:
+        return complete, complete, dict(root.get_assets())
+    remove_visuals(root, contacts=contacts)
+    return complete, str(root.to_xml_string()), {}
 
 
 def _scale_lengths(root: Any, arm_length: float) -> None:
@@ -274,19 +254,20 @@ def _thrust_gear(vehicle: Vehicle, spin: float) -> tuple[float, ...]:
     return 0.0, 0.0, vehicle.thrust_coefficient, 0.0, 0.0, drag
 
 
-def _set_inertia(root: Any, vehicle: Vehicle, pod: Pod | None) -> None:
+def _set_inertia(root: Any, spec: RotorcraftSpec) -> None:
     """Give the pods their mass and inertia and the body the rest of the vehicle's."""
     inertial = root.find("body", "vehicle").inertial
-    inertial.mass, inertial.diaginertia = _body_inertia(vehicle, pod)
-    if pod is not None:
+    inertial.mass, inertial.diaginertia = _body_inertia(spec)
+    if spec.tilts:
         for i in ROTORS:
             inertial = root.find("body", f"pod_{i}").inertial
-            inertial.mass = pod.mass
-            inertial.diaginertia = [pod.inertia] * 3
+            inertial.mass = spec.pod.mass
+            inertial.diaginertia = [spec.pod.inertia] * 3
 
 
-def _body_inertia(vehicle: Vehicle, pod: Pod | None) -> tuple[float, list[float]]:
-    """Mass and principal moments of inertia of the body: the vehicle's less its pods'."""
+def _body_inertia(spec: RotorcraftSpec) -> tuple[float, list[float]]:
+    """Mass and principal moments of inertia of the body: the vehicle's less its hinged pods'."""
+    vehicle, pod = spec.vehicle, spec.pod if spec.tilts else None
     mass = vehicle.mass
     moments = [vehicle.inertia_xx, vehicle.inertia_yy, vehicle.inertia_zz]
     if pod is not None:
@@ -306,17 +287,10 @@ def _body_inertia(vehicle: Vehicle, pod: Pod | None) -> tuple[float, list[float]
 
 def _set_servos(root: Any, servo: TiltServo, pod: Pod) -> None:
     defaults = root.find("default", "servo")
-    inertia = pod.inertia + SERVO_ARMATURE
     defaults.joint.armature = SERVO_ARMATURE
-    defaults.position.kp = inertia * servo.natural_frequency**2
-    defaults.position.kv = 2.0 * inertia * servo.damping_ratio * servo.natural_frequency
+    set_servo_gains(defaults.position, pod.inertia + SERVO_ARMATURE, servo)
     if servo.max_angle is not None:
-        angle_range = (-servo.max_angle, servo.max_angle)
-        defaults.joint.range = angle_range
-        # As stiff as MuJoCo allows: its usual stop is softer than the servo and would do nothing.
-        defaults.joint.solreflimit = (2.0 * root.option.timestep, 1.0)
-        defaults.joint.solimplimit = (0.99, 0.99, 0.001, 0.5, 2.0)
-        defaults.position.ctrlrange = angle_range
+        set_stop(defaults.joint, defaults.position, servo.max_angle, root.option.timestep)
 
 
 def _set_ground(root: Any, ground: Ground) -> None:
@@ -335,5 +309,5 @@ def _set_keyframe(key: Any, rotor_speed: float) -> None:
     """Let all rotors of an upright, untilted vehicle turn at this speed (rad/s)."""
     key.act = [spin * rotor_speed for spin in SPIN]
     ctrl = key.ctrl.copy()
-    ctrl[-8:-4] = rotor_speed**2  # the thrust actuators stand before the four rotor speeds
+    ctrl[-8:-4] = rotor_speed**2  # the thrust actuators precede the four rotor speeds
     key.ctrl = ctrl

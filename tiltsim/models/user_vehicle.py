@@ -1,29 +1,27 @@
-"""A user's own vehicle: an MJCF file with the names that the shipped ones have.
+"""A user's own vehicle: an MJCF file with the names of the shipped ones.
 
-`read_user_vehicle` compiles the file as it is, checks the names, and measures what control laws and
-the scenario need to know. `tiltsim.models.rotorcraft` then puts a scenario's own numbers in their
-place, as it does with the shipped files. docs/own_vehicle.md tells users the same.
+`read_user_vehicle` compiles the file unchanged, checks the names, and measures the parameters that
+control laws and the scenario need. `tiltsim.models.rotorcraft` then sets a scenario's parameters in
+it, as in the shipped files. docs/own_vehicle.md explains the same to users.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
+from tiltsim.models.mjcf_editing import set_servo_gains, set_stop
+from tiltsim.models.parts import ROTORS, TiltServo
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 
 if TYPE_CHECKING:
     import mujoco
 
-    from tiltsim.models.parts import TiltServo
-
-ROTORS: Final = (1, 2, 3, 4)
 JOINTS: Final = {
     "tiltrotor": ("vehicle", *(f"tilt_{i}" for i in ROTORS)),
     "quadrotor": ("vehicle",),
@@ -34,41 +32,37 @@ ACTUATORS: Final = {
 }
 SITES: Final = ("imu", *(f"rotor_{i}" for i in ROTORS))
 
-ALIGNED: Final = 1e-4
-"""How far, as a share of the arm or of a unit vector, what must be aligned may be off."""
+ALIGNMENT_TOLERANCE: Final = 1e-4
+"""Largest misalignment, as a fraction of the arm or of a unit vector."""
 
-SMALL_PRODUCT: Final = 0.01
-"""Products of inertia worth telling, as a share of the least moment."""
+PRODUCT_TOLERANCE: Final = 0.01
+"""Largest product of inertia that is not reported, as a fraction of the smallest moment."""
 
 
 @dataclass(frozen=True, eq=False)
 class UserVehicle:
-    """An MJCF file of a user's, as measured.
+    """A user's MJCF file and what was measured of it, untilted, along the body's axes.
 
     Attributes
     ----------
     path
         The file.
     modified
-        When it was last changed, ns, to tell one version of it from another.
+        When it was last changed, ns, to distinguish its versions.
     vehicle
-        Its parameters, untilted: inertia about the centre of mass along the body's axes.
+        Its parameters; inertia about the centre of mass.
     layout_mismatch
-        In what it differs from the layout that the shipped laws assume; empty where it does not.
+        How it differs from the layout that the built-in control laws assume; empty if it does not.
     hinge_inertias
         About each tilt hinge, armature included, kg m^2.
-    rest_mass
-        Of all that moves but is not the body ``vehicle`` itself, kg.
-    rest_moment
-        First moment of that about the body's origin, kg m.
-    rest_inertia
-        Its inertia about the body's origin, (3, 3), kg m^2.
+    carried
+        Mass properties of all bodies that the body ``vehicle`` carries, about its origin.
     center
-        The whole vehicle's centre of mass, m, body axes.
+        The whole vehicle's centre of mass, m, shape (3,).
     products
-        The entries xy, xz and yz of its inertia about the centre of mass, kg m^2, body axes.
+        The entries xy, xz and yz of its inertia about the centre of mass, kg m^2.
     has_contact_geoms
-        Whether it has the geoms by which a scenario's ground is touched.
+        Whether it has the geoms that contacts with a scenario's ground need.
     """
 
     path: str
@@ -76,47 +70,57 @@ class UserVehicle:
     vehicle: Vehicle
     layout_mismatch: str
     hinge_inertias: tuple[float, ...]
-    rest_mass: float
-    rest_moment: Floats
-    rest_inertia: Floats
+    carried: _Moments
     center: Floats
     products: tuple[float, float, float]
     has_contact_geoms: bool
 
     @property
     def unmodeled_properties(self) -> str:
-        """In what the shipped laws take it for another vehicle, in words; empty where in nothing.
+        """The properties that the built-in control laws neglect; empty if there are none.
 
-        They fly all the same, with a model error. docs/own_vehicle.md says what it costs.
+        The laws fly it all the same, with a model error. docs/own_vehicle.md says what it costs.
         """
         found = []
-        if np.linalg.norm(self.center) > ALIGNED * self.vehicle.arm_length:
+        if np.linalg.norm(self.center) > ALIGNMENT_TOLERANCE * self.vehicle.arm_length:
             found.append(f"its centre of mass at {_triple(self.center)} m")
-        if np.abs(self.products).max() > SMALL_PRODUCT * min(self.vehicle[1:4]):
+        if np.abs(self.products).max() > PRODUCT_TOLERANCE * min(self.vehicle[1:4]):
             products = _triple(np.array(self.products))
             found.append(f"its products of inertia (xy, xz, yz) = {products} kg m^2")
         return " and ".join(found)
 
     def set_inertia(self, root: Any, vehicle: Vehicle) -> None:
-        """Let mass and moments of the whole be a vehicle's; what differs goes into the body.
+        """Set mass and moments of inertia of the whole vehicle by changing the body ``vehicle``.
 
-        Centre of mass and products of inertia stay the file's. Raises ValueError where no body
-        makes up for it.
+        Centre of mass and products of inertia stay the file's.
+
+        Parameters
+        ----------
+        root
+            The file as dm_control's tree.
+        vehicle
+            The parameters to set.
+
+        Raises
+        ------
+        ValueError
+            If no body could have the mass and moments that remain for it.
         """
         if vehicle[:4] == self.vehicle[:4]:
             return
-        mass = vehicle.mass - self.rest_mass
+        carried = self.carried
+        mass = vehicle.mass - carried.mass
         if mass <= 0.0:
             raise ValueError(
                 f"vehicle.mass = {vehicle.mass!r}: the bodies that the body 'vehicle' carries "
-                f"have {self.rest_mass:.6g} kg already"
+                f"already have {carried.mass:.6g} kg"
             )
-        center = (vehicle.mass * self.center - self.rest_moment) / mass
+        center = (vehicle.mass * self.center - carried.first_moment) / mass
         xy, xz, yz = self.products
         xx, yy, zz = vehicle[1:4]
         about_center = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         whole = about_center + vehicle.mass * _parallel_axis(self.center)
-        inertia = whole - self.rest_inertia - mass * _parallel_axis(center)
+        inertia = whole - carried.inertia - mass * _parallel_axis(center)
         moments = np.linalg.eigvalsh(inertia)
         if moments[0] <= 0.0 or 2.0 * moments[-1] > moments.sum():
             raise ValueError(
@@ -136,20 +140,16 @@ class UserVehicle:
         )
 
     def set_servos(self, root: Any, servo: TiltServo) -> None:
-        """Give each tilt servo its natural frequency, damping and stops."""
+        """Give each tilt servo in a tree its natural frequency, damping and stops."""
         for i, inertia in zip(ROTORS, self.hinge_inertias, strict=True):
             actuator, joint = root.find("actuator", f"tilt_{i}"), root.find("joint", f"tilt_{i}")
-            actuator.kp = inertia * servo.natural_frequency**2
-            actuator.kv = 2.0 * inertia * servo.damping_ratio * servo.natural_frequency
+            set_servo_gains(actuator, inertia, servo)
             actuator.dampratio = None
             joint.range = actuator.ctrlrange = None
             joint.limited = actuator.ctrllimited = "false"
             if servo.max_angle is not None:
-                joint.range = actuator.ctrlrange = (-servo.max_angle, servo.max_angle)
+                set_stop(joint, actuator, servo.max_angle, root.option.timestep)
                 joint.limited = actuator.ctrllimited = "true"
-                # As for the shipped vehicles: as stiff as MuJoCo allows.
-                joint.solreflimit = (2.0 * root.option.timestep, 1.0)
-                joint.solimplimit = (0.99, 0.99, 0.001, 0.5, 2.0)
 
 
 def read_user_vehicle(path: str, model: str) -> UserVehicle:
@@ -172,7 +172,7 @@ def read_user_vehicle(path: str, model: str) -> UserVehicle:
     except OSError as error:
         raise ValueError(f"cannot be read: {error.strerror}") from None
     if not Path(path).is_file():
-        raise ValueError("is no file")
+        raise ValueError("is not a file")
     return _read(path, model, modified)
 
 
@@ -187,92 +187,90 @@ def _read(path: str, model: str, modified: int) -> UserVehicle:
     data = mujoco.MjData(compiled)
     mujoco.mj_forward(compiled, data)
     _check_names(compiled, model)
-    _check_actuators(compiled, model)
-    body = int(compiled.body("vehicle").id)
-    frame = data.xmat[body].reshape(3, 3)  # from body to world, as the file leaves it
-
-    def in_body(point: Floats) -> Floats:
-        return np.asarray(frame.T @ (point - data.xpos[body]))
-
-    carried = [b for b in range(body + 1, compiled.nbody) if compiled.body_rootid[b] == body]
-    rest = _moments(compiled, data, carried, in_body, frame)
-    whole = _moments(compiled, data, [body, *carried], in_body, frame)
-    mass = whole[0]
-    center = whole[1] / mass
-    inertia = whole[2] - mass * _parallel_axis(center)
+    _check_joints(compiled)
+    _check_thrusts(compiled)
+    tilting = model == "tiltrotor"
+    if tilting:
+        _check_servos(compiled)
+    pose = _InBody(compiled, data)
+    carried = [
+        b for b in range(pose.body + 1, compiled.nbody) if compiled.body_rootid[b] == pose.body
+    ]
+    whole = pose.moments([pose.body, *carried])
+    center = whole.first_moment / whole.mass
+    inertia = whole.inertia - whole.mass * _parallel_axis(center)
     thrust = compiled.actuator("thrust_1")
-    arm = float(np.linalg.norm(in_body(data.site("rotor_1").xpos)))
+    arm = float(np.linalg.norm(pose.point(data.site("rotor_1").xpos)))
     gravity = float(-compiled.opt.gravity[2])
     if gravity <= 0.0 or np.any(compiled.opt.gravity[:2]):
         raise ValueError(f"option gravity = {compiled.opt.gravity.tolist()}: must point down z")
     xx, yy, zz = np.diag(inertia).tolist()
-    vehicle = Vehicle(
-        *(mass, xx, yy, zz, arm, float(thrust.gear[2]), abs(float(thrust.gear[5])), gravity)
-    )
-    tilts = [compiled.joint(f"tilt_{i}").dofadr[0] for i in ROTORS] if model == "tiltrotor" else []
+    thrust_coefficient, drag_coefficient = float(thrust.gear[2]), abs(float(thrust.gear[5]))
+    tilts = [compiled.joint(f"tilt_{i}").dofadr[0] for i in ROTORS] if tilting else []
     return UserVehicle(
-        path,
-        modified,
-        vehicle,
-        _misfit(compiled, data, in_body, frame, arm, tilting=model == "tiltrotor"),
-        tuple(float(compiled.dof_M0[dof]) for dof in tilts),
-        *rest,
-        center,
-        (float(inertia[0, 1]), float(inertia[0, 2]), float(inertia[1, 2])),
-        _can_touch(compiled),
+        path=path,
+        modified=modified,
+        vehicle=Vehicle(whole.mass, xx, yy, zz, arm, thrust_coefficient, drag_coefficient, gravity),
+        layout_mismatch=_layout_mismatch(pose, arm, tilting=tilting),
+        hinge_inertias=tuple(float(compiled.dof_M0[dof]) for dof in tilts),
+        carried=pose.moments(carried),
+        center=center,
+        products=(float(inertia[0, 1]), float(inertia[0, 2]), float(inertia[1, 2])),
+        has_contact_geoms=_has_contact_geoms(compiled),
     )
 
 
 def _check_names(compiled: mujoco.MjModel, model: str) -> None:
-    """Raise ValueError, naming what is missing, or too much, or out of order."""
+    """Raise ValueError with the name that is missing, superfluous or out of order."""
     joints = [compiled.joint(j).name for j in range(compiled.njnt)]
     actuators = [compiled.actuator(a).name for a in range(compiled.nu)]
-    sites = [compiled.site(s).name for s in range(compiled.nsite)]
-    bodies = [compiled.body(b).name for b in range(compiled.nbody)]
-    _check_complete("body", bodies, ("vehicle",), model)
-    _check_complete("joint", joints, JOINTS[model], model)
-    _check_complete("site", sites, SITES, model)
-    _check_complete("actuator", actuators, ACTUATORS[model], model)
-    for kind, found, wanted in (
+    for kind, found, required in (
+        ("body", [compiled.body(b).name for b in range(compiled.nbody)], ("vehicle",)),
+        ("joint", joints, JOINTS[model]),
+        ("site", [compiled.site(s).name for s in range(compiled.nsite)], SITES),
+        ("actuator", actuators, ACTUATORS[model]),
+    ):
+        missing = [name for name in required if name not in found]
+        if missing:
+            more = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
+            raise ValueError(
+                f"no {kind} {missing[0]!r}{more}; a {model} has the {kind} names "
+                f"{', '.join(required)}"
+            )
+    for kind, found, required in (
         ("joint", joints, JOINTS[model]),
         ("actuator", actuators, ACTUATORS[model]),
     ):
-        besides = [name for name in found if name not in wanted]
-        if besides:
+        superfluous = [name for name in found if name not in required]
+        if superfluous:
             raise ValueError(
-                f"{kind} {besides[0]!r} is not one of a {model}: {', '.join(wanted)}, and no other"
+                f"{kind} {superfluous[0]!r} is not one of a {model}'s, which are "
+                f"{', '.join(required)}"
             )
-        if tuple(found) != wanted:
-            raise ValueError(f"its {kind}s stand in another order than {', '.join(wanted)}")
+        if tuple(found) != required:
+            raise ValueError(f"its {kind}s must be in the order {', '.join(required)}")
+
+
+def _check_joints(compiled: mujoco.MjModel) -> None:
+    """Raise ValueError where a joint has another type than its name says."""
     import mujoco
 
-    for name in joints:
-        free = compiled.joint(name).type[0] == mujoco.mjtJoint.mjJNT_FREE
-        hinge = compiled.joint(name).type[0] == mujoco.mjtJoint.mjJNT_HINGE
-        if not (free if name == "vehicle" else hinge):
-            kind = "free joint" if name == "vehicle" else "hinge"
-            raise ValueError(f"joint {name!r} must be a {kind}")
+    for j in range(compiled.njnt):
+        name, actual = compiled.joint(j).name, compiled.joint(j).type[0]
+        free = name == "vehicle"
+        if actual != (mujoco.mjtJoint.mjJNT_FREE if free else mujoco.mjtJoint.mjJNT_HINGE):
+            raise ValueError(f"joint {name!r} must be a {'free joint' if free else 'hinge'}")
     if compiled.joint("vehicle").bodyid[0] != compiled.body("vehicle").id:
         raise ValueError("the free joint 'vehicle' must be that of the body 'vehicle'")
 
 
-def _can_touch(compiled: mujoco.MjModel) -> bool:
+def _has_contact_geoms(compiled: mujoco.MjModel) -> bool:
     names = [compiled.geom(g).name for g in range(compiled.ngeom)]
     return "ground" in names and any(name.endswith("collision") for name in names)
 
 
-def _check_complete(kind: str, found: Iterable[str], wanted: Iterable[str], model: str) -> None:
-    there = set(found)
-    missing = [name for name in wanted if name not in there]
-    if missing:
-        more = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
-        raise ValueError(
-            f"no {kind} {missing[0]!r}{more}; a {model} has the {kind} names {', '.join(wanted)}"
-        )
-
-
-def _check_actuators(compiled: mujoco.MjModel, model: str) -> None:
-    """Raise ValueError where an actuator does not do what its name says."""
+def _check_thrusts(compiled: mujoco.MjModel) -> None:
+    """Raise ValueError where an actuator of a rotor does not do what its name says."""
     import mujoco
 
     gears = []
@@ -297,73 +295,87 @@ def _check_actuators(compiled: mujoco.MjModel, model: str) -> None:
             raise ValueError(
                 f"actuator 'rotor_speed_{i}' must have dyntype integrator and a gain of 0"
             )
-        if model == "tiltrotor":
-            servo, hinge = compiled.actuator(f"tilt_{i}"), compiled.joint(f"tilt_{i}").id
-            on_hinge = servo.trntype[0] == mujoco.mjtTrn.mjTRN_JOINT and servo.trnid[0] == hinge
-            position = servo.biastype[0] == mujoco.mjtBias.mjBIAS_AFFINE
-            plain = servo.gear[0] == 1.0 and servo.actadr[0] < 0
-            if not (on_hinge and position and plain):
-                raise ValueError(
-                    f"actuator 'tilt_{i}' must be a position servo of the joint 'tilt_{i}', "
-                    "without gear or state"
-                )
     if len({np.round(gear, 15).tobytes() for gear in gears}) > 1:
         raise ValueError("the four thrust actuators must have the same Kf and Km in their gear")
 
 
-def _misfit(
-    compiled: mujoco.MjModel,
-    data: mujoco.MjData,
-    in_body: Any,
-    frame: Floats,
-    arm: float,
-    *,
-    tilting: bool,
-) -> str:
-    """In what a layout differs from four equal arms at right angles, in a few words."""
+def _check_servos(compiled: mujoco.MjModel) -> None:
+    """Raise ValueError where the actuator of a hinge is not a position servo."""
+    import mujoco
+
+    for i in ROTORS:
+        servo, hinge = compiled.actuator(f"tilt_{i}"), compiled.joint(f"tilt_{i}").id
+        on_hinge = servo.trntype[0] == mujoco.mjtTrn.mjTRN_JOINT and servo.trnid[0] == hinge
+        position = servo.biastype[0] == mujoco.mjtBias.mjBIAS_AFFINE
+        plain = servo.gear[0] == 1.0 and servo.actadr[0] < 0
+        if not (on_hinge and position and plain):
+            raise ValueError(
+                f"actuator 'tilt_{i}' must be a position servo of the joint 'tilt_{i}', "
+                "without gear or state"
+            )
+
+
+class _Moments(NamedTuple):
+    """Mass, first moment and inertia of bodies about an origin."""
+
+    mass: float  # kg
+    first_moment: Floats  # kg m, shape (3,)
+    inertia: Floats  # kg m^2, shape (3, 3)
+
+
+class _InBody:
+    """A compiled vehicle as its file leaves it, seen from the body ``vehicle``."""
+
+    def __init__(self, compiled: mujoco.MjModel, data: mujoco.MjData) -> None:
+        self.compiled, self.data = compiled, data
+        self.body = int(compiled.body("vehicle").id)
+        self.frame = data.xmat[self.body].reshape(3, 3)  # from body to world
+
+    def point(self, point: Floats) -> Floats:
+        """A point of the world in body axes, from the body's origin."""
+        return np.asarray(self.frame.T @ (point - self.data.xpos[self.body]))
+
+    def moments(self, bodies: list[int]) -> _Moments:
+        """Mass properties of bodies, given by their ids, about the vehicle's origin."""
+        mass, moment, inertia = 0.0, np.zeros(3), np.zeros((3, 3))
+        for body in bodies:
+            own = float(self.compiled.body_mass[body])
+            center = self.point(self.data.xipos[body])
+            turn = self.frame.T @ self.data.ximat[body].reshape(3, 3)
+            mass += own
+            moment += own * center
+            inertia += turn @ np.diag(self.compiled.body_inertia[body]) @ turn.T
+            inertia += own * _parallel_axis(center)
+        return _Moments(mass, moment, inertia)
+
+
+def _layout_mismatch(pose: _InBody, arm: float, *, tilting: bool) -> str:
+    """How a layout differs from four equal arms at right angles, in a few words."""
+    data, frame = pose.data, pose.frame
     directions = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
     for i, direction in zip(ROTORS, directions, strict=True):
         site = data.site(f"rotor_{i}")
-        wanted = arm * np.array(direction)
-        place = in_body(site.xpos)
-        if np.abs(place - wanted).max() > ALIGNED * arm:
-            return f"site 'rotor_{i}' lies at {_triple(place)} m instead of {_triple(wanted)}"
+        expected = arm * np.array(direction)
+        place = pose.point(site.xpos)
+        if np.abs(place - expected).max() > ALIGNMENT_TOLERANCE * arm:
+            return f"site 'rotor_{i}' lies at {_triple(place)} m instead of {_triple(expected)}"
         up = frame.T @ site.xmat.reshape(3, 3)[:, 2]
-        if np.abs(up - (0.0, 0.0, 1.0)).max() > ALIGNED:
+        if np.abs(up - (0.0, 0.0, 1.0)).max() > ALIGNMENT_TOLERANCE:
             return f"the z axis of site 'rotor_{i}' points to {_triple(up)}, not straight up"
         if tilting:
-            joint = compiled.joint(f"tilt_{i}").id
+            joint = pose.compiled.joint(f"tilt_{i}").id
             axis = frame.T @ data.xaxis[joint]
-            if np.abs(axis - direction).max() > ALIGNED:
-                return f"joint 'tilt_{i}' turns about {_triple(axis)}, not about its arm outwards"
-            anchor = in_body(data.xanchor[joint])
-            if np.linalg.norm(anchor - anchor @ wanted / arm**2 * wanted) > ALIGNED * arm:
+            if np.abs(axis - direction).max() > ALIGNMENT_TOLERANCE:
+                return f"joint 'tilt_{i}' turns about {_triple(axis)}, not outwards about its arm"
+            anchor = pose.point(data.xanchor[joint])
+            off_arm = anchor - anchor @ expected / arm**2 * expected
+            if np.linalg.norm(off_arm) > ALIGNMENT_TOLERANCE * arm:
                 return f"joint 'tilt_{i}' does not lie on its arm"
     return ""
 
 
-def _moments(
-    compiled: mujoco.MjModel,
-    data: mujoco.MjData,
-    bodies: list[int],
-    in_body: Any,
-    frame: Floats,
-) -> tuple[float, Floats, Floats]:
-    """Mass, first moment and inertia of bodies about the vehicle's origin, in its axes."""
-    mass, moment, inertia = 0.0, np.zeros(3), np.zeros((3, 3))
-    for body in bodies:
-        own = float(compiled.body_mass[body])
-        center = in_body(data.xipos[body])
-        turn = frame.T @ data.ximat[body].reshape(3, 3)
-        mass += own
-        moment += own * center
-        inertia += turn @ np.diag(compiled.body_inertia[body]) @ turn.T
-        inertia += own * _parallel_axis(center)
-    return mass, moment, inertia
-
-
 def _parallel_axis(offset: Floats) -> Floats:
-    """What a unit mass at an offset adds to an inertia about the origin, m^2."""
+    """The inertia (m^2, shape (3, 3)) about the origin of a unit mass at an offset (m)."""
     return np.asarray(np.dot(offset, offset) * np.eye(3) - np.outer(offset, offset))
 
 

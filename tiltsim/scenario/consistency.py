@@ -113,7 +113,7 @@ def _check_actuators(scenario: Scenario) -> None:
 
 
 def _check_layout(scenario: Scenario) -> None:
-    own = scenario.rotorcraft.own
+    own = scenario.rotorcraft.user_vehicle
     if own is not None and own.layout_mismatch:
         raise InvalidValueError(
             "vehicle.mjcf",
@@ -289,7 +289,7 @@ def _check_ground(scenario: Scenario) -> None:
             "thesis",
             "its equations know no contact with ground; use mujoco",
         )
-    own = scenario.rotorcraft.own
+    own = scenario.rotorcraft.user_vehicle
     if own is not None and not own.has_contact_geoms:
         raise InvalidValueError(
             "ground",

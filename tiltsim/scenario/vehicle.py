@@ -92,7 +92,7 @@ class VehicleTable(Table):
                 zip(("inertia_xx", "inertia_yy", "inertia_zz"), self.inertia, strict=True)
             )
         known = {key: value for key, value in given.items() if value is not None}
-        own = self.own
+        own = self.user_vehicle
         base = PRESETS[self.preset] if own is None else own.vehicle
         return base._replace(**known)
 
@@ -104,7 +104,7 @@ class VehicleTable(Table):
         return -greatest if low is None else low, greatest
 
     @property
-    def own(self) -> UserVehicle | None:
+    def user_vehicle(self) -> UserVehicle | None:
         """The user's own file as measured; None for the shipped vehicles."""
         if self.mjcf is None:
             return None

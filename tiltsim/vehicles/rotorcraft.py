@@ -77,11 +77,11 @@ def _compile(
     visuals: bool,
 ) -> mujoco.MjModel:
     from tiltsim.models.parts import Ground, Pod, RotorLimits, TiltServo
-    from tiltsim.models.rotorcraft import compile_model
+    from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 
     vehicle: VehicleTable = scenario.rotorcraft
     simulation, ground = scenario.simulation, scenario.ground
-    return compile_model(
+    spec = RotorcraftSpec(
         vehicle.model,
         scenario.true_rotorcraft,
         timestep=simulation.timestep,
@@ -95,9 +95,9 @@ def _compile(
         law_states=law_states,
         extra_actuators=extra_actuators,
         ground=None if ground is None else Ground(ground.height, ground.friction),
-        visuals=visuals,
-        own=vehicle.own,
+        user_vehicle=vehicle.user_vehicle,
     )
+    return compile_model(spec, visuals=visuals)
 
 
 def initial_tilts(scenario: Scenario) -> tuple[Quad, Quad]:

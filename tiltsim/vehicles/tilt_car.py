@@ -62,12 +62,12 @@ def _compile(
     visuals: bool,
 ) -> mujoco.MjModel:
     from tiltsim.models.parts import TiltServo
-    from tiltsim.models.tilt_car import compile_tilt_car
+    from tiltsim.models.tilt_car import TiltCarSpec, compile_tilt_car
 
     car, simulation = scenario.tilt_car, scenario.simulation
     if extra_actuators:
         raise ValueError("the tilt-car takes no actuators beyond its own")
-    return compile_tilt_car(
+    spec = TiltCarSpec(
         car.resolve(),
         timestep=simulation.timestep,
         integrator=simulation.integrator,
@@ -75,8 +75,8 @@ def _compile(
         tilt_servo=TiltServo(car.tilt_servo.natural_frequency, car.tilt_servo.damping_ratio),
         law_states=law_states,
         rotor_floor=getattr(scenario.controller, "anti_windup", True),
-        visuals=visuals,
     )
+    return compile_tilt_car(spec, visuals=visuals)
 
 
 def initial_tilt(scenario: Scenario) -> tuple[float, float]:
