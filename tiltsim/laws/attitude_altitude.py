@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, SignCheck, Sizes
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
-from tiltsim.scenario.tiltrotor_laws import AttitudeAltitudeController
+from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.gaits import tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import (

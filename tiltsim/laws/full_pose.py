@@ -19,7 +19,7 @@ from tiltsim.laws.tiltrotor import (
     singularity_columns,
     tiltrotor_state,
 )
-from tiltsim.scenario.tiltrotor_laws import FullPoseController
+from tiltsim.scenario.tiltrotor_controllers import FullPoseController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT, initial_tilts
 from tiltsim_controllers.laws.full_pose import Parameters, full_pose_inputs, limited_tilt_rate
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values, Vector, scalar

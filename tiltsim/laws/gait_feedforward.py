@@ -23,7 +23,7 @@ from tiltsim.laws.tiltrotor import (
     singularity_columns,
     tiltrotor_state,
 )
-from tiltsim.scenario.tiltrotor_laws import AttitudeAltitudeController
+from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.gaits import tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import STATE_FIELDS, State

@@ -19,7 +19,7 @@ from tiltsim.laws.quadrotor import (
     thrust_axis_value,
     upright_margin,
 )
-from tiltsim.scenario.quadrotor_laws import QuadrotorAttitudeAltitudeController
+from tiltsim.scenario.quadrotor_controllers import QuadrotorAttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.laws.quadrotor_attitude_altitude import Gains, attitude_altitude_inputs
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar

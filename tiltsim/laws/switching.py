@@ -21,7 +21,7 @@ from tiltsim.laws.quadrotor import (
     thrust_axis_check,
     thrust_axis_value,
 )
-from tiltsim.scenario.quadrotor_laws import SwitchingController
+from tiltsim.scenario.quadrotor_controllers import SwitchingController
 from tiltsim_controllers.laws.switching import (
     EXTENSIONS,
     Parameters,

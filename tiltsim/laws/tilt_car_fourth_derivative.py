@@ -13,7 +13,7 @@ from tiltsim.laws.tilt_car import (
     running_speed,
     speed_squares,
 )
-from tiltsim.scenario.tilt_car_laws import FourthDerivativeController
+from tiltsim.scenario.tilt_car_controllers import FourthDerivativeController
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.tilt_car.fourth_derivative import (
     DECOUPLINGS,

@@ -18,7 +18,7 @@ from tiltsim.laws.tilt_car import (
     initial_motion,
     reference_columns,
 )
-from tiltsim.scenario.tilt_car_laws import PlannedDirectionController
+from tiltsim.scenario.tilt_car_controllers import PlannedDirectionController
 from tiltsim.vehicles.tilt_car import ROTORS, TILT_CAR
 from tiltsim_controllers.gaits import GaitParameters, tilt_reference
 from tiltsim_controllers.mathematics.scalar import Floats, Pair, Triple, Values, Vector, scalar

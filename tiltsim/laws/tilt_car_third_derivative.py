@@ -14,7 +14,7 @@ from tiltsim.laws.tilt_car import (
     running_speed,
     speed_squares,
 )
-from tiltsim.scenario.tilt_car_laws import ThirdDerivativeController
+from tiltsim.scenario.tilt_car_controllers import ThirdDerivativeController
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.tilt_car.third_derivative import Parameters, third_derivative_inputs
 

@@ -18,7 +18,7 @@ from tiltsim.laws.quadrotor import (
     thrust_axis_check,
     thrust_tilt_cosine,
 )
-from tiltsim.scenario.quadrotor_laws import YawPositionController
+from tiltsim.scenario.quadrotor_controllers import YawPositionController
 from tiltsim_controllers.laws.yaw_position import Parameters, yaw_position_inputs
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, get_args
 
 from tiltsim.scenario.controller import Controller
+from tiltsim.scenario.controller_table import ANY_ROTORCRAFT, ControllerTable
 from tiltsim.scenario.gait import FixedGait
-from tiltsim.scenario.law_table import ANY_ROTORCRAFT, ControllerTable
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.tiltrotor_laws import AttitudeAltitudeController
+from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.scenario.time_steps import check_time_steps
 from tiltsim.scenario.vehicle import ModelErrorTable, PodTable, TiltServoTable, VehicleTable
 

@@ -7,18 +7,18 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from tiltsim.scenario.law_table import ANY_ROTORCRAFT, ControllerTable
-from tiltsim.scenario.quadrotor_laws import (
+from tiltsim.scenario.controller_table import ANY_ROTORCRAFT, ControllerTable
+from tiltsim.scenario.quadrotor_controllers import (
     QuadrotorAttitudeAltitudeController,
     SwitchingController,
     YawPositionController,
 )
-from tiltsim.scenario.tilt_car_laws import (
+from tiltsim.scenario.tilt_car_controllers import (
     FourthDerivativeController,
     PlannedDirectionController,
     ThirdDerivativeController,
 )
-from tiltsim.scenario.tiltrotor_laws import AttitudeAltitudeController, FullPoseController
+from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController, FullPoseController
 from tiltsim_controllers.analysis.stability import (
     ErrorLoop,
 )

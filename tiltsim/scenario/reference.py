@@ -9,7 +9,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from tiltsim.scenario.law_table import ReferenceKind
+from tiltsim.scenario.controller_table import ReferenceKind
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import Angle, Angles3, Positive, Table, Vector3
 from tiltsim_controllers.gaits.keyframes import NO_KNOTS

@@ -21,7 +21,7 @@ from tiltsim.scenario.surroundings import AirTable, Disturbance, Fault, GroundTa
 from tiltsim.scenario.table import (
     Table,
 )
-from tiltsim.scenario.tiltrotor_laws import AttitudeAltitudeController
+from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.scenario.vehicle import (
     ModelErrorTable,
     TiltCarTable,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.tiltrotor_laws import AttitudeAltitudeController
+from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim_controllers.analysis.stability import ErrorLoop
 from tiltsim_controllers.laws.supervisor import LAG
 

@@ -9,7 +9,7 @@ from pydantic import Discriminator, Field, Tag
 import tiltsim_controllers.tilt_car.fourth_derivative as fourth_derivative
 import tiltsim_controllers.tilt_car.planned_direction as planned_direction
 import tiltsim_controllers.tilt_car.third_derivative as third_derivative
-from tiltsim.scenario.law_table import ControllerTable, _gain_kind
+from tiltsim.scenario.controller_table import ControllerTable, _gain_kind
 from tiltsim.scenario.table import Gains2, Gains4, NonNegative, Table, Vector3
 from tiltsim_controllers.analysis.stability import (
     ErrorLoop,

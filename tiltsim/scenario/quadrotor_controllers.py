@@ -8,7 +8,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 import tiltsim_controllers.laws.quadrotor_attitude_altitude as quadrotor_attitude_altitude
 import tiltsim_controllers.laws.yaw_position as yaw_position
-from tiltsim.scenario.law_table import ControllerTable, _gain_kind
+from tiltsim.scenario.controller_table import ControllerTable, _gain_kind
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import Gains2, Positive, Table
 from tiltsim_controllers.analysis.stability import (

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Discriminator, Field, Tag, model_validator
 
 import tiltsim_controllers.laws.full_pose as full_pose
-from tiltsim.scenario.law_table import ControllerTable, _gain_kind
+from tiltsim.scenario.controller_table import ControllerTable, _gain_kind
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import Gains2, NonNegative, Positive, Table, Vector3
 from tiltsim_controllers.analysis.stability import (
