@@ -17,7 +17,7 @@ import pytest
 import tiltsim.equations.ode3
 import tiltsim.laws.assembling
 import tiltsim_controllers
-from tiltsim_controllers.gaits import GAIT_TYPES, GaitParameters
+from tiltsim_controllers.gaits.parameters import GAIT_TYPES, GaitParameters
 from tiltsim_controllers.laws.attitude_altitude import Parameters, rotor_accelerations
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.gains import GAIN_SETS

@@ -19,7 +19,7 @@ from tiltsim.views.figures.flight import flight_figure
 from tiltsim.views.replay import thrust_sites, visible_model
 from tiltsim.views.rerun.geometry import ground_height
 from tiltsim.views.rerun.recording import save_recording
-from tiltsim_controllers.gaits import tilt_reference
+from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.tilt_car.penguin_cycle import Swing, limit_cycle, lyapunov, lyapunov_bound
 from tiltsim_controllers.tilt_car.planned_direction import GAIN_SETS
 from tiltsim_controllers.tilt_car.state_drift import lean_after, lean_of, orbit, restored_lean
@@ -261,7 +261,7 @@ def test_the_thrusts_follow_the_planned_direction(plant):
     wanted = flight["time"]  # psi + alpha = t, Eq. (18)
     np.testing.assert_allclose(flight["direction"], wanted, atol=1e-6)
     gait = flight.scenario.gait.plan(THESIS_CAR)
-    assert tilt_reference(3.0, gait.parameters, gait.table)[0] == pytest.approx(6.0)
+    assert tilt_reference(3.0, gait.parameters, gait.knots)[0] == pytest.approx(6.0)
 
 
 @on_both_plants

@@ -22,7 +22,7 @@ from tiltsim.laws.commanded import COMMANDED_LOOPS
 from tiltsim.laws.tiltrotor import tiltrotor_state
 from tiltsim.plants.command import Command, checked
 from tiltsim.plants.commanded_plant import CommandedPlant
-from tiltsim_controllers.gaits import tilt_reference
+from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import Parameters, rotor_accelerations
 from tiltsim_controllers.references.trajectories import reference_derivatives
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
@@ -310,7 +310,7 @@ def test_what_is_seen_is_the_state_the_reference_and_the_gait():
     np.testing.assert_array_equal(second.reference.acceleration, wanted[6:9])
     np.testing.assert_array_equal(second.reference.attitude, [0.0, 0.0, 0.2])
     gait = flown.scenario.gait.plan(flown.scenario.vehicle.resolve())
-    planned = tilt_reference(second.time, gait.parameters, gait.table)
+    planned = tilt_reference(second.time, gait.parameters, gait.knots)
     np.testing.assert_array_equal(second.reference.tilt_angles, planned[:4])
     np.testing.assert_array_equal(second.reference.tilt_rates, planned[4:])
     # The servos keep to the plan, for the command left the tilt angles out.

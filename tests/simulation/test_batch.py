@@ -28,7 +28,7 @@ from tiltsim.plants.flight_model import flight_model, model_cache_key
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import merge
 from tiltsim.simulation.batch import fly
-from tiltsim_controllers.gaits import GAIT_TYPES
+from tiltsim_controllers.gaits.parameters import GAIT_TYPES
 
 TROT = {"amplitude": 0.3, "period": 0.8}
 GAITS = {

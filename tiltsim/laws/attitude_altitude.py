@@ -9,7 +9,7 @@ from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, SignCh
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
-from tiltsim_controllers.gaits import tilt_reference
+from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import (
     DECOUPLINGS,
     EXACT_DECOUPLING,

@@ -26,7 +26,7 @@ from tiltsim.laws.tiltrotor import (
     singularity_columns,
 )
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
-from tiltsim_controllers.gaits import GaitParameters
+from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.parameters import Vehicle

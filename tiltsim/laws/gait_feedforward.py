@@ -25,7 +25,7 @@ from tiltsim.laws.tiltrotor import (
 )
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
-from tiltsim_controllers.gaits import tilt_reference
+from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import STATE_FIELDS, State
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.gait_feedforward import INTEGRAL_FIELDS, Parameters, tracking_inputs
@@ -90,7 +90,7 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
         integral=controller.resolve_integral_gains(),
         max_acceleration=controller.max_acceleration,
         max_angular_acceleration=controller.max_angular_acceleration,
-        anticipation=min(controller.anticipation, 0.5 * gait.shortest_line),
+        anticipation=min(controller.anticipation, 0.5 * gait.min_segment_time),
         # The thesis's own equations leave the gyroscopic torque out.
         ingredients=controller.resolve_feedforward_terms(
             gyroscopic_torque=scenario.simulation.plant != "thesis"

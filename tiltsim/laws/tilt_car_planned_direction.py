@@ -20,7 +20,8 @@ from tiltsim.laws.tilt_car import (
 )
 from tiltsim.scenario.tilt_car_controllers import PlannedDirectionController
 from tiltsim.vehicles.tilt_car import ROTORS, TILT_CAR
-from tiltsim_controllers.gaits import GaitParameters, tilt_reference
+from tiltsim_controllers.gaits.parameters import GaitParameters
+from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.mathematics.scalar import Floats, Pair, Triple, Values, Vector, scalar
 from tiltsim_controllers.tilt_car.planned_direction import (
     Parameters,

@@ -16,7 +16,8 @@ from tiltsim.closed_loop.loop import ControlSetup, SignCheck
 from tiltsim.engines.rows import evaluate_over_samples
 from tiltsim.vehicles.rotorcraft import OBSERVED_FIELDS
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
-from tiltsim_controllers.gaits import GaitParameters, tilt_reference
+from tiltsim_controllers.gaits.parameters import GaitParameters
+from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import State
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion, world_up_in_body
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Values, Vector, scalar

@@ -29,7 +29,7 @@ from tiltsim.plants.command import (
 from tiltsim.plants.mujoco_plant import MujocoPlant, quiet_warnings
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.rotorcraft import initial_tilts
-from tiltsim_controllers.gaits import tilt_reference
+from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.mathematics.records import flatten, slotted
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, clipped

@@ -256,12 +256,12 @@ def _check_gait(scenario: Scenario) -> None:
             f"tilts by {gait.amplitude:.4g} rad, beyond the servo limit "
             f"vehicle.tilt_servo.max_angle = {limit}",
         )
-    rows = len(gait.table)
+    rows = len(gait.knots)
     if rows > MAX_TABLE:
         raise InvalidValueError(
             f"gait.{key}", value, f"too many keyframes: {rows} numbers, at most {MAX_TABLE}"
         )
-    total = len(scenario.reference.placed(gait.table)[1])
+    total = len(scenario.reference.placed(gait.knots)[1])
     if total > MAX_TABLE:
         raise InvalidValueError(
             "reference.times",

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from tiltsim.scenario.controller_table import ReferenceKind
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import Angle, Angles3, Positive, Table, Vector3
-from tiltsim_controllers.gaits.keyframes import NO_KNOTS
+from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
 from tiltsim_controllers.references.waypoints import minimum_snap_knots
 

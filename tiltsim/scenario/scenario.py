@@ -142,7 +142,7 @@ class Scenario(Table):
     def reference_and_knots(self) -> tuple[ReferenceParameters, tuple[float, ...]]:
         """The reference's record, and the table of the flight: the gait's and the reference's."""
         gait = self.gait.plan(self.vehicle.resolve())
-        return self.reference.placed(gait.table)
+        return self.reference.placed(gait.knots)
 
 
 class Variant(Table):

@@ -10,7 +10,7 @@ import numpy as np
 
 from tiltsim.closed_loop.limits import rotorcraft_limit_exceeded
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
-from tiltsim_controllers.gaits import tilt_reference
+from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import STATE_FIELDS
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Vector, clipped
@@ -107,7 +107,7 @@ def initial_tilts(scenario: Scenario) -> tuple[Quad, Quad]:
     exactly. So nothing swings in, and no pod is faster than its servo can be.
     """
     gait = scenario.gait.plan(scenario.rotorcraft.resolve())
-    a1, a2, a3, a4, *planned = tilt_reference(0.0, gait.parameters, gait.table)
+    a1, a2, a3, a4, *planned = tilt_reference(0.0, gait.parameters, gait.knots)
     fastest = scenario.rotorcraft.tilt_servo.max_rate or inf
     rate_1, rate_2, rate_3, rate_4 = (clipped(rate, -fastest, fastest) for rate in planned)
     return (a1, a2, a3, a4), (rate_1, rate_2, rate_3, rate_4)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from tiltsim.closed_loop.limits import tilt_car_limit_exceeded
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
-from tiltsim_controllers.gaits import tilt_reference
+from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.tilt_car.vehicle import counter_yaw_per_tilt
 
@@ -82,7 +82,7 @@ def _compile(
 def initial_tilt(scenario: Scenario) -> tuple[float, float]:
     """Tilt angle (rad) and its rate (rad/s) at time zero: the gait's."""
     gait = scenario.gait.plan(scenario.tilt_car.resolve())
-    angles = tilt_reference(0.0, gait.parameters, gait.table)
+    angles = tilt_reference(0.0, gait.parameters, gait.knots)
     return angles[0], angles[4]
 
 

@@ -1,16 +1,11 @@
-"""Planned gaits with their corners rounded, for what cannot turn about at once."""
+"""Planned gaits with rounded corners, for the attitude, which cannot change its rate at once."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tiltsim_controllers.gaits import (
-    FIXED,
-    TWO_COLOR_CIRCLE,
-    GaitParameters,
-    tilt_acceleration,
-    tilt_reference,
-)
+from tiltsim_controllers.gaits.parameters import FIXED, TWO_COLOR_CIRCLE, GaitParameters
+from tiltsim_controllers.gaits.tilts import tilt_acceleration, tilt_reference
 from tiltsim_controllers.mathematics.jets import Jet
 from tiltsim_controllers.mathematics.scalar import clipped, scalar
 
@@ -19,7 +14,7 @@ from tiltsim_controllers.mathematics.scalar import clipped, scalar
 def rounded_ramp(x: float, half: float) -> Jet:
     """The ramp ``max(x, 0)``, smooth within ``half`` of its corner.
 
-    Its second derivative is the kernel ``15/16 (1 - (x/half)^2)^2 / half`` of area one.
+    The second derivative is the kernel ``15/16 (1 - (x/half)^2)^2 / half`` of area one.
     """
     if x <= -half:
         return 0.0, 0.0, 0.0
@@ -40,10 +35,18 @@ def rounded_ramp(x: float, half: float) -> Jet:
 def rounded_corner(
     start: float, start_rate: float, stop: float, stop_rate: float, half: float
 ) -> Jet:
-    """A motion along two straight lines, its corner rounded, in the middle of a window.
+    """Motion along two straight lines with a rounded corner, in the middle of a time window.
 
-    The window lasts ``2 half`` seconds and holds one corner at most; ``start`` and ``stop`` are the
-    values at its ends. The lines tell where the corner is.
+    The window contains at most one corner, where the lines meet.
+
+    Parameters
+    ----------
+    start, stop
+        Values at the ends of the window.
+    start_rate, stop_rate
+        Rates at its ends, 1/s.
+    half
+        Half the length of the window, s.
     """
     middle = start + half * start_rate
     bend = stop_rate - start_rate
@@ -56,21 +59,35 @@ def rounded_corner(
 
 @scalar
 def anticipated_tilts(
-    time: float, gait: GaitParameters, table: Sequence[float], half: float
+    time: float, gait: GaitParameters, knots: Sequence[float], half: float
 ) -> tuple[Jet, Jet, Jet, Jet]:
-    """The planned tilt angles, for the attitude: their corners rounded, ``half`` seconds each way.
+    """The planned tilt angles with rounded corners, for the attitude.
 
-    A gait of straight lines turns about at once, the body cannot. But the corner is known before
-    it comes, so the body starts ``half`` before and ends ``half`` after it; what it misses before
-    makes up for what it misses after, but for second order. Smooth gaits stay as they are, and so
-    do jumps, which have no rates.
+    The rates of a piecewise linear gait jump at its corners, which the body cannot follow. The
+    corner is known in advance, so the body starts to turn ``half`` before and ends ``half`` after
+    it; the errors before and after cancel to first order. Smooth gaits and jumps, which have no
+    rates, are unchanged.
+
+    Parameters
+    ----------
+    time
+        s.
+    gait, knots
+        As for `tilt_reference`.
+    half
+        Time before and after a corner, s.
+
+    Returns
+    -------
+    tuple
+        Four jets, rad and s.
     """
     if half <= 0.0 or gait.type == FIXED or gait.type == TWO_COLOR_CIRCLE:
-        a1, a2, a3, a4, v1, v2, v3, v4 = tilt_reference(time, gait, table)
+        a1, a2, a3, a4, v1, v2, v3, v4 = tilt_reference(time, gait, knots)
         b1, b2, b3, b4 = tilt_acceleration(time, gait)
         return (a1, v1, b1), (a2, v2, b2), (a3, v3, b3), (a4, v4, b4)
-    a1, a2, a3, a4, v1, v2, v3, v4 = tilt_reference(time - half, gait, table)
-    b1, b2, b3, b4, w1, w2, w3, w4 = tilt_reference(time + half, gait, table)
+    a1, a2, a3, a4, v1, v2, v3, v4 = tilt_reference(time - half, gait, knots)
+    b1, b2, b3, b4, w1, w2, w3, w4 = tilt_reference(time + half, gait, knots)
     return (
         rounded_corner(a1, v1, b1, w1, half),
         rounded_corner(a2, v2, b2, w2, half),

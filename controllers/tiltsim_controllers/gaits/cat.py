@@ -1,17 +1,18 @@
 """Gaits after the cat: walk, run, transverse gallop, rotary gallop (ch. 5).
 
-The figures that hold ch. 5's keyframes are lost. These gaits are a reconstruction: the order of the
-feet from published footfalls, and a timing and a swing chosen so that what is left of ch. 5 holds
-(`SWINGS`). Many others would do as well, so numbers flown with them are ours, not the thesis'.
+The figures with the keyframes of ch. 5 are missing. These gaits are a reconstruction: the order of
+the feet from published footfalls, and a timing and a swing chosen so that the remaining statements
+of ch. 5 hold (`SWINGS`). Many others would satisfy them as well, so numbers flown with these gaits
+are ours, not the thesis's.
 
-A pod is a leg. The references of ch. 4 and 5 head for +X and +Y alike, so the pods of the +X, +Y,
--X and -Y arms (1 to 4) are the right fore, left fore, left hind and right hind leg. Legs that are
-``f`` forward of the vertical tilt the pods so that their thrust points forward, which is ``alpha =
-(-f, f, f, -f)`` by the signs of ch. 3's ``F(alpha)``. During stance a leg goes from ``lean +
-amplitude`` at touchdown to ``lean - amplitude`` at lift-off, at a constant rate, and then swings
-back. Each gait is four touchdown phases, one duty factor (the share of the stride that a foot is on
-the ground), and a swing. The continuous trot of ch. 4, Eq. (34), is exactly such a gait, with duty
-factor 1/2, no lean, and the diagonal pairs half a stride apart.
+A pod corresponds to a leg. The references of ch. 4 and 5 move towards +X and +Y alike, so the pods
+of the +X, +Y, -X and -Y arms (1 to 4) are the right fore, left fore, left hind and right hind leg.
+A leg at the angle ``f`` forward of the vertical tilts its pod so that the thrust points forward,
+which is ``alpha = (-f, f, f, -f)`` with the signs of ``F(alpha)`` in ch. 3. During stance a leg
+moves from ``lean + amplitude`` at touchdown to ``lean - amplitude`` at lift-off, at a constant
+rate, and then swings back. A gait is four touchdown phases, one duty factor (the fraction of the
+stride during which a foot is on the ground), and a swing. The continuous trot of ch. 4, Eq. (34),
+is such a gait, with duty factor 1/2, no lean, and the diagonal pairs half a stride apart.
 
 Sources of the order and the rules:
 
@@ -26,8 +27,8 @@ Sources of the order and the rules:
   animals", Int. J. Robotics Research 3 (1984); C. M. Biancardi and A. E. Minetti, "Biomechanical
   determinants of transverse and rotary gallop in cursorial mammals", J. Exp. Biol. 215 (2012).
 
-Within these rules the numbers are chosen: the walk's long stance and the run's late fore feet keep
-all rotors turning their way (ch. 5, Sec. 2), see `SWINGS` for the rest.
+Within these rules the numbers are chosen: with the walk's long stance and the run's late fore feet
+no rotor reverses its direction (ch. 5, Sec. 2); see `SWINGS` for the rest.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ FORWARD: Final = (-1.0, 1.0, 1.0, -1.0)
 
 
 class Footfall(NamedTuple):
-    """Timing of one stride, as shares of the period."""
+    """Timing of one stride, as fractions of the period."""
 
     touchdown: tuple[float, float, float, float]  # of pods 1 to 4: RF, LF, LH, RH
     duty_factor: float
@@ -51,11 +52,11 @@ FOOTFALLS: Final = {
     "transverse_gallop": Footfall((0.60, 0.50, 0.00, 0.10), duty_factor=0.30),
     "rotary_gallop": Footfall((0.50, 0.60, 0.00, 0.10), duty_factor=0.30),
 }
-"""Cat gaits by the name a scenario gives them."""
+"""Cat gaits by their name in a scenario."""
 
 
 class Swing(NamedTuple):
-    """How far the legs swing, rad, before any scale."""
+    """Swing of the legs, rad, before scaling."""
 
     lean: float  # forward, mean of touchdown and lift-off
     amplitude: float
@@ -67,23 +68,26 @@ SWINGS: Final = {
     "transverse_gallop": Swing(lean=1.3, amplitude=0.4),
     "rotary_gallop": Swing(lean=1.3, amplitude=0.4),
 }
-"""The swings with which ch. 5's statements hold, under the timing of `FOOTFALLS`.
+"""The swings with which the statements of ch. 5 hold, with the timing of `FOOTFALLS`.
 
-* A conventional decoupler that leaves 2.47 m at T = 1 s, hardly less or more at other periods,
-  needs a mean side force: 2.47 m times the position gain is an acceleration of 0.25 g. Legs that
-  swing evenly about the vertical have next to none. It sets the walk's lean, and the 0.19 m that
-  the modified decoupler leaves set its amplitude.
-* Walk and gallops meet a singular matrix unscaled, and are the further from one the smaller they
-  are, at 1/2 and at 1/3. The determinant falls with the lean of the hind legs over the fore legs,
-  ``R = 4 + (1/r - 2 r) (f_1 + f_2 - f_3 - f_4)`` to first order: it bounds all amplitudes, and the
-  gallops', whose fore and hind pairs are half a stride apart, most.
-* The run flies unscaled; its errors are the largest, the walk's the least, those of the gallops
-  alike.
+* An error of 2.47 m under the conventional decoupler at T = 1 s, nearly independent of the period,
+  requires a mean side force: 2.47 m times the position gain is an acceleration of 0.25 g. Legs that
+  swing evenly about the vertical have almost none. It determines the walk's lean, and the error of
+  0.19 m under the modified decoupler its amplitude.
+* Unscaled, walk and gallops reach a singular matrix; scaled by 1/2 and 1/3 their distance from it
+  grows. The determinant decreases with the lean of the hind legs relative to the fore legs,
+  ``R = 4 + (1/r - 2 r) (f_1 + f_2 - f_3 - f_4)`` to first order: this bounds all amplitudes,
+  especially those of the gallops, whose fore and hind pairs are half a stride apart.
+* The run flies unscaled; its errors are the largest, the walk's the smallest, those of the two
+  gallops similar.
 """
 
 
 def leg_angle(phase: float, touchdown: float, duty_factor: float) -> float:
-    """Angle of a leg in units of its amplitude, +1 at touchdown and -1 at lift-off."""
+    """Angle of a leg in units of its amplitude, +1 at touchdown and -1 at lift-off.
+
+    ``phase``, ``touchdown`` and ``duty_factor`` are fractions of the period.
+    """
     since = (phase - touchdown) % 1.0
     if since <= duty_factor:
         return 1.0 - 2.0 * since / duty_factor
@@ -93,11 +97,14 @@ def leg_angle(phase: float, touchdown: float, duty_factor: float) -> float:
 def cat_keyframes(
     footfall: Footfall, amplitude: float, lean: float = 0.0
 ) -> list[tuple[float, ...]]:
-    """Rows ``(phase, alpha_1, ..., alpha_4)`` (rad) at every touchdown and lift-off."""
+    """Rows ``(phase, alpha_1, ..., alpha_4)`` (rad) at every touchdown and lift-off.
+
+    ``amplitude`` and forward ``lean`` are in rad.
+    """
     duty = footfall.duty_factor
     events = {0.0}
     for touchdown in footfall.touchdown:
-        # Rounded, so that one event reached in two ways is one keyframe.
+        # Rounded, so that coinciding events make one keyframe.
         events |= {round(touchdown % 1.0, 12), round((touchdown + duty) % 1.0, 12)}
     legs = tuple(zip(FORWARD, footfall.touchdown, strict=True))
     return [

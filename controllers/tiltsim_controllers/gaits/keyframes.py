@@ -1,9 +1,9 @@
 """Gaits through keyframes: periodic and linear in between.
 
-Keyframes are as many as a gait needs, so they travel in a table beside the parameter record: rows
-of ``(phase, alpha_1, alpha_2, alpha_3, alpha_4)`` one after the other, with the phase (time over
-period) running from 0 in the first row to 1 in the last. Angles are in rad. A gait that closes has
-the same angles in both; two rows of equal phase make a jump.
+The number of keyframes varies, so they are passed as ``knots`` beside the parameter record: rows of
+``(phase, alpha_1, alpha_2, alpha_3, alpha_4)`` one after the other, with the phase (time over
+period) from 0 in the first row to 1 in the last. Angles are in rad. A closed gait has the same
+angles in both; two rows of equal phase make a jump.
 """
 
 from __future__ import annotations
@@ -12,23 +12,23 @@ from collections.abc import Sequence
 from math import floor
 from typing import Final
 
-from tiltsim_controllers.gaits.trot import TiltsAndRates
+from tiltsim_controllers.gaits.parameters import TiltsAndRates
 from tiltsim_controllers.mathematics.scalar import scalar
 
 ROW: Final = 5
-"""Floats in a row of the table."""
-
-NO_KNOTS: Final = (0.0, 0.0)
-"""The table of gaits without keyframes; not empty, so that native code can give it a type."""
+"""Floats per keyframe."""
 
 
 @scalar
-def keyframe_row(phase: float, rows: int, table: Sequence[float]) -> int:
-    """Index of the last of the ``rows - 1`` segments that starts at or before ``phase``."""
+def keyframe_row(phase: float, rows: int, knots: Sequence[float]) -> int:
+    """Index of the last of the ``rows - 1`` segments that starts at or before ``phase``.
+
+    ``knots`` are the keyframes.
+    """
     low, high = 0, rows - 1
     while high - low > 1:
         middle = (low + high) // 2
-        if table[ROW * middle] <= phase:
+        if knots[ROW * middle] <= phase:
             low = middle
         else:
             high = middle
@@ -36,27 +36,34 @@ def keyframe_row(phase: float, rows: int, table: Sequence[float]) -> int:
 
 
 @scalar
-def keyframe_gait(time: float, period: float, rows: float, table: Sequence[float]) -> TiltsAndRates:
-    """Tilt angles (rad) and rates (rad/s) of a keyframe table at a time (s).
+def keyframe_gait(time: float, period: float, rows: float, knots: Sequence[float]) -> TiltsAndRates:
+    """Tilt angles (rad) and rates (rad/s) of a gait through keyframes.
 
-    ``rows`` is the number of rows in use; the table may be longer.
+    Parameters
+    ----------
+    time, period
+        s.
+    rows
+        Number of keyframes.
+    knots
+        The keyframes; further floats may follow.
     """
     turns = time / period
     phase = turns - floor(turns)
-    start = ROW * keyframe_row(phase, int(rows), table)
+    start = ROW * keyframe_row(phase, int(rows), knots)
     stop = start + ROW
-    span = table[stop] - table[start]
-    part = (phase - table[start]) / span
+    span = knots[stop] - knots[start]
+    part = (phase - knots[start]) / span
     per_second = 1.0 / (span * period)
-    step_1 = table[stop + 1] - table[start + 1]
-    step_2 = table[stop + 2] - table[start + 2]
-    step_3 = table[stop + 3] - table[start + 3]
-    step_4 = table[stop + 4] - table[start + 4]
+    step_1 = knots[stop + 1] - knots[start + 1]
+    step_2 = knots[stop + 2] - knots[start + 2]
+    step_3 = knots[stop + 3] - knots[start + 3]
+    step_4 = knots[stop + 4] - knots[start + 4]
     return (
-        table[start + 1] + part * step_1,
-        table[start + 2] + part * step_2,
-        table[start + 3] + part * step_3,
-        table[start + 4] + part * step_4,
+        knots[start + 1] + part * step_1,
+        knots[start + 2] + part * step_2,
+        knots[start + 3] + part * step_3,
+        knots[start + 4] + part * step_4,
         per_second * step_1,
         per_second * step_2,
         per_second * step_3,

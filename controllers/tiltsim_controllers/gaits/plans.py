@@ -1,7 +1,7 @@
-"""Planned gaits: what a flight evaluates, with what an engineer wants to know of it.
+"""Planned gaits with name, source and properties, and their constructors.
 
-A `Gait` couples the parameters and the keyframe table of `tiltsim_controllers.gaits.tilt_reference`
-with the gait's name and source, and answers for its period, amplitude, continuity and largest rate.
+A `Gait` combines the parameters and knots of `tiltsim_controllers.gaits.tilts.tilt_reference` with
+the gait's name and source, and computes its period, amplitude, continuity and largest rate.
 """
 
 from __future__ import annotations
@@ -13,39 +13,39 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tiltsim_controllers.gaits import (
+from tiltsim_controllers.gaits.cat import FOOTFALLS, cat_keyframes
+from tiltsim_controllers.gaits.keyframes import ROW
+from tiltsim_controllers.gaits.parameters import (
     FIXED,
     KEYFRAMES,
+    NO_KNOTS,
     PENGUIN,
     ROTATING,
     TROT_CONTINUOUS,
     TROT_INSTANT,
     TWO_COLOR_CIRCLE,
     GaitParameters,
-    tilt_reference,
 )
-from tiltsim_controllers.gaits.cat import FOOTFALLS, cat_keyframes
-from tiltsim_controllers.gaits.keyframes import NO_KNOTS, ROW
+from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.gaits.two_color import COLORS
 from tiltsim_controllers.vehicle.parameters import drag_ratio
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
+    from tiltsim_controllers.mathematics.scalar import Floats
     from tiltsim_controllers.vehicle.parameters import Vehicle
-
-    Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Gait:
-    """A gait ready to be flown: pass `parameters` and `table` to `tilt_reference`."""
+    """A gait ready to be flown: pass `parameters` and `knots` to `tilt_reference`."""
 
     name: str
     parameters: GaitParameters
-    table: tuple[float, ...] = NO_KNOTS
+    knots: tuple[float, ...] = NO_KNOTS
     source: str = ""
 
     @property
@@ -97,7 +97,7 @@ class Gait:
         return float(np.abs(self.rates(eighths)).max())
 
     @property
-    def shortest_line(self) -> float:
+    def min_segment_time(self) -> float:
         """The shortest time (s) between two corners; infinite without corners, 0 with jumps."""
         if not self.is_continuous:
             return 0.0
@@ -106,16 +106,16 @@ class Gait:
             return float(np.diff(rows[:, 0]).min()) * self.parameters.period
         return 0.5 * self.parameters.period if self.parameters.type == TROT_CONTINUOUS else inf
 
-    def angles(self, time: ArrayLike) -> Array:
+    def angles(self, time: ArrayLike) -> Floats:
         """Tilt angles (rad) at times (s) of shape (...), as an array of shape (..., 4)."""
         return self._evaluate(time)[..., :4]
 
-    def rates(self, time: ArrayLike) -> Array:
+    def rates(self, time: ArrayLike) -> Floats:
         """Tilt rates (rad/s) at times (s) of shape (...), as an array of shape (..., 4)."""
         return self._evaluate(time)[..., 4:]
 
-    def sample_times(self, samples: int = 201) -> Array:
-        """Times (s) over one period, ends and keyframes included; just 0 for a constant gait."""
+    def sample_times(self, samples: int = 201) -> Floats:
+        """Times (s) over one period, with ends and keyframes; only 0 for a constant gait."""
         if self.is_constant:
             return np.zeros(1)
         phases = np.linspace(0.0, 1.0, samples)
@@ -128,7 +128,13 @@ class Gait:
         return np.asarray(phases * self.parameters.period)
 
     def scaled(self, divisor: float) -> Gait:
-        """All tilt angles divided by ``divisor`` (ch. 5, Eq. 16)."""
+        """The gait with all tilt angles divided by ``divisor`` (ch. 5, Eq. 16).
+
+        Raises
+        ------
+        ValueError
+            If the divisor is not positive and finite.
+        """
         if not (isfinite(divisor) and divisor > 0.0):
             raise ValueError(f"scale 1/{divisor}: must be positive and finite")
         if divisor == 1.0:
@@ -137,24 +143,24 @@ class Gait:
         return replace(self, name=f"{self.name} / {divisor:g}", parameters=parameters)
 
     def biased(self, eta: float) -> Gait:
-        """``alpha_3`` and ``alpha_4`` multiplied by ``eta`` (ch. 6, Eqs. 12-15)."""
+        """The gait with ``alpha_3`` and ``alpha_4`` multiplied by ``eta`` (ch. 6, Eqs. 12-15)."""
         if eta == 1.0:
             return self
         parameters = self.parameters._replace(bias=self.parameters.bias * eta)
         return replace(self, name=f"{self.name}, biased {eta:.0%}", parameters=parameters)
 
-    def _rows(self) -> Array | None:
+    def _rows(self) -> Floats | None:
         """The keyframes as flown, shape (N, 5); None for gaits without them."""
         if self.parameters.type != KEYFRAMES:
             return None
-        rows = np.reshape(self.table, (-1, ROW))[: int(self.parameters.keyframes)].copy()
+        rows = np.reshape(self.knots, (-1, ROW))[: int(self.parameters.keyframes)].copy()
         rows[:, 1:] *= self.parameters.scale
         rows[:, 3:] *= self.parameters.bias
         return rows
 
-    def _evaluate(self, time: ArrayLike) -> Array:
+    def _evaluate(self, time: ArrayLike) -> Floats:
         times = np.asarray(time, dtype=float)
-        values = [tilt_reference(t, self.parameters, self.table) for t in times.ravel().tolist()]
+        values = [tilt_reference(t, self.parameters, self.knots) for t in times.ravel().tolist()]
         return np.reshape(np.asarray(values, dtype=float), (*times.shape, 8))
 
 
@@ -170,7 +176,7 @@ def instant_trot(amplitude: float, period: float) -> Gait:
 
 
 def continuous_trot(amplitude: float, period: float) -> Gait:
-    """The trot at a constant rate between plus and minus the amplitude (rad) (ch. 4, Eq. 34)."""
+    """The trot at constant rate between plus and minus the amplitude (rad) (ch. 4, Eq. 34)."""
     parameters = GaitParameters(TROT_CONTINUOUS, amplitude=amplitude, period=_positive(period))
     return Gait("trot_continuous", parameters, source="ch. 4, Sec. 4.3")
 
@@ -182,21 +188,32 @@ def penguin(name: str, amplitude: float, period: float) -> Gait:
 
 
 def rotating(start: float, rate: float) -> Gait:
-    """A tilt that turns on at a constant rate (rad/s) from ``start`` (rad) (ch. 10, Eq. 18)."""
+    """A tilt that grows from ``start`` (rad) at a constant rate (rad/s) (ch. 10, Eq. 18)."""
     period = _positive(2.0 * pi / abs(rate)) if rate else 1.0
     parameters = GaitParameters(ROTATING, angle_1=start, rate=rate, period=period)
     return Gait("rotating", parameters, source="ch. 10, Eq. (18)")
 
 
 def cat(name: str, amplitude: float, period: float, lean: float = 0.0) -> Gait:
-    """A cat gait by its name in `FOOTFALLS` (ch. 5, Sec. 3.2).
+    """A cat gait (ch. 5, Sec. 3.2).
 
-    Its legs swing by ``amplitude`` (rad) to either side of ``lean`` (rad, forward) in ``period``
-    (s); `tiltsim_controllers.gaits.cat.SWINGS` has what ch. 5 was flown with, as far as we can
-    tell.
+    Parameters
+    ----------
+    name
+        A name in `FOOTFALLS`.
+    amplitude, lean
+        The legs swing by ``amplitude`` to either side of ``lean`` (forward), rad;
+        `tiltsim_controllers.gaits.cat.SWINGS` has the values reconstructed from ch. 5.
+    period
+        s.
+
+    Raises
+    ------
+    ValueError
+        If there is no cat gait of this name.
     """
     if name not in FOOTFALLS:
-        raise ValueError(f"{name!r} is no cat gait; choose {', '.join(FOOTFALLS)}")
+        raise ValueError(f"{name!r} is not a cat gait; choose {', '.join(FOOTFALLS)}")
     rows = cat_keyframes(FOOTFALLS[name], amplitude, lean)
     return keyframes(rows, period, name=name, source="ch. 5, Sec. 3.2; keyframes reconstructed")
 
@@ -204,10 +221,21 @@ def cat(name: str, amplitude: float, period: float, lean: float = 0.0) -> Gait:
 def waypoints(
     angles: Sequence[Sequence[float]], period: float, phases: Sequence[float] | None = None
 ) -> Gait:
-    """A closed gait through the given tilt angles (rad), straight in between.
+    """A closed, piecewise linear gait through the given tilt angles.
 
-    Each of ``angles`` is reached at its phase (share of the period); without ``phases`` they are
-    spread evenly. The last one runs back to the first.
+    Parameters
+    ----------
+    angles
+        Waypoints of four tilt angles, rad; the last segment leads back to the first.
+    period
+        s.
+    phases
+        When each waypoint is reached, as a fraction of the period; evenly spaced by default.
+
+    Raises
+    ------
+    ValueError
+        If the numbers of waypoints and phases differ, or as `keyframes`.
     """
     count = len(angles)
     if phases is None:
@@ -223,13 +251,22 @@ def waypoints(
 def keyframes(
     rows: Iterable[Sequence[float]], period: float, *, name: str = "keyframes", source: str = ""
 ) -> Gait:
-    """A gait through rows of ``(phase, alpha_1, ..., alpha_4)``, phase from 0 to 1, angles in rad.
+    """A gait through keyframes, linear in between.
+
+    Parameters
+    ----------
+    rows
+        ``(phase, alpha_1, ..., alpha_4)``, phase from 0 to 1, angles in rad.
+    period
+        s.
+    name, source
+        Name and origin of the gait.
 
     Raises
     ------
     ValueError
-        If a row has not five finite numbers, or the phases do not run from 0 to 1, or they go back,
-        or three rows share a phase (two make a jump), or the period is not positive.
+        If a row is not five finite numbers, the phases do not run from 0 to 1 or decrease, three
+        rows share a phase (two make a jump), or the period is not positive.
     """
     frames = [tuple(map(float, row)) for row in rows]
     for frame in frames:
@@ -241,7 +278,7 @@ def keyframes(
     if any(later < earlier for earlier, later in itertools.pairwise(phases)):
         raise ValueError(f"keyframe phases {phases}: must not decrease")
     if phases[1] == 0.0 or phases[-2] == 1.0:
-        raise ValueError(f"keyframe phases {phases}: only one row may stand at 0, one at 1")
+        raise ValueError(f"keyframe phases {phases}: only one row may be at 0 and one at 1")
     if any(third == first for first, third in zip(phases, phases[2:], strict=False)):
         raise ValueError(f"keyframe phases {phases}: at most two rows may share a phase")
     parameters = GaitParameters(KEYFRAMES, period=_positive(period), keyframes=float(len(frames)))
@@ -258,7 +295,26 @@ def two_color_circle(
     name: str = "two_color",
     source: str = "",
 ) -> Gait:
-    """A circle in the alpha_1-alpha_2 plane on one colour (ch. 8, Sec. 4); angles in rad."""
+    """A circle in the alpha_1-alpha_2 plane on one colour (ch. 8, Sec. 4).
+
+    Parameters
+    ----------
+    centre, radius
+        ``(alpha_1, alpha_2)`` of the centre and the radius, rad.
+    color
+        ``red`` or ``blue``.
+    period
+        s.
+    vehicle
+        Its drag ratio sets the offset of the blue lines.
+    name, source
+        Name and origin of the gait.
+
+    Raises
+    ------
+    ValueError
+        If the colour is unknown or the period not positive.
+    """
     parameters = GaitParameters(
         TWO_COLOR_CIRCLE,
         period=_positive(period),
@@ -272,9 +328,9 @@ def two_color_circle(
 
 
 def color_code(color: str) -> float:
-    """The code of a colour's name; ValueError with the choices for any other name."""
+    """The code of a colour's name; raises ValueError for any other name."""
     if color not in COLORS:
-        raise ValueError(f"{color!r} is no color; choose {', '.join(COLORS)}")
+        raise ValueError(f"{color!r} is not a color; choose {', '.join(COLORS)}")
     return COLORS[color]
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from math import floor
 
+from tiltsim_controllers.gaits.parameters import TiltsAndRates
 from tiltsim_controllers.mathematics.scalar import scalar
-
-TiltsAndRates = tuple[float, float, float, float, float, float, float, float]
 
 
 @scalar
@@ -17,7 +16,10 @@ def _trot(rho: float, rate: float) -> TiltsAndRates:
 
 @scalar
 def instant_trot(time: float, amplitude: float, period: float) -> TiltsAndRates:
-    """``rho`` switches between plus and minus the amplitude at half periods (ch. 4, Eq. 33)."""
+    """``rho`` switches between plus and minus the amplitude at half periods (ch. 4, Eq. 33).
+
+    Time and period in s, amplitude in rad.
+    """
     phase = time - floor(time / period) * period
     if phase <= 0.5 * period:
         return _trot(amplitude, 0.0)
@@ -26,7 +28,10 @@ def instant_trot(time: float, amplitude: float, period: float) -> TiltsAndRates:
 
 @scalar
 def continuous_trot(time: float, amplitude: float, period: float) -> TiltsAndRates:
-    """``rho`` runs from plus to minus the amplitude and back at a constant rate (ch. 4, Eq. 34)."""
+    """``rho`` moves from plus to minus the amplitude and back at constant rate (ch. 4, Eq. 34).
+
+    Time and period in s, amplitude in rad.
+    """
     phase = time - floor(time / period) * period
     rate = 4.0 * amplitude / period
     if phase <= 0.5 * period:

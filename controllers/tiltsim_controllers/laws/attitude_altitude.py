@@ -12,8 +12,7 @@ from collections.abc import Sequence
 from math import nan
 from typing import Final, NamedTuple
 
-from tiltsim_controllers.gaits import GaitParameters
-from tiltsim_controllers.gaits.keyframes import NO_KNOTS
+from tiltsim_controllers.gaits.parameters import NO_KNOTS, GaitParameters
 from tiltsim_controllers.laws.decouplers import (
     CONVENTIONAL,
     EXACT,
@@ -23,10 +22,9 @@ from tiltsim_controllers.laws.decouplers import (
     modified_decoupler,
 )
 from tiltsim_controllers.mathematics.rotation import world_up_in_body, wrap_angle
-from tiltsim_controllers.mathematics.scalar import Quad, scalar
+from tiltsim_controllers.mathematics.scalar import Octet, Quad, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
 from tiltsim_controllers.vehicle.decoupling_matrix import (
-    Octet,
     body_force,
     sines_and_cosines,
     solve_by_pairs,

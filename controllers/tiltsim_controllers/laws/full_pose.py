@@ -20,12 +20,11 @@ from collections.abc import Sequence
 from math import copysign, inf, nan
 from typing import Final, NamedTuple
 
-from tiltsim_controllers.gaits.keyframes import NO_KNOTS
+from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
-from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Octet, Quad, Triple, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
 from tiltsim_controllers.vehicle.decoupling_matrix import (
-    Octet,
     body_force,
     sines_and_cosines,
     torque_entries,

@@ -24,9 +24,9 @@ from collections.abc import Sequence
 from math import atan2, nan, sqrt
 from typing import Final, NamedTuple
 
-from tiltsim_controllers.gaits import GaitParameters, tilt_reference
 from tiltsim_controllers.gaits.anticipation import anticipated_tilts
-from tiltsim_controllers.gaits.keyframes import NO_KNOTS
+from tiltsim_controllers.gaits.parameters import NO_KNOTS, GaitParameters
+from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import Gains, State
 from tiltsim_controllers.laws.decouplers import NONE
 from tiltsim_controllers.laws.gains import IntegralGains

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from math import cos, nan, sin
 from typing import Final, NamedTuple
 
-from tiltsim_controllers.gaits.keyframes import NO_KNOTS
+from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.laws.yaw_position import State, euler_rates, gyroscopic_acceleration
 from tiltsim_controllers.mathematics.rotation import wrap_angle
 from tiltsim_controllers.mathematics.scalar import Quad, scalar

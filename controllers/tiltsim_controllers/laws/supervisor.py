@@ -29,9 +29,9 @@ from collections.abc import Sequence
 from math import asin, pi, sqrt
 from typing import Final, NamedTuple
 
-from tiltsim_controllers.gaits import GaitParameters, tilt_acceleration, tilt_reference
+from tiltsim_controllers.gaits.parameters import GaitParameters, TiltsAndRates
 from tiltsim_controllers.gaits.red_gait import Jets4, nearest_red_angles
-from tiltsim_controllers.gaits.trot import TiltsAndRates
+from tiltsim_controllers.gaits.tilts import tilt_acceleration, tilt_reference
 from tiltsim_controllers.mathematics.jets import Jet, jet_product, jet_scaled, jet_sum
 from tiltsim_controllers.mathematics.rotation import world_up_in_body
 from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar

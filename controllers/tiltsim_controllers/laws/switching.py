@@ -17,7 +17,7 @@ from typing import Final, NamedTuple
 
 import tiltsim_controllers.laws.quadrotor_attitude_altitude as attitude_altitude
 import tiltsim_controllers.laws.yaw_position as yaw_position
-from tiltsim_controllers.gaits.keyframes import NO_KNOTS
+from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.laws.quadrotor_attitude_altitude import attitude_altitude_inputs
 from tiltsim_controllers.laws.yaw_position import Inputs, State, euler_rates, yaw_position_inputs
 from tiltsim_controllers.mathematics.scalar import scalar

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from math import cos, nan, sin
 from typing import Final, NamedTuple
 
-from tiltsim_controllers.gaits.keyframes import NO_KNOTS
+from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler, wrap_angle
 from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
 from tiltsim_controllers.mathematics.z_down import (

@@ -1,8 +1,8 @@
-"""Jets: a quantity with its first and second derivative by time, carried through arithmetic.
+"""Jets: a quantity with its first and second time derivative, carried through arithmetic.
 
-What depends on time through several steps (tilt angles, torque-free force, attitude) has its
-derivatives by the chain rule; jets apply the rule step by step, to rounding and without
-differences. A jet is a triple ``(value, first, second)``, in native code three registers.
+A quantity that depends on time through several steps (tilt angles, torque-free force, attitude)
+gets its derivatives by the chain rule. Jets apply the rule step by step, exact to rounding and
+without finite differences. A jet is a triple ``(value, first, second)``.
 """
 
 from __future__ import annotations
@@ -16,7 +16,15 @@ Jet = tuple[float, float, float]
 
 @scalar
 def jet_sum(a: float, x: Jet, b: float, y: Jet) -> Jet:
-    """The combination ``a x + b y`` with constant ``a`` and ``b``."""
+    """The linear combination ``a x + b y``.
+
+    Parameters
+    ----------
+    a, b
+        Constant factors.
+    x, y
+        The jets.
+    """
     return a * x[0] + b * y[0], a * x[1] + b * y[1], a * x[2] + b * y[2]
 
 
@@ -46,7 +54,7 @@ def jet_quotient(x: Jet, y: Jet) -> Jet:
 
 @scalar
 def jet_square_root(x: Jet) -> Jet:
-    """The root of a positive ``x``."""
+    """The square root of a positive ``x``."""
     value = sqrt(x[0])
     first = 0.5 * x[1] / value
     return value, first, (0.5 * x[2] - first * first) / value
@@ -68,7 +76,7 @@ def jet_cosine(x: Jet) -> Jet:
 
 @scalar
 def jet_angle(y: Jet, x: Jet) -> Jet:
-    """The angle ``atan2(y, x)`` in rad, of a vector that is not zero."""
+    """The angle ``atan2(y, x)`` in rad, of a non-zero vector."""
     square = x[0] * x[0] + y[0] * y[0]
     first = (x[0] * y[1] - y[0] * x[1]) / square
     growth = x[0] * x[1] + y[0] * y[1]

@@ -1,8 +1,8 @@
 """Parameter records: one declaration read by name in Python and in native code.
 
 A record is a ``NamedTuple`` whose fields are floats or further records. Flattened, it fills the
-head of MuJoCo's ``userdata``, so the parameters of a flight are part of its state; seen through
-`record_dtype`, the same numbers are a struct whose fields native code reads by the same names.
+head of MuJoCo's ``userdata``, so the parameters of a flight are part of its state. Through
+`record_dtype` the same numbers are a struct whose fields native code reads by the same names.
 """
 
 from __future__ import annotations
@@ -26,16 +26,15 @@ def flatten(record: Iterable[Any]) -> Iterator[float]:
 
 
 def unflatten(record_type: type[Record], values: Iterable[float]) -> Record:
-    """Rebuild a record of the given type from its floats; the inverse of `flatten`."""
+    """Rebuild a record of type ``record_type`` from its floats; the inverse of `flatten`."""
     record: Record = _take(record_type, iter(values))
     return record
 
 
 def slotted(record: Any) -> Any:
-    """The same fields in an object with slots, which Python reads several times faster.
+    """Return the same fields in an object with slots, which Python reads several times faster.
 
-    For the parameters of a law that is evaluated a hundred thousand times; everything else keeps
-    the record.
+    For the parameters of a controller that is evaluated a hundred thousand times.
     """
     if not isinstance(record, tuple):
         return record
@@ -47,7 +46,7 @@ def slotted(record: Any) -> Any:
 
 
 def make_record_type(name: str, **fields: type) -> Any:
-    """A record type with these fields, for records that wrap others known only at run time."""
+    """Create a record type with these fields, for records of types known only at run time."""
     made: Any = NamedTuple(name, list(fields.items()))  # type: ignore[misc]
     return made
 
@@ -63,13 +62,13 @@ def _take(record_type: Any, values: Iterator[float]) -> Any:
 
 @cache
 def _fields(record_type: type[tuple[Any, ...]]) -> dict[str, Any]:
-    """Types by name; to ask for them takes longer than many a flight's metrics."""
+    """Types by name, cached: resolving them takes longer than computing a flight's metrics."""
     return get_type_hints(record_type)
 
 
 @cache
 def record_dtype(record_type: type[tuple[Any, ...]]) -> np.dtype[np.void]:
-    """The structured dtype (all float64, no padding) with the record's field names."""
+    """Return the structured dtype (all float64, no padding) with the record's field names."""
     return np.dtype(
         [
             (name, record_dtype(kind) if _is_record(kind) else np.float64)
@@ -79,7 +78,7 @@ def record_dtype(record_type: type[tuple[Any, ...]]) -> np.dtype[np.void]:
 
 
 def record_size(record_type: type[tuple[Any, ...]]) -> int:
-    """The number of floats in a flattened record."""
+    """Return the number of floats in a flattened record."""
     return record_dtype(record_type).itemsize // np.dtype(np.float64).itemsize
 
 

@@ -10,7 +10,13 @@ from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
 
 @scalar
 def euler_from_quaternion(w: float, x: float, y: float, z: float) -> Triple:
-    """Roll, pitch and yaw (rad) of a unit quaternion, scalar first."""
+    """Roll, pitch and yaw (rad) of a unit quaternion.
+
+    Parameters
+    ----------
+    w, x, y, z
+        The components, real part first.
+    """
     sin_pitch = 2.0 * (w * y - z * x)
     # Rounding may carry the sine past one at pitch = +-90 degrees.
     if not -1.0 <= sin_pitch <= 1.0:
@@ -24,7 +30,7 @@ def euler_from_quaternion(w: float, x: float, y: float, z: float) -> Triple:
 
 @scalar
 def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> Quad:
-    """The unit quaternion (scalar first) of roll, pitch and yaw (rad)."""
+    """The unit quaternion ``(w, x, y, z)`` of roll, pitch and yaw (rad)."""
     cr, sr = cos(0.5 * roll), sin(0.5 * roll)
     cp, sp = cos(0.5 * pitch), sin(0.5 * pitch)
     cy, sy = cos(0.5 * yaw), sin(0.5 * yaw)
@@ -38,10 +44,7 @@ def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> Quad:
 
 @scalar
 def wrap_angle(angle: float) -> float:
-    """The angle (rad) within half a revolution either way that turns to the same direction.
-
-    For differences of yaw: a quaternion tells yaw between -pi and pi, a vehicle may cross there.
-    """
+    """The equivalent angle (rad) from -pi to pi, for differences of yaw."""
     if abs(angle) > pi:
         return angle - 2.0 * pi * floor(angle / (2.0 * pi) + 0.5)
     return angle
@@ -49,14 +52,14 @@ def wrap_angle(angle: float) -> float:
 
 @scalar
 def world_up_in_body(roll: float, pitch: float) -> Triple:
-    """World up seen from the body, ``r3``: the third row of the body-to-world rotation."""
+    """World up in body axes, ``r3``: third row of the body-to-world rotation (ch. 3, Eq. 2)."""
     cos_pitch = cos(pitch)
     return -sin(pitch), sin(roll) * cos_pitch, cos(roll) * cos_pitch
 
 
 @scalar
 def rotation_from_euler(roll: float, pitch: float, yaw: float) -> tuple[float, ...]:
-    """The nine entries, rows first, of the body-to-world rotation (ch. 3, Eq. 2)."""
+    """The body-to-world rotation (ch. 3, Eq. 2) of angles in rad: nine entries, row by row."""
     sr, cr = sin(roll), cos(roll)
     sp, cp = sin(pitch), cos(pitch)
     sy, cy = sin(yaw), cos(yaw)
@@ -75,7 +78,13 @@ def rotation_from_euler(roll: float, pitch: float, yaw: float) -> tuple[float, .
 
 @scalar
 def rotation_from_quaternion(w: float, x: float, y: float, z: float) -> tuple[float, ...]:
-    """The nine entries, rows first, of the body-to-world rotation of a unit quaternion."""
+    """The body-to-world rotation of a unit quaternion: nine entries, row by row.
+
+    Parameters
+    ----------
+    w, x, y, z
+        The components, real part first.
+    """
     return (
         1.0 - 2.0 * (y * y + z * z),
         2.0 * (x * y - w * z),
@@ -91,7 +100,7 @@ def rotation_from_quaternion(w: float, x: float, y: float, z: float) -> tuple[fl
 
 @scalar
 def to_world(rotation: Sequence[float], vector: Triple) -> Triple:
-    """A vector in body axes, turned to the world's; ``rotation`` holds nine entries, rows first."""
+    """A body-frame vector in world axes; ``rotation`` holds nine entries, row by row."""
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
     x, y, z = vector
     return (
@@ -103,10 +112,10 @@ def to_world(rotation: Sequence[float], vector: Triple) -> Triple:
 
 @scalar
 def quaternion_from_rotation(rotation: tuple[float, ...]) -> Quad:
-    """A unit quaternion (scalar first) of a body-to-world rotation, nine entries, rows first.
+    """A unit quaternion ``(w, x, y, z)`` of a body-to-world rotation, nine entries, row by row.
 
-    Twice the products of its largest component with all four stand in the rotation; which one is
-    the largest shows on the diagonal. What rounding has added to the rotation's length is left out.
+    The diagonal shows which component is the largest; sums of the entries are its products with
+    all four. Normalizing removes the rounding error of the rotation.
     """
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
     if r11 + r22 + r33 >= max(r11, r22, r33):

@@ -13,6 +13,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 Quad = tuple[float, float, float, float]
+Octet = tuple[float, float, float, float, float, float, float, float]
 Values = tuple[float, ...]
 Vector = Sequence[float]
 Floats = npt.NDArray[np.float64]
@@ -21,12 +22,12 @@ _registry: list[Callable[..., Any]] = []
 
 
 def scalar(function: Function) -> Function:
-    """Register ``function`` as scalar code and return it untouched.
+    """Register ``function`` as scalar code and return it unchanged.
 
     Scalar code works on floats, tuples of floats and parameter records; it uses only arithmetic,
     comparisons, the ``math`` module and other scalar functions. Called from Python it is ordinary
-    Python; the native engine compiles the very same source, callees before callers, in the order
-    of registration. A marker, not a compiler: importing ``controllers`` never imports numba.
+    Python; the native engine compiles the same source, callees before callers, in the order of
+    registration. A marker, not a compiler: importing ``tiltsim_controllers`` never imports numba.
     """
     _registry.append(function)
     return function
@@ -39,7 +40,7 @@ def scalar_functions() -> tuple[Callable[..., Any], ...]:
 
 @scalar
 def clipped(value: float, low: float, high: float) -> float:
-    """The nearest number between two bounds; what is no number stays none."""
+    """Limit ``value`` to the interval from ``low`` to ``high``; NaN stays NaN."""
     if value < low:
         return low
     return high if value > high else value

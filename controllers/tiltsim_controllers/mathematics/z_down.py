@@ -1,8 +1,8 @@
 """Between ch. 2's axes (x forward, y right, z down) and ours (x forward, y left, z up).
 
-Both world and body are turned half a revolution about x, so every vector changes the signs of y
-and z, and so do pitch and yaw. Each function is its own inverse: it takes either convention to the
-other. Nothing else in the package knows that there are two.
+World and body axes are both rotated by half a revolution about x, so the signs of y and z of every
+vector flip, and so do those of pitch and yaw. Each function is its own inverse: it converts from
+either convention to the other.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from tiltsim_controllers.mathematics.scalar import Triple, scalar
 
 @scalar
 def flip_vector(x: float, y: float, z: float) -> Triple:
-    """A vector of either convention (position, rate, torque; world or body axes) in the other."""
+    """Convert a vector (position, rate, torque; world or body axes) to the other convention."""
     return x, -y, -z
 
 
 @scalar
 def flip_attitude(roll: float, pitch: float, yaw: float) -> Triple:
-    """Roll, pitch and yaw (rad) of either convention in the other.
+    """Convert roll, pitch and yaw (rad) to the other convention.
 
     The rotation becomes ``D Rz(yaw) Ry(pitch) Rx(roll) D`` with ``D = diag(1, -1, -1)``, which is
     ``Rz(-yaw) Ry(-pitch) Rx(roll)``.
@@ -28,7 +28,7 @@ def flip_attitude(roll: float, pitch: float, yaw: float) -> Triple:
 
 @scalar
 def flip_state(state: tuple[float, ...]) -> tuple[float, ...]:
-    """A quadrotor's state of either convention in the other.
+    """Convert a quadrotor's state to the other convention.
 
     The state is ``(x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r, thrust, thrust_rate)``; thrust
     is a magnitude and keeps its sign.
@@ -39,5 +39,6 @@ def flip_state(state: tuple[float, ...]) -> tuple[float, ...]:
         *flip_vector(vx, vy, vz),
         *flip_attitude(roll, pitch, yaw),
         *flip_vector(p, q, r),
-        *(thrust, thrust_rate),
+        thrust,
+        thrust_rate,
     )

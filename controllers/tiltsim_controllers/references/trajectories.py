@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import cos, sin
 from typing import Final, NamedTuple
 
-from tiltsim_controllers.gaits.keyframes import NO_KNOTS
+from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.mathematics.scalar import scalar
 from tiltsim_controllers.references.waypoints import waypoint_motion
 

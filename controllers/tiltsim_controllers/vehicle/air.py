@@ -1,24 +1,21 @@
-"""Forces of the air: drag, wind, discrete gusts, turbulence and ground effect.
+"""Aerodynamic forces: drag, wind, discrete gusts, turbulence and ground effect.
 
 Sources: MIL-F-8785C, "Flying qualities of piloted airplanes" (5 November 1980), for gusts and the
 Dryden spectra; Cheeseman and Bennett, "The effect of the ground on a helicopter rotor in forward
-flight", ARC R&M 3021 (September 1955, published 1957). The formulas were checked against others who
-implement them; paragraphs and equations are not cited, as neither print was at hand. Air velocities
-are in world axes, z up.
+flight", ARC R&M 3021 (September 1955, published 1957). The formulas were checked against other
+implementations; paragraphs and equations are not cited, as neither document was available. Air
+velocities are in world axes, z up.
 """
 
 from __future__ import annotations
 
 from math import cos, pi, sqrt
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from tiltsim_controllers.mathematics.noise import normal
 from tiltsim_controllers.mathematics.scalar import Triple, scalar
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 FOOT: Final = 0.3048
 """m; MIL-F-8785C is in feet, and its exponents do not carry over."""
@@ -27,12 +24,12 @@ FOOT: Final = 0.3048
 
 
 class Drag(NamedTuple):
-    """Coefficients of the force against the motion through the air, along each body axis."""
+    """Drag coefficients along each body axis."""
 
     linear_x: float = 0.0  # N s/m
     linear_y: float = 0.0
     linear_z: float = 0.0
-    area_x: float = 0.0  # m^2: drag coefficient times the area seen along the axis
+    area_x: float = 0.0  # m^2: drag coefficient times the area projected along the axis
     area_y: float = 0.0
     area_z: float = 0.0
     density: float = 1.225  # kg/m^3, of the standard atmosphere at sea level
@@ -42,8 +39,8 @@ class Drag(NamedTuple):
 def drag_force(velocity: Triple, drag: Drag) -> Triple:
     """Force (N) on a body that moves through the air at a velocity (m/s), body axes.
 
-    ``F_i = -(linear_i + density / 2 area_i |v|) v_i``. The linear part stands for rotors, whose
-    drag grows with speed and thrust alone (their H-force); the quadratic one for the fuselage.
+    ``F_i = -(linear_i + density / 2 area_i |v|) v_i``. The linear part models the drag of the
+    rotors (H-force), the quadratic part that of the fuselage.
     """
     vx, vy, vz = velocity
     pressure = 0.5 * drag.density * sqrt(vx * vx + vy * vy + vz * vz)
@@ -58,11 +55,11 @@ def drag_force(velocity: Triple, drag: Drag) -> Triple:
 
 
 class Gust(NamedTuple):
-    """A discrete gust (MIL-F-8785C), given by its rise time instead of its length."""
+    """A discrete gust (MIL-F-8785C), specified by its rise time instead of its length."""
 
     start: float = 0.0  # s
     rise: float = 1.0  # s, d_m over the speed of flight
-    duration: float = 0.0  # s, from start to the end of the fall; 0: it stays
+    duration: float = 0.0  # s, from start to the end of the fall; 0: it does not fall
     x: float = 0.0  # m/s, at its peak
     y: float = 0.0
     z: float = 0.0
@@ -70,7 +67,7 @@ class Gust(NamedTuple):
 
 @scalar
 def gust_profile(time: float, gust: Gust) -> float:
-    """Share of the peak: ``(1 - cos(pi t / rise)) / 2`` up, and down again before the end."""
+    """Fraction of the peak at a time (s): ``(1 - cos(pi t / rise)) / 2``, mirrored at the end."""
     since = time - gust.start
     if since <= 0.0 or (gust.duration > 0.0 and since >= gust.duration):
         return 0.0
@@ -86,7 +83,7 @@ def gust_profile(time: float, gust: Gust) -> float:
 
 
 class Turbulence(NamedTuple):
-    """Dryden turbulence that a vehicle meets at a constant speed; see `dryden_rates`."""
+    """Dryden turbulence met at a constant airspeed; see `dryden_rates`."""
 
     intensity_u: float = 0.0  # m/s, standard deviation along the mean wind
     intensity_w: float = 0.0  # m/s, vertical; across the wind it is that of u
@@ -95,7 +92,7 @@ class Turbulence(NamedTuple):
     speed: float = 1.0  # m/s, through the turbulence
     along_x: float = 1.0  # unit vector of the mean wind, horizontal
     along_y: float = 0.0
-    sample_time: float = 0.01  # s for which a draw of the noise stands
+    sample_time: float = 0.01  # s for which a draw of the noise is held
     seed: float = 0.0
 
 
@@ -112,7 +109,7 @@ def low_altitude_turbulence(
     sample_time: float = 0.01,
     seed: float = 0.0,
 ) -> Turbulence:
-    """The low-altitude model (MIL-F-8785C), 10 to 1000 ft.
+    """Parameters of the low-altitude model (MIL-F-8785C), 10 to 1000 ft.
 
     ``L_w = h``, ``L_u = L_v = h / (0.177 + 0.000823 h)^1.2``, ``sigma_w = 0.1 W_20`` and
     ``sigma_u = sigma_v = sigma_w / (0.177 + 0.000823 h)^0.4``, ``h`` in feet.
@@ -122,13 +119,13 @@ def low_altitude_turbulence(
     wind_at_20_ft : float
         Mean wind 6 m above the ground, m/s.
     height : float
-        Above the ground, m; what lies outside 10 to 1000 ft is taken at the bound.
+        Above the ground, m; limited to 10 to 1000 ft.
     speed : float
-        Of the vehicle relative to the air, m/s; in hover that of the mean wind.
+        Airspeed of the vehicle, m/s; in hover that of the mean wind.
     direction : float
-        Where the mean wind blows to, rad from +x towards +y.
+        Direction into which the mean wind blows, rad from +x towards +y.
     sample_time : float
-        For which a draw of the noise stands, s.
+        Time for which a draw of the noise is held, s.
     seed : float
         A whole number.
     """
@@ -150,8 +147,8 @@ def low_altitude_turbulence(
 
 @scalar
 def white_noise(time: float, channel: float, turbulence: Turbulence) -> float:
-    """Noise whose integral has the variance ``time``, but for its sampling; 1/s^0.5."""
-    # An exact multiple may come out a hair below itself; the next draw must not wait for a step.
+    """Sampled white noise (1/s^0.5) at a time (s): its integral has the variance ``time``."""
+    # Rounding may leave an exact multiple slightly too small; that must not delay the next draw.
     index = float(int(time / turbulence.sample_time + 1e-6))
     return normal(turbulence.seed, channel, index) / sqrt(turbulence.sample_time)
 
@@ -160,15 +157,15 @@ def white_noise(time: float, channel: float, turbulence: Turbulence) -> float:
 def dryden_rates(
     time: float, states: tuple[float, ...], turbulence: Turbulence
 ) -> tuple[float, float, float, float, float]:
-    """Rates of the shaping filters' states, driven by white noise.
+    """Rates of the shaping filters' ``states`` at a time (s), driven by white noise.
 
     With ``T = L / V`` the filters are ``sigma sqrt(2 T) / (1 + T s)`` for u and
-    ``sigma sqrt(T) (1 + sqrt(3) T s) / (1 + T s)^2`` for v and w. The states are outputs of lags:
-    one for u, two in a row for v and for w.
+    ``sigma sqrt(T) (1 + sqrt(3) T s) / (1 + T s)^2`` for v and w. The states are outputs of
+    first-order lags: one for u, two in series for v and for w.
     """
     u, v1, v2, w1, w2 = states
     if turbulence.intensity_u == 0.0 and turbulence.intensity_w == 0.0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0  # nobody sees them move
+        return 0.0, 0.0, 0.0, 0.0, 0.0
     rate_u = turbulence.speed / turbulence.length_u
     rate_w = turbulence.speed / turbulence.length_w
     return (
@@ -184,7 +181,7 @@ def dryden_rates(
 def dryden_velocity(states: tuple[float, ...], turbulence: Turbulence) -> Triple:
     """The turbulent velocity of the air (m/s, world) from the filters' states.
 
-    ``(1 + sqrt(3) T s)`` after two lags is ``sqrt(3)`` times the first lag's output less
+    ``(1 + sqrt(3) T s)`` after two lags is ``sqrt(3)`` times the first lag's output minus
     ``sqrt(3) - 1`` times the second's.
     """
     u, v1, v2, w1, w2 = states
@@ -198,27 +195,10 @@ def dryden_velocity(states: tuple[float, ...], turbulence: Turbulence) -> Triple
     return cx * along - cy * across, cy * along + cx * across, up
 
 
-def dryden_spectrum(omega: ArrayLike, turbulence: Turbulence, axis: str) -> NDArray[np.float64]:
-    """Power spectral density (m^2/s^2 per rad/s, one-sided) of a component: ``u``, ``v`` or ``w``.
-
-    Sec. 3.7.1.2, over time: ``Phi(omega) = Phi(Omega) / V`` with ``Omega = omega / V``. Its
-    integral from zero to infinity is the variance.
-    """
-    w = np.asarray(omega, dtype=float)
-    length, sigma = turbulence.length_u, turbulence.intensity_u
-    if axis == "w":
-        length, sigma = turbulence.length_w, turbulence.intensity_w
-    tau = length / turbulence.speed
-    x = (tau * w) ** 2
-    if axis == "u":
-        return np.asarray(sigma**2 * 2.0 * tau / np.pi / (1.0 + x))
-    return np.asarray(sigma**2 * tau / np.pi * (1.0 + 3.0 * x) / (1.0 + x) ** 2)
-
-
 # --- ground effect -----------------------------------------------------------------------------
 
 
-class Ground(NamedTuple):
+class GroundEffect(NamedTuple):
     """The ground under the rotors."""
 
     rotor_radius: float = 0.0  # m; 0 for no ground effect
@@ -227,11 +207,11 @@ class Ground(NamedTuple):
 
 @scalar
 def ground_effect(above: float, rotor_radius: float) -> float:
-    """Thrust of a rotor near the ground over its thrust far away, at equal power.
+    """Ratio of a rotor's thrust near the ground to its thrust far away, at equal power.
 
     ``1 / (1 - (R / 4 h)^2)`` (Cheeseman and Bennett, at rest) with the rotor's height ``h``
-    above the ground, m. Derived for single, level rotors from a source and its image, and good
-    above half a radius; below, the value at half a radius, 4/3, stands.
+    (``above``, m) and radius ``R`` (m). Derived for single, level rotors from a source and its
+    image and valid above half a radius; below, the value at half a radius, 4/3, is used.
     """
     if rotor_radius == 0.0:
         return 1.0
@@ -239,24 +219,27 @@ def ground_effect(above: float, rotor_radius: float) -> float:
     return 1.0 / (1.0 - ratio * ratio)
 
 
-# --- all of it ---------------------------------------------------------------------------------
+# --- combined ----------------------------------------------------------------------------------
 
 
 class Air(NamedTuple):
     """The air around a vehicle."""
 
-    wind_x: float = 0.0  # m/s, world: where the air goes
+    wind_x: float = 0.0  # m/s, world: velocity of the air
     wind_y: float = 0.0
     wind_z: float = 0.0
     drag: Drag = Drag()
     gust: Gust = Gust()
     turbulence: Turbulence = Turbulence()
-    ground: Ground = Ground()
+    ground: GroundEffect = GroundEffect()
 
 
 @scalar
 def air_velocity(time: float, states: tuple[float, ...], air: Any) -> Triple:
-    """Velocity of the air (m/s, world): wind, gust and turbulence."""
+    """Velocity of the air (m/s, world) at a time (s): wind, gust and turbulence.
+
+    ``states`` are those of the turbulence's filters; ``air`` is an `Air`.
+    """
     share = gust_profile(time, air.gust)
     x, y, z = dryden_velocity(states, air.turbulence)
     return (
@@ -267,10 +250,10 @@ def air_velocity(time: float, states: tuple[float, ...], air: Any) -> Triple:
 
 
 def stationary_states(turbulence: Turbulence) -> tuple[float, float, float, float, float]:
-    """A draw of the filters' states from their stationary distribution, for the start.
+    """A draw of the filters' initial states from their stationary distribution.
 
-    A lag ``T`` of unit noise has the variance ``1 / 2T``, a second one behind it ``1 / 4T``, and so
-    has their product.
+    A lag ``T`` of unit noise has the variance ``1 / 2T``, a second one in series ``1 / 4T``, which
+    is also their covariance.
     """
     u, v1, v2, w1, w2 = (normal(turbulence.seed, channel, 0.0) for channel in range(25, 30))
     scale_u = float(np.sqrt(turbulence.speed / turbulence.length_u))

@@ -1,32 +1,37 @@
 """The decoupling matrix of the tiltrotor in factored form (ch. 3, Eqs. 3, 5, 12, 16-18).
 
 Ch. 3 asks when ``[tau(alpha); r3^T F(alpha)]`` is invertible, with ``r3`` the third row of the
-body-to-world rotation (world up seen from the body), and expands the determinant into some thirty
-products. Its geometry is simpler. Rotors 2 and 4 alone make roll torque, rotors 1 and 3 alone
-pitch torque, so the rotor inputs that leave the vehicle free of torque follow pair by pair; the
-force they make has the direction ``n(alpha)``, and
+body-to-world rotation (world up in body axes), and expands the determinant into some thirty
+products. The geometry is simpler. Only rotors 2 and 4 produce roll torque and only rotors 1 and 3
+pitch torque, so the rotor inputs with zero total torque follow pair by pair; their force has the
+direction ``n(alpha)``, and
 
     ``det [tau; r3^T F] = 2 L^2 K_f^3 K_m (n . r3)``,  ``n = (-R_theta, R_phi, R)``.
 
 The matrix is singular exactly where world up is perpendicular to ``n``.
 
-Everything but `sines_and_cosines` is arithmetic on its tuple ``trig`` and on the drag ratio
+Everything except `sines_and_cosines` is arithmetic on its tuple ``trig`` and on the drag ratio
 ``r = K_m / (L K_f)``, so that it runs on floats, in native code and, element by element, on
-arrays. Torques are in units of ``L K_f``, forces in units of ``K_f``.
+arrays. Torques are in units of ``L K_f``, forces in units of ``K_f``; rotor inputs are
+``w_i = varpi_i |varpi_i|`` (rad^2/s^2).
 """
 
 from __future__ import annotations
 
 from math import cos, nan, sin
 
-from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
-
-Octet = tuple[float, float, float, float, float, float, float, float]
+from tiltsim_controllers.mathematics.scalar import Octet, Quad, Triple, scalar
 
 
 @scalar
 def sines_and_cosines(alpha_1: float, alpha_2: float, alpha_3: float, alpha_4: float) -> Octet:
-    """``(sin alpha_1, cos alpha_1, ..., sin alpha_4, cos alpha_4)`` of tilt angles in rad."""
+    """``(sin alpha_1, cos alpha_1, ..., sin alpha_4, cos alpha_4)``.
+
+    Parameters
+    ----------
+    alpha_1, alpha_2, alpha_3, alpha_4
+        Tilt angles, rad.
+    """
     return (
         sin(alpha_1),
         cos(alpha_1),
@@ -42,6 +47,8 @@ def sines_and_cosines(alpha_1: float, alpha_2: float, alpha_3: float, alpha_4: f
 @scalar
 def torque_entries(trig: Octet, drag_ratio: float) -> Octet:
     """The eight non-zero entries of ``tau(alpha) / (L K_f)`` (ch. 3, Eq. 5).
+
+    ``trig`` are the `sines_and_cosines` of the tilt angles.
 
     Returns ``(x2, x4, y1, y3, z1, z2, z3, z4)``: roll, pitch and yaw torque by rotor.
     """
@@ -60,7 +67,15 @@ def torque_entries(trig: Octet, drag_ratio: float) -> Octet:
 
 @scalar
 def body_force(trig: Octet, w1: float, w2: float, w3: float, w4: float) -> Triple:
-    """The product ``F(alpha) w / K_f`` in body axes (ch. 3, Eq. 3)."""
+    """The force ``F(alpha) w / K_f`` in body axes (ch. 3, Eq. 3).
+
+    Parameters
+    ----------
+    trig
+        `sines_and_cosines` of the tilt angles.
+    w1, w2, w3, w4
+        Rotor inputs, rad^2/s^2.
+    """
     s1, c1, s2, c2, s3, c3, s4, c4 = trig
     return (
         s2 * w2 - s4 * w4,
@@ -71,9 +86,14 @@ def body_force(trig: Octet, w1: float, w2: float, w3: float, w4: float) -> Tripl
 
 @scalar
 def body_torque(torque: Octet, w1: float, w2: float, w3: float, w4: float) -> Triple:
-    """The product ``tau(alpha) w / (L K_f)`` in body axes (ch. 3, Eq. 5).
+    """The torque ``tau(alpha) w / (L K_f)`` in body axes (ch. 3, Eq. 5).
 
-    ``torque`` are the `torque_entries`.
+    Parameters
+    ----------
+    torque
+        `torque_entries` of the tilt angles.
+    w1, w2, w3, w4
+        Rotor inputs, rad^2/s^2.
     """
     x2, x4, y1, y3, z1, z2, z3, z4 = torque
     return x2 * w2 + x4 * w4, y1 * w1 + y3 * w3, z1 * w1 + z2 * w2 + z3 * w3 + z4 * w4
@@ -81,9 +101,16 @@ def body_torque(torque: Octet, w1: float, w2: float, w3: float, w4: float) -> Tr
 
 @scalar
 def vertical_force_entries(trig: Octet, ux: float, uy: float, uz: float) -> Quad:
-    """The row ``u^T F(alpha) / K_f``: force along the body-frame direction ``u``, by rotor.
+    """The row ``u^T F(alpha) / K_f``: force along the direction ``u``, by rotor.
 
     With ``u = r3`` this is the last row of the decoupling matrix (ch. 3, Eq. 18).
+
+    Parameters
+    ----------
+    trig
+        `sines_and_cosines` of the tilt angles.
+    ux, uy, uz
+        The direction, body axes.
     """
     s1, c1, s2, c2, s3, c3, s4, c4 = trig
     return (
@@ -96,12 +123,11 @@ def vertical_force_entries(trig: Octet, ux: float, uy: float, uz: float) -> Quad
 
 @scalar
 def torque_free_inputs(torque: Octet) -> Quad:
-    """The inputs ``w`` that span ``ker tau(alpha)`` (where tau has rank 3; else they may vanish).
+    """The rotor inputs that span ``ker tau(alpha)``; they may vanish where its rank is below 3.
 
-    ``torque`` are the `torque_entries`.
-
-    Rotors 2 and 4 share a factor that cancels their roll torque, rotors 1 and 3 one that cancels
-    their pitch torque; the ratio of the two factors cancels the yaw torque.
+    ``torque`` are the `torque_entries`. Rotors 2 and 4 share a factor that cancels their roll
+    torque, rotors 1 and 3 one that cancels their pitch torque; the ratio of the two factors cancels
+    the yaw torque.
     """
     x2, x4, y1, y3, z1, z2, z3, z4 = torque
     yaw_of_13 = z3 * y1 - z1 * y3
@@ -111,7 +137,10 @@ def torque_free_inputs(torque: Octet) -> Quad:
 
 @scalar
 def unscaled_torque_free_force(trig: Octet, torque: Octet) -> Triple:
-    """Where the rotors push at zero torque, body axes: along `torque_free_force`, of any length."""
+    """A vector along `torque_free_force`, body axes, of arbitrary length.
+
+    ``trig`` are the `sines_and_cosines`, ``torque`` the `torque_entries` of the tilt angles.
+    """
     w1, w2, w3, w4 = torque_free_inputs(torque)
     return body_force(trig, w1, w2, w3, w4)
 
@@ -120,10 +149,10 @@ def unscaled_torque_free_force(trig: Octet, torque: Octet) -> Triple:
 def torque_free_force(trig: Octet, torque: Octet, drag_ratio: float) -> Triple:
     """The force at zero torque, ``n = (-R_theta, R_phi, R)``, body axes.
 
-    Its length carries ch. 3's normalisation: ``R = 4`` for an untilted vehicle. Where ``n = 0`` the
-    decoupling matrix is singular at every attitude: wherever ``tau`` has lost rank, and also where
-    the torque-free inputs of the two pairs push against each other, as red gaits do on the curve L
-    of the Two Color Map.
+    Normalized as in ch. 3: ``R = 4`` for an untilted vehicle. Where ``n = 0`` the decoupling matrix
+    is singular at every attitude: where ``tau`` is rank-deficient, and also where the torque-free
+    forces of the two pairs cancel, as for red gaits on the curve L of the Two Color Map. ``trig``
+    are the `sines_and_cosines`, ``torque`` the `torque_entries` of the tilt angles.
     """
     nx, ny, nz = unscaled_torque_free_force(trig, torque)
     scale = 0.5 / drag_ratio
@@ -134,13 +163,25 @@ def torque_free_force(trig: Octet, torque: Octet, drag_ratio: float) -> Triple:
 def solve_by_pairs(
     torque: Octet, force: Quad, roll: float, pitch: float, yaw: float, lift: float
 ) -> Quad:
-    """Solve the 4 x 4 system of the decoupling matrix for the rotor inputs.
+    """Solve the 4 x 4 system of the decoupling matrix for the rotor inputs (ch. 3, Eq. 16).
 
-    ``torque`` are the `torque_entries`, ``force`` the four entries of the last row. Each opposite
-    pair of rotors splits into the part that makes its torque and the part that does not:
-    ``(v2, v4) = roll (x2, x4) / |(x2, x4)|^2 + mu (-x4, x2)``, likewise ``(v1, v3)`` with pitch and
-    ``nu``; yaw and lift then fix ``mu`` and ``nu``. Returns ``(v1, v2, v3, v4)``, all NaN where the
-    matrix is singular.
+    The input of each opposite pair of rotors is the sum of a part that produces its torque and a
+    part that does not: ``(v2, v4) = roll (x2, x4) / |(x2, x4)|^2 + mu (-x4, x2)``, likewise
+    ``(v1, v3)`` with pitch and ``nu``; yaw and lift then determine ``mu`` and ``nu``.
+
+    Parameters
+    ----------
+    torque
+        `torque_entries` of the tilt angles.
+    force
+        The four entries of the last row, `vertical_force_entries`.
+    roll, pitch, yaw, lift
+        The right-hand side, in units of ``L K_f`` and ``K_f``.
+
+    Returns
+    -------
+    tuple
+        ``(v1, v2, v3, v4)``, all NaN where the matrix is singular.
     """
     x2, x4, y1, y3, z1, z2, z3, z4 = torque
     h1, h2, h3, h4 = force

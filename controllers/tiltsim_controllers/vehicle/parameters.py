@@ -50,8 +50,8 @@ PRESETS: Final = {
         gravity=9.8,
     ),
     # ch. 2, Table A1: the same airframe with its inertia unrounded, flown as a plain quadrotor. The
-    # table gives 8.048e-4 for both rotor coefficients; the law's inputs are forces and torques and
-    # use neither, so the rotors here are ch. 3's.
+    # table gives 8.048e-4 for both rotor coefficients. The inputs of ch. 2 are forces and torques
+    # and do not use them, so the rotors here are those of ch. 3.
     "ar_drone_2_unrounded": Vehicle(
         mass=0.429,
         inertia_xx=2.237568e-3,

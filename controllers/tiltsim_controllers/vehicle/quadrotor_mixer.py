@@ -1,7 +1,7 @@
-"""From the quadrotor's thrust and torques to what its four rotors do, and back to their speeds.
+"""Mixer of the quadrotor: rotor speeds that produce a thrust and three torques.
 
-Rotors 1 to 4 sit on +x, +y, -x and -y. With ``c_i = s_i varpi_i |varpi_i|``, positive where a rotor
-pushes up, the total thrust is ``K_f (c_1 + c_2 + c_3 + c_4)``, the roll torque ``L K_f (c_2 -
+Rotors 1 to 4 are on +x, +y, -x and -y. With ``c_i = s_i varpi_i |varpi_i|``, positive for upward
+thrust, the total thrust is ``K_f (c_1 + c_2 + c_3 + c_4)``, the roll torque ``L K_f (c_2 -
 c_4)``, the pitch torque ``L K_f (c_3 - c_1)`` and the yaw torque ``K_m (c_1 - c_2 + c_3 - c_4)``:
 ch. 3, Eqs. (3) and (5), without tilt.
 """
@@ -18,7 +18,17 @@ from tiltsim_controllers.vehicle.parameters import Vehicle
 def thrust_controls(
     thrust: float, roll_torque: float, pitch_torque: float, yaw_torque: float, vehicle: Vehicle
 ) -> Quad:
-    """The ``c_i`` ((rad/s)^2) that make a thrust (N) and torques (N m, body axes, z up)."""
+    """The ``c_i`` (rad^2/s^2) that produce a thrust and torques.
+
+    Parameters
+    ----------
+    thrust
+        N.
+    roll_torque, pitch_torque, yaw_torque
+        N m, body axes, z up.
+    vehicle
+        The quadrotor.
+    """
     lever = vehicle.arm_length * vehicle.thrust_coefficient
     lift = thrust / vehicle.thrust_coefficient
     roll, pitch = roll_torque / lever, pitch_torque / lever
@@ -34,5 +44,5 @@ def thrust_controls(
 
 @scalar
 def speed_along_spin(thrust_control: float) -> float:
-    """The rotor speed (rad/s) of a ``c_i``, negative where the rotor must turn against its spin."""
+    """The rotor speed (rad/s) of a ``c_i`` (rad^2/s^2), negative against the nominal spin."""
     return sqrt(thrust_control) if thrust_control >= 0.0 else -sqrt(-thrust_control)

@@ -1,4 +1,4 @@
-"""How a rigid body turns: Euler angles, body rates and torque with their derivatives."""
+"""Rotational kinematics and dynamics: Euler angles, body rates and torque with derivatives."""
 
 from __future__ import annotations
 
@@ -12,10 +12,17 @@ from tiltsim_controllers.mathematics.scalar import Triple, scalar
 def euler_derivatives(
     roll: float, pitch: float, omega: Triple, omega_rate: Triple
 ) -> tuple[float, float, float, float, float, float]:
-    """First and second derivatives of roll, pitch and yaw from the body rates and their rates.
+    """First and second derivatives of roll, pitch and yaw, in rad/s and rad/s^2.
 
-    Inverts ``omega = M(roll, pitch) eta'`` and ``omega' = M eta'' + M' eta'``. Infinite where the
-    pitch is a right angle.
+    Inverts ``omega = M(roll, pitch) eta'`` and ``omega' = M eta'' + M' eta'`` (the exact relation
+    that ch. 3, Eq. 8, approximates); divides by ``cos(pitch)``.
+
+    Parameters
+    ----------
+    roll, pitch
+        rad.
+    omega, omega_rate
+        Body rates (rad/s) and their rates (rad/s^2).
     """
     p, q, r = omega
     sr, cr, sp, cp = sin(roll), cos(roll), sin(pitch), cos(pitch)
@@ -32,17 +39,28 @@ def euler_derivatives(
     )
     yaw_acceleration = (sr * q_rate + cr * r_rate) / cp
     return (
-        *(roll_rate, pitch_rate, yaw_rate),
-        *(p_rate + sp * yaw_acceleration, cr * q_rate - sr * r_rate, yaw_acceleration),
+        roll_rate,
+        pitch_rate,
+        yaw_rate,
+        p_rate + sp * yaw_acceleration,
+        cr * q_rate - sr * r_rate,
+        yaw_acceleration,
     )
 
 
 @scalar
 def angular_jerk(roll: Jet, pitch: Jet, yaw: Jet, jerk: Triple) -> Triple:
-    """Second derivatives of the body rates when roll, pitch and yaw have the given ``jerk``.
+    """Second derivatives (rad/s^3) of the body rates.
 
     ``p = roll' - yaw' sin(pitch)``, ``q = pitch' cos(roll) + yaw' sin(roll) cos(pitch)``, ``r =
     -pitch' sin(roll) + yaw' cos(roll) cos(pitch)``, each differentiated twice.
+
+    Parameters
+    ----------
+    roll, pitch, yaw
+        The angles with their first two derivatives, rad and s.
+    jerk
+        Third derivatives of the three angles, rad/s^3.
     """
     sin_roll, cos_roll = jet_sine(roll), jet_cosine(roll)
     sin_pitch, cos_pitch = jet_sine(pitch), jet_cosine(pitch)
@@ -65,9 +83,16 @@ def cross(a: Triple, b: Triple) -> Triple:
 def torque_rate(
     omega: Triple, omega_rate: Triple, jerk: Triple, inertia: Triple, gyroscopic: float
 ) -> Triple:
-    """Rate (N m/s) of the torque that makes the body rates' second derivative ``jerk``.
+    """Torque rate (N m/s) that gives an angular jerk: derivative of ``I omega' + omega x I omega``.
 
-    The derivative of ``I omega' + omega x I omega``, the latter ``gyroscopic`` times.
+    Parameters
+    ----------
+    omega, omega_rate, jerk
+        Body rates (rad/s) and their first two derivatives.
+    inertia
+        Principal moments of inertia, kg m^2.
+    gyroscopic
+        Factor of the gyroscopic torque ``omega x I omega``, 1 or 0.
     """
     ixx, iyy, izz = inertia
     mx, my, mz = cross(omega_rate, (ixx * omega[0], iyy * omega[1], izz * omega[2]))

@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 
 from tiltsim_controllers.analysis.published_gaits import smallest_margin
 from tiltsim_controllers.analysis.singularity import residuals
-from tiltsim_controllers.gaits import GAIT_TYPES, GaitParameters, plans, tilt_reference
+from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.gaits.cat import FOOTFALLS, FORWARD, SWINGS, Footfall, cat_keyframes
+from tiltsim_controllers.gaits.parameters import GAIT_TYPES, GaitParameters
 from tiltsim_controllers.gaits.plans import Gait
+from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.gaits.trot import continuous_trot as scalar_trot
 from tiltsim_controllers.gaits.two_color import BLUE, RED, colored_angles
 from tiltsim_controllers.mathematics.records import flatten, record_dtype
@@ -93,7 +95,7 @@ def test_a_jump_belongs_to_the_time_after_it() -> None:
 def test_sample_times_hit_every_keyframe() -> None:
     rotary = GAITS["rotary_gallop"]
     times = rotary.sample_times(11)
-    for phase in rotary.table[::5]:
+    for phase in rotary.knots[::5]:
         assert phase * 1.0 in times
     assert times[0] == 0.0
     assert times[-1] == rotary.period
@@ -201,7 +203,7 @@ def test_defaults_leave_the_existing_gaits_untouched() -> None:
         ([(0, 0, 0, 0), (1, 0, 0, 0)], "four finite"),
         ([(0, 0, 0, 0, float("nan")), (1, 0, 0, 0, 0)], "four finite"),
         ([(0, *[0] * 4), (0.6, *[0] * 4), (0.5, *[0] * 4), (1, *[0] * 4)], "decrease"),
-        ([(0, *[0] * 4), (0, *[0] * 4), (1, *[0] * 4)], "one row may stand"),
+        ([(0, *[0] * 4), (0, *[0] * 4), (1, *[0] * 4)], "one row may be"),
         ([(0, *[0] * 4), *[(0.5, *[0] * 4)] * 3, (1, *[0] * 4)], "share a phase"),
     ],
 )
@@ -254,9 +256,9 @@ def native_record(gait: Gait) -> np.ndarray:
 @given(name=st.sampled_from(sorted(GAITS)), time=st.floats(-100, 100))
 def test_native_code_gives_the_same_bits(native, name, time) -> None:
     gait = GAITS[name]
-    table = np.array([*gait.table, *[np.nan] * 7])  # longer than the rows in use
+    table = np.array([*gait.knots, *[np.nan] * 7])  # longer than the rows in use
     evaluated = native["with"](time, native_record(gait), table)
-    assert evaluated == tilt_reference(time, gait.parameters, gait.table)
+    assert evaluated == tilt_reference(time, gait.parameters, gait.knots)
 
 
 def test_native_code_needs_no_table_for_gaits_without_keyframes(native) -> None:

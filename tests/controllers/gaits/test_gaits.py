@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tiltsim_controllers.gaits import GAIT_TYPES, GaitParameters, tilt_reference
+from tiltsim_controllers.gaits.parameters import GAIT_TYPES, GaitParameters
+from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.gaits.trot import continuous_trot, instant_trot
 
 RHO, PERIOD = 0.65, 2.0

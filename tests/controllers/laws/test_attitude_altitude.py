@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.thesis import force_matrix, torque_matrix
-from tiltsim_controllers.gaits import GAIT_TYPES, GaitParameters
+from tiltsim_controllers.gaits.parameters import GAIT_TYPES, GaitParameters
 from tiltsim_controllers.laws.attitude_altitude import (
     DECOUPLINGS,
     Gains,

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from tests.controllers.flights import fly, rk4_step, tiltrotor_rates
 from tests.controllers.scalar_sources import as_native
 from tiltsim_controllers.analysis.stability import is_hurwitz
-from tiltsim_controllers.gaits import GAIT_TYPES, GaitParameters
+from tiltsim_controllers.gaits.parameters import GAIT_TYPES, GaitParameters
 from tiltsim_controllers.laws import attitude_altitude
 from tiltsim_controllers.laws.attitude_altitude import rotor_accelerations
 from tiltsim_controllers.laws.full_pose import (

@@ -12,9 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from tests.thesis import force_matrix, torque_matrix
 from tiltsim_controllers.analysis.stability import feedforward_loops
-from tiltsim_controllers.gaits import GAIT_TYPES, GaitParameters, tilt_acceleration, tilt_reference
 from tiltsim_controllers.gaits.anticipation import anticipated_tilts, rounded_corner, rounded_ramp
+from tiltsim_controllers.gaits.parameters import GAIT_TYPES, GaitParameters
 from tiltsim_controllers.gaits.plans import continuous_trot, fixed, keyframes, two_color_circle
+from tiltsim_controllers.gaits.tilts import tilt_acceleration, tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import Gains
 from tiltsim_controllers.laws.decouplers import DECOUPLERS, exact_decoupler
 from tiltsim_controllers.laws.gains import (
@@ -386,34 +387,34 @@ WALK = keyframes(
 
 @pytest.mark.parametrize("gait", [continuous_trot(0.6, 1.0), WALK], ids=["trot", "keyframes"])
 def test_anticipated_tilts_are_smooth_and_the_gait_itself_away_from_corners(gait):
-    half = min(0.1, 0.5 * gait.shortest_line)
+    half = min(0.1, 0.5 * gait.min_segment_time)
     for time in np.linspace(0.003, 1.99, 97):
-        jets = anticipated_tilts(float(time), gait.parameters, gait.table, half)
+        jets = anticipated_tilts(float(time), gait.parameters, gait.knots, half)
         expected = differences(
             lambda t, time=time: [
-                jet[0] for jet in anticipated_tilts(time + t, gait.parameters, gait.table, half)
+                jet[0] for jet in anticipated_tilts(time + t, gait.parameters, gait.knots, half)
             ]
         )
         np.testing.assert_allclose([jet[1] for jet in jets], expected[1], atol=1e-4)
         np.testing.assert_allclose([jet[2] for jet in jets], expected[2], atol=0.2)
     straight = 0.5 * (WALK.sample_times(2)[0] + 0.8) if gait is WALK else 0.25
-    jets = anticipated_tilts(straight, gait.parameters, gait.table, half)
+    jets = anticipated_tilts(straight, gait.parameters, gait.knots, half)
     np.testing.assert_allclose([jet[0] for jet in jets], gait.angles(straight), atol=1e-14)
 
 
 def test_jumps_and_smooth_gaits_are_left_alone():
     circle = two_color_circle((0.1, -0.2), 0.3, "blue", 2.0, VEHICLE).biased(0.9).scaled(1.5)
     for time in (0.0, 0.3, 1.7):
-        jets = anticipated_tilts(time, circle.parameters, circle.table, 0.1)
+        jets = anticipated_tilts(time, circle.parameters, circle.knots, 0.1)
         found = differences(lambda t, time=time: circle.angles(time + t), 1e-3)
         for order, tolerance in enumerate((1e-14, 1e-8, 1e-6)):
             got = [jet[order] for jet in jets]
             np.testing.assert_allclose(got, found[order], atol=tolerance)
         acceleration = tilt_acceleration(time, circle.parameters)
         np.testing.assert_array_equal([jet[2] for jet in jets], acceleration)
-    assert fixed([0.1] * 4).shortest_line == float("inf")
-    plain = anticipated_tilts(0.3, circle.parameters, circle.table, 0.0)
-    expected = tilt_reference(0.3, circle.parameters, circle.table)
+    assert fixed([0.1] * 4).min_segment_time == float("inf")
+    plain = anticipated_tilts(0.3, circle.parameters, circle.knots, 0.0)
+    expected = tilt_reference(0.3, circle.parameters, circle.knots)
     assert tuple(jet[0] for jet in plain) + tuple(jet[1] for jet in plain) == expected
 
 

@@ -13,9 +13,9 @@ from tiltsim_controllers.analysis.singularity import (
     torque_free_direction,
     world_up,
 )
-from tiltsim_controllers.gaits import tilt_reference
 from tiltsim_controllers.gaits.plans import instant_trot as trot_instant
 from tiltsim_controllers.gaits.plans import waypoints
+from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.decouplers import exact_decoupler
 from tiltsim_controllers.laws.supervisor import (
     BAND,
@@ -160,9 +160,9 @@ def test_the_clock_slows_down_within_the_band():
     state = asked_rates = None
     for time in np.arange(0.0, 2.0, 1e-3):
         acceleration = supervised_derivative(
-            time, 0.0, 0.0, 0.0, 0.0, gait.parameters, gait.table, supervisor, RATIO
+            time, 0.0, 0.0, 0.0, 0.0, gait.parameters, gait.knots, supervisor, RATIO
         )[2]
-        ahead = tilt_reference(time + 0.5, gait.parameters, gait.table)[:4]
+        ahead = tilt_reference(time + 0.5, gait.parameters, gait.knots)[:4]
         left = room(ahead, (0.0, 0.0, 1.0), supervisor, RATIO)
         state, asked_rates = left, acceleration * LAG
         assert asked_rates == pytest.approx(min(1.0, max(0.0, 1.0 - left / BAND)), abs=1e-9)

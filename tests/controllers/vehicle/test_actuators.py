@@ -12,13 +12,15 @@ from scipy.spatial.transform import Rotation
 
 from tiltsim_controllers.vehicle.actuators import (
     RotorFault,
-    Sensor,
     rate_limited_command,
+    servo_command,
+    thrust_factor,
+)
+from tiltsim_controllers.vehicle.sensors import (
+    Sensor,
     reading_error,
     reading_index,
     rotate_by_small_angle,
-    servo_command,
-    thrust_factor,
 )
 
 angles = st.floats(-3.0, 3.0)

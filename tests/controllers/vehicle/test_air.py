@@ -15,7 +15,6 @@ from tiltsim_controllers.vehicle.air import (
     Turbulence,
     drag_force,
     dryden_rates,
-    dryden_spectrum,
     dryden_velocity,
     ground_effect,
     gust_profile,
@@ -28,6 +27,23 @@ speeds = st.floats(-20.0, 20.0)
 
 
 # --- drag --------------------------------------------------------------------------------------
+
+
+def dryden_spectrum(omega, turbulence, axis):
+    """Power spectral density (m^2/s^2 per rad/s, one-sided) of a component: ``u``, ``v`` or ``w``.
+
+    Sec. 3.7.1.2, over time: ``Phi(omega) = Phi(Omega) / V`` with ``Omega = omega / V``. Its
+    integral from zero to infinity is the variance.
+    """
+    w = np.asarray(omega, dtype=float)
+    length, sigma = turbulence.length_u, turbulence.intensity_u
+    if axis == "w":
+        length, sigma = turbulence.length_w, turbulence.intensity_w
+    tau = length / turbulence.speed
+    x = (tau * w) ** 2
+    if axis == "u":
+        return np.asarray(sigma**2 * 2.0 * tau / np.pi / (1.0 + x))
+    return np.asarray(sigma**2 * tau / np.pi * (1.0 + 3.0 * x) / (1.0 + x) ** 2)
 
 
 @given(st.tuples(speeds, speeds, speeds))

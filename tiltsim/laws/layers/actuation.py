@@ -25,24 +25,26 @@ from tiltsim.laws.layers.layer import around
 from tiltsim.laws.tiltrotor import rotor_thrust_controls, servo_lead
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.vehicles.rotorcraft import initial_tilts
-from tiltsim_controllers.gaits import tilt_reference
+from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.allocation import allocate_accelerations
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 from tiltsim_controllers.vehicle.actuators import (
     Faults,
     RotorFault,
-    Sensor,
-    Sensors,
     limited_speed_command_rate,
     rate_limited_command,
-    reading_error,
-    reading_index,
-    rotate_by_small_angle,
     servo_command,
     thrust_factor,
 )
 from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.sensors import (
+    Sensor,
+    Sensors,
+    reading_error,
+    reading_index,
+    rotate_by_small_angle,
+)
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
@@ -375,7 +377,7 @@ def _faults(scenario: Scenario) -> Faults:
     for table in scenario.fault:
         fault = faults[table.rotor - 1]
         if table.type == "stuck_servo":
-            planned = tilt_reference(table.time, gait.parameters, gait.table)[table.rotor - 1]
+            planned = tilt_reference(table.time, gait.parameters, gait.knots)[table.rotor - 1]
             angle = planned if table.angle is None else table.angle
             fault = fault._replace(stuck_time=table.time, stuck_angle=angle)
         else:

@@ -24,7 +24,7 @@ from tiltsim_controllers.vehicle.air import (
     DRYDEN_STATES,
     Air,
     Drag,
-    Ground,
+    GroundEffect,
     Gust,
     Turbulence,
     air_velocity,
@@ -212,11 +212,11 @@ def _surroundings(scenario: Scenario) -> Surroundings:
             sample_time=table.turbulence.sample_time,
             seed=float(scenario.simulation.seed),
         )
-    gust, ground = Gust(), Ground()
+    gust, ground = Gust(), GroundEffect()
     if table.gust is not None:
         times = table.gust.start, table.gust.rise, table.gust.duration
         gust = Gust(*times, *table.gust.velocity)
     if table.ground_effect is not None:
-        ground = Ground(table.ground_effect.rotor_radius, table.ground_effect.height)
+        ground = GroundEffect(table.ground_effect.rotor_radius, table.ground_effect.height)
     drag = Drag(*table.drag.linear, *table.drag.area, table.density)
     return Surroundings(Air(*table.wind, drag, gust, turbulence, ground), scenario.true_rotorcraft)

@@ -21,7 +21,8 @@ from tiltsim.laws.tiltrotor import (
     singularity_columns,
     tiltrotor_state,
 )
-from tiltsim_controllers.gaits import GaitParameters, tilt_reference
+from tiltsim_controllers.gaits.parameters import GaitParameters
+from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import STATE_FIELDS
 from tiltsim_controllers.laws.supervisor import (
     HOLD,

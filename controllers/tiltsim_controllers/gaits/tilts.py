@@ -1,0 +1,95 @@
+"""The planned tilt angles of every gait, with rates and accelerations, at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import cos, pi, sin
+
+from tiltsim_controllers.gaits.keyframes import keyframe_gait
+from tiltsim_controllers.gaits.parameters import (
+    FIXED,
+    KEYFRAMES,
+    NO_KNOTS,
+    PENGUIN,
+    ROTATING,
+    TROT_CONTINUOUS,
+    TWO_COLOR_CIRCLE,
+    GaitParameters,
+    TiltsAndRates,
+)
+from tiltsim_controllers.gaits.penguin import penguin_swing, rotating
+from tiltsim_controllers.gaits.trot import continuous_trot, instant_trot
+from tiltsim_controllers.gaits.two_color import RED, two_color_circle
+from tiltsim_controllers.mathematics.scalar import Quad, scalar
+
+
+@scalar
+def planned_angles(time: float, gait: GaitParameters, knots: Sequence[float]) -> TiltsAndRates:
+    """The gait before scale and bias; arguments and result as for `tilt_reference`."""
+    if gait.type == FIXED:
+        return gait.angle_1, gait.angle_2, gait.angle_3, gait.angle_4, 0.0, 0.0, 0.0, 0.0
+    if gait.type == KEYFRAMES:
+        return keyframe_gait(time, gait.period, gait.keyframes, knots)
+    if gait.type == TWO_COLOR_CIRCLE:
+        return two_color_circle(time, gait)
+    if gait.type == PENGUIN:
+        return penguin_swing(time, gait.amplitude, gait.period)
+    if gait.type == ROTATING:
+        return rotating(time, gait.angle_1, gait.rate)
+    if gait.type == TROT_CONTINUOUS:
+        return continuous_trot(time, gait.amplitude, gait.period)
+    return instant_trot(time, gait.amplitude, gait.period)
+
+
+@scalar
+def tilt_reference(
+    time: float, gait: GaitParameters, knots: Sequence[float] = NO_KNOTS
+) -> TiltsAndRates:
+    """The planned tilt angles (rad) and their rates (rad/s).
+
+    At a jump and at a corner the values after it hold, except that the first half of a trot's
+    period includes its end, as printed in ch. 4.
+
+    Parameters
+    ----------
+    time
+        s.
+    gait
+        Type and parameters.
+    knots
+        The keyframes of gaits that have them (`tiltsim_controllers.gaits.keyframes`): a flat tuple
+        of floats in Python, a one-dimensional array in native code. Other gaits do not read it.
+
+    Returns
+    -------
+    tuple
+        ``(alpha_1, ..., alpha_4, rate_1, ..., rate_4)``.
+    """
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = planned_angles(time, gait, knots)
+    front = gait.scale
+    back = gait.scale * gait.bias
+    return (
+        front * a1,
+        front * a2,
+        back * a3,
+        back * a4,
+        front * rate_1,
+        front * rate_2,
+        back * rate_3,
+        back * rate_4,
+    )
+
+
+@scalar
+def tilt_acceleration(time: float, gait: GaitParameters) -> Quad:
+    """The second derivatives (rad/s^2) of the planned tilt angles at a time (s).
+
+    Zero for constant and piecewise linear gaits, whose rates jump at the corners.
+    """
+    if gait.type != TWO_COLOR_CIRCLE:
+        return 0.0, 0.0, 0.0, 0.0
+    turning = 2.0 * pi / gait.period
+    inward = -gait.scale * gait.radius * turning * turning
+    front_1, front_2 = inward * cos(turning * time), inward * sin(turning * time)
+    slope = gait.bias if gait.color == RED else -gait.bias
+    return front_1, front_2, slope * front_1, slope * front_2
