@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import tiltsim.views.video
-import tiltsim.views.video.film
+import tiltsim.views.video.rendering
 from tests.flights import saved
 from tests.sweeps.files import short_sweep
 from tiltsim.cli import main
@@ -98,7 +98,7 @@ def test_a_film_counts_its_frames(tmp_path, monkeypatch):
 
     stage = SimpleNamespace(canvas=nullcontext(), frame=frame)
     monkeypatch.setattr(tiltsim.views.video, "prefer_offscreen_gl", lambda: None)
-    monkeypatch.setattr(tiltsim.views.video.film, "_Stage", lambda *_: stage)
+    monkeypatch.setattr(tiltsim.views.video.rendering, "_Stage", lambda *_: stage)
     with terminal_as_stderr(monkeypatch) as shown:
         assert main(["video", str(saved("fixed", tmp_path)), "--size", "64x64", "--fps", "10"]) == 0
     assert "| 0/13 frames [00:00<?, ? frames/s]" in shown.text

@@ -18,7 +18,7 @@ from tiltsim.resources import shipped_folder
 from tiltsim.views.figures.flight import flight_figure
 from tiltsim.views.replay import thrust_sites, visible_model
 from tiltsim.views.rerun.geometry import ground_height
-from tiltsim.views.rerun.recording import save_recording
+from tiltsim.views.rerun.recording_file import save_recording
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.tilt_car.penguin_cycle import Swing, limit_cycle, lyapunov, lyapunov_bound
 from tiltsim_controllers.tilt_car.planned_direction import GAIN_SETS

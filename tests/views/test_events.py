@@ -1,4 +1,4 @@
-"""Events: what is worth telling of a flight, once and at the right time."""
+"""Events of a flight: each reported once and at the right time."""
 
 from __future__ import annotations
 
@@ -11,28 +11,35 @@ from tests.flights import flight
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import SAMPLE_FIELDS
 from tiltsim.scenario.loading import load_scenario
-from tiltsim.views.events import EventDetector, flight_events
+from tiltsim.views.events import EventDetector, rotorcraft_conditions, tilt_car_conditions
+
+
+def flight_events(flight):
+    """All events of a rotorcraft's flight, in order of time."""
+    detector = EventDetector(flight.scenario, rotorcraft_conditions)
+    return [detector.opening(), *detector.observe(flight), *detector.closing(flight.end)]
 
 
 def texts(events):
     return [event.text for event in events]
 
 
-def test_a_quiet_flight_tells_what_it_is_how_close_it_came_and_that_it_ended():
+def test_a_flight_without_incidents_has_an_opening_its_margin_and_an_end():
     first, closest, last = flight_events(flight("fixed"))
     assert first.text.startswith(
-        "tests/fixed: gait fixed, modified decoupler, attitude-altitude law"
+        "tests/fixed: gait fixed, modified decoupler, attitude-altitude controller"
     )
-    assert "closest to singular: " in closest.text
+    assert "minimum singularity margin: " in closest.text
     assert (last.text, last.level, last.time) == ("flight completed", "INFO", pytest.approx(1.2))
 
 
-def test_no_gait_is_told_of_a_quadrotor():
+def test_the_opening_of_a_quadrotor_names_no_gait():
     scenario = load_scenario("ch01_gust/hover#quadrotor")
-    assert EventDetector(scenario).opening().text == "Quadrotor: yaw-position law, mujoco plant"
+    opening = EventDetector(scenario, rotorcraft_conditions).opening()
+    assert opening.text == "Quadrotor: yaw-position controller, mujoco plant"
 
 
-def test_saturation_is_told_when_it_sets_in():
+def test_saturation_is_reported_at_its_onset():
     events = [event for event in flight_events(flight("limited")) if "saturated" in event.text]
     assert events
     assert {event.level for event in events} == {"WARN"}
@@ -43,11 +50,11 @@ def test_chatter_is_one_event():
     this = flight("fixed")
     samples = this.samples.copy()
     samples[::2, SAMPLE_FIELDS.index("rotor_speed_2")] = -1.0
-    told = texts(flight_events(replace(this, samples=samples)))
-    assert told.count("rotor 2 has reversed") == 1
+    found = texts(flight_events(replace(this, samples=samples)))
+    assert found.count("rotor 2 reversed") == 1
 
 
-def test_a_small_margin_is_told():
+def test_a_small_margin_is_reported():
     this = flight("fixed")
     samples = this.samples.copy()
     samples[50:60, SAMPLE_FIELDS.index("pitch")] = -1.15
@@ -57,36 +64,45 @@ def test_a_small_margin_is_told():
     assert near.level == "WARN"
 
 
-def test_a_supervisor_is_told_when_it_sets_in():
+def test_a_supervisor_is_reported_when_it_becomes_active():
     this = flight("supervised")
-    acts = this["time"][this["supervision"] > 0.01]
-    told = [event for event in flight_events(this) if "supervisor takes" in event.text]
-    assert told[0].time == acts[0]
-    assert {event.text for event in told} == {"supervisor takes the gait towards red"}
+    active = this["time"][this["supervision"] > 0.01]
+    found = [event for event in flight_events(this) if "supervisor moves" in event.text]
+    assert found[0].time == active[0]
+    assert {event.text for event in found} == {"supervisor moves the gait towards red"}
     assert any("margin below 0.9 rad" in text for text in texts(flight_events(this)))
 
 
-def test_a_lost_flight_ends_with_its_cause():
+def test_a_flight_that_terminates_early_ends_with_its_cause():
     lost = replace(flight("fixed"), end=End("singular", 0.7, "why"))
     last = flight_events(lost)[-1]
-    assert (last.level, last.text, last.time) == ("ERROR", "flight singular: why", 0.7)
+    assert (last.level, last.time) == ("ERROR", 0.7)
+    assert last.text == "flight terminated early (singular): why"
 
 
-def test_a_flight_in_pieces_tells_the_same_as_a_whole_one():
+def test_a_flight_in_pieces_has_the_events_of_a_complete_one():
     this = flight("limited")
-    watch = EventDetector(this.scenario)
+    detector = EventDetector(this.scenario, rotorcraft_conditions)
     pieces = [replace(this, samples=this.samples[at : at + 7]) for at in range(0, len(this), 7)]
-    told = [watch.opening(), *(e for piece in pieces for e in watch.observe(piece))]
-    assert [*told, *watch.closing(this.end)] == flight_events(this)
+    found = [detector.opening(), *(e for piece in pieces for e in detector.observe(piece))]
+    assert [*found, *detector.closing(this.end)] == flight_events(this)
 
 
-def test_switches_between_laws_are_told():
+def test_switches_between_control_laws_are_reported():
     scenario = tiltsim.load_scenario(
         "ch02_singular_zone/experiments#experiment_1", {"simulation.duration": 0.5}
     )
     found = [e for e in flight_events(tiltsim.simulate(scenario)) if "switched" in e.text]
     assert [event.text.rpartition(" to ")[2] for event in found] == [
-        "yaw and position",
-        "attitude and altitude",
+        "yaw-position control",
+        "attitude-altitude control",
     ]
     assert found[1].time == pytest.approx(0.308, abs=0.011)
+
+
+def test_a_tilt_cars_rotor_at_rest_is_saturated():
+    this = flight("tilt_car")
+    resting = this["rotor_speed_1"] <= 0.0
+    texts, _, holds = zip(*tilt_car_conditions(this), strict=True)
+    assert texts == ("rotor 1 saturated at zero", "rotor 2 saturated at zero")
+    assert (holds[0] == resting).all()

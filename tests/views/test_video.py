@@ -17,10 +17,10 @@ from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, torque_free_directions
 from tiltsim.views.video import aspects, has_display, inset, offscreen
-from tiltsim.views.video.aspects import RotorcraftAspect
-from tiltsim.views.video.film import Format, _Stage, frames, write_video
 from tiltsim.views.video.inset import PlaneInset, overlay_inset
 from tiltsim.views.video.offscreen import make_contexts
+from tiltsim.views.video.overlay import RotorcraftAspect
+from tiltsim.views.video.rendering import Format, _Stage, frames, write_video
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 SMALL = Format(width=320, height=180, fps=10, speed=2.0)

@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.views.video import prefer_offscreen_gl
 
     prefer_offscreen_gl()  # before anything imports MuJoCo
-    from tiltsim.views.video.film import Format, moments, write_video
+    from tiltsim.views.video.rendering import Format, moments, write_video
 
     width, height = arguments.size
     form = Format(width, height, arguments.fps, arguments.speed)

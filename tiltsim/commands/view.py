@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
 
         view_flights(flights, arguments.connect, names)
         return 0
-    from tiltsim.views.rerun.recording import save_recording
+    from tiltsim.views.rerun.recording_file import save_recording
 
     save_recording(flights, arguments.rerun, names)
     print(f"recording written to {arguments.rerun}; open it with: rerun {arguments.rerun}")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tiltsim.flight.saturation import at_lower_limit, at_upper_limit
 from tiltsim.laws.assembling import loop_of
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -109,7 +110,7 @@ def _tilt_car_metrics(flight: Flight) -> dict[str, float | bool]:
     metrics["max_rotor_speed"] = float(speeds.max())
     metrics["max_tilt_rate"] = float(np.abs(columns["alpha_rate"]).max())
     # A thrust cannot pull: at rest a rotor is at its limit.
-    metrics["saturated_fraction"] = float((speeds <= 0.0).any(axis=0).mean())
+    metrics["saturated_fraction"] = float(at_lower_limit(speeds, 0.0).any(axis=0).mean())
     metrics["diverged"] = flight.end.kind in {"diverged", "singular"}
     metrics["duration"] = float(time[-1])
     metrics["realtime_factor"] = float(time[-1] / max(flight.wall_time, 1e-9))
@@ -126,13 +127,9 @@ def _wrapped(angle: Floats) -> Floats:
 
 def _saturated_fraction(flight: Flight, spins: Floats) -> float:
     vehicle = flight.scenario.rotorcraft
-    saturated = np.zeros(len(flight), dtype=bool)
-    # The integrator stops on the limit to rounding, so a hair's breadth counts as reached.
-    if vehicle.max_rotor_speed is not None:
-        saturated |= (spins >= vehicle.max_rotor_speed * (1.0 - 1e-9)).any(axis=0)
-    if vehicle.min_rotor_speed is not None:
-        saturated |= (spins <= vehicle.min_rotor_speed * (1.0 + 1e-9)).any(axis=0)
-    return float(saturated.mean())
+    saturated = at_upper_limit(spins, vehicle.max_rotor_speed)
+    saturated |= at_lower_limit(spins, vehicle.min_rotor_speed)
+    return float(saturated.any(axis=0).mean())
 
 
 def _min_decoupling_condition(flight: Flight) -> float:

@@ -1,8 +1,8 @@
-"""Replaying a flight on a MuJoCo model: where each of its bodies was at every sample.
+"""Replaying a flight on a MuJoCo model: the pose of every body at every sample.
 
-Nothing here knows a particular vehicle. Free joints take the recorded position and attitude, every
-other joint the column that bears its name (`COLUMN_OF_JOINT` lists the exceptions), and what has no
-column stays where the model puts it.
+Independent of the vehicle. Free joints take the recorded position and attitude, every other joint
+the column of its own name (`COLUMN_OF_JOINT` lists the exceptions); a joint without a column keeps
+the model's default.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from tiltsim.laws.assembling import control_setup
 from tiltsim.plants.flight_model import build_model
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
 from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.references.trajectories import position_reference
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 Columns = Mapping[str, Floats]
 
 COLUMN_OF_JOINT: Final = {f"tilt_{i}": f"alpha_{i}" for i in (1, 2, 3, 4)} | {"tilt": "alpha"}
-"""Columns of joints that do not bear the column's name."""
+"""Columns of the joints whose names differ from the column's."""
 
 
 class Poses(NamedTuple):
@@ -37,14 +38,14 @@ class Poses(NamedTuple):
 
 
 def visible_model(scenario: Scenario) -> mujoco.MjModel:
-    """The compiled model of a scenario's vehicle with everything that is drawn."""
-    # The same arguments as for the flight: what they compose is then at hand.
+    """The compiled model of a scenario's vehicle, visual geometry included."""
+    # The same arguments as for the flight, so that the compiled model is found in the cache.
     userdata_size = HEADER_SIZE + len(control_setup(scenario).userdata)
     return build_model(scenario, userdata_size=userdata_size, visuals=True)
 
 
 def joint_positions(model: mujoco.MjModel, columns: Columns) -> Floats:
-    """MuJoCo's ``qpos`` at every sample, shape (N, nq)."""
+    """MuJoCo's ``qpos`` at every one of N samples, shape (N, nq)."""
     qpos = np.tile(model.qpos0, (len(columns["time"]), 1))
     for joint in range(model.njnt):
         address = model.jnt_qposadr[joint]
@@ -62,7 +63,7 @@ def joint_positions(model: mujoco.MjModel, columns: Columns) -> Floats:
 
 
 def world_poses(model: mujoco.MjModel, qpos: Floats) -> Poses:
-    """Poses of the bodies in the world."""
+    """World poses of the bodies for joint positions ``qpos``, shape (N, nq)."""
     data = mujoco.MjData(model)
     poses = Poses(np.empty((len(qpos), model.nbody, 3)), np.empty((len(qpos), model.nbody, 4)))
     for sample, row in enumerate(qpos):
@@ -73,15 +74,15 @@ def world_poses(model: mujoco.MjModel, qpos: Floats) -> Poses:
 
 
 def poses_in_parents(model: mujoco.MjModel, poses: Poses) -> Poses:
-    """Poses of the bodies relative to the bodies that carry them."""
+    """Poses of the bodies relative to their parent bodies, from world poses."""
     parents = model.body_parentid
-    turn = poses.quaternion[:, parents] * (1.0, -1.0, -1.0, -1.0)  # the inverse rotations
-    apart = poses.position - poses.position[:, parents]
-    return Poses(rotate(turn, apart), _product(turn, poses.quaternion))
+    inverse = poses.quaternion[:, parents] * (1.0, -1.0, -1.0, -1.0)
+    offset = poses.position - poses.position[:, parents]
+    return Poses(rotate(inverse, offset), _product(inverse, poses.quaternion))
 
 
 def thrust_sites(model: mujoco.MjModel) -> dict[int, str]:
-    """Sites that carry a rotor's thrust along their z axis, and the column that holds it (N)."""
+    """Sites with a rotor's thrust along their z axis, and the column of that thrust (N)."""
     names = {site: model.site(site).name for site in range(model.nsite)}
     return {
         site: name.replace("rotor_", "thrust_")
@@ -91,7 +92,7 @@ def thrust_sites(model: mujoco.MjModel) -> dict[int, str]:
 
 
 def vehicle_radius(model: mujoco.MjModel) -> float:
-    """How far a vehicle's thrusts or bodies reach from its centre (m), at least 1 cm."""
+    """Largest distance of a rotor, or else of a body, from the vehicle's centre (m), min 1 cm."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     free = first_free_body(model)
@@ -100,26 +101,29 @@ def vehicle_radius(model: mujoco.MjModel) -> float:
 
 
 def thrust_scale(model: mujoco.MjModel) -> float:
-    """Length of a thrust arrow (m/N): 1, 2 or 5 times a power of ten, at hover about one radius."""
+    """Length of a thrust arrow per newton (m/N): about one vehicle radius in hover.
+
+    Rounded to 1, 2 or 5 times a power of ten.
+    """
     free = first_free_body(model)
     weight = float(model.body_subtreemass[free] * np.linalg.norm(model.opt.gravity))
     rotors = max(1, len(thrust_sites(model)))
-    wanted = vehicle_radius(model) * rotors / max(weight, 1e-9)
-    decade = 10.0 ** floor(log10(wanted))
-    return min((digit * decade for digit in (1.0, 2.0, 5.0, 10.0)), key=lambda x: abs(x - wanted))
+    exact = vehicle_radius(model) * rotors / max(weight, 1e-9)
+    decade = 10.0 ** floor(log10(exact))
+    return min((digit * decade for digit in (1.0, 2.0, 5.0, 10.0)), key=lambda x: abs(x - exact))
 
 
 def first_free_body(model: mujoco.MjModel) -> int:
-    """The body that moves as the vehicle does: the first with a joint."""
+    """The body that represents the vehicle: the first with a joint; 0 (world) without joints."""
     moving = np.flatnonzero(model.body_dofnum)
     return int(moving[0]) if len(moving) else 0
 
 
 def rotate(quaternion: Floats, vector: Floats) -> Floats:
-    """Vectors, shape (..., 3), turned by unit quaternions, shape (..., 4)."""
+    """Vectors, shape (..., 3), rotated by unit quaternions (scalar first), shape (..., 4)."""
     axis = quaternion[..., 1:]
-    across = 2.0 * np.cross(axis, vector)
-    return np.asarray(vector + quaternion[..., :1] * across + np.cross(axis, across))
+    cross = 2.0 * np.cross(axis, vector)
+    return np.asarray(vector + quaternion[..., :1] * cross + np.cross(axis, cross))
 
 
 def _product(left: Floats, right: Floats) -> Floats:
@@ -131,15 +135,32 @@ def _product(left: Floats, right: Floats) -> Floats:
 
 
 def positions(columns: Columns) -> Floats:
-    """The vehicle's positions at every sample, shape (N, 3); 0 along axes that it has not."""
+    """The vehicle's position at every sample (m), shape (N, 3); 0 for axes without a column."""
     zero = np.zeros_like(columns["time"])
     return np.stack([columns.get(axis, zero) for axis in "xyz"], axis=1)
 
 
 def reference_positions(columns: Columns) -> Floats:
-    """The reference's positions at every sample, shape (N, 3); 0 along axes that it leaves out."""
+    """The reference position at every sample (m), shape (N, 3); 0 for axes without a column."""
     zero = np.zeros_like(columns["time"])
     return np.stack([columns.get(f"{axis}_ref", zero) for axis in "xyz"], axis=1)
+
+
+def reference_path(scenario: Scenario, end: float, points: int) -> Floats:
+    """The reference position (m) at equidistant times, shape (points, 3).
+
+    Parameters
+    ----------
+    scenario
+        The scenario with the reference.
+    end
+        Last time, s; the first is zero.
+    points
+        Number of times.
+    """
+    reference, table = scenario.reference.parameters, scenario.reference.table
+    times = np.linspace(0.0, end, points).tolist()
+    return np.array([position_reference(time, reference, table)[:3] for time in times])
 
 
 def _stack(columns: Columns, names: tuple[str, ...]) -> Floats:

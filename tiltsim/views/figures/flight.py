@@ -1,215 +1,26 @@
-"""One flight on a page: time series, path over the ground, and the roll-pitch plane (ch. 4)."""
+"""One flight on a page."""
 
 from __future__ import annotations
 
-from math import pi
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
-from tiltsim.laws.assembling import follows_position, loop_of
-from tiltsim.laws.layers.supervision import SUPERVISION
-from tiltsim.views.attitude_plane import (
-    HALF_WIDTH,
-    SUPERVISION_THRESHOLD,
-    margin_threshold,
-    nearest_singular,
-    singular_curves,
-    torque_free_directions,
-    unreachable_pitch,
-)
-from tiltsim.views.figures import style
-from tiltsim.views.figures.page import (
-    SIZE,
-    add_headings,
-    exclude_divergence_from_scale,
-    label,
-    plan_view,
-    widen,
-)
+from tiltsim.laws.assembling import loop_of
+from tiltsim.views.figures.rotorcraft import rotorcraft_figure
 from tiltsim.views.figures.tilt_car import tilt_car_figure
-from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tiltsim.flight.flight import Flight
 
-FORBIDDEN: Final = "#F6DDD0"
-INSTANTS: Final = 120
-"""Instants of the flight for which the plane shows what its gait forbids."""
-
-MANY: Final = 20
-"""A panel with more periods of a gait than this would be a solid band."""
-
-LAST: Final = 6
-"""So many periods are shown then."""
-
-_ROTORS: Final = (1, 2, 3, 4)
-_SUBSCRIPTS: Final = "₁₂₃₄"
+FIGURES: Final[dict[str, Callable[[Flight], Figure]]] = {
+    "rotorcraft": rotorcraft_figure,
+    "tilt_car": tilt_car_figure,
+}
+"""Figures by the name of the kind of vehicle."""
 
 
 def flight_figure(flight: Flight) -> Figure:
-    """What the vehicle did, on one page, in the panels of its kind."""
-    return _PAGES[loop_of(flight.scenario).kind.name](flight)
-
-
-def rotorcraft_figure(flight: Flight) -> Figure:
-    """What a rotorcraft did and how close it came to a singularity, on one page."""
-    with style.paper_style():
-        figure = style.new_figure(*SIZE)
-        add_headings(figure, flight)
-        halves: Any = figure.subfigures(1, 2, width_ratios=[2.1, 1.0])
-        left, right = halves
-        panels = (_attitude, _tilt_angles, _altitude, _rotor_speeds, _position_error, _margin)
-        series: Any = left.subplots(3, 2)
-        for axes, panel in zip(series.flat, panels, strict=True):
-            style.time_axis(axes, flight["time"][-1])
-            axes.tick_params(labelbottom=axes in series[-1])
-            panel(axes, flight)
-            if panel is not _margin:
-                exclude_divergence_from_scale(axes, flight)
-        for axes in series[-1]:
-            axes.set_xlabel("time (s)")
-        above, below = right.subplots(2, 1)
-        plan_view(above, flight)
-        _roll_pitch_plane(below, flight)
-        return figure
-
-
-def _attitude(axes: Any, flight: Flight) -> None:
-    for angle, look in zip(("roll", "pitch", "yaw"), style.AXIS_LINES):
-        axes.plot(flight["time"], flight[angle], label=angle, **look)
-        axes.plot(flight["time"], flight[f"{angle}_ref"], color=style.INK, ls=":", lw=0.8)
-    axes.plot([], [], color=style.INK, ls=":", lw=0.8, label="reference")
-    label(axes, "Attitude", "rad", columns=4)
-
-
-def _altitude(axes: Any, flight: Flight) -> None:
-    axes.plot(flight["time"], flight["z"], color=style.BLUE, label="actual")
-    axes.plot(flight["time"], flight["z_ref"], color=style.INK, ls=":", lw=1.0, label="reference")
-    widen(axes, 0.1)
-    label(axes, "Altitude", "m")
-
-
-def _position_error(axes: Any, flight: Flight) -> None:
-    follows = follows_position(flight.scenario)
-    axes.axhline(0.0, color=style.GREY, lw=0.7)
-    for axis, look in zip("xyz", style.AXIS_LINES):
-        if follows or axis == "z":
-            error = flight[f"{axis}_ref"] - flight[axis]
-            axes.plot(flight["time"], error, label=axis, **look)
-    widen(axes, 0.1)
-    label(axes, "Position error", "m")
-
-
-def _tilt_angles(axes: Any, flight: Flight) -> None:
-    end, begin = flight["time"][-1], _begin_of_gait(flight)
-    for rotor, line in zip(_ROTORS, style.ROTOR_LINES, strict=True):
-        name = f"α{_SUBSCRIPTS[rotor - 1]}"
-        axes.plot(flight["time"], flight[f"alpha_{rotor}"], label=name, **line)
-    widen(axes, 0.1)
-    title = "Tilt angles"
-    if begin > 0.0:
-        axes.set_xlim(begin, end)
-        axes.tick_params(labelbottom=True)
-        title += f", last {end - begin:g} s"
-    label(axes, title, "rad", columns=4)
-
-
-def _begin_of_gait(flight: Flight) -> float:
-    """From when on (s) tilt angles are shown: all of them, or the last of very many periods."""
-    vehicle, end = flight.scenario.vehicle.resolve(), float(flight["time"][-1])
-    if not isinstance(vehicle, Vehicle) or SUPERVISION in flight.columns:
-        return 0.0
-    period = flight.scenario.gait.plan(vehicle).period
-    return 0.0 if period is None or end <= MANY * period else end - LAST * period
-
-
-def _rotor_speeds(axes: Any, flight: Flight) -> None:
-    for rotor, spin, line in zip(_ROTORS, SPIN, style.ROTOR_LINES, strict=True):
-        speed = spin * flight[f"rotor_speed_{rotor}"]
-        axes.plot(flight["time"], speed, label=f"{rotor}", **line)
-    vehicle = flight.scenario.rotorcraft
-    for limit in (vehicle.min_rotor_speed, vehicle.max_rotor_speed):
-        if limit is not None:
-            axes.axhline(limit, color=style.RED, ls="--", lw=0.9)
-    widen(axes, 20.0)
-    label(axes, "Rotor speeds", "rad/s", name="along the spin", columns=4)
-
-
-def _margin(axes: Any, flight: Flight) -> None:
-    time, margin = flight["time"], np.abs(flight["singularity_margin"])
-    closest = int(np.argmin(margin))
-    threshold = margin_threshold(flight.scenario)
-    axes.fill_between(time, 0.0, threshold, color=FORBIDDEN, lw=0.0)
-    words = f"below {threshold:g} rad"
-    axes.text(0.012, 0.03, words, transform=axes.transAxes, fontsize=7.5, color="#7A4A33")
-    if SUPERVISION in flight.columns:
-        acts = flight[SUPERVISION] > SUPERVISION_THRESHOLD
-        axes.axhline(threshold, color=style.RED, ls="--", lw=0.9)
-        axes.fill_between(
-            *(time, 0.0, 1.0),
-            where=acts,
-            transform=axes.get_xaxis_transform(),
-            **{"color": style.PALE, "lw": 0.0, "zorder": 0.5},
-        )
-        words = "shaded: supervisor acts"
-        axes.text(0.99, 0.03, words, transform=axes.transAxes, ha="right", fontsize=8)
-    axes.plot(time, margin, color=style.BLUE)
-    axes.plot(time[closest], margin[closest], "o", color=style.RED, ms=5, clip_on=False, zorder=5)
-    style.angle_axis(axes, "y", pi / 2)
-    axes.set_ylim(0.0, pi / 2 * 1.04)
-    label(axes, f"Singularity margin, least {margin[closest]:.2f} rad", "rad")
-
-
-def _roll_pitch_plane(axes: Any, flight: Flight) -> None:
-    """The attitudes flown, those out of reach, and the closest approach to a singular one."""
-    n = torque_free_directions(flight.columns, flight.scenario.rotorcraft.resolve())
-    margin = flight["singularity_margin"]
-    closest = int(np.argmin(np.abs(margin)))
-    side = float(np.sign(margin[0])) or 1.0
-    shaded = _shade_forbidden(axes, n, side)
-    attitude = np.stack([flight["roll"], flight["pitch"]], axis=1)
-    axes.plot(*attitude.T, color=style.BLUE, lw=0.9)
-    curve = singular_curves(n[[closest]], 181)[0]
-    here = attitude[closest]
-    if np.isfinite(curve).any():
-        axes.plot(*curve.T, color=style.RED, lw=1.8)
-        there = nearest_singular(n[[closest]], attitude[[closest]])[0]
-        axes.plot(*np.stack([here, there]).T, color=style.INK, lw=1.0, ls="--")
-    axes.plot(*here, "o", color=style.RED, ms=5, zorder=5)
-    axes.text(
-        *(0.97, 0.03),
-        f"closest: {abs(margin[closest]):.2f} rad at {flight['time'][closest]:.2f} s",
-        transform=axes.transAxes,
-        ha="right",
-        fontsize=8,
-        bbox={"facecolor": "white", "edgecolor": style.GREY, "linewidth": 0.5, "pad": 2.5},
-    )
-    style.angle_axis(axes, "x", HALF_WIDTH)
-    style.angle_axis(axes, "y", HALF_WIDTH)
-    axes.set_aspect("equal")
-    axes.set_xlabel("roll φ (rad)")
-    axes.set_ylabel("pitch θ (rad)")
-    axes.set_title(f"Attitudes flown; {'shaded: out' if shaded else 'none is out'} of reach")
-
-
-def _shade_forbidden(axes: Any, n: np.typing.NDArray[np.float64], side: float) -> bool:
-    """Shade what the gait puts out of reach, the darker the longer it does; whether it does."""
-    instants = np.unique(np.linspace(0, len(n) - 1, INSTANTS).round().astype(int))
-    edges = np.linspace(-HALF_WIDTH, HALF_WIDTH, 361)
-    centres = 0.5 * (edges[1:] + edges[:-1])
-    intervals = unreachable_pitch(n[instants], side, centres)[:, np.newaxis]
-    pitch = centres[:, np.newaxis]
-    inside = (pitch > intervals[..., 0]) & (pitch < intervals[..., 1])
-    share = inside.mean(axis=0)
-    axes.grid(False)
-    from matplotlib.colors import LinearSegmentedColormap
-
-    shades = LinearSegmentedColormap.from_list("forbidden", ["#FFFFFF", FORBIDDEN, "#E9B49A"])
-    axes.pcolormesh(edges, edges, share, cmap=shades, vmin=0.0, vmax=1.0, rasterized=True)
-    return bool(share.any())
-
-
-_PAGES: Final = {"rotorcraft": rotorcraft_figure, "tilt_car": tilt_car_figure}
+    """The page of a flight, with the panels of its kind of vehicle."""
+    return FIGURES[loop_of(flight.scenario).kind.name](flight)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltsim.views.figures import style
-from tiltsim.views.figures.page import SIZE, add_headings, label, plan_view, widen
+from tiltsim.views.figures.flight_layout import SIZE, add_headings, label, plan_view, widen
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

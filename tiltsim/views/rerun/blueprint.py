@@ -1,46 +1,36 @@
-"""The blueprint: which views a recording opens with, and where they stand."""
+"""The blueprint: the views that the viewer opens for a recording, and their layout."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
 
-from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME
-from tiltsim.views.rerun.names import TIMELINE
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, curve_is_constant
+from tiltsim.views.replay import reference_path, thrust_scale, vehicle_radius
+from tiltsim.views.rerun.geometry import ground_height
 from tiltsim.views.rerun.plane import BOUND
+from tiltsim.views.rerun.scene import REFERENCE_POINTS
+from tiltsim.views.rerun.timeline import TIMELINE
 
 if TYPE_CHECKING:
-    import rerun.blueprint as rrb
-
-    from tiltsim.views.rerun.series import Panel
+    from tiltsim.views.rerun.flight_recorder import FlightRecorder
 
 
-@dataclass(frozen=True)
-class Shown:
-    """What the blueprint must know of a flight."""
-
-    name: str
-    world: str  # entities
-    vehicle: str
-    camera: str
-    floor: str
-    plane: str  # empty where there is none
-    curve_is_constant: bool  # whether its curve stays where it is
-    panels: tuple[Panel, ...]
-    eye: tuple[float, float, float]  # seen from the vehicle, in radii of it
-    up: tuple[float, float, float]
-    overview: tuple[float, float, float] | None  # m, from where the whole reference is seen
-    radius: float  # m
-    thrust_scale: float  # m/N
-    ground: float  # m
+OVERVIEW_HEIGHT: Final = 1.35
+"""Height of the overview camera in lengths of the reference, which it shows completely."""
 
 
-def flight_blueprint(flights: list[Shown], *, live: bool = False) -> rrb.Blueprint:
-    """Vehicle, trajectory, roll-pitch plane and events on the left, time series on the right."""
-    import rerun.blueprint as rrb
+def flight_blueprint(flights: Sequence[FlightRecorder], *, live: bool = False) -> rrb.Blueprint:
+    """Vehicle, trajectory, roll-pitch plane and events on the left, time series on the right.
 
+    ``live`` lets the viewer follow the latest time instead of playing from the start.
+    """
     vehicle, trajectory, events = _vehicle_view(flights), _trajectory_view(flights), _events_view()
-    if flights[0].plane:
+    if flights[0].plane is not None:
         views = rrb.Horizontal(vehicle, _plane_view(flights), column_shares=[5, 4])
         below = rrb.Horizontal(trajectory, events, column_shares=[5, 4])
         left = rrb.Vertical(views, below, row_shares=[11, 8])
@@ -60,102 +50,96 @@ def flight_blueprint(flights: list[Shown], *, live: bool = False) -> rrb.Bluepri
     )
 
 
-def _vehicle_view(flights: list[Shown]) -> Any:
-    """The vehicle from near by; the camera goes with it but does not turn."""
-    import rerun.blueprint as rrb
-
+def _vehicle_view(flights: Sequence[FlightRecorder]) -> rrb.View:
+    """The vehicle at close range; the camera moves with it but does not rotate."""
     first = flights[0]
+    radius = vehicle_radius(first.model)
     return rrb.Spatial3DView(
-        origin=first.camera,
-        contents=[f"{flight.world}/**" for flight in flights],
-        name=f"Vehicle (thrust arrows: {100.0 * first.thrust_scale:g} cm per newton)",
+        origin=first.scene.camera,
+        contents=[f"{flight.scene.root}/**" for flight in flights],
+        name=f"Vehicle (thrust arrows: {100.0 * thrust_scale(first.model):g} cm per newton)",
         eye_controls=rrb.EyeControls3D(
-            position=[first.radius * part for part in first.eye],
-            look_target=(0.0, 0.0, 0.15 * first.radius),
-            eye_up=first.up,
+            position=[radius * part for part in first.display.eye],
+            look_target=(0.0, 0.0, 0.15 * radius),
+            eye_up=first.display.up,
         ),
         line_grid=False,
         overrides=_trails(flights),
     )
 
 
-def _trajectory_view(flights: list[Shown]) -> Any:
-    """The whole paths of all vehicles and references."""
-    import rerun.blueprint as rrb
-
+def _trajectory_view(flights: Sequence[FlightRecorder]) -> rrb.View:
+    """The complete paths of all vehicles and references."""
     contents = []
     for flight in flights:
-        contents += [f"{flight.world}/trail", f"{flight.world}/reference/**"]
-        contents += [f"{flight.vehicle}/**", f"{flight.camera}/**"]
+        contents += [f"{flight.scene.root}/trail", f"{flight.scene.root}/reference/**"]
+        contents += [f"{flight.scene.vehicle}/**", f"{flight.scene.camera}/**"]
     return rrb.Spatial3DView(
         origin="world",
         contents=contents,
         name="Trajectory and reference",
         eye_controls=_from_above(flights[0]),
-        line_grid=_grid(flights[0].ground),
+        line_grid=_grid(ground_height(flights[0].model)),
         overrides=_trails(flights),
     )
 
 
-def _from_above(flight: Shown) -> Any:
-    """A camera straight above the reference, for what moves in a plane."""
-    import rerun.blueprint as rrb
-
-    if flight.overview is None:
+def _from_above(flight: FlightRecorder) -> rrb.EyeControls3D | None:
+    """A camera straight above the reference, for vehicles that move in a plane."""
+    if not flight.display.overview:
         return None
-    x, y, _ = flight.overview
+    path = reference_path(flight.scenario, flight.scenario.simulation.duration, REFERENCE_POINTS)
+    x, y, _ = (0.5 * (path.min(axis=0) + path.max(axis=0))).tolist()
+    height = OVERVIEW_HEIGHT * max(np.ptp(path, axis=0).max(), 1.0)
     return rrb.EyeControls3D(
-        position=flight.overview, look_target=(x, y, 0.0), eye_up=(0.0, 1.0, 0.0)
+        position=(x, y, float(height)), look_target=(x, y, 0.0), eye_up=(0.0, 1.0, 0.0)
     )
 
 
-def _plane_view(flights: list[Shown]) -> Any:
-    import rerun.blueprint as rrb
+def _plane_view(flights: Sequence[FlightRecorder]) -> rrb.View:
 
     return rrb.Spatial2DView(
         origin="plane",
-        name="Attitude (shaded: unacceptable attitudes)",
+        name="Attitude (shaded: unreachable attitudes)",
         visual_bounds=rrb.VisualBounds2D(x_range=(-BOUND, BOUND), y_range=(-BOUND, BOUND)),
-        overrides={f"{flight.plane}/trail": _attitude_trail(flight) for flight in flights},
+        overrides={f"{f.plane.root}/trail": _attitude_trail(f) for f in flights if f.plane},
     )
 
 
-def _events_view() -> Any:
-    import rerun.blueprint as rrb
+def _events_view() -> rrb.View:
 
     return rrb.TextLogView(
         origin="events",
         name="Events",
         columns=rrb.TextLogColumns(
             timeline_columns=[TIMELINE],
-            text_log_columns=["Body"],  # colours tell the levels
+            text_log_columns=["Body"],  # the colour shows the level
         ),
     )
 
 
-def _plots(flights: list[Shown]) -> tuple[list[Any], list[float]]:
-    """The time series and their heights; of several flights what they are compared by.
+def _plots(flights: Sequence[FlightRecorder]) -> tuple[list[rrb.View], list[float]]:
+    """The plots of the time series and their heights; for several flights, those compared.
 
-    Flights keep their colours, so one legend will do; long names would hide half of every plot.
+    Only the first plot of a comparison has a legend: colours are the same in all plots, and long
+    names would cover half of each.
     """
-    panels = flights[0].panels
+    panels = flights[0].display.panels(flights[0].scenario)
     if len(flights) == 1:
         whole = [(panel.title, [f"{panel.path}/**"]) for panel in panels]
         return [_plot(*plot) for plot in whole], [panel.height for panel in panels]
-    import rerun as rr
 
     parts = [rr.escape_entity_path_part(flight.name) for flight in flights]
-    plots: list[Any] = []
+    plots: list[rrb.View] = []
     for panel in panels:
         levels = [f"{parts[0]}/{panel.path}/{level}" for level in panel.levels]
-        for series, title in panel.compared:
-            lines = [f"{part}/{panel.path}/{series}" for part in parts]
-            plots.append(_plot(title, [*lines, *levels], legend=not plots))
+        for compared in panel.compared:
+            lines = [f"{part}/{panel.path}/{compared.name}" for part in parts]
+            plots.append(_plot(compared.title, [*lines, *levels], legend=not plots))
     return plots, [1.0] * len(plots)
 
 
-def _plot(title: str, contents: list[str], *, legend: bool = True) -> Any:
-    import rerun.blueprint as rrb
+def _plot(title: str, contents: list[str], *, legend: bool = True) -> rrb.View:
 
     return rrb.TimeSeriesView(
         origin="/",
@@ -166,24 +150,19 @@ def _plot(title: str, contents: list[str], *, legend: bool = True) -> Any:
     )
 
 
-def _grid(height: float) -> Any:
-    import rerun as rr
-    import rerun.blueprint as rrb
+def _grid(height: float) -> rrb.LineGrid3D:
 
     plane = rr.encodings.Plane3D(normal=(0.0, 0.0, 1.0), distance=height)
     return rrb.LineGrid3D(visible=True, spacing=1.0, plane=plane)
 
 
-def _trails(flights: list[Shown]) -> dict[str, Any]:
-    return {f"{flight.world}/trail": _from_the_start() for flight in flights}
+def _trails(flights: Sequence[FlightRecorder]) -> dict[str, rrb.VisibleTimeRanges]:
+    return {f"{flight.scene.root}/trail": _from_the_start() for flight in flights}
 
 
-def _attitude_trail(flight: Shown) -> Any:
-    """All attitudes so far, or the latest: earlier ones were among other unacceptable ones."""
-    import rerun as rr
-    import rerun.blueprint as rrb
-
-    if flight.curve_is_constant:
+def _attitude_trail(flight: FlightRecorder) -> rrb.VisibleTimeRanges:
+    """All attitudes so far or, where the curve moves, only the latest, to which it applies."""
+    if curve_is_constant(flight.scenario):
         return _from_the_start()
     return rrb.VisibleTimeRanges(
         timeline=TIMELINE,
@@ -192,11 +171,8 @@ def _attitude_trail(flight: Shown) -> Any:
     )
 
 
-def _from_the_start() -> Any:
-    """Show all that has been drawn so far, not just the latest stretch."""
-    import rerun as rr
-    import rerun.blueprint as rrb
-
+def _from_the_start() -> rrb.VisibleTimeRanges:
+    """Show everything logged so far, not just the latest segment."""
     return rrb.VisibleTimeRanges(
         timeline=TIMELINE,
         start=rr.TimeRangeBoundary.infinite(),

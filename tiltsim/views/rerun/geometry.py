@@ -1,41 +1,39 @@
-"""What a compiled MuJoCo model looks like, as static Rerun entities; for any model.
+"""The visual geometry of any compiled MuJoCo model as static Rerun entities.
 
-A body is an entity below the body that carries it, so that poses stay relative; its geoms are
-entities below the body. Infinite planes are left to the view's grid.
+A body's entity lies below that of its parent body, so that poses are relative; its geoms are
+entities below the body's. Infinite planes are not drawn: the view has a grid.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
+import rerun as rr
 
 from tiltsim.views.replay import rotate
 from tiltsim_controllers.mathematics.scalar import Floats
 
-if TYPE_CHECKING:
-    import rerun as rr
-
 VISIBLE_GROUPS: Final = (0, 1, 2)
-"""Geom groups that are drawn; by MuJoCo's habit collision geometry stands in group 3."""
+"""Geom groups that are drawn; collision geometry is in group 3 by convention."""
 
 _XYZW: Final = [1, 2, 3, 0]
-"""From MuJoCo's order of a quaternion, scalar first, to Rerun's, scalar last."""
+"""Permutation from MuJoCo's quaternion order, scalar first, to Rerun's, scalar last."""
 
 _UNSET_COLOR: Final = (0.5, 0.5, 0.5, 1.0)
-"""MuJoCo's default: a geom that bears it takes its material's colour instead."""
+"""MuJoCo's default RGBA; a geom with it has its material's colour instead."""
 
 
 def xyzw(quaternion: npt.ArrayLike) -> npt.NDArray[np.float32]:
-    """Quaternions as Rerun orders them, scalar last."""
+    """Quaternions, shape (..., 4), from MuJoCo's order to Rerun's, scalar last."""
     return np.asarray(quaternion, dtype=np.float32)[..., _XYZW]
 
 
 def body_paths(model: mujoco.MjModel, root: str) -> list[str]:
-    """The entity of every body; the world's is ``root`` itself."""
+    """The entity path of every body; that of the world body is ``root``."""
     paths = [root]
     for body in range(1, model.nbody):
         name = _part(model.body(body).name or f"body_{body}")
@@ -44,30 +42,30 @@ def body_paths(model: mujoco.MjModel, root: str) -> list[str]:
 
 
 def log_geometry(recording: rr.RecordingStream, model: mujoco.MjModel, root: str) -> list[str]:
-    """Log all visible geoms below ``root``; returns the names of those that could not be drawn."""
+    """Log all visible geoms below ``root``; return the names of those without a Rerun shape."""
     paths = body_paths(model, root)
-    left_out = []
+    not_drawn = []
     for geom in range(model.ngeom):
         if model.geom_group[geom] not in VISIBLE_GROUPS or is_infinite_plane(model, geom):
             continue
         name = model.geom(geom).name or f"geom_{geom}"
         archetypes = geom_archetypes(model, geom)
         if not archetypes:
-            left_out.append(name)
+            not_drawn.append(name)
             continue
         path = f"{paths[model.geom_bodyid[geom]]}/{_part(name)}"
         recording.log(path, *archetypes, static=True)
-    return left_out
+    return not_drawn
 
 
 def is_infinite_plane(model: mujoco.MjModel, geom: int) -> bool:
-    """Whether a geom is a plane without end."""
+    """Whether a geom is an infinite plane."""
     is_plane = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
     return bool(is_plane and not model.geom_size[geom, :2].all())
 
 
 def ground_height(model: mujoco.MjModel) -> float:
-    """Height (m) of the model's highest infinite plane; 0 where there is none."""
+    """Height (m) of the model's highest infinite plane; 0 without one."""
     heights = [
         float(model.geom_pos[geom, 2])
         for geom in range(model.ngeom)
@@ -77,13 +75,13 @@ def ground_height(model: mujoco.MjModel) -> float:
 
 
 def geom_archetypes(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
-    """Rerun's archetypes for a geom in its body's frame; none where it has no counterpart."""
+    """Rerun's archetypes for a geom in its body's frame; empty for shapes that Rerun lacks."""
     shape = _SHAPES.get(model.geom_type[geom])
     return () if shape is None else shape(model, geom)
 
 
 def geom_color(model: mujoco.MjModel, geom: int) -> npt.NDArray[np.uint8]:
-    """RGBA of a geom, its material's where it has no colour of its own."""
+    """RGBA (0 to 255) of a geom, or of its material if the geom has no colour of its own."""
     rgba, material = model.geom_rgba[geom], model.geom_matid[geom]
     if material >= 0 and np.allclose(rgba, _UNSET_COLOR):
         rgba = model.mat_rgba[material]
@@ -91,19 +89,16 @@ def geom_color(model: mujoco.MjModel, geom: int) -> npt.NDArray[np.uint8]:
 
 
 def _part(name: str) -> str:
-    import rerun as rr
 
     return str(rr.escape_entity_path_part(name))
 
 
-def _placed(model: mujoco.MjModel, geom: int, offset: tuple[float, float, float]) -> Floats:
-    """A point of the geom's frame in its body's frame."""
-    turned = rotate(model.geom_quat[geom], np.array(offset))
-    return np.asarray(model.geom_pos[geom] + turned)
+def _in_body(model: mujoco.MjModel, geom: int, point: tuple[float, float, float]) -> Floats:
+    """A point of the geom's frame (m) in its body's frame."""
+    return np.asarray(model.geom_pos[geom] + rotate(model.geom_quat[geom], np.array(point)))
 
 
 def _common(model: mujoco.MjModel, geom: int) -> dict[str, Any]:
-    import rerun as rr
 
     return {
         "quaternions": [xyzw(model.geom_quat[geom])],
@@ -113,14 +108,12 @@ def _common(model: mujoco.MjModel, geom: int) -> dict[str, Any]:
 
 
 def _box(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
-    import rerun as rr
 
     centers, sizes = [model.geom_pos[geom]], [model.geom_size[geom]]
     return (rr.Boxes3D(centers=centers, half_sizes=sizes, **_common(model, geom)),)
 
 
 def _ellipsoid(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
-    import rerun as rr
 
     size = model.geom_size[geom]
     is_sphere = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_SPHERE
@@ -130,7 +123,6 @@ def _ellipsoid(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
 
 
 def _cylinder(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
-    import rerun as rr
 
     radius, half_length, _ = model.geom_size[geom]
     return (
@@ -144,7 +136,6 @@ def _cylinder(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
 
 
 def _capsule(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
-    import rerun as rr
 
     radius, half_length, _ = model.geom_size[geom]
     return (
@@ -152,20 +143,19 @@ def _capsule(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
             lengths=[2.0 * half_length],
             radii=[radius],
             # Rerun's capsule starts at its origin, MuJoCo's is centred there.
-            translations=[_placed(model, geom, (0.0, 0.0, -half_length))],
+            translations=[_in_body(model, geom, (0.0, 0.0, -half_length))],
             **_common(model, geom),
         ),
     )
 
 
 def _plane(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
-    import rerun as rr
 
     half_x, half_y, _ = model.geom_size[geom]
-    thickness = 1e-3  # m, to have something to draw; the upper face is the plane
+    thickness = 1e-3  # m, half of a thin box whose upper face is the plane
     return (
         rr.Boxes3D(
-            centers=[_placed(model, geom, (0.0, 0.0, -thickness))],
+            centers=[_in_body(model, geom, (0.0, 0.0, -thickness))],
             half_sizes=[(half_x, half_y, thickness)],
             **_common(model, geom),
         ),
@@ -173,12 +163,11 @@ def _plane(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
 
 
 def _mesh(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
-    import rerun as rr
 
     mesh = model.geom_dataid[geom]
     first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
     vertex, normal = model.mesh_vertadr[mesh], model.mesh_normaladr[mesh]
-    # MuJoCo numbers vertices and normals apart, Rerun together: every corner becomes a vertex.
+    # MuJoCo indexes vertices and normals separately, Rerun together: each corner is a vertex.
     corners = model.mesh_vert[vertex + model.mesh_face[first : first + count].ravel()]
     normals = model.mesh_normal[normal + model.mesh_facenormal[first : first + count].ravel()]
     return (

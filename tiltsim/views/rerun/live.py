@@ -1,4 +1,4 @@
-"""Streaming a flight while it is flown."""
+"""Streaming a flight to a viewer while it is simulated."""
 
 from __future__ import annotations
 
@@ -10,58 +10,61 @@ from typing import TYPE_CHECKING, Final, Self
 from uuid import uuid4
 
 import numpy as np
+import rerun as rr
 
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.views.rerun.blueprint import flight_blueprint
-from tiltsim.views.rerun.recorder import FlightRecorder
-from tiltsim.views.rerun.recording import new_recording
-from tiltsim.views.rerun.viewer import attach_viewer, require_viewer
+from tiltsim.views.rerun.flight_recorder import FlightRecorder
+from tiltsim.views.rerun.recording_file import new_recording
+from tiltsim.views.rerun.requirements import require_viewer
+from tiltsim.views.rerun.viewer import attach_viewer
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
+    from tiltsim_controllers.mathematics.scalar import Floats
 
 SEND_INTERVAL: Final = 0.25  # s of wall time between pieces; each costs about 0.04 s
 SHUTDOWN_TIMEOUT: Final = 5.0
-"""How long (s) to wait, after the flight, for the viewer to take what is left."""
+"""Time (s) to wait after the flight until the viewer has received the remaining samples."""
 
 
 class LiveStream:
-    """Sends samples to a viewer from a thread of its own, as they are recorded.
+    """Sends samples to a viewer from a separate thread as they are recorded.
 
-    The flight only puts its samples into a queue without bounds, so a slow viewer, or one that has
-    been closed, never holds it up. Use it as a context manager and as `simulate`'s observer.
+    The simulation only puts its samples into an unbounded queue, so that a slow or closed viewer
+    never delays it. Use it as a context manager and as `simulate`'s observer.
 
     Parameters
     ----------
     scenario
-        What is flown.
+        The scenario of the flight.
     url
-        The viewer's address; None opens one.
+        The viewer's address; None opens a viewer.
 
     Raises
     ------
     InputError
-        If there is no viewer, or no screen to open one on.
+        If no viewer listens at the address, or there is no screen to open one on.
     """
 
     def __init__(self, scenario: Scenario, url: str | None = None) -> None:
         require_viewer(url)
         self._scenario = scenario
-        # Every live flight is a recording of its own, also in a viewer that has seen it before.
+        # A unique name: a viewer would merge two flights of one scenario into one recording.
         self._recording = new_recording([scenario], salt=uuid4().hex)
         self._recorder = FlightRecorder(self._recording, scenario)
-        blueprint = flight_blueprint([self._recorder.shown()], live=True)
+        blueprint = flight_blueprint([self._recorder], live=True)
         attach_viewer(self._recording, url, blueprint)
         self._samples: SimpleQueue[Floats] = SimpleQueue()
         self._end: End | None = None
         self._over = Event()
-        # A daemon: a viewer that takes nothing more cannot keep the program from ending.
+        # A daemon thread, so that a frozen viewer does not keep the program from exiting.
         self._thread = Thread(target=self._send_all, name="live stream", daemon=True)
 
     def __call__(self, sample: Floats) -> None:
-        """Take a sample of the flight; returns at once."""
+        """Queue a sample of the flight; returns immediately."""
         self._samples.put(sample)
 
     def __enter__(self) -> Self:
@@ -70,7 +73,7 @@ class LiveStream:
         return self
 
     def finish(self, end: End) -> None:
-        """Tell how the flight ended; sent after its last sample."""
+        """Set how the flight ended; sent after its last sample."""
         self._end = end
 
     def __exit__(
@@ -79,27 +82,27 @@ class LiveStream:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Send what is left and stop, within `SHUTDOWN_TIMEOUT` seconds at most."""
+        """Send the remaining samples and stop, within `SHUTDOWN_TIMEOUT` seconds at most."""
         self._over.set()
         self._thread.join(SHUTDOWN_TIMEOUT)
         if self._thread.is_alive():
-            _leave_behind()
+            _abandon_connection()
 
     def _send_all(self) -> None:
         try:
             self._recorder.begin()
             self._recorder.draw_references(self._scenario.simulation.duration)
             while not self._over.wait(SEND_INTERVAL):
-                self._send_waiting()
-            self._send_waiting()
+                self._send_queued()
+            self._send_queued()
             if self._end is not None:
                 self._recorder.finish(self._end)
             self._recording.disconnect()
-        except Exception as error:  # the flight goes on, whatever befalls its picture
+        except Exception as error:  # the flight continues regardless of viewer errors
             sys.stderr.write(f"tiltsim: live view ended: {error}\n")
 
-    def _send_waiting(self) -> None:
-        """Send all samples that have come since the last time, as one piece of the flight."""
+    def _send_queued(self) -> None:
+        """Send all queued samples as one piece of the flight."""
         samples = []
         try:
             while True:
@@ -112,9 +115,7 @@ class LiveStream:
             self._recorder.append(piece)
 
 
-def _leave_behind() -> None:
-    """Let the program end although a viewer has not taken all: Rerun would wait without end."""
-    import rerun as rr
-
+def _abandon_connection() -> None:
+    """Let the program exit before the viewer has received everything: Rerun would wait forever."""
     rr.unregister_shutdown()
-    sys.stderr.write("tiltsim: the viewer does not answer; the live view is incomplete\n")
+    sys.stderr.write("tiltsim: the viewer does not respond; the live view is incomplete\n")

@@ -1,4 +1,4 @@
-"""Colours on Rerun's dark and light grounds, after Okabe and Ito's colour-blind safe set."""
+"""Colours for Rerun's dark and light themes, after Okabe and Ito's colour-blind safe palette."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ FAINT: Final = (88, 94, 102)
 WHITE: Final = (235, 238, 242)
 
 FLIGHTS: Final = (SKY, AMBER, PINK, GREEN, YELLOW, RED, BLUE, GREY)
-"""Colours of flights that are compared, in order."""
+"""Colours of the flights of a comparison, in order."""
 
-FORBIDDEN: Final = (92, 50, 42)
-"""The ground of attitudes that cannot be reached."""
+UNREACHABLE: Final = (92, 50, 42)
+"""Colour of the region of unreachable attitudes."""
 
 
-def dimmed(color: Color, share: float = 0.62) -> Color:
-    """A darker shade: the reference of what is shown in ``color``."""
-    red, green, blue = (round(channel * share) for channel in color)
+def dimmed(color: Color, factor: float = 0.62) -> Color:
+    """A darker shade of a colour, for the reference of a quantity shown in ``color``."""
+    red, green, blue = (round(channel * factor) for channel in color)
     return red, green, blue

@@ -1,7 +1,7 @@
-"""A recording that is written by a process of its own.
+"""Writing a recording in a separate process.
 
-To load Rerun and to draw a vehicle takes most of a second of Python, of which a process runs one
-line at a time. In a process of its own it costs the flight nothing while there is a core.
+Importing Rerun and logging a vehicle take most of a second of Python. In a separate process this
+does not slow the simulation down if a second core is free.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import subprocess
 import sys
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Final, Self
 
 from tiltsim.errors import InputError
 from tiltsim.views.rerun.requirements import require_rerun
@@ -26,15 +26,15 @@ _PROGRAM: Final = "from tiltsim.views.rerun.process import serve; serve()"
 
 
 class RecordingProcess:
-    """Makes a recording ready while its flight is flown, and writes it while other files are.
+    """Prepares a recording during the simulation and writes it while other files are written.
 
-    Use it as a context manager: `start` once the flight is over, `finish` when all else is done.
-    No interrupt from the keyboard reaches the process, and it ends with the one that it serves.
+    Use it as a context manager: call `start` after the flight and `finish` after all other work.
+    The process receives no keyboard interrupt and ends with its parent.
 
     Parameters
     ----------
     scenario
-        What is flown.
+        The scenario of the flight.
 
     Raises
     ------
@@ -44,7 +44,7 @@ class RecordingProcess:
 
     def __init__(self, scenario: Scenario) -> None:
         require_rerun()
-        # Modules are looked for where this process found them, not in the current folder first.
+        # The same module search path as in this process, without the current folder in front.
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", _PROGRAM],
             stdin=subprocess.PIPE,
@@ -53,7 +53,7 @@ class RecordingProcess:
             start_new_session=True,
         )
         self._work: tuple[Flight, Path] | None = None
-        self._say(scenario)
+        self._send(scenario)
 
     def __enter__(self) -> Self:
         return self
@@ -61,27 +61,30 @@ class RecordingProcess:
     def __exit__(self, *_error: object) -> None:
         if self._work is None:
             self._process.kill()
-        with suppress(OSError):  # it may have ended by itself
+        with suppress(OSError):  # the process may have ended already
             self._process.stdin.close()  # type: ignore[union-attr]
         self._process.wait()
-        self._process.stdout.close()  # type: ignore[union-attr]  # not before it has answered
+        self._process.stdout.close()  # type: ignore[union-attr]  # only after its answer
 
     def start(self, flight: Flight, path: Path) -> None:
-        """Begin to write the flight."""
-        flight.columns  # noqa: B018  derived here, where the code for it is loaded
+        """Start writing the flight to a file."""
+        flight.columns  # noqa: B018  computed here, where the code is already compiled
         self._work = flight, path
-        self._say(self._work)
+        self._send(self._work)
 
     def finish(self) -> None:
-        """Wait for the file that was begun.
+        """Wait until the file of `start` is written.
 
-        Raises `InputError` where it cannot be written.
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
         """
         assert self._work is not None
         try:
             error = pickle.load(self._process.stdout)  # type: ignore[arg-type]
-        except EOFError:  # something has ended the process
-            from tiltsim.views.rerun.recording import save_recording
+        except EOFError:  # the process was killed
+            from tiltsim.views.rerun.recording_file import save_recording
 
             flight, path = self._work
             save_recording([flight], path)
@@ -90,24 +93,24 @@ class RecordingProcess:
         if error is not None:
             raise error
 
-    def _say(self, what: Any) -> None:
-        with suppress(OSError):  # `finish` notices that nobody answers
-            pickle.dump(what, self._process.stdin)  # type: ignore[arg-type]
+    def _send(self, message: Scenario | tuple[Flight, Path]) -> None:
+        with suppress(OSError):  # `finish` detects that the process has ended
+            pickle.dump(message, self._process.stdin)  # type: ignore[arg-type]
             self._process.stdin.flush()  # type: ignore[union-attr]
 
 
 def serve() -> None:
-    """What the process does: a scenario in, its flight and a path in, out what went wrong."""
-    gc.disable()  # it does not live long enough to make garbage
-    # Nobody wants an answer, or what is ready, where the flight's process has ended.
+    """Run the process: read a scenario, then flight and path, and answer with an error or None."""
+    gc.disable()  # the process is too short-lived for garbage collection to pay off
+    # The pipe breaks if the parent process has ended; its answer is then not needed.
     with suppress(BrokenPipeError), os.fdopen(os.dup(1), "wb") as answer:
-        os.dup2(2, 1)  # what libraries print is no answer
-        from tiltsim.views.rerun.recording import RecordingFile
+        os.dup2(2, 1)  # keep library output out of the answer
+        from tiltsim.views.rerun.recording_file import RecordingFile
 
         try:
             file = RecordingFile([pickle.load(sys.stdin.buffer)])
             flight, path = pickle.load(sys.stdin.buffer)
-        except (EOFError, pickle.UnpicklingError):  # the latter if it ended while it spoke
+        except (EOFError, pickle.UnpicklingError):  # the latter for an incomplete message
             os._exit(0)
         error = None
         try:

@@ -1,4 +1,4 @@
-"""The scene: the moving vehicle with its thrust, the reference, and the trails of both."""
+"""The 3D scene: the moving vehicle with its thrust arrows, the reference, and their trails."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import mujoco
 import numpy as np
+import rerun as rr
 
 from tiltsim.laws.assembling import follows_position
 from tiltsim.views.replay import (
     first_free_body,
     joint_positions,
     poses_in_parents,
+    reference_path,
     reference_positions,
     rotate,
     thrust_scale,
@@ -21,28 +23,41 @@ from tiltsim.views.replay import (
 )
 from tiltsim.views.rerun import palette
 from tiltsim.views.rerun.geometry import body_paths, ground_height, log_geometry, xyzw
-from tiltsim.views.rerun.rows import Ticks, send_rows
+from tiltsim.views.rerun.timeline import Ticks, send_rows, trail_segments
 from tiltsim_controllers.mathematics.scalar import Floats
-from tiltsim_controllers.references.trajectories import position_reference
 
 if TYPE_CHECKING:
-    import rerun as rr
-
     from tiltsim.flight.flight import Flight
     from tiltsim.scenario.scenario import Scenario
     from tiltsim.views.rerun.palette import Color
 
 TRAIL_INTERVAL: Final = 0.1  # s between the corners of a trail
 REFERENCE_POINTS: Final = 400
-TRAIL_WIDTH: Final = -1.5  # negative: in points of the screen, whatever the distance
+TRAIL_WIDTH: Final = -1.5  # negative radii are in screen points, independent of the distance
 REFERENCE_WIDTH: Final = -1.0
-DOT: Final = -4.0  # vehicle and reference, to be seen from however far
+DOT: Final = -4.0  # of vehicle and reference, visible from any distance
 FLOOR_CELL: Final = 1.0  # m
-FLOOR_CELLS: Final = 12  # either way of the vehicle
+FLOOR_CELLS: Final = 12  # to each side of the vehicle
 
 
 class Scene:
-    """The entities below ``world`` for one flight."""
+    """The entities below ``world`` for one flight.
+
+    Parameters
+    ----------
+    recording
+        The recording to write to.
+    scenario
+        The scenario of the flight.
+    model
+        The vehicle's model, visual geometry included.
+    root
+        The entity of the scene.
+    color
+        The flight's colour.
+    name
+        The label of the vehicle in a comparison; empty for a single flight.
+    """
 
     def __init__(
         self,
@@ -69,36 +84,29 @@ class Scene:
 
     @property
     def vehicle(self) -> str:
-        """The entity of the first body that is free to move."""
+        """The entity of the vehicle's body."""
         return self._paths[first_free_body(self._model)]
 
     @property
     def camera(self) -> str:
-        """The entity that goes with the vehicle without turning, for a camera to stand on."""
+        """The entity that moves with the vehicle but does not rotate, for the camera."""
         return f"{self.root}/camera"
 
     @property
     def floor(self) -> str:
-        """The entity of the ground's grid, of which a piece goes with the vehicle."""
+        """The entity of the ground's grid, which moves with the vehicle in whole cells."""
         return f"{self.root}/floor"
 
     def begin(self) -> list[str]:
-        """Log all that does not move.
-
-        Returns the names of geoms that could not be drawn.
-        """
-        import rerun as rr
-
+        """Log the static data; returns the names of geoms that Rerun cannot draw."""
         self._log(self.root.partition("/")[0], rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-        left_out = log_geometry(self._recording, self._model, self.root)
+        not_drawn = log_geometry(self._recording, self._model, self.root)
         model = self._model
         for body in range(1, model.nbody):
             if not model.body_dofnum[body]:
-                pose = {
-                    "translation": model.body_pos[body],
-                    "quaternion": xyzw(model.body_quat[body]),
-                }
-                self._log(self._paths[body], rr.Transform3D(**pose))
+                translation, quaternion = model.body_pos[body], xyzw(model.body_quat[body])
+                pose = rr.Transform3D(translation=translation, quaternion=quaternion)
+                self._log(self._paths[body], pose)
         self._log(
             f"{self.root}/trail",
             rr.LineStrips3D.from_fields(colors=[self._color], radii=[TRAIL_WIDTH]),
@@ -113,12 +121,10 @@ class Scene:
             show_labels=True,
         )
         self._log(f"{self.camera}/dot", dot)
-        return left_out
+        return not_drawn
 
     def append(self, piece: Flight) -> None:
-        """Log the rows of a piece of the flight that follows on from the last."""
-        import rerun as rr
-
+        """Log the next piece of the flight."""
         model, columns, time = self._model, piece.columns, piece["time"]
         world = world_poses(model, joint_positions(model, columns))
         local = poses_in_parents(model, world)
@@ -150,11 +156,10 @@ class Scene:
     def _thrust_path(self, site: int) -> str:
         body = self._model.site_bodyid[site]
         alone = [self._model.site_bodyid[other] for other in self._thrust].count(body) == 1
-        # Several on one body are told apart by their columns, such as thrust_1.
+        # Several on one body are named after their columns, such as thrust_1.
         return f"{self._paths[body]}/{'thrust' if alone else self._thrust[site]}"
 
     def _begin_thrust(self) -> None:
-        import rerun as rr
 
         for site in self._thrust:
             arrow = rr.Arrows3D.from_fields(
@@ -164,13 +169,11 @@ class Scene:
             )
             self._log(self._thrust_path(site), arrow)
 
-    def draw_reference(self, until: float) -> None:
-        """Log the whole path that the vehicle is to follow until a time (s), if it follows one."""
-        import rerun as rr
-
+    def draw_reference(self, end: float) -> None:
+        """Log the path of the reference up to a time (s), if the controller follows a position."""
         if not self._follows:
             return
-        path = reference_path(self._scenario, until)
+        path = reference_path(self._scenario, end, REFERENCE_POINTS)
         now = rr.Points3D.from_fields(colors=[palette.WHITE], radii=[DOT])
         self._log(f"{self.root}/reference/now", now)
         if np.ptp(path, axis=0).max() > 0.0:
@@ -179,19 +182,15 @@ class Scene:
 
     def _begin_floor(self) -> None:
         """Log the grid around the origin, at the height of the model's ground."""
-        import rerun as rr
-
-        reach = FLOOR_CELL * FLOOR_CELLS
+        half = FLOOR_CELL * FLOOR_CELLS
         height = ground_height(self._model)
-        across = np.linspace(-reach, reach, 2 * FLOOR_CELLS + 1)
-        lines = [[(c, -reach, height), (c, reach, height)] for c in across]
-        lines += [[(-reach, c, height), (reach, c, height)] for c in across]
+        offsets = np.linspace(-half, half, 2 * FLOOR_CELLS + 1)
+        lines = [[(c, -half, height), (c, half, height)] for c in offsets]
+        lines += [[(-half, c, height), (half, c, height)] for c in offsets]
         self._log(self.floor, rr.LineStrips3D(lines, colors=[palette.FAINT], radii=[-0.5]))
 
     def _append_floor(self, time: Floats, position: Floats) -> None:
-        """Move the grid by whole cells, so that it seems to stand still and has no end."""
-        import rerun as rr
-
+        """Move the grid by whole cells, so that it appears fixed and infinite."""
         cells = FLOOR_CELL * np.round(position * (1.0, 1.0, 0.0) / FLOOR_CELL)
         before = cells[:1] + 1.0 if self._floor_cell is None else self._floor_cell[np.newaxis]
         moved = np.any(cells != np.concatenate([before, cells[:-1]]), axis=1)
@@ -200,25 +199,15 @@ class Scene:
         self._floor_cell = cells[-1]
 
     def _append_trail(self, time: Floats, position: Floats) -> None:
-        """Log the next stretches of the trail, each at the time at which its end is reached."""
-        import rerun as rr
-
+        """Log the next segments of the trail, each at the time of its end."""
         picked = self._ticks.pick(time)
         if len(picked) == 0:
             return
         ends = position[picked]
-        start = ends[:1] if self._trail_end is None else self._trail_end[np.newaxis]
-        stretches = np.stack([np.concatenate([start, ends[:-1]]), ends], axis=1)
-        strips = rr.LineStrips3D.columns(strips=stretches.astype(np.float32))
+        segments = trail_segments(ends, self._trail_end)
+        strips = rr.LineStrips3D.columns(strips=segments.astype(np.float32))
         send_rows(self._recording, f"{self.root}/trail", time[picked], strips)
         self._trail_end = ends[-1]
-
-
-def reference_path(scenario: Scenario, until: float) -> Floats:
-    """Points of the reference from the start to a time (s), shape (N, 3)."""
-    reference, table = scenario.reference.parameters, scenario.reference.table
-    times = np.linspace(0.0, until, REFERENCE_POINTS).tolist()
-    return np.array([position_reference(time, reference, table)[:3] for time in times])
 
 
 def _axis_in_body(model: mujoco.MjModel, site: int) -> Floats:

@@ -1,18 +1,16 @@
-"""Opening the Rerun viewer, or reaching one that is open."""
+"""Opening the Rerun viewer, or connecting to a running one."""
 
 from __future__ import annotations
 
 import os
-import socket
 import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
-from urllib.parse import urlsplit
 
 from tiltsim.errors import InputError
-from tiltsim.views.rerun.requirements import require_rerun
+from tiltsim.views.rerun.requirements import require_viewer
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -20,31 +18,37 @@ if TYPE_CHECKING:
 
     from tiltsim.flight.flight import Flight
 
-DEFAULT_URL: Final = "rerun+http://127.0.0.1:9876/proxy"
-"""Where a viewer listens unless told otherwise."""
-
 RECORDING_START: Final = b"RRF"
-"""What every recording begins with; the version follows."""
-
-PATIENCE: Final = 2.0  # s to wait for a viewer to answer
+"""First bytes of every recording; the version follows."""
 
 
 def view_flights(
     flights: Sequence[Flight], url: str | None = None, names: Sequence[str] = ()
 ) -> None:
-    """Show flights, in the viewer at a URL or else in one of our own.
+    """Show flights in a viewer.
 
-    ``names`` are those of several flights, by default `tiltsim.views.titles.flight_names`.
-    Raises `InputError` where there is no viewer, or no screen to open one on.
+    Parameters
+    ----------
+    flights
+        One flight, or several for a comparison.
+    url
+        The address of a running viewer; None opens one.
+    names
+        Names of several flights, by default `flight_names`.
+
+    Raises
+    ------
+    InputError
+        If no viewer listens at the address, or there is no screen to open one on.
     """
     from tiltsim.views.rerun.blueprint import flight_blueprint
-    from tiltsim.views.rerun.recording import make_recorders, new_recording, write_flights
+    from tiltsim.views.rerun.recording_file import make_recorders, new_recording, write_flights
 
     require_viewer(url)
     scenarios = [flight.scenario for flight in flights]
     recording = new_recording(scenarios, names)
     recorders = make_recorders(recording, scenarios, names)
-    attach_viewer(recording, url, flight_blueprint([recorder.shown() for recorder in recorders]))
+    attach_viewer(recording, url, flight_blueprint(recorders))
     for recorder in recorders:
         recorder.begin()
     write_flights(recorders, flights)
@@ -54,7 +58,10 @@ def view_flights(
 def view_recordings(paths: Sequence[Path]) -> None:
     """Open saved recordings in a viewer.
 
-    Raises `InputError` where one cannot be read or is no recording, or where there is no screen.
+    Raises
+    ------
+    InputError
+        If a file cannot be read or is not a recording, or there is no screen.
     """
     import rerun_cli
 
@@ -72,7 +79,7 @@ def view_recordings(paths: Sequence[Path]) -> None:
 
 
 def _require_recording(path: Path) -> None:
-    """The viewer would open with nothing but a notice that soon goes away."""
+    """Check the first bytes: for other files the viewer would only show a short notice."""
     try:
         with path.open("rb") as file:
             start = file.read(len(RECORDING_START))
@@ -82,40 +89,8 @@ def _require_recording(path: Path) -> None:
         raise InputError(f"{path}: not a Rerun recording")
 
 
-def require_viewer(url: str | None) -> None:
-    """Make sure that a viewer listens at a URL or, without one, that there is a screen.
-
-    Raises `InputError` otherwise, in one line with the way out.
-    """
-    require_rerun()
-    if url is not None:
-        _require_listener(url)
-    elif sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ):
-        raise InputError(
-            "no screen to open the Rerun viewer on (DISPLAY and WAYLAND_DISPLAY are not set); "
-            "save a recording with --rerun FILE.rrd, or --connect to a viewer elsewhere"
-        )
-
-
-def _require_listener(url: str) -> None:
-    parts = urlsplit(url)
-    try:
-        known = parts.scheme in {"rerun+http", "rerun+https", "rerun"} and parts.hostname
-        port = parts.port or 9876
-    except ValueError:
-        known, port = None, 0
-    if not known or parts.path != "/proxy":
-        raise InputError(f"--connect {url}: not a viewer's address; write {DEFAULT_URL}")
-    try:
-        socket.create_connection((str(parts.hostname), port), PATIENCE).close()
-    except OSError as error:
-        raise InputError(
-            f"--connect {url}: no viewer listens there; start one with the command rerun"
-        ) from error
-
-
 def attach_viewer(recording: rr.RecordingStream, url: str | None, blueprint: rrb.Blueprint) -> None:
-    """Send a recording to the viewer at a URL, or to one of our own that is opened if need be."""
+    """Send a recording to the viewer at a URL, or else to a local one, opened if necessary."""
     if url is not None:
         recording.connect_grpc(url, default_blueprint=blueprint)
         return

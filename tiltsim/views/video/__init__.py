@@ -1,6 +1,6 @@
 """Films of flights: MuJoCo's offscreen renderer, a camera that follows, encoded by PyAV.
 
-Works without a screen. `tiltsim.views.video.film.write_video` makes a film;
+Works without a screen. `tiltsim.views.video.rendering.write_video` makes a film;
 `tiltsim.views.video.offscreen` finds a way to draw, `tiltsim.views.video.inset` paints the
 roll-pitch plane into the corner.
 """

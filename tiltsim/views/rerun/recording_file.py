@@ -1,4 +1,4 @@
-"""Whole flights into recordings, in bulk."""
+"""Writing complete flights into recordings."""
 
 from __future__ import annotations
 
@@ -7,59 +7,62 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+import rerun as rr
+
 from tiltsim.errors import InputError
 from tiltsim.system.files import replacing
 from tiltsim.views.rerun import palette
 from tiltsim.views.rerun.blueprint import flight_blueprint
-from tiltsim.views.rerun.names import APPLICATION
-from tiltsim.views.rerun.recorder import FlightRecorder
+from tiltsim.views.rerun.flight_recorder import FlightRecorder
 from tiltsim.views.rerun.requirements import require_rerun
 from tiltsim.views.titles import common_title, flight_names
 
 if TYPE_CHECKING:
-    import rerun as rr
-
     from tiltsim.flight.flight import Flight
     from tiltsim.scenario.scenario import Scenario
 
 
-UNHURRIED: Final = 3600.0
-"""Seconds between flushes by the clock of a recording that is saved in one go."""
+APPLICATION: Final = "tiltsim"
+
+FLUSH_INTERVAL: Final = 3600.0
+"""Time (s) between timed flushes of a saved recording: in effect none."""
 
 
 class RecordingFile:
-    """A recording to be saved in one go.
+    """A recording of complete flights.
 
-    All that does not need the flights is made here, the imports of Rerun first of all, so that it
-    can be done while they are flown.
+    The constructor prepares everything that does not need the flights, the import of Rerun
+    included, so that it can run during the simulation.
 
     Parameters
     ----------
     scenarios
-        What the recording will show.
+        The scenarios of the flights.
     names
-        Those of several flights, by default `flight_names`.
+        Names of several flights, by default `flight_names`.
     """
 
     def __init__(self, scenarios: Sequence[Scenario], names: Sequence[str] = ()) -> None:
-        import rerun as rr
 
         require_rerun()
-        # Flushed by rows and bytes alone: a clock would cut the chunks elsewhere in every run.
-        unhurried = rr.ChunkBatcherConfig(flush_tick=UNHURRIED)
-        self._recording = new_recording(scenarios, names, batching=unhurried)
+        # Flushed by row and byte counts only: timed flushes would make no two files equal.
+        batching = rr.ChunkBatcherConfig(flush_tick=FLUSH_INTERVAL)
+        self._recording = new_recording(scenarios, names, batching=batching)
         self._recorders = make_recorders(self._recording, scenarios, names)
         for recorder in self._recorders:
             recorder.begin()
-        blueprint = flight_blueprint([recorder.shown() for recorder in self._recorders])
-        # Not into a file: Rerun would take no notice of a full disk.
+        blueprint = flight_blueprint(self._recorders)
+        # In memory first: Rerun does not report a full disk.
         self._content = self._recording.memory_recording()
         self._recording.send_blueprint(blueprint, make_active=False, make_default=True)
 
     def save(self, flights: Sequence[Flight], path: Path) -> None:
-        """Write the flights, one a scenario; the file appears whole or not at all.
+        """Write the flights, one per scenario, atomically; equal flights give equal files.
 
-        Equal flights give equal recordings. Raises `InputError` where the file cannot be written.
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
         """
         write_flights(self._recorders, flights)
         content = self._content.drain_as_bytes()
@@ -72,7 +75,7 @@ class RecordingFile:
 
 
 def save_recording(flights: Sequence[Flight], path: Path, names: Sequence[str] = ()) -> None:
-    """Write flights into one recording; see `RecordingFile.save`."""
+    """Write flights into one recording file; see `RecordingFile`."""
     RecordingFile([flight.scenario for flight in flights], names).save(flights, path)
 
 
@@ -83,12 +86,19 @@ def new_recording(
     salt: str = "",
     batching: rr.ChunkBatcherConfig | None = None,
 ) -> rr.RecordingStream:
-    """An empty recording that is the same for the same scenarios and names, whenever it is made.
+    """An empty recording whose identifier depends on its arguments only.
 
-    Recordings of equal name are one to the viewer; ``salt`` tells them apart.
+    Parameters
+    ----------
+    scenarios
+        The scenarios of the flights.
+    names
+        Names of several flights, by default `flight_names`.
+    salt
+        Distinguishes recordings of equal scenarios, which the viewer would merge.
+    batching
+        When Rerun flushes rows; None for its default.
     """
-    import rerun as rr
-
     content = "\n".join([*(scenario.model_dump_json() for scenario in scenarios), *names, salt])
     digest = hashlib.sha256(content.encode()).hexdigest()[:16]
     recording = rr.RecordingStream(
@@ -110,7 +120,7 @@ def new_recording(
 def make_recorders(
     recording: rr.RecordingStream, scenarios: Sequence[Scenario], names: Sequence[str] = ()
 ) -> list[FlightRecorder]:
-    """A recorder for each flight; several flights get names and colours of their own."""
+    """One recorder per flight; several flights have distinct names and colours."""
     if len(scenarios) == 1:
         return [FlightRecorder(recording, scenarios[0])]
     names = names or flight_names(scenarios)
@@ -127,9 +137,9 @@ def make_recorders(
 
 
 def write_flights(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> None:
-    """Write whole flights with recorders that have begun."""
-    until = max(float(flight["time"][-1]) for flight in flights)
+    """Write complete flights with recorders whose `begin` has been called."""
+    end = max(float(flight["time"][-1]) for flight in flights)
     for recorder, flight in zip(recorders, flights, strict=True):
-        recorder.draw_references(until)
+        recorder.draw_references(end)
         recorder.append(flight)
         recorder.finish(flight.end)

@@ -17,16 +17,16 @@ from tiltsim.views.replay import (
     first_free_body,
     joint_positions,
     positions,
+    reference_path,
     reference_positions,
     thrust_scale,
     thrust_sites,
     vehicle_radius,
     visible_model,
 )
-from tiltsim.views.video.aspects import aspect_of
 from tiltsim.views.video.offscreen import Canvas, Image
+from tiltsim.views.video.overlay import aspect_of
 from tiltsim_controllers.mathematics.scalar import Floats
-from tiltsim_controllers.references.trajectories import position_reference
 
 if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
@@ -107,7 +107,10 @@ class _Stage:
         self._body = first_free_body(model)
         self._radius = vehicle_radius(model)
         self._arrow_scale = thrust_scale(model)
-        self._reference = _reference_path(flight)
+        self._reference: Floats | None = None
+        if follows_position(flight.scenario):
+            path = reference_path(flight.scenario, float(flight["time"][-1]), REFERENCE_POINTS)
+            self._reference = path if np.ptp(path, axis=0).max() > 0.0 else path[:1]
         self._targets = reference_positions(flight.columns)
         self._position = positions(flight.columns)
         self._aspect = aspect_of(flight, form.height)
@@ -202,14 +205,3 @@ class _Stage:
             geom.size[2] *= 2.0  # MuJoCo draws arrows at half the length it sets
             geom.emission = 0.4
         scene.ngeom += 1
-
-
-def _reference_path(flight: Flight) -> Floats | None:
-    """The path that the vehicle is to follow; None where its position is free."""
-    if not follows_position(flight.scenario):
-        return None
-    reference = flight.scenario.reference.parameters
-    table = flight.scenario.reference.table
-    times = np.linspace(0.0, float(flight["time"][-1]), REFERENCE_POINTS).tolist()
-    path = np.array([position_reference(time, reference, table)[:3] for time in times])
-    return path if np.ptp(path, axis=0).max() > 0.0 else path[:1]

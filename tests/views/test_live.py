@@ -1,0 +1,89 @@
+"""Live streams to viewers that respond, do not respond, or break."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from tests.flights import flight
+from tiltsim.simulation.simulate import simulate
+from tiltsim.views.rerun.live import LiveStream
+
+
+class Wall:
+    """A recorder that takes nothing for a while, or at all."""
+
+    def __init__(self, error=None):
+        self.released = threading.Event()
+        self.error = error
+        self.samples = 0
+
+    def begin(self):
+        pass
+
+    def draw_references(self, _until):
+        pass
+
+    def append(self, piece):
+        if self.error:
+            raise self.error
+        self.samples += len(piece)
+        self.released.wait(60.0)
+
+    def finish(self, _end):
+        pass
+
+
+@pytest.fixture
+def listener():
+    """The address of something that listens but never answers."""
+    import socket
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        yield f"rerun+http://127.0.0.1:{server.getsockname()[1]}/proxy"
+
+
+def stream_to(recorder, url, monkeypatch, farewell=30.0):
+    from tiltsim.views.rerun import live
+
+    monkeypatch.setattr(live, "attach_viewer", lambda *_: None)
+    monkeypatch.setattr(live, "SHUTDOWN_TIMEOUT", farewell)
+    stream = LiveStream(flight("fixed").scenario, url)
+    monkeypatch.setattr(stream, "_recorder", recorder)
+    return stream
+
+
+def test_a_viewer_that_takes_nothing_does_not_hold_the_flight_up(listener, monkeypatch, capsys):
+    wall = Wall()
+    began = time.monotonic()
+    with stream_to(wall, listener, monkeypatch, farewell=0.3) as stream:
+        this = simulate(flight("fixed").scenario, stream)
+        stream.finish(this.end)
+    assert time.monotonic() - began < 30.0, "the wall stands for a minute"
+    assert "the viewer does not respond" in capsys.readouterr().err
+    assert this.end.kind == "completed"
+    np.testing.assert_array_equal(this.samples, flight("fixed").samples)
+    wall.released.set()
+
+
+def test_a_stream_that_breaks_is_one_line_and_no_loss(listener, monkeypatch, capsys):
+    with stream_to(Wall(OSError("gone")), listener, monkeypatch) as stream:
+        this = simulate(flight("fixed").scenario, stream)
+        stream.finish(this.end)
+    assert this.end.kind == "completed"
+    assert capsys.readouterr().err == "tiltsim: live view ended: gone\n"
+
+
+def test_all_samples_reach_the_recorder_in_order(listener, monkeypatch):
+    pieces = []
+
+    class Taker(Wall):
+        def append(self, piece):
+            pieces.append(piece.samples)
+
+    with stream_to(Taker(), listener, monkeypatch) as stream:
+        this = simulate(flight("fixed").scenario, stream)
+    np.testing.assert_array_equal(np.concatenate(pieces), this.samples)

@@ -1,0 +1,89 @@
+"""Recordings that a separate process writes."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.flights import flight
+from tests.views.recordings import rerun_rrd
+from tiltsim.errors import InputError
+from tiltsim.views.rerun.process import RecordingProcess
+from tiltsim.views.rerun.recording_file import save_recording
+
+
+def test_the_recordings_process_tells_what_went_wrong(tmp_path):
+    path = tmp_path / "no folder" / "flight.rrd"
+    with RecordingProcess(flight("fixed").scenario) as process:
+        process.start(flight("fixed"), path)
+        with pytest.raises(InputError, match=r"flight\.rrd: cannot be written: No such file"):
+            process.finish()
+
+
+def test_a_recording_whose_process_is_killed_is_written_all_the_same(tmp_path):
+    this, paths = flight("trot"), [tmp_path / "a.rrd", tmp_path / "b.rrd"]
+    with RecordingProcess(this.scenario) as process:
+        process._process.kill()
+        process._process.wait()
+        process.start(this, paths[0])
+        process.finish()
+    save_recording([this], paths[1])
+    done = rerun_rrd("compare", *paths)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_recordings_process_ends_with_a_flight_that_comes_to_nothing():
+    with pytest.raises(KeyboardInterrupt), RecordingProcess(flight("trot").scenario) as process:
+        raise KeyboardInterrupt
+    assert process._process.returncode is not None
+
+
+def test_the_recordings_process_says_nothing_where_its_answer_is_not_awaited(tmp_path, capfd):
+    """As where another file of the flight cannot be written."""
+    path = tmp_path / "flight.rrd"
+    with RecordingProcess(flight("fixed").scenario) as process:
+        process.start(flight("fixed"), path)
+    assert process._process.returncode == 0
+    assert path.is_file()
+    assert capfd.readouterr().err == ""
+
+
+def test_the_recordings_process_says_nothing_of_half_a_flight(capfd):
+    with RecordingProcess(flight("fixed").scenario) as process:
+        process._work = flight("fixed"), Path("nowhere")
+        process._process.stdin.write(pickle.dumps(process._work)[:1000])
+    assert process._process.returncode == 0
+    assert capfd.readouterr().err == ""
+
+
+def test_the_recordings_process_ends_with_the_one_that_it_serves(tmp_path):
+    """Also when that is killed, with no time to clean up."""
+    program = (
+        "import os, signal; from tests.flights import flight; "
+        "from tiltsim.views.rerun.process import RecordingProcess; "
+        "RecordingProcess(flight('fixed').scenario); os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    # Both write to one pipe, of which the end is seen when both have ended.
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, env=environment, stderr=subprocess.PIPE, text=True, timeout=30)
+    assert (done.returncode, done.stderr) == (-signal.SIGKILL, "")
+
+
+def test_a_flight_is_recorded_without_loading_rerun_beside_it(tmp_path):
+    path = tmp_path / "flight.rrd"
+    options = ["--set", "simulation.duration=0.1", "--set", "expect=[]", "--quiet"]
+    arguments = ["run", "ch04_tracking/setpoint#rho_065_modified", *options, "--rerun", str(path)]
+    program = (
+        f"import sys; from tiltsim.cli import main; main({arguments!r}); "
+        "assert 'rerun' not in sys.modules"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert path.is_file()

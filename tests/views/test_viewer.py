@@ -1,0 +1,84 @@
+"""The viewer shows recordings and live flights without errors."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from tests.flights import flight
+from tests.views.viewer_shot import (
+    free_port,
+    missing_driver,
+    shoot,
+    viewer,
+    viewer_process,
+    wait_for,
+)
+from tiltsim.errors import InputError
+from tiltsim.flight.reading import load_flight
+from tiltsim.simulation.simulate import simulate
+from tiltsim.views.rerun.live import LiveStream
+from tiltsim.views.rerun.recording_file import save_recording
+from tiltsim.views.rerun.viewer import require_viewer
+
+needs_driver = pytest.mark.skipif(bool(missing_driver()), reason=missing_driver())
+
+
+@pytest.mark.viewer
+@needs_driver
+@pytest.mark.parametrize("names", [["fixed"], ["trot"], ["free"], ["tilt_car"], ["fixed", "trot"]])
+def test_the_viewer_shows_recordings_without_complaints(names, tmp_path):
+    path = tmp_path / "flight.rrd"
+    save_recording([flight(name) for name in names], path)
+    shot = shoot(path, 1.0)
+    assert shot.reports == []
+    assert len(shot.views) == (8 if names == ["tilt_car"] else 9)
+    assert shot.png.startswith(b"\x89PNG")
+
+
+@pytest.mark.viewer
+@needs_driver
+def test_the_viewer_receives_a_live_flight():
+    port = free_port()
+    url = f"rerun+http://127.0.0.1:{port}/proxy"
+    with viewer("800x600", port) as client:
+        with LiveStream(flight("fixed").scenario, url) as stream:
+            stream.finish(simulate(flight("fixed").scenario, stream).end)
+        (recording,) = wait_for(lambda: client.get_state().recordings, "the live recording")
+        assert "tiltsim" in str(recording)
+
+
+@pytest.mark.viewer
+@needs_driver
+@pytest.mark.parametrize("stop", ["kill", "freeze"])
+def test_closing_the_viewer_leaves_the_flight_whole(stop, tmp_path):
+    port = free_port()
+    url = f"rerun+http://127.0.0.1:{port}/proxy"
+    name = "ch04_tracking/setpoint#rho_065_modified"
+    options = ["--set", "simulation.duration=8", "--set", "simulation.engine=python", "--quiet"]
+    command = [sys.executable, "-m", "tiltsim", "run", name, "--connect", url, *options]
+    with viewer_process(port) as process:
+        wait_for(lambda: listens(url), "the viewer to listen")
+        sent = signal.SIGKILL if stop == "kill" else signal.SIGSTOP
+        timer = threading.Timer(3.0, process.send_signal, [sent])
+        timer.start()
+        done = subprocess.run([*command, "--out", str(tmp_path)], timeout=120)
+        timer.join()
+        if stop == "freeze":
+            process.send_signal(signal.SIGCONT)
+    assert done.returncode in (0, 1)
+    this = load_flight(tmp_path)
+    assert (this.end.kind, len(this)) == ("completed", 801)
+    assert (tmp_path / "metrics.json").is_file()
+
+
+def listens(url):
+    try:
+        require_viewer(url)
+    except InputError:
+        return False
+    return True

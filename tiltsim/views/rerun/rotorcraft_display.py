@@ -1,0 +1,157 @@
+"""What the viewer shows for a rotorcraft."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from tiltsim.laws.assembling import follows_position, loop_of
+from tiltsim.laws.layers.supervision import SUPERVISION
+from tiltsim.views.attitude_plane import margin_threshold
+from tiltsim.views.events import rotorcraft_conditions
+from tiltsim.views.rerun.display import (
+    REFERENCE_WIDTH,
+    Compared,
+    Level,
+    Panel,
+    Series,
+    VehicleDisplay,
+    column,
+    distance,
+    error,
+)
+from tiltsim.views.rerun.palette import AMBER, GREEN, GREY, PINK, RED, SKY, dimmed
+from tiltsim.views.rerun.plane import AttitudePlane
+from tiltsim_controllers.vehicle.parameters import SPIN
+
+if TYPE_CHECKING:
+    from tiltsim.flight.flight import Flight
+    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.views.rerun.display import Values
+    from tiltsim_controllers.mathematics.scalar import Floats
+
+_ROTORS: Final = (1, 2, 3, 4)
+_ROTOR_COLORS: Final = (AMBER, SKY, PINK, GREEN)
+# Lines of equal angles and speeds would cover each other: later ones are thinner.
+_ROTOR_WIDTHS: Final = (4.0, 3.0, 2.0, 1.2)
+_ANGLE_COLORS: Final = {"roll": RED, "pitch": GREEN, "yaw": SKY}
+_AXIS_COLORS: Final = {"x": RED, "y": GREEN, "z": SKY}
+
+
+def _spin_speed(rotor: int) -> Values:
+    """The speed of a rotor along its spin, rad/s."""
+    return lambda flight: SPIN[rotor - 1] * flight[f"rotor_speed_{rotor}"]
+
+
+def _slowest(flight: Flight) -> Floats:
+    return np.asarray(np.min([_spin_speed(rotor)(flight) for rotor in _ROTORS], axis=0))
+
+
+def _distance(flight: Flight) -> Floats:
+    return distance(flight, error_axes(flight.scenario))
+
+
+PANELS: Final = (
+    Panel(
+        "attitude",
+        "Attitude (rad)",
+        7.5,
+        (
+            Compared("roll", "Roll (rad)", column("roll")),
+            Compared("pitch", "Pitch (rad)", column("pitch")),
+        ),
+    ),
+    Panel("tilt_angles", "Tilt angles (rad)", 6.5),
+    Panel(
+        "rotor_speeds",
+        "Rotor speeds along their spins (rad/s)",
+        6.0,
+        (Compared("slowest", "Slowest rotor and limits (rad/s)", _slowest),),
+        ("min", "max"),
+    ),
+    Panel(
+        "singularity",
+        "Singularity margin (rad)",
+        6.0,
+        (
+            Compared(
+                "margin", "Singularity margin and threshold (rad)", column("singularity_margin")
+            ),
+        ),
+        ("threshold", "singular"),
+    ),
+    Panel(
+        "position_error",
+        "Position error, reference minus actual (m)",
+        4.5,
+        (Compared("distance", "Distance from the reference (m)", _distance),),
+    ),
+)
+"""The plots from top to bottom; their legends fit a window of 1600 by 1000 pixels."""
+
+
+def panels(scenario: Scenario) -> tuple[Panel, ...]:
+    """The plots of a scenario's flights; a quadrotor has no tilt angles."""
+    tilts = scenario.vehicle.model != "quadrotor"
+    return tuple(panel for panel in PANELS if tilts or panel.path != "tilt_angles")
+
+
+def rotorcraft_series(scenario: Scenario) -> list[Series]:
+    """The lines of the plots of a scenario's flights."""
+    series = []
+    for angle, color in _ANGLE_COLORS.items():
+        series.append(Series(f"attitude/{angle}", angle, color, column(angle)))
+        name, values = f"{angle}_ref", column(f"{angle}_ref")
+        dark = dimmed(color)
+        series.append(Series(f"attitude/{name}", f"{angle} ref", dark, values, REFERENCE_WIDTH))
+    for rotor, color, width in zip(_ROTORS, _ROTOR_COLORS, _ROTOR_WIDTHS, strict=True):
+        name, values = f"alpha_{rotor}", column(f"alpha_{rotor}")
+        series.append(Series(f"tilt_angles/{name}", f"α{rotor}", color, values, width))
+        name, values = f"alpha_ref_{rotor}", column(f"alpha_ref_{rotor}")
+        dark = dimmed(color)
+        series.append(Series(f"tilt_angles/{name}", f"α{rotor} ref", dark, values, REFERENCE_WIDTH))
+        name, values = f"rotor_{rotor}", _spin_speed(rotor)
+        series.append(Series(f"rotor_speeds/{name}", f"rotor {rotor}", color, values, width))
+    margin = column("singularity_margin")
+    series.append(Series("singularity/margin", "margin", AMBER, margin, 2.5))
+    if SUPERVISION in loop_of(scenario).extra_columns:
+        path, label = f"singularity/{SUPERVISION}", "supervisor, 0 to 1"
+        series.append(Series(path, label, SKY, column(SUPERVISION)))
+    for axis in error_axes(scenario):
+        series.append(Series(f"position_error/{axis}", axis, _AXIS_COLORS[axis], error(axis)))
+    return series
+
+
+def rotorcraft_levels(scenario: Scenario) -> list[Level]:
+    """Rotor speed limits, singularity, and the threshold of the singularity margin."""
+    threshold = margin_threshold(scenario)
+    levels = [
+        Level("singularity/threshold", f"threshold {threshold:g}", RED, threshold),
+        Level("singularity/singular", "singular", GREY, 0.0),
+    ]
+    vehicle = scenario.rotorcraft
+    for name, label, limit in (
+        ("min", "lower limit", vehicle.min_rotor_speed),
+        ("max", "upper limit", vehicle.max_rotor_speed),
+    ):
+        if limit is not None:
+            levels.append(Level(f"rotor_speeds/{name}", label, RED if limit else GREY, limit))
+    return levels
+
+
+def error_axes(scenario: Scenario) -> str:
+    """The axes along which the scenario's controller follows the reference."""
+    return "xyz" if follows_position(scenario) else "z"
+
+
+ROTORCRAFT_DISPLAY: Final = VehicleDisplay(
+    conditions=rotorcraft_conditions,
+    panels=panels,
+    series=rotorcraft_series,
+    levels=rotorcraft_levels,
+    plane=AttitudePlane,
+    eye=(-2.4, -2.4, 1.9),
+    up=(0.0, 0.0, 1.0),
+    overview=False,
+)
