@@ -1,4 +1,4 @@
-"""A tiny library: a family that hovers, a lost flight, one that the thesis plant refuses."""
+"""A tiny library: a family that hovers, one that diverges, one that only MuJoCo supports."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ attitude = [3.0, 0.0, 0.0]
 [[expect]]
 metric = "diverged"
 equals = true
-claim = "The flight is lost"
+claim = "The flight terminates early"
 published = true
 
 [[expect]]
@@ -113,7 +113,7 @@ def library(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def kept(tmp_path_factory):
-    """The folder where the reports of a session keep their flights."""
+    """The folder where the reports of a session store their flights."""
     return tmp_path_factory.mktemp("report") / "kept"
 
 

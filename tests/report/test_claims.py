@@ -12,11 +12,11 @@ from tiltsim.report.claims.ch03 import EQ_17, EQ_19
 from tiltsim.report.measures import determinant_coefficients
 from tiltsim.report.model import (
     AnalysisClaim,
+    ClaimVerdict,
     FlightClaim,
-    Outcome,
-    judge_value,
     plain,
     scenario_claims,
+    verdict_on,
 )
 from tiltsim.scenario.library import library_entries
 from tiltsim.scenario.loading import load_scenario
@@ -62,12 +62,12 @@ def test_one_pair_of_chapter_3_can_switch_without_a_crossing():
 
 
 @pytest.mark.parametrize("claim", ANALYSED, ids=lambda claim: f"{claim.chapter}-{claim.key}"[:80])
-def test_what_is_computed_is_judged_and_explained(claim):
-    outcome = judge_value(claim, plain(claim.measure()))
-    if outcome is Outcome.NOT_REPRODUCED:
+def test_computed_claims_have_verdicts_and_reasons(claim):
+    verdict = verdict_on(claim, plain(claim.measure()))
+    if verdict is ClaimVerdict.NOT_REPRODUCED:
         assert claim.why
     if claim.wrong:
-        assert outcome is Outcome.WRONG, "it agrees after all"
+        assert verdict is ClaimVerdict.WRONG, "it agrees after all"
 
 
 def test_flights_of_claims_are_in_the_library():
@@ -77,7 +77,7 @@ def test_flights_of_claims_are_in_the_library():
             assert set(claim.flights) <= library, claim.statement
 
 
-def test_chapter_5_is_flown_with_the_swings_that_are_judged():
+def test_chapter_5_is_flown_with_the_swings_that_its_claims_use():
     flown = [load_scenario(address) for address, _, _ in library_entries() if "ch05" in address]
     assert {scenario.gait.type for scenario in flown} == set(SWINGS)
     for scenario in flown:
@@ -86,12 +86,12 @@ def test_chapter_5_is_flown_with_the_swings_that_are_judged():
 
 
 @pytest.mark.parametrize("measured", [0.1852, 0.1949, 0.1839, 0.1961])
-def test_the_walk_is_not_judged_by_a_lucky_digit(measured):
+def test_the_verdict_on_the_walk_does_not_depend_on_one_digit(measured):
     """Both plants lie 0.0002 m within half a unit of the printed digit; a hair must not count."""
     walk = load_scenario("ch05_gaits/line#walk_third_t1_modified")
     [claim] = scenario_claims(walk)
-    assert judge_value(claim, measured) is Outcome.REPRODUCED
-    assert judge_value(claim, 0.19 + 3.0 * (measured - 0.19)) is Outcome.IN_KIND
+    assert verdict_on(claim, measured) is ClaimVerdict.REPRODUCED
+    assert verdict_on(claim, 0.19 + 3.0 * (measured - 0.19)) is ClaimVerdict.QUALITATIVE
 
 
 def test_every_chapter_has_claims():
@@ -109,18 +109,18 @@ def test_no_claim_stands_twice():
     "claim", FLOWN, ids=lambda claim: f"{claim.chapter}-{claim.statement} {claim.case}"[:99]
 )
 def test_a_comparison_of_flights_can_come_out_either_way(claim):
-    outcomes = set()
+    verdicts = set()
     for seed in range(1000):
         bad = (0.0, 0.2, 1.0)[seed % 3]
         flights = {address: RandomMetrics(f"{seed} {address}", bad) for address in claim.flights}
-        outcomes.add(plain(claim.measure(flights)))
-        if len(outcomes) > 1:
+        verdicts.add(plain(claim.measure(flights)))
+        if len(verdicts) > 1:
             return
-    pytest.fail(f"always {outcomes}")
+    pytest.fail(f"always {verdicts}")
 
 
 class RandomMetrics(dict):
-    """A flight with random metrics of all sizes; a share ``bad`` is lost or reverses a rotor."""
+    """A flight with random metrics of all sizes; a fraction ``bad`` diverges or stops a rotor."""
 
     def __init__(self, seed, bad):
         self.random, self.bad = random.Random(seed), bad

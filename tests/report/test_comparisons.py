@@ -1,4 +1,4 @@
-"""Flights beyond the thesis, each beside the same flight without what it shows."""
+"""Flights beyond the thesis, compared with the same flight without the feature."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ max = 1.0
 
 [[variant]]
 name = "alone"
-title = "Beside a flight that is not flown"
+title = "Compared with a flight that is not flown"
 without = "ch04_tracking/setpoint#rho_0_modified"
 
 [[variant.expect]]
@@ -68,7 +68,7 @@ def pushed(tmp_path_factory):
     return make_report([str(folder)], folder / "kept", 1)
 
 
-def test_values_stand_beside_those_without(pushed):
+def test_values_are_compared_with_those_of_the_other_flight(pushed):
     calm, push = (
         pushed.flights[f"{pushed.comparisons[0].file}#{name}", "mujoco"].metrics
         for name in ("calm", "pushed")
@@ -77,8 +77,8 @@ def test_values_stand_beside_those_without(pushed):
     both = [f"{m['final_position_error_x']:.3g}".replace("-", "−") for m in (calm, push)]
     assert error.plants["mujoco"] == " → ".join(both)
     assert both[0] != both[1]
-    assert end.plants == {"thesis": "flown → flown", "mujoco": "flown → flown"}
-    assert thrown.plants["mujoco"].startswith(f"{both[0]} → lost at ")
+    assert end.plants == {"thesis": "completed → completed", "mujoco": "completed → completed"}
+    assert thrown.plants["mujoco"].startswith(f"{both[0]} → terminated at ")
     assert "→" not in alone.plants["mujoco"]
     assert not pushed.rows, "claims of the thesis there are none"
 
@@ -86,7 +86,7 @@ def test_values_stand_beside_those_without(pushed):
 def test_page_and_summary_have_them(pushed):
     text, html = markdown(pushed), page(pushed)
     assert "## Beyond the thesis" in text
-    assert "A push <from> the \\| left (beside `" in text
+    assert "A push <from> the \\| left (compared with `" in text
     assert '<section id="beyond">' in html
     assert "A push &lt;from&gt; the | left" in html
 
@@ -99,7 +99,7 @@ def test_the_page_names_a_flight_once_for_all_its_metrics(pushed):
     assert [row.count(f"<td>{name}") for name in ("final position error x", "diverged")] == [1, 1]
 
 
-def test_the_library_sets_flights_beside_flights_of_the_library():
+def test_the_library_compares_flights_with_flights_of_the_library():
     addresses = {address for address, _, _ in library_entries()}
     pairs = {a: other_address(a, load_scenario(a).without) for a in addresses}
     named = {without for without in pairs.values() if without}

@@ -15,8 +15,8 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.mark.parametrize("finding", FINDINGS, ids=lambda finding: finding.key)
 def test_the_tests_behind_a_finding_exist(finding):
-    assert finding.tests
-    for node in finding.tests:
+    assert finding.nodes
+    for node in finding.nodes:
         file, _, name = node.partition("::")
         tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
         assert name in {n.name for n in tree.body if isinstance(n, ast.FunctionDef)}, node

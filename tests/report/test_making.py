@@ -1,4 +1,4 @@
-"""The report end to end, on a tiny library: flights kept, rows judged, page and summary written."""
+"""The report end to end, on a tiny library: flights, rows, page and summary."""
 
 from __future__ import annotations
 
@@ -13,16 +13,18 @@ from PIL import Image
 
 from tiltsim.cli import main
 from tiltsim.exit_codes import EXPECTATION_FAILED, INVALID_INPUT
-from tiltsim.report import flying
+from tiltsim.report import flights, store
 from tiltsim.report.content import Group, failure_text, measured_text, published_text
+from tiltsim.report.drawing import DPI, Drawing, png
 from tiltsim.report.findings import FINDINGS
-from tiltsim.report.flying import Record, Refusal, flight_key, fly, plan_flights
+from tiltsim.report.flights import FlightRecord, Unsupported, fly, report_entries
 from tiltsim.report.making import make_report
 from tiltsim.report.markdown import markdown
-from tiltsim.report.model import Outcome
+from tiltsim.report.model import ClaimVerdict
 from tiltsim.report.page import page
-from tiltsim.report.pictures import DPI, AnalysisPicture, Drawing, png
+from tiltsim.report.pictures import AnalysisPicture
 from tiltsim.report.rows import count
+from tiltsim.report.store import flight_key
 from tiltsim.studies.checking import collect
 from tiltsim.views.figures.style import CYCLE, new_figure
 
@@ -31,42 +33,42 @@ def rows_of(report, statement):
     return [row for row in report.rows if row.claim.statement == statement]
 
 
-def test_every_scenario_is_flown_on_both_plants_or_says_why_not(report, library):
+def test_every_scenario_is_flown_on_both_plants_or_gives_the_reason(report, library):
     assert {key[1] for key in report.flights} == {"thesis", "mujoco"}
-    refusals = {k: v for k, v in report.flights.items() if isinstance(v, Refusal)}
-    assert list(refusals) == [(f"{library}/bounded.toml", "thesis")]
-    assert "no contact with ground" in refusals[f"{library}/bounded.toml", "thesis"].reason
+    unsupported = {k: v for k, v in report.flights.items() if isinstance(v, Unsupported)}
+    assert list(unsupported) == [(f"{library}/bounded.toml", "thesis")]
+    assert "no contact with ground" in unsupported[f"{library}/bounded.toml", "thesis"].reason
 
 
 def test_rows_hold_both_plants_and_their_verdicts(report):
     level, tilted = rows_of(report, "It stays where it is")
     assert [plant for plant, _ in level.plants] == ["thesis", "mujoco"]
-    assert level.outcome is Outcome.REPRODUCED
-    assert tilted.outcome is Outcome.IN_KIND
+    assert level.verdict is ClaimVerdict.REPRODUCED
+    assert tilted.verdict is ClaimVerdict.QUALITATIVE
     for row in (level, tilted):
         for plant, cell in row.plants:
             record = report.flights[row.claim.address, plant]
             assert cell.measured == record.metrics["final_position_error_x"]
     [flies] = rows_of(report, "It flies | to the end")
-    assert flies.outcome is Outcome.WRONG
+    assert flies.verdict is ClaimVerdict.WRONG
     assert count(report.rows).total() == len(report.rows) == 6
 
 
-def test_a_plant_that_refuses_has_no_cell(report):
+def test_an_unsupported_plant_has_no_cell(report):
     [row] = rows_of(report, "Rotors are slow")
     assert row.cell("thesis") is None
     assert row.cell("mujoco").measured is False
-    assert row.outcome is Outcome.REPRODUCED
+    assert row.verdict is ClaimVerdict.REPRODUCED
 
 
-def test_a_lost_flight_has_no_final_values(report):
-    [lost] = rows_of(report, "The flight is lost")
-    assert lost.outcome is Outcome.REPRODUCED
-    assert re.fullmatch(r"lost at [\d.]+ s", measured_text(lost.claim, lost.cell("mujoco")))
+def test_a_flight_that_terminates_early_has_no_final_values(report):
+    [lost] = rows_of(report, "The flight terminates early")
+    assert lost.verdict is ClaimVerdict.REPRODUCED
+    assert re.fullmatch(r"terminated at [\d.]+ s", measured_text(lost.claim, lost.cell("mujoco")))
     [level] = rows_of(report, "It ends level")
     assert level.cell("thesis").measured is None
-    assert level.outcome is Outcome.NOT_REPRODUCED
-    assert measured_text(level.claim, level.cell("thesis")).startswith("lost at ")
+    assert level.verdict is ClaimVerdict.NOT_REPRODUCED
+    assert measured_text(level.claim, level.cell("thesis")).startswith("terminated at ")
 
 
 def test_bounds_that_do_not_hold_are_named(report, library):
@@ -88,7 +90,7 @@ def test_values_are_shown_a_digit_finer_than_printed(report):
 
 
 def test_a_second_report_flies_nothing(library, kept, report, monkeypatch):
-    monkeypatch.setattr(flying, "_fly_one", lambda *_, **__: pytest.fail("flown again"))
+    monkeypatch.setattr(flights, "_fly_one", lambda *_, **__: pytest.fail("flown again"))
     again = make_report([str(library)], kept, 1)
     assert again.flights == report.flights
     assert again.rows == report.rows
@@ -96,8 +98,8 @@ def test_a_second_report_flies_nothing(library, kept, report, monkeypatch):
 
 
 def test_an_interrupted_report_goes_on(library, report, tmp_path, monkeypatch):
-    plans = plan_flights(collect([str(library)]))
-    fly_one, flown = flying._fly_one, []
+    entries = report_entries(collect([str(library)]))
+    fly_one, flown = flights._fly_one, []
 
     def interrupted(task, **how):
         if len(flown) == 3:
@@ -105,37 +107,37 @@ def test_an_interrupted_report_goes_on(library, report, tmp_path, monkeypatch):
         flown.append(task)
         return fly_one(task, **how)
 
-    monkeypatch.setattr(flying, "_fly_one", interrupted)
+    monkeypatch.setattr(flights, "_fly_one", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        fly(plans, tmp_path, 1)
+        fly(entries, tmp_path, 1)
     flown.clear()
     seen = []
     monkeypatch.setattr(
-        flying, "_fly_one", lambda task, **how: flown.append(task) or fly_one(task, **how)
+        flights, "_fly_one", lambda task, **how: flown.append(task) or fly_one(task, **how)
     )
-    flights = fly(plans, tmp_path, 1, lambda done, total: seen.append((done, total)))
-    assert len(flown) == 4  # seven flights, three of them kept
-    assert seen[0] == (4, 8)  # and a refusal
+    records = fly(entries, tmp_path, 1, lambda done, total: seen.append((done, total)))
+    assert len(flown) == 4  # seven flights, three of them stored
+    assert seen[0] == (4, 8)  # and an unsupported plant
     assert seen[-1] == (8, 8)
-    assert flights == report.flights
+    assert records == report.flights
 
 
 def test_a_damaged_record_is_flown_again(library, report, tmp_path):
-    plans = plan_flights([f"{library}/lost.toml"])
-    fly(plans, tmp_path, 1)
+    entries = report_entries([f"{library}/lost.toml"])
+    fly(entries, tmp_path, 1)
     for file in tmp_path.iterdir():
         file.write_text("{", encoding="utf-8")
-    flights = fly(plans, tmp_path, 1)
-    assert all(isinstance(record, Record) for record in flights.values())
+    records = fly(entries, tmp_path, 1)
+    assert all(isinstance(record, FlightRecord) for record in records.values())
 
 
 def test_a_flights_key_tells_apart_what_its_numbers_depend_on(library):
-    [plan] = plan_flights([f"{library}/lost.toml"])
-    scenario = plan.scenario
+    [entry] = report_entries([f"{library}/lost.toml"])
+    scenario = entry.scenario
     simulation = scenario.simulation.model_copy(update={"duration": 0.5})
     keys = {
         flight_key(scenario),
-        flight_key(plan.plants["thesis"]),
+        flight_key(entry.plants["thesis"]),
         flight_key(scenario.model_copy(update={"simulation": simulation})),
     }
     assert len(keys) == 3
@@ -144,16 +146,16 @@ def test_a_flights_key_tells_apart_what_its_numbers_depend_on(library):
 
 
 def test_a_changed_source_means_another_key(library, monkeypatch):
-    [plan] = plan_flights([f"{library}/lost.toml"])
-    before = flight_key(plan.scenario)
-    monkeypatch.setattr(flying, "code_digest", lambda: b"another")
-    assert flight_key(plan.scenario) != before
+    [entry] = report_entries([f"{library}/lost.toml"])
+    before = flight_key(entry.scenario)
+    monkeypatch.setattr(store, "code_digest", lambda: b"another")
+    assert flight_key(entry.scenario) != before
 
 
 def test_the_digest_covers_the_core_and_spares_the_screens(monkeypatch):
     seen = []
-    monkeypatch.setattr(flying, "sources_digest", lambda files, *_: seen.extend(files) or b"")
-    flying.code_digest.__wrapped__()
+    monkeypatch.setattr(store, "sources_digest", lambda files, *_: seen.extend(files) or b"")
+    store.code_digest.__wrapped__()
     names = {file.as_posix() for file in seen}
     for name in (
         "tiltsim/flight/metrics.py",
@@ -197,7 +199,7 @@ def full(report):
 
     figure = Figure(figsize=(2.0, 1.0))
     figure.subplots().plot([0.0, 1.0])
-    picture = AnalysisPicture(4, "line", "A <line>")
+    picture = AnalysisPicture(4, "line", "A <line>", draw=lambda: figure)
     return dataclasses.replace(report, findings=FINDINGS, drawings=[Drawing(picture, png(figure))])
 
 
@@ -222,13 +224,13 @@ def test_the_page_says_what_was_found(full):
     assert text.count("<tbody>") >= len(full.chapters)
     for finding in FINDINGS:
         assert f'id="{finding.key}"' in text
-    for outcome in Outcome:
-        assert f">{outcome.value}</span>" in text
+    for verdict in ClaimVerdict:
+        assert f">{verdict.value}</span>" in text
     assert "{" not in re.sub(r"<style>.*?</style>", "", text, flags=re.DOTALL)
 
 
 def test_rows_of_one_flight_are_told_by_their_metrics(report, library):
-    [row] = rows_of(report, "The flight is lost")
+    [row] = rows_of(report, "The flight terminates early")
     claim = dataclasses.replace(row.claim, statement="Both", case="Blue")
     wanted = claim.expectation.model_copy(update={"metric": "final_roll"})
     other = dataclasses.replace(claim, expectation=wanted)
@@ -310,7 +312,7 @@ def test_digest_of_sources_is_that_of_their_contents_wherever_they_lie(tmp_path)
             (tmp_path / folder / "law.py").write_text(text)
     here = sorted(tmp_path.glob("[ab]/law.py"))
     there = sorted(tmp_path.glob("[cz]/law.py"))
-    assert flying.sources_digest(here, "numpy") == flying.sources_digest(there, "numpy")
-    assert flying.sources_digest(here) != flying.sources_digest(here, "numpy")
+    assert store.sources_digest(here, "numpy") == store.sources_digest(there, "numpy")
+    assert store.sources_digest(here) != store.sources_digest(here, "numpy")
     there[0].write_text("three")
-    assert flying.sources_digest(here, "numpy") != flying.sources_digest(there, "numpy")
+    assert store.sources_digest(here, "numpy") != store.sources_digest(there, "numpy")

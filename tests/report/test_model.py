@@ -1,4 +1,4 @@
-"""Claims: how printed digits are read and how measured values are judged against them."""
+"""Claims: how printed digits are read and measured values are compared with them."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from tiltsim.report.claims import registered_claims
 from tiltsim.report.model import (
     AnalysisClaim,
     Claim,
+    ClaimVerdict,
     FlightClaim,
-    Outcome,
-    judge_value,
     scenario_claims,
+    verdict_on,
     worst,
 )
 from tiltsim.scenario.loading import parse_scenario
@@ -47,75 +47,78 @@ def test_digits_set_the_tolerance(printed, number, tolerance):
 
 @given(st.decimals(min_value=-1000, max_value=1000, places=3), st.floats(-0.49, 0.49))
 def test_what_rounds_to_the_printed_digits_is_reproduced(printed, part):
-    assert judge_value(claim(str(printed)), float(printed) + part * 1e-3) is Outcome.REPRODUCED
+    assert verdict_on(claim(str(printed)), float(printed) + part * 1e-3) is ClaimVerdict.REPRODUCED
 
 
 @given(st.decimals(min_value=-1000, max_value=1000, places=3), st.floats(0.51, 1e6))
 def test_what_rounds_to_other_digits_is_not(printed, part):
     for value in (float(printed) + part * 1e-3, float(printed) - part * 1e-3):
-        assert judge_value(claim(str(printed)), value) is Outcome.NOT_REPRODUCED
+        assert verdict_on(claim(str(printed)), value) is ClaimVerdict.NOT_REPRODUCED
 
 
 @pytest.mark.parametrize(
-    ("more", "measured", "outcome"),
+    ("more", "measured", "verdict"),
     [
-        ({}, 3.345, Outcome.REPRODUCED),
-        ({}, 3.36, Outcome.NOT_REPRODUCED),
-        ({}, nan, Outcome.NOT_REPRODUCED),
-        ({}, inf, Outcome.NOT_REPRODUCED),
-        ({}, None, Outcome.NOT_REPRODUCED),
-        ({}, True, Outcome.NOT_REPRODUCED),
-        ({"tolerance": 0.5}, 3.8, Outcome.REPRODUCED),
-        ({"in_kind": (1.0, inf)}, 100.0, Outcome.IN_KIND),
-        ({"in_kind": (1.0, inf)}, 0.9, Outcome.NOT_REPRODUCED),
-        ({"in_kind": (1.0, inf)}, 3.35, Outcome.REPRODUCED),
-        ({"in_kind": (1.0, inf)}, nan, Outcome.NOT_REPRODUCED),
-        ({"wrong": True, "why": "a slip"}, 0.9, Outcome.WRONG),
-        ({"wrong": True, "why": "a slip"}, None, Outcome.WRONG),
-        ({"wrong": True, "why": "a slip"}, 3.35, Outcome.REPRODUCED),
-        ({"why": "a reason"}, 0.9, Outcome.NOT_REPRODUCED),
+        ({}, 3.345, ClaimVerdict.REPRODUCED),
+        ({}, 3.36, ClaimVerdict.NOT_REPRODUCED),
+        ({}, nan, ClaimVerdict.NOT_REPRODUCED),
+        ({}, inf, ClaimVerdict.NOT_REPRODUCED),
+        ({}, None, ClaimVerdict.NOT_REPRODUCED),
+        ({}, True, ClaimVerdict.NOT_REPRODUCED),
+        ({"tolerance": 0.5}, 3.8, ClaimVerdict.REPRODUCED),
+        ({"in_kind": (1.0, inf)}, 100.0, ClaimVerdict.QUALITATIVE),
+        ({"in_kind": (1.0, inf)}, 0.9, ClaimVerdict.NOT_REPRODUCED),
+        ({"in_kind": (1.0, inf)}, 3.35, ClaimVerdict.REPRODUCED),
+        ({"in_kind": (1.0, inf)}, nan, ClaimVerdict.NOT_REPRODUCED),
+        ({"wrong": True, "why": "a slip"}, 0.9, ClaimVerdict.WRONG),
+        ({"wrong": True, "why": "a slip"}, None, ClaimVerdict.WRONG),
+        ({"wrong": True, "why": "a slip"}, 3.35, ClaimVerdict.REPRODUCED),
+        ({"why": "a reason"}, 0.9, ClaimVerdict.NOT_REPRODUCED),
     ],
 )
-def test_a_number_is_judged_by_its_digits_then_by_its_kind(more, measured, outcome):
-    assert judge_value(claim(3.35, **more), measured) is outcome
+def test_a_number_is_compared_by_its_digits_then_by_its_range(more, measured, verdict):
+    assert verdict_on(claim(3.35, **more), measured) is verdict
 
 
 @pytest.mark.parametrize("published", [True, False])
 def test_yes_and_no_agree_or_not(published):
-    assert judge_value(claim(published), published) is Outcome.REPRODUCED
-    assert judge_value(claim(published), not published) is Outcome.NOT_REPRODUCED
-    assert judge_value(claim(published), float(published)) is Outcome.NOT_REPRODUCED
+    assert verdict_on(claim(published), published) is ClaimVerdict.REPRODUCED
+    assert verdict_on(claim(published), not published) is ClaimVerdict.NOT_REPRODUCED
+    assert verdict_on(claim(published), float(published)) is ClaimVerdict.NOT_REPRODUCED
 
 
 def test_several_numbers_agree_together():
     pair = claim(("3.35", "-3.56"))
-    assert judge_value(pair, (3.3456, -3.5597)) is Outcome.REPRODUCED
-    assert judge_value(pair, (3.3456, -3.5499)) is Outcome.NOT_REPRODUCED
-    assert judge_value(pair, (3.3456,)) is Outcome.NOT_REPRODUCED
-    assert judge_value(pair, 3.35) is Outcome.NOT_REPRODUCED
+    assert verdict_on(pair, (3.3456, -3.5597)) is ClaimVerdict.REPRODUCED
+    assert verdict_on(pair, (3.3456, -3.5499)) is ClaimVerdict.NOT_REPRODUCED
+    assert verdict_on(pair, (3.3456,)) is ClaimVerdict.NOT_REPRODUCED
+    assert verdict_on(pair, 3.35) is ClaimVerdict.NOT_REPRODUCED
     near = claim(("1.0", "2.0"), in_kind=(0.0, 3.0))
-    assert judge_value(near, (1.2, 2.2)) is Outcome.IN_KIND
-    assert judge_value(near, (1.2, 3.2)) is Outcome.NOT_REPRODUCED
+    assert verdict_on(near, (1.2, 2.2)) is ClaimVerdict.QUALITATIVE
+    assert verdict_on(near, (1.2, 3.2)) is ClaimVerdict.NOT_REPRODUCED
 
 
 def test_the_worst_verdict_counts():
-    assert worst([Outcome.REPRODUCED, Outcome.WRONG, Outcome.IN_KIND]) is Outcome.WRONG
-    assert worst([Outcome.IN_KIND, Outcome.REPRODUCED]) is Outcome.IN_KIND
+    assert (
+        worst([ClaimVerdict.REPRODUCED, ClaimVerdict.WRONG, ClaimVerdict.QUALITATIVE])
+        is ClaimVerdict.WRONG
+    )
+    assert worst([ClaimVerdict.QUALITATIVE, ClaimVerdict.REPRODUCED]) is ClaimVerdict.QUALITATIVE
 
 
 @pytest.mark.parametrize(
     ("record", "words"),
     [
-        ({"source": "Sec. 4"}, "begin with the chapter"),
+        ({"source": "Sec. 4"}, "must begin with a chapter"),
         ({"statement": ""}, "needs a statement"),
         ({"published": "four"}, "not a number"),
         ({"published": "inf"}, "not a finite number"),
         ({"published": True, "tolerance": 0.1}, "neither tolerance"),
         ({"published": True, "in_kind": (0.0, 1.0)}, "neither tolerance"),
-        ({"wrong": True}, "needs why"),
+        ({"wrong": True}, "requires why"),
     ],
 )
-def test_a_claim_that_contradicts_itself_is_refused(record, words):
+def test_a_claim_that_contradicts_itself_is_rejected(record, words):
     good = {"source": "ch. 3, Eq. (19)", "statement": "It is so", "published": 1.0}
     with pytest.raises(ValueError, match=words):
         Claim(**(good | record))
@@ -161,15 +164,15 @@ def test_yes_about_a_number_means_that_it_lies_within_the_bounds():
     [made] = scenario_claims(scenario([expect]))
     assert made.measure({"max_tilt_rate": 30.0}) is True
     assert made.measure({"max_tilt_rate": 10.0}) is False
-    assert judge_value(made, made.measure({"max_tilt_rate": 10.0})) is Outcome.NOT_REPRODUCED
+    assert verdict_on(made, made.measure({"max_tilt_rate": 10.0})) is ClaimVerdict.NOT_REPRODUCED
 
 
 def test_a_flight_published_as_flown_and_lost_here_is_not_reproduced():
     [made] = scenario_claims(
         scenario([{"metric": "diverged", "equals": True, "published": False, "claim": "It flies"}])
     )
-    assert judge_value(made, made.measure({"diverged": True})) is Outcome.NOT_REPRODUCED
-    assert judge_value(made, made.measure({"diverged": False})) is Outcome.REPRODUCED
+    assert verdict_on(made, made.measure({"diverged": True})) is ClaimVerdict.NOT_REPRODUCED
+    assert verdict_on(made, made.measure({"diverged": False})) is ClaimVerdict.REPRODUCED
 
 
 @pytest.mark.parametrize(

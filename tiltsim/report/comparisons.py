@@ -1,8 +1,8 @@
-"""Flights beyond the thesis: each beside the same flight without what it shows.
+"""Flights beyond the thesis, compared with the same flight without the feature that they show.
 
-A scenario whose ``source`` names no chapter says with ``without = "ADDRESS"`` (``"#name"`` within
-its file) what to set it beside; what is compared are the metrics of its expectations. Without that
-key its own values stand alone.
+In a scenario whose ``source`` names no chapter, ``without = "ADDRESS"`` (``"#name"`` within its
+file) names the flight to compare with; the metrics of its expectations are compared. Without that
+key only its own values are shown.
 """
 
 from __future__ import annotations
@@ -12,34 +12,32 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Final
 
-from tiltsim.report.flying import PLANTS, Flights, Plan, Plant, Record
+from tiltsim.report.flights import PLANTS, FlightRecord, Flights, Plant, ReportEntry
 from tiltsim.report.model import CHAPTER
 from tiltsim.scenario.metric_names import unit_of
 
 TITLE: Final = "Beyond the thesis"
 EXPLANATION: Final = (
-    "What the thesis does not have, each flight beside the same flight without it: the value "
-    "without, an arrow, the value with. Bounds on all of them are in the scenario files; "
-    "`docs/beyond.md` says what they mean."
+    "Features that the thesis does not have, each flight compared with the same flight without "
+    "the feature: the value without it, an arrow, the value with it. Bounds on all of them are in "
+    "the scenario files; `docs/beyond.md` explains them."
 )
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One metric of a flight, beside that of the flight without what it shows.
+    """One metric of a flight and of the flight without the feature.
 
     Attributes
     ----------
-    address, title
-        Of the flight.
-    source
-        Of its scenario.
+    address, title, source
+        Of the scenario.
     metric
-        What is compared.
+        The compared metric.
     without
-        Address of the other flight, empty where there is none.
+        Address of the other flight, empty if there is none.
     plants
-        What each plant shows, as text; plants on which it does not fly are left out.
+        The values on each supported plant, as text.
     """
 
     address: str
@@ -55,57 +53,57 @@ class Comparison:
         return self.address.partition("#")[0]
 
 
-def compare(plans: list[Plan], flights: Flights) -> list[Comparison]:
-    """The comparisons that scenarios ask for, in order; of those that were not flown there is none.
+def compare(entries: list[ReportEntry], flights: Flights) -> list[Comparison]:
+    """The comparisons of all entries that have a record, in order.
 
-    A flight that was not flown to be set beside leaves its place empty.
+    If there is no record of the flight to compare with, only one value is shown.
     """
     found = []
-    others = {plan.address: other_address(plan.address, plan.scenario.without) for plan in plans}
-    for plan in plans:
-        scenario, without = plan.scenario, others[plan.address]
-        shown_beside = not without and plan.address in others.values()
+    others = {e.address: other_address(e.address, e.scenario.without) for e in entries}
+    for entry in entries:
+        scenario, without = entry.scenario, others[entry.address]
+        shown_beside = not without and entry.address in others.values()
         if CHAPTER.match(scenario.source) is not None or shown_beside:
             continue
-        for metric in dict.fromkeys(wanted.metric for wanted in scenario.expect):
+        for metric in dict.fromkeys(expectation.metric for expectation in scenario.expect):
             plants: dict[Plant, str] = {}
             for plant in PLANTS:
-                record = flights[plan.address, plant]
-                if isinstance(record, Record):
+                record = flights[entry.address, plant]
+                if isinstance(record, FlightRecord):
                     texts = [_text(record, metric)]
                     other = flights.get((without, plant))
-                    if isinstance(other, Record):
+                    if isinstance(other, FlightRecord):
                         texts.insert(0, _text(other, metric))
                     plants[plant] = " → ".join(texts)
             found.append(
-                Comparison(plan.address, scenario.title, scenario.source, metric, without, plants)
+                Comparison(entry.address, scenario.title, scenario.source, metric, without, plants)
             )
     return found
 
 
 def other_address(address: str, without: str) -> str:
-    """The full address of the flight to be set beside; empty where that is the flight itself."""
+    """The full address of the flight to compare with; empty if that is the flight itself."""
     full = address.partition("#")[0] + without if without.startswith("#") else without
     return "" if full == address else full
 
 
 def families(comparisons: list[Comparison]) -> Iterator[tuple[str, list[Comparison]]]:
-    """Comparisons by the file they are from."""
+    """Comparisons by the file of their scenario."""
     for file, members in groupby(comparisons, lambda one: one.file):
         yield file, list(members)
 
 
 def quantity(comparison: Comparison) -> str:
-    """What is compared, in words."""
+    """Name and unit of the compared metric, as text."""
     unit = unit_of(comparison.metric)
     return comparison.metric.replace("_", " ") + (f", {unit}" if unit else "")
 
 
-def _text(record: Record, metric: str) -> str:
-    if record.lost:
-        return f"lost at {record.end_time:.3g} s"
+def _text(record: FlightRecord, metric: str) -> str:
+    if record.ended_early:
+        return f"terminated at {record.end_time:.3g} s"
     value = record.metrics.get(metric)
     if isinstance(value, bool):
-        words = ("flown", "lost") if metric == "diverged" else ("no", "yes")
+        words = ("completed", "terminated") if metric == "diverged" else ("no", "yes")
         return words[value]
     return "no value" if value is None else f"{value:.3g}".replace("-", "−")

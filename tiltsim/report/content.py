@@ -1,4 +1,4 @@
-"""What page and summary both say: the report's parts, in words and numbers as text."""
+"""The content of the report as text, shared by page and summary."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from math import floor, isfinite, log10
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.report.comparisons import Comparison
+from tiltsim.report.drawing import Drawing
 from tiltsim.report.findings import FINDINGS, Finding
-from tiltsim.report.model import Claim, ExpectationClaim, Outcome
-from tiltsim.report.pictures import Drawing
+from tiltsim.report.model import Claim, ClaimVerdict, ExpectationClaim
 from tiltsim.report.rows import Cell, Failure, Row
 
 if TYPE_CHECKING:
-    from tiltsim.report.flying import Flights, Plan
+    from tiltsim.report.flights import Flights, ReportEntry
 
 TITLE: Final = "Reproduction report"
 SUBJECT: Final = (
-    "Every claim with a number or a yes or no in the doctoral thesis “Advanced Feedback "
+    "Every claim with a number or a yes/no answer in the doctoral thesis “Advanced Feedback "
     "Linearization Control for Tiltrotor UAVs: Gait Plan, Controller Design, and Stability "
-    "Analysis” by Zhe Shen, beside what tiltsim measures."
+    "Analysis” by Zhe Shen, compared with the results of tiltsim."
 )
 CHAPTERS: Final = {
     1: "Hovering in a gust",
     2: "Yaw-position control of the quadrotor",
     3: "Fixed gaits and the decoupling matrix",
     4: "Tracking with the trot",
-    5: "Gaits after the cat",
+    5: "Cat-inspired gaits",
     6: "The Two Color Map",
     7: "Tracking with robust gaits",
     8: "The generalized map",
@@ -39,28 +39,27 @@ CHAPTERS: Final = {
     12: "The map of another vehicle",
 }
 MEANINGS: Final = {
-    Outcome.REPRODUCED: "measured within the printed digits, or the same yes or no",
-    Outcome.IN_KIND: "the statement holds, the number differs",
-    Outcome.NOT_REPRODUCED: "it does not come out; the reason is given",
-    Outcome.WRONG: "refuted by proof or by the thesis' own equations",
+    ClaimVerdict.REPRODUCED: "equal within the printed digits, or the same yes/no answer",
+    ClaimVerdict.QUALITATIVE: "the statement holds, but the number differs",
+    ClaimVerdict.NOT_REPRODUCED: "the result differs; the reason is given",
+    ClaimVerdict.WRONG: "refuted by proof or by the thesis's own equations",
 }
 METHOD: Final = (
-    "Two plants fly every scenario with the same control law. The thesis plant integrates the "
-    "printed equations, which have no gyroscopic torque, with a fixed-step third-order method. "
-    "MuJoCo integrates a multibody model with a fourth-order method. Claims that need no flight "
-    "are computed. A claim takes the worse of its two verdicts, so that one that fails on either "
-    "plant counts as failed.",
-    "A number is reproduced if it rounds to the printed digits, unless the claim names another "
-    "tolerance. Nothing measured is stored: all values and verdicts are computed anew from the "
-    "scenario library, and kept only for as long as sources and versions stay the same.",
+    "Every scenario is simulated on two plants with the same controller. The thesis plant "
+    "integrates the printed equations, which have no gyroscopic torque, with a fixed-step "
+    "third-order method. MuJoCo integrates a multibody model with a fourth-order method. Claims "
+    "that need no flight are computed. A claim gets the worse of its two verdicts.",
+    "A number is reproduced if it rounds to the printed digits, unless the claim states another "
+    "tolerance. All values and verdicts are computed from the scenario library and cached only "
+    "until a source or a version changes.",
 )
 
 
 @dataclass(frozen=True)
 class Report:
-    """All that a page or summary shows."""
+    """Everything that a page or summary shows."""
 
-    plans: list[Plan]
+    entries: list[ReportEntry]
     flights: Flights
     rows: list[Row]
     failures: list[Failure]
@@ -74,7 +73,7 @@ class Report:
         return sorted({row.claim.chapter for row in self.rows})
 
     def chapter_groups(self, chapter: int) -> list[Group]:
-        """The rows of a chapter by claim, cases together, in order of their first appearance."""
+        """The rows of a chapter grouped by statement, in order of first appearance."""
         rows = [row for row in self.rows if row.claim.chapter == chapter]
         order = list(dict.fromkeys(row.claim.statement for row in rows))
         rows.sort(key=lambda row: order.index(row.claim.statement))
@@ -90,7 +89,7 @@ class Group:
 
     @property
     def sources(self) -> str:
-        """Where the claims stand, without the chapter and what tells the cases apart."""
+        """Sections and figures of the claims, without the chapter and the labels of cases."""
         panels = (re.sub(r" \([A-Z]\d*\)$", "", row.claim.section) for row in self.rows)
         texts, last = [], ""
         for place in dict.fromkeys(panels):
@@ -101,29 +100,29 @@ class Group:
 
     @property
     def shared_why(self) -> str:
-        """The reason, where all that fails here fails for the same one."""
+        """The reason, if all rows that fail have the same one."""
         reasons = [reason for row in self.rows if (reason := why_of(row))]
         return reasons[0] if len(reasons) > 1 and len(set(reasons)) == 1 else ""
 
     def case(self, row: Row) -> str:
-        """What tells a row from the others; where titles are the same, file or metric, too."""
+        """Label of a row within the group; with file or metric if titles are equal."""
         claim = row.claim
         alike = [other.claim for other in self.rows if other.claim.case == claim.case]
         if len(alike) < 2 or not isinstance(claim, ExpectationClaim):
             return claim.case
         flights = [other for other in alike if isinstance(other, ExpectationClaim)]
-        words = []
+        details = []
         if len({other.address for other in flights}) > 1:
             file = claim.address.partition("#")[0].rpartition("/")[2]
-            words.append(file.removesuffix(".toml").replace("_", " "))
+            details.append(file.removesuffix(".toml").replace("_", " "))
         if sum(other.address == claim.address for other in flights) > 1:
-            words.append(claim.expectation.metric.replace("_", " "))
-        return f"{claim.case} ({', '.join(words)})"
+            details.append(claim.expectation.metric.replace("_", " "))
+        return f"{claim.case} ({', '.join(details)})"
 
 
 def why_of(row: Row) -> str:
-    """The reason of a row that is not simply reproduced."""
-    return "" if row.outcome is Outcome.REPRODUCED else row.claim.why
+    """The reason of a row that is not reproduced."""
+    return "" if row.verdict is ClaimVerdict.REPRODUCED else row.claim.why
 
 
 def published_text(claim: Claim) -> str:
@@ -138,13 +137,13 @@ def published_text(claim: Claim) -> str:
 
 
 def measured_text(claim: Claim, cell: Cell) -> str:
-    """The measured value, one digit finer than the published one, or why there is none."""
+    """The measured value, with one digit more than the published one, or why there is none."""
     value = cell.measured
     if value is None:
         return cell.note or "no value"
     if isinstance(value, bool):
         text = _yes_or_no(value, claim)
-        return f"{text} at {cell.note.removeprefix('lost at ')}" if text == "lost" else text
+        return cell.note if cell.note and text == "terminated" else text
     numbers = value if isinstance(value, tuple) else (value,)
     shown = [_measured_number(one, claim) for one in numbers]
     text = shown[0] if len(shown) == 1 else f"({', '.join(shown)})"
@@ -153,7 +152,7 @@ def measured_text(claim: Claim, cell: Cell) -> str:
 
 def _yes_or_no(value: bool, claim: Claim) -> str:
     if isinstance(claim, ExpectationClaim) and claim.expectation.metric == "diverged":
-        return "lost" if value else "flown"
+        return "terminated" if value else "completed"
     return "yes" if value else "no"
 
 
@@ -183,14 +182,14 @@ def _tolerance(claim: Claim) -> float:
 
 
 def _sign(text: str) -> str:
-    """A number with a proper minus sign, and none before zero."""
+    """A number with a typographic minus sign, without one before zero."""
     bare = text.lstrip("-")
     negative = text.startswith("-") and float(text) != 0.0
     return f"−{bare}" if negative else bare
 
 
 def failure_text(failure: Failure) -> str:
-    """One line on a bound that does not hold."""
+    """One line about a bound that does not hold."""
     verdict = failure.verdict
     measured = verdict.measured
     shown = "no value" if measured is None else f"{measured:.6g}"
@@ -203,11 +202,11 @@ def failure_text(failure: Failure) -> str:
 
 
 def flown_text(report: Report) -> str:
-    """One sentence on how much was flown."""
-    records = [plan for plan in report.plans if all(map(_flies, plan.plants.values()))]
+    """The number of simulated scenarios, as text."""
+    records = [entry for entry in report.entries if all(map(_flies, entry.plants.values()))]
     both = len(records)
-    rest = len(report.plans) - both
-    text = f"{len(report.plans)} scenarios, {both} of them on both plants"
+    rest = len(report.entries) - both
+    text = f"{len(report.entries)} scenarios, {both} of them on both plants"
     return text if rest else f"{both} scenarios, each on both plants"
 
 

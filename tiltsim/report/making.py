@@ -1,15 +1,16 @@
-"""From paths to a report."""
+"""Makes a report from paths of scenarios."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
 
+from tiltsim.report.analysis import analyze
 from tiltsim.report.comparisons import compare
 from tiltsim.report.content import Report
+from tiltsim.report.drawing import draw_all
 from tiltsim.report.findings import FINDINGS
-from tiltsim.report.flying import analyze, fly, plan_flights
-from tiltsim.report.pictures import draw_all
+from tiltsim.report.flights import fly, report_entries
 from tiltsim.report.rows import failures, make_rows
 from tiltsim.resources import shipped_folder
 from tiltsim.studies.checking import collect
@@ -21,19 +22,19 @@ def make_report(
     jobs: int,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Report:
-    """Fly, compute and draw what a report shows.
+    """Fly, compute and draw everything that a report shows.
 
     Parameters
     ----------
     paths
-        Files, folders or library names, as in `tiltsim.studies.checking.collect`. Without any, the
-        report is the whole: all scenarios, all claims, and the findings.
+        Files, folders or library names, as in `tiltsim.studies.checking.collect`. With none, the
+        report is complete: all scenarios, all claims, and the findings.
     folder
-        Where flights, computed values and drawings are kept.
+        Where flights, computed values and drawings are stored.
     jobs
         Processes.
     progress
-        Called with the flights that are done, of how many.
+        Called with the number of finished flights and the total.
 
     Raises
     ------
@@ -41,16 +42,16 @@ def make_report(
         If a scenario is invalid, or a process dies.
     """
     whole = not paths
-    plans = plan_flights(collect(paths or [str(shipped_folder("scenarios"))]))
-    flights = fly(plans, folder, jobs, progress)
+    entries = report_entries(collect(paths or [str(shipped_folder("scenarios"))]))
+    flights = fly(entries, folder, jobs, progress)
     values = analyze(folder, jobs) if whole else {}
-    rows = make_rows(plans, flights, values, whole=whole)
+    rows = make_rows(entries, flights, values, whole=whole)
     return Report(
-        plans=plans,
+        entries=entries,
         flights=flights,
         rows=rows,
-        failures=failures(plans, flights),
-        comparisons=compare(plans, flights),
-        drawings=draw_all(plans, flights, folder, jobs, whole=whole),
+        failures=failures(entries, flights),
+        comparisons=compare(entries, flights),
+        drawings=draw_all(entries, flights, folder, jobs, whole=whole),
         findings=FINDINGS if whole else (),
     )

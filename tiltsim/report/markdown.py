@@ -1,4 +1,4 @@
-"""The report as Markdown for the repository: stable, without figures or machine facts."""
+"""The report as Markdown for the repository: reproducible, without figures or machine details."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from tiltsim.report.content import (
     published_text,
     why_of,
 )
-from tiltsim.report.flying import PLANTS
-from tiltsim.report.model import Outcome
+from tiltsim.report.flights import PLANTS
+from tiltsim.report.model import ClaimVerdict
 from tiltsim.report.rows import Row, count
 
 
@@ -31,13 +31,13 @@ def markdown(report: Report) -> str:
 def _lines(report: Report) -> Iterator[str]:
     yield f"# {TITLE}"
     yield from ("", SUBJECT, "")
-    yield "Written by `tiltsim report --markdown FILE`, whose HTML page has figures, too."
+    yield "Written by `tiltsim report --markdown FILE`; its HTML page also has figures."
     yield ""
     for paragraph in METHOD:
         yield from (paragraph, "")
     yield from _summary(report)
     if report.findings:
-        yield from ("", "## What we found", "")
+        yield from ("", "## Our findings", "")
         for finding in report.findings:
             yield f"### {finding.title}"
             yield from ("", f"*{finding.chapters}*", "")
@@ -60,27 +60,27 @@ def _lines(report: Report) -> Iterator[str]:
 
 
 def _comparison(one: comparisons.Comparison) -> str:
-    beside = f" (beside `{one.without}`)" if one.without else ""
+    other = f" (compared with `{one.without}`)" if one.without else ""
     shown = [one.plants.get(plant, "") for plant in PLANTS]
-    return _cells([one.title + beside, comparisons.quantity(one), *shown])
+    return _cells([one.title + other, comparisons.quantity(one), *shown])
 
 
 def _summary(report: Report) -> Iterator[str]:
-    yield "| Chapter | " + " | ".join(outcome.value for outcome in Outcome) + " | claims |"
-    yield "| --- |" + " ---: |" * (len(Outcome) + 1)
+    yield "| Chapter | " + " | ".join(verdict.value for verdict in ClaimVerdict) + " | claims |"
+    yield "| --- |" + " ---: |" * (len(ClaimVerdict) + 1)
     for chapter in report.chapters:
         rows = [row for row in report.rows if row.claim.chapter == chapter]
         yield _counts(f"{chapter}. {CHAPTERS.get(chapter, '')}", rows)
     yield _counts("all", report.rows)
     yield ""
-    yield from (f"- **{outcome.value}**: {meaning}" for outcome, meaning in MEANINGS.items())
+    yield from (f"- **{verdict.value}**: {meaning}" for verdict, meaning in MEANINGS.items())
     yield ""
     yield f"Flown: {flown_text(report)}."
 
 
 def _counts(name: str, rows: list[Row]) -> str:
     counts = count(rows)
-    cells = [str(counts[outcome] or "") for outcome in Outcome]
+    cells = [str(counts[verdict] or "") for verdict in ClaimVerdict]
     return f"| {name} | {' | '.join(cells)} | {len(rows)} |"
 
 
@@ -92,7 +92,7 @@ def _group(group: Group) -> Iterator[str]:
     for row in group.rows:
         claim = row.claim
         head = f"**{claim.statement}** ({claim.section})" if single else group.case(row)
-        verdict = row.outcome.value
+        verdict = row.verdict.value
         if why_of(row) and not group.shared_why:
             verdict += f": {why_of(row)}"
         yield _cells([head, published_text(claim), *_measured(row), verdict])

@@ -1,7 +1,8 @@
-"""What several chapters' claims measure."""
+"""Measures that the claims of several chapters share."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise, product
 from math import hypot
@@ -20,10 +21,10 @@ if TYPE_CHECKING:
 
 
 PRINTED: Final = 1e-3
-"""What the coefficients of the determinant are printed to."""
+"""Accuracy to which the coefficients of the determinant are printed."""
 
 Quantity: TypeAlias = "str | Callable[[Metrics], float]"
-"""A metric by name, or a number made of several."""
+"""A metric by name, or a number computed from several."""
 
 
 class Coefficients(NamedTuple):
@@ -34,8 +35,16 @@ class Coefficients(NamedTuple):
     R_theta: dict[str, float]  # of sin(pitch)
 
 
+def terms(formula: str) -> dict[str, float]:
+    """Read printed terms: "4.000 cccc - 5.592 ccsc" has the coefficient -5.592 of c1 c2 s3 c4."""
+    coefficients: dict[str, float] = {}
+    for sign, number, product_ in re.findall(r"([+-]?) ?([\d.]+) ([cs]{4})", formula):
+        coefficients[product_] = coefficients.get(product_, 0.0) + float(sign + number)
+    return coefficients
+
+
 def determinant_coefficients(vehicle: Vehicle) -> Coefficients:
-    """The determinant's coefficients: at tilt angles of 0 and 90 degrees one product is 1 alone."""
+    """The determinant's coefficients: at tilt angles of 0 and 90 degrees only one product is 1."""
     names = ["".join(letters) for letters in product("cs", repeat=4)]
     angles = [[np.pi / 2 if letter == "s" else 0.0 for letter in name] for name in names]
     values = residuals(angles, vehicle)
@@ -43,7 +52,7 @@ def determinant_coefficients(vehicle: Vehicle) -> Coefficients:
 
 
 def worst_coefficient(printed: Coefficients, vehicle: Vehicle) -> float:
-    """Largest distance of a printed coefficient from the computed one; absent ones are 0."""
+    """Largest difference of a printed coefficient from the computed one; absent ones are 0."""
     computed = determinant_coefficients(vehicle)
     return max(
         abs(own.get(name, 0.0) - table.get(name, 0.0))
@@ -53,18 +62,18 @@ def worst_coefficient(printed: Coefficients, vehicle: Vehicle) -> float:
 
 
 def terms_hold(part: str, printed: Mapping[str, float], vehicle: Vehicle) -> bool:
-    """A measure: every printed term of a part of the determinant is right, and none is missing."""
+    """Whether the printed terms of a part of the determinant are correct and complete."""
     computed = getattr(determinant_coefficients(vehicle), part)
     return all(abs(computed[name] - printed.get(name, 0.0)) < PRINTED for name in computed)
 
 
 def is_more_robust(key: str) -> bool:
-    """A measure: what the thesis says of a published gait's robustness holds."""
+    """Whether the thesis's claim about the robustness of a published gait holds."""
     return bool(robustness(PUBLISHED_GAITS[key]).claim_holds)
 
 
 def routh_holds(rows: Sequence[str]) -> bool:
-    """A measure: ch. 4's gains meet Routh's condition as printed, without any other loop gain."""
+    """Whether ch. 4's gains satisfy Routh's condition as printed, without another loop gain."""
     gains = GAIN_SETS["ch04"]._asdict()
     triples = [tuple(gains[f"{row}_{i}"] for i in (1, 2, 3)) for row in rows]
     return all(third_order_loop("", triple, 1.0).stable for triple in triples)
@@ -81,21 +90,21 @@ def resting_error(metrics: Metrics) -> float:
 
 
 def grows(value: Quantity, flights: Mapping[str, Metrics]) -> bool:
-    """A measure: a metric grows from each flight of the claim to the next."""
+    """Whether a metric increases from each flight of the claim to the next."""
     of = (lambda metrics: float(metrics[value])) if isinstance(value, str) else value
     return all(first < second for first, second in pairwise(map(of, flights.values())))
 
 
 def falls(value: Quantity, flights: Mapping[str, Metrics]) -> bool:
-    """A measure: a metric falls from each flight of the claim to the next."""
+    """Whether a metric decreases from each flight of the claim to the next."""
     return grows(value, dict(reversed(list(flights.items()))))
 
 
 def no_rotor_stops(flights: Mapping[str, Metrics]) -> bool:
-    """A measure: in no flight did a rotor come to rest."""
+    """Whether all rotors keep turning in all flights."""
     return all(float(metrics["min_rotor_speed"]) > 0.0 for metrics in flights.values())
 
 
 def every_flight_completed(flights: Mapping[str, Metrics]) -> bool:
-    """A measure: no flight was lost."""
+    """Whether all flights complete."""
     return not any(metrics["diverged"] for metrics in flights.values())

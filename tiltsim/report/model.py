@@ -1,4 +1,4 @@
-"""Claims, and how a measured value is judged against a published one."""
+"""Claims, and the verdict on a measured value compared with a published one."""
 
 from __future__ import annotations
 
@@ -25,57 +25,57 @@ Published: TypeAlias = "float | str | bool | tuple[float | str, ...]"
 Metrics: TypeAlias = Mapping[str, float | bool]
 
 CHAPTER: Final = re.compile(r"ch\. (\d+)")
-ROUNDING: Final = 1.0 + 1e-9  # 0.345 is not exact in binary, and is meant to round to 0.35
+ROUNDING: Final = 1.0 + 1e-9  # 0.345 is not exact in binary, but should round to 0.35
 
 
-class Outcome(Enum):
+class ClaimVerdict(Enum):
     """The verdict on a claim, from best to worst."""
 
     REPRODUCED = "reproduced"
-    IN_KIND = "reproduced in kind"
+    QUALITATIVE = "reproduced qualitatively"
     NOT_REPRODUCED = "not reproduced"
     WRONG = "published claim is wrong"
 
     @property
     def rank(self) -> int:
-        """0 for the best."""
-        return list(Outcome).index(self)
+        """Position in the order, 0 for the best."""
+        return list(ClaimVerdict).index(self)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """One statement of the thesis that has a number or a yes or no.
+    """One statement of the thesis that has a number or a yes/no answer.
 
-    Raises `ValueError` where the record contradicts itself.
+    Raises `ValueError` if the fields contradict each other.
     """
 
     source: str
     """Chapter first, then section, figure or equation: "ch. 3, Sec. 4, Eq. (19)"."""
     statement: str
-    """What the thesis states, one sentence in our words."""
+    """The statement of the thesis, one sentence in our words."""
     published: Published
     case: str = ""
-    """Which one, where several claims share a statement."""
+    """Label, if several claims share a statement."""
     unit: str = ""
     tolerance: float | None = None
-    """What counts as the same number; default: half a unit of the last printed digit."""
+    """Difference up to which numbers count as equal; default: half of the last printed digit."""
     in_kind: tuple[float, float] | None = None
-    """Where the statement still holds though the number differs."""
+    """Range in which the statement still holds although the number differs."""
     wrong: bool = False
-    """Refuted, by proof or by the thesis' own equations, and not merely unseen."""
+    """Refuted by proof or by the thesis's own equations, not merely not observed."""
     why: str = ""
-    """The reason where it does not come out."""
+    """The reason if it is not reproduced."""
 
     def __post_init__(self) -> None:
         yes_or_no = isinstance(self.published, bool)
         if CHAPTER.match(self.source) is None:
-            raise ValueError(f"source {self.source!r}: begin with the chapter, as in 'ch. 3, Sec.'")
+            raise ValueError(f"source {self.source!r}: must begin with a chapter: 'ch. 3, Sec.'")
         if not self.statement:
             raise ValueError(f"{self.source}: a claim needs a statement")
         if yes_or_no and (self.tolerance is not None or self.in_kind is not None):
             raise ValueError(f"{self.statement!r}: yes or no has neither tolerance nor in_kind")
         if self.wrong and not self.why:
-            raise ValueError(f"{self.statement!r}: wrong needs why")
+            raise ValueError(f"{self.statement!r}: wrong requires why")
         if not yes_or_no:
             self.numbers()
 
@@ -92,7 +92,7 @@ class Claim:
         return CHAPTER.sub("", self.source, count=1).lstrip(", ")
 
     def numbers(self) -> list[tuple[float, float]]:
-        """The published numbers, each with its tolerance. Raises `ValueError` where one is none."""
+        """The published numbers with their tolerances. Raises `ValueError` for other values."""
         several = self.published if isinstance(self.published, tuple) else (self.published,)
         return [self._number(printed) for printed in several]
 
@@ -110,24 +110,24 @@ class Claim:
 
 @dataclass(frozen=True, kw_only=True)
 class AnalysisClaim(Claim):
-    """A claim that is computed, not flown."""
+    """A claim that is computed, without a flight."""
 
     measure: Callable[[], Value]
 
     @property
     def key(self) -> str:
-        """Tells it from every other claim."""
+        """Unique among all claims."""
         return f"{self.source}: {self.statement} [{self.case}]"
 
 
 @dataclass(frozen=True, kw_only=True)
 class FlightClaim(Claim):
-    """A claim about several flights, such as that one tracks better than the other."""
+    """A claim about several flights, for example that one tracks better than another."""
 
     flights: tuple[str, ...]
     """Addresses in the scenario library."""
     measure: Callable[[Mapping[str, Metrics]], Value]
-    """From the metrics of the flights, by address, to the measured value; once a plant."""
+    """From the metrics of the flights, by address, to the measured value; called per plant."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,11 +139,11 @@ class ExpectationClaim(Claim):
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """Equal for expectations that are one claim, judged on one plant each."""
+        """Equal for expectations that are the same claim on different plants."""
         return self.address, self.expectation.metric, self.statement
 
     def measure(self, metrics: Metrics) -> Value | None:
-        """The measured value, or whether the bounds hold where the thesis says yes or no."""
+        """The measured value, or whether the bounds hold if the thesis gives a yes/no answer."""
         from tiltsim.flight.verdicts import Verdict
 
         value = metrics.get(self.expectation.metric)
@@ -152,18 +152,18 @@ class ExpectationClaim(Claim):
         return Verdict(self.expectation, value).holds
 
 
-def judge_value(claim: Claim, measured: Value | None) -> Outcome:
-    """The verdict on a claim by a measured value, None where there is none."""
+def verdict_on(claim: Claim, measured: Value | None) -> ClaimVerdict:
+    """The verdict on a claim; ``measured`` is None if there is no value."""
     if measured is not None and _agrees(claim, measured):
-        return Outcome.REPRODUCED
+        return ClaimVerdict.REPRODUCED
     if claim.wrong:
-        return Outcome.WRONG
+        return ClaimVerdict.WRONG
     if claim.in_kind is not None and measured is not None:
         low, high = claim.in_kind
         values = measured if isinstance(measured, tuple) else (measured,)
         if all(low <= value <= high for value in values):
-            return Outcome.IN_KIND
-    return Outcome.NOT_REPRODUCED
+            return ClaimVerdict.QUALITATIVE
+    return ClaimVerdict.NOT_REPRODUCED
 
 
 def _agrees(claim: Claim, measured: Value) -> bool:
@@ -178,41 +178,41 @@ def _agrees(claim: Claim, measured: Value) -> bool:
 
 
 def plain(measured: object) -> Value:
-    """A measured value in plain Python types: NumPy's own are unwrapped."""
+    """A measured value in plain Python types: NumPy scalars are unwrapped."""
     if isinstance(measured, tuple | list):
         return tuple(float(value) for value in measured)
     value = measured.item() if hasattr(measured, "item") else measured
     return value if isinstance(value, bool) else float(value)  # type: ignore[arg-type]
 
 
-def worst(outcomes: list[Outcome]) -> Outcome:
-    """The least favourable of several verdicts."""
-    return max(outcomes, key=lambda outcome: outcome.rank)
+def worst(verdicts: list[ClaimVerdict]) -> ClaimVerdict:
+    """The worst of several verdicts."""
+    return max(verdicts, key=lambda verdict: verdict.rank)
 
 
 def scenario_claims(scenario: Scenario) -> list[ExpectationClaim]:
-    """The claims that a scenario's expectations make, in order: those that have ``published``.
+    """The claims of a scenario, in order: its expectations with a ``published`` value.
 
-    A scenario of our own, whose ``source`` names no chapter, makes none.
+    A scenario beyond the thesis, whose ``source`` names no chapter, has none.
     """
     if CHAPTER.match(scenario.source) is None:
         return []
     return [
         ExpectationClaim(
             source=scenario.source,
-            statement=wanted.claim or _meaning(wanted.metric),
+            statement=expectation.claim or _meaning(expectation.metric),
             case=scenario.title,
-            published=wanted.published,
-            unit=unit_of(wanted.metric),
-            tolerance=wanted.published_tolerance,
-            in_kind=wanted.in_kind,
-            wrong=wanted.wrong,
-            why=wanted.why,
+            published=expectation.published,
+            unit=unit_of(expectation.metric),
+            tolerance=expectation.published_tolerance,
+            in_kind=expectation.in_kind,
+            wrong=expectation.wrong,
+            why=expectation.why,
             address=scenario.address,
-            expectation=wanted,
+            expectation=expectation,
         )
-        for wanted in scenario.expect
-        if wanted.published is not None
+        for expectation in scenario.expect
+        if expectation.published is not None
     ]
 
 

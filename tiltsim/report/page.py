@@ -1,4 +1,4 @@
-"""The report as one HTML page that needs nothing else: style and figures are inside."""
+"""The report as one self-contained HTML page, with style and figures inside."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from tiltsim.report.content import (
     published_text,
     why_of,
 )
+from tiltsim.report.drawing import DPI, Drawing
 from tiltsim.report.findings import Finding
-from tiltsim.report.flying import PLANTS
-from tiltsim.report.model import Outcome
-from tiltsim.report.pictures import DPI, Drawing
+from tiltsim.report.flights import PLANTS
+from tiltsim.report.model import ClaimVerdict
 from tiltsim.report.rows import Cell, Row, count
 
 _CLASSES: Final = {
-    Outcome.REPRODUCED: "reproduced",
-    Outcome.IN_KIND: "in-kind",
-    Outcome.NOT_REPRODUCED: "not-reproduced",
-    Outcome.WRONG: "wrong",
+    ClaimVerdict.REPRODUCED: "reproduced",
+    ClaimVerdict.QUALITATIVE: "qualitative",
+    ClaimVerdict.NOT_REPRODUCED: "not-reproduced",
+    ClaimVerdict.WRONG: "wrong",
 }
 
 _SHOWN_DPI: Final = 108
@@ -80,7 +80,7 @@ def _header(report: Report) -> Iterator[str]:
     yield '<nav aria-label="Contents"><ol>'
     yield '<li><a href="#summary">Summary</a></li>'
     if report.findings:
-        yield '<li><a href="#findings">What we found</a></li>'
+        yield '<li><a href="#findings">Our findings</a></li>'
     for chapter in report.chapters:
         title = f"{chapter} {CHAPTERS.get(chapter, '')}"
         yield f'<li><a href="#chapter-{chapter}">{escape(title)}</a></li>'
@@ -94,23 +94,24 @@ def _summary(report: Report) -> Iterator[str]:
     counts = count(report.rows)
     total = len(report.rows)
     yield '<section id="summary"><h2>Summary</h2>'
-    reproduced = counts[Outcome.REPRODUCED]
+    reproduced = counts[ClaimVerdict.REPRODUCED]
     yield (
         f"<p>{total} claims, {flown_text(report)}: {reproduced} reproduced, "
-        f"{counts[Outcome.IN_KIND]} reproduced in kind, {counts[Outcome.NOT_REPRODUCED]} not "
-        f"reproduced, {counts[Outcome.WRONG]} published claims wrong.</p>"
+        f"{counts[ClaimVerdict.QUALITATIVE]} reproduced qualitatively, "
+        f"{counts[ClaimVerdict.NOT_REPRODUCED]} not reproduced, "
+        f"{counts[ClaimVerdict.WRONG]} published claims wrong.</p>"
     )
     yield f'<div class="bar" role="img" aria-label="{reproduced} of {total} claims reproduced">'
-    for outcome in Outcome:
-        if counts[outcome]:
-            yield f'<i class="{_CLASSES[outcome]}" style="flex:{counts[outcome]}"></i>'
+    for verdict in ClaimVerdict:
+        if counts[verdict]:
+            yield f'<i class="{_CLASSES[verdict]}" style="flex:{counts[verdict]}"></i>'
     yield '</div><ul class="key">'
-    for outcome, meaning in MEANINGS.items():
-        yield f'<li>{_mark(outcome)} <span class="meaning">{escape(meaning)}</span></li>'
+    for verdict, meaning in MEANINGS.items():
+        yield f'<li>{_mark(verdict)} <span class="meaning">{escape(meaning)}</span></li>'
     yield "</ul>"
     yield from (f"<p>{escape(paragraph)}</p>" for paragraph in METHOD)
     yield '<div class="scroll summary" tabindex="0"><table><thead><tr><th>Chapter</th>'
-    yield "".join(f'<th class="n">{escape(outcome.value)}</th>' for outcome in Outcome)
+    yield "".join(f'<th class="n">{escape(verdict.value)}</th>' for verdict in ClaimVerdict)
     yield '<th class="n">claims</th></tr></thead><tbody>'
     for chapter in report.chapters:
         rows = [row for row in report.rows if row.claim.chapter == chapter]
@@ -122,7 +123,7 @@ def _summary(report: Report) -> Iterator[str]:
 
 def _counts(name: str, rows: list[Row]) -> str:
     counts = count(rows)
-    cells = [str(counts[outcome] or "") for outcome in Outcome]
+    cells = [str(counts[verdict] or "") for verdict in ClaimVerdict]
     numbers = "".join(f'<td class="n">{cell}</td>' for cell in [*cells, str(len(rows))])
     return f"<tr><th>{name}</th>{numbers}</tr>"
 
@@ -139,13 +140,13 @@ def _findings(findings: Iterable[Finding]) -> Iterator[str]:
     findings = list(findings)
     if not findings:
         return
-    yield '<section id="findings"><h2>What we found</h2>'
-    yield "<p>Each result is backed by tests; the command runs them in a checkout.</p>"
+    yield '<section id="findings"><h2>Our findings</h2>'
+    yield "<p>Tests support each result; the command runs them in a checkout.</p>"
     for finding in findings:
         yield f'<article id="{finding.key}"><h3>{escape(finding.title)}</h3>'
         yield f'<p class="where">{escape(finding.chapters)}</p>'
         yield from (f"<p>{_prose(paragraph)}</p>" for paragraph in finding.paragraphs)
-        tests = f"{len(finding.tests)} tests" if len(finding.tests) > 1 else "1 test"
+        tests = f"{len(finding.nodes)} tests" if len(finding.nodes) > 1 else "1 test"
         yield f"<details><summary>{tests}</summary><pre>{escape(finding.command)}</pre></details>"
         yield "</article>"
     yield "</section>"
@@ -188,10 +189,11 @@ def _beyond(rows: list[comparisons.Comparison]) -> Iterator[str]:
 
 
 def _compared(metrics: list[comparisons.Comparison]) -> Iterator[str]:
-    """The rows of one flight, named once."""
+    """The rows of one flight, with its title in the first."""
     one = metrics[0]
-    beside = f' <span class="section">beside {escape(one.without)}</span>' if one.without else ""
-    title = f"{_prose(one.title)}{beside}"
+    title = _prose(one.title)
+    if one.without:
+        title += f' <span class="section">compared with {escape(one.without)}</span>'
     head = f'<th class="what" scope="rowgroup" rowspan="{len(metrics)}">{title}</th>'
     for metric in metrics:
         cells = "".join(
@@ -221,7 +223,7 @@ def _group(group: Group) -> Iterator[str]:
         yield (
             f'<tr{kind}><th class="what" scope="row">{head}</th>'
             f'<td class="n">{_number(published_text(row.claim), row)}</td>{_measured(row)}'
-            f'<td class="verdict">{_mark(row.outcome)}{note}</td></tr>'
+            f'<td class="verdict">{_mark(row.verdict)}{note}</td></tr>'
         )
     yield "</tbody>"
 
@@ -236,7 +238,7 @@ def _measured(row: Row) -> str:
 def _plant(row: Row, cell: Cell | None) -> str:
     if cell is None:
         return '<td class="n unit">–</td>'
-    differs = len({one.outcome for one in row.cells}) > 1 and cell.outcome is row.outcome
+    differs = len({one.verdict for one in row.cells}) > 1 and cell.verdict is row.verdict
     text = _number(measured_text(row.claim, cell), row)
     return f'<td class="n{" off" if differs else ""}">{text}</td>'
 
@@ -252,7 +254,7 @@ def _number(text: str, row: Row) -> str:
 def _figure(drawing: Drawing) -> str:
     picture = drawing.picture
     data = b64encode(drawing.png).decode()
-    # Drawn finer than shown, for screens of high density and print.
+    # Drawn at a higher resolution than shown, for high-density screens and print.
     pixels = (int.from_bytes(drawing.png[i : i + 4], "big") for i in (16, 20))
     width, height = (round(size * _SHOWN_DPI / DPI) for size in pixels)
     return (
@@ -263,8 +265,8 @@ def _figure(drawing: Drawing) -> str:
     )
 
 
-def _mark(outcome: Outcome) -> str:
-    return f'<span class="mark {_CLASSES[outcome]}">{escape(outcome.value)}</span>'
+def _mark(verdict: ClaimVerdict) -> str:
+    return f'<span class="mark {_CLASSES[verdict]}">{escape(verdict.value)}</span>'
 
 
 def _prose(text: str) -> str:

@@ -1,204 +1,107 @@
-"""The figures of the report, a few a chapter, drawn with `tiltsim.views.figures`."""
+"""The figures of the report, a few per chapter, drawn with `tiltsim.views.figures`."""
 
 from __future__ import annotations
 
-import hashlib
 import json
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from io import BytesIO
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from tiltsim.errors import InputError
-from tiltsim.report.flying import (
-    Flights,
-    Plan,
-    Plant,
-    Record,
-    code_digest,
-    flight_key,
-    keep,
-    sources_digest,
-)
+from tiltsim.report.flights import PLANTS, Plant, variant_for
 from tiltsim.report.model import Metrics
-from tiltsim.scenario.scenario import Scenario
-from tiltsim.system.processes import in_processes
+from tiltsim.report.store import flight_key
 from tiltsim_controllers.analysis.published_gaits import PATHS, PUBLISHED_GAITS
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from tiltsim.scenario.scenario import Scenario
+
 _VEHICLE: Final = PRESETS["ar_drone_2"]
-DPI: Final = 144
-COLOURS: Final = 256
 
 
 @dataclass(frozen=True)
-class Picture:
-    """A figure: where it belongs and, in words, what it shows."""
+class Picture(ABC):
+    """A figure with its chapter and caption."""
 
     chapter: int
     name: str
     caption: str
 
+    @abstractmethod
+    def content(
+        self,
+        scenarios: Mapping[tuple[str, Plant], Scenario],
+        metrics: Mapping[tuple[str, Plant], Metrics],
+    ) -> str | None:
+        """The data that the figure depends on, as text; None if its flights are missing."""
 
-@dataclass(frozen=True)
+    @abstractmethod
+    def figure(self, metrics: Mapping[tuple[str, Plant], Metrics]) -> Figure:
+        """Draw the figure from the metrics of the flights."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class AnalysisPicture(Picture):
     """A figure that needs no flight."""
 
-    draw: Callable[[], Figure] | None = None
+    draw: Callable[[], Figure]
+
+    def content(self, scenarios: object, metrics: object) -> str:
+        """Nothing but the sources."""
+        return ""
+
+    def figure(self, metrics: object) -> Figure:
+        """Draw the figure."""
+        return self.draw()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FlightPicture(Picture):
     """The page of one flight (`tiltsim.views.figures.flight`)."""
 
-    address: str = ""
+    address: str
     plant: Plant = "mujoco"
 
-
-@dataclass(frozen=True)
-class MetricsPicture(Picture):
-    """A figure of several flights' metrics."""
-
-    addresses: tuple[str, ...] = ()
-    draw: Callable[[Mapping[tuple[str, Plant], Metrics]], Figure] | None = None
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """A picture as PNG."""
-
-    picture: Picture
-    png: bytes
-
-
-def draw_all(
-    plans: list[Plan], flights: Flights, folder: Path, jobs: int, *, whole: bool
-) -> list[Drawing]:
-    """Draw what can be drawn of the flights there are; drawings are kept in the folder.
-
-    Parameters
-    ----------
-    plans, flights
-        The scenarios and what came of them.
-    folder
-        Where drawings are kept.
-    jobs
-        Processes.
-    whole
-        Whether to draw what needs no flight, too.
-
-    Raises
-    ------
-    InputError
-        If a figure cannot be drawn or a process dies.
-    """
-    sources = Path(__file__).parents[1] / "views" / "figures"
-    style = sources_digest([*sources.glob("*.py"), Path(__file__)], code_digest().hex())
-    scenarios = {
-        (plan.address, plant): scenario
-        for plan in plans
-        for plant, scenario in plan.plants.items()
-        if isinstance(scenario, Scenario)
-    }
-    metrics = {key: r.metrics for key, r in flights.items() if isinstance(r, Record)}
-    keys: dict[str, str] = {}
-    jobs_to_do: list[tuple[str, str]] = []
-    for picture in PICTURES:
-        if isinstance(picture, AnalysisPicture) and not whole:
-            continue
-        content = _content(picture, scenarios, metrics)
-        if content is None:
-            continue
-        digest = hashlib.sha256(style + picture.name.encode() + content.encode()).hexdigest()[:24]
-        keys[picture.name] = digest
-        if not (folder / f"{digest}.png").is_file():
-            jobs_to_do.append((picture.name, digest))
-    work = partial(_draw_one, folder=folder, metrics=metrics)
-    if jobs == 1 or len(jobs_to_do) < 2:
-        for job in jobs_to_do:
-            work(job)
-    else:
-        for job, future in in_processes(work, jobs_to_do, jobs):
-            error = future.exception()
-            if error is not None:
-                raise InputError(f"figure {job[0]}: {type(error).__name__}: {error}") from error
-    return [
-        Drawing(picture, (folder / f"{keys[picture.name]}.png").read_bytes())
-        for picture in PICTURES
-        if picture.name in keys
-    ]
-
-
-def _content(
-    picture: Picture,
-    scenarios: Mapping[tuple[str, Plant], Scenario],
-    metrics: Mapping[tuple[str, Plant], Metrics],
-) -> str | None:
-    """What a picture depends on besides the sources; None where its flights are missing."""
-    if isinstance(picture, FlightPicture):
-        scenario = scenarios.get((picture.address, picture.plant))
+    def content(
+        self, scenarios: Mapping[tuple[str, Plant], Scenario], metrics: object
+    ) -> str | None:
+        """The scenario."""
+        scenario = scenarios.get((self.address, self.plant))
         return None if scenario is None else flight_key(scenario) + scenario.title
-    if isinstance(picture, MetricsPicture):
-        wanted = [(address, plant) for address in picture.addresses for plant in _PLANTS]
-        if not all(key in metrics for key in wanted):
+
+    def figure(self, metrics: object) -> Figure:
+        """Fly again, and draw."""
+        from tiltsim.simulation.simulate import simulate
+        from tiltsim.views.figures.flight import flight_figure
+
+        return flight_figure(simulate(variant_for(self.address, self.plant)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class MetricsPicture(Picture):
+    """A figure of the metrics of several flights."""
+
+    addresses: tuple[str, ...]
+    draw: Callable[[Mapping[tuple[str, Plant], Metrics]], Figure]
+
+    def content(
+        self, scenarios: object, metrics: Mapping[tuple[str, Plant], Metrics]
+    ) -> str | None:
+        """The metrics of the flights on both plants."""
+        keys = [(address, plant) for address in self.addresses for plant in PLANTS]
+        if not all(key in metrics for key in keys):
             return None
-        return json.dumps([metrics[key] for key in wanted], sort_keys=True)
-    return ""
+        return json.dumps([metrics[key] for key in keys], sort_keys=True)
+
+    def figure(self, metrics: Mapping[tuple[str, Plant], Metrics]) -> Figure:
+        """Draw the figure."""
+        return self.draw(metrics)
 
 
-def _draw_one(
-    job: tuple[str, str], folder: Path, metrics: Mapping[tuple[str, Plant], Metrics]
-) -> None:
-    name, digest = job
-    picture = next(candidate for candidate in PICTURES if candidate.name == name)
-    if isinstance(picture, FlightPicture):
-        figure = _flight_page(picture)
-    elif isinstance(picture, MetricsPicture):
-        assert picture.draw is not None
-        figure = picture.draw(metrics)
-    else:
-        assert isinstance(picture, AnalysisPicture)
-        assert picture.draw is not None
-        figure = picture.draw()
-    keep(folder / f"{digest}.png", png(figure))
-
-
-def png(figure: Figure) -> bytes:
-    """A figure as PNG, the same for equal figures.
-
-    Of a palette of 256 colours, which nobody sees and makes the page a third as large.
-    """
-    from PIL import Image
-
-    from tiltsim.views.figures.style import paper_style
-
-    drawn, packed = BytesIO(), BytesIO()
-    with paper_style():
-        figure.savefig(drawn, format="png", dpi=DPI)
-    with Image.open(drawn) as image:
-        # Other methods spend the palette on large areas and give thin lines another hue.
-        method, dither = Image.Quantize.MAXCOVERAGE, Image.Dither.NONE
-        few = image.convert("RGB").quantize(COLOURS, method, dither=dither)
-    few.save(packed, format="PNG", optimize=True)
-    return packed.getvalue()
-
-
-def _flight_page(picture: FlightPicture) -> Figure:
-    from tiltsim.report.flying import variant_for
-    from tiltsim.simulation.simulate import simulate
-    from tiltsim.views.figures.flight import flight_figure
-
-    return flight_figure(simulate(variant_for(picture.address, picture.plant)))
-
-
-# --- what is drawn -----------------------------------------------------------------------------
-
-_PLANTS: Final[tuple[Plant, ...]] = ("thesis", "mujoco")
 _RHOS: Final = ("rho_065", "rho_0325", "rho_0", "rho_minus_0325", "rho_minus_065")
 _LETTERS: Final = {"conventional": "A", "modified": "B"}
 _PERIODS: Final = (1, 2, 3)
@@ -250,7 +153,7 @@ def _trot_errors(metrics: Mapping[tuple[str, Plant], Metrics]) -> Figure:
     panels = [
         (
             f"{reference}, {form}",
-            [series(reference, form, d, plant) for plant in reversed(_PLANTS) for d in _LETTERS],
+            [series(reference, form, d, plant) for plant in reversed(PLANTS) for d in _LETTERS],
         )
         for reference in ("line", "circle")
         for form in ("instant", "continuous")
@@ -270,13 +173,15 @@ def _determinant() -> Figure:
     return determinant_figure("equal", _VEHICLE)
 
 
-def _gait_and_twin(key: str) -> Figure:
+def _gait_and_biased(key: str) -> Figure:
     from tiltsim.views.figures.gait import comparison_figure
 
     published = PUBLISHED_GAITS[key]
     assert published.biased is not None
-    twin = f"biased, η = {published.bias:.0%}"
-    return comparison_figure([("as published", published.gait), (twin, published.biased)], _VEHICLE)
+    biased = f"biased, η = {published.bias:.0%}"
+    return comparison_figure(
+        [("as published", published.gait), (biased, published.biased)], _VEHICLE
+    )
 
 
 def _map(preset: str, *, examples: bool = False) -> Figure:
@@ -308,8 +213,8 @@ PICTURES: Final[tuple[Picture, ...]] = (
     FlightPicture(
         2,
         "through-the-curve",
-        "Yaw-position control with gains that pass Routh: the flight from (0.5, 0.5, 0) crosses "
-        "S = 0 and goes on to the circle.",
+        "Yaw-position control with gains that satisfy the Routh-Hurwitz criterion: the flight from "
+        "(0.5, 0.5, 0) crosses S = 0 and continues to the circle.",
         address="ch02_singular_zone/exact_law#stable_gains",
     ),
     AnalysisPicture(
@@ -328,7 +233,7 @@ PICTURES: Final[tuple[Picture, ...]] = (
     MetricsPicture(
         4,
         "setpoint-errors",
-        "Steady errors at the setpoint (ch. 4, Fig. 4): dots measured in MuJoCo, squares "
+        "Steady-state errors at the set point (ch. 4, Fig. 4): dots measured in MuJoCo, squares "
         "published. A is the conventional decoupler, B the modified one; 1 to 5 run from ρ = 0.65 "
         "to -0.65.",
         addresses=_SETPOINTS,
@@ -337,7 +242,7 @@ PICTURES: Final[tuple[Picture, ...]] = (
     MetricsPicture(
         4,
         "trot-errors",
-        "Largest error after 20 s by the period of the trot (ch. 4, Figs. 8, 9, 13, 14).",
+        "Largest error after 20 s against the period of the trot (ch. 4, Figs. 8, 9, 13, 14).",
         addresses=_TROTS,
         draw=_trot_errors,
     ),
@@ -356,17 +261,17 @@ PICTURES: Final[tuple[Picture, ...]] = (
     AnalysisPicture(
         6,
         "red-and-biased",
-        "Gait 3 (red) and its biased twin (ch. 6, Figs. 24, 25): the unacceptable attitudes over a "
-        "period. On red there are none.",
-        draw=partial(_gait_and_twin, "ch06_gait_3"),
+        "Gait 3 (red) and its biased counterpart (ch. 6, Figs. 24, 25): the singular attitudes "
+        "over a period. On red there are none.",
+        draw=partial(_gait_and_biased, "ch06_gait_3"),
     ),
     AnalysisPicture(
         6,
         "blue-and-biased",
-        "Gait 1 (blue) as printed and its biased twin (ch. 6, Figs. 20, 21). The curves of the "
-        "printed gait come from the rounding of its angles: on the exact blue lines the matrix is "
-        "singular at every attitude.",
-        draw=partial(_gait_and_twin, "ch06_gait_1"),
+        "Gait 1 (blue) as printed and its biased counterpart (ch. 6, Figs. 20, 21). The curves of "
+        "the printed gait result from the rounding of its angles: on the exact blue lines the "
+        "matrix is singular at every attitude.",
+        draw=partial(_gait_and_biased, "ch06_gait_1"),
     ),
     FlightPicture(
         7,
@@ -377,8 +282,8 @@ PICTURES: Final[tuple[Picture, ...]] = (
     AnalysisPicture(
         8,
         "circle-and-biased",
-        "Gait 2 of ch. 8, a circle on red, and its biased twin.",
-        draw=partial(_gait_and_twin, "ch08_gait_2"),
+        "Gait 2 of ch. 8, a circle on red, and its biased counterpart.",
+        draw=partial(_gait_and_biased, "ch08_gait_2"),
     ),
     AnalysisPicture(
         9,
@@ -395,7 +300,7 @@ PICTURES: Final[tuple[Picture, ...]] = (
     FlightPicture(
         10,
         "drift",
-        "Two thousand seconds on the circle: no error, and rotor speeds that part (MuJoCo).",
+        "Two thousand seconds on the circle: no error, and diverging rotor speeds (MuJoCo).",
         address="ch10_state_drift/third_derivative#two_thousand_seconds",
     ),
     FlightPicture(

@@ -1,4 +1,4 @@
-"""The rows of the report: every claim with what was measured and how it is judged."""
+"""The rows of the report: every claim with its measured values and verdicts."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 
 from tiltsim.flight.verdicts import Verdict, judge
 from tiltsim.report.claims import registered_claims
-from tiltsim.report.flying import PLANTS, Flights, Plan, Plant, Record
+from tiltsim.report.flights import PLANTS, FlightRecord, Flights, Plant, ReportEntry
 from tiltsim.report.model import (
     Claim,
+    ClaimVerdict,
     ExpectationClaim,
     FlightClaim,
-    Outcome,
     Value,
-    judge_value,
     plain,
     scenario_claims,
+    verdict_on,
     worst,
 )
 from tiltsim.scenario.scenario import Scenario
@@ -28,16 +28,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Cell:
-    """What one plant, or the analysis, has to say on a claim."""
+    """The measured value of a claim on one plant, or by analysis, and its verdict."""
 
     measured: Value | None
-    outcome: Outcome
-    note: str = ""  # why there is no value, or how a lost flight ended
+    verdict: ClaimVerdict
+    note: str = ""  # why there is no value, or when the flight terminated
 
 
 @dataclass(frozen=True)
 class Row:
-    """A claim with a cell for each plant, or the one cell of an analysis."""
+    """A claim with a cell per plant, or the single cell of an analysis."""
 
     claim: Claim
     analysis: Cell | None = None
@@ -45,16 +45,16 @@ class Row:
 
     @property
     def cells(self) -> list[Cell]:
-        """All cells that say something."""
+        """All cells."""
         return [self.analysis] if self.analysis else [cell for _, cell in self.plants]
 
     @property
-    def outcome(self) -> Outcome:
-        """The least favourable verdict among the cells."""
-        return worst([cell.outcome for cell in self.cells])
+    def verdict(self) -> ClaimVerdict:
+        """The worst verdict of the cells."""
+        return worst([cell.verdict for cell in self.cells])
 
     def cell(self, plant: Plant) -> Cell | None:
-        """The cell of a plant, None where it says nothing."""
+        """The cell of a plant, None if it has none."""
         return dict(self.plants).get(plant)
 
 
@@ -68,40 +68,40 @@ class Failure:
 
 
 def make_rows(
-    plans: list[Plan], flights: Flights, values: Mapping[str, Value], *, whole: bool
+    entries: list[ReportEntry], flights: Flights, values: Mapping[str, Value], *, whole: bool
 ) -> list[Row]:
-    """All claims that can be judged, in the order of the text.
+    """All claims that can be evaluated, in the order of the text.
 
     Parameters
     ----------
-    plans
-        The scenarios that were flown, in order.
+    entries
+        The scenarios, in order.
     flights
-        What came of them.
+        Their records.
     values
-        What the analysis measured, by `AnalysisClaim.key`; not read unless ``whole``.
+        Measured values of the computed claims, by `AnalysisClaim.key`; read only if ``whole``.
     whole
-        Whether the library was flown as a whole: else the claims that are computed are left out,
-        and those about several flights where one of these is missing.
+        Whether this is the whole library. Otherwise computed claims are omitted, and so are claims
+        about several flights of which one is missing.
     """
-    rows = _expectation_rows(plans, flights)
+    rows = _expectation_rows(entries, flights)
     for claim in registered_claims():
         if isinstance(claim, FlightClaim):
             if whole or all((address, "mujoco") in flights for address in claim.flights):
                 rows.append(_flight_row(claim, flights))
         elif whole:
             value = values[claim.key]
-            rows.append(Row(claim, analysis=Cell(value, judge_value(claim, value))))
+            rows.append(Row(claim, analysis=Cell(value, verdict_on(claim, value))))
     return sorted((row for row in rows if row.cells), key=lambda row: row.claim.chapter)
 
 
-def _expectation_rows(plans: list[Plan], flights: Flights) -> list[Row]:
+def _expectation_rows(entries: list[ReportEntry], flights: Flights) -> list[Row]:
     rows: dict[tuple[str, str, str], Row] = {}
-    for plan in plans:
-        for claim in scenario_claims(plan.scenario):
+    for entry in entries:
+        for claim in scenario_claims(entry.scenario):
             for plant in PLANTS:
-                record = flights[plan.address, plant]
-                if claim.expectation.plant in {None, plant} and isinstance(record, Record):
+                record = flights[entry.address, plant]
+                if claim.expectation.plant in {None, plant} and isinstance(record, FlightRecord):
                     row = rows.get(claim.key, Row(claim))
                     cell = _expectation_cell(claim, record)
                     if claim.why and not row.claim.why:
@@ -110,46 +110,49 @@ def _expectation_rows(plans: list[Plan], flights: Flights) -> list[Row]:
     return list(rows.values())
 
 
-def _expectation_cell(claim: ExpectationClaim, record: Record) -> Cell:
+def _expectation_cell(claim: ExpectationClaim, record: FlightRecord) -> Cell:
     measured = claim.measure(record.metrics)
-    return Cell(measured, judge_value(claim, measured), _ending(record))
+    return Cell(measured, verdict_on(claim, measured), _ending(record))
 
 
-def _ending(record: Record) -> str:
-    return f"lost at {f'{record.end_time:#.3g}'.rstrip('.')} s" if record.lost else ""
+def _ending(record: FlightRecord) -> str:
+    if not record.ended_early:
+        return ""
+    time = f"{record.end_time:#.3g}".rstrip(".")
+    return f"terminated at {time} s"
 
 
 def _flight_row(claim: FlightClaim, flights: Flights) -> Row:
     cells: list[tuple[Plant, Cell]] = []
     for plant in PLANTS:
         records = [flights[address, plant] for address in claim.flights]
-        flown = [record for record in records if isinstance(record, Record)]
+        flown = [record for record in records if isinstance(record, FlightRecord)]
         if len(flown) < len(records):
             continue
         metrics = {record.address: record.metrics for record in flown}
-        lost = any(record.lost for record in flown)
         try:
             value: Value | None = plain(claim.measure(metrics))
-        except KeyError:  # a lost flight has no final values
+        except KeyError:  # a flight that terminates early has no final values
             value = None
-        note = "lost" if value is None and lost else ""
-        cells.append((plant, Cell(value, judge_value(claim, value), note)))
+        ended_early = any(record.ended_early for record in flown)
+        note = "terminated" if value is None and ended_early else ""
+        cells.append((plant, Cell(value, verdict_on(claim, value), note)))
     return Row(claim, plants=tuple(cells))
 
 
-def failures(plans: list[Plan], flights: Flights) -> list[Failure]:
+def failures(entries: list[ReportEntry], flights: Flights) -> list[Failure]:
     """The bounds that do not hold, on either plant."""
     return [
-        Failure(plan.address, plant, verdict)
-        for plan in plans
-        for plant, scenario in plan.plants.items()
+        Failure(entry.address, plant, verdict)
+        for entry in entries
+        for plant, scenario in entry.plants.items()
         if isinstance(scenario, Scenario)
-        and isinstance(record := flights[plan.address, plant], Record)
+        and isinstance(record := flights[entry.address, plant], FlightRecord)
         for verdict in judge(scenario, record.metrics)
         if not verdict.holds
     ]
 
 
-def count(rows: Iterable[Row]) -> Counter[Outcome]:
-    """How many rows have each verdict."""
-    return Counter(row.outcome for row in rows)
+def count(rows: Iterable[Row]) -> Counter[ClaimVerdict]:
+    """The number of rows with each verdict."""
+    return Counter(row.verdict for row in rows)

@@ -1,6 +1,6 @@
-"""Claims that no single flight shows: computed, or drawn from several flights.
+"""Claims that need more than one flight, or none: computed, or derived from several flights.
 
-One module a chapter, found by its name; each holds a tuple ``CLAIMS``, in the order of the text::
+One module per chapter, found by its name; each has a tuple ``CLAIMS``, in the order of the text::
 
     from tiltsim.report.model import AnalysisClaim, FlightClaim
 
@@ -19,15 +19,15 @@ One module a chapter, found by its name; each holds a tuple ``CLAIMS``, in the o
             statement="The error grows with the period of the trot",
             published=True,                 # yes
             flights=("ch04_tracking/line#instant_t1_modified", ...),
-            measure=grows,                  # sees {address: metrics} of one plant
+            measure=grows,                  # gets {address: metrics} of one plant
         ),
     )
 
 ``measure`` returns a number, a tuple of numbers or a bool, always computed, never a constant.
 Keep it under a second or so: the report computes every claim, in parallel with the flights.
-Import what is heavy (scipy, mujoco) inside of the functions. ``source`` begins with the chapter; a
-statement with several cases is written several times with different ``case``. A flight of a claim
-that is lost has ``diverged`` true in its metrics and may lack others.
+Import heavy modules (scipy, mujoco) inside the functions. ``source`` begins with the chapter; a
+statement with several cases is written several times with different ``case``. A flight that
+terminates early has ``diverged`` true in its metrics and may lack others.
 """
 
 from __future__ import annotations

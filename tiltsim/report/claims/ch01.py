@@ -23,7 +23,7 @@ def _tilt(metrics: Metrics) -> float:
     return hypot(*(float(metrics[f"final_{angle}"]) for angle in ("roll", "pitch", "yaw")))
 
 
-def _perfect_is_least(flights: Mapping[str, Metrics]) -> bool:
+def _perfect_is_smallest(flights: Mapping[str, Metrics]) -> bool:
     return min(flights, key=lambda address: _tilt(flights[address])) == _PERFECT
 
 
@@ -32,14 +32,14 @@ def _quadrotor_tilts_more(flights: Mapping[str, Metrics]) -> bool:
 
 
 def _some_gait_tilts_more_than_the_quadrotor() -> bool:
-    """Statics of the mirrored perfect gait, whose force at level attitude helps the gust."""
+    """Statics of the mirrored perfect gait, whose force at level attitude adds to the gust."""
     from tiltsim_controllers.analysis.balance import even_load_gait
 
     vehicle = PRESETS["ar_drone_2"]
     gait = even_load_gait((-_GUST, 0.0, 0.0), vehicle)
-    wanted = np.array([-_GUST, 0.0, vehicle.gravity]) / hypot(_GUST, vehicle.gravity)
-    lean = acos(float(torque_free_direction(gait, vehicle) @ wanted))
-    return lean > acos(float(wanted[2]))
+    direction = np.array([-_GUST, 0.0, vehicle.gravity]) / hypot(_GUST, vehicle.gravity)
+    lean = acos(float(torque_free_direction(gait, vehicle) @ direction))
+    return lean > acos(float(direction[2]))
 
 
 def _planned_gaits_tilt_less(flights: Mapping[str, Metrics]) -> bool:
@@ -56,10 +56,10 @@ def _map_enlarges_the_attitudes() -> bool:
 CLAIMS = (
     FlightClaim(
         source="ch. 1, Sec. 2, Figs. 2-4",
-        statement="In a constant gust the perfect gait needs the least attitude of the three",
+        statement="In a constant gust the perfect gait needs the smallest attitude of the three",
         published=True,
         flights=_FLIGHTS,
-        measure=_perfect_is_least,
+        measure=_perfect_is_smallest,
     ),
     FlightClaim(
         source="ch. 1, Sec. 2, Fig. 4",
@@ -76,8 +76,8 @@ CLAIMS = (
     ),
     FlightClaim(
         source="ch. 1, Abstract of the thesis; Sec. 3, Fig. 5",
-        statement="Planned gaits spare the tilt angles the over-intensive changes that feedback "
-        "linearization of all eight inputs asks for",
+        statement="Planned gaits avoid the over-intensive changes of the tilt angles that feedback "
+        "linearization of all eight inputs requires",
         published=True,
         flights=_TILTING,
         measure=_planned_gaits_tilt_less,
@@ -87,7 +87,7 @@ CLAIMS = (
         statement="The Two Color Map enlarges the acceptable attitudes of all gaits compared",
         published=True,
         wrong=True,
-        why="It does for every red gait and for no blue one, for which no attitude is acceptable.",
+        why="It does so for every red gait but for no blue one: there every attitude is singular.",
         measure=_map_enlarges_the_attitudes,
     ),
 )

@@ -24,9 +24,9 @@ _HOVER: Final = _VEHICLE.mass * _VEHICLE.gravity
 _SINGULAR: Final = 1e-9
 _STABLE: Final = "ch02_singular_zone/exact_law#stable_gains"
 _ONE_ENTRY: Final = (
-    "Entry (3,1) of Eq. (43) is printed as 0; its own factors make it -cos²θ (cos φ - sin φ), and "
-    "with it the determinant is -1 everywhere. The exact determinant, -d³ζ² cos φ / "
-    "(I_x I_y I_z m³ cos θ), is zero nowhere within 90 degrees."
+    "Entry (3,1) of Eq. (43) is printed as 0; its own factors give -cos²θ (cos φ - sin φ), with "
+    "which the determinant is -1 everywhere. The exact determinant, -d³ζ² cos φ / "
+    "(I_x I_y I_z m³ cos θ), has no zero within 90 degrees."
 )
 
 
@@ -79,7 +79,7 @@ def _attitude_altitude_is_singular() -> bool:
 
 
 def _signs_of_axes_matter() -> bool:
-    """Whether turning the body axes round changes where S or the exact determinant vanish."""
+    """Whether reversing the body axes changes where S or the exact determinant vanish."""
     angles = np.linspace(-1.5, 1.5, 61)
     roll, pitch = np.meshgrid(angles, angles)
     published = published_determinant(roll, pitch) - published_determinant(roll, -pitch)
@@ -91,13 +91,13 @@ def _signs_of_axes_matter() -> bool:
 
 
 def _crossing_is_harmful(flights: Mapping[str, Metrics]) -> bool:
-    """Whether the law that crosses S = 0 with stable gains is lost there."""
+    """Whether the flight that crosses S = 0 with stable gains diverges there."""
     metrics = flights[_STABLE]
     crossed = metrics["min_published_determinant"] < 0.0 < metrics["max_published_determinant"]
     return bool(metrics["diverged"]) or not crossed
 
 
-def _lost_with_stable_gains(flights: Mapping[str, Metrics]) -> bool:
+def _diverges_with_stable_gains(flights: Mapping[str, Metrics]) -> bool:
     return bool(flights[_STABLE]["diverged"])
 
 
@@ -129,7 +129,7 @@ CLAIMS = (
         statement="At level attitude the determinant is zero (here over its value in hover)",
         published="0.00",
         wrong=True,
-        why="As above; level hover is as regular as an attitude can be.",
+        why="As above; the matrix is best conditioned in level hover.",
         measure=lambda: float(normalized_determinant(0.0, 0.0, _HOVER, _VEHICLE)),
     ),
     AnalysisClaim(
@@ -140,7 +140,7 @@ CLAIMS = (
     ),
     AnalysisClaim(
         source="ch. 2, App. B, Eqs. (A3)-(A6)",
-        statement="The gains of the yaw-position law stabilize the linearized system",
+        statement="The gains of the yaw-position controller stabilize the linearized system",
         published=True,
         wrong=True,
         why="s⁴ + 10s³ + 20s² + 50s + 500 has roots at 1.30 ± 3.26j: Routh's condition fails.",
@@ -148,7 +148,7 @@ CLAIMS = (
     ),
     AnalysisClaim(
         source="ch. 2, App. B, Eqs. (A8)-(A9)",
-        statement="The gains of the attitude-altitude law stabilize the linearized system",
+        statement="The gains of the attitude-altitude controller stabilize the linearized system",
         published=True,
         measure=_attitude_altitude_gains_are_stable,
     ),
@@ -160,22 +160,23 @@ CLAIMS = (
     ),
     FlightClaim(
         source="ch. 2, Sec. 4",
-        statement="Crossing the curve S = 0 breaks the law",
+        statement="Crossing the curve S = 0 makes the control law fail",
         published=True,
         wrong=True,
-        why="With stable gains the same law flies through it on the way to the circle, and tracks.",
+        why="With stable gains the same control law crosses it on the way to the circle, "
+        "and tracks.",
         flights=(_STABLE,),
         measure=_crossing_is_harmful,
     ),
     FlightClaim(
         source="ch. 2, Sec. 6",
-        statement="The singular matrix is why the yaw-position law fails",
+        statement="The singular matrix is why the yaw-position controller fails",
         published=True,
         wrong=True,
-        why="The gains are: Appendix B's are unstable by themselves, and with stable ones the law "
-        "flies from the same start.",
+        why="The cause is the gains: Appendix B's are unstable on their own, and with stable ones "
+        "the flight completes from the same start.",
         flights=(_STABLE,),
-        measure=_lost_with_stable_gains,
+        measure=_diverges_with_stable_gains,
     ),
     AnalysisClaim(
         source="ch. 2, Sec. 4",

@@ -13,6 +13,7 @@ from tiltsim.report.measures import (
     Coefficients,
     determinant_coefficients,
     grows,
+    terms,
     terms_hold,
     worst_coefficient,
 )
@@ -23,28 +24,26 @@ from tiltsim_controllers.vehicle.parameters import PRESETS
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
 
-EQ_19: Final = {
-    **{"cccc": 4.000},
-    **{"cccs": 5.592, "ccsc": -5.592, "cscc": 5.592, "sccc": -5.592},
-    **{"ccss": 0.9716, "cssc": 0.9716, "sccs": 0.9716, "sscc": 0.9716},
-    **{"cscs": -2.000, "scsc": -2.000},
-    **{"csss": -0.1687, "scss": 0.1687, "sscs": -0.1687, "sssc": 0.1687},
-}
+EQ_19: Final = terms(
+    "4.000 cccc + 5.592 cccs - 5.592 ccsc + 5.592 cscc - 5.592 sccc + 0.9716 ccss "
+    "+ 0.9716 cssc + 0.9716 sccs + 0.9716 sscc - 2.000 cscs - 2.000 scsc - 0.1687 csss "
+    "+ 0.1687 scss - 0.1687 sscs + 0.1687 sssc"
+)
 """The printed condition at level attitude, term by term."""
 
 EQ_17: Final = Coefficients(
     R=EQ_19,
     # -2.880 s1 c2 s3 s4 and -2.880 s1 s2 c3 s4 as printed; the latter comes on top of 1.000.
-    R_phi={
-        **{"ccsc": 1.000, "sccc": -1.000, "csss": -1.000, "sscs": 1.000 - 2.880},
-        **{"ccss": 2.880, "cssc": 2.880, "scss": -2.880},
-    },
-    R_theta={
-        **{"cccs": 1.000, "cscc": -1.000, "scss": -1.000, "sssc": 1.000},
-        **{"ccss": -2.880, "cssc": 2.880, "sccs": -2.880, "sscc": 2.880},
-    },
+    R_phi=terms(
+        "1.000 ccsc - 1.000 sccc - 1.000 csss + 1.000 sscs - 2.880 sscs + 2.880 ccss "
+        "+ 2.880 cssc - 2.880 scss"
+    ),
+    R_theta=terms(
+        "1.000 cccs - 1.000 cscc - 1.000 scss + 1.000 sssc - 2.880 ccss + 2.880 cssc "
+        "- 2.880 sccs + 2.880 sscc"
+    ),
 )
-"""The printed condition at any attitude, term by term, with its slips."""
+"""The printed condition at any attitude, term by term, with its misprints."""
 
 
 def _coefficient(part: int, product: str) -> Callable[[], float]:
@@ -76,10 +75,10 @@ def _triangle_is_regular(case: str) -> bool:
 
 
 def _switching_crosses(case: str) -> bool:
-    """Whether R changes sign on the straight way from (1, 1) to (-1, -1), for every pair."""
-    way = np.linspace(1.0, -1.0, 201)
+    """Whether R changes sign on the straight line from (1, 1) to (-1, -1), for every pair."""
+    line = np.linspace(1.0, -1.0, 201)
     for alpha_1, alpha_3 in DETERMINANT_CASES[case].pairs:
-        angles = np.stack([0 * way + alpha_1, way, 0 * way + alpha_3, way], axis=-1)
+        angles = np.stack([0 * line + alpha_1, line, 0 * line + alpha_3, line], axis=-1)
         R = residuals(angles, _VEHICLE).R
         if R.min() > 0.0 or R.max() < 0.0:
             return False
@@ -96,7 +95,7 @@ def _pair(gait: str) -> tuple[str, str]:
     return f"ch03_gaits/over_actuated#{gait}", f"ch03_gaits/over_actuated#{gait}_planned"
 
 
-def _home_is_safe() -> bool:
+def _return_to_no_tilt_is_regular() -> bool:
     """Whether R stays positive while any gait of the triangle shrinks to no tilt."""
     share = np.array([(i, j, 20 - i - j) for i in range(21) for j in range(21 - i)]) / 20.0
     points = share @ np.array(TRIANGLE)
@@ -128,7 +127,7 @@ def _lifts_at_start() -> bool:
 
 
 def _stable_flights(flights: Mapping[str, Metrics]) -> float:
-    """Flights at rest in the end, with every rotor turning its way all along (ch. 3, Sec. 4)."""
+    """Number of flights at rest at the end, without a reversed rotor (ch. 3, Sec. 4)."""
     resting = ("final_roll", "final_pitch", "final_yaw", "final_position_error_z")
     return float(
         sum(
@@ -169,8 +168,8 @@ CLAIMS = (
         statement="Eq. (17), term by term, is the determinant at any attitude",
         published=True,
         wrong=True,
-        why="Two slips of the pen: -2.880 s1 s2 c3 s4 sin φ cos θ stands for s1 s2 c3 c4, as ch. 5 "
-        "and 6 have it, and -2.880 s1 c2 s3 s4 sin φ cos θ for s1 c2 c3 s4.",
+        why="Two misprints: -2.880 s1 s2 c3 s4 sin φ cos θ should be s1 s2 c3 c4, as in ch. 5 "
+        "and 6, and -2.880 s1 c2 s3 s4 sin φ cos θ should be s1 c2 c3 s4.",
         measure=lambda: worst_coefficient(EQ_17, _VEHICLE) < PRINTED,
     ),
     AnalysisClaim(
@@ -182,7 +181,7 @@ CLAIMS = (
     *(
         AnalysisClaim(
             source="ch. 3, Sec. 5.2, Figs. 10-13",
-            statement="The triangle U, V, M of (α₂, α₄) holds no singular gait",
+            statement="The triangle U, V, M of (α₂, α₄) contains no singular gait",
             case=restriction,
             published=True,
             measure=partial(_triangle_is_regular, case),
@@ -250,11 +249,11 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 3, Sec. 6.1.1, Eq. (12)",
         statement="A rotor at rest makes the decoupling matrix singular",
-        case="as printed, in the fourth row alone",
+        case="as printed, in the fourth row only",
         published=True,
         wrong=True,
-        why="As printed the column of the resting rotor keeps its torques: regular. It is the "
-        "exact matrix, without the slip, for which the statement holds.",
+        why="As printed the column of the resting rotor keeps its torques: regular. The statement "
+        "holds for the exact matrix.",
         measure=partial(_rest_is_singular, exact=False),
     ),
     AnalysisClaim(
@@ -267,7 +266,7 @@ CLAIMS = (
         source="ch. 3, Sec. 7",
         statement="Every gait of the region can return to no tilt without a singularity",
         published=True,
-        measure=_home_is_safe,
+        measure=_return_to_no_tilt_is_regular,
     ),
     FlightClaim(
         source="ch. 3, Sec. 6.2, Figs. 20-23",

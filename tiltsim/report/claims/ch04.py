@@ -35,10 +35,10 @@ _REFERENCES: Final = {"line": "line", "circle": "circle"}
 _DECOUPLERS: Final = ("conventional", "modified")
 _PERIODS: Final = (1, 2, 3)
 _SHORT: Final = 0.1
-"""Share of the difference at T = 3 s below which decouplers at T = 1 s do not differ."""
+"""Fraction of the difference at T = 3 s below which the decouplers at T = 1 s count as equal."""
 _GYROSCOPIC: Final = (
-    "In MuJoCo the instant trot with T = 3 s and the conventional decoupler loses the flight: the "
-    "gyroscopic torque of the turning body, which the thesis leaves out, is there."
+    "In MuJoCo the instant trot with T = 3 s and the conventional decoupler loses control, because "
+    "of the gyroscopic torque of the rotating body, which the thesis omits."
 )
 
 
@@ -93,8 +93,8 @@ def _decouplers_agree_without_tilt() -> bool:
     trig = sines_and_cosines(0.0, 0.0, 0.0, 0.0)
     ratio = drag_ratio(_VEHICLE)
     n = torque_free_force(trig, torque_entries(trig, ratio), ratio)
-    wanted = (1.3, -0.7, 0.4, _VEHICLE.gravity)  # m/s^2, m/s^2, rad, m/s^2
-    pair = zip(modified_decoupler(*wanted, n), conventional_decoupler(*wanted), strict=True)
+    desired = (1.3, -0.7, 0.4, _VEHICLE.gravity)  # m/s^2, m/s^2, rad, m/s^2
+    pair = zip(modified_decoupler(*desired, n), conventional_decoupler(*desired), strict=True)
     return max(abs(modified - conventional) for modified, conventional in pair) < 1e-12
 
 
@@ -114,7 +114,7 @@ def _better(
 ) -> FlightClaim:
     return FlightClaim(
         source=source,
-        statement="The modified decoupler reduces the error that remains",
+        statement="The modified decoupler reduces the remaining error",
         case=case,
         published=True,
         flights=(conventional, modified),
@@ -126,7 +126,7 @@ def _better(
 CLAIMS = (
     AnalysisClaim(
         source="ch. 4, Sec. 3.3, Eq. (25)",
-        statement="Under the trot the determinant at level attitude is 4 cos² ρ",
+        statement="For the trot the determinant at level attitude is 4 cos² ρ",
         published=True,
         measure=_eq_25_holds,
     ),
@@ -138,18 +138,18 @@ CLAIMS = (
     ),
     AnalysisClaim(
         source="ch. 4, Sec. 5.1, Prop. 4",
-        statement="The gains meet Eqs. (35)-(38), so that attitude and altitude are stable",
+        statement="The gains satisfy Eqs. (35)-(38), so that attitude and altitude are stable",
         case="roll and pitch",
         published=True,
         wrong=True,
-        why="K_P1 K_P2 = 10 does not exceed K_P3 = 50. The flights are stable all the same: the "
+        why="K_P1 K_P2 = 10 does not exceed K_P3 = 50. The flights are stable nevertheless: the "
         "matrix is printed, and used, without the factor 2|ϖ| in its first three rows, which "
         "multiplies the gains of these loops by about 720.",
         measure=partial(routh_holds, ("roll", "pitch")),
     ),
     AnalysisClaim(
         source="ch. 4, Sec. 5.1, Prop. 4",
-        statement="The gains meet Eqs. (35)-(38), so that attitude and altitude are stable",
+        statement="The gains satisfy Eqs. (35)-(38), so that attitude and altitude are stable",
         case="yaw",
         published=True,
         wrong=True,
@@ -159,14 +159,14 @@ CLAIMS = (
     ),
     AnalysisClaim(
         source="ch. 4, Sec. 5.1, Prop. 4",
-        statement="The gains meet Eqs. (35)-(38), so that attitude and altitude are stable",
+        statement="The gains satisfy Eqs. (35)-(38), so that attitude and altitude are stable",
         case="altitude",
         published=True,
         measure=partial(routh_holds, ("altitude",)),
     ),
     AnalysisClaim(
         source="ch. 4, Sec. 5.1, Prop. 5",
-        statement="The gains of the position loop meet Eqs. (39)-(40)",
+        statement="The gains of the position loop satisfy Eqs. (39)-(40)",
         published=True,
         measure=_position_gains_are_positive,
     ),
@@ -253,7 +253,7 @@ CLAIMS = (
         published=True,
         flights=_ALL_TROTS,
         measure=no_rotor_stops,
-        why="In MuJoCo a rotor of the flight that is lost (see above) reverses.",
+        why="In MuJoCo a rotor of the flight that loses control (see above) reverses.",
     ),
     AnalysisClaim(
         source="ch. 4, Sec. 3.2, Remark 2",
@@ -264,7 +264,7 @@ CLAIMS = (
     *(
         FlightClaim(
             source="ch. 4, Sec. 8",
-            statement="Without leaving out terms of higher order the error falls further",
+            statement="Without neglecting higher-order terms the error decreases further",
             case=f"setpoint, {title}",
             published=True,
             flights=(

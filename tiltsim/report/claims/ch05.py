@@ -1,8 +1,8 @@
-"""Chapter 5: walk, run and gallops, their scaling, and the unacceptable attitudes.
+"""Chapter 5: walk, run and gallops, their scaling, and the singular attitudes.
 
 The keyframes are reconstructed so that these claims hold (`tiltsim_controllers.gaits.cat.SWINGS`).
-A claim that they were fitted to says so: that it holds shows that some gaits do what ch. 5 reports,
-and not that its gaits were these.
+A claim that they were fitted to says so: it shows that some gaits behave as ch. 5 reports, not that
+its gaits were these.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from tiltsim.report.measures import (
     every_flight_completed,
     falls,
     routh_holds,
+    terms,
     terms_hold,
     tracking_error,
     worst_coefficient,
@@ -45,15 +46,15 @@ _SCALED: Final = ("walk", "transverse_gallop", "rotary_gallop")
 _FITTED: Final = " (keyframes fitted)"
 
 _WALK_AND_PERIOD: Final = (
-    "Under the conventional decoupler the walk's error grows by 6 % from T = 1 s to 3 s, as "
-    "published; what the modified one leaves, 0.2 m at T = 1 s, nearly doubles."
+    "With the conventional decoupler the walk's error grows by 6 % from T = 1 s to 3 s, as "
+    "published; with the modified one it nearly doubles from 0.2 m at T = 1 s."
 )
 
-EQ_15_R_PHI: Final = {
-    **{"ccsc": 1.000, "sccc": -1.000, "csss": -1.000, "sssc": 1.000},
-    **{"ccss": 2.880, "cssc": 2.880, "scss": -2.880, "sscc": -2.880},
-}
-"""The printed terms with sin(roll), with their slips."""
+EQ_15_R_PHI: Final = terms(
+    "1.000 ccsc - 1.000 sccc - 1.000 csss + 1.000 sssc + 2.880 ccss + 2.880 cssc "
+    "- 2.880 scss - 2.880 sscc"
+)
+"""The printed terms with sin(roll), with their misprints."""
 
 
 def _eq_15_holds() -> bool:
@@ -72,7 +73,7 @@ def _is_singular(gait: str) -> bool:
 
 
 def _scaling_enlarges(gait: str) -> bool:
-    """Whether the margin grows from 1 over 1/2 to 1/3, counting a gait that loses R as none."""
+    """Whether the margin grows from 1 over 1/2 to 1/3, where a gait whose R vanishes has none."""
     margins = [max(0.0, _margin(gait, scale)) for scale in (1, 2, 3)]
     return all(first < second for first, second in pairwise(margins))
 
@@ -95,12 +96,12 @@ def _error(flights: Mapping[str, Metrics], *address: str | int) -> float:
     return tracking_error(flights[name])
 
 
-def _saves_most_where_most_is_lost(reference: str, flights: Mapping[str, Metrics]) -> bool:
-    """Whether the case with the largest conventional error is the one that gains the most."""
+def _saves_most_where_the_error_is_largest(reference: str, flights: Mapping[str, Metrics]) -> bool:
+    """Whether the case with the largest conventional error is the one that improves the most."""
     cases = list(product(_GAITS, _PERIODS))
-    lost = [_error(flights, reference, *case, "conventional") for case in cases]
-    saved = [a - _error(flights, reference, *case, "modified") for a, case in zip(lost, cases)]
-    return int(np.argmax(lost)) == int(np.argmax(saved))
+    plain = [_error(flights, reference, *case, "conventional") for case in cases]
+    saved = [a - _error(flights, reference, *case, "modified") for a, case in zip(plain, cases)]
+    return int(np.argmax(plain)) == int(np.argmax(saved))
 
 
 def _grows(reference: str, gait: str, flights: Mapping[str, Metrics]) -> bool:
@@ -112,7 +113,7 @@ def _grows(reference: str, gait: str, flights: Mapping[str, Metrics]) -> bool:
 
 
 def _depends_on_period(reference: str, gait: str, flights: Mapping[str, Metrics]) -> bool:
-    """Whether a longer period makes the error 1.5 times as large, under either decoupler."""
+    """Whether a longer period makes the error 1.5 times as large, with either decoupler."""
     return any(
         _error(flights, reference, gait, 3, d) > 1.5 * _error(flights, reference, gait, 1, d)
         for d in _DECOUPLERS
@@ -124,7 +125,7 @@ def _mean_error(reference: str, gait: str, flights: Mapping[str, Metrics]) -> fl
     return float(np.mean(errors))
 
 
-def _walk_is_least(reference: str, flights: Mapping[str, Metrics]) -> bool:
+def _walk_is_smallest(reference: str, flights: Mapping[str, Metrics]) -> bool:
     return min(_GAITS, key=lambda g: _mean_error(reference, g, flights)) == "walk_third"
 
 
@@ -156,40 +157,40 @@ def _per_reference() -> tuple[FlightClaim, ...]:
             FlightClaim(
                 source=source,
                 statement="The modified decoupler decreases the error for all gaits" + _FITTED,
-                case=f"{reference}, {words}, T = {period} s",
+                case=f"{reference}, {title}, T = {period} s",
                 published=True,
                 flights=tuple(_address(reference, gait, period, d) for d in _DECOUPLERS),
                 measure=partial(falls, tracking_error),
             )
-            for (gait, words), period in product(_GAITS.items(), _PERIODS)
+            for (gait, title), period in product(_GAITS.items(), _PERIODS)
         ]
         claims.append(
             FlightClaim(
                 source=source,
-                statement="The modified decoupler pays most where the error is largest",
+                statement="The modified decoupler helps most where the error is largest",
                 case=reference,
                 published=True,
                 flights=_all(reference),
-                measure=partial(_saves_most_where_most_is_lost, reference),
+                measure=partial(_saves_most_where_the_error_is_largest, reference),
             )
         )
         claims += [
             FlightClaim(
                 source=source,
                 statement="The error tends to grow with the period of the gait" + _FITTED,
-                case=f"{reference}, {words}",
+                case=f"{reference}, {title}",
                 published=True,
                 flights=_all(reference, (gait,)),
                 measure=partial(_grows, reference, gait),
             )
-            for gait, words in _GAITS.items()
+            for gait, title in _GAITS.items()
         ]
         claims += [
             *(
                 FlightClaim(
                     source=source,
-                    statement="The error depends much on the period "
-                    "(half as much again from T = 1 s to 3 s)",
+                    statement="The error depends strongly on the period "
+                    "(it grows by half from T = 1 s to 3 s)",
                     case=f"{reference}, {_GAITS[gait]}",
                     published=gait == "run_full",
                     flights=_all(reference, (gait,)),
@@ -200,11 +201,11 @@ def _per_reference() -> tuple[FlightClaim, ...]:
             ),
             FlightClaim(
                 source="ch. 5, Sec. 7",
-                statement="The walk has the least errors of the four gaits" + _FITTED,
+                statement="The walk has the smallest errors of the four gaits" + _FITTED,
                 case=reference,
                 published=True,
                 flights=_all(reference),
-                measure=partial(_walk_is_least, reference),
+                measure=partial(_walk_is_smallest, reference),
             ),
             FlightClaim(
                 source="ch. 5, Sec. 7",
@@ -238,8 +239,8 @@ CLAIMS = (
         statement="Eq. (15), term by term, is the determinant at any attitude",
         published=True,
         wrong=True,
-        why="-2.880 s1 c2 s3 s4 sin φ cos θ stands for s1 c2 c3 s4, and the last term, "
-        "1.000 s1 s2 s3 c4 sin φ cos θ, for s1 s2 c3 s4.",
+        why="-2.880 s1 c2 s3 s4 sin φ cos θ should be s1 c2 c3 s4, and the last term, "
+        "1.000 s1 s2 s3 c4 sin φ cos θ, should be s1 s2 c3 s4.",
         measure=_eq_15_holds,
     ),
     *(
@@ -254,15 +255,14 @@ CLAIMS = (
     ),
     AnalysisClaim(
         source="ch. 5, Sec. 4, Prop. 1, Eq. (18)",
-        statement="Some whole number n makes a gait scaled by 1/n regular",
+        statement="Some integer n makes a gait scaled by 1/n regular",
         published=True,
         measure=_some_scale_is_regular,
     ),
     *(
         AnalysisClaim(
             source=f"ch. 5, Sec. 4, Fig. {figure}",
-            statement="Scaled by 1/2 and 1/3 the unacceptable attitudes move away from level"
-            + _FITTED,
+            statement="Scaled by 1/2 and 1/3 the singular attitudes move away from level" + _FITTED,
             case=gait.replace("_", " "),
             published=True,
             measure=partial(_scaling_enlarges, gait),
@@ -294,7 +294,7 @@ CLAIMS = (
     FlightClaim(
         source="ch. 5, Sec. 7, Figs. 14-15",
         statement="The scale of the walk, 1/3 or 1/6, changes the rotor speeds "
-        "(their range by a tenth and more)",
+        "(their range by at least a tenth)",
         published=True,
         flights=tuple(_address("line", f"walk_{n}", 3, "modified") for n in ("third", "sixth")),
         measure=_scale_changes_the_speeds,

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from tiltsim.report.claims.ch03 import EQ_17, EQ_19
-from tiltsim.report.measures import is_more_robust, terms_hold
+from tiltsim.report.measures import is_more_robust, terms, terms_hold
 from tiltsim.report.model import AnalysisClaim
 from tiltsim_controllers.analysis.published_gaits import (
     PUBLISHED_GAITS,
@@ -32,24 +32,24 @@ from tiltsim_controllers.vehicle.parameters import PRESETS
 _VEHICLE: Final = PRESETS["ar_drone_2"]
 _ZERO: Final = 1e-9
 _NEAR_RIGHT_ANGLE: Final = 1.55
-"""rad: with such a margin the unacceptable attitudes are within 0.02 rad of a right angle."""
+"""rad: with such a margin the singular attitudes are within 0.02 rad of a right angle."""
 
-EQ_4: Final = {
-    **{"ccsc": 1.000, "sccc": -1.000, "csss": -1.000, "sscs": 1.000},
-    **{"ccss": 2.880, "cssc": 2.880, "sccs": -2.880, "sscc": -2.880},
-}
+EQ_4: Final = terms(
+    "1.000 ccsc - 1.000 sccc - 1.000 csss + 1.000 sscs + 2.880 ccss + 2.880 cssc "
+    "- 2.880 sccs - 2.880 sscc"
+)
 """R_phi as printed, term by term."""
 
-EQ_1_ROLL: Final = {
-    **{"ccsc": 1.000, "sccc": -1.000, "csss": -1.000, "sscs": 1.000},
-    **{"ccss": 2.880, "cssc": 2.880, "scss": -2.880, "sscc": -2.880},
-}
-"""The terms of Eq. (1) with sin(roll), with their slip."""
+EQ_1_ROLL: Final = terms(
+    "1.000 ccsc - 1.000 sccc - 1.000 csss + 1.000 sscs + 2.880 ccss + 2.880 cssc "
+    "- 2.880 scss - 2.880 sscc"
+)
+"""The terms of Eq. (1) with sin(roll), with their misprint."""
 
 RANK: Final = (
     "On blue the opposite columns of τ cancel: rank 2, the matrix is singular at every attitude. "
-    "The printed angles have a margin by their rounding alone; the smallest singular value of τ "
-    "is 1e-4 of the largest."
+    "The printed angles have a margin only because of their rounding; the smallest singular value "
+    "of τ is 1e-4 of the largest."
 )
 
 
@@ -59,7 +59,7 @@ def _grid() -> list[list[list[Root]]]:
 
 
 def _counts() -> tuple[float, ...]:
-    """Roots inside, on the sides, in the corners; NaN where they are not alike."""
+    """Roots inside, on the sides, in the corners; NaN where they differ."""
     counts = root_counts(_grid())
     sides = [counts[0, 1:-1], counts[-1, 1:-1], counts[1:-1, 0], counts[1:-1, -1]]
     groups = [counts[1:-1, 1:-1], np.concatenate(sides), counts[[0, 0, -1, -1], [0, -1, 0, -1]]]
@@ -126,7 +126,7 @@ def _nearly_all(key: str) -> bool:
 
 
 def _greater_advantage_over_99() -> bool:
-    """Whether the margin of printed Gait 2 exceeds that of the 99 % twin by more than the 80 %."""
+    """Whether the margin of printed Gait 2 exceeds that of the 99 % gait by more than the 80 %."""
     gait = PUBLISHED_GAITS["ch06_gait_2"].gait
     own, near, far = (smallest_margin(gait.biased(eta), _VEHICLE) for eta in (1.0, 0.99, 0.8))
     return own > near and own - near > own - far
@@ -145,7 +145,7 @@ def _partial_scaling_can_harm() -> bool:
 
 
 def _angles_on_lines(key: str) -> bool:
-    """Whether the printed angles lie on the lines of their colour, to half their last digit."""
+    """Whether the printed angles lie on the lines of their color, to half their last digit."""
     published = PUBLISHED_GAITS[key]
     first, second, third, fourth = published.gait.angles(np.arange(4) / 4.0).T
     if published.color == "blue":
@@ -170,13 +170,13 @@ CLAIMS = (
         case="terms with sin φ",
         published=True,
         wrong=True,
-        why="-2.880 s1 c2 s3 s4 sin φ cos θ stands for s1 c2 c3 s4, as Eq. (4) has it.",
+        why="-2.880 s1 c2 s3 s4 sin φ cos θ should be s1 c2 c3 s4, as in Eq. (4).",
         measure=partial(terms_hold, "R_phi", EQ_1_ROLL, _VEHICLE),
     ),
     *(
         AnalysisClaim(
             source=f"ch. 6, Sec. {section}",
-            statement=f"{name} is printed right, term by term",
+            statement=f"{name} is printed correctly, term by term",
             published=True,
             measure=partial(terms_hold, part, printed, _VEHICLE),
         )
@@ -213,15 +213,15 @@ CLAIMS = (
     ),
     AnalysisClaim(
         source="ch. 6, Sec. 3, Figs. 11-14",
-        statement="Roots with R > 0 are of the classes (+,+), (+,?) and (?,+) alone",
+        statement="Roots with R > 0 are of the classes (+,+), (+,?) and (?,+) only",
         published=True,
-        why="Where both pairs of planes meet within half a grid step there are (?,?) as well: "
+        why="Where both pairs of planes meet within half a grid step there are also (?,?): "
         "three grid points next to P.",
         measure=lambda: _classes(lambda root: root.R > _ZERO) <= {"(+,+)", "(+,?)", "(?,+)"},
     ),
     AnalysisClaim(
         source="ch. 6, Sec. 3, Figs. 11-14",
-        statement="One root with R > 0 where there is any",
+        statement="At most one root with R > 0",
         published=True,
         measure=_one_positive_root_each,
     ),
@@ -238,8 +238,8 @@ CLAIMS = (
         statement="Roots with R < 0 cover all seven classes",
         published=True,
         wrong=True,
-        why="Blue roots, those with a minus, have R = 0 exactly; the sign of the printed "
-        "coefficients' R there is rounding.",
+        why="Blue roots, those with a minus, have R = 0 exactly; with the printed coefficients "
+        "the sign of R there is rounding.",
         measure=lambda: len(_classes(lambda root: root.R < -_ZERO)) == 7,
     ),
     AnalysisClaim(
@@ -267,7 +267,7 @@ CLAIMS = (
     *(
         AnalysisClaim(
             source="ch. 6, Sec. 4, Theorem 1",
-            statement="A closed path in one colour gives a continuous gait",
+            statement="A closed path in one color gives a continuous gait",
             case=color,
             published=True,
             measure=partial(_one_color_is_accepted, color),
@@ -287,7 +287,7 @@ CLAIMS = (
     *(
         AnalysisClaim(
             source="ch. 6, Sec. 5",
-            statement="Sign of R all along the gait, on the exact lines",
+            statement="Sign of R along the whole gait, on the exact lines",
             case=name,
             published=_SIGN[key],
             wrong=key in _BLUE,
@@ -299,7 +299,7 @@ CLAIMS = (
     *(
         AnalysisClaim(
             source=f"ch. 6, Sec. 5, Fig. {_FIGURES[key]}",
-            statement="The gait is more robust than its biased twin",
+            statement="The gait is more robust than its biased counterpart",
             case=name,
             published=True,
             wrong=key in _BLUE,
@@ -320,11 +320,11 @@ CLAIMS = (
     ),
     AnalysisClaim(
         source="ch. 6, Sec. 6, Figs. 23, 28",
-        statement="Gait 2, as printed, has a greater advantage over the twin of 99 % than over "
-        "that of 80 %",
+        statement="Gait 2, as printed, has a greater advantage over the gait with a bias of 99 % "
+        "than over that of 80 %",
         published=True,
-        why="By the margin the printed Gait 2 has none over either: 0.7251 rad against 0.7285 and "
-        "0.7851. What the diagrams compare is rounding.",
+        why="By the margin the printed Gait 2 has none over either: 0.7251 rad compared with "
+        "0.7285 and 0.7851. The diagrams compare rounding.",
         measure=_greater_advantage_over_99,
     ),
     AnalysisClaim(
@@ -335,7 +335,7 @@ CLAIMS = (
     ),
     AnalysisClaim(
         source="ch. 6, Sec. 6",
-        statement="Scaling α₃ and α₄ alone may make a gait less robust",
+        statement="Scaling only α₃ and α₄ may make a gait less robust",
         published=True,
         measure=_partial_scaling_can_harm,
     ),

@@ -11,13 +11,13 @@ from tiltsim.report.measures import is_more_robust, no_rotor_stops, tracking_err
 from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
 from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS, robustness
 
-_SHAPES: Final = "The figures are lost: place and colour as described, size ours. "
+_SHAPES: Final = "The figures are not available: place and color as described, size ours. "
 _CIRCLE: Final = "ch07_robust_gaits/circle#"
 _GAITS: Final = {f"ch07_gait_{i}": f"Gait {i}" for i in (1, 2, 3)}
 
 
 def _is_sensitive(key: str) -> bool:
-    """Whether less than 0.2 rad of roll or pitch make the biased twin singular."""
+    """Whether less than 0.2 rad of roll or pitch make the biased gait singular."""
     margin = robustness(PUBLISHED_GAITS[key]).margin_biased
     return margin is not None and margin < 0.2
 
@@ -32,7 +32,7 @@ CLAIMS = (
     *(
         AnalysisClaim(
             source=f"ch. 7, Sec. 3.2, Fig. {figure}",
-            statement="The gait is more robust than its biased twin",
+            statement="The gait is more robust than its biased counterpart",
             case=name,
             published=True,
             wrong=key == "ch07_gait_1",
@@ -46,8 +46,8 @@ CLAIMS = (
         statement="The biased Gait 2 is very sensitive to the attitude (margin below 0.2 rad)",
         published=True,
         why=_SHAPES
-        + "The biased twin keeps 1.45 rad. It keeps the less the larger the rectangle: 0.25 "
-        "rad with a corner at (-1.40, 1.40) rad, beyond which the red gait itself is singular.",
+        + "The biased gait keeps 1.45 rad. A larger rectangle reduces it: 0.25 rad with a "
+        "corner at (-1.40, 1.40) rad, beyond which the red gait itself is singular.",
         measure=partial(_is_sensitive, "ch07_gait_2"),
     ),
     FlightClaim(
@@ -59,7 +59,7 @@ CLAIMS = (
     ),
     FlightClaim(
         source="ch. 7, Sec. 5, Fig. 9",
-        statement="No rotor reaches zero speed while tracking; flown: the red gaits, which track",
+        statement="No rotor reaches zero speed while tracking (the red gaits, which track)",
         published=True,
         flights=tuple(_CIRCLE + name for name in ("gait_2", "gait_3")),
         measure=no_rotor_stops,

@@ -27,8 +27,8 @@ _GAITS: Final[dict[str, Path]] = {
     "Gait 3": Circle("blue", (0.5, -0.5), 0.3),
 }
 DIGITS: Final = (
-    "The thesis searches with coefficients printed to four digits; searched with those, the "
-    "printed value comes out. In closed form it is 2δ = 2 atan(K_m / (L K_f))."
+    "The thesis searches with coefficients printed to four digits; a search with those "
+    "gives the printed value. In closed form it is 2δ = 2 atan(K_m / (L K_f))."
 )
 
 
@@ -53,7 +53,7 @@ def _divides_in_two() -> bool:
 
 
 def _is_zero_on(color: str) -> bool:
-    """Whether R_φ and R_θ vanish on a colour's lines."""
+    """Whether R_φ and R_θ vanish on the lines of a color."""
     rng = np.random.default_rng(0)
     for first, second in rng.uniform(-1.0, 1.0, (200, 2)).tolist():
         back = (
@@ -86,7 +86,7 @@ def _regular(name: str) -> bool:
     return row.margin_exact > 1e-6
 
 
-def _no_unacceptable_attitude() -> bool:
+def _no_singular_attitude() -> bool:
     return robustness(PUBLISHED_GAITS["ch08_gait_2"]).margin > np.pi / 2 - 1e-9
 
 
@@ -112,7 +112,7 @@ CLAIMS = (
     ),
     AnalysisClaim(
         source="ch. 8, Sec. 3.4",
-        statement="The colours meet at P = (p, -p) with p",
+        statement="The colors meet at P = (p, -p) with p",
         published="0.167099",
         unit="rad",
         in_kind=(0.167, 0.1672),
@@ -144,7 +144,7 @@ CLAIMS = (
             case=color,
             published=color == "red",
             wrong=color == "blue",
-            why="They vanish exactly on blue, too, and so does R: " + RANK
+            why="They also vanish exactly on blue, and so does R: " + RANK
             if color == "blue"
             else "",
             measure=partial(_is_zero_on, color),
@@ -163,7 +163,7 @@ CLAIMS = (
     ),
     AnalysisClaim(
         source="ch. 8, Secs. 3.4-3.5",
-        statement="At P both colours have the same angles, so that the colour can change",
+        statement="At P both colors have the same angles, so that the color can change",
         published=True,
         measure=_colors_meet_at_p,
     ),
@@ -180,7 +180,7 @@ CLAIMS = (
     *(
         AnalysisClaim(
             source="ch. 8, Sec. 3.5",
-            statement="Under the theorem the determinant at level attitude is never zero",
+            statement="According to the theorem the determinant at level attitude is never zero",
             case=name,
             published=True,
             wrong=name != "Gait 2",
@@ -191,7 +191,7 @@ CLAIMS = (
     ),
     AnalysisClaim(
         source="ch. 8, Sec. 4.1, Fig. 10",
-        statement="The gait is more robust than its biased twin",
+        statement="The gait is more robust than its biased counterpart",
         case="Gait 1",
         published=True,
         wrong=True,
@@ -200,23 +200,23 @@ CLAIMS = (
     ),
     AnalysisClaim(
         source="ch. 8, Sec. 4.2, Fig. 12",
-        statement="The gait is more robust than its biased twin",
+        statement="The gait is more robust than its biased counterpart",
         case="Gait 2",
         published=True,
         measure=partial(is_more_robust, "ch08_gait_2"),
     ),
     AnalysisClaim(
         source="ch. 8, Sec. 4.2, Fig. 12",
-        statement="Gait 2 has no unacceptable attitude at all",
+        statement="Gait 2 has no singular attitude at all",
         published=True,
-        measure=_no_unacceptable_attitude,
+        measure=_no_singular_attitude,
     ),
     AnalysisClaim(
         source="ch. 8, Sec. 4.3, Fig. 14",
-        statement="Gait 3 and its biased twin both leave attitudes enough (0.2 rad)",
+        statement="Gait 3 and its biased counterpart both leave enough attitudes (0.2 rad)",
         published=True,
         wrong=True,
-        why=RANK + " The twin's R changes sign.",
+        why=RANK + " R of the biased gait changes sign.",
         measure=_both_are_sufficient,
     ),
 )

@@ -29,7 +29,7 @@ _RED: Final = (1, 2, 3, 4)
 _BLUE: Final = (5, 6, 7, 8)
 _LESS: Final = (
     "With rotors from 305.27 to 394.10 rad/s, F_Z = 4.2 N and no yaw torque, the side forces of a "
-    "red gait are those of opposite rotors that differ, and these have little room left."
+    "red gait come from differences between opposite rotors, which have little room left."
 )
 
 
@@ -78,7 +78,7 @@ def _is_rectangle(number: int) -> bool:
     return len(corners) == 4 and all(len(span) == 2 for span in spans)
 
 
-def _gaits_2_and_3_are_alike() -> bool:
+def _gaits_2_and_3_are_similar() -> bool:
     return bool(np.allclose(_acceleration(2), _acceleration(3), rtol=1e-6))
 
 
@@ -99,10 +99,12 @@ def _first_four_repeat(flights: Mapping[str, Metrics]) -> bool:
 
 
 def _spread(address: str, flights: Mapping[str, Metrics]) -> float:
-    """Largest over smallest distance from the centre."""
+    """Largest over smallest distance from the center."""
     metrics = flights[address]
-    most, least = (float(metrics[f"{which}_orbit_radius_after_20s"]) for which in ("max", "min"))
-    return most / least
+    largest, smallest = (
+        float(metrics[f"{which}_orbit_radius_after_20s"]) for which in ("max", "min")
+    )
+    return largest / smallest
 
 
 def _circle(name: str) -> str:
@@ -126,7 +128,7 @@ CLAIMS = (
     *(
         AnalysisClaim(
             source="ch. 9, Sec. 3.2",
-            statement="Without yaw torque the rotor limits leave a solution",
+            statement="Without yaw torque there is a solution within the rotor limits",
             case=f"Gait {number}",
             published=number not in (1, 4),
             measure=partial(_has_solution, number),
@@ -140,7 +142,7 @@ CLAIMS = (
             case=f"Gait {number}",
             published=True,
             wrong=number == 6,
-            why="Under Eq. (11) a rotor makes 1.25 N at most; two tilted by 0.5 rad and two by "
+            why="Under Eq. (11) a rotor produces at most 1.25 N; two tilted by 0.5 rad and two by "
             "0.834 rad lift 3.87 N."
             if number == 6
             else "",
@@ -161,7 +163,7 @@ CLAIMS = (
     *(
         AnalysisClaim(
             source="ch. 9, Sec. 5",
-            statement="The coupling is no singularity: τ has full rank",
+            statement="The coupling is not a singularity: τ has full rank",
             case=f"Gait {number}",
             published=True,
             wrong=True,
@@ -173,13 +175,13 @@ CLAIMS = (
     *(
         AnalysisClaim(
             source=f"ch. 9, Sec. 3.3, Fig. {figure}",
-            statement="Accelerations reached in body axes: least and greatest, along x and y",
+            statement="Attainable accelerations in body axes: minimum and maximum along x and y",
             case=f"Gait {number}",
             published=("-2", "-2", "2", "2"),
             unit="m/s^2",
             wrong=True,
-            why=_LESS + " To lift 4.2 N, tilted by 0.5 rad, the four make 4.79 N of the 5 N that "
-            "Eq. (11) allows: opposite ones differ by 0.21 N at most, which is 0.24 m/s^2 "
+            why=_LESS + " To lift 4.2 N, tilted by 0.5 rad, the four produce 4.79 N of the 5 N "
+            "that Eq. (11) allows: opposite ones differ by at most 0.21 N, which is 0.24 m/s^2 "
             "sideways, and half of it without yaw torque.",
             measure=partial(_acceleration, number),
         )
@@ -199,7 +201,7 @@ CLAIMS = (
         source="ch. 9, Sec. 3.3",
         statement="Gaits 2 and 3 reach similar accelerations",
         published=True,
-        measure=_gaits_2_and_3_are_alike,
+        measure=_gaits_2_and_3_are_similar,
     ),
     AnalysisClaim(
         source="ch. 9, Sec. 4.1",
@@ -210,14 +212,14 @@ CLAIMS = (
     ),
     FlightClaim(
         source="ch. 9, Sec. 4.2, Fig. 10",
-        statement="All four references end in periodic trajectories: none of them is lost",
+        statement="All four references end in periodic trajectories: none of the flights diverges",
         published=True,
         flights=tuple(map(_circle, ("01", "05", "10", "15"))),
         measure=_first_four_repeat,
     ),
     FlightClaim(
         source="ch. 9, Sec. 5",
-        statement="The faster the circle, the larger the error; the fastest is lost",
+        statement="The faster the circle, the larger the error; the fastest diverges",
         published=True,
         flights=tuple(map(_circle, ("01", "05", "10", "15", "20"))),
         measure=_faster_is_worse,
@@ -229,7 +231,7 @@ CLAIMS = (
             case=f"{omega} rad/s",
             published="1.00",
             in_kind=(1.0, 1.15),
-            why="A circle at 0.5 rad/s, a tenth off round at 1.0 rad/s." if omega == "1.0" else "",
+            why="A circle at 0.5 rad/s, a tenth off at 1.0 rad/s." if omega == "1.0" else "",
             flights=(_circle(name),),
             measure=partial(_spread, _circle(name)),
         )
@@ -237,7 +239,7 @@ CLAIMS = (
     ),
     FlightClaim(
         source="ch. 9, Sec. 4.2, Fig. 10",
-        statement="At 1.5 rad/s the orbit is an ellipse (radii a fifth apart and more)",
+        statement="At 1.5 rad/s the orbit is an ellipse (radii at least a fifth apart)",
         published=True,
         flights=(_circle("15"),),
         measure=lambda flights: _spread(_circle("15"), flights) > 1.2,

@@ -44,7 +44,7 @@ def _full_rank_unless_both_rest() -> bool:
     return _rank(200.0, 0.0, tilting=False) == 2 and _rank(0.0, 200.0, tilting=False) == 2
 
 
-def _thrust_points_to_the_centre() -> bool:
+def _thrust_points_to_the_center() -> bool:
     """Eq. (18), alpha = t / (1 - I_T / I_B): the thrusts turn with the circle, 1 rad/s."""
     tilt_rate = 1.0 / turn_per_tilt(THESIS_CAR)
     yaw_rate = -counter_yaw_per_tilt(THESIS_CAR) * tilt_rate
@@ -52,7 +52,7 @@ def _thrust_points_to_the_centre() -> bool:
 
 
 def _drift_has_a_cause() -> bool:
-    """Whether the minimum-norm law moves the lean while position and error rest."""
+    """Whether the minimum-norm control law moves the lean in steady tracking."""
     return drift_rate(0.0, orbit(_RADIUS, _OMEGA), THESIS_CAR) > 0.0
 
 
@@ -65,7 +65,7 @@ def _both_small(flights: Mapping[str, Metrics]) -> bool:
     return all(_small(address, f"final_position_error_{axis}", 0.01, flights) for axis in "xy")
 
 
-def _inputs_part(flights: Mapping[str, Metrics]) -> bool:
+def _inputs_diverge(flights: Mapping[str, Metrics]) -> bool:
     """Whether the inputs are ten times as far apart after 2000 s as after 10 s."""
     early, late = (
         abs(float(flights[_THIRD + name]["final_input_split"]))
@@ -133,7 +133,7 @@ CLAIMS = (
     ),
     FlightClaim(
         source="ch. 10, Sec. 4.1, Figs. 7-8",
-        statement="The third-derivative law brings the error to zero within ten seconds (0.01 m)",
+        statement="The third-derivative controller makes the error vanish in ten seconds (0.01 m)",
         published=True,
         flights=(_THIRD + "ten_seconds",),
         measure=_both_small,
@@ -149,23 +149,23 @@ CLAIMS = (
     ),
     FlightClaim(
         source="ch. 10, Sec. 4.1, Figs. 9, 14",
-        statement="State drift: the inputs part after the error is gone",
+        statement="State drift: the inputs diverge after the error has vanished",
         published=True,
         flights=(_THIRD + "ten_seconds", _THIRD + "two_thousand_seconds"),
-        measure=_inputs_part,
+        measure=_inputs_diverge,
     ),
     AnalysisClaim(
         source="ch. 10, Sec. 6.2",
-        statement="The cause of the drift from one equilibrium to another can be given",
+        statement="The cause of the drift from one equilibrium to another is known",
         published=False,
         wrong=True,
-        why="It can: the minimum-norm distribution is not integrable, and the lean advances by a "
+        why="It is: the minimum-norm distribution is not integrable, and the lean advances by a "
         "holonomy, β' = Ω / (1 + κ² W(β)) on a circle.",
         measure=_drift_has_a_cause,
     ),
     FlightClaim(
         source="ch. 10, Sec. 5, Figs. 20-21",
-        statement="With the tilt planned the error vanishes, too (0.01 m at 10 s)",
+        statement="With the tilt planned the error also vanishes (0.01 m at 10 s)",
         published=True,
         flights=(_PLANNED,),
         measure=partial(_small, _PLANNED, "final_position_error_x", 0.01),
@@ -186,13 +186,14 @@ CLAIMS = (
     ),
     AnalysisClaim(
         source="ch. 10, Sec. 5, Eq. (18)",
-        statement="α = t / (1 - I_T / I_B) keeps the thrusts pointed at the centre",
+        statement="α = t / (1 - I_T / I_B) keeps the thrusts pointed at the center",
         published=True,
-        measure=_thrust_points_to_the_centre,
+        measure=_thrust_points_to_the_center,
     ),
     FlightClaim(
         source="ch. 10, Sec. 6.1, Figs. 24-25",
-        statement="The fourth-derivative law drifts until a rotor stops, and then loses the circle",
+        statement="With the fourth-derivative controller the inputs drift until a rotor stops, "
+        "and then it fails",
         published=True,
         flights=(_FAILURE,),
         measure=_fails_after_a_rotor_stops,

@@ -29,7 +29,8 @@ _SMALL: Final = "ch11_penguin/straight_line#small"
 _LARGE: Final = "ch11_penguin/straight_line#large"
 _SERVO: Final = (
     "In MuJoCo the tilt servo needs some 20 ms for a swing of 4.2 rad, in which the thrusts point "
-    "elsewhere: e_x reaches 13 mm. In the thesis' equations the thrusts jump, and e_x stays 0."
+    "in other directions: e_x reaches 13 mm. In the thesis's equations the thrusts jump, and e_x "
+    "stays 0."
 )
 
 
@@ -60,7 +61,7 @@ def _switches_within(state: State) -> bool:
     return 0.0 < half_period(_SWING, state).free_time < 1.0
 
 
-def _greatest_at_the_ends(state: State) -> bool:
+def _largest_at_the_ends(state: State) -> bool:
     """Proposition 6, along the motion in steps of 10 ms."""
     half = half_period(_SWING, state)
     between = _SWING.free(half.free_time, state)
@@ -86,7 +87,7 @@ def _eq_42_holds(state: State) -> bool:
 
 
 def _first_half_period() -> bool:
-    """Remark 8: from rest one rotor alone pushes for half a period, mirrored, into the zone."""
+    """Remark 8: from rest a single rotor pushes for half a period, mirrored, into the zone."""
     error, rate = _SWING.pushed(_SWING.half_period, (0.0, 0.0))
     return _SWING.both_push((-error, -rate))
 
@@ -103,7 +104,7 @@ def _switch_line() -> float:
 
 
 def _is_asymptotically_stable() -> bool:
-    """Whether errors die out: whether the limit cycle is the origin."""
+    """Whether errors vanish: whether the limit cycle is the origin."""
     return max(map(abs, limit_cycle(_SWING))) < 1e-9
 
 
@@ -120,7 +121,7 @@ def _errors_stay_below(flights: Mapping[str, Metrics]) -> bool:
     return all(float(flights[_SMALL][f"max_abs_error_{axis}"]) < 0.1 for axis in "xy")
 
 
-def _saturates_now_and_then(flights: Mapping[str, Metrics]) -> bool:
+def _saturates_intermittently(flights: Mapping[str, Metrics]) -> bool:
     return 0.0 < float(flights[_LARGE]["saturated_fraction"]) < 1.0
 
 
@@ -152,7 +153,7 @@ CLAIMS = (
     ),
     FlightClaim(
         source="ch. 11, Sec. 4.4, Fig. 10",
-        statement="With the small swing no input saturates (share of samples)",
+        statement="With the small swing no input saturates (fraction of samples)",
         published="0.00",
         flights=(_SMALL,),
         measure=lambda flights: float(flights[_SMALL]["saturated_fraction"]),
@@ -176,7 +177,7 @@ CLAIMS = (
     ),
     AnalysisClaim(
         source="ch. 11, Sec. 6, Lemma 5, Eq. (42)",
-        statement="The printed solution with both rotors pushing is right",
+        statement="The printed solution with both rotors pushing is correct",
         published=True,
         measure=lambda: _for_all(_eq_42_holds),
     ),
@@ -202,7 +203,7 @@ CLAIMS = (
         source="ch. 11, Sec. 6, Prop. 6",
         statement="In between, the Lyapunov candidate does not exceed its values at half periods",
         published=True,
-        measure=lambda: _for_all(_greatest_at_the_ends),
+        measure=lambda: _for_all(_largest_at_the_ends),
     ),
     AnalysisClaim(
         source="ch. 11, Sec. 6, Remark 10, Eq. (71)",
@@ -212,7 +213,7 @@ CLAIMS = (
     ),
     AnalysisClaim(
         source="ch. 11, Sec. 6, Remark 10",
-        statement="It grows nowhere in the zone by more",
+        statement="It grows by more nowhere in the zone",
         published=True,
         measure=lambda: _for_all(lambda state: lyapunov_growth(_SWING, state) <= 0.75 + 1e-12),
     ),
@@ -233,7 +234,7 @@ CLAIMS = (
         statement="With the large swing inputs saturate from time to time, not always",
         published=True,
         flights=(_LARGE,),
-        measure=_saturates_now_and_then,
+        measure=_saturates_intermittently,
     ),
     FlightClaim(
         source="ch. 11, Sec. 8, Prop. 7, Eq. (77)",

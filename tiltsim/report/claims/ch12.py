@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from tiltsim.report.claims.ch08 import DIGITS
-from tiltsim.report.measures import determinant_coefficients
+from tiltsim.report.measures import determinant_coefficients, terms
 from tiltsim.report.model import AnalysisClaim
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.analysis.two_color_map import (
@@ -27,21 +27,19 @@ _P: Final = point_p(_VEHICLE)
 SCALE: Final = 1.025
 """Ch. 12 prints the determinant times this constant."""
 
-EQ_8: Final = {
-    **{"cccc": 4.100},
-    **{"cccs": 5.680, "ccsc": -5.680, "cscc": 5.680, "sccc": -5.680},
-    **{"ccss": 0.9954, "cssc": 0.9954, "sccs": 0.9954, "sscc": 0.9954},
-    **{"cscs": -2.050, "scsc": -2.050},
-    **{"csss": -0.1743, "scss": 0.1743, "sscs": -0.1743, "sssc": 0.1743},
-}
-EQ_6: Final = {
-    **{"ccsc": 1.025, "sccc": -1.025, "csss": -1.025, "sscs": 1.025},
-    **{"ccss": 2.927, "cssc": 2.927, "sccs": -2.927, "sscc": -2.927},
-}
-EQ_7: Final = {
-    **{"cccs": 1.025, "cscc": -1.025, "scss": -1.025, "sssc": 1.025},
-    **{"ccss": -2.927, "cssc": 2.927, "sccs": -2.927, "sscc": 2.927},
-}
+EQ_8: Final = terms(
+    "4.100 cccc + 5.680 cccs - 5.680 ccsc + 5.680 cscc - 5.680 sccc + 0.9954 ccss "
+    "+ 0.9954 cssc + 0.9954 sccs + 0.9954 sscc - 2.050 cscs - 2.050 scsc - 0.1743 csss "
+    "+ 0.1743 scss - 0.1743 sscs + 0.1743 sssc"
+)
+EQ_6: Final = terms(
+    "1.025 ccsc - 1.025 sccc - 1.025 csss + 1.025 sscs + 2.927 ccss + 2.927 cssc "
+    "- 2.927 sccs - 2.927 sscc"
+)
+EQ_7: Final = terms(
+    "1.025 cccs - 1.025 cscc - 1.025 scss + 1.025 sssc - 2.927 ccss + 2.927 cssc "
+    "- 2.927 sccs + 2.927 sscc"
+)
 
 
 def _terms_hold(part: str, printed: dict[str, float]) -> bool:
@@ -64,7 +62,7 @@ def _coefficients_differ_greatly() -> bool:
     return False
 
 
-def _maps_are_alike() -> bool:
+def _maps_are_similar() -> bool:
     """The same counts of roots, P within 0.01 rad and L within 0.02 rad."""
     own, former = (root_counts(grid_roots(vehicle)) for vehicle in (_VEHICLE, _FORMER))
     axis = np.linspace(-1.0, 1.0, 41)
@@ -74,8 +72,8 @@ def _maps_are_alike() -> bool:
     )
 
 
-def _only_three_parameters_count() -> bool:
-    """Whether mass, inertia and gravity leave the determinant's coefficients alone."""
+def _only_three_parameters_matter() -> bool:
+    """Whether mass, inertia and gravity do not change the determinant's coefficients."""
     other = _VEHICLE._replace(mass=1.0, inertia_xx=0.1, inertia_zz=0.2, gravity=3.7)
     angles = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 4))
     same = zip(residuals(angles, _VEHICLE), residuals(angles, other), strict=True)
@@ -83,14 +81,14 @@ def _only_three_parameters_count() -> bool:
 
 
 def _two_vehicles_can_share_a_map() -> bool:
-    """Whether other L, K_f and K_m with the same ratio make the same map."""
-    twin = _VEHICLE._replace(
+    """Whether other L, K_f and K_m with the same ratio give the same map."""
+    other_vehicle = _VEHICLE._replace(
         arm_length=2.0 * _VEHICLE.arm_length,
         thrust_coefficient=3.0 * _VEHICLE.thrust_coefficient,
         drag_coefficient=6.0 * _VEHICLE.drag_coefficient,
     )
     angles = np.random.default_rng(1).uniform(-1.0, 1.0, (50, 4))
-    same = zip(residuals(angles, _VEHICLE), residuals(angles, twin), strict=True)
+    same = zip(residuals(angles, _VEHICLE), residuals(angles, other_vehicle), strict=True)
     return all(np.allclose(own, changed, rtol=1e-9, atol=1e-12) for own, changed in same)
 
 
@@ -116,7 +114,7 @@ CLAIMS = (
     *(
         AnalysisClaim(
             source=f"ch. 12, {equations}",
-            statement=f"{name} is printed right, term by term",
+            statement=f"{name} is printed correctly, term by term",
             published=True,
             measure=partial(_terms_hold, part, printed),
         )
@@ -132,32 +130,32 @@ CLAIMS = (
         published=True,
         wrong=True,
         why="Up to the common factor 1.025 they are those of ch. 3 within 1 %: K_m / (L K_f) is "
-        "0.1700 in place of 0.1687.",
+        "0.1700 instead of 0.1687.",
         measure=_coefficients_differ_greatly,
     ),
     AnalysisClaim(
         source="ch. 12",
         statement="L, K_f and K_m are the only parameters that the map depends on",
         published=True,
-        measure=_only_three_parameters_count,
+        measure=_only_three_parameters_matter,
     ),
     AnalysisClaim(
         source="ch. 12",
-        statement="Every set of L, K_f and K_m has a map of its own",
+        statement="Every set of L, K_f and K_m has its own map",
         published=True,
         wrong=True,
-        why="The map depends on the ratio K_m / (L K_f) alone.",
+        why="The map depends only on the ratio K_m / (L K_f).",
         measure=lambda: not _two_vehicles_can_share_a_map(),
     ),
     AnalysisClaim(
         source="ch. 12, Fig. 1",
-        statement="The map is much like that of ch. 8",
+        statement="The map is very similar to that of ch. 8",
         published=True,
-        measure=_maps_are_alike,
+        measure=_maps_are_similar,
     ),
     AnalysisClaim(
         source="ch. 12, Fig. 1",
-        statement="The colours meet at P = (p, -p) with p",
+        statement="The colors meet at P = (p, -p) with p",
         published="0.168421",
         unit="rad",
         in_kind=(0.1684, 0.1685),
