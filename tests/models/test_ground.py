@@ -10,6 +10,7 @@ import tiltsim
 from tiltsim.errors import InputError
 from tiltsim.models.parts import Ground
 from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
+from tiltsim.plants.flight_model import flight_model
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 VEHICLE = PRESETS["ar_drone_2"]
@@ -41,21 +42,32 @@ def test_a_vehicle_set_down_stands_on_its_skids_and_carries_its_weight(vehicle, 
     assert touching == {"ground", "skid_left_collision", "skid_right_collision"}
 
 
-def test_friction_holds_up_to_its_share_of_the_weight():
-    def slid(push):
-        model = compile_model(
-            RotorcraftSpec("quadrotor", VEHICLE, ground=Ground(0.0, 0.5)), visuals=False
-        )
+@pytest.mark.parametrize(
+    "friction", [0.2, 0.5, 1.0, 1.5, None], ids=lambda value: value or "default"
+)
+def test_friction_holds_up_to_its_share_of_the_weight(friction):
+    ground = {"height": 0.0} if friction is None else {"height": 0.0, "friction": friction}
+    tables = {"vehicle": {"model": "quadrotor"}, "controller": {"law": "yaw_position"}}
+    scenario = tiltsim.parse_scenario(
+        {**tables, "ground": ground, "initial": {"position": [0, 0, 1]}}
+    )
+    model = flight_model(scenario, 100)
+    share = 0.8 if friction is None else friction
+
+    def acceleration(push):
+        """In g, of a vehicle that stands and is then pushed at the height of its skids."""
         data = mujoco.MjData(model)
         data.qpos[2] = ON_SKIDS
+        mujoco.mj_step(model, data, 300)
         data.body("vehicle").xfrc_applied[0] = push * WEIGHT
-        # Pushed at the height of the skids, lest it tip over.
-        data.body("vehicle").xfrc_applied[4] = push * WEIGHT * ON_SKIDS
-        mujoco.mj_step(model, data, 500)
-        return data.qpos[0]
+        data.body("vehicle").xfrc_applied[4] = -push * WEIGHT * ON_SKIDS
+        mujoco.mj_step(model, data, 50)
+        before = data.qvel[0]
+        mujoco.mj_step(model, data, 100)
+        return (data.qvel[0] - before) / (100 * model.opt.timestep * VEHICLE.gravity)
 
-    assert slid(0.4) < 0.01
-    assert slid(0.6) > 0.05
+    assert abs(acceleration(0.95 * share)) < 0.005
+    assert acceleration(1.2 * share) == pytest.approx(0.2 * share, rel=0.3)
 
 
 def test_without_ground_nothing_touches():

@@ -66,6 +66,7 @@ class TestMap:
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
+        self.failed: set[str] = set()
         self.by_line: dict[str, dict[int, list[str]]] = {}
         self._coverage: Coverage | None = None
 
@@ -75,13 +76,15 @@ class TestMap:
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         self.seconds[report.nodeid] = self.seconds.get(report.nodeid, 0.0) + report.duration
+        if report.failed:
+            self.failed.add(report.nodeid)
 
     def measure(self, file: Path) -> int:
         """Run all tests once, in a process of their own."""
         data = file.with_suffix(".coverage")
         self._coverage = Coverage(data, source=[str(SOURCE_ROOT / PACKAGE)], config_file=False)
         self._coverage.start()
-        code = pytest.main([*PYTEST, TESTS], plugins=[self])
+        pytest.main([*PYTEST, TESTS], plugins=[self])
         self._coverage.stop()
         self._coverage.save()
         contexts = CoverageData(data)
@@ -89,15 +92,17 @@ class TestMap:
         for name in contexts.measured_files():
             lines = contexts.contexts_by_lineno(name)
             self.by_line[str(Path(name).relative_to(SOURCE_ROOT))] = {
-                line: sorted(tests) for line, tests in lines.items()
+                line: sorted(set(tests) - self.failed) for line, tests in lines.items()
             }
         data.unlink()
-        if code == pytest.ExitCode.OK:
-            file.write_text(json.dumps([self.seconds, self.by_line]))
-        return int(code)
+        passed = {test: self.seconds[test] for test in self.seconds.keys() - self.failed}
+        file.write_text(json.dumps([passed, self.by_line, sorted(self.failed)]))
+        return 0
 
     def read(self, file: Path) -> None:
-        self.seconds, self.by_line = json.loads(file.read_text())
+        self.seconds, self.by_line, failed = json.loads(file.read_text())
+        for test in failed:
+            print(f"left out, as it fails without any mutant: {test}")
 
     def tests_of(self, path: str, mutant: Mutant) -> list[str]:
         """Tests that execute the mutant's lines, quickest first.
@@ -185,8 +190,8 @@ def measured_map() -> TestMap:
     if not file.exists():
         print("running all tests once, to see which lines each executes", flush=True)
         child = in_a_fork(lambda: tests.measure(file), 1800.0)
-        if os.waitpid(child, 0)[1] or not file.exists():
-            sys.exit(f"the tests in {TESTS} do not pass")
+        if os.waitpid(child, 0)[1]:
+            sys.exit(f"the tests in {TESTS} could not be run")
     tests.read(file)
     return tests
 

@@ -11,7 +11,7 @@ import pytest
 from tiltsim.errors import InputError
 from tiltsim.scenario.document import scenario_toml
 from tiltsim.scenario.library import library_entries
-from tiltsim.scenario.loading import load_scenario, parse_override, parse_scenario
+from tiltsim.scenario.loading import load_scenario, merge, parse_override, parse_scenario
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.studies.checking import collect
 
@@ -679,3 +679,31 @@ def test_an_unknown_key_is_told_before_the_one_it_leaves_missing(write):
 def test_a_single_table_of_a_list_is_told_how_to_write_it(write):
     line = refusal(write('[expect]\nmetric = "duration"\nmin = 1.0\n'))
     assert "expect: one table where a list of tables stands; write [[expect]]" in line
+
+
+# --- merging -----------------------------------------------------------------------------------
+
+SPELT_OUT = {"law": "attitude_altitude", "gains": "exact"}
+
+
+def test_the_default_law_written_out_keeps_the_rest_of_its_table():
+    """A table without ``law`` is of the default one: naming it is no change of the kind."""
+    unnamed = {"controller": {"decoupler": "exact"}}
+    merged = merge(unnamed, {"controller": SPELT_OUT})
+    assert merged == {"controller": {"decoupler": "exact", **SPELT_OUT}}
+    assert unnamed == {"controller": {"decoupler": "exact"}}, "its arguments stay as they are"
+    back = merge({"controller": SPELT_OUT}, unnamed)
+    assert back == {"controller": {**SPELT_OUT, "decoupler": "exact"}}
+
+
+def test_another_law_or_type_replaces_the_whole_table():
+    base = {"controller": {"decoupler": "exact"}, "gait": {"type": "fixed", "angles": [0.0] * 4}}
+    full_pose, walk = {"law": "full_pose"}, {"type": "walk"}
+    assert merge(base, {"controller": full_pose, "gait": walk}) == {
+        "controller": full_pose,
+        "gait": walk,
+    }
+    longer = merge({"simulation": {"duration": 1.0}}, {"simulation": {"timestep": 0.002}})
+    assert longer == {"simulation": {"duration": 1.0, "timestep": 0.002}}
+    assert merge({"gait": 1}, {"gait": walk}) == {"gait": walk}
+    assert merge({"gait": walk}, {"gait": 1}) == {"gait": 1}

@@ -12,6 +12,7 @@ import pytest
 import tiltsim
 import tiltsim.engines.rows
 import tiltsim.plants.mujoco_plant
+import tiltsim.simulation.batch
 from tests.laws.layers.test_actuation import EVERYTHING
 from tests.laws.layers.test_air import STORM
 from tests.laws.test_laws import GUST, LAWS
@@ -25,6 +26,7 @@ from tiltsim.laws.layers.on_equations import on_equations
 from tiltsim.laws.layers.supervision import with_supervisor
 from tiltsim.plants.factory import make_plant
 from tiltsim.plants.flight_model import flight_model, model_cache_key
+from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import merge
 from tiltsim.simulation.batch import fly
@@ -57,6 +59,7 @@ STOPPING_ROTOR = {
     "controller": EXACT,
     "initial": {"rotor_speed": [20.0, 300.0, 300.0, 300.0], "angular_velocity": [0, 20, 0]},
 }
+LATE_LOSS = {"gait": {"type": "trot_instant", "amplitude": 0.9, "period": 2.0}}
 
 
 def scenario(tables, **simulation):
@@ -204,6 +207,26 @@ def test_a_lost_row_is_flown_no_further_and_its_place_is_taken():
     assert {result.end.time for result in results} == {results[0].end.time}
     assert results[0].end.time < 1.0
     assert all(result.flight is None for result in results)
+
+
+def test_the_end_of_a_lost_row_is_looked_for_from_the_last_calls_on(monkeypatch):
+    """Calls of 64 steps: at most two of them and one recording interval are flown again."""
+    flown = []
+    advance = MujocoPlant.advance
+
+    def counted(plant, steps, *rest):
+        flown.append(steps)
+        return advance(plant, steps, *rest)
+
+    lost = scenario(LATE_LOSS, duration=3600.0, record_timestep=0.05)
+    monkeypatch.setattr(tiltsim.simulation.batch, "CALL_TIME", 0.0)
+    monkeypatch.setattr(MujocoPlant, "advance", counted)
+    (row,) = fly([lost], keep_samples=True)
+    assert 2.0 < row.end.time < 2.1
+    assert 0 < sum(flown) <= 2 * 64 + 50
+    alone = tiltsim.simulate(lost)
+    assert row.end == alone.end
+    np.testing.assert_array_equal(row.flight.samples, alone.samples)
 
 
 # --- layers around the laws ---------------------------------------------------------------------

@@ -1,0 +1,57 @@
+"""What ends a flight, sample by sample: limits, numbers that are not finite, singular matrices."""
+
+from __future__ import annotations
+
+from math import inf, nan
+
+import numpy as np
+import pytest
+
+import tiltsim
+from tiltsim.laws.assembling import loop_of
+from tiltsim.plants.factory import make_plant
+from tiltsim.simulation.monitor import TerminationMonitor
+
+
+@pytest.fixture
+def judged():
+    """The end that a first sample with some fields changed calls for."""
+    scenario = tiltsim.parse_scenario({"simulation": {"engine": "python"}})
+    plant, fields = make_plant(scenario), loop_of(scenario).sample_fields
+    first = np.array([plant.time, *plant.observe()])
+
+    def end(**changed):
+        sample = first.copy()
+        for name, value in changed.items():
+            sample[fields.index(name)] = value
+        return TerminationMonitor(scenario).judge(plant, sample)
+
+    return end
+
+
+@pytest.mark.parametrize(
+    ("changed", "cause"),
+    [
+        ({"x": 6e4, "y": -8e4}, "1e+05 m away from the reference"),
+        ({"z": -2e4}, "2e+04 m away from the reference altitude"),
+        ({"p": -2e3}, "body rate p = -2e+03 rad/s"),
+        ({"q": 3e3}, "body rate q = 3e+03 rad/s"),
+        ({"r": 4e3}, "body rate r = 4e+03 rad/s"),
+        ({"rotor_speed_1": -2e5}, "rotor 1 at -2e+05 rad/s"),
+        ({"rotor_speed_4": 3e5}, "rotor 4 at 3e+05 rad/s"),
+    ],
+)
+def test_a_limit_is_named_with_its_value(judged, changed, cause):
+    end = judged(**changed)
+    assert (end.kind, end.cause, end.time) == ("diverged", cause, 0.0)
+
+
+@pytest.mark.parametrize("value", [nan, inf, -inf])
+def test_a_number_that_is_not_finite_is_named(judged, value):
+    end = judged(vy=value, roll=nan)
+    assert end.kind == "diverged"
+    assert end.cause.startswith("vy is no longer")
+
+
+def test_a_sound_sample_ends_nothing(judged):
+    assert judged() is None
