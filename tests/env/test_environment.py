@@ -240,8 +240,8 @@ def test_actions_have_the_vehicles_bounds_and_are_clipped_there(vehicle, low, hi
 @pytest.mark.parametrize(
     ("action", "words"),
     [
-        (np.zeros(7), r"action of shape \(7,\); \(8,\) is wanted \(thrusts, tilt_angles\)"),
-        (np.array([0.0] * 7 + [np.nan]), r"action\[7\] = nan; it must be finite"),
+        (np.zeros(7), r"action of shape \(7,\); expected \(8,\) \(thrusts, tilt_angles\)"),
+        (np.array([0.0] * 7 + [np.nan]), r"action\[7\] = nan: must be finite"),
     ],
 )
 def test_actions_that_cannot_be_told_are_refused(action, words):
@@ -467,7 +467,7 @@ def test_gymnasium_refuses_steps_outside_of_an_episode_and_actions_of_other_shap
         env.step(np.zeros(8))
     env.reset(seed=1)
     for action in (0.0, [0.0], np.zeros(4)):
-        with pytest.raises(ValueError, match=r"\(8,\) is wanted"):
+        with pytest.raises(ValueError, match=r"expected \(8,\)"):
             env.step(action)
     env.step(np.full(8, 5.0))  # clipped
 

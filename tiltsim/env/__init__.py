@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
-from tiltsim.env.environment import Reward, TiltrotorEnv, hover_reward
+from tiltsim.env.environment import Environment, TiltrotorEnv
+from tiltsim.env.task import Reward, Task, hover_reward
 
-__all__ = ["Reward", "TiltrotorEnv", "hover_reward"]
+__all__ = ["Environment", "Reward", "Task", "TiltrotorEnv", "hover_reward"]

@@ -1,4 +1,4 @@
-"""Domain randomisation: every episode flies a scenario drawn along the axes of a sweep."""
+"""Domain randomization: every episode flies a scenario drawn along the axes of a sweep."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from pydantic import ValidationError
 from tiltsim.errors import InputError
 from tiltsim.scenario.document import without_none
 from tiltsim.scenario.messages import one_line_message
-from tiltsim.sweeps.definition import Definition
+from tiltsim.sweeps.checks import check_points
+from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.loading import load_sweep
-from tiltsim.sweeps.plan import Plan
+from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.tables import NormalAxis, SeedAxis, Sweep, UniformAxis
 
 if TYPE_CHECKING:
@@ -28,13 +29,17 @@ LARGEST_SEED: Final = 2**31
 class Domain:
     """Scenarios around a base: values drawn along axes, independently for every episode.
 
-    ``uniform`` and ``normal`` axes are drawn from their distributions, those with values of their
-    own (``list``, ``linspace``, ``cases``) from these, each as likely as the next, and one place
-    for all axes of a group; a ``seed`` is any.
+    ``uniform`` and ``normal`` axes are drawn from their distributions; axes that list their values
+    (``list``, ``linspace``, ``cases``) from these with equal probability, at one position for all
+    axes of a group; a ``seed`` is drawn from all seeds.
     """
 
-    def __init__(self, scenario: Scenario, axes: Sequence[Mapping[str, Any]]) -> None:
-        """Raises `InputError`, as a sweep would, where an axis is invalid."""
+    def __init__(self, points: SweepPoints) -> None:
+        self._points = points
+
+    @classmethod
+    def from_axes(cls, scenario: Scenario, axes: Sequence[Mapping[str, Any]]) -> Domain:
+        """The domain around a scenario. Raises `InputError` if an axis is invalid."""
         drawn = any(axis.get("type") in {"uniform", "normal", "seed"} for axis in axes)
         document = {
             "scenario": "base",
@@ -47,41 +52,39 @@ class Domain:
             raise InputError(f"domain: {one_line_message(error, document, Sweep)}") from None
         base = without_none(scenario.model_dump(mode="json"))
         base.pop("expect", None)
-        self._plan = _plan(sweep, base)
-        self._plan.check()
+        tables = json.loads(sweep.model_dump_json(exclude_none=True))
+        definition = SweepDefinition("domain", tables, json.loads(json.dumps(base)), {})
+        points = SweepPoints(definition)
+        check_points(points)
+        return cls(points)
 
     @classmethod
-    def of_sweep(cls, path: str | Path) -> tuple[Domain, Scenario]:
-        """The domain of a sweep file, and its base scenario.
-
-        Raises `InputError` where the file is no sweep along axes.
-        """
+    def from_sweep(cls, path: str | Path) -> Domain:
+        """The domain of a sweep file. Raises `InputError` if it is not a sweep along axes."""
         definition = load_sweep(path)
-        sweep = Sweep.model_validate(definition.sweep)
-        if sweep.bisect is not None:
-            raise InputError(f"{definition.address}: bisect: a search is nothing to draw from")
-        domain = cls.__new__(cls)
-        domain._plan = Plan(definition)
-        return domain, domain._plan.scenario(domain._plan.point(0))
+        points = SweepPoints(definition)
+        if points.sweep.bisect is not None:
+            raise InputError(f"{definition.address}: bisect: a search has no draws")
+        return cls(points)
+
+    @property
+    def base(self) -> Scenario:
+        """The scenario at the first value of every axis."""
+        return self._points.scenario(self._points.point(0))
 
     def draw(self, generator: np.random.Generator) -> Scenario:
-        """A scenario of the domain. Raises `InputError` where what was drawn cannot be flown."""
+        """A scenario of the domain. Raises `InputError` if the values drawn cannot be flown."""
         values: dict[str, Any] = {}
-        places: dict[str, int] = {}
-        for axis in self._plan.sweep.axis:
-            values |= self._plan.place(axis, _row(axis, generator, places))
-        return self._plan.scenario(values)
+        positions: dict[str, int] = {}
+        for axis in self._points.sweep.axis:
+            values |= self._points.place(axis, _row(axis, generator, positions))
+        return self._points.scenario(values)
 
 
-def _plan(sweep: Sweep, base: dict[str, Any]) -> Plan:
-    tables = json.loads(sweep.model_dump_json(exclude_none=True))
-    return Plan(Definition("domain", tables, json.loads(json.dumps(base)), {}))
-
-
-def _row(axis: Axis, generator: np.random.Generator, places: dict[str, int]) -> Sequence[Any]:
+def _row(axis: Axis, generator: np.random.Generator, positions: dict[str, int]) -> Sequence[Any]:
     """One value for each key of an axis; keys that move together get the same draw.
 
-    ``places`` are those drawn for groups so far.
+    ``positions`` holds those drawn for groups so far.
     """
     if isinstance(axis, UniformAxis):
         return [float(generator.uniform(axis.low, axis.high))] * len(axis.targets)
@@ -91,9 +94,9 @@ def _row(axis: Axis, generator: np.random.Generator, places: dict[str, int]) -> 
     if isinstance(axis, SeedAxis):
         return [int(generator.integers(LARGEST_SEED))] * len(axis.targets)
     rows = axis.rows()
-    if axis.group in places:
-        return rows[places[axis.group]]
-    place = int(generator.integers(len(rows)))
+    if axis.group in positions:
+        return rows[positions[axis.group]]
+    position = int(generator.integers(len(rows)))
     if axis.group is not None:
-        places[axis.group] = place
-    return rows[place]
+        positions[axis.group] = position
+    return rows[position]

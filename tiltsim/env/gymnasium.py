@@ -68,10 +68,10 @@ class GymnasiumEnv(gymnasium.Env):  # type: ignore[misc]
         """Hold an action for one control step; ``info["cause"]`` tells why a flight was lost."""
         if not self._flying:
             raise RuntimeError("no episode goes on: call reset()")
-        told = np.asarray(action, dtype=np.float64)
-        if told.shape != self._middle.shape:
-            raise ValueError(f"action of shape {told.shape}; {self._middle.shape} is wanted")
-        step = self.env.step(self._middle + self._half * told)
+        array = np.asarray(action, dtype=np.float64)
+        if array.shape != self._middle.shape:
+            raise ValueError(f"action of shape {array.shape}; expected {self._middle.shape}")
+        step = self.env.step(self._middle + self._half * array)
         self._flying = not step.last()
         lost = bool(step.last() and step.discount == 0.0)
         info: dict[str, Any] = (

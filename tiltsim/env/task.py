@@ -1,0 +1,124 @@
+"""The task of an episode: its scenario, observation, reward and termination."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from tiltsim.env.arrays import has_tilts, observation_arrays
+from tiltsim.env.domain import Domain
+from tiltsim.errors import InputError
+from tiltsim.flight.end import End
+from tiltsim.plants.command import CheckedCommand
+from tiltsim.plants.commanded_plant import CommandedPlant
+from tiltsim.plants.user_controller import with_external_commands
+from tiltsim.scenario.scenario import Scenario
+from tiltsim_controllers.mathematics.scalar import Floats
+
+Reward = Callable[[Mapping[str, Floats], Floats], float]
+"""``(observation, action) -> reward``, called after every step."""
+
+ENVIRONMENT: Final = "tiltsim.env.TiltrotorEnv"
+"""What the scenarios of episodes name as their controller."""
+
+
+def hover_reward(observation: Mapping[str, Floats], action: Floats) -> float:
+    """Between 0 and 1: 1 at rest on the reference, half of it 1 m away."""
+    error = observation["reference_position"] - observation["position"]
+    velocity_error = observation["reference_velocity"] - observation["velocity"]
+    rates = observation["body_rates"]
+    return float(
+        1.0
+        / (1.0 + error @ error + 0.1 * (velocity_error @ velocity_error) + 0.01 * (rates @ rates))
+    )
+
+
+class Task:
+    """Follow the scenario's reference: the hooks that an `Environment` calls.
+
+    A subclass may replace any of them.
+
+    Parameters
+    ----------
+    scenario
+        The episode's; its own controller is replaced by the actions.
+    control_timestep
+        Duration (s) of an action, in place of the scenario's ``simulation.control_timestep``.
+    domain
+        A `Domain`, or axes as in a sweep file, that the scenario of each episode is drawn from;
+        empty repeats ``scenario``.
+    reward
+        See `Reward`.
+    max_position_error
+        Distance from the reference (m) beyond which an episode terminates.
+
+    Raises
+    ------
+    InputError
+        If the scenario cannot be flown under commands, an axis is invalid, or
+        ``max_position_error`` is not positive.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        control_timestep: float | None = None,
+        domain: Domain | Sequence[Mapping[str, Any]] = (),
+        reward: Reward = hover_reward,
+        max_position_error: float = 10.0,
+    ) -> None:
+        self._simulation = (
+            None if control_timestep is None else {"control_timestep": control_timestep}
+        )
+        self.scenario = self._commanded(scenario)
+        self._domain = domain if isinstance(domain, Domain) else None
+        if domain and not isinstance(domain, Domain):
+            self._domain = Domain.from_axes(self.scenario, domain)
+        if not max_position_error > 0.0:
+            raise InputError(
+                f"environment: max_position_error = {max_position_error}: must be greater than 0"
+            )
+        self._tilting = has_tilts(scenario)
+        self._reward = reward
+        self._max_position_error = max_position_error
+
+    def _commanded(self, scenario: Scenario) -> Scenario:
+        return with_external_commands(scenario, ENVIRONMENT, self._simulation)
+
+    def initialize_episode(self, generator: np.random.Generator) -> Scenario:
+        """The scenario of the next episode. Raises `InputError` where the draw cannot be flown."""
+        if self._domain is None:
+            return self.scenario
+        return self._commanded(self._domain.draw(generator))
+
+    def before_step(self, action: Floats, plant: CommandedPlant) -> None:
+        """Send a clipped action to the plant, where it is held for one control step."""
+        thrusts, tilts = action[:4].tolist(), action[4:].tolist()
+        plant.apply(CheckedCommand("thrusts", tuple(thrusts), tuple(tilts) if tilts else None))
+
+    def get_observation(self, plant: CommandedPlant) -> dict[str, Floats]:
+        """The observation of the plant's state, through the scenario's sensors."""
+        return observation_arrays(plant.seen(), tilting=self._tilting)
+
+    def get_reward(self, observation: Mapping[str, Floats], action: Floats) -> float:
+        """The reward of a step that took ``action`` to ``observation``."""
+        return float(self._reward(observation, action))
+
+    def get_termination(self, sample: Floats, observation: Mapping[str, Floats]) -> End | None:
+        """How the episode ended in a state within the simulation's limits; None goes on.
+
+        Parameters
+        ----------
+        sample
+            The true state: time (s), then position (m, world) first; see `ClosedLoop`.
+        observation
+            The same state, through the scenario's sensors.
+        """
+        offset = observation["reference_position"] - sample[1:4]
+        error = float(offset @ offset) ** 0.5
+        if error <= self._max_position_error:
+            return None
+        return End("diverged", float(sample[0]), f"{error:.3g} m away from the reference")
