@@ -1,4 +1,4 @@
-"""The command line: one subcommand a module of `tiltsim.commands`, each a thin layer."""
+"""The command line: one subcommand per module of `tiltsim.commands`, each a thin layer."""
 
 from __future__ import annotations
 
@@ -17,21 +17,32 @@ from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT, TERMINATED
 from tiltsim.system.interrupts import terminations_as_interrupts
 
 COMMANDS: Final = (
-    *("run", "check", "sweep", "list", "view", "plot", "video"),
-    *("gait", "map", "singularity", "report", "bench", "schema"),
+    "run",
+    "check",
+    "sweep",
+    "list",
+    "view",
+    "plot",
+    "video",
+    "gait",
+    "map",
+    "singularity",
+    "report",
+    "bench",
+    "schema",
 )
 
 
 def printable(text: str) -> str:
-    """Text on one line: line breaks and other control characters, as file names may have, escaped.
+    """Text with line breaks and other control characters, as file names may have, escaped.
 
-    So that a message cannot do anything to the terminal.
+    So a message is one line and cannot control the terminal.
     """
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 class Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line, like every other mistake."""
+    """Reports a mistake in one line, like every other mistake."""
 
     def error(self, message: str) -> NoReturn:
         """Print the line and exit."""
@@ -39,7 +50,7 @@ class Parser(argparse.ArgumentParser):
 
 
 class _Version(argparse.Action):
-    """Looks the version up only when asked: reading package metadata costs start-up time."""
+    """Reads the version only when requested: reading package metadata costs start-up time."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         from importlib.metadata import version
@@ -52,8 +63,8 @@ def build_parser() -> argparse.ArgumentParser:
     """The parser of the whole command line."""
     parser = Parser(
         prog="tiltsim",
-        description="A MuJoCo testbed for thrust-vectoring vehicles: fly scenarios, judge flights.",
-        epilog="exit codes: 0 done, 1 an expectation failed, 2 invalid input, 3 flight lost",
+        description="A MuJoCo testbed for thrust-vectoring vehicles: fly scenarios, check flights.",
+        epilog="exit codes: 0 done, 1 an expectation failed, 2 invalid input, 3 vehicle lost",
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
@@ -62,27 +73,27 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
-LOOK_FOR_OPENGL: Final = ("mujoco", "dm_control._render")
-"""Packages that fail to load where what MUJOCO_GL names is not there."""
+OPENGL_USERS: Final = ("mujoco", "dm_control._render")
+"""Packages that fail to load if the OpenGL library that MUJOCO_GL names is missing."""
 
-OBJECTS_BETWEEN_COLLECTIONS: Final = 50_000
-"""How many more objects than before there must be for a search for garbage to be worth its time."""
+GARBAGE_THRESHOLD: Final = 50_000
+"""New objects that make a garbage collection worth its time."""
 
 
-def spare_garbage_collection() -> None:
-    """Let the process spend no time on garbage among the modules that it has loaded.
+def reduce_garbage_collection() -> None:
+    """Make garbage collections rare, and skip the one at exit.
 
-    A short command makes little garbage and loads hundreds of modules; to search these again and
-    again, and once more at the end, took a quarter of a flight of 40 s.
+    A short command makes little garbage and loads hundreds of modules; searching these repeatedly,
+    and once more at exit, took a quarter of the time of a flight of 40 s.
     """
-    gc.set_threshold(OBJECTS_BETWEEN_COLLECTIONS)
+    gc.set_threshold(GARBAGE_THRESHOLD)
     atexit.register(gc.freeze)
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run one command, the process's own unless it is given, and return its exit code."""
+    """Run one command, by default that of ``sys.argv``, and return its exit code."""
     if arguments is None:
-        spare_garbage_collection()
+        reduce_garbage_collection()
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # as Python has it for standard error
     with terminations_as_interrupts() as terminated:
@@ -91,7 +102,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _run(arguments: list[str] | None) -> int:
-    """Parse and run; every mistake becomes a line and an exit code."""
+    """Parse and run; every mistake becomes one line and an exit code."""
     try:
         parsed = build_parser().parse_args(arguments)
         return int(parsed.run(parsed))
@@ -102,7 +113,7 @@ def _run(arguments: list[str] | None) -> int:
         print("tiltsim: interrupted", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
-        # The reader (head, less) has gone; the rest of the output is nobody's.
+        # The reader (head, less) has ended: discard the rest of the output.
         sys.stderr.close()
         return DONE
     except OSError as error:
@@ -110,21 +121,21 @@ def _run(arguments: list[str] | None) -> int:
         print(f"tiltsim: {place}: {error.strerror or error}", file=sys.stderr)
         return INVALID_INPUT
     except Exception as error:
-        if not (_rose_while_mujoco_loaded(error) and "MUJOCO_GL" in os.environ):
+        if not (_raised_while_loading_mujoco(error) and "MUJOCO_GL" in os.environ):
             raise
-        way, reason = os.environ["MUJOCO_GL"], str(error).strip().partition("\n")[0]
+        library, reason = os.environ["MUJOCO_GL"], str(error).strip().partition("\n")[0]
         print(
-            f"tiltsim: MUJOCO_GL = {way!r}: MuJoCo cannot be loaded with it ({reason}); choose "
-            "egl, osmesa or glfw, whichever is installed, or unset it",
+            f"tiltsim: MUJOCO_GL = {library!r}: MuJoCo cannot be loaded with it ({reason}); choose "
+            "an installed one of egl, osmesa and glfw, or unset it",
             file=sys.stderr,
         )
         return INVALID_INPUT
 
 
-def _rose_while_mujoco_loaded(error: Exception) -> bool:
-    """Whether an error comes from an import, where MuJoCo looks for what MUJOCO_GL names."""
+def _raised_while_loading_mujoco(error: Exception) -> bool:
+    """Whether an error comes from an import that looks for the library named by MUJOCO_GL."""
     return any(
-        frame.f_code.co_name == "<module>" and frame.f_globals["__name__"] in LOOK_FOR_OPENGL
+        frame.f_code.co_name == "<module>" and frame.f_globals["__name__"] in OPENGL_USERS
         for frame, _ in walk_tb(error.__traceback__)
     )
 

@@ -47,7 +47,7 @@ def test_another_attitude_and_vehicle(capsys):
 
 def test_the_summary_is_for_people(capsys):
     assert main(["singularity", "quadrotor"]) == 0
-    assert "nowhere singular" in capsys.readouterr().out
+    assert "never singular" in capsys.readouterr().out
 
 
 def test_the_figure_is_drawn(capsys, tmp_path):

@@ -246,9 +246,9 @@ def test_check_tells_flights_that_nothing_judges(tmp_path, capsys):
     assert main(["check", *good, "--jobs", "1", "--junit", str(junit)]) == 0
     rows = capsys.readouterr().out.splitlines()
     assert [row[:3] for row in rows[:2]] == ["ok ", "ok "]
-    assert ["nothing judged" in row for row in rows[:2]] == [True, False]
+    assert ["no expectations" in row for row in rows[:2]] == [True, False]
     assert "1/1 hold" in rows[1]
-    assert rows[-1] == "2 scenarios: 1 nothing judged, 1 passed"
+    assert rows[-1] == "2 scenarios: 1 without expectations, 1 passed"
     assert len(ElementTree.parse(junit).getroot()[0]) == 2
     assert main(["check", str(tmp_path / "c.toml")]) == 2
     output = capsys.readouterr().out
@@ -399,7 +399,9 @@ def test_a_terminal_is_told_what_is_being_compiled(capsys, monkeypatch):
         (tell,) = before_compiling
         tell(name)
     assert before_compiling == []
-    assert "tiltsim: compiling tiltrotor for the thesis plant, once" in capsys.readouterr().err
+    assert (
+        "tiltsim: compiling attitude_altitude for the thesis plant, once" in capsys.readouterr().err
+    )
 
 
 def test_schema_knows_every_table_and_the_variants(capsys):

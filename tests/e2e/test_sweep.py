@@ -15,7 +15,7 @@ from tiltsim.resources import shipped_folder
 from tiltsim.scenario.library import library_sweeps, scenario_files
 from tiltsim.sweeps.dataset import load_results
 from tiltsim.sweeps.loading import load_sweep
-from tiltsim.sweeps.plan import Plan
+from tiltsim.sweeps.points import SweepPoints
 from tiltsim.views.figures.distributions import wilson_interval
 from tiltsim.views.figures.sweep import sweep_figure
 
@@ -69,11 +69,11 @@ def test_a_continued_sweep_says_what_is_kept(grid, tmp_path, capsys):
     command = ["sweep", str(grid), "--out", str(tmp_path / "out"), "--jobs", "1"]
     assert main([*command, "--quiet"]) == 0
     assert main(command) == 0
-    assert capsys.readouterr().err == "A grid: all 24 flights kept, nothing to fly\n"
+    assert capsys.readouterr().err == "A grid: all 24 flights finished, nothing to fly\n"
     for number in (3, 7):
         (tmp_path / "out" / "parts" / f"{number:06d}.parquet").unlink()
     assert main(command) == 0
-    assert capsys.readouterr().err == "A grid: 22 of 24 flights kept, 2 to fly\n"
+    assert capsys.readouterr().err == "A grid: 22 of 24 flights finished, 2 to fly\n"
 
 
 def test_the_dataset_goes_to_a_folder_of_its_own_by_default(grid, tmp_path, monkeypatch):
@@ -105,7 +105,7 @@ def test_a_changed_sweep_is_refused(grid, tmp_path, capsys):
         (["ch04_tracking/setpoint"], "a scenario, not a sweep"),
         (["ch04_tracking/sweeps/periods", "--jobs", "0"], "at least 1"),
         (["ch04_tracking/sweeps/periods", "--set", "gait.perod=1"], "did you mean period"),
-        (["ch04_tracking/sweeps/periods", "--set", "gait.period=1"], "an axis sets it, too"),
+        (["ch04_tracking/sweeps/periods", "--set", "gait.period=1"], "also set by an axis"),
         (["ch04_tracking/sweeps/perods"], "did you mean ch04_tracking/sweeps/periods?"),
     ],
 )
@@ -123,7 +123,7 @@ def test_mistakes_are_one_line_and_exit_2(arguments, words, capsys):
 @pytest.mark.parametrize("address", SHIPPED)
 def test_every_shipped_sweep_is_valid(address):
     definition = load_sweep(address)
-    assert len(Plan(definition)) > 1
+    assert len(SweepPoints(definition)) > 1
     assert definition.sweep["title"]
     assert definition.sweep["source"]
 

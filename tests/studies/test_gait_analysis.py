@@ -227,7 +227,7 @@ def test_the_page_on_gaits_shows_the_table_of_today(capsys) -> None:
 @with_docs
 def test_the_documented_gait_of_ones_own_flies_and_is_judged_as_shown(tmp_path, capsys) -> None:
     page = GAIT_PAGE.read_text(encoding="utf-8")
-    section = page.partition("## A gait of your own")[2].partition("\n## ")[0]
+    section = page.partition("## Your own gait")[2].partition("\n## ")[0]
     file = tmp_path / "my_gait.toml"
     file.write_text(re.findall(r"```toml\n(.*?)```", section, re.S)[0])
     brief = {"simulation.duration": 0.1, "simulation.engine": "python"}
@@ -254,7 +254,7 @@ def test_rotors_that_would_turn_backwards_to_hover_are_named(capsys, angles, bac
     weight = AR_DRONE.mass * AR_DRONE.gravity
     assert force_matrix(report["angles"]) @ squares == pytest.approx([0, 0, weight], abs=1e-9)
     assert torque_matrix(report["angles"], AR_DRONE) @ squares == pytest.approx([0] * 3, abs=1e-9)
-    warning = f"{backward} would have to turn backwards to hover"
+    warning = f"{backward} would have to spin backwards to hover"
     assert report["warnings"] == ([warning] if backward else [])
     run(*words)
     text = capsys.readouterr().out
@@ -293,8 +293,10 @@ def test_a_moving_gait_tells_its_start_from_its_worst(capsys) -> None:
     run("gait", "ch05_gaits/line#walk_full")
     text = capsys.readouterr().out
     assert "\nsingularity margin  0.839116 rad at the gait's start\n" in text
-    assert re.search(r"\nleast margin +-0.874638 rad over the period\n +its sign counts", text)
-    assert "\nlargest tilt angle  2.305 rad\n" in text
+    assert re.search(
+        r"\nminimum margin +-0.874638 rad over the period\n +its sign is relative", text
+    )
+    assert "\nmaximum tilt angle  2.305 rad\n" in text
     assert "amplitude" not in text
 
 
@@ -372,7 +374,7 @@ def test_a_vehicle_is_printed_as_it_is_given(command, text, shown, capsys) -> No
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("arm=0.3", "'arm' is no parameter; choose mass, inertia_xx, "),
+        ("arm=0.3", "'arm' is not a parameter; choose mass, inertia_xx, "),
         ("luukkonen,arm_length=0", "arm_length = 0: must be a number from 1e-12 to 1e+09"),
         ("arm_length=-1", "must be a number from 1e-12 to 1e+09"),
         ("arm_length=nan", "must be a number from 1e-12 to 1e+09"),
@@ -382,9 +384,9 @@ def test_a_vehicle_is_printed_as_it_is_given(command, text, shown, capsys) -> No
         ("luukkonen,ar_drone_2", "'ar_drone_2': write KEY=VALUE after the preset"),
         (
             "quad,mass=1",
-            "'quad' is no vehicle; choose ar_drone_2, ar_drone_2_unrounded, luukkonen, or KEY=",
+            "'quad' is not a vehicle; choose ar_drone_2, ar_drone_2_unrounded, luukkonen, or KEY=",
         ),
-        ("", "'' is no vehicle"),
+        ("", "'' is not a vehicle"),
     ],
 )
 @pytest.mark.parametrize("command", [["gait", "--angles", "0,0,0,0"], ["map"]])
@@ -421,8 +423,8 @@ def test_vehicles_are_named_or_listed() -> None:
         (["--angles", "0,0,0,0", "--plot", "figure.xyz"], "unknown format '.xyz'"),
         (["--list", "--published", "ch06_gait_3"], "takes no other option than --json"),
         (["--angles", "0,0,0,0", "--figure", "margin"], "needs --plot FILE"),
-        (["--angles", "0,0,0,0", "--case", "half"], "goes with --figure determinant"),
-        (["--angles", "0,0,0,0", "--speed-limits", "1,2"], "goes with --figure attainable"),
+        (["--angles", "0,0,0,0", "--case", "half"], "needs --figure determinant"),
+        (["--angles", "0,0,0,0", "--speed-limits", "1,2"], "needs --figure attainable"),
         (["--figure", "determinant", "--plot", "f.png", "--angles", "0,0,0,0"], "takes --case"),
         (["--figure", "determinant", "--plot", "f.png", "--roll", "0"], "at level attitude"),
         (["--figure", "comparison", "--plot", "f.png", "--angles", "0,0,0,0"], "no bias"),
@@ -451,7 +453,7 @@ def test_vehicles_are_named_or_listed() -> None:
                 "--speed-limits",
                 "3",
             ],
-            "needs LEAST,GREATEST",
+            "needs MIN,MAX",
         ),
         (["--angles", "0,0,0,0", "--plot", "figure"], "unknown format ''; choose .png, .svg, .pdf"),
         (["--angles", "0,0,0,0", "--plot", "/no/such/folder/f.png"], "folder does not exist"),
@@ -490,7 +492,7 @@ def test_map_of_any_vehicle() -> None:
 def test_a_refused_path_is_refused_with_the_place(capsys) -> None:
     assert run("map", "--leg", "red", "0.3,-0.8", "0.8,-0.3", "0.1,0.6", "0.3,-0.8") == 1
     output = capsys.readouterr().out
-    assert "refused: red crosses the curve L (R = 0) at (0.452123, 0.147270)" in output
+    assert "rejected: red crosses the curve L (R = 0) at (0.452123, 0.147270)" in output
 
 
 def test_accepted_paths(capsys) -> None:
@@ -635,7 +637,7 @@ def test_a_bad_target_is_noticed_before_any_work(tmp_path, monkeypatch) -> None:
     def work(*_: object, **__: object) -> None:
         raise AssertionError("worked")
 
-    monkeypatch.setattr(gait_command, "_choose", work)
+    monkeypatch.setattr(gait_command, "select_gait", work)
     monkeypatch.setattr(map_command, "parse_vehicle", work)
     closed = tmp_path / "closed.png"
     closed.touch()

@@ -20,11 +20,11 @@ from tiltsim.scenario.loading import parse_scenario
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.simulation import batch
 from tiltsim.simulation.simulate import simulate
-from tiltsim.sweeps import flying, running
+from tiltsim.sweeps import chunks, executing, running
 from tiltsim.sweeps.dataset import load_results
 from tiltsim.sweeps.folder import open_sweep_folder, write_durably
 from tiltsim.sweeps.loading import load_sweep
-from tiltsim.sweeps.plan import Plan
+from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.running import run_sweep
 from tiltsim.system.processes import ProcessDiedError
 from tiltsim.views.figures.sweep import sweep_figure
@@ -63,15 +63,15 @@ def fly_until_killed(arguments, folder, moment, parts=0):
 
 def test_rows_hold_what_was_flown(tmp_path):
     definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
-    plan = Plan(definition)
+    sweep = SweepPoints(definition)
     assert run_sweep(definition, tmp_path / "out") == tmp_path / "out" / "sweep.parquet"
     table = rows(tmp_path / "out")
     assert [row["index"] for row in table] == list(range(12))
     for row in table:
-        point = plan.point(row["index"])
+        point = sweep.point(row["index"])
         assert {key: row[key] for key in point} == point
         scenario = parse_scenario(json.loads(row["scenario"]))
-        assert scenario.model_dump() == plan.scenario(point).model_dump()
+        assert scenario.model_dump() == sweep.scenario(point).model_dump()
         assert row["mujoco_version"] == definition.versions["mujoco"]
         assert row["end"] == "completed"
     flight = simulate(parse_scenario(json.loads(table[7]["scenario"])))
@@ -91,15 +91,15 @@ def test_a_sweep_continues_where_it_stopped(tmp_path, monkeypatch):
     definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
     whole = run_sweep(definition, tmp_path / "whole")
     flown = []
-    original = flying.fly_points
+    original = chunks.fly_points
 
-    def fly_points(plan, points, engine):
+    def fly_points(sweep, points, engine):
         flown.append(list(points))
         if len(flown) == 3:
             raise KeyboardInterrupt
-        return original(plan, points, engine)
+        return original(sweep, points, engine)
 
-    monkeypatch.setattr(flying, "fly_points", fly_points)
+    monkeypatch.setattr(chunks, "fly_points", fly_points)
     with pytest.raises(KeyboardInterrupt):
         run_sweep(definition, tmp_path / "parts")
     leftover = tmp_path / "parts" / "parts" / ".000003.parquet.new"
@@ -132,7 +132,7 @@ def test_other_results_are_not_written_over(tmp_path):
 def test_two_sweeps_do_not_share_a_folder(tmp_path):
     definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
     with (
-        open_sweep_folder(tmp_path / "out", Plan(definition)),
+        open_sweep_folder(tmp_path / "out", SweepPoints(definition)),
         pytest.raises(InputError, match="another tiltsim sweep"),
     ):
         run_sweep(definition, tmp_path / "out")
@@ -150,14 +150,14 @@ def test_a_file_appears_whole_or_not_at_all(tmp_path, monkeypatch):
 
 
 def test_a_bad_flight_becomes_a_row(tmp_path, monkeypatch):
-    original = flying.simulate
+    original = executing.simulate
 
     def simulate(scenario):
         if scenario.initial.attitude[0] > 0.0:
             raise RuntimeError("no such luck")
         return original(scenario)
 
-    monkeypatch.setattr(flying, "simulate", simulate)
+    monkeypatch.setattr(executing, "simulate", simulate)
     monkeypatch.setattr(batch, "simulate", simulate)
     run_sweep(load_sweep(short_sweep(tmp_path / "sweep.toml")), tmp_path / "out")
     for row in rows(tmp_path / "out"):
@@ -278,7 +278,7 @@ def test_a_terminated_sweep_cleans_up_and_continues(tmp_path):
     _, error = process.communicate(timeout=30.0)
     assert process.returncode == 143
     assert error.decode() == (
-        f"tiltsim: interrupted; what is finished is in {folder}, the same command continues\n"
+        f"tiltsim: interrupted; finished flights are in {folder}; the same command continues\n"
     )
     kept = parts_in(folder)
     assert 0 < kept < 60
@@ -296,7 +296,7 @@ def test_a_damaged_folder_is_told_of_or_mended(tmp_path):
     assert run_sweep(definition, tmp_path / "out").read_bytes() == whole
     part = next(iter((tmp_path / "out" / "parts").iterdir()))
     part.write_bytes(part.read_bytes()[:100])
-    with pytest.raises(InputError, match=f"{part.name}: not readable, delete it"):
+    with pytest.raises(InputError, match=f"{part.name}: not readable; delete it"):
         run_sweep(definition, tmp_path / "out")
 
 
@@ -304,7 +304,9 @@ def test_parts_with_other_columns_are_refused(tmp_path, monkeypatch):
     definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
     run_sweep(definition, tmp_path / "out")
     monkeypatch.setitem(METRICS, "a_metric_of_tomorrow", "of no use, m")
-    with pytest.raises(InputError, match=r"made by another tiltsim: .* a_metric_of_tomorrow"):
+    with pytest.raises(
+        InputError, match=r"made by another version of tiltsim: .* a_metric_of_tomorrow"
+    ):
         run_sweep(definition, tmp_path / "out")
     assert sweep_figure(load_results(tmp_path / "out"))  # but they can be drawn
 

@@ -1,28 +1,29 @@
-"""Reading angles and vehicles from the command line: one line for a mistake."""
+"""Parsing angles and vehicles from the command line; mistakes become one-line errors."""
 
 from __future__ import annotations
 
+import argparse
 import re
 from math import isfinite, pi
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from tiltsim.errors import InputError
 
 if TYPE_CHECKING:
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
-LEAST: Final = 1e-12
-GREATEST: Final = 1e9
-"""What a parameter may be, far from underflow and overflow (SI units)."""
+MIN_PARAMETER: Final = 1e-12
+MAX_PARAMETER: Final = 1e9
+"""Range of a parameter (SI units), far from underflow and overflow."""
 
 
-def allow_negative_lists(parser: Any) -> None:
-    """Let ``-0.5,0.5`` be a value and not an option, as argparse has it for plain ``-0.5``."""
+def allow_negative_lists(parser: argparse.ArgumentParser) -> None:
+    """Accept ``-0.5,0.5`` as a value, not an option, as argparse does for plain ``-0.5``."""
     parser._negative_number_matcher = re.compile(r"-\.?\d")
 
 
 def parse_angle(option: str, text: str) -> float:
-    """One angle in rad; `InputError` for what is no angle, or looks like degrees."""
+    """One angle in rad. Raises `InputError` unless it is finite and at most half a turn."""
     try:
         value = float(text)
     except ValueError:
@@ -31,7 +32,7 @@ def parse_angle(option: str, text: str) -> float:
 
 
 def parse_angles(option: str, text: str, count: int = 4) -> tuple[float, ...]:
-    """Angles in rad, separated by commas; `InputError` as `parse_angle`, or for a wrong count."""
+    """Angles in rad, separated by commas. Raises `InputError` like `parse_angle`."""
     parts = text.split(",")
     if len(parts) != count:
         raise InputError(
@@ -40,8 +41,8 @@ def parse_angles(option: str, text: str, count: int = 4) -> tuple[float, ...]:
     try:
         values = [float(part) for part in parts]
     except ValueError:
-        what = "a number" if count == 1 else f"{count} numbers"
-        raise InputError(f"{option} {text}: must be {what}, in rad") from None
+        expected = "a number" if count == 1 else f"{count} numbers"
+        raise InputError(f"{option} {text}: must be {expected}, in rad") from None
     return tuple(_checked(option, text, value) for value in values)
 
 
@@ -60,7 +61,7 @@ def parse_vehicle(text: str | None) -> Vehicle:
     """A vehicle: a preset's name, ``KEY=VALUE`` in place of its parameters, or both.
 
     The parts are separated by commas, the preset first; without one, and for None, it is
-    ar_drone_2. `InputError` lists the choices.
+    ar_drone_2. Raises `InputError`, which lists the choices.
     """
     from tiltsim_controllers.vehicle.parameters import PRESETS
 
@@ -68,7 +69,7 @@ def parse_vehicle(text: str | None) -> Vehicle:
     name = parts.pop(0) if parts and "=" not in parts[0] else "ar_drone_2"
     if name not in PRESETS:
         choices = f"{', '.join(PRESETS)}, or KEY=VALUE"
-        raise InputError(f"--vehicle {text}: {name!r} is no vehicle; choose {choices}")
+        raise InputError(f"--vehicle {text}: {name!r} is not a vehicle; choose {choices}")
     vehicle = PRESETS[name]
     changes: dict[str, float] = {}
     for part in parts:
@@ -77,7 +78,7 @@ def parse_vehicle(text: str | None) -> Vehicle:
             raise InputError(f"--vehicle {text}: {part!r}: write KEY=VALUE after the preset")
         if key not in vehicle._fields:
             choices = ", ".join(vehicle._fields)
-            raise InputError(f"--vehicle {text}: {key!r} is no parameter; choose {choices}")
+            raise InputError(f"--vehicle {text}: {key!r} is not a parameter; choose {choices}")
         if key in changes:
             raise InputError(f"--vehicle {text}: {key} is given twice")
         changes[key] = _positive(f"--vehicle {text}: {key}", value)
@@ -85,7 +86,7 @@ def parse_vehicle(text: str | None) -> Vehicle:
 
 
 def vehicle_text(vehicle: str | dict[str, float]) -> str:
-    """A report's vehicle as `parse_vehicle` reads it: the closest preset and what differs."""
+    """A report's vehicle as `parse_vehicle` reads it: the closest preset and the differences."""
     from tiltsim_controllers.vehicle.parameters import PRESETS
 
     if isinstance(vehicle, str):
@@ -102,14 +103,14 @@ def vehicle_text(vehicle: str | dict[str, float]) -> str:
 
 
 def parse_speed_limits(text: str) -> tuple[float, float]:
-    """Least and greatest rotor speed (rad/s), separated by a comma."""
+    """Minimum and maximum rotor speed (rad/s), separated by a comma."""
     parts = text.split(",")
     if len(parts) != 2:
-        raise InputError(f"--speed-limits {text}: needs LEAST,GREATEST in rad/s")
-    least, greatest = (_positive(f"--speed-limits {text}: limit", part) for part in parts)
-    if least >= greatest:
+        raise InputError(f"--speed-limits {text}: needs MIN,MAX in rad/s")
+    low, high = (_positive(f"--speed-limits {text}: limit", part) for part in parts)
+    if low >= high:
         raise InputError(f"--speed-limits {text}: the first must be less than the second")
-    return least, greatest
+    return low, high
 
 
 def _positive(place: str, text: str) -> float:
@@ -117,6 +118,7 @@ def _positive(place: str, text: str) -> float:
         value = float(text)
     except ValueError:
         value = -1.0
-    if not LEAST <= value <= GREATEST:
-        raise InputError(f"{place} = {text}: must be a number from {LEAST:g} to {GREATEST:g}")
+    if not MIN_PARAMETER <= value <= MAX_PARAMETER:
+        allowed = f"must be a number from {MIN_PARAMETER:g} to {MAX_PARAMETER:g}"
+        raise InputError(f"{place} = {text}: {allowed}")
     return value

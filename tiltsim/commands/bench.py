@@ -6,32 +6,33 @@ import argparse
 import json
 from typing import Any
 
+from tiltsim.commands.options import Subparsers, add_json
 from tiltsim.commands.progress import announce_compilation
 from tiltsim.errors import InputError
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
     parser = subparsers.add_parser(
         "bench",
-        help="measure the closed loop against bare MuJoCo",
+        help="measure the speed of the closed loop relative to bare MuJoCo",
         description=(
-            "Measure the speed of the closed loop, single and in batches, as a share of bare "
-            "mj_step on the same model, flying, in one interleaved run; medians."
+            "Measure the speed of the closed loop, for one vehicle and for batches, as a fraction "
+            "of bare mj_step on the same model in flight; medians of interleaved runs."
         ),
     )
-    parser.add_argument("--json", action="store_true", help="machine-readable")
+    add_json(parser)
     instead = parser.add_mutually_exclusive_group()
     instead.add_argument(
         "--vehicles",
         type=int,
         metavar="N",
-        help="instead fly N whole flights, metrics included, and tell time and memory",
+        help="instead simulate N whole flights with metrics; print time and memory",
     )
     instead.add_argument(
         "--accuracy",
         action="store_true",
-        help="instead show RK4's position error against the time step and the speed",
+        help="instead print RK4's position error and speed for several time steps",
     )
     parser.add_argument("--duration", type=float, default=10.0, help="with --vehicles, s")
     parser.add_argument("--timestep", type=float, default=0.001, help="with --vehicles, s")
@@ -84,8 +85,8 @@ def _print_ratios(rows: list[dict[str, Any]]) -> None:
             f"{1e6 / row['steps_per_second']:>9.2f}{row['realtime_factor']:>13.0f}"
             f"{row['ratio']:>8.3f}"
         )
-    print("\nratio: share of the speed of bare mj_step on the same model in the same run; medians")
-    print("empty: a native callback that does nothing; native callbacks stop MuJoCo's timers")
+    print("\nratio: speed relative to bare mj_step on the same model in the same run; medians")
+    print("empty: a native callback that does nothing; native callbacks disable MuJoCo's timers")
 
 
 def _print_flights(row: dict[str, Any]) -> None:
@@ -93,7 +94,7 @@ def _print_flights(row: dict[str, Any]) -> None:
         f"{row['vehicles']} flights, {row['completed']} completed, {row['integrator']} at "
         f"{1e3 * row['timestep']:g} ms on {row['threads']} threads: {row['seconds']:.1f} s, "
         f"{row['steps_per_second']:.4g} steps/s, {row['realtime_factor']:.0f} x real time, "
-        f"largest memory {row['memory'] / 2**20:.0f} MiB"
+        f"peak memory {row['memory'] / 2**20:.0f} MiB"
     )
 
 

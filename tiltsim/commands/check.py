@@ -1,13 +1,13 @@
-"""``tiltsim check``: every scenario under some paths, for continuous integration."""
+"""``tiltsim check``: flies all scenarios under some paths, for continuous integration."""
 
 from __future__ import annotations
 
 import argparse
-import os
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from tiltsim.commands.options import Subparsers, add_jobs, add_overrides
 from tiltsim.commands.progress import announce_compilation
 from tiltsim.commands.text import counted
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INVALID_INPUT, VEHICLE_LOST
@@ -17,48 +17,28 @@ if TYPE_CHECKING:
     from tiltsim.studies.checking import CheckResult
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
     parser = subparsers.add_parser(
         "check",
-        help="fly all scenarios under some paths and judge them",
+        help="fly all scenarios under some paths and check their expectations",
         description=(
-            "Fly all scenarios under files and folders, and judge their expectations. Sweeps in a "
-            "folder are passed over. Interrupted, it still writes the JUnit file: what is not "
-            "flown counts there as an error."
+            "Fly all scenarios under files and folders, and check their expectations. Sweep files "
+            "in folders are skipped. The JUnit file is written even when interrupted; scenarios "
+            "not yet flown are errors in it."
         ),
         epilog=(
-            "exit codes: 0 all passed, 1 an expectation failed, 2 invalid or crashed, 3 a flight "
-            "was lost; where several apply, 2 goes before 3, and 3 before 1"
+            "exit codes: 0 all passed, 1 an expectation failed, 2 invalid or crashed, 3 a vehicle "
+            "was lost; if several apply, the most severe is returned (2 > 3 > 1)"
         ),
     )
     parser.add_argument(
         "paths", nargs="*", metavar="PATH", help="files, folders or library names; default: all"
     )
-    parser.add_argument(
-        "--jobs",
-        type=positive_integer,
-        default=os.cpu_count() or 1,
-        metavar="N",
-        help="processes (default: the number of cores)",
-    )
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        dest="overrides",
-        help="override a key of every scenario, such as simulation.plant=thesis; repeatable",
-    )
+    add_jobs(parser)
+    add_overrides(parser, "every scenario", "simulation.plant=thesis")
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write JUnit XML")
     parser.set_defaults(run=run)
-
-
-def positive_integer(text: str) -> int:
-    """A whole number of at least 1, from the command line."""
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text}: must be a whole number of at least 1")
-    return int(text)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -92,7 +72,9 @@ def run(arguments: argparse.Namespace) -> int:
         raise
     if junit is not None:
         write_junit(results, junit)
-    labels = Counter("nothing judged" if _unjudged(result) else result.status for result in results)
+    labels = Counter(
+        "without expectations" if _is_unchecked(result) else result.status for result in results
+    )
     print(
         f"\n{counted(len(results), 'scenario', 'scenarios')}: "
         + ", ".join(f"{n} {label}" for label, n in labels.items())
@@ -105,20 +87,20 @@ def run(arguments: argparse.Namespace) -> int:
     return EXPECTATION_FAILED if counts["failed"] else DONE
 
 
-def _unjudged(result: CheckResult) -> bool:
-    """Whether a flight went well that no expectation speaks of."""
+def _is_unchecked(result: CheckResult) -> bool:
+    """Whether a flight completed that has no expectations."""
     return result.status == "passed" and not result.verdicts
 
 
 def _print_result(result: CheckResult, width: int) -> None:
     if result.verdicts:
         held = sum(verdict.holds for verdict in result.verdicts)
-        judged = f"{held}/{len(result.verdicts)} hold"
+        outcome = f"{held}/{len(result.verdicts)} hold"
     else:
-        judged = "nothing judged" if _unjudged(result) else ""
+        outcome = "no expectations" if _is_unchecked(result) else ""
     mark = "ok" if result.status == "passed" else result.status.upper()
     print(
-        f"{mark:<8}{result.address:<{width}}  {judged:<14}  {result.wall_time:6.1f} s",
+        f"{mark:<8}{result.address:<{width}}  {outcome:<15}  {result.wall_time:6.1f} s",
         flush=True,
     )
     if result.message:

@@ -1,16 +1,16 @@
-"""``tiltsim list``: the scenario library."""
+"""``tiltsim list``: prints the scenario library."""
 
 from __future__ import annotations
 
 import argparse
 import json
-from typing import Any
 
+from tiltsim.commands.options import Subparsers, add_json
 from tiltsim.commands.text import fitted
 from tiltsim.scenario.library import Entry, library_entries, library_families, library_sweeps
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
     parser = subparsers.add_parser(
         "list",
@@ -18,13 +18,13 @@ def add_parser(subparsers: Any) -> None:
         description="List the scenario library with titles and sources in the thesis. A line that "
         "begins with # is a variant of the file above it: tiltsim run 'FILE#VARIANT'.",
     )
-    parser.add_argument("--sweeps", action="store_true", help="the sweeps alone")
-    parser.add_argument("--json", action="store_true", help="machine-readable")
+    parser.add_argument("--sweeps", action="store_true", help="list only the sweeps")
+    add_json(parser)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print a line a file, and one a variant below; sweeps at the end."""
+    """Print one line per file, with one per variant below it; sweeps at the end."""
     if arguments.json:
         entries = library_sweeps() if arguments.sweeps else library_entries()
         keys = ("sweep" if arguments.sweeps else "scenario", "title", "source")

@@ -1,12 +1,12 @@
-"""``tiltsim map``: the Two Color Map, and paths on it."""
+"""``tiltsim map``: the Two Color Map of a vehicle, and checks of paths on it."""
 
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.angles import allow_negative_lists, parse_angles, parse_vehicle, vehicle_text
+from tiltsim.commands.options import Subparsers, add_json, add_plot, add_vehicle, prepare_figure
 from tiltsim.commands.text import aligned, json_text, print_figure_path
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
 
@@ -15,24 +15,20 @@ if TYPE_CHECKING:
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
     parser = subparsers.add_parser(
         "map",
         help="draw the Two Color Map and check a path on it",
         description=(
-            "The Two Color Map of a vehicle: delta, P, the exact red and blue lines, the curve L "
-            "and the grid search of ch. 6. With --leg or --circle, the verdict on a path."
+            "Print the Two Color Map of a vehicle: delta, P, the exact red and blue lines, the "
+            "curve L and the grid search of ch. 6. With --leg or --circle, also check a path."
         ),
-        epilog="exit codes: 0 done, 1 the path is refused by both theorems, or singular although "
-        "they accept it, as all of blue is, 2 invalid input",
+        epilog="exit codes: 0 done, 1 both theorems reject the path, or it is singular although "
+        "they accept it, as every blue path is, 2 invalid input",
     )
     allow_negative_lists(parser)
-    parser.add_argument(
-        "--vehicle",
-        metavar="VEHICLE",
-        help="ar_drone_2 (default), luukkonen, KEY=VALUE,..., or a preset with KEY=VALUE,...",
-    )
+    add_vehicle(parser)
     parser.add_argument(
         "--leg",
         action="append",
@@ -46,23 +42,17 @@ def add_parser(subparsers: Any) -> None:
         metavar=("COLOR", "A1,A2", "RADIUS"),
         help="a circular path: centre and radius in rad",
     )
-    parser.add_argument("--json", action="store_true", help="machine-readable")
-    parser.add_argument(
-        "--plot", type=Path, metavar="FILE", help="draw the map: FILE.png, .svg or .pdf"
-    )
+    add_json(parser)
+    add_plot(parser, "the map")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Report, draw, judge."""
+    """Compute, draw, print."""
     from tiltsim.errors import InputError
     from tiltsim.studies.gait_analysis import map_report
 
-    if arguments.plot is not None:
-        from tiltsim.system.files import prepare_file
-        from tiltsim.views.figures.style import FORMATS
-
-        prepare_file("--plot", arguments.plot, FORMATS)
+    prepare_figure("--plot", arguments.plot)
     vehicle = parse_vehicle(arguments.vehicle)
     path = _path(arguments, vehicle)
     try:
@@ -146,6 +136,6 @@ def _summary(report: dict[str, Any]) -> str:
         path = report["path"]
         if path["accepted"]:
             lines.append(f"path: accepted by the {path['theorem']} theorem")
-        lines += [f"path: refused: {reason}" for reason in path["reasons"]]
+        lines += [f"path: rejected: {reason}" for reason in path["reasons"]]
         lines += [f"path: singular: {text}" for text in path["warnings"]]
     return "\n".join(lines)

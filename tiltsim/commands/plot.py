@@ -1,16 +1,18 @@
-"""``tiltsim plot``: the figure of a flight, of several, or of a sweep."""
+"""``tiltsim plot``: draws a flight, a comparison of several, or a sweep."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from tiltsim.commands.options import Subparsers, prepare_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
     parser = subparsers.add_parser(
         "plot",
@@ -18,8 +20,8 @@ def add_parser(subparsers: Any) -> None:
         description=(
             "Draw a flight on one page: attitude, altitude, position error, tilt angles, rotor "
             "speeds, singularity margin, path over the ground, roll-pitch plane. Several flights: "
-            "margin, determinant and position error of each over time. Or draw a sweep: lines, "
-            "maps, distributions or boundaries, as its axes or its [plot] table have it."
+            "margin, determinant and position error of each over time. A sweep: lines, maps, "
+            "distributions or boundaries, according to its axes or its [plot] table."
         ),
     )
     parser.add_argument(
@@ -36,13 +38,13 @@ def add_parser(subparsers: Any) -> None:
         default=[],
         metavar="NAME",
         dest="metrics",
-        help="what to draw of a sweep; repeatable",
+        help="metric of a sweep to draw; repeatable",
     )
     parser.add_argument(
         "--out",
         type=Path,
         metavar="FILE",
-        help="PNG, SVG or PDF by its ending (default: flight.png, flights.png or sweep.png beside "
+        help="PNG, SVG or PDF by its suffix (default: flight.png, flights.png or sweep.png beside "
         "the first of the data)",
     )
     parser.set_defaults(run=run)
@@ -56,9 +58,11 @@ def run(arguments: argparse.Namespace) -> int:
     first, *others = arguments.flights
     sweep = next((path for path in arguments.flights if is_sweep_folder(path)), None)
     if sweep is not None and others:
-        raise InputError(f"{sweep}: a sweep is drawn alone; leave the other paths out")
+        raise InputError(
+            f"{sweep}: a sweep cannot be drawn together with others; remove the other paths"
+        )
     if arguments.metrics and sweep is None:
-        raise InputError(f"--metric {arguments.metrics[0]}: {first} holds no sweep")
+        raise InputError(f"--metric {arguments.metrics[0]}: {first} is not the folder of a sweep")
     folder = first if first.is_dir() else first.parent
     name = "flights.png" if others else "flight.png"
     out = arguments.out or folder / (name if sweep is None else "sweep.png")
@@ -78,7 +82,7 @@ def _flights_figure(paths: list[Path], out: Path) -> Figure:
     from tiltsim.flight.reading import load_flight
 
     flights = [load_flight(path) for path in paths]
-    _check(out)
+    prepare_figure("--out", out)
     if len(flights) > 1:
         from tiltsim.views.figures.comparison import comparison_figure
         from tiltsim.views.titles import flight_names
@@ -94,14 +98,7 @@ def _sweep_figure(folder: Path, metrics: list[str], out: Path) -> Figure:
     from tiltsim.sweeps.dataset import load_results
 
     results = load_results(folder)
-    _check(out)
+    prepare_figure("--out", out)
     from tiltsim.views.figures.sweep import sweep_figure
 
     return sweep_figure(results, tuple(metrics))
-
-
-def _check(out: Path) -> None:
-    from tiltsim.system.files import prepare_file
-    from tiltsim.views.figures.style import FORMATS
-
-    prepare_file("--out", out, FORMATS)

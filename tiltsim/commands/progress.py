@@ -7,21 +7,24 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Final
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from tqdm import tqdm
 
 TICK: Final = 1.0
-"""So often (s) the clock of a counting bar moves while nothing gets finished."""
+"""Interval (s) at which the clock of a counting bar moves while nothing is finished."""
 
 
 @contextmanager
 def announce_compilation(*, shown: bool) -> Iterator[None]:
-    """Meanwhile, a line on standard error, if that is a terminal, tells what is being compiled."""
+    """Announce compilations within the block on standard error, if that is a terminal."""
     if not shown or not sys.stderr.isatty():
         yield
         return
     from tiltsim.engines.cache import before_compiling
 
-    def tell(name: str) -> None:
+    def announce(name: str) -> None:
         from tqdm import tqdm
 
         plant, _, step = name.partition(".")
@@ -31,11 +34,11 @@ def announce_compilation(*, shown: bool) -> Iterator[None]:
             file=sys.stderr,
         )
 
-    before_compiling.append(tell)
+    before_compiling.append(announce)
     try:
         yield
     finally:
-        before_compiling.remove(tell)
+        before_compiling.remove(announce)
 
 
 @contextmanager
@@ -58,28 +61,29 @@ def progress_bar(total: float, unit: str, *, shown: bool) -> Iterator[Callable[[
 
 @contextmanager
 def counting_bar(total: int, unit: str, *, shown: bool) -> Iterator[Callable[[int], None]]:
-    """A progress bar for things that are counted, with their rate and the time left.
+    """A progress bar for countable things, with their rate and the remaining time.
 
-    Like `progress_bar`; the bar appears with the first call, which says what was finished before
-    and took no time.
+    Like `progress_bar`; the bar appears with the first call, whose value is the number that an
+    earlier run finished, which the rate leaves out.
     """
     if not shown or not sys.stderr.isatty():
         yield lambda value: None
         return
     layout = "{l_bar}{bar}| {n}/{total}{unit} [{elapsed}<{remaining}, {rate_noinv_fmt}]"
-    bar: Any = None
+    bar: tqdm | None = None
     finished = threading.Event()
 
-    def tick() -> None:
+    def tick(bar: tqdm) -> None:
         while not finished.wait(TICK):
             bar.refresh()
 
-    ticking = threading.Thread(target=tick, daemon=True)
+    ticking: threading.Thread | None = None
 
     def move(value: int) -> None:
-        nonlocal bar
+        nonlocal bar, ticking
         if bar is None:
             bar = _bar(total, f" {unit}", layout, value)
+            ticking = threading.Thread(target=tick, args=(bar,), daemon=True)
             ticking.start()
         bar.update(value - bar.n)
 
@@ -88,20 +92,26 @@ def counting_bar(total: int, unit: str, *, shown: bool) -> Iterator[Callable[[in
             yield move
         finally:
             finished.set()
-            if bar is not None:
+            if bar is not None and ticking is not None:
                 ticking.join()
                 bar.close()
 
 
-def _bar(total: float, unit: str, layout: str, initial: float = 0) -> Any:
-    """A bar as wide as the terminal; one that tells no size, as some services', has 80 columns."""
+def _bar(total: float, unit: str, layout: str, initial: float = 0) -> tqdm:
+    """A bar as wide as the terminal, or 80 columns if that reports no size."""
     from tqdm import tqdm
 
     try:
         size = os.get_terminal_size(sys.stderr.fileno())
     except OSError:
         size = os.terminal_size((0, 0))
-    # Left to itself, tqdm shows no bar at all on a terminal of no size.
-    columns, rows = size.columns or 80, size.lines or 24
-    options = {"leave": False, "bar_format": layout, "ncols": columns, "nrows": rows}
-    return tqdm(total=total, initial=initial, unit=unit, **options)
+    # On a terminal of unknown size tqdm's default is to show no bar at all.
+    return tqdm(
+        total=total,
+        initial=initial,
+        unit=unit,
+        leave=False,
+        bar_format=layout,
+        ncols=size.columns or 80,
+        nrows=size.lines or 24,
+    )

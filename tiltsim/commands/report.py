@@ -1,27 +1,25 @@
-"""``tiltsim report``: the thesis' claims beside what is measured, on one page."""
+"""``tiltsim report``: compares the thesis's claims with the simulated flights, on one page."""
 
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
-from typing import Any
 
-from tiltsim.commands.check import positive_integer
+from tiltsim.commands.options import Subparsers, add_jobs
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
     parser = subparsers.add_parser(
         "report",
-        help="compare the whole library with the published claims, on one page",
+        help="compare the whole library with the published claims on one HTML page",
         description=(
-            "Fly scenarios on both plants, judge every published claim, and write one "
-            "self-contained HTML page. Flights are kept: a second report takes seconds, and an "
-            "interrupted one goes on."
+            "Fly scenarios on both plants, check every published claim, and write one "
+            "self-contained HTML page. Flights are cached: a second report takes seconds, and an "
+            "interrupted one continues."
         ),
-        epilog="exit codes: 0 done, 1 a scenario's bounds do not hold, 2 invalid input",
+        epilog="exit codes: 0 done, 1 an expectation of a scenario failed, 2 invalid input",
     )
     parser.add_argument(
         "paths",
@@ -34,21 +32,15 @@ def add_parser(subparsers: Any) -> None:
         type=Path,
         default=Path("report"),
         metavar="DIR",
-        help="folder for report.html and what is kept (default: report)",
+        help="folder for report.html and the cached flights (default: report)",
     )
-    parser.add_argument("--markdown", type=Path, metavar="FILE", help="write a summary, too")
-    parser.add_argument(
-        "--jobs",
-        type=positive_integer,
-        default=os.cpu_count() or 1,
-        metavar="N",
-        help="processes (default: the number of cores)",
-    )
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="also write a summary")
+    add_jobs(parser)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Fly, judge, write."""
+    """Fly, evaluate, write."""
     from tiltsim.commands.progress import progress_bar
     from tiltsim.report.content import failure_text
     from tiltsim.report.making import make_report

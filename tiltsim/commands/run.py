@@ -1,4 +1,4 @@
-"""``tiltsim run``: one flight."""
+"""``tiltsim run``: flies one scenario."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import argparse
 import sys
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from tiltsim.commands.options import Subparsers, add_overrides, add_quiet
 from tiltsim.commands.progress import progress_bar
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INTERRUPTED, VEHICLE_LOST
 from tiltsim.system.interrupts import defer_interrupts
@@ -21,24 +22,24 @@ if TYPE_CHECKING:
     from tiltsim.views.rerun.live import LiveStream
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
     parser = subparsers.add_parser(
         "run",
         help="fly one scenario",
-        description="Fly one scenario, write its files and judge its expectations.",
+        description="Fly one scenario, write its files and check its expectations.",
     )
     parser.add_argument(
         "scenario",
         metavar="SCENARIO",
         help="a TOML file or a name from the library, with #VARIANT for a member of a family "
-        "(a family without #VARIANT flies its base if --set is given)",
+        "(with --set, a family without #VARIANT flies its base)",
     )
     parser.add_argument(
         "--controller",
         metavar="FILE.py:NAME",
-        help="fly a controller of your own, a function or class of a Python file; short for --set "
-        "controller.law=python and controller.function",
+        help="fly your own controller, a function or class in a Python file; short for --set "
+        "controller.law=python --set controller.function=FILE.py:NAME",
     )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="write metrics.json, flight.parquet, scenario.toml"
@@ -51,20 +52,13 @@ def add_parser(subparsers: Any) -> None:
     live.add_argument(
         "--connect", metavar="URL", help="stream to a Rerun viewer that is already open"
     )
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        dest="overrides",
-        help="override a key of the scenario, such as controller.decoupler=exact; repeatable",
-    )
-    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    add_overrides(parser, "the scenario", "controller.decoupler=exact")
+    add_quiet(parser)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Fly, save, judge."""
+    """Fly, save, evaluate."""
     from tiltsim.flight.verdicts import judge
     from tiltsim.scenario.loading import load_scenario, parse_override
     from tiltsim.system.files import prepare_file, prepare_folder
@@ -85,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not arguments.quiet and isinstance(vehicle, Vehicle):
         for warning in gait_warnings(scenario.gait.plan(vehicle), vehicle):
             print(f"tiltsim: warning: gait: {warning}", file=sys.stderr)
-        _tell_what_the_law_does_not_know(scenario)
+        _warn_unmodeled_properties(scenario)
     if arguments.rerun is None:
         flight = fly(scenario, arguments)
         _save(flight, arguments)
@@ -106,7 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
     reversed_rotor = flight.end.kind == "completed" and metrics["min_rotor_speed"] < 0.0
     if reversed_rotor and not arguments.quiet:
         print(
-            "tiltsim: warning: a rotor came to rest and reversed (min_rotor_speed = "
+            "tiltsim: warning: a rotor stopped and reversed (min_rotor_speed = "
             f"{metrics['min_rotor_speed']:.4g} rad/s)",
             file=sys.stderr,
         )
@@ -116,7 +110,9 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.out is not None:
             print(f"written to {arguments.out}")
         if arguments.rerun is not None:
-            print(f"recording written to {arguments.rerun}; see: tiltsim view {arguments.rerun}")
+            print(
+                f"recording written to {arguments.rerun}; open with: tiltsim view {arguments.rerun}"
+            )
     if flight.end.kind != "completed":
         print(f"tiltsim: {lost(flight)}", file=sys.stderr)
         return VEHICLE_LOST
@@ -131,13 +127,13 @@ def run(arguments: argparse.Namespace) -> int:
     return EXPECTATION_FAILED if failed else DONE
 
 
-def _tell_what_the_law_does_not_know(scenario: Scenario) -> None:
-    """A line on what a law of ours has wrong of a user's own vehicle."""
+def _warn_unmodeled_properties(scenario: Scenario) -> None:
+    """Warn of properties of a user's vehicle that the built-in controllers do not model."""
     own = scenario.rotorcraft.user_vehicle
     if own is not None and own.unmodeled_properties and scenario.controller.law != "python":
         print(
-            f"tiltsim: warning: vehicle.mjcf: the {scenario.controller.law} law, which takes the "
-            "centre of mass for the body's origin and the inertia for diagonal, does not know of "
+            f"tiltsim: warning: vehicle.mjcf: the {scenario.controller.law} controller assumes the "
+            "centre of mass at the body's origin and a diagonal inertia; it does not model "
             f"{own.unmodeled_properties}",
             file=sys.stderr,
         )
@@ -150,7 +146,7 @@ def _save(flight: Flight, arguments: argparse.Namespace) -> None:
 
 
 def fly(scenario: Scenario, arguments: argparse.Namespace) -> Flight:
-    """Simulate, with a progress bar and, if asked, a live view."""
+    """Simulate, with a progress bar and, if requested, a live view."""
     from tiltsim.simulation.simulate import simulate
 
     with ExitStack() as stack:
@@ -184,7 +180,7 @@ def summary(flight: Flight, verdicts: list[Verdict]) -> str:
 
     scenario, metrics = flight.scenario, flight.metrics()
     lines = [scenario.title or scenario.address or "scenario"]
-    if scenario.title and "#" in scenario.address:  # a family's title may not tell its member
+    if scenario.title and "#" in scenario.address:  # the title may be the family's
         lines.append(f"  {scenario.address}")
     if scenario.source:
         lines.append(f"  {scenario.source}")
@@ -215,17 +211,17 @@ def _measured(verdict: Verdict) -> str:
         return str(value).lower()
     if value is not None:
         return f"{value:.6g}"
-    return "flight under 20 s" if metric.endswith("after_20s") else "no value"
+    return "flight shorter than 20 s" if metric.endswith("after_20s") else "no value"
 
 
-def _published(wanted: Expectation) -> str:
-    value = wanted.published
+def _published(expectation: Expectation) -> str:
+    value = expectation.published
     if value is None:
         return ""
     if not isinstance(value, bool):
         return f"{value:g}"
-    # The thesis states that a number lies within the bounds, and prints none.
-    words = ("out of bounds", "in bounds") if wanted.equals is None else ("false", "true")
+    # The thesis states that a number lies within the bounds, without printing it.
+    words = ("out of bounds", "in bounds") if expectation.equals is None else ("false", "true")
     return words[value]
 
 
@@ -233,13 +229,12 @@ def expectation_lines(verdicts: list[Verdict]) -> list[str]:
     """A table of expectations: verdict, metric, measured, published, bounds."""
     rows = [("", "expected", "measured", "published", "bounds")]
     for verdict in verdicts:
-        wanted = verdict.expectation
         rows.append(
             (
                 "ok" if verdict.holds else "FAILED",
-                wanted.metric,
+                verdict.expectation.metric,
                 _measured(verdict),
-                _published(wanted),
+                _published(verdict.expectation),
                 verdict.bounds,
             )
         )

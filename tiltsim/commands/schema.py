@@ -1,4 +1,4 @@
-"""``tiltsim schema``: the JSON Schema of the scenario or the sweep file, for editors."""
+"""``tiltsim schema``: prints the JSON Schema of the scenario or the sweep file, for editors."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ import argparse
 import json
 from typing import Any
 
+from tiltsim.commands.options import Subparsers
 from tiltsim.scenario.scenario import Scenario, Variant
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
     parser = subparsers.add_parser(
         "schema",
         help="print the JSON Schema of the scenario file",
-        description="Print the JSON Schema of the scenario file; editors complete TOML with it.",
+        description="Print the JSON Schema of the scenario file, with which editors complete TOML.",
     )
     parser.add_argument("--sweep", action="store_true", help="the schema of the sweep file instead")
     parser.set_defaults(run=run)

@@ -1,51 +1,49 @@
-"""``tiltsim singularity``: where a quadrotor's decoupling matrix is said to be singular, and is."""
+"""``tiltsim singularity``: a quadrotor's published and exact determinants."""
 
 from __future__ import annotations
 
 import argparse
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.angles import allow_negative_lists, parse_angle, parse_vehicle
+from tiltsim.commands.options import Subparsers, add_json, add_plot, prepare_figure
 from tiltsim.commands.text import aligned, print_figure_path
 
 if TYPE_CHECKING:
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
     parser = subparsers.add_parser(
         "singularity",
         help="compare the quadrotor's published and exact determinants",
         description=(
-            "Ch. 2's determinant surface S(theta, phi) of yaw-position control and its singular "
-            "curve, beside the exact determinant, which in hover is zero nowhere within 90 degrees."
+            "Compare ch. 2's determinant surface S(theta, phi) of yaw-position control and its "
+            "singular curve with the exact determinant, which is not zero in hover up to 90 deg."
         ),
     )
     allow_negative_lists(parser)
     parser.add_argument("vehicle_model", metavar="quadrotor", choices=("quadrotor",))
     parser.add_argument("--vehicle", metavar="PRESET", help="default: ar_drone_2_unrounded")
-    parser.add_argument("--roll", metavar="RAD", default="0", help="attitude to judge, default 0")
+    parser.add_argument(
+        "--roll", metavar="RAD", default="0", help="attitude to evaluate (default 0)"
+    )
     parser.add_argument("--pitch", metavar="RAD", default="0")
-    parser.add_argument("--json", action="store_true", help="machine-readable, with the curve")
-    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw surfaces, curve and zone")
+    add_json(parser)
+    add_plot(parser, "surfaces, curve and zone")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Report, draw."""
+    """Compute, draw, print."""
     vehicle = parse_vehicle(arguments.vehicle or "ar_drone_2_unrounded")
     attitude = (
         parse_angle("--roll", arguments.roll),
         parse_angle("--pitch", arguments.pitch),
     )
-    if arguments.plot is not None:
-        from tiltsim.system.files import prepare_file
-        from tiltsim.views.figures.style import FORMATS
-
-        prepare_file("--plot", arguments.plot, FORMATS)
+    prepare_figure("--plot", arguments.plot)
     report = _report(vehicle, *attitude)
     if arguments.plot is not None:
         from tiltsim.views.figures.quadrotor_singularity import singularity_figure
@@ -103,7 +101,7 @@ def _summary(report: dict[str, Any]) -> str:
         ),
         (
             "exact on that curve",
-            f"{on_curve['min']:.6g} to {on_curve['max']:.6g}, nowhere singular",
+            f"{on_curve['min']:.6g} to {on_curve['max']:.6g}, never singular",
         ),
         (
             "published zone",

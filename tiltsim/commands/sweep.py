@@ -1,42 +1,35 @@
-"""``tiltsim sweep``: many flights along axes, into one dataset."""
+"""``tiltsim sweep``: flies a scenario along axes, into one dataset."""
 
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from tiltsim.commands.check import positive_integer
+from tiltsim.commands.options import Subparsers, add_jobs, add_overrides, add_quiet
 from tiltsim.commands.progress import counting_bar
 from tiltsim.commands.text import counted
 from tiltsim.exit_codes import INTERRUPTED
 
 if TYPE_CHECKING:
-    from tiltsim.sweeps.plan import Plan
+    from tiltsim.sweeps.points import SweepPoints
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
     parser = subparsers.add_parser(
         "sweep",
         help="fly a scenario along axes: grids, random sets, stability boundaries",
         description=(
-            "Fly a scenario along axes into one Parquet dataset. Killed at any moment, the same "
-            "command continues."
+            "Fly a scenario along axes into one Parquet dataset. If it is interrupted or killed, "
+            "running the same command again continues."
         ),
     )
     parser.add_argument(
         "sweep", metavar="SWEEP", help="a TOML file or a name from the library (tiltsim list)"
     )
-    parser.add_argument(
-        "--jobs",
-        type=positive_integer,
-        default=os.cpu_count() or 1,
-        metavar="N",
-        help="processes (default: the number of cores)",
-    )
+    add_jobs(parser)
     parser.add_argument(
         "--cluster",
         metavar="ADDRESS",
@@ -45,42 +38,35 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="the results (default: sweeps/NAME)"
     )
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        dest="overrides",
-        help="override a key of the base scenario, such as simulation.plant=thesis; repeatable",
-    )
-    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    add_overrides(parser, "the base scenario", "simulation.plant=thesis")
+    add_quiet(parser)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Fly what is not yet finished, and sum up."""
+    """Fly the points that are not yet finished, and print a summary."""
     from tiltsim.scenario.loading import parse_override
     from tiltsim.sweeps.loading import load_sweep
-    from tiltsim.sweeps.plan import Plan
+    from tiltsim.sweeps.points import SweepPoints
     from tiltsim.sweeps.running import run_sweep
 
     overrides = dict(parse_override(text) for text in arguments.overrides)
     definition = load_sweep(arguments.sweep, overrides)
-    plan = Plan(definition)
+    points = SweepPoints(definition)
     out = arguments.out or Path("sweeps") / Path(definition.address).stem
     shown = not arguments.quiet
-    units = ("flight", "flights") if plan.sweep.bisect is None else ("boundary", "boundaries")
+    units = ("flight", "flights") if points.sweep.bisect is None else ("boundary", "boundaries")
     begun = False
 
     def report(rows: int) -> None:
         nonlocal begun
         if shown and not begun:
-            print(_headline(plan, rows, units), file=sys.stderr)
+            print(_headline(points, rows, units), file=sys.stderr)
         begun = True
         move(rows)
 
     try:
-        with counting_bar(len(plan), units[1], shown=shown) as move:
+        with counting_bar(len(points), units[1], shown=shown) as move:
             dataset = run_sweep(
                 definition,
                 out,
@@ -90,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
             )
     except KeyboardInterrupt:
         print(
-            f"tiltsim: interrupted; what is finished is in {out}, the same command continues",
+            f"tiltsim: interrupted; finished flights are in {out}; the same command continues",
             file=sys.stderr,
         )
         return INTERRUPTED
@@ -99,14 +85,14 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _headline(plan: Plan, kept: int, units: tuple[str, str]) -> str:
-    """What there is to do, less what an earlier run has finished."""
-    title = plan.sweep.title or plan.definition.address
-    everything = counted(len(plan), *units)
-    if kept == len(plan):
-        return f"{title}: all {everything} kept, nothing to fly"
-    if kept:
-        return f"{title}: {kept} of {everything} kept, {len(plan) - kept} to fly"
+def _headline(points: SweepPoints, finished: int, units: tuple[str, str]) -> str:
+    """How many points are to be flown, and how many an earlier run has finished."""
+    title = points.sweep.title or points.definition.address
+    everything = counted(len(points), *units)
+    if finished == len(points):
+        return f"{title}: all {everything} finished, nothing to fly"
+    if finished:
+        return f"{title}: {finished} of {everything} finished, {len(points) - finished} to fly"
     return f"{title}: {everything}"
 
 

@@ -1,4 +1,4 @@
-"""Reports as text: aligned lines, tables, and JSON without negative zeros."""
+"""Text output: aligned lines, tables, and JSON without negative zeros."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 
 def number(value: float, form: str = ".6g") -> str:
-    """A number as text; zero, and what rounds to it, has no sign."""
+    """A number as text; a value that prints as zero has no sign."""
     text = format(value, form)
     return text[1:] if text.startswith("-") and float(text) == 0.0 else text
 
@@ -23,18 +23,18 @@ def numbers(values: Iterable[float]) -> str:
 
 
 def counted(count: int, one: str, many: str) -> str:
-    """How many there are: ``1 flight``, ``2 flights``."""
+    """A count with its noun: ``1 flight``, ``2 flights``."""
     return f"{count} {one if count == 1 else many}"
 
 
 def print_figure_path(arguments: argparse.Namespace) -> None:
-    """Say where ``--plot`` went, as `tiltsim plot` does, unless the output is JSON."""
+    """Print the path of the ``--plot`` figure, unless the output is JSON."""
     if arguments.plot is not None and not arguments.json:
         print(f"figure written to {arguments.plot}")
 
 
 def json_text(report: Any) -> str:
-    """A report as JSON; NaN and infinity are errors."""
+    """A report as JSON. Raises ValueError for NaN and infinity."""
     return json.dumps(_unsigned_zeros(report), indent=2, allow_nan=False)
 
 
@@ -47,15 +47,15 @@ def _unsigned_zeros(value: Any) -> Any:
 
 
 def aligned(rows: Sequence[tuple[str, str]]) -> list[str]:
-    """Pairs of name and value as lines, the values under each other."""
+    """Pairs of name and value as lines, with the values aligned."""
     width = max(len(name) for name, _ in rows)
     return [fitted(f"{name:<{width}}  {value}", width + 2) for name, value in rows]
 
 
 def fitted(line: str, indent: int) -> str:
-    """A line; on a terminal that is too narrow for it, wrapped with the rest indented.
+    """A line, wrapped and indented on a terminal that is too narrow for it.
 
-    Files and pipes get lines as they are, so that a program finds one thing on each.
+    Lines in files and pipes are never wrapped, so that a program finds one item per line.
     """
     if not sys.stdout.isatty():
         return line
@@ -66,7 +66,7 @@ def fitted(line: str, indent: int) -> str:
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]], numeric: frozenset[int]) -> str:
-    """A table; the columns in ``numeric`` are set flush right."""
+    """A table; the columns in ``numeric`` are right-aligned."""
     widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
     lines = []
     for row in (header, *rows):

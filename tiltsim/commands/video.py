@@ -1,26 +1,27 @@
-"""``tiltsim video``: a film of a flight."""
+"""``tiltsim video``: renders a flight as a video."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
+from tiltsim.commands.options import Subparsers, add_quiet
 from tiltsim.commands.progress import counting_bar
 
 MANY_FRAMES: Final = 100
-"""From here on the user is told how long it may take."""
+"""Frames from which on the expected duration is printed."""
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
     parser = subparsers.add_parser(
         "video",
-        help="film a flight",
+        help="render a video of a flight",
         description=(
-            "Film a flight with MuJoCo's renderer, the camera following the vehicle; works without "
-            "a screen. The picture in the corner is the roll-pitch plane."
+            "Render a flight with MuJoCo, the camera following the vehicle; works without a "
+            "screen. The inset shows the roll-pitch plane."
         ),
     )
     parser.add_argument(
@@ -38,7 +39,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--speed", type=_speed, default=1.0, metavar="X", help="times real time (default 1)"
     )
-    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    add_quiet(parser)
     parser.set_defaults(run=run)
 
 
@@ -54,7 +55,7 @@ def _size(text: str) -> tuple[int, int]:
 
 def _frame_rate(text: str) -> int:
     if not (text.isdecimal() and 1 <= int(text) <= 240):
-        raise argparse.ArgumentTypeError(f"{text}: must be a whole number from 1 to 240")
+        raise argparse.ArgumentTypeError(f"{text}: must be an integer from 1 to 240")
     return int(text)
 
 
@@ -69,7 +70,7 @@ def _speed(text: str) -> float:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Draw and encode."""
+    """Render and encode."""
     from tiltsim.flight.reading import load_flight
     from tiltsim.system.files import prepare_file
 
@@ -88,8 +89,8 @@ def run(arguments: argparse.Namespace) -> int:
     count = len(moments(flight, form))
     if count > MANY_FRAMES and not arguments.quiet:
         print(
-            f"{count} frames of {width}x{height}; without a graphics card a frame takes up to half "
-            "a second (--speed, --fps and --size change that)",
+            f"{count} frames of {width}x{height}; without a GPU a frame takes up to half a second "
+            "(reduce with --speed, --fps or --size)",
             file=sys.stderr,
         )
     with counting_bar(count, "frames", shown=not arguments.quiet) as move:
@@ -97,5 +98,5 @@ def run(arguments: argparse.Namespace) -> int:
         drawn = iter(range(1, count + 1))
         write_video(flight, out, form, lambda _time: move(next(drawn)))
     if not arguments.quiet:
-        print(f"film written to {out}")
+        print(f"video written to {out}")
     return 0

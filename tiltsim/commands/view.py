@@ -1,20 +1,21 @@
-"""``tiltsim view``: flights and recordings in the Rerun viewer."""
+"""``tiltsim view``: shows flights and recordings in the Rerun viewer."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+
+from tiltsim.commands.options import Subparsers
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
     parser = subparsers.add_parser(
         "view",
-        help="show flights in the Rerun viewer, several for comparison",
+        help="show flights in the Rerun viewer",
         description=(
             "Show a flight in the Rerun viewer, or several in one recording for comparison. "
-            "Recordings (.rrd) are opened as they are."
+            "Recordings (.rrd) are opened unchanged."
         ),
     )
     parser.add_argument(
@@ -26,14 +27,17 @@ def add_parser(subparsers: Any) -> None:
     )
     target = parser.add_mutually_exclusive_group()
     target.add_argument(
-        "--rerun", type=Path, metavar="FILE.rrd", help="save the recording and open no viewer"
+        "--rerun",
+        type=Path,
+        metavar="FILE.rrd",
+        help="save a recording instead of opening the viewer",
     )
     target.add_argument("--connect", metavar="URL", help="show it in a viewer that is already open")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Open the viewer, or save what it would show."""
+    """Open the viewer, or save a recording."""
     from tiltsim.errors import InputError
     from tiltsim.flight.reading import load_flight
     from tiltsim.system.files import prepare_file
@@ -43,8 +47,8 @@ def run(arguments: argparse.Namespace) -> int:
     if recordings:
         if len(recordings) < len(arguments.paths) or arguments.rerun or arguments.connect:
             raise InputError(
-                f"{recordings[0]}: a recording is opened as it is; "
-                "to compare, to save or to connect give the flights' folders"
+                f"{recordings[0]}: a recording can only be opened; to compare, save or connect, "
+                "give the folders of the flights"
             )
         for path in recordings:
             if not path.is_file():

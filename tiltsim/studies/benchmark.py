@@ -1,8 +1,8 @@
-"""How fast the closed loop runs, as a share of bare MuJoCo on the same model in the same run.
+"""Speed of the closed loop relative to bare MuJoCo on the same model in the same run.
 
-Every figure comes from turns: in each turn the variants are timed one after the other from the same
-state, and the ratio of a variant is the median over the turns of bare time over its time. So a
-machine that is busy, or changes its clock, spoils all variants of a turn alike.
+All variants are timed in rounds: in each round one after the other, from the same state. The ratio
+of a variant is the median over the rounds of bare time over its time, so that a busy machine, or a
+change of its clock, affects all variants of a round alike.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ ROUNDS: Final = 15
 ENGINES: Final[tuple[EngineName, ...]] = ("python", "native")
 STEPS: Final = 3000
 PYTHON_STEPS: Final = 400
-"""Steps of one timing, long enough for the clock and short enough to take turns."""
+"""Steps per timing: long enough for the clock, short enough for many rounds."""
 
 RECORD_STEPS: Final = 10
 BATCH_ROWS: Final = 64
@@ -49,7 +49,7 @@ Rows = list[dict[str, Any]]
 
 
 def flying_plant(integrator: str) -> MujocoPlant:
-    """A tiltrotor in steady flight with tilted rotors: every part of the loop has work to do."""
+    """A tiltrotor in steady flight with tilted rotors, so that every part of the loop is active."""
     plant = MujocoPlant(
         parse_scenario(
             {
@@ -63,11 +63,11 @@ def flying_plant(integrator: str) -> MujocoPlant:
 
 
 def bench_single(integrator: str, rounds: int = ROUNDS) -> Rows:
-    """Time one vehicle: bare ``mj_step`` with frozen controls, then each engine, in turns.
+    """Time one vehicle: bare ``mj_step`` with constant controls, and each engine.
 
-    ``empty`` is a native callback that does nothing: bare MuJoCo without its timers, which stand
-    still under native callbacks. What a law costs is the way from there to ``native``. ``recorded``
-    takes a sample every tenth step. Rows as in ``tiltsim bench --json``.
+    ``empty`` is a native callback that does nothing: bare MuJoCo without its timers, which native
+    callbacks disable. The cost of a controller is the difference from ``empty`` to ``native``.
+    ``recorded`` takes a sample every tenth step. Rows as in ``tiltsim bench --json``.
     """
     plant = flying_plant(integrator)
     model, data, state = plant.model, plant.data, plant.state
@@ -93,12 +93,12 @@ def bench_single(integrator: str, rounds: int = ROUNDS) -> Rows:
         for name, callback in callbacks.items()
     }
     variants["recorded", "native"] = recording
-    seconds = _take_turns(variants, rounds)
+    seconds = _time_in_rounds(variants, rounds)
     return _rows(seconds, ("single", "bare"), integrator, model, vehicles=1, threads=1)
 
 
 def bench_batch(integrator: str, threads: int, rounds: int = BATCH_ROUNDS) -> Rows:
-    """Time a batch of vehicles: open loop with frozen controls, and the native engine, in turns."""
+    """Time a batch of vehicles: open loop with constant controls, and the native engine."""
     from mujoco.batch import Batch
 
     plant = flying_plant(integrator)
@@ -117,16 +117,30 @@ def bench_batch(integrator: str, threads: int, rounds: int = BATCH_ROUNDS) -> Ro
         ("batch", "bare"): stepping(None),
         ("batch", "native"): stepping(plant.callback),
     }
-    seconds = _take_turns(variants, rounds)
+    seconds = _time_in_rounds(variants, rounds)
     return _rows(
         seconds, ("batch", "bare"), integrator, plant.model, vehicles=BATCH_ROWS, threads=threads
     )
 
 
 def bench_flights(vehicles: int, duration: float, integrator: str, timestep: float) -> Rows:
-    """Fly whole flights with samples, judgement and metrics; one row, its ratio left open.
+    """Time whole flights with samples, termination checks and metrics.
 
-    ``memory`` is the largest the process has ever been, bytes.
+    Parameters
+    ----------
+    vehicles
+        Number of flights.
+    duration
+        Of each, s.
+    integrator
+        MuJoCo's.
+    timestep
+        Of the physics, s.
+
+    Returns
+    -------
+    list of dict
+        One row without a ratio; ``memory`` is the peak of the process, bytes.
     """
     scenarios = [_trotting(index, duration, integrator, timestep) for index in range(vehicles)]
     for _ in fly(scenarios[:1]):
@@ -156,9 +170,9 @@ def bench_flights(vehicles: int, duration: float, integrator: str, timestep: flo
 
 
 def bench_accuracy(vehicles: int = BATCH_ROWS) -> Rows:
-    """Position error of RK4 against the step, and what all cores fly of it together.
+    """Position error of RK4 for several time steps, and the speed of all cores together.
 
-    The error (m) is the largest difference of any coordinate from the flight with the reference
+    The error (m) is the maximum difference of any coordinate from the flight with the reference
     step, over the samples of the flight.
     """
     reference = _positions(REFERENCE_STEP)
@@ -189,7 +203,7 @@ def bench_accuracy(vehicles: int = BATCH_ROWS) -> Rows:
 
 
 def _trotting(index: int, duration: float, integrator: str, timestep: float) -> Scenario:
-    """One vehicle of many, each with another mass and start."""
+    """One vehicle of many, each with a different mass and start."""
     return parse_scenario(
         {
             "simulation": {
@@ -206,7 +220,7 @@ def _trotting(index: int, duration: float, integrator: str, timestep: float) -> 
 
 
 def _circling(timestep: float) -> Scenario:
-    """Ch. 4's circle with the exact law; the servo is slow enough for steps of 8 ms."""
+    """Ch. 4's circle with the exact control law; the servo is slow enough for steps of 8 ms."""
     return parse_scenario(
         {
             "simulation": {
@@ -235,15 +249,15 @@ def _seconds(action: Callable[[], object]) -> float:
     return perf_counter() - start
 
 
-def _take_turns(
+def _time_in_rounds(
     variants: Mapping[tuple[str, str], Callable[[], float]], rounds: int
 ) -> dict[tuple[str, str], list[float]]:
-    """Seconds a step of each variant in each turn."""
+    """Seconds per step of each variant in each round."""
     seconds: dict[tuple[str, str], list[float]] = {name: [] for name in variants}
-    for turn in range(rounds + 1):
+    for round_ in range(rounds + 1):
         for name, run in variants.items():
             per_step = run()
-            if turn > 0:  # the first turn warms caches
+            if round_ > 0:  # the first round warms the caches
                 seconds[name].append(per_step)
     return seconds
 

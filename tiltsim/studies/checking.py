@@ -1,4 +1,4 @@
-"""Headless checks: fly many scenarios, judge each, report for people and for CI machines."""
+"""Headless checks: fly many scenarios, evaluate their expectations, write JUnit XML."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ Status = Literal["passed", "failed", "lost", "invalid", "crashed", "interrupted"
 
 @dataclass(frozen=True)
 class CheckResult:
-    """The outcome of one scenario."""
+    """The outcome of checking one scenario."""
 
     address: str
     status: Status
-    message: str  # why it is not passed, in one line; empty when passed
+    message: str  # why it did not pass, in one line; empty if passed
     verdicts: tuple[Verdict, ...] = ()
     wall_time: float = 0.0  # s
 
 
 def collect(paths: Iterable[str]) -> list[str]:
-    """Addresses of all scenarios under files and folders, families spread into variants.
+    """Addresses of all scenarios under files and folders, families expanded into variants.
 
-    A path that does not exist is looked up in the library. Raises `InputError` where it is not
-    there either, or where a folder holds no scenario.
+    A path that does not exist is looked up in the library. Raises `InputError` if it is not there
+    either, or if a folder contains no scenario.
     """
     addresses: list[str] = []
     for path in paths:
@@ -58,28 +58,28 @@ def collect(paths: Iterable[str]) -> list[str]:
             try:
                 names = variant_names(file, read_toml(file))
             except InputError:
-                names = []  # the file stays on the list and fails there, by itself
+                names = []  # the file is checked like the others, and reported as invalid
             addresses += [f"{base}#{member}" for member in names] or [base]
     return list(dict.fromkeys(addresses))
 
 
 def _find(name: str) -> Path:
     if not name:
-        raise InputError("no scenario named; see tiltsim list")
+        raise InputError("the name of a scenario is empty; see tiltsim list")
     library = shipped_folder("scenarios")
     for place in (Path(name), library / name, library / f"{name}.toml"):
         if place.exists():
             return place
     hint = closest_in_library(name)
     raise InputError(
-        f"{name}: no such file or folder, nor one of the library ({hint}see tiltsim list)"
+        f"{name}: no such file or folder, here or in the library ({hint}see tiltsim list)"
     )
 
 
 def check_one(
     address: str, overrides: Mapping[str, Any], engine: EngineName | None = None
 ) -> CheckResult:
-    """Fly and judge one scenario; everything that goes wrong becomes part of the result."""
+    """Fly one scenario and evaluate its expectations; errors become part of the result."""
     start = perf_counter()
     try:
         scenario = load_scenario(address, overrides)
@@ -92,9 +92,9 @@ def check_one(
         raise KeyboardInterrupt
     verdicts = tuple(judge(scenario, flight.metrics()))
     wall_time = perf_counter() - start
-    # A scenario may be about a loss: then it says what it expects of `diverged`.
-    loss_expected = any(v.expectation.metric == "diverged" for v in verdicts)
-    if flight.end.kind != "completed" and not loss_expected:
+    # A scenario that may end early has an expectation on `diverged`.
+    may_end_early = any(v.expectation.metric == "diverged" for v in verdicts)
+    if flight.end.kind != "completed" and not may_end_early:
         message = f"flight {flight.end.kind} at t = {flight.end.time:.3f} s: {flight.end.cause}"
         return CheckResult(address, "lost", message, verdicts, wall_time)
     failed = [v for v in verdicts if not v.holds]
@@ -116,11 +116,26 @@ def check_all(
     overrides: Mapping[str, Any],
     report: Callable[[CheckResult], None],
 ) -> list[CheckResult]:
-    """Check scenarios on several processes; ``report`` sees each result as it comes.
+    """Check scenarios on several processes.
 
-    Returns the results in the order of the addresses. A process that dies takes only the
-    scenarios down that it was working on, and they are reported as crashed. An interrupt from the
-    keyboard ends all processes at once.
+    If a process dies, only the scenario that it was flying is reported as crashed. An interrupt
+    from the keyboard ends all processes at once.
+
+    Parameters
+    ----------
+    addresses
+        Of scenarios, as from `collect`.
+    jobs
+        Number of processes.
+    overrides
+        Values by dotted key, for every scenario.
+    report
+        Called with each result as it becomes known.
+
+    Returns
+    -------
+    list of CheckResult
+        In the order of the addresses.
     """
     scenarios = _valid(addresses, overrides)
     engine = shared_engine(list(scenarios.values()))
@@ -132,7 +147,7 @@ def check_all(
         return results
     by_address: dict[str, CheckResult] = {}
     work = partial(check_one, overrides=overrides, engine=engine)
-    # The longest first, so that no process ends up alone with one of them.
+    # The longest first, so that none of them is still running when all others have finished.
     steps = {address: scenario.simulation.steps for address, scenario in scenarios.items()}
     by_length = sorted(addresses, key=lambda address: -steps.get(address, 0))
     for address, future in in_processes(work, by_length, jobs):
@@ -154,12 +169,12 @@ def _valid(addresses: list[str], overrides: Mapping[str, Any]) -> dict[str, Scen
         try:
             scenarios[address] = load_scenario(address, overrides)
         except InputError:
-            continue  # it is reported when its turn comes
+            continue  # reported when it is checked
     return scenarios
 
 
 def interrupted_result(address: str) -> CheckResult:
-    """What stands for a scenario that an interrupt left without an outcome."""
+    """The result of a scenario that was not finished before an interrupt."""
     return CheckResult(address, "interrupted", "not flown: interrupted")
 
 

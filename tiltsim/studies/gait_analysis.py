@@ -1,4 +1,4 @@
-"""Reports on gaits and on the Two Color Map, as plain dicts ready for JSON.
+"""Analyses of gaits and of the Two Color Map, as plain dicts ready for JSON.
 
 Angles are in rad, everything else in SI units; NaN becomes null.
 """
@@ -48,14 +48,14 @@ if TYPE_CHECKING:
 
 
 NEARLY_SINGULAR: Final = 1e-3
-"""Smallest over largest singular value of tau below which a gait has its rank by rounding alone.
+"""Ratio of singular values of tau below which a gait has full rank only because of rounding.
 
-Blue gaits with angles rounded as in the thesis stay below 3e-4, sound gaits above 1e-2.
+Blue gaits with angles rounded as in the thesis stay below 3e-4, nonsingular gaits above 1e-2.
 """
 
 
-STANDS_STILL: Final = 1e-6
-"""Share of the fastest rotor's speed below which a rotor stands still."""
+REST_TOLERANCE: Final = 1e-6
+"""Fraction of the fastest rotor's speed below which a rotor counts as at rest."""
 
 
 def gait_report(
@@ -66,12 +66,25 @@ def gait_report(
     pitch: float | None = None,
     samples: int = 201,
 ) -> dict[str, Any]:
-    """Everything about the singularities of a gait (``tiltsim gait --json``).
+    """The singularities of a gait (``tiltsim gait --json``).
 
-    The values at the top are those at time zero. A gait that moves adds ``time``, a table of arrays
-    over one period, and ``min_singularity_margin`` over it. With ``roll`` or ``pitch`` (rad) the
-    margins and the determinant are taken at that attitude, else margins at level. Fixed angles have
-    ``hover_rotor_speeds`` (rad/s, along the spins), null where they cannot hover.
+    Parameters
+    ----------
+    gait
+        Tilt angles over time.
+    vehicle
+        Their vehicle.
+    roll, pitch
+        Attitude of the margins and the determinant, rad; without either, margins at level.
+    samples
+        Number of samples over one period.
+
+    Returns
+    -------
+    dict
+        Values at time zero. A moving gait adds ``time``, a table of arrays over one period, and
+        ``min_singularity_margin`` over it. Fixed angles have ``hover_rotor_speeds`` (rad/s, along
+        the spins), null if they cannot hover.
     """
     at_attitude = roll is not None or pitch is not None
     roll, pitch = roll or 0.0, pitch or 0.0
@@ -93,9 +106,9 @@ def gait_report(
     if at_attitude:
         report |= {"roll": roll, "pitch": pitch}
         report["determinant"] = float(determinant(start, roll, pitch, vehicle))
-    times = gait.sample_times(samples)
-    angles = gait.angles(times)
     if not gait.is_constant:
+        times = gait.sample_times(samples)
+        angles = gait.angles(times)
         table = _instant(angles, vehicle, roll, pitch)
         table["singularity_margin"] = margin_over_gait(angles, vehicle, roll, pitch).tolist()
         table |= {"time": times.tolist(), "rates": gait.rates(times).tolist()}
@@ -121,70 +134,83 @@ def gait_report(
 
 
 def gait_warnings(gait: Gait, vehicle: Vehicle, samples: int = 201) -> list[str]:
-    """What makes a gait unfit for flight, in one line each; empty for a sound gait."""
+    """Reasons why a gait is not fit for flight, one line each."""
     times = gait.sample_times(samples)
     angles = gait.angles(times)
-    lost = rank(angles, vehicle) < 3
+    deficient = rank(angles, vehicle) < 3
     values = singular_values(angles, vehicle)
     conditioning = values[:, 2] / values[:, 0]
-    by_rounding = (conditioning < NEARLY_SINGULAR) & ~lost
-    directionless = np.isnan(torque_free_direction(angles, vehicle)).any(axis=-1) & ~lost
+    by_rounding = (conditioning < NEARLY_SINGULAR) & ~deficient
+    directionless = np.isnan(torque_free_direction(angles, vehicle)).any(axis=-1) & ~deficient
     warnings = []
-    if lost.any():
+    if deficient.any():
         warnings.append(
-            f"rank of tau is {int(rank(angles, vehicle).min())}{_when(lost, times, gait)}: the "
-            "decoupling matrix is singular at every attitude"
+            f"rank of tau is {int(rank(angles, vehicle).min())}{_when(deficient, times, gait)}: "
+            "the decoupling matrix is singular at every attitude"
         )
     if by_rounding.any():
         warnings.append(
             f"tau is nearly singular{_when(by_rounding, times, gait)}: its smallest singular value "
-            f"is {conditioning[by_rounding].min():.2g} of the largest; the margin means little"
+            f"is {conditioning[by_rounding].min():.2g} of the largest; the margin is not meaningful"
         )
     if directionless.any():
         warnings.append(
             f"R = R_phi = R_theta = 0 (curve L){_when(directionless, times, gait)}: the decoupling "
             "matrix is singular at every attitude"
         )
-    R = np.where(lost | directionless, 0.0, residuals(angles, vehicle).R)
+    R = np.where(deficient | directionless, 0.0, residuals(angles, vehicle).R)
     signs = R[R != 0.0]
     if (signs > 0.0).any() and (signs < 0.0).any():
-        turned = (np.sign(R) == -np.sign(signs[0])) & (R != 0.0)
+        reversed_ = (np.sign(R) == -np.sign(signs[0])) & (R != 0.0)
         warnings.append(
-            f"R changes sign before t = {times[turned][0]:.3f} s: the decoupling matrix is "
-            "singular on the way"
+            f"R changes sign before t = {times[reversed_][0]:.3f} s: the decoupling matrix is "
+            "singular in between"
         )
     return warnings
 
 
 def _backward_rotors(speeds: Quad | None) -> list[str]:
-    """The warning on hover speeds along the spins, if some are negative."""
+    """A warning if some hover speeds along the spins are negative."""
     if speeds is None:
         return []
-    # A rotor at rest may have either sign by rounding.
-    still = STANDS_STILL * max(map(abs, speeds))
-    backward = [str(rotor) for rotor, speed in zip(ROTORS, speeds, strict=True) if speed < -still]
+    # Rounding gives a rotor at rest either sign.
+    at_rest = REST_TOLERANCE * max(map(abs, speeds))
+    backward = [str(rotor) for rotor, speed in zip(ROTORS, speeds, strict=True) if speed < -at_rest]
     if not backward:
         return []
     names = ("rotors " if len(backward) > 1 else "rotor ") + " and ".join(backward)
-    return [f"{names} would have to turn backwards to hover"]
+    return [f"{names} would have to spin backwards to hover"]
 
 
 def fault_report(tilts: Quad, vehicle: Vehicle, opposite_speed: float) -> dict[str, Any]:
-    """What a vehicle survives hovering (``tiltsim gait --faults``).
+    """Hovering after the loss of each rotor (``tiltsim gait --faults``).
 
-    For the loss of each rotor: by how much (rad) the given tilts miss a hover on the rotors that
-    are left, and the hover on three rotors with free tilts, the opposite one at a speed (rad/s).
-    ``least_speed`` is the top speed that the rotors must reach after a loss with tilts free.
+    Parameters
+    ----------
+    tilts
+        Tilt angles, rad.
+    vehicle
+        Their vehicle.
+    opposite_speed
+        Of the rotor opposite the failed one in the hover with free tilt angles, rad/s.
+
+    Returns
+    -------
+    dict
+        For each rotor: how far (rad) the tilt angles are from a hover on the other three, and a
+        hover on three rotors with free tilt angles. ``least_speed`` is the maximum speed (rad/s)
+        that the rotors must reach for it.
     """
     losses = []
-    for lost in ROTORS:
-        free = three_rotor_hover(lost, vehicle, opposite_speed=opposite_speed)
-        factors = [0.0 if rotor == lost else 1.0 for rotor in ROTORS]
+    for failed in ROTORS:
+        free = three_rotor_hover(failed, vehicle, opposite_speed=opposite_speed)
+        factors = [0.0 if rotor == failed else 1.0 for rotor in ROTORS]
         losses.append(
             {
-                "rotor": lost,
-                "fixed_tilts_miss": fixed_tilt_imbalance(tilts, lost, vehicle),
-                "hovers_with_fixed_tilts": fixed_tilt_hover(tilts, vehicle, lost=lost) is not None,
+                "rotor": failed,
+                "fixed_tilts_miss": fixed_tilt_imbalance(tilts, failed, vehicle),
+                "hovers_with_fixed_tilts": fixed_tilt_hover(tilts, vehicle, lost=failed)
+                is not None,
                 "least_speed": minimum_hover_speed(
                     vehicle, factors=(factors[0], factors[1], factors[2], factors[3])
                 ),
@@ -205,7 +231,7 @@ def fault_report(tilts: Quad, vehicle: Vehicle, opposite_speed: float) -> dict[s
 
 
 def map_report(vehicle: Vehicle, path: Path | None = None) -> dict[str, Any]:
-    """The Two Color Map of a vehicle, and the verdict on a path (``tiltsim map --json``).
+    """The Two Color Map of a vehicle, and the check of a path (``tiltsim map --json``).
 
     ``red`` and ``blue`` give ``alpha_3 = slope * alpha_1 + offset`` and likewise ``alpha_4`` from
     ``alpha_2``. ``roots`` is the 17 x 17 search of ch. 6, done numerically.
@@ -258,7 +284,7 @@ def map_report(vehicle: Vehicle, path: Path | None = None) -> dict[str, Any]:
 def determinant_report(case: str, vehicle: Vehicle, samples: int = 101) -> dict[str, Any]:
     """How far a restriction of ch. 3 stays from singular (``tiltsim gait --figure determinant``).
 
-    For each pair ``(alpha_1, alpha_3)`` the least ``R`` over the region of interest of
+    For each pair ``(alpha_1, alpha_3)`` the minimum of ``R`` over the region of interest of
     ``(alpha_2, alpha_4)``, the triangle U V M with its edges.
     """
     corners = np.array(TRIANGLE)
@@ -281,7 +307,7 @@ def determinant_report(case: str, vehicle: Vehicle, samples: int = 101) -> dict[
 
 
 def vehicle_name(vehicle: Vehicle) -> str | dict[str, float]:
-    """The preset's name, or the parameters of a vehicle that is none."""
+    """The preset's name, or the parameters of any other vehicle."""
     for name, preset in PRESETS.items():
         if preset == vehicle:
             return name
@@ -304,7 +330,7 @@ def _instant(angles: Array, vehicle: Vehicle, roll: float, pitch: float) -> dict
 
 
 def _vectors(directions: Array) -> Any:
-    """Vectors as lists, null for those that do not exist."""
+    """Vectors as lists, null for NaN."""
     if directions.ndim > 1:
         return [_vectors(direction) for direction in directions]
     return None if np.isnan(directions).any() else directions.tolist()

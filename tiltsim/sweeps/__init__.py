@@ -1,5 +1,6 @@
 """Sweeps: many flights of one scenario along axes, into one Parquet dataset.
 
-`tables` mirrors the file, `plan` makes scenarios of it, `flying` flies a chunk of them, `folder`
-keeps what is finished, `running` hands chunks to processes or to a cluster.
+`tables` mirrors the sweep file, `loading` reads it, `points` makes scenarios of it, `chunks` flies
+some of them, `folder` saves finished chunks, `running` distributes chunks over processes or a
+cluster, `dataset` reads the results.
 """

@@ -1,4 +1,4 @@
-"""Chunks on a Dask cluster: an existing scheduler, its workers anywhere."""
+"""Flying chunks on a Dask cluster: an existing scheduler with workers anywhere."""
 
 from __future__ import annotations
 
@@ -10,18 +10,35 @@ from typing import Any, Final
 
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
-from tiltsim.sweeps.flying import Part, fly_sweep_chunk, installed_versions
+from tiltsim.sweeps.chunks import FinishedChunk, fly_sweep_chunk
+from tiltsim.sweeps.columns import installed_versions
 
 CONNECT_TIMEOUT: Final = 10.0  # s
 
 
 def fly_on_cluster(
     definition: str, numbers: list[int], address: str, engine: EngineName | None
-) -> Iterator[Part]:
+) -> Iterator[FinishedChunk]:
     """Fly chunks on the workers of a Dask scheduler, yielding each when it is finished.
 
-    Workers may come and go. Raises `InputError` where Dask is not installed, the scheduler does
-    not answer or has no workers, or workers cannot fly the sweep as this machine would.
+    Workers may come and go.
+
+    Parameters
+    ----------
+    definition
+        The sweep, see `SweepDefinition.to_json`.
+    numbers
+        Of the chunks.
+    address
+        Of the scheduler.
+    engine
+        For scenarios whose engine is auto; None lets each choose.
+
+    Raises
+    ------
+    InputError
+        If Dask is not installed, the scheduler does not answer or has no workers, or a worker fails
+        or has other versions of the packages.
     """
     client = _connect(address)
     with client:
@@ -31,7 +48,7 @@ def fly_on_cluster(
 def _connect(address: str) -> Any:
     if not re.fullmatch(r"((tcp|tls|ucx|wss?)://)?[^/]*[\w\]]:\d+", address):
         raise InputError(
-            f"--cluster {address}: no scheduler's address; write one such as tcp://192.168.0.1:8786"
+            f"--cluster {address}: not a scheduler address; expected for example tcp://192.168.0.1:8786"
         )
     try:
         from distributed import Client
@@ -44,7 +61,7 @@ def _connect(address: str) -> Any:
         client = Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         reason = str(error).partition("\n")[0] or "no answer"
-        raise InputError(f"--cluster {address}: no scheduler to be reached: {reason}") from None
+        raise InputError(f"--cluster {address}: cannot reach a scheduler: {reason}") from None
     if not client.scheduler_info()["workers"]:
         client.close()
         raise InputError(
@@ -55,7 +72,7 @@ def _connect(address: str) -> Any:
 
 def _fly(
     client: Any, definition: str, numbers: list[int], address: str, engine: EngineName | None
-) -> Iterator[Part]:
+) -> Iterator[FinishedChunk]:
     from distributed import as_completed
 
     digest = hashlib.sha256(definition.encode()).hexdigest()[:16]
@@ -63,14 +80,12 @@ def _fly(
 
     def submit() -> Any:
         number = waiting.pop()
-        return client.submit(
-            *(fly_sweep_chunk, definition, number, engine),
-            key=f"tiltsim-{digest}-{number}",
-        )
+        key = f"tiltsim-{digest}-{number}"
+        return client.submit(fly_sweep_chunk, number, definition, engine, key=key)
 
     first = [submit() for _ in range(min(len(waiting), _window(client)))]
-    flying = as_completed(first, loop=client.loop)
-    for future in flying:
+    submitted = as_completed(first, loop=client.loop)
+    for future in submitted:
         try:
             part = future.result()
         except Exception as error:
@@ -80,18 +95,18 @@ def _fly(
             ) from error
         _compare_versions(part, address)
         future.release()
-        while waiting and flying.count() < _window(client):
-            flying.add(submit())
+        while waiting and submitted.count() < _window(client):
+            submitted.add(submit())
         yield part
 
 
 def _window(client: Any) -> int:
-    """Chunks to have under way: two a thread, so that none waits and none piles up."""
+    """Number of chunks to have submitted: two per thread, so that no thread waits for work."""
     workers = client.scheduler_info()["workers"].values()
     return 2 * max(1, sum(int(worker["nthreads"]) for worker in workers))
 
 
-def _compare_versions(part: Part, address: str) -> None:
+def _compare_versions(part: FinishedChunk, address: str) -> None:
     for name, here in installed_versions().items():
         there = part.versions[name]
         if there != here:

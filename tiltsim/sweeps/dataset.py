@@ -1,4 +1,4 @@
-"""Reading a sweep's results back, finished or not."""
+"""Reading the results of a sweep, finished or not."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.messages import one_line_message, show
 from tiltsim.sweeps.expressions import evaluate
 from tiltsim.sweeps.folder import DATASET, DEFINITION, read_definition
-from tiltsim.sweeps.plan import Plan
+from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.tables import Sweep
 
 Column = npt.NDArray[Any]
@@ -23,18 +23,18 @@ Column = npt.NDArray[Any]
 
 @dataclass(frozen=True)
 class SweepResults:
-    """The rows of a sweep by column, and the sweep they belong to.
+    """The rows of a sweep by column, and the points of the sweep.
 
     Attributes
     ----------
-    plan
-        The sweep.
+    points
+        The sweep's.
     columns
         Each of shape (rows,), in the order of the points: floats (NaN where there is no value),
         objects for text and lists. Entries of lists have columns of their own, ``key[0]``.
     """
 
-    plan: Plan
+    points: SweepPoints
     columns: Mapping[str, Column]
 
     def __len__(self) -> int:
@@ -42,7 +42,7 @@ class SweepResults:
         return len(self.columns["index"])
 
     def values(self, expression: str) -> Column:
-        """A column, or arithmetic on columns row by row. Raises InputError where it is neither."""
+        """A column, or arithmetic on columns row by row. Raises `InputError` if it is neither."""
         if expression in self.columns:
             return self.columns[expression]
         numbers = {k: v.tolist() for k, v in self.columns.items() if v.dtype == np.float64}
@@ -54,26 +54,26 @@ class SweepResults:
                 ]
             )
         except ValueError as error:
-            address = self.plan.definition.address
+            address = self.points.definition.address
             raise InputError(f"{address}: plot: {show(expression)}: {error}") from None
 
 
 def is_sweep_folder(path: Path) -> bool:
-    """Whether a folder holds a sweep's results."""
+    """Whether a folder contains the results of a sweep."""
     return (path / DEFINITION).is_file()
 
 
 def load_results(folder: Path) -> SweepResults:
-    """Read what a sweep's folder holds, the finished chunks of an unfinished sweep included.
+    """Read the dataset in a sweep's folder, or the finished chunks of an unfinished sweep.
 
-    Raises `InputError` where there is nothing yet, or it cannot be read.
+    Raises `InputError` if there is nothing yet, or it cannot be read.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     definition = read_definition(folder / DEFINITION)
     try:
-        plan = Plan(definition)
+        points = SweepPoints(definition)
     except ValidationError as error:
         mistake = one_line_message(error, definition.sweep, Sweep)
         raise InputError(f"{folder / DEFINITION}: {mistake}") from None
@@ -96,7 +96,7 @@ def load_results(folder: Path) -> SweepResults:
             for entry in range(max((len(value) for value in values if value), default=0)):
                 entries = [value[entry] if value else None for value in values]
                 columns[f"{name}[{entry}]"] = _column(entries)
-    return SweepResults(plan, columns)
+    return SweepResults(points, columns)
 
 
 def _column(values: list[Any]) -> Column:

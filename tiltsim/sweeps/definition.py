@@ -1,4 +1,4 @@
-"""A sweep as it is resolved before it is flown."""
+"""A sweep's definition: all that decides its rows, as plain data that processes can share."""
 
 from __future__ import annotations
 
@@ -10,35 +10,31 @@ from pydantic import ValidationError
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.document import without_none
-from tiltsim.scenario.loading import (
-    parse_scenario,
-)
+from tiltsim.scenario.loading import parse_scenario
 from tiltsim.scenario.messages import show
-from tiltsim.sweeps.tables import (
-    Sweep,
-)
+from tiltsim.sweeps.tables import Sweep
 
 VERSIONS: Final = ("tiltsim", "mujoco", "numpy", "scipy")
-
+"""Packages whose arithmetic the rows depend on."""
 
 COSMETIC: Final = ("title", "source", "without", "plot")
 """Keys of a sweep file that change no flight."""
 
 
 @dataclass(frozen=True)
-class Definition:
+class SweepDefinition:
     """All that decides the rows of a sweep, in plain dicts and lists.
 
     Attributes
     ----------
     address
-        How the sweep is called on the command line.
+        The sweep's name on the command line.
     sweep
         The validated file.
     base
         The base scenario with every default written out.
     versions
-        Of the packages whose arithmetic the rows depend on.
+        Installed versions of `VERSIONS`.
     """
 
     address: str
@@ -51,25 +47,25 @@ class Definition:
         return json.dumps(vars(self), indent=2) + "\n"
 
     @staticmethod
-    def from_json(text: str) -> Definition:
-        """The inverse of `to_json`. Raises ValueError or TypeError where the text is another."""
-        return Definition(**json.loads(text))
+    def from_json(text: str) -> SweepDefinition:
+        """The inverse of `to_json`. Raises ValueError or TypeError for any other text."""
+        return SweepDefinition(**json.loads(text))
 
-    def difference(self, other: Definition) -> str:
-        """The first thing in which another definition would give other rows, else empty.
+    def difference(self, other: SweepDefinition) -> str:
+        """The first difference by which another definition would give other rows, or "".
 
-        A key that one of them does not name, as it was written before there was such a key, has
+        A key that is missing from one of them, because it was written before the key existed, has
         its default there.
         """
-        ours, theirs = (_flat(known._completed()._decisive()) for known in (self, other))
+        ours, theirs = (_flat(one._completed()._decisive()) for one in (self, other))
         for key in [*ours, *theirs]:
             before, now = ours.get(key), theirs.get(key)
             if before != now:
                 return f"{key} was {show(before)} and is {show(now)}"
         return ""
 
-    def _completed(self) -> Definition:
-        """The same with today's defaults written out; as it is where it is no longer valid."""
+    def _completed(self) -> SweepDefinition:
+        """The same with today's defaults written out; unchanged if it is no longer valid."""
         try:
             sweep = Sweep.model_validate(self.sweep).model_dump_json(exclude_none=True)
             base = without_none(parse_scenario(self.base).model_dump(mode="json"))
@@ -81,7 +77,7 @@ class Definition:
     def _decisive(self) -> dict[str, Any]:
         sweep = {key: value for key, value in self.sweep.items() if key not in COSMETIC}
         base = {key: value for key, value in self.base.items() if key not in COSMETIC}
-        sweep.pop("scenario")  # what it names is in the base
+        sweep.pop("scenario")  # the scenario that it names is in the base
         return {**sweep, "scenario": base, "versions": self.versions}
 
 

@@ -1,4 +1,4 @@
-"""Arithmetic in sweep files: a few operators and functions over named numbers, nothing else."""
+"""Arithmetic in sweep files: only a few operators and functions over named numbers."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def evaluate(expression: str, values: Mapping[str, Any]) -> float:
     Raises
     ------
     ValueError
-        In a few words: what cannot be read, or has no value.
+        If the expression cannot be parsed or has no value; the message is a predicate of it.
     """
     try:
         value = _value(_parse(expression), values)
@@ -60,14 +60,14 @@ def evaluate(expression: str, values: Mapping[str, Any]) -> float:
     except ArithmeticError as error:
         raise ValueError(f"has no value: {error}") from None
     except TypeError:
-        raise ValueError("applies something to what it is not for") from None
+        raise ValueError("has an operator or a function with the wrong type of argument") from None
     if not (_is_number(value) and math.isfinite(value)):
-        raise ValueError("is no real number")
+        raise ValueError("is not a real number")
     return float(value)
 
 
 def names(expression: str) -> set[str]:
-    """The names that an expression reads. Raises ValueError where it cannot be read."""
+    """The names in an expression. Raises ValueError if it cannot be parsed."""
     return set(_names(_parse(expression)))
 
 
@@ -76,7 +76,7 @@ def _parse(expression: str) -> ast.expr:
     try:
         return ast.parse(expression.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ValueError("is no arithmetic expression") from None
+        raise ValueError("is not an arithmetic expression") from None
 
 
 def _is_name(node: ast.expr) -> bool:
@@ -120,4 +120,4 @@ def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
         if function is not None:
             return function(*(_value(argument, values) for argument in node.args))
         raise ValueError(f"{node.func.id}() is unknown; known: {', '.join(FUNCTIONS)}")
-    raise ValueError(f"{ast.unparse(node)} is not allowed: arithmetic alone is")
+    raise ValueError(f"{ast.unparse(node)} is not allowed, only arithmetic")

@@ -1,9 +1,9 @@
-"""A sweep's folder: what is finished survives any crash, and nothing in it is half-written.
+"""A sweep's folder: finished chunks survive any crash, and no file in it is half-written.
 
-- ``sweep.json``: the definition, which later runs must share
-- ``parts/000007.parquet``: one finished chunk each
-- ``flights/0000123.parquet``: where flights are kept
-- ``sweep.parquet``: all rows in order, once every chunk is there
+- ``sweep.json``: the definition, which later runs must match
+- ``parts/000007.parquet``: one file per finished chunk
+- ``flights/0000123.parquet``: one file per flight, if the sweep keeps flights
+- ``sweep.parquet``: all rows in order, once every chunk is finished
 """
 
 from __future__ import annotations
@@ -12,28 +12,27 @@ import os
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from tiltsim.errors import InputError
-from tiltsim.sweeps.definition import Definition
-from tiltsim.sweeps.plan import Plan
+from tiltsim.sweeps.chunks import FinishedChunk
+from tiltsim.sweeps.columns import schema
+from tiltsim.sweeps.definition import SweepDefinition
+from tiltsim.sweeps.points import SweepPoints
 from tiltsim.system.files import prepare_folder
 from tiltsim.system.locks import locked
-
-if TYPE_CHECKING:
-    from tiltsim.sweeps.flying import Part
 
 DEFINITION: Final = "sweep.json"
 DATASET: Final = "sweep.parquet"
 ROW_GROUP: Final = 4096
-"""Rows that are held in memory while the parts are joined."""
+"""Rows held in memory while the parts are joined."""
 
 
 class SweepFolder:
-    """Where one sweep keeps its results; make it with `open_sweep_folder`."""
+    """The results of one sweep on disk; opened with `open_sweep_folder`."""
 
-    def __init__(self, path: Path, plan: Plan) -> None:
-        self.path, self._plan = path, plan
+    def __init__(self, path: Path, points: SweepPoints) -> None:
+        self.path, self._points = path, points
         self._parts, self._flights = path / "parts", path / "flights"
 
     @property
@@ -42,33 +41,31 @@ class SweepFolder:
         return self.path / DATASET
 
     def check(self) -> None:
-        """Raise `InputError` where a finished chunk cannot be read, or has other columns."""
+        """Raise `InputError` if a finished chunk cannot be read, or has other columns."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        from tiltsim.sweeps.flying import schema
-
-        wanted = schema(self._plan)
+        expected = schema(self._points)
         for file in sorted(self._parts.glob("[0-9]*.parquet")):
             try:
                 found = pq.read_schema(file)
             except (OSError, pa.ArrowException) as error:
                 reason = str(error).partition("\n")[0]
-                raise InputError(f"{file}: not readable, delete it: {reason}") from error
-            odd = {*found.names} ^ {*wanted.names}
-            if odd:
+                raise InputError(f"{file}: not readable; delete it: {reason}") from error
+            differing = {*found.names} ^ {*expected.names}
+            if differing:
                 raise InputError(
-                    f"--out {self.path}: made by another tiltsim: {file.name} differs in column "
-                    f"{min(odd)}; choose another folder, or delete this one"
+                    f"--out {self.path}: made by another version of tiltsim: {file.name} "
+                    f"differs in column {min(differing)}; choose another folder, or delete this one"
                 )
 
     def finished(self) -> set[int]:
-        """Numbers of the chunks that are safe on disk."""
+        """Numbers of the chunks on disk."""
         return {int(file.stem) for file in self._parts.glob("[0-9]*.parquet")}
 
     @property
     def is_joined(self) -> bool:
-        """Whether the dataset is there and whole."""
+        """Whether the dataset is complete and readable."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -78,11 +75,11 @@ class SweepFolder:
             return False
         return True
 
-    def keep(self, part: Part) -> None:
-        """Make a finished chunk safe: when this returns, no crash can lose it."""
+    def save(self, part: FinishedChunk) -> None:
+        """Save a finished chunk durably: after this returns, no crash can lose it."""
         for index, flight in part.flights.items():
             write_durably(self._flights / f"{index:07d}.parquet", flight)
-        # Last, for the part tells that all of the chunk is there.
+        # Last, because the part marks the chunk as finished.
         write_durably(self._part(part.number), part.table)
 
     def _part(self, number: int) -> Path:
@@ -93,30 +90,28 @@ class SweepFolder:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        from tiltsim.sweeps.flying import schema
-
-        columns = schema(self._plan)
+        columns = schema(self._points)
         temporary = _temporary(self.dataset)
         waiting: list[pa.Table] = []
         with pq.ParquetWriter(temporary, columns, compression="zstd") as writer:
-            for number in range(self._plan.chunks):
+            for number in range(self._points.chunks):
                 table = pq.read_table(self._part(number), partitioning=None)
                 waiting.append(table.replace_schema_metadata(columns.metadata))
-                last = number == self._plan.chunks - 1
+                last = number == self._points.chunks - 1
                 if last or sum(map(len, waiting)) >= ROW_GROUP:
                     writer.write_table(pa.concat_tables(waiting))
                     waiting.clear()
-        _settle(temporary, self.dataset)
+        _commit(temporary, self.dataset)
 
 
 @contextmanager
-def open_sweep_folder(path: Path, plan: Plan) -> Iterator[SweepFolder]:
-    """Open a sweep's folder for this process alone, a new one or one to continue.
+def open_sweep_folder(path: Path, points: SweepPoints) -> Iterator[SweepFolder]:
+    """Open a new folder, or one to continue, with exclusive access.
 
     Raises
     ------
     InputError
-        If the folder cannot be written, is in use, or holds another sweep; the message names the
+        If the folder cannot be written, is in use, or contains another sweep; the message names the
         difference.
     """
     prepare_folder(path)
@@ -124,31 +119,31 @@ def open_sweep_folder(path: Path, plan: Plan) -> Iterator[SweepFolder]:
         try:
             stack.enter_context(locked(path / ".lock", wait=False))
         except BlockingIOError:
-            raise InputError(f"--out {path}: another tiltsim sweep is at work there") from None
+            raise InputError(f"--out {path}: another tiltsim sweep is using it") from None
         for leftover in [*path.glob(".*.new"), *path.glob("*/.*.new")]:
             leftover.unlink()
         definition = path / DEFINITION
         if definition.exists():
-            difference = read_definition(definition).difference(plan.definition)
+            difference = read_definition(definition).difference(points.definition)
             if difference:
                 raise InputError(
-                    f"--out {path}: holds another sweep: {difference}; choose another folder, or "
-                    "delete this one"
+                    f"--out {path}: contains another sweep: {difference}; choose another folder, "
+                    "or delete this one"
                 )
         elif any(path.glob("*.parquet")):
-            raise InputError(f"--out {path}: holds other results; choose another folder")
-        for folder in ("parts", *(["flights"] if plan.sweep.keep_flights else [])):
+            raise InputError(f"--out {path}: contains other results; choose another folder")
+        for folder in ("parts", *(["flights"] if points.sweep.keep_flights else [])):
             (path / folder).mkdir(exist_ok=True)
-        opened = SweepFolder(path, plan)
+        opened = SweepFolder(path, points)
         opened.check()
-        write_durably(definition, plan.definition.to_json().encode())
+        write_durably(definition, points.definition.to_json().encode())
         yield opened
 
 
-def read_definition(file: Path) -> Definition:
-    """The definition that a folder was made for. Raises InputError where it cannot be read."""
+def read_definition(file: Path) -> SweepDefinition:
+    """The definition in a folder. Raises `InputError` if it cannot be read."""
     try:
-        return Definition.from_json(file.read_text(encoding="utf-8"))
+        return SweepDefinition.from_json(file.read_text(encoding="utf-8"))
     except TypeError:
         raise InputError(f"{file}: not the definition of a sweep: keys are missing") from None
     except (OSError, ValueError) as error:
@@ -156,18 +151,18 @@ def read_definition(file: Path) -> Definition:
 
 
 def write_durably(path: Path, content: bytes) -> None:
-    """Write a file so that after any crash it is there whole, or not at all."""
+    """Write a file so that after any crash it is complete or absent."""
     temporary = _temporary(path)
     temporary.write_bytes(content)
-    _settle(temporary, path)
+    _commit(temporary, path)
 
 
 def _temporary(path: Path) -> Path:
     return path.with_name(f".{path.name}.new")
 
 
-def _settle(temporary: Path, path: Path) -> None:
-    """Put a finished temporary file in its place, on disk."""
+def _commit(temporary: Path, path: Path) -> None:
+    """Move a complete temporary file to its place, flushed to disk."""
     _flush(temporary)
     temporary.replace(path)
     _flush(path.parent)

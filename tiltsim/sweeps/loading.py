@@ -1,4 +1,4 @@
-"""Load a sweep file."""
+"""Reading sweep files."""
 
 from __future__ import annotations
 
@@ -20,16 +20,13 @@ from tiltsim.scenario.loading import (
     parse_scenario,
 )
 from tiltsim.scenario.messages import one_line_message
-from tiltsim.sweeps.definition import VERSIONS, Definition
-from tiltsim.sweeps.plan import Plan
-from tiltsim.sweeps.tables import (
-    CasesAxis,
-    Sweep,
-    dotted,
-)
+from tiltsim.sweeps.checks import check_points
+from tiltsim.sweeps.definition import VERSIONS, SweepDefinition
+from tiltsim.sweeps.points import SweepPoints
+from tiltsim.sweeps.tables import CasesAxis, Sweep, dotted
 
 
-def load_sweep(path: str | Path, overrides: dict[str, Any] | None = None) -> Definition:
+def load_sweep(path: str | Path, overrides: dict[str, Any] | None = None) -> SweepDefinition:
     """Read a sweep file.
 
     Parameters
@@ -61,13 +58,13 @@ def load_sweep(path: str | Path, overrides: dict[str, Any] | None = None) -> Def
         for tables in axis.cases.values() if isinstance(axis, CasesAxis) else ():
             locate_named_files(tables, file.parent)
     base = _base(sweep, file.parent, address)
-    definition = Definition(
+    definition = SweepDefinition(
         address,
         json.loads(sweep.model_dump_json(exclude_none=True)),
         json.loads(json.dumps(base)),
         {name: version(name) for name in VERSIONS},
     )
-    Plan(definition).check()
+    check_points(SweepPoints(definition))
     return definition
 
 

@@ -1,4 +1,4 @@
-"""Running a sweep: chunks to this process, to several, or to a cluster, until all are finished."""
+"""Running a sweep: flies its chunks in this process, in several, or on a cluster."""
 
 from __future__ import annotations
 
@@ -11,27 +11,26 @@ from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.shared_engine import shared_engine
-from tiltsim.sweeps.definition import Definition
-from tiltsim.sweeps.flying import Part, fly_sweep_chunk
+from tiltsim.sweeps.checks import check_points
+from tiltsim.sweeps.chunks import FinishedChunk, fly_sweep_chunk
+from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.folder import open_sweep_folder
-from tiltsim.sweeps.plan import Plan
+from tiltsim.sweeps.points import SweepPoints
 from tiltsim.system.processes import ProcessDiedError, in_processes
 
 MAX_DEATHS: Final = 3
-"""So many times in a row may all processes die before a single chunk gets finished."""
-
-Report = Callable[[int], None]
+"""How often in a row all processes may die without finishing a chunk."""
 
 
 def run_sweep(
-    definition: Definition,
+    definition: SweepDefinition,
     out: Path,
     *,
     jobs: int = 1,
     cluster: str | None = None,
-    report: Report = lambda rows: None,
+    report: Callable[[int], None] = lambda rows: None,
 ) -> Path:
-    """Fly what is not yet finished of a sweep.
+    """Fly the chunks of a sweep that are not yet finished.
 
     Parameters
     ----------
@@ -44,28 +43,27 @@ def run_sweep(
     cluster
         Address of a Dask scheduler whose workers fly instead.
     report
-        Called with the number of rows that are finished, at first and after every chunk.
+        Called with the number of finished rows, at the start and after every chunk.
 
     Returns
     -------
     pathlib.Path
-        The finished dataset. It is the same however often the sweep was killed and continued, and
-        wherever it was flown.
+        The finished dataset, which does not depend on interruptions or on the machines.
 
     Raises
     ------
     InputError
         As `open_sweep_folder`, or if the cluster cannot be used or processes keep dying.
     """
-    plan = Plan(definition)
-    with open_sweep_folder(out, plan) as folder:
+    points = SweepPoints(definition)
+    with open_sweep_folder(out, points) as folder:
         done = folder.finished()
-        rows = sum(len(plan.chunk(number)) for number in done)
+        rows = sum(len(points.chunk(number)) for number in done)
         report(rows)
-        todo = [number for number in range(plan.chunks) if number not in done]
+        todo = [number for number in range(points.chunks) if number not in done]
         if todo:
-            for part in _fly(plan, todo, jobs, cluster):
-                folder.keep(part)
+            for part in _fly(points, todo, jobs, cluster):
+                folder.save(part)
                 rows += part.rows
                 report(rows)
         if todo or not folder.is_joined:
@@ -73,53 +71,66 @@ def run_sweep(
         return folder.dataset
 
 
-def _fly(plan: Plan, numbers: list[int], jobs: int, cluster: str | None) -> Iterator[Part]:
-    definition = plan.definition.to_json()
-    examples = plan.check()
-    points = sum(len(plan.chunk(number)) for number in numbers)
-    steps = points * max(example.simulation.steps for example in examples)
+def _fly(
+    points: SweepPoints, numbers: list[int], jobs: int, cluster: str | None
+) -> Iterator[FinishedChunk]:
+    definition = points.definition.to_json()
+    examples = check_points(points)
+    count = sum(len(points.chunk(number)) for number in numbers)
+    steps = count * max(example.simulation.steps for example in examples)
     if cluster is not None:
         from tiltsim.sweeps.cluster import fly_on_cluster
 
         return fly_on_cluster(definition, numbers, cluster, worthwhile_engine(steps))
     engine = shared_engine(examples, steps)
     if jobs == 1 or len(numbers) == 1:
-        return (fly_sweep_chunk(definition, number, engine) for number in numbers)
+        return (fly_sweep_chunk(number, definition, engine) for number in numbers)
     return fly_on_processes(definition, numbers, jobs, engine)
 
 
 def worthwhile_engine(steps: int) -> EngineName | None:
-    """The engine for flights of ``steps`` in all, without compiling anything here."""
+    """The engine for flights of ``steps`` in total, without compiling anything here."""
     examples: Sequence[Scenario] = ()
     return shared_engine(examples, steps)
 
 
 def fly_on_processes(
     definition: str, numbers: list[int], jobs: int, engine: EngineName | None
-) -> Iterator[Part]:
+) -> Iterator[FinishedChunk]:
     """Fly chunks on several processes, yielding each when it is finished.
 
-    A process that dies is replaced, and its chunk flown again. Raises InputError where that does
-    not help.
+    A process that dies is replaced, and its chunk flown again.
+
+    Parameters
+    ----------
+    definition
+        The sweep, see `SweepDefinition.to_json`.
+    numbers
+        Of the chunks.
+    jobs
+        Number of processes.
+    engine
+        For scenarios whose engine is auto; None lets each choose.
+
+    Raises
+    ------
+    InputError
+        If processes keep dying.
     """
-    work = partial(_fly_chunk, definition=definition, engine=engine)
+    work = partial(fly_sweep_chunk, definition_json=definition, engine=engine)
     waiting, deaths, most = numbers, 0, MAX_DEATHS * min(jobs, len(numbers))
     while waiting:
-        lost: list[int] = []
+        died: list[int] = []
         for number, future in in_processes(work, waiting, jobs):
             if not isinstance(future.exception(), ProcessDiedError):
                 deaths = 0
                 yield future.result()
                 continue
-            lost.append(number)
+            died.append(number)
             deaths += 1
             if deaths == most:
                 raise InputError(
-                    f"--jobs {jobs}: processes keep dying while they fly chunk {min(lost)}; is "
-                    "there too little memory? What is finished is kept"
+                    f"--jobs {jobs}: processes keep dying while they fly chunk {min(died)}; is "
+                    "there too little memory? Finished chunks are kept"
                 )
-        waiting = sorted(lost)
-
-
-def _fly_chunk(number: int, definition: str, engine: EngineName | None) -> Part:
-    return fly_sweep_chunk(definition, number, engine)
+        waiting = sorted(died)

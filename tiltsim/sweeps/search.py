@@ -1,4 +1,4 @@
-"""Stability boundaries: where, walking along a line, a condition first fails."""
+"""Stability boundaries: the first value along a line at which a condition fails."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 
 class Boundary(NamedTuple):
-    """The last value found at which the condition holds, and the first one at which it does not.
+    """The last value found at which the condition holds, and the first at which it fails.
 
-    ``holds`` is None where it fails at the start, ``fails`` where it holds up to the end.
+    ``holds`` is None if it fails at the start, ``fails`` is None if it holds up to the end.
     """
 
     holds: float | None
@@ -20,11 +20,20 @@ class Boundary(NamedTuple):
 def boundary(
     start: float, stop: float, step: float, tolerance: float
 ) -> Generator[float, bool, Boundary]:
-    """Search a boundary; yields values, takes whether the condition holds there.
+    """Search a boundary; yields values, and is sent whether the condition holds there.
 
-    The value walks from ``start`` to ``stop`` (either way) by ``step``, the last step shorter where
-    need be, as ch. 3, Eq. (26), asks: all values before the boundary hold. From the first failure
-    on, the bracket is halved until it is at most ``tolerance`` wide, or as narrow as floats are.
+    The value walks from ``start`` to ``stop`` (up or down) in steps, so that the condition holds at
+    all values before the boundary, as in ch. 3, Eq. (26). After the first failure the bracket is
+    halved.
+
+    Parameters
+    ----------
+    start, stop
+        Ends of the walk.
+    step
+        Its step; the last one may be shorter.
+    tolerance
+        Maximum width of the final bracket, unless floats are coarser.
     """
     length = abs(stop - start)
     last = start

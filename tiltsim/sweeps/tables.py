@@ -1,4 +1,4 @@
-"""The sweep file: every table with its keys, checked like a scenario's."""
+"""The tables of a sweep file and their keys, validated like a scenario's."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Count = Annotated[int, Field(ge=1, le=10_000_000)]
 
 
 class AxisTable(Table):
-    """What every axis has: one key, or several that move together."""
+    """The keys that every axis has: one key, or several that move together."""
 
     key: str | None = Field(
         None,
@@ -35,7 +35,7 @@ class AxisTable(Table):
 
     @property
     def name(self) -> str:
-        """What messages call the axis."""
+        """The axis's name in messages."""
         return ", ".join(self.targets)
 
     @model_validator(mode="after")
@@ -43,12 +43,14 @@ class AxisTable(Table):
         if (self.key is None) == (self.keys is None):
             raise InvalidValueError("axis.key", self.key, "give either key or keys")
         if self.relative and not all("." in key for key in self.targets):
-            raise InvalidValueError("axis.relative", True, "only keys of the scenario have a base")
+            raise InvalidValueError(
+                "axis.relative", True, "only keys of the scenario have a base value"
+            )
         return self
 
 
 def _leaves(value: Any) -> Iterator[Any]:
-    """What lists within lists hold."""
+    """The items of nested lists."""
     if isinstance(value, list | tuple):
         for item in value:
             yield from _leaves(item)
@@ -57,7 +59,7 @@ def _leaves(value: Any) -> Iterator[Any]:
 
 
 class ListAxis(AxisTable):
-    """Values written out; for several keys, a row of values each."""
+    """A list of values; for several keys, a list of rows of values."""
 
     type: Literal["list"]
     values: Annotated[tuple[Any, ...], Field(strict=False, min_length=1)]
@@ -71,7 +73,7 @@ class ListAxis(AxisTable):
         for row in self.values if self.keys else ():
             if not isinstance(row, list | tuple) or len(row) != len(self.keys or ()):
                 raise InvalidValueError(
-                    "axis.values", row, f"needs one value each for {self.name}, as a list"
+                    "axis.values", row, f"must be a list with one value for each of {self.name}"
                 )
         return self
 
@@ -102,7 +104,7 @@ class LinspaceAxis(AxisTable):
     def rows(self) -> list[tuple[Any, ...]]:
         """The values of all keys, point by point."""
         last = self.count - 1
-        # Weighed from both ends, so that both come out exactly.
+        # Weighted from both ends, so that both are exact.
         values = [
             (self.start * (last - step) + self.stop * step) / last for step in range(self.count)
         ]
@@ -110,7 +112,7 @@ class LinspaceAxis(AxisTable):
 
 
 class UniformAxis(AxisTable):
-    """A number drawn evenly from a range; several keys get the same draw."""
+    """A number drawn from a uniform distribution; several keys get the same draw."""
 
     type: Literal["uniform"]
     low: float
@@ -132,7 +134,7 @@ class NormalAxis(AxisTable):
 
 
 class SeedAxis(AxisTable):
-    """A whole number of each sample's own, for ``simulation.seed``: equal in all other axes."""
+    """A different integer for each sample, for ``simulation.seed``; other axes do not change it."""
 
     type: Literal["seed"]
     start: Annotated[int, Field(ge=0)] = Field(0, description="the first sample's")
@@ -140,10 +142,10 @@ class SeedAxis(AxisTable):
 
 
 class CasesAxis(AxisTable):
-    """Named sets of tables, laid over the base as a ``[[variant]]`` lays its own."""
+    """Named sets of tables that override the base, as a ``[[variant]]`` does."""
 
     type: Literal["cases"]
-    key: str = Field(description="a name without a dot: the column that tells which case it is")
+    key: str = Field(description="a name without a dot: the column with the name of the case")
     keys: None = None
     relative: Literal[False] = False
     cases: Annotated[dict[str, dict[str, Any]], Field(min_length=1)] = Field(
@@ -154,7 +156,9 @@ class CasesAxis(AxisTable):
     @model_validator(mode="after")
     def _check_name(self) -> Self:
         if "." in self.key:
-            raise InvalidValueError("axis.key", self.key, "cases have a name without a dot")
+            raise InvalidValueError(
+                "axis.key", self.key, "the key of cases is a name without a dot"
+            )
         return self
 
     @property
@@ -168,10 +172,10 @@ class CasesAxis(AxisTable):
 
 
 SampledAxis = UniformAxis | NormalAxis | SeedAxis
-"""What has a value of its own in every sample."""
+"""Axes with a value for every sample."""
 
 GridAxis = ListAxis | LinspaceAxis | CasesAxis
-"""What has rows of values, crossed with the other axes or advancing with its group."""
+"""Axes with rows of values, crossed with the other axes or advancing with a group."""
 
 Axis = Annotated[
     ListAxis | LinspaceAxis | CasesAxis | UniformAxis | NormalAxis | SeedAxis,
@@ -180,7 +184,7 @@ Axis = Annotated[
 
 
 class SampleTable(Table):
-    """How the uniform and normal axes are drawn, all of them together."""
+    """How all uniform and normal axes are drawn together."""
 
     method: Literal["random", "latin_hypercube", "sobol"] = "random"
     count: Count
@@ -190,7 +194,7 @@ class SampleTable(Table):
     def _check(self) -> Self:
         if self.method == "sobol" and self.count & (self.count - 1):
             raise InvalidValueError(
-                "sample.count", self.count, "Sobol's sequence is even for powers of two alone"
+                "sample.count", self.count, "Sobol's sequence is balanced only for powers of two"
             )
         return self
 
@@ -206,28 +210,28 @@ class BisectTable(Table):
     start: float
     stop: float | str = Field(description="a number, or an expression over the axes' names")
     step: Positive
-    tolerance: Positive = Field(description="at most this far apart when the search ends")
+    tolerance: Positive = Field(description="maximum width of the bracket at the end of the search")
     holds: Annotated[tuple[Expectation, ...], Field(strict=False, min_length=1)] = Field(
-        description="bounds on metrics, as in [[expect]]; a lost flight holds none"
+        description="bounds on metrics, as in [[expect]]; they fail if the flight terminates early"
     )
 
 
 class PlotTable(Table):
-    """How ``tiltsim plot`` draws the sweep; by default it looks at the axes."""
+    """How ``tiltsim plot`` draws the sweep; by default the axes decide."""
 
     kind: Literal["lines", "map", "quantiles", "boundary", "plane"] | None = None
     x: str | None = Field(None, description="a column, or an expression over columns")
-    y: str | None = Field(None, description="likewise, for map and plane")
+    y: str | None = Field(None, description="likewise; for map and plane")
     metrics: Annotated[tuple[str, ...], Field(strict=False)] = ()
-    lines: str | None = Field(None, description="a column whose values get a line each")
-    panels: str | None = Field(None, description="a column whose values get a panel each")
+    lines: str | None = Field(None, description="a column; one line per value")
+    panels: str | None = Field(None, description="a column; one panel per value")
     log: Annotated[tuple[Literal["x", "y"], ...], Field(strict=False)] = Field(
         (), description="axes of lines with a logarithmic scale"
     )
 
 
 def dotted(tables: dict[str, Any], head: str = "") -> dict[str, Any]:
-    """Tables within tables as one table of dotted keys."""
+    """Nested tables as one table of dotted keys."""
     flat: dict[str, Any] = {}
     for key, value in tables.items():
         if isinstance(value, dict):
@@ -253,11 +257,11 @@ class Sweep(Table):
     )
     bisect: BisectTable | None = None
     metrics: Annotated[tuple[str, ...], Field(strict=False)] | None = Field(
-        None, description="the metrics to keep; default: all"
+        None, description="metrics in the dataset; default: all"
     )
-    keep_flights: bool = Field(False, description="keep every flight.parquet, too")
+    keep_flights: bool = Field(False, description="also keep every flight.parquet")
     chunk_size: Count | None = Field(
-        None, description="points that are flown, and become safe on disk, together"
+        None, description="number of points that are flown and saved together"
     )
     plot: PlotTable = PlotTable()
 
@@ -276,8 +280,8 @@ class Sweep(Table):
         for metric in self.plot.metrics:
             kept = METRICS if self.metrics is None else self.metrics
             if metric not in kept:
-                words = f"is not among the metrics kept; {choose(metric, kept)}"
-                raise InvalidValueError("plot.metrics", metric, words)
+                reason = f"is not in the dataset; {choose(metric, kept)}"
+                raise InvalidValueError("plot.metrics", metric, reason)
         if not self.axis and self.bisect is None:
             raise InvalidValueError("axis", [], "a sweep needs at least one [[axis]] or a [bisect]")
         drawn = [a for a in self.axis if isinstance(a, SampledAxis)]
@@ -297,7 +301,7 @@ class Sweep(Table):
             raise InvalidValueError("axis.key", twice, "set twice")
         fixed = next((key for key in targets if key in self.set), None)
         if fixed is not None:
-            raise InvalidValueError(f"set.{fixed}", self.set[fixed], "an axis sets it, too")
+            raise InvalidValueError(f"set.{fixed}", self.set[fixed], "also set by an axis")
         for axis in self.axis:
             if isinstance(axis, CasesAxis):
                 self._check_cases(axis, [key for key in (*targets, *self.set) if "." in key])
@@ -308,5 +312,5 @@ class Sweep(Table):
             for key, value in dotted(tables).items():
                 if any(key == other or key.startswith(f"{other}.") for other in taken):
                     raise InvalidValueError(
-                        f"axis.cases.{name}.{key}", value, "set by another axis or by set, too"
+                        f"axis.cases.{name}.{key}", value, "also set by another axis or by set"
                     )

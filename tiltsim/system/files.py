@@ -1,8 +1,4 @@
-"""Flights on disk: metrics.json, flight.parquet and scenario.toml in one folder.
-
-A flight reads back from flight.parquet alone: the samples are among its columns, the rest is in
-the schema's metadata.
-"""
+"""Output files and folders: checked before the work, written atomically."""
 
 from __future__ import annotations
 
@@ -15,7 +11,7 @@ from tiltsim.errors import InputError
 
 
 def prepare_folder(folder: Path) -> None:
-    """Create a folder for results before the flight. Raises `InputError` where it cannot be."""
+    """Create a folder for results before the flight. Raises `InputError` if that is impossible."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -24,15 +20,26 @@ def prepare_folder(folder: Path) -> None:
         raise InputError(f"--out {folder}: not writable")
 
 
-def prepare_file(option: str, file: Path, endings: Sequence[str] = ()) -> None:
-    """See that a file can be written before the work for it begins.
+def prepare_file(option: str, file: Path, suffixes: Sequence[str] = ()) -> None:
+    """Check that a file can be written, before the work for it begins.
 
-    Raises `InputError`, naming the command line's ``option``, where it cannot, or its name does not
-    end in one of the ``endings``, where there are some (lower case, with their dots).
+    Parameters
+    ----------
+    option
+        Of the command line, for the message.
+    file
+        The file.
+    suffixes
+        Allowed suffixes, lower case with their dots; empty allows any.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written or its suffix is not allowed.
     """
-    if endings and file.suffix.lower() not in endings:
+    if suffixes and file.suffix.lower() not in suffixes:
         raise InputError(
-            f"{option} {file}: unknown format {file.suffix!r}; choose {', '.join(endings)}"
+            f"{option} {file}: unknown format {file.suffix!r}; choose {', '.join(suffixes)}"
         )
     folder = file.absolute().parent
     if not folder.is_dir():
@@ -45,8 +52,8 @@ def prepare_file(option: str, file: Path, endings: Sequence[str] = ()) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary path beside ``path`` that takes its place when the block succeeds."""
-    # An ordinary file, unlike one of tempfile's, gets the permissions that the user asked for.
+    """Yield a temporary path that replaces ``path`` atomically when the block succeeds."""
+    # An ordinary file, unlike tempfile's, gets the permissions of the user's umask.
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         yield temporary

@@ -1,4 +1,4 @@
-"""Interrupts that must neither get lost nor lose what is computed."""
+"""Handling of SIGINT and SIGTERM, so that neither interrupts nor results are lost."""
 
 from __future__ import annotations
 
@@ -7,50 +7,52 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from types import FrameType
 
+    Handler = Callable[[int, FrameType | None], object] | int | None
+
 
 @contextmanager
 def reraise_swallowed_interrupts() -> Iterator[None]:
-    """Raise KeyboardInterrupt after the block where one was dropped within it.
+    """Raise KeyboardInterrupt after the block if one was swallowed within it.
 
-    Where compiled code calls Python back, as LLVM does while it compiles, no exception can pass:
-    Python reports it as unraisable and goes on as if there had been no interrupt. Interrupts come
-    to the main thread alone; in others the block runs as ever.
+    An exception cannot pass through compiled code that calls Python back, as LLVM does while it
+    compiles: Python reports it as unraisable and continues. Only the main thread receives
+    interrupts; in others this has no effect.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     before = sys.unraisablehook
-    dropped = False
+    swallowed = False
 
-    def keep(unraisable: Any) -> None:
-        nonlocal dropped
+    def notice(unraisable: sys.UnraisableHookArgs) -> None:
+        nonlocal swallowed
         if issubclass(unraisable.exc_type, KeyboardInterrupt):
-            dropped = True
+            swallowed = True
         else:
             before(unraisable)
 
-    sys.unraisablehook = keep
+    sys.unraisablehook = notice
     try:
         yield
     finally:
         sys.unraisablehook = before
-    if dropped:
+    if swallowed:
         raise KeyboardInterrupt
 
 
 @contextmanager
 def defer_interrupts() -> Iterator[None]:
-    """Let the block finish: an interrupt within it is raised at its end, a second one at once.
+    """Defer an interrupt to the end of the block; a second one is raised immediately.
 
-    For what is short and must not be lost, such as writing a flight's files. In threads other than
-    the main one the block runs as ever. A block within another leaves its interrupt to the outer
-    one. Where the keyboard is ignored, as by a shell's job in the background, it still is, but
-    terminations are deferred there, too.
+    For short work whose result must not be lost, such as writing a flight's files. Only the main
+    thread receives interrupts; in others this has no effect. A nested block passes its interrupt to
+    the outer one. If SIGINT is ignored, as in a shell's background job, it still is; terminations
+    are deferred nevertheless.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -81,8 +83,8 @@ def defer_interrupts() -> Iterator[None]:
 _deferring: list[Callable[[int, FrameType | None], None]] = []
 
 
-def _interrupt(handler: Any, frame: FrameType | None) -> None:
-    """Do what a handler of SIGINT does; one that ignores the keyboard is passed by."""
+def _interrupt(handler: Handler, frame: FrameType | None) -> None:
+    """Call a handler of SIGINT, or raise KeyboardInterrupt if SIGINT is ignored or the default."""
     if not callable(handler):
         raise KeyboardInterrupt
     handler(signal.SIGINT, frame)
@@ -90,10 +92,10 @@ def _interrupt(handler: Any, frame: FrameType | None) -> None:
 
 @contextmanager
 def terminations_as_interrupts() -> Iterator[Callable[[], bool]]:
-    """Within the block SIGTERM is an interrupt, so that it, too, is cleaned up after.
+    """Treat SIGTERM, as sent by schedulers and ``kill``, as an interrupt within the block.
 
-    Schedulers and ``kill`` end a process so. A second one ends it at once. Yields whether there
-    was one. In threads other than the main one the block runs as ever.
+    A second SIGTERM ends the process immediately. Yields a function that returns whether there was
+    one. In threads other than the main one this has no effect.
     """
     terminated = False
     if threading.current_thread() is not threading.main_thread():

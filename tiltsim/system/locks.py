@@ -9,14 +9,14 @@ from pathlib import Path
 
 @contextmanager
 def locked(path: Path, *, wait: bool) -> Iterator[None]:
-    """Keep other processes out of this block; the lock ends with the process, however that ends.
+    """Hold an exclusive lock during the block; it is released even if the process is killed.
 
-    ``path`` is a file that stands for what must not be shared, and stays. Raises BlockingIOError
-    where another process has the lock and this one is not to ``wait``.
+    ``path`` is the lock file, which is created and not removed. Raises BlockingIOError if another
+    process holds the lock, unless ``wait`` is true. Without ``fcntl`` this has no effect.
     """
     try:
         import fcntl
-    except ImportError:  # not on this system: take care yourself
+    except ImportError:
         yield
         return
     with path.open("w", encoding="utf-8") as file:

@@ -1,4 +1,4 @@
-"""Work for several processes, results as they come."""
+"""Distributing work over several processes."""
 
 from __future__ import annotations
 
@@ -20,20 +20,19 @@ Result = TypeVar("Result")
 
 
 class ProcessDiedError(RuntimeError):
-    """A process ended before it could answer, as the system ends those that take all memory."""
+    """A process ended before it could answer, for example because the system ran out of memory."""
 
 
 def in_processes(
     work: Callable[[Item], Result], items: Sequence[Item], jobs: int
 ) -> Iterator[tuple[Item, Future[Result]]]:
-    """Do ``work`` for all items on at most ``jobs`` processes; yield each that is finished.
+    """Call ``work`` for all items on at most ``jobs`` processes; yield each as it finishes.
 
-    A process that dies is replaced and takes down only the item it was at work on, whose future
-    holds a `ProcessDiedError`. Leaving the loop, an interrupt among other ways, ends all processes
-    at once.
+    A process that dies is replaced; only the future of its item holds a `ProcessDiedError`. Leaving
+    the loop, for example by an interrupt, ends all processes immediately.
 
-    Each process has a pipe of its own and there are no locks, for with those of the standard
-    library's pools one that is ended while it answers leaves the others, or this one, waiting.
+    Each process has its own pipe, without locks: a process of the standard library's pools that is
+    killed while it answers keeps a lock, for which the others, or this one, then wait forever.
     """
     waiting, processes = list(reversed(items)), list[BaseProcess]()
     busy: dict[Connection, tuple[BaseProcess, Item]] = {}
@@ -47,7 +46,7 @@ def in_processes(
                 assert isinstance(ready, Connection)
                 process, item = busy.pop(ready)
                 future: Future[Result] = _answer(ready, process)
-                # Its next item first, so that it need not wait for what is done with this one.
+                # Send the next item first, so that the process does not wait for the loop's body.
                 if waiting and process.is_alive():
                     busy[ready] = process, _give(ready, waiting.pop())
                 else:
@@ -64,24 +63,24 @@ def _begin(work: Callable[[Item], Result]) -> tuple[BaseProcess, Connection]:
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     process = context.Process(target=_serve, args=(there, work), daemon=True)
-    with _interrupts_held():
+    with _interrupts_blocked():
         process.start()
-    there.close()  # the process has it alone, so that its end is told here
+    there.close()  # only the process holds it now, so its death closes the pipe
     return process, here
 
 
 @contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Interrupts wait for the end of the block, and never reach a process begun within it.
+def _interrupts_blocked() -> Iterator[None]:
+    """Block SIGINT until the end of the block, also for processes started within it.
 
-    One that is still importing would meet an interrupt with a traceback.
+    An interrupt during a process's imports would print a traceback.
     """
     if sys.platform == "win32":
         yield
         return
     from multiprocessing import resource_tracker
 
-    resource_tracker.ensure_running()  # else the first process would start it, and lift the mask
+    resource_tracker.ensure_running()  # else the first process would start it, and unblock SIGINT
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -90,7 +89,7 @@ def _interrupts_held() -> Iterator[None]:
 
 
 def _give(connection: Connection, item: Item) -> Item:
-    with suppress(OSError):  # it has died, which its answer will tell
+    with suppress(OSError):  # if it has died, reading its answer reports it
         connection.send(item)
     return item
 
@@ -112,7 +111,7 @@ def _answer(connection: Connection, process: BaseProcess) -> Future[Result]:
 
 
 def _serve(connection: Connection, work: Callable[[Item], Result]) -> None:
-    """What a process does: leave interrupts to the parent, answer, and end when it ends."""
+    """Body of a process: ignore interrupts, answer requests, and end with the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:

@@ -40,7 +40,7 @@ def distributions_figure(results: SweepResults, metrics: tuple[str, ...]) -> Fig
     A lost flight counts as the worst: a curve of errors ends at the share that came through, one
     of margins (``min_...``) begins at the share that did not.
     """
-    key = results.plan.sweep.plot.lines or next(iter(_grid_keys(results)), None)
+    key = results.points.sweep.plot.lines or next(iter(_grid_keys(results)), None)
     groups = list(groups_of(results, key, np.ones(len(results), dtype=bool)))
     keys = _most_telling(results, metrics[0], groups)
     figure = new_figure(10.0, 6.2 if keys else 3.2)
@@ -71,7 +71,7 @@ def distributions_figure(results: SweepResults, metrics: tuple[str, ...]) -> Fig
 
 def _grid_keys(results: SweepResults) -> list[str]:
     """Keys of crossed axes, those of text first."""
-    keys = [a.targets[0] for a in results.plan.sweep.axis if isinstance(a, GridAxis)]
+    keys = [a.targets[0] for a in results.points.sweep.axis if isinstance(a, GridAxis)]
     return sorted(keys, key=lambda key: results.columns[key].dtype == np.float64)
 
 

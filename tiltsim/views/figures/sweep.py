@@ -55,7 +55,7 @@ def sweep_figure(results: SweepResults, metrics: tuple[str, ...] = ()) -> Figure
     InputError
         If a column or metric is unknown, or there would be too many panels.
     """
-    plot = results.plan.sweep.plot
+    plot = results.points.sweep.plot
     kind = plot.kind or _kind(results)
     draw = {
         "lines": _lines_figure,
@@ -66,44 +66,44 @@ def sweep_figure(results: SweepResults, metrics: tuple[str, ...] = ()) -> Figure
     }[kind]
     chosen = _metrics(results, metrics)
     if not chosen and kind not in {"boundary", "plane"}:
-        address = results.plan.definition.address
+        address = results.points.definition.address
         raise InputError(f"{address}: metrics = []: none is kept, so there is nothing to draw")
     with paper_style():
         figure = draw(results, chosen)
-        title = results.plan.sweep.title or results.plan.definition.address
-        missing = len(results.plan) - len(results)
-        more = f" ({missing} of {len(results.plan)} points still to come)" if missing else ""
+        title = results.points.sweep.title or results.points.definition.address
+        missing = len(results.points) - len(results)
+        more = f" ({missing} of {len(results.points)} points still to come)" if missing else ""
         lines = fill(verbatim(title) + more, round(11.0 * figure.get_figwidth()))
         figure.suptitle(lines, x=0.01, ha="left", fontsize=10.5)
         return figure
 
 
 def _kind(results: SweepResults) -> str:
-    if results.plan.sweep.bisect is not None:
+    if results.points.sweep.bisect is not None:
         return "boundary"
-    if any(isinstance(axis, SampledAxis) for axis in results.plan.sweep.axis):
+    if any(isinstance(axis, SampledAxis) for axis in results.points.sweep.axis):
         return "quantiles"
     return "map" if len(_numeric_axes(results)) >= 2 else "lines"
 
 
 def _numeric_axes(results: SweepResults) -> list[str]:
-    keys = [key for axis in results.plan.sweep.axis for key in axis.targets[:1]]
+    keys = [key for axis in results.points.sweep.axis for key in axis.targets[:1]]
     return [key for key in keys if results.columns[key].dtype == np.float64]
 
 
 def _text_axes(results: SweepResults) -> list[str]:
-    keys = [a.targets[0] for a in results.plan.sweep.axis if isinstance(a, GridAxis)]
+    keys = [a.targets[0] for a in results.points.sweep.axis if isinstance(a, GridAxis)]
     return [key for key in keys if results.columns[key].dtype != np.float64]
 
 
 def _metrics(results: SweepResults, wanted: tuple[str, ...]) -> tuple[str, ...]:
     # Results of an earlier tiltsim lack the metrics that came later.
-    kept = tuple(name for name in results.plan.metrics if name in results.columns)
-    chosen = wanted or results.plan.sweep.plot.metrics
+    kept = tuple(name for name in results.points.metrics if name in results.columns)
+    chosen = wanted or results.points.sweep.plot.metrics
     for name in chosen:
         if name not in kept:
             raise InputError(
-                f"{results.plan.definition.address}: plot.metrics = {name!r}: not in these "
+                f"{results.points.definition.address}: plot.metrics = {name!r}: not in these "
                 f"results; {choose(name, kept)}"
             )
     return chosen or tuple(name for name in kept if _varies(results.columns[name]))[:3] or kept[:1]
@@ -116,7 +116,7 @@ def _varies(column: Column) -> bool:
 
 def _columns_for(results: SweepResults) -> tuple[str, str | None, str | None]:
     """The columns for x, lines and panels: as the file says, else by the kind of axis."""
-    plot = results.plan.sweep.plot
+    plot = results.points.sweep.plot
     numeric, text = _numeric_axes(results), _text_axes(results)
     longest = max(numeric, key=lambda key: len(np.unique(results.columns[key])), default="index")
     x = plot.x or longest
@@ -166,7 +166,7 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
             axes.set_title(title)
             axes.set_ylabel(label_of(metric))
             axes.set_xlabel(label_of(x))
-    for axis in results.plan.sweep.plot.log:
+    for axis in results.points.sweep.plot.log:
         for axes in grid.flat:
             getattr(axes, f"set_{axis}scale")("log")
     _share_limits(grid)
@@ -200,7 +200,7 @@ def _make_room_below(axes: Any, share: float) -> None:
 def _map_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
     from matplotlib.colors import LogNorm, Normalize
 
-    plot, numeric = results.plan.sweep.plot, _numeric_axes(results)
+    plot, numeric = results.points.sweep.plot, _numeric_axes(results)
     x = plot.x or next((key for key in numeric if key != plot.y), None)
     y = plot.y or next((key for key in numeric if key != x), None)
     if x is None or y is None:
@@ -240,7 +240,7 @@ def _map_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
 
 
 def _boundary_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure:
-    bisect = results.plan.sweep.bisect
+    bisect = results.points.sweep.bisect
     if bisect is None:
         raise InputError("plot.kind = 'boundary': the sweep has no [bisect]")
     x, lines, panels = _columns_for(results)
@@ -276,7 +276,7 @@ def _boundary_key(axes: Axes, holds: Column, fails: Column) -> None:
 
 
 def _plane_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure:
-    plot, bisect = results.plan.sweep.plot, results.plan.sweep.bisect
+    plot, bisect = results.points.sweep.plot, results.points.sweep.bisect
     if bisect is None or plot.x is None or plot.y is None:
         raise InputError("plot.kind = 'plane': needs a [bisect], x and y")
     columns = list(groups_of(results, plot.panels, np.ones(len(results), dtype=bool)))

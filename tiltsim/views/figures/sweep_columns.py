@@ -36,7 +36,7 @@ _KEY_UNITS: Final = {
 
 def sampled_keys(results: SweepResults) -> list[str]:
     """The first key of every axis that is drawn from a distribution."""
-    axes = results.plan.sweep.axis
+    axes = results.points.sweep.axis
     return [a.targets[0] for a in axes if isinstance(a, UniformAxis | NormalAxis)]
 
 

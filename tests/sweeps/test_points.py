@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from tiltsim.errors import InputError
-from tiltsim.sweeps.definition import Definition
+from tiltsim.sweeps.checks import VALUES_TRIED, check_points
+from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.loading import load_sweep
-from tiltsim.sweeps.plan import VALUES_TRIED, Plan
+from tiltsim.sweeps.points import SweepPoints
 
 HEAD = """
 scenario = "ch04_tracking/circle#continuous_t2_modified"
@@ -51,25 +52,25 @@ holds = [{ metric = "diverged", equals = false }]
 
 
 @pytest.fixture
-def plan_of(tmp_path):
+def points_of(tmp_path):
     def make(text, overrides=None):
         path = tmp_path / "sweep.toml"
         path.write_text(HEAD + text if "scenario" not in text else text, encoding="utf-8")
-        return Plan(load_sweep(path, overrides))
+        return SweepPoints(load_sweep(path, overrides))
 
     return make
 
 
-def test_axes_are_crossed_the_last_one_fastest(plan_of):
-    plan = plan_of(AMPLITUDES + PERIODS)
-    points = [plan.point(index) for index in range(len(plan))]
+def test_axes_are_crossed_the_last_one_fastest(points_of):
+    sweep = points_of(AMPLITUDES + PERIODS)
+    points = [sweep.point(index) for index in range(len(sweep))]
     assert len(points) == 25
     assert [p["gait.period"] for p in points[:6]] == [1.0, 1.5, 2.0, 2.5, 3.0, 1.0]
     assert [p["gait.amplitude"] for p in points[::5]] == [0.1, 0.2, 0.3, 0.4, 0.5]
-    assert sorted(i for n in range(plan.chunks) for i in plan.chunk(n)) == list(range(25))
+    assert sorted(i for n in range(sweep.chunks) for i in sweep.chunk(n)) == list(range(25))
 
 
-def test_a_table_is_no_value_of_an_axis(plan_of):
+def test_a_table_is_no_value_of_an_axis(points_of):
     axis = """
 [[axis]]
 type = "list"
@@ -77,35 +78,35 @@ key = "controller.gains"
 values = [{ attitude = { bandwidth = 20.0 }, altitude = { bandwidth = 8.0 } }]
 """
     with pytest.raises(InputError, match=r"controller\.gains is a table; vary its keys one by one"):
-        plan_of(axis).check()
+        check_points(points_of(axis))
 
 
-def test_axes_of_a_group_advance_together(plan_of):
+def test_axes_of_a_group_advance_together(points_of):
     grouped = [text.rstrip() + '\ngroup = "both"\n' for text in (AMPLITUDES, PERIODS)]
-    plan = plan_of("".join(grouped))
-    assert len(plan) == 5
-    assert plan.point(3) == {"gait.amplitude": 0.4, "gait.period": 2.5}
+    sweep = points_of("".join(grouped))
+    assert len(sweep) == 5
+    assert sweep.point(3) == {"gait.amplitude": 0.4, "gait.period": 2.5}
 
 
-def test_rows_move_several_keys_together(plan_of):
+def test_rows_move_several_keys_together(points_of):
     rows = '[[axis]]\ntype = "list"\nkeys = ["gait.period", "gait.amplitude"]\n'
-    plan = plan_of(rows + "values = [[1, 0.5], [2.5, 0.25]]")
-    assert [plan.point(i) for i in range(2)] == [
+    sweep = points_of(rows + "values = [[1, 0.5], [2.5, 0.25]]")
+    assert [sweep.point(i) for i in range(2)] == [
         {"gait.period": 1.0, "gait.amplitude": 0.5},
         {"gait.period": 2.5, "gait.amplitude": 0.25},
     ]
-    assert plan.scenario(plan.point(1)).gait.amplitude == 0.25
+    assert sweep.scenario(sweep.point(1)).gait.amplitude == 0.25
 
 
 @pytest.mark.parametrize("method", ["random", "latin_hypercube", "sobol"])
-def test_samples_follow_their_distributions_and_their_seed(plan_of, method):
+def test_samples_follow_their_distributions_and_their_seed(points_of, method):
     normal = '[[axis]]\ntype = "normal"\nkey = "initial.attitude[1]"\nmean = 0.1\n'
     normal += "standard_deviation = 0.02\n"
 
     def sample(seed):
         text = f'{MASS}{normal}[sample]\nmethod = "{method}"\ncount = 256\nseed = {seed}\n'
-        plan = plan_of(text)
-        points = [plan.point(index) for index in range(len(plan))]
+        sweep = points_of(text)
+        points = [sweep.point(index) for index in range(len(sweep))]
         return np.array([[p["vehicle.mass"], p["initial.attitude[1]"]] for p in points])
 
     draws = sample(1)
@@ -123,16 +124,18 @@ def test_samples_follow_their_distributions_and_their_seed(plan_of, method):
         assert sorted(cells) == list(range(256))
 
 
-def test_relative_values_scale_what_a_preset_gives(plan_of):
+def test_relative_values_scale_what_a_preset_gives(points_of):
     text = '[[axis]]\ntype = "list"\nrelative = true\nkey = "{key}"\nvalues = [0.9, 1.1]'
-    plan = plan_of(text.format(key="vehicle.inertia[1]"))
-    assert plan.scenario(plan.point(1)).vehicle.resolve().inertia_yy == pytest.approx(1.1 * 2.99e-3)
-    assert plan.scenario(plan.point(1)).vehicle.resolve().inertia_xx == 2.24e-3
-    plan = plan_of(text.format(key="vehicle.inertia"))
-    assert plan.point(0) == {"vehicle.inertia": [0.9 * v for v in (2.24e-3, 2.99e-3, 4.80e-3)]}
+    sweep = points_of(text.format(key="vehicle.inertia[1]"))
+    assert sweep.scenario(sweep.point(1)).vehicle.resolve().inertia_yy == pytest.approx(
+        1.1 * 2.99e-3
+    )
+    assert sweep.scenario(sweep.point(1)).vehicle.resolve().inertia_xx == 2.24e-3
+    sweep = points_of(text.format(key="vehicle.inertia"))
+    assert sweep.point(0) == {"vehicle.inertia": [0.9 * v for v in (2.24e-3, 2.99e-3, 4.80e-3)]}
 
 
-def test_derived_keys_follow_the_axes(plan_of):
+def test_derived_keys_follow_the_axes(points_of):
     text = """
 scenario = "ch03_gaits/stabilization#gait_1"
 [derive]
@@ -148,17 +151,17 @@ start = 0.0
 stop = 0.2
 count = 3
 """
-    plan = plan_of(text)
-    scenario = plan.scenario(plan.point(4))
+    sweep = points_of(text)
+    scenario = sweep.scenario(sweep.point(4))
     assert scenario.gait.angles == pytest.approx((0.1, 0.1, -0.1, 0.2))
     assert scenario.initial.position == (0.0, 0.0, 0.1)
 
 
-def test_what_is_set_survives_a_change_of_kind(plan_of):
+def test_what_is_set_survives_a_change_of_kind(points_of):
     text = '[set]\ngait.amplitude = 0.3\ngait.period = 2.0\n[[axis]]\ntype = "list"\n'
     text += 'key = "gait.type"\nvalues = ["trot_instant", "walk"]'
-    plan = plan_of(text)
-    gaits = [plan.scenario(plan.point(i)).gait for i in range(2)]
+    sweep = points_of(text)
+    gaits = [sweep.scenario(sweep.point(i)).gait for i in range(2)]
     assert [(g.type, g.amplitude) for g in gaits] == [("trot_instant", 0.3), ("walk", 0.3)]
 
 
@@ -178,46 +181,46 @@ gait = { type = "walk", amplitude = 0.1, period = 2.0 }
 SEED = '[[axis]]\ntype = "seed"\nkey = "simulation.seed"\nstart = 7\n'
 
 
-def test_cases_lay_their_tables_over_the_base(plan_of):
-    plan = plan_of(CASES.replace(", period = 2.0", "") + PERIODS)
-    assert [plan.point(i)["stack"] for i in (0, 5, 10)] == ["published", "poles", "walk"]
-    published, poles, walk = (plan.scenario(plan.point(i)) for i in (1, 6, 11))
+def test_cases_lay_their_tables_over_the_base(points_of):
+    sweep = points_of(CASES.replace(", period = 2.0", "") + PERIODS)
+    assert [sweep.point(i)["stack"] for i in (0, 5, 10)] == ["published", "poles", "walk"]
+    published, poles, walk = (sweep.scenario(sweep.point(i)) for i in (1, 6, 11))
     assert (published.controller.decoupling, published.controller.gains) == ("published", "ch04")
     assert poles.controller.decoupler == "exact"
     assert poles.controller.gains.attitude.bandwidth == 20.0
     assert walk.gait.type == "walk"
-    assert walk.controller == plan_of(PERIODS).scenario({}).controller
+    assert walk.controller == points_of(PERIODS).scenario({}).controller
     assert {s.gait.period for s in (published, poles, walk)} == {1.5}, "axes have the last word"
 
 
-def test_seeds_number_the_samples_and_every_case_flies_the_same_draws(plan_of):
-    plan = plan_of(f"{CASES}{MASS}{SEED}[sample]\ncount = 4\n")
-    points = [plan.point(index) for index in range(len(plan))]
+def test_seeds_number_the_samples_and_every_case_flies_the_same_draws(points_of):
+    sweep = points_of(f"{CASES}{MASS}{SEED}[sample]\ncount = 4\n")
+    points = [sweep.point(index) for index in range(len(sweep))]
     assert [p["simulation.seed"] for p in points] == [7, 8, 9, 10] * 3
     draws = [{k: v for k, v in p.items() if k != "stack"} for p in points]
     assert draws[:4] == draws[4:8] == draws[8:]
-    assert plan.scenario(points[6]).simulation.seed == 9
+    assert sweep.scenario(points[6]).simulation.seed == 9
 
 
-def test_seeds_alone_are_a_random_set(plan_of):
-    plan = plan_of(f"{SEED}[sample]\ncount = 3\n")
-    assert [plan.point(index) for index in range(3)] == [{"simulation.seed": i} for i in (7, 8, 9)]
+def test_seeds_alone_are_a_random_set(points_of):
+    sweep = points_of(f"{SEED}[sample]\ncount = 3\n")
+    assert [sweep.point(index) for index in range(3)] == [{"simulation.seed": i} for i in (7, 8, 9)]
 
 
-def test_files_of_an_inline_scenario_lie_beside_the_sweep(plan_of, tmp_path, monkeypatch):
+def test_files_of_an_inline_scenario_lie_beside_the_sweep(points_of, tmp_path, monkeypatch):
     (tmp_path / "mine.py").write_text("def law(seen): ...\n", encoding="utf-8")
     monkeypatch.chdir("/")
     own = 'controller = { law = "python", function = "mine.py:law" }\n'
     inline = f"[scenario.simulation]\nduration = 0.01\n{SEED}[sample]\ncount = 1\n"
     case = f'[[axis]]\ntype = "cases"\nkey = "law"\n[axis.cases.mine]\n{own}'
     for text in (f"scenario.{own}{inline}", inline + case):
-        plan = plan_of(text)
-        assert plan.scenario(plan.point(0)).controller.file == tmp_path / "mine.py"
+        sweep = points_of(text)
+        assert sweep.scenario(sweep.point(0)).controller.file == tmp_path / "mine.py"
 
 
-def test_a_definition_survives_its_file(plan_of):
-    definition = plan_of(AMPLITUDES + PERIODS).definition
-    again = Definition.from_json(definition.to_json())
+def test_a_definition_survives_its_file(points_of):
+    definition = points_of(AMPLITUDES + PERIODS).definition
+    again = SweepDefinition.from_json(definition.to_json())
     assert again == definition
     assert again.difference(definition) == ""
 
@@ -231,31 +234,31 @@ def test_a_definition_survives_its_file(plan_of):
         ('title = "other"\n' + PERIODS, ""),
     ],
 )
-def test_differences_are_named(plan_of, text, difference):
-    before = plan_of(PERIODS).definition
-    found = before.difference(plan_of(text).definition)
+def test_differences_are_named(points_of, text, difference):
+    before = points_of(PERIODS).definition
+    found = before.difference(points_of(text).definition)
     assert difference in found
     assert bool(found) == bool(difference)
 
 
-def test_keys_that_came_after_a_definition_was_written_have_their_defaults(plan_of):
-    now = plan_of(PERIODS).definition
-    old = Definition.from_json(now.to_json())
+def test_keys_that_came_after_a_definition_was_written_have_their_defaults(points_of):
+    now = points_of(PERIODS).definition
+    old = SweepDefinition.from_json(now.to_json())
     del old.base["sensors"], old.base["simulation"]["control_latency"], old.sweep["keep_flights"]
     assert old.difference(now) == ""
-    changed = plan_of(PERIODS + "[set]\nsimulation.timestep = 0.002").definition
+    changed = points_of(PERIODS + "[set]\nsimulation.timestep = 0.002").definition
     assert "scenario.simulation.timestep" in old.difference(changed)
     old.base["no_longer_known"] = 1
     assert "no_longer_known was 1" in old.difference(now)
 
 
 @pytest.mark.parametrize("count", [10_000_000, 20_000])
-def test_huge_axes_are_refused_or_tried_in_a_few_places(plan_of, count):
+def test_huge_axes_are_refused_or_tried_in_a_few_places(points_of, count):
     axis = PERIODS.replace("5", str(count))
     if count == 20_000:
-        assert len(plan_of(axis).check()) == VALUES_TRIED
+        assert len(check_points(points_of(axis))) == VALUES_TRIED
     with pytest.raises(InputError, match="more than 10000000 points"):
-        plan_of(axis + AMPLITUDES + MASS + "[sample]\ncount = 1000000")
+        points_of(axis + AMPLITUDES + MASS + "[sample]\ncount = 1000000")
 
 
 @pytest.mark.parametrize(
@@ -277,7 +280,7 @@ def test_huge_axes_are_refused_or_tried_in_a_few_places(plan_of, count):
         (AMPLITUDES.replace("0.5", "nan"), ["axis.values = NaN", "must be finite"]),
         (PERIODS.replace('key = "gait.period"', ""), ["axis.key", "key or keys"]),
         (PERIODS + PERIODS, ["gait.period", "set twice"]),
-        (PERIODS + "[set]\ngait.period = 1.0", ["set.gait.period", "an axis sets it, too"]),
+        (PERIODS + "[set]\ngait.period = 1.0", ["set.gait.period", "also set by an axis"]),
         (MASS, ["axis.type", "[sample]"]),
         (PERIODS + "[sample]\ncount = 3", ["sample.count", "no axis"]),
         (MASS + '[sample]\nmethod = "sobol"\ncount = 3', ["sample.count", "powers of two"]),
@@ -304,9 +307,9 @@ def test_huge_axes_are_refused_or_tried_in_a_few_places(plan_of, count):
         ),
     ],
 )
-def test_mistakes_are_named_in_one_line(plan_of, text, words):
+def test_mistakes_are_named_in_one_line(points_of, text, words):
     with pytest.raises(InputError) as caught:
-        plan_of(text)
+        points_of(text)
     message = str(caught.value)
     assert "\n" not in message
     assert "sweep.toml" in message
@@ -322,10 +325,10 @@ def test_documented_sweeps_are_valid_and_end_soon(tmp_path):
     for number, block in enumerate(sweeps):
         file = tmp_path / f"{number}.toml"
         file.write_text(block, encoding="utf-8")
-        plan = Plan(load_sweep(file))
-        flights = len(plan)
-        if (bisect := plan.sweep.bisect) is not None:
-            steps = (plan.stop(plan.point(i)) - bisect.start for i in range(len(plan)))
+        sweep = SweepPoints(load_sweep(file))
+        flights = len(sweep)
+        if (bisect := sweep.sweep.bisect) is not None:
+            steps = (sweep.stop(sweep.point(i)) - bisect.start for i in range(len(sweep)))
             halvings = ceil(log2(bisect.step / bisect.tolerance))
             flights = sum(ceil(length / bisect.step) + 1 + halvings for length in steps)
         assert flights <= 256

@@ -1,0 +1,76 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+from typing import TypeAlias
+
+Subparsers: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
+"""Where `tiltsim.cli.build_parser` lets commands declare themselves."""
+
+
+def positive_integer(text: str) -> int:
+    """An integer of at least 1, from the command line."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text}: must be an integer of at least 1")
+    return int(text)
+
+
+def add_jobs(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--jobs``."""
+    parser.add_argument(
+        "--jobs",
+        type=positive_integer,
+        default=os.cpu_count() or 1,
+        metavar="N",
+        help="processes (default: the number of cores)",
+    )
+
+
+def add_overrides(parser: argparse.ArgumentParser, what: str, example: str) -> None:
+    """Declare ``--set``, which overrides keys of ``what``, with an example in its help."""
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        dest="overrides",
+        help=f"override a key of {what}, such as {example}; repeatable",
+    )
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--json``."""
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def add_quiet(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--quiet``."""
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+
+
+def add_plot(parser: argparse.ArgumentParser, figure: str) -> None:
+    """Declare ``--plot``, which draws a ``figure``."""
+    parser.add_argument(
+        "--plot", type=Path, metavar="FILE", help=f"draw {figure}: FILE.png, .svg or .pdf"
+    )
+
+
+def add_vehicle(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--vehicle``, which `tiltsim.commands.angles.parse_vehicle` reads."""
+    parser.add_argument(
+        "--vehicle",
+        metavar="VEHICLE",
+        help="ar_drone_2 (default), luukkonen, KEY=VALUE,..., or a preset with KEY=VALUE,...",
+    )
+
+
+def prepare_figure(option: str, path: Path | None) -> None:
+    """Raise `InputError` unless a figure, if one is requested, can be written to ``path``."""
+    if path is not None:
+        from tiltsim.system.files import prepare_file
+        from tiltsim.views.figures.style import FORMATS
+
+        prepare_file(option, path, FORMATS)

@@ -1,0 +1,155 @@
+"""Flying a chunk of a sweep: from points to rows, searches for boundaries included."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from io import BytesIO
+from typing import Any
+
+from tiltsim.engines.base import EngineName
+from tiltsim.errors import InputError
+from tiltsim.flight.verdicts import Verdict
+from tiltsim.plants.engine_choice import with_engine
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.sweeps.columns import installed_versions, make_row, rows_to_table
+from tiltsim.sweeps.definition import SweepDefinition
+from tiltsim.sweeps.executing import ScenarioResult, fly_scenarios
+from tiltsim.sweeps.points import SweepPoints
+from tiltsim.sweeps.search import boundary
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class FinishedChunk:
+    """The rows of a chunk, ready to be written.
+
+    Attributes
+    ----------
+    number
+        Of the chunk.
+    rows
+        Number of rows.
+    table
+        The rows as a Parquet file.
+    flights
+        Files ``flight.parquet`` by point, if the sweep keeps flights.
+    versions
+        Of the packages that made the rows.
+    """
+
+    number: int
+    rows: int
+    table: bytes
+    flights: dict[int, bytes]
+    versions: dict[str, str]
+
+
+def fly_sweep_chunk(number: int, definition_json: str, engine: EngineName | None) -> FinishedChunk:
+    """Fly one chunk of a sweep.
+
+    Parameters
+    ----------
+    number
+        Of the chunk.
+    definition_json
+        The sweep, see `SweepDefinition.to_json`.
+    engine
+        For scenarios whose engine is auto; None lets each choose.
+    """
+    points = _points(definition_json)
+    rows, flights = fly_points(points, points.chunk(number), engine)
+    table = rows_to_table(points, rows)
+    import pyarrow.parquet as pq
+
+    buffer = BytesIO()
+    pq.write_table(table, buffer, compression="zstd")
+    return FinishedChunk(number, len(rows), buffer.getvalue(), flights, installed_versions())
+
+
+@lru_cache(maxsize=2)
+def _points(definition_json: str) -> SweepPoints:
+    return SweepPoints(SweepDefinition.from_json(definition_json))
+
+
+def fly_points(
+    points: SweepPoints, indices: Iterable[int], engine: EngineName | None
+) -> tuple[list[Row], dict[int, bytes]]:
+    """Fly some points of a sweep; return their rows, in order, and the flights to keep.
+
+    The searches of all points advance together, so that their flights come in batches.
+    """
+    finished: dict[int, tuple[Row, ScenarioResult]] = {}
+    searches = {index: _search(points, index) for index in indices}
+    pending = {index: next(search) for index, search in searches.items()}
+    while pending:
+        results = _fly_values(points, list(pending.values()), engine)
+        for index, result in zip(list(pending), results, strict=True):
+            try:
+                pending[index] = searches[index].send(result)
+            except StopIteration as stop:
+                finished[index] = stop.value
+                del pending[index]
+    rows = [finished[index][0] for index in searches]
+    flights = {index: finished[index][1].flight for index in searches}
+    return rows, {index: flight for index, flight in flights.items() if flight is not None}
+
+
+def _fly_values(
+    points: SweepPoints, batch: list[dict[str, Any]], engine: EngineName | None
+) -> list[ScenarioResult]:
+    """Results for values of the axes, "invalid" where they do not make a scenario."""
+    results: dict[int, ScenarioResult] = {}
+    scenarios: dict[int, Scenario] = {}
+    for position, values in enumerate(batch):
+        try:
+            scenario = points.scenario(values)
+        except InputError as error:
+            results[position] = ScenarioResult({}, "invalid", None, str(error))
+            continue
+        if engine is not None and scenario.simulation.engine == "auto":
+            scenario = with_engine(scenario, engine)
+        scenarios[position] = scenario
+    flown = fly_scenarios(list(scenarios.values()), keep_flights=points.sweep.keep_flights)
+    results |= dict(zip(scenarios, flown, strict=True))
+    return [results[position] for position in range(len(batch))]
+
+
+Search = Generator[dict[str, Any], ScenarioResult, tuple[Row, ScenarioResult]]
+
+
+def _search(points: SweepPoints, index: int) -> Search:
+    """The flights of one point: yields values of the axes, returns the row."""
+    values, bisect = points.point(index), points.sweep.bisect
+    if bisect is None:
+        result = yield values
+        return make_row(points, index, values, result), result
+    walk = boundary(bisect.start, points.stop(values), bisect.step, bisect.tolerance)
+    at, flights = next(walk), 0
+    shown: ScenarioResult | None = None  # the last at which the condition holds, or the first
+    while True:
+        result = yield values | {bisect.key: at}
+        flights += 1
+        holds = _holds(points, result)
+        if holds or shown is None:
+            shown = result
+        try:
+            at = walk.send(holds)
+        except StopIteration as stop:
+            found = stop.value
+            break
+    reached = bisect.start if found.holds is None else found.holds
+    row = make_row(points, index, values | {bisect.key: reached}, shown)
+    row[bisect.key] = found.holds
+    return row | {f"{bisect.key}_beyond": found.fails, "flights": flights}, shown
+
+
+def _holds(points: SweepPoints, result: ScenarioResult) -> bool:
+    assert points.sweep.bisect is not None
+    bounds = points.sweep.bisect.holds
+    may_diverge = any(bound.metric == "diverged" for bound in bounds)
+    if result.end != "completed" and not may_diverge:
+        return False
+    return all(Verdict(bound, result.metrics.get(bound.metric)).holds for bound in bounds)

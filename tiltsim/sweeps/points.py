@@ -1,0 +1,221 @@
+"""The points of a sweep: which there are, in which order, and which scenario each one flies.
+
+Everything follows from the `SweepDefinition`, so that processes and machines that share it agree on
+every point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from functools import cached_property
+from math import prod
+from typing import Any, Final
+
+from tiltsim.scenario.loading import apply_overrides, merge, parse_scenario, split_key
+from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.sweeps.base_values import BaseValues, is_number, mistake
+from tiltsim.sweeps.definition import SweepDefinition
+from tiltsim.sweeps.expressions import evaluate
+from tiltsim.sweeps.sampling import draw_samples
+from tiltsim.sweeps.tables import (
+    AxisTable,
+    CasesAxis,
+    GridAxis,
+    NormalAxis,
+    SeedAxis,
+    Sweep,
+    UniformAxis,
+)
+from tiltsim_controllers.mathematics.scalar import Floats
+
+MAX_POINTS: Final = 10_000_000
+LARGEST_CHUNK: Final = 32
+"""Points per chunk unless the file sets it: few enough that little is lost when killed."""
+
+
+class SweepPoints:
+    """The points of a sweep.
+
+    Points are numbered: the axes' groups in the order of the file, the last one fastest, and for
+    each combination all samples. A chunk is a range of points.
+    """
+
+    def __init__(self, definition: SweepDefinition) -> None:
+        self.definition = definition
+        self.sweep = Sweep.model_validate(definition.sweep)
+        self._base_values = BaseValues(definition)
+        self._check_count()
+        self._groups = self._make_groups()
+        axes = self.sweep.axis
+        self._drawn = [axis for axis in axes if isinstance(axis, UniformAxis | NormalAxis)]
+        self._seeds = [axis for axis in axes if isinstance(axis, SeedAxis)]
+        self.cases = [axis for axis in axes if isinstance(axis, CasesAxis)]
+        samples = self.sweep.sample.count if self.sweep.sample is not None else 1
+        self._lengths = [*(len(group) for group in self._groups), samples]
+
+    def __len__(self) -> int:
+        """Number of points."""
+        return prod(self._lengths)
+
+    @property
+    def chunk_size(self) -> int:
+        """Points per chunk."""
+        if self.sweep.chunk_size is not None:
+            return self.sweep.chunk_size
+        return max(1, min(LARGEST_CHUNK, len(self) // 64))
+
+    @property
+    def chunks(self) -> int:
+        """Number of chunks."""
+        return -(-len(self) // self.chunk_size)
+
+    def chunk(self, number: int) -> range:
+        """The points of a chunk."""
+        first = number * self.chunk_size
+        return range(first, min(first + self.chunk_size, len(self)))
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        """The metrics that the dataset holds."""
+        everything = tuple(name for name in METRICS if name not in WALL_CLOCK_METRICS)
+        return self.sweep.metrics if self.sweep.metrics is not None else everything
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """The columns of axes and derived keys in the results."""
+        keys = [key for axis in self.sweep.axis for key in axis.targets]
+        if self.sweep.bisect is not None:
+            keys += [self.sweep.bisect.key, f"{self.sweep.bisect.key}_beyond"]
+        return (*keys, *self.sweep.derive)
+
+    def point(self, index: int) -> dict[str, Any]:
+        """The values that the axes set at a point, by key."""
+        values: dict[str, Any] = {}
+        remaining, positions = index, []
+        for length in reversed(self._lengths):
+            remaining, position = divmod(remaining, length)
+            positions.append(position)
+        sample, *grid = positions
+        for group, position in zip(self._groups, reversed(grid), strict=True):
+            values |= group[position]
+        for axis, draw in zip(self._drawn, self._draws[sample] if self._drawn else ()):
+            values |= self.place(axis, [float(draw)] * len(axis.targets))
+        for seed in self._seeds:
+            values |= dict.fromkeys(seed.targets, seed.start + sample)
+        return values
+
+    def along_each_group(self, most: int) -> list[dict[str, Any]]:
+        """The first point, and those at other values of one group of axes at a time.
+
+        Of a group with more than ``most`` values, so many spread evenly, both ends included.
+        """
+        points = [self.point(0)]
+        for position, length in enumerate(self._lengths[:-1]):
+            stride = prod(self._lengths[position + 1 :])
+            count = min(length, most)
+            places = [place * (length - 1) // max(1, count - 1) for place in range(1, count)]
+            points += [self.point(place * stride) for place in places]
+        return points
+
+    def derived(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """The ``[derive]`` keys for values of the axes. Raises `InputError` if one has no value."""
+        rules = self.sweep.derive.items()
+        return {key: self._evaluate(f"derive.{key}", rule, values) for key, rule in rules}
+
+    def stop(self, values: Mapping[str, Any]) -> float:
+        """Where the bisected key stops at a point."""
+        assert self.sweep.bisect is not None
+        return float(self._evaluate("bisect.stop", self.sweep.bisect.stop, values))
+
+    def document(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """The scenario's document for values of the axes."""
+        document = deepcopy(self.definition.base)
+        for axis in self.cases:
+            document = merge(document, deepcopy(axis.cases[values[axis.key]]))
+        overrides = {**self.sweep.set, **values, **self.derived(values)}
+        overrides = {key: value for key, value in overrides.items() if "." in key}
+        for key in overrides:
+            if "[" in key:
+                self._write_out(document, key.partition("[")[0])
+        apply_overrides(document, overrides, self.definition.address)
+        return document
+
+    def scenario(self, values: Mapping[str, Any]) -> Scenario:
+        """The scenario for values of the axes. Raises `InputError` if it is not valid."""
+        return parse_scenario(self.document(values), self.definition.address)
+
+    def place(self, axis: AxisTable, values: Sequence[Any]) -> dict[str, Any]:
+        """The values that an axis sets, by key, from one value for each of its targets."""
+        placed = dict(zip(axis.targets, values, strict=True))
+        return self._base_values.scaled(placed) if axis.relative else placed
+
+    def _write_out(self, document: dict[str, Any], key: str) -> None:
+        """Put a list that follows from a preset into the document, to change an entry of it."""
+        table: Any = document
+        *path, last = split_key(key)
+        for step in path:
+            table = table.get(step) if isinstance(table, dict) else None
+        if isinstance(table, dict) and last not in table:
+            value = self._base_values.look_up(key)
+            if isinstance(value, list):
+                table[last] = list(value)
+
+    def _evaluate(self, key: str, rule: Any, values: Mapping[str, Any]) -> Any:
+        if isinstance(rule, list | tuple):
+            return [self._evaluate(key, entry, values) for entry in rule]
+        if isinstance(rule, str):
+            try:
+                return evaluate(rule, values)
+            except ValueError as error:
+                raise mistake(self.definition, key, rule, str(error)) from None
+        if is_number(rule):
+            return float(rule)
+        raise mistake(self.definition, key, rule, "must be an expression or a list of them")
+
+    def _check_count(self) -> None:
+        """Refuse more points than a sweep may have, before any of them is made."""
+        sample = self.sweep.sample
+        points = 1 if sample is None else sample.count
+        groups: set[str] = set()
+        for axis in self.sweep.axis:
+            if isinstance(axis, GridAxis) and axis.group not in groups:
+                points *= axis.length
+                groups |= {axis.group} if axis.group else set()
+        if points > MAX_POINTS:
+            raise mistake(self.definition, "axis", points, f"more than {MAX_POINTS} points")
+
+    def _make_groups(self) -> list[list[dict[str, Any]]]:
+        members: dict[str, list[list[dict[str, Any]]]] = {}
+        for number, axis in enumerate(self.sweep.axis):
+            if isinstance(axis, GridAxis):
+                columns = [_of_one_type(column) for column in zip(*axis.rows())]
+                rows = [self.place(axis, row) for row in zip(*columns)]
+                # A group's name is never a number.
+                members.setdefault(axis.group or f"{number}", []).append(rows)
+        groups = []
+        for name, axes in members.items():
+            lengths = [len(rows) for rows in axes]
+            if len(set(lengths)) > 1:
+                allowed = f"its axes have {lengths} values"
+                raise mistake(self.definition, "axis.group", name, allowed)
+            groups.append(
+                [
+                    {key: value for part in parts for key, value in part.items()}
+                    for parts in zip(*axes)
+                ]
+            )
+        return groups
+
+    @cached_property
+    def _draws(self) -> Floats:
+        """Values of the drawn axes, shape (samples, axes)."""
+        assert self.sweep.sample is not None
+        return draw_samples(self._drawn, self.sweep.sample)
+
+
+def _of_one_type(values: Sequence[Any]) -> Sequence[Any]:
+    """Integers mixed with floats as floats; other values unchanged."""
+    mixed = all(map(is_number, values)) and any(isinstance(value, float) for value in values)
+    return [float(value) for value in values] if mixed else values
