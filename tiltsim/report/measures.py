@@ -61,10 +61,26 @@ def worst_coefficient(printed: Coefficients, vehicle: Vehicle) -> float:
     )
 
 
-def terms_hold(part: str, printed: Mapping[str, float], vehicle: Vehicle) -> bool:
-    """Whether the printed terms of a part of the determinant are correct and complete."""
+def terms_hold(
+    part: str, printed: Mapping[str, float], vehicle: Vehicle, scale: float = 1.0
+) -> bool:
+    """Whether the printed terms of a part of the determinant are correct and complete.
+
+    Parameters
+    ----------
+    part
+        ``R``, ``R_phi`` or ``R_theta``.
+    printed
+        Printed coefficients by product; absent ones are 0.
+    vehicle
+        The vehicle of the chapter.
+    scale
+        Constant by which the chapter multiplies the determinant.
+    """
     computed = getattr(determinant_coefficients(vehicle), part)
-    return all(abs(computed[name] - printed.get(name, 0.0)) < PRINTED for name in computed)
+    return all(
+        abs(scale * value - printed.get(name, 0.0)) < PRINTED for name, value in computed.items()
+    )
 
 
 def is_more_robust(key: str) -> bool:

@@ -53,7 +53,8 @@ class Claim:
     """Chapter first, then section, figure or equation: "ch. 3, Sec. 4, Eq. (19)"."""
     statement: str
     """The statement of the thesis, one sentence in our words."""
-    published: Published
+    published: Published = True
+    """The published value; True if the thesis says that the statement holds."""
     case: str = ""
     """Label, if several claims share a statement."""
     unit: str = ""

@@ -17,17 +17,16 @@ One module per chapter, found by its name; each has a tuple ``CLAIMS``, in the o
         FlightClaim(
             source="ch. 4, Sec. 7.2, Fig. 9",
             statement="The error grows with the period of the trot",
-            published=True,                 # yes
             flights=("ch04_tracking/line#instant_t1_modified", ...),
             measure=grows,                  # gets {address: metrics} of one plant
         ),
     )
 
-``measure`` returns a number, a tuple of numbers or a bool, always computed, never a constant.
-Keep it under a second or so: the report computes every claim, in parallel with the flights.
-Import heavy modules (scipy, mujoco) inside the functions. ``source`` begins with the chapter; a
-statement with several cases is written several times with different ``case``. A flight that
-terminates early has ``diverged`` true in its metrics and may lack others.
+``published`` is True by default: the thesis says yes. ``measure`` returns a number, several numbers
+or a bool, always computed, never a constant, within about a second. Import heavy modules (scipy,
+mujoco) inside the functions. ``source`` begins with the chapter; a statement with several cases is
+written several times with different ``case``. A flight that terminates early has ``diverged`` true
+in its metrics and may lack others.
 """
 
 from __future__ import annotations

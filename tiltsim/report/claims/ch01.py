@@ -57,35 +57,30 @@ CLAIMS = (
     FlightClaim(
         source="ch. 1, Sec. 2, Figs. 2-4",
         statement="In a constant gust the perfect gait needs the smallest attitude of the three",
-        published=True,
         flights=_FLIGHTS,
         measure=_perfect_is_smallest,
     ),
     FlightClaim(
         source="ch. 1, Sec. 2, Fig. 4",
         statement="A quadrotor leans more than the tiltrotor with the perfect gait",
-        published=True,
         flights=(_PERFECT, _QUADROTOR),
         measure=_quadrotor_tilts_more,
     ),
     AnalysisClaim(
         source="ch. 1, Sec. 2, Fig. 3",
         statement="An imperfect gait may need a larger attitude than the quadrotor",
-        published=True,
         measure=_some_gait_tilts_more_than_the_quadrotor,
     ),
     FlightClaim(
         source="ch. 1, Abstract of the thesis; Sec. 3, Fig. 5",
         statement="Planned gaits avoid the over-intensive changes of the tilt angles that feedback "
         "linearization of all eight inputs requires",
-        published=True,
         flights=_TILTING,
         measure=_planned_gaits_tilt_less,
     ),
     AnalysisClaim(
         source="ch. 1, Abstract of the thesis",
         statement="The Two Color Map enlarges the acceptable attitudes of all gaits compared",
-        published=True,
         wrong=True,
         why="It does so for every red gait but for no blue one: there every attitude is singular.",
         measure=_map_enlarges_the_attitudes,

@@ -105,7 +105,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 2, Sec. 3, Eqs. (21), (44)",
         statement="Yaw-position control has singular attitudes within 90 degrees of roll and pitch",
-        published=True,
         wrong=True,
         why=_ONE_ENTRY,
         measure=_zero_inside,
@@ -113,13 +112,11 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 2, Sec. 3, Eqs. (43)-(44)",
         statement="S(θ, φ) is the determinant of the matrix in Eq. (43)",
-        published=True,
         measure=_eq_43_as_printed,
     ),
     AnalysisClaim(
         source="ch. 2, Sec. 4, Fig. 3",
         statement="On the curve S(θ, φ) = 0 the decoupling matrix is singular",
-        published=True,
         wrong=True,
         why="As above: on the curve the exact determinant is far from zero.",
         measure=_exact_on_published_curve,
@@ -141,7 +138,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 2, App. B, Eqs. (A3)-(A6)",
         statement="The gains of the yaw-position controller stabilize the linearized system",
-        published=True,
         wrong=True,
         why="s⁴ + 10s³ + 20s² + 50s + 500 has roots at 1.30 ± 3.26j: Routh's condition fails.",
         measure=_position_gains_are_stable,
@@ -149,19 +145,16 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 2, App. B, Eqs. (A8)-(A9)",
         statement="The gains of the attitude-altitude controller stabilize the linearized system",
-        published=True,
         measure=_attitude_altitude_gains_are_stable,
     ),
     AnalysisClaim(
         source="ch. 2, Sec. 3.2",
         statement="Without thrust the yaw-position matrix is singular",
-        published=True,
         measure=lambda: float(normalized_determinant(0.3, 0.2, 0.0, _VEHICLE)) == 0.0,
     ),
     FlightClaim(
         source="ch. 2, Sec. 4",
         statement="Crossing the curve S = 0 makes the control law fail",
-        published=True,
         wrong=True,
         why="With stable gains the same control law crosses it on the way to the circle, "
         "and tracks.",
@@ -171,7 +164,6 @@ CLAIMS = (
     FlightClaim(
         source="ch. 2, Sec. 6",
         statement="The singular matrix is why the yaw-position controller fails",
-        published=True,
         wrong=True,
         why="The cause is the gains: Appendix B's are unstable on their own, and with stable ones "
         "the flight completes from the same start.",
@@ -181,7 +173,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 2, Sec. 4",
         statement="The direction of the body-fixed axes has no influence on the result",
-        published=True,
         measure=lambda: not _signs_of_axes_matter(),
     ),
     AnalysisClaim(

@@ -166,7 +166,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 3, Sec. 4, Eq. (17)",
         statement="Eq. (17), term by term, is the determinant at any attitude",
-        published=True,
         wrong=True,
         why="Two misprints: -2.880 s1 s2 c3 s4 sin φ cos θ should be s1 s2 c3 c4, as in ch. 5 "
         "and 6, and -2.880 s1 c2 s3 s4 sin φ cos θ should be s1 c2 c3 s4.",
@@ -175,7 +174,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 3, Sec. 4, Eq. (19)",
         statement="Eq. (19), term by term, is the determinant at level attitude",
-        published=True,
         measure=partial(terms_hold, "R", EQ_19, _VEHICLE),
     ),
     *(
@@ -183,7 +181,6 @@ CLAIMS = (
             source="ch. 3, Sec. 5.2, Figs. 10-13",
             statement="The triangle U, V, M of (α₂, α₄) contains no singular gait",
             case=restriction,
-            published=True,
             measure=partial(_triangle_is_regular, case),
         )
         for case, (restriction, _) in DETERMINANT_CASES.items()
@@ -193,7 +190,6 @@ CLAIMS = (
             source="ch. 3, Sec. 5.2, Figs. 3, 5, 7, 9",
             statement="From (α₂, α₄) = (1, 1) to (-1, -1) a gait crosses a singular one",
             case=restriction,
-            published=True,
             wrong=case == "negative",
             why=_NO_CROSSING if case == "negative" else "",
             measure=partial(_switching_crosses, case),
@@ -203,7 +199,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 3, Sec. 7",
         statement="The untilted vehicle's decoupling matrix is always invertible",
-        published=True,
         measure=_untilted_is_regular,
     ),
     *(
@@ -211,7 +206,6 @@ CLAIMS = (
             source="ch. 3, Sec. 6.3, Figs. 24-27",
             statement="Over-actuated control responds faster than the planned gait",
             case=title,
-            published=True,
             flights=_pair(gait),
             measure=partial(grows, "altitude_settling_time"),
         )
@@ -222,7 +216,6 @@ CLAIMS = (
             source="ch. 3, Sec. 7",
             statement="Over-actuated control overshoots less than the planned gait",
             case=title,
-            published=True,
             flights=_pair(gait),
             measure=partial(grows, "altitude_overshoot"),
         )
@@ -233,7 +226,6 @@ CLAIMS = (
             source="ch. 3, Sec. 6.3, Fig. 27",
             statement="Over-actuated control tilts over-rapidly, the planned gait does not",
             case=title,
-            published=True,
             flights=_pair(gait),
             measure=partial(_tilts_less, gait),
         )
@@ -243,14 +235,12 @@ CLAIMS = (
         source="ch. 3, Sec. 6.1.1, Eq. (12)",
         statement="A rotor at rest makes the decoupling matrix singular",
         case="with the factor 2|ϖ| in all rows",
-        published=True,
         measure=partial(_rest_is_singular, exact=True),
     ),
     AnalysisClaim(
         source="ch. 3, Sec. 6.1.1, Eq. (12)",
         statement="A rotor at rest makes the decoupling matrix singular",
         case="as printed, in the fourth row only",
-        published=True,
         wrong=True,
         why="As printed the column of the resting rotor keeps its torques: regular. The statement "
         "holds for the exact matrix.",
@@ -265,7 +255,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 3, Sec. 7",
         statement="Every gait of the region can return to no tilt without a singularity",
-        published=True,
         measure=_return_to_no_tilt_is_regular,
     ),
     FlightClaim(

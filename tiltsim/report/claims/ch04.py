@@ -116,7 +116,6 @@ def _better(
         source=source,
         statement="The modified decoupler reduces the remaining error",
         case=case,
-        published=True,
         flights=(conventional, modified),
         measure=partial(falls, resting_error if setpoint else tracking_error),
         why="" if "instant_t3" not in conventional else _GYROSCOPIC,
@@ -127,20 +126,17 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 4, Sec. 3.3, Eq. (25)",
         statement="For the trot the determinant at level attitude is 4 cos² ρ",
-        published=True,
         measure=_eq_25_holds,
     ),
     AnalysisClaim(
         source="ch. 4, Sec. 3.3, Prop. 3",
         statement="The trot meets no singularity at level attitude for |ρ| <= 0.65",
-        published=True,
         measure=_trot_is_regular,
     ),
     AnalysisClaim(
         source="ch. 4, Sec. 5.1, Prop. 4",
         statement="The gains satisfy Eqs. (35)-(38), so that attitude and altitude are stable",
         case="roll and pitch",
-        published=True,
         wrong=True,
         why="K_P1 K_P2 = 10 does not exceed K_P3 = 50. The flights are stable nevertheless: the "
         "matrix is printed, and used, without the factor 2|ϖ| in its first three rows, which "
@@ -151,7 +147,6 @@ CLAIMS = (
         source="ch. 4, Sec. 5.1, Prop. 4",
         statement="The gains satisfy Eqs. (35)-(38), so that attitude and altitude are stable",
         case="yaw",
-        published=True,
         wrong=True,
         why="K_P1 K_P2 = 1 does not exceed K_P3 = 1: on the boundary. The missing factor 2|ϖ| "
         "makes it stable, as above.",
@@ -161,13 +156,11 @@ CLAIMS = (
         source="ch. 4, Sec. 5.1, Prop. 4",
         statement="The gains satisfy Eqs. (35)-(38), so that attitude and altitude are stable",
         case="altitude",
-        published=True,
         measure=partial(routh_holds, ("altitude",)),
     ),
     AnalysisClaim(
         source="ch. 4, Sec. 5.1, Prop. 5",
         statement="The gains of the position loop satisfy Eqs. (39)-(40)",
-        published=True,
         measure=_position_gains_are_positive,
     ),
     *(
@@ -207,7 +200,6 @@ CLAIMS = (
             source=f"ch. 4, Sec. {'7.2, Figs. 8-9' if reference == 'line' else '7.3, Figs. 13-14'}",
             statement="The error grows with the period of the trot (T = 1, 2, 3 s)",
             case=f"{reference}, {_FORMS[form]}, {decoupler}",
-            published=True,
             flights=tuple(_trot(reference, form, T, decoupler) for T in _PERIODS),
             measure=partial(grows, tracking_error),
             why=_GYROSCOPIC if (form, decoupler) == ("instant", "conventional") else "",
@@ -220,7 +212,6 @@ CLAIMS = (
             statement="At the short period the decouplers hardly differ "
             "(T = 1 s: by less than a tenth of the difference at T = 3 s)",
             case=f"{reference}, {_FORMS[form]}",
-            published=True,
             flights=_trots(reference, form),
             measure=partial(_short_periods_do_not_differ, reference, form),
             why=_GYROSCOPIC if form == "instant" else "",
@@ -232,7 +223,6 @@ CLAIMS = (
             source=f"ch. 4, Sec. {'7.2, Figs. 8-9' if reference == 'line' else '7.3, Figs. 13-14'}",
             statement="The continuous trot tracks better than the instant one, period by period",
             case=f"{reference}, {decoupler}",
-            published=True,
             flights=tuple(_trot(reference, f, T, decoupler) for f in _FORMS for T in _PERIODS),
             measure=partial(_continuous_is_better, reference, decoupler),
             why=_GYROSCOPIC if decoupler == "conventional" else "",
@@ -242,7 +232,6 @@ CLAIMS = (
     FlightClaim(
         source="ch. 4, Sec. 8",
         statement="The trot tracks line and circle, with either decoupler and every period",
-        published=True,
         flights=_ALL_TROTS,
         measure=every_flight_completed,
         why=_GYROSCOPIC,
@@ -250,7 +239,6 @@ CLAIMS = (
     FlightClaim(
         source="ch. 4, Sec. 5.1",
         statement="No rotor reaches the limit of zero speed",
-        published=True,
         flights=_ALL_TROTS,
         measure=no_rotor_stops,
         why="In MuJoCo a rotor of the flight that loses control (see above) reverses.",
@@ -258,7 +246,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 4, Sec. 3.2, Remark 2",
         statement="Without tilt the modified decoupler is the conventional one",
-        published=True,
         measure=_decouplers_agree_without_tilt,
     ),
     *(
@@ -266,7 +253,6 @@ CLAIMS = (
             source="ch. 4, Sec. 8",
             statement="Without neglecting higher-order terms the error decreases further",
             case=f"setpoint, {title}",
-            published=True,
             flights=(
                 f"ch04_tracking/setpoint#{name}_modified",
                 f"beyond/setpoint_exact_decoupler#{name}",

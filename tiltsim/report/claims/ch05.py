@@ -158,7 +158,6 @@ def _per_reference() -> tuple[FlightClaim, ...]:
                 source=source,
                 statement="The modified decoupler decreases the error for all gaits" + _FITTED,
                 case=f"{reference}, {title}, T = {period} s",
-                published=True,
                 flights=tuple(_address(reference, gait, period, d) for d in _DECOUPLERS),
                 measure=partial(falls, tracking_error),
             )
@@ -169,7 +168,6 @@ def _per_reference() -> tuple[FlightClaim, ...]:
                 source=source,
                 statement="The modified decoupler helps most where the error is largest",
                 case=reference,
-                published=True,
                 flights=_all(reference),
                 measure=partial(_saves_most_where_the_error_is_largest, reference),
             )
@@ -179,7 +177,6 @@ def _per_reference() -> tuple[FlightClaim, ...]:
                 source=source,
                 statement="The error tends to grow with the period of the gait" + _FITTED,
                 case=f"{reference}, {title}",
-                published=True,
                 flights=_all(reference, (gait,)),
                 measure=partial(_grows, reference, gait),
             )
@@ -203,7 +200,6 @@ def _per_reference() -> tuple[FlightClaim, ...]:
                 source="ch. 5, Sec. 7",
                 statement="The walk has the smallest errors of the four gaits" + _FITTED,
                 case=reference,
-                published=True,
                 flights=_all(reference),
                 measure=partial(_walk_is_smallest, reference),
             ),
@@ -211,7 +207,6 @@ def _per_reference() -> tuple[FlightClaim, ...]:
                 source="ch. 5, Sec. 7",
                 statement="The run has the largest errors of the four gaits" + _FITTED,
                 case=reference,
-                published=True,
                 flights=_all(reference),
                 measure=partial(_run_is_largest, reference),
             ),
@@ -219,7 +214,6 @@ def _per_reference() -> tuple[FlightClaim, ...]:
                 source="ch. 5, Sec. 7",
                 statement="The two gallops have similar errors (within a tenth)" + _FITTED,
                 case=reference,
-                published=True,
                 flights=_all(reference),
                 measure=partial(_gallops_are_alike, reference),
             ),
@@ -231,13 +225,11 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 5, Sec. 3.1, Eq. (11)",
         statement="Eq. (11), term by term, is the determinant at level attitude",
-        published=True,
         measure=partial(terms_hold, "R", EQ_19, _VEHICLE),
     ),
     AnalysisClaim(
         source="ch. 5, Sec. 4, Eq. (15)",
         statement="Eq. (15), term by term, is the determinant at any attitude",
-        published=True,
         wrong=True,
         why="-2.880 s1 c2 s3 s4 sin φ cos θ should be s1 c2 c3 s4, and the last term, "
         "1.000 s1 s2 s3 c4 sin φ cos θ, should be s1 s2 c3 s4.",
@@ -256,7 +248,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 5, Sec. 4, Prop. 1, Eq. (18)",
         statement="Some integer n makes a gait scaled by 1/n regular",
-        published=True,
         measure=_some_scale_is_regular,
     ),
     *(
@@ -264,7 +255,6 @@ CLAIMS = (
             source=f"ch. 5, Sec. 4, Fig. {figure}",
             statement="Scaled by 1/2 and 1/3 the singular attitudes move away from level" + _FITTED,
             case=gait.replace("_", " "),
-            published=True,
             measure=partial(_scaling_enlarges, gait),
         )
         for gait, figure in zip(_SCALED, (9, 10, 11), strict=True)
@@ -272,7 +262,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 5, App. A, Eqs. (A1)-(A4)",
         statement="With the printed gains the attitude loops are stable",
-        published=True,
         wrong=True,
         why="K1 K2 > K3 fails as in ch. 4, Prop. 4: 10 against 50 for roll and pitch, 1 against 1 "
         "for yaw. The factor missing in the printed matrix makes the flights stable.",
@@ -284,7 +273,6 @@ CLAIMS = (
             statement="The gaits track the reference with either decoupler and every period"
             + _FITTED,
             case=f"{reference}, walk and gallops at 1/3, run",
-            published=True,
             flights=_all(reference),
             measure=every_flight_completed,
         )
@@ -295,7 +283,6 @@ CLAIMS = (
         source="ch. 5, Sec. 7, Figs. 14-15",
         statement="The scale of the walk, 1/3 or 1/6, changes the rotor speeds "
         "(their range by at least a tenth)",
-        published=True,
         flights=tuple(_address("line", f"walk_{n}", 3, "modified") for n in ("third", "sixth")),
         measure=_scale_changes_the_speeds,
     ),

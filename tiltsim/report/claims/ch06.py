@@ -168,7 +168,6 @@ CLAIMS = (
         source="ch. 6, Sec. 2, Eq. (1)",
         statement="Eq. (1), term by term, is the determinant at any attitude",
         case="terms with sin φ",
-        published=True,
         wrong=True,
         why="-2.880 s1 c2 s3 s4 sin φ cos θ should be s1 c2 c3 s4, as in Eq. (4).",
         measure=partial(terms_hold, "R_phi", EQ_1_ROLL, _VEHICLE),
@@ -177,7 +176,6 @@ CLAIMS = (
         AnalysisClaim(
             source=f"ch. 6, Sec. {section}",
             statement=f"{name} is printed correctly, term by term",
-            published=True,
             measure=partial(terms_hold, part, printed, _VEHICLE),
         )
         for section, name, part, printed in (
@@ -196,7 +194,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 6, Sec. 3, Figs. 5-10",
         statement="α₃ lies on two planes, and so does α₄",
-        published=True,
         measure=_on_two_planes,
     ),
     AnalysisClaim(
@@ -214,7 +211,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 6, Sec. 3, Figs. 11-14",
         statement="Roots with R > 0 are of the classes (+,+), (+,?) and (?,+) only",
-        published=True,
         why="Where both pairs of planes meet within half a grid step there are also (?,?): "
         "three grid points next to P.",
         measure=lambda: _classes(lambda root: root.R > _ZERO) <= {"(+,+)", "(+,?)", "(?,+)"},
@@ -222,13 +218,11 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 6, Sec. 3, Figs. 11-14",
         statement="At most one root with R > 0",
-        published=True,
         measure=_one_positive_root_each,
     ),
     AnalysisClaim(
         source="ch. 6, Sec. 3",
         statement="The points with R > 0 fill the triangle (-7, 7), (-7, -5), (5, 7) in π/16",
-        published=True,
         wrong=True,
         why="They reach (-7, -7) and (7, 7), and include the untilted vehicle, whose R is 4.",
         measure=_triangle_is_the_published,
@@ -236,7 +230,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 6, Sec. 3, Figs. 15-16",
         statement="Roots with R < 0 cover all seven classes",
-        published=True,
         wrong=True,
         why="Blue roots, those with a minus, have R = 0 exactly; with the printed coefficients "
         "the sign of R there is rounding.",
@@ -245,7 +238,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 6, Sec. 3",
         statement="For an (α₁, α₂) with R < 0 there may be two usable roots, red and blue",
-        published=True,
         wrong=True,
         why="Only red ones are usable: " + RANK,
         measure=lambda: any(
@@ -257,7 +249,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 6, Sec. 6",
         statement="On (+,+) α₁ = α₃ and α₂ = α₄",
-        published=True,
         measure=lambda: all(
             abs(root.alpha_3 - root.alpha_1) + abs(root.alpha_4 - root.alpha_2) < _ZERO
             for root in _inside()
@@ -269,7 +260,6 @@ CLAIMS = (
             source="ch. 6, Sec. 4, Theorem 1",
             statement="A closed path in one color gives a continuous gait",
             case=color,
-            published=True,
             measure=partial(_one_color_is_accepted, color),
         )
         for color in ("red", "blue")
@@ -279,7 +269,6 @@ CLAIMS = (
             source="ch. 6, Sec. 5",
             statement="The printed angles lie on the surface",
             case=name,
-            published=True,
             measure=partial(_angles_on_lines, key),
         )
         for key, name in _GAITS.items()
@@ -301,7 +290,6 @@ CLAIMS = (
             source=f"ch. 6, Sec. 5, Fig. {_FIGURES[key]}",
             statement="The gait is more robust than its biased counterpart",
             case=name,
-            published=True,
             wrong=key in _BLUE,
             why=RANK if key in _BLUE else "",
             measure=partial(is_more_robust, key),
@@ -313,7 +301,6 @@ CLAIMS = (
             source=f"ch. 6, Sec. 5, Fig. {_FIGURES[key]}",
             statement="Nearly all attitudes within 90 degrees are admissible",
             case=_GAITS[key],
-            published=True,
             measure=partial(_nearly_all, key),
         )
         for key in ("ch06_gait_3", "ch06_gait_4")
@@ -322,7 +309,6 @@ CLAIMS = (
         source="ch. 6, Sec. 6, Figs. 23, 28",
         statement="Gait 2, as printed, has a greater advantage over the gait with a bias of 99 % "
         "than over that of 80 %",
-        published=True,
         why="By the margin the printed Gait 2 has none over either: 0.7251 rad compared with "
         "0.7285 and 0.7851. The diagrams compare rounding.",
         measure=_greater_advantage_over_99,
@@ -330,13 +316,11 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 6, Sec. 6",
         statement="Gaits on (+,+) have more acceptable attitudes than those on (-,-)",
-        published=True,
         measure=_red_beats_blue,
     ),
     AnalysisClaim(
         source="ch. 6, Sec. 6",
         statement="Scaling only α₃ and α₄ may make a gait less robust",
-        published=True,
         measure=_partial_scaling_can_harm,
     ),
 )

@@ -34,7 +34,6 @@ CLAIMS = (
             source=f"ch. 7, Sec. 3.2, Fig. {figure}",
             statement="The gait is more robust than its biased counterpart",
             case=name,
-            published=True,
             wrong=key == "ch07_gait_1",
             why=RANK if key == "ch07_gait_1" else "",
             measure=partial(is_more_robust, key),
@@ -44,7 +43,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 7, Sec. 3.2, Fig. 6",
         statement="The biased Gait 2 is very sensitive to the attitude (margin below 0.2 rad)",
-        published=True,
         why=_SHAPES
         + "The biased gait keeps 1.45 rad. A larger rectangle reduces it: 0.25 rad with a "
         "corner at (-1.40, 1.40) rad, beyond which the red gait itself is singular.",
@@ -53,14 +51,12 @@ CLAIMS = (
     FlightClaim(
         source="ch. 7, Sec. 4.2, Figs. 10-11",
         statement="A gait on the map tracks the circle with little error (0.1 m)",
-        published=True,
         flights=tuple(_CIRCLE + name for name in ("gait_1_blue", "gait_2", "gait_3")),
         measure=_some_gait_tracks,
     ),
     FlightClaim(
         source="ch. 7, Sec. 5, Fig. 9",
         statement="No rotor reaches zero speed while tracking (the red gaits, which track)",
-        published=True,
         flights=tuple(_CIRCLE + name for name in ("gait_2", "gait_3")),
         measure=no_rotor_stops,
     ),

@@ -101,13 +101,11 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 8, Sec. 3.1, Eq. (7)",
         statement="Eq. (7), term by term, is R on red",
-        published=True,
         measure=_eq_7_holds,
     ),
     AnalysisClaim(
         source="ch. 8, Sec. 3.1, Fig. 6",
         statement="L divides the square |α₁|, |α₂| <= 1 in two, with R > 0 above and R < 0 below",
-        published=True,
         measure=_divides_in_two,
     ),
     AnalysisClaim(
@@ -122,7 +120,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 8, Sec. 3.1",
         statement="P lies below L, in S_D",
-        published=True,
         wrong=True,
         why="P lies on L exactly: tan(-δ) = tan δ - 2r with r = tan δ. The printed P has "
         "R = -1.4e-4, from its rounding.",
@@ -164,7 +161,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 8, Secs. 3.4-3.5",
         statement="At P both colors have the same angles, so that the color can change",
-        published=True,
         measure=_colors_meet_at_p,
     ),
     *(
@@ -172,7 +168,6 @@ CLAIMS = (
             source="ch. 8, Sec. 4",
             statement="The gait violates the Two Color Map Theorem and follows the generalized one",
             case=name,
-            published=True,
             measure=partial(_needs_the_generalized, name),
         )
         for name in _GAITS
@@ -182,7 +177,6 @@ CLAIMS = (
             source="ch. 8, Sec. 3.5",
             statement="According to the theorem the determinant at level attitude is never zero",
             case=name,
-            published=True,
             wrong=name != "Gait 2",
             why={"Gait 1": _AT_P + RANK, "Gait 3": RANK}.get(name, ""),
             measure=partial(_regular, name),
@@ -193,7 +187,6 @@ CLAIMS = (
         source="ch. 8, Sec. 4.1, Fig. 10",
         statement="The gait is more robust than its biased counterpart",
         case="Gait 1",
-        published=True,
         wrong=True,
         why=_AT_P + RANK,
         measure=partial(is_more_robust, "ch08_gait_1"),
@@ -202,19 +195,16 @@ CLAIMS = (
         source="ch. 8, Sec. 4.2, Fig. 12",
         statement="The gait is more robust than its biased counterpart",
         case="Gait 2",
-        published=True,
         measure=partial(is_more_robust, "ch08_gait_2"),
     ),
     AnalysisClaim(
         source="ch. 8, Sec. 4.2, Fig. 12",
         statement="Gait 2 has no singular attitude at all",
-        published=True,
         measure=_no_singular_attitude,
     ),
     AnalysisClaim(
         source="ch. 8, Sec. 4.3, Fig. 14",
         statement="Gait 3 and its biased counterpart both leave enough attitudes (0.2 rad)",
-        published=True,
         wrong=True,
         why=RANK + " R of the biased gait changes sign.",
         measure=_both_are_sufficient,

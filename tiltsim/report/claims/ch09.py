@@ -115,7 +115,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 9, Sec. 2, Eq. (8)",
         statement="Eq. (8), term by term, is R on red",
-        published=True,
         measure=partial(terms_hold, "R", EQ_19, _VEHICLE),
     ),
     AnalysisClaim(
@@ -140,7 +139,6 @@ CLAIMS = (
             source="ch. 9, Sec. 3.3",
             statement="The gaits with solutions can carry 4.2 N, the weight",
             case=f"Gait {number}",
-            published=True,
             wrong=number == 6,
             why="Under Eq. (11) a rotor produces at most 1.25 N; two tilted by 0.5 rad and two by "
             "0.834 rad lift 3.87 N."
@@ -165,7 +163,6 @@ CLAIMS = (
             source="ch. 9, Sec. 5",
             statement="The coupling is not a singularity: τ has full rank",
             case=f"Gait {number}",
-            published=True,
             wrong=True,
             why=RANK,
             measure=partial(_has_full_rank, number),
@@ -192,7 +189,6 @@ CLAIMS = (
             source="ch. 9, Sec. 5",
             statement="The region of accelerations is a rectangle",
             case=f"Gait {number}",
-            published=True,
             measure=partial(_is_rectangle, number),
         )
         for number in (2, 3)
@@ -200,7 +196,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 9, Sec. 3.3",
         statement="Gaits 2 and 3 reach similar accelerations",
-        published=True,
         measure=_gaits_2_and_3_are_similar,
     ),
     AnalysisClaim(
@@ -213,14 +208,12 @@ CLAIMS = (
     FlightClaim(
         source="ch. 9, Sec. 4.2, Fig. 10",
         statement="All four references end in periodic trajectories: none of the flights diverges",
-        published=True,
         flights=tuple(map(_circle, ("01", "05", "10", "15"))),
         measure=_first_four_repeat,
     ),
     FlightClaim(
         source="ch. 9, Sec. 5",
         statement="The faster the circle, the larger the error; the fastest diverges",
-        published=True,
         flights=tuple(map(_circle, ("01", "05", "10", "15", "20"))),
         measure=_faster_is_worse,
     ),
@@ -240,7 +233,6 @@ CLAIMS = (
     FlightClaim(
         source="ch. 9, Sec. 4.2, Fig. 10",
         statement="At 1.5 rad/s the orbit is an ellipse (radii at least a fifth apart)",
-        published=True,
         flights=(_circle("15"),),
         measure=lambda flights: _spread(_circle("15"), flights) > 1.2,
     ),

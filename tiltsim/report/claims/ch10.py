@@ -104,21 +104,18 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 10, Sec. 2, Eq. (6)",
         statement="The matrix from squared speeds to acceleration can be inverted",
-        published=True,
         measure=_thrusts_can_be_inverted,
     ),
     AnalysisClaim(
         source="ch. 10, Sec. 3.1, Eqs. (10)-(12)",
         statement="Rank 2 if and only if both rotors turn",
         case="columns of the rotors, Δ1",
-        published=True,
         measure=partial(_full_rank_needs_both, tilting=False),
     ),
     AnalysisClaim(
         source="ch. 10, Sec. 3.1, Eqs. (10)-(12)",
         statement="Rank 2 if and only if both rotors turn",
         case="with the column of the tilt, [Δ1 | Δ2]",
-        published=True,
         wrong=True,
         why="With one rotor at rest the tilt turns the other one's thrust: still rank 2.",
         measure=partial(_full_rank_needs_both, tilting=True),
@@ -126,7 +123,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 10, Sec. 6.1, Eq. (28)",
         statement="The columns of the rotors have rank 2 unless both rotors are at rest",
-        published=True,
         wrong=True,
         why="One rotor at rest leaves one column: rank 1. Both must turn.",
         measure=_full_rank_unless_both_rest,
@@ -134,14 +130,12 @@ CLAIMS = (
     FlightClaim(
         source="ch. 10, Sec. 4.1, Figs. 7-8",
         statement="The third-derivative controller makes the error vanish in ten seconds (0.01 m)",
-        published=True,
         flights=(_THIRD + "ten_seconds",),
         measure=_both_small,
     ),
     FlightClaim(
         source="ch. 10, Sec. 4.1, Figs. 12-13",
         statement="The error stays at zero for 2000 s (0.01 m after 20 s)",
-        published=True,
         flights=(_THIRD + "two_thousand_seconds",),
         measure=partial(
             _small, _THIRD + "two_thousand_seconds", "sup_position_error_after_20s", 0.01
@@ -150,7 +144,6 @@ CLAIMS = (
     FlightClaim(
         source="ch. 10, Sec. 4.1, Figs. 9, 14",
         statement="State drift: the inputs diverge after the error has vanished",
-        published=True,
         flights=(_THIRD + "ten_seconds", _THIRD + "two_thousand_seconds"),
         measure=_inputs_diverge,
     ),
@@ -166,35 +159,30 @@ CLAIMS = (
     FlightClaim(
         source="ch. 10, Sec. 5, Figs. 20-21",
         statement="With the tilt planned the error also vanishes (0.01 m at 10 s)",
-        published=True,
         flights=(_PLANNED,),
         measure=partial(_small, _PLANNED, "final_position_error_x", 0.01),
     ),
     FlightClaim(
         source="ch. 10, Sec. 5, Fig. 22",
         statement="With the tilt planned the inputs become identical: no state drift",
-        published=True,
         flights=(_PLANNED,),
         measure=partial(_small, _PLANNED, "final_input_split", 1.0),
     ),
     FlightClaim(
         source="ch. 10, Sec. 5, Fig. 23",
         statement="With the tilt planned the inputs saturate for a while",
-        published=True,
         flights=(_PLANNED,),
         measure=_saturates,
     ),
     AnalysisClaim(
         source="ch. 10, Sec. 5, Eq. (18)",
         statement="α = t / (1 - I_T / I_B) keeps the thrusts pointed at the center",
-        published=True,
         measure=_thrust_points_to_the_center,
     ),
     FlightClaim(
         source="ch. 10, Sec. 6.1, Figs. 24-25",
         statement="With the fourth-derivative controller the inputs drift until a rotor stops, "
         "and then it fails",
-        published=True,
         flights=(_FAILURE,),
         measure=_fails_after_a_rotor_stops,
     ),

@@ -134,7 +134,6 @@ CLAIMS = (
         source="ch. 11, Sec. 3, Figs. 5-8",
         statement="The thrusts can keep the acceleration along y at zero",
         case="small swing, π/8",
-        published=True,
         measure=lambda: _can_push_straight_ahead(pi / 8),
     ),
     AnalysisClaim(
@@ -147,7 +146,6 @@ CLAIMS = (
     FlightClaim(
         source="ch. 11, Sec. 4.4",
         statement="With the small swing the errors stay below 0.1 m",
-        published=True,
         flights=(_SMALL,),
         measure=_errors_stay_below,
     ),
@@ -178,31 +176,26 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 11, Sec. 6, Lemma 5, Eq. (42)",
         statement="The printed solution with both rotors pushing is correct",
-        published=True,
         measure=lambda: _for_all(_eq_42_holds),
     ),
     AnalysisClaim(
         source="ch. 11, Sec. 6, Lemmas 5 and 6",
         statement="From the zone of Eq. (39) a rotor stops within 0 < t < 1 s",
-        published=True,
         measure=lambda: _for_all(_switches_within),
     ),
     AnalysisClaim(
         source="ch. 11, Sec. 6, Lemmas 7 and 8, Prop. 5",
         statement="Half a period leads from the zone into its mirror image",
-        published=True,
         measure=lambda: _for_all(_comes_back_mirrored),
     ),
     AnalysisClaim(
         source="ch. 11, Sec. 6, Remark 8",
         statement="The first half period, from rest, ends in the zone",
-        published=True,
         measure=_first_half_period,
     ),
     AnalysisClaim(
         source="ch. 11, Sec. 6, Prop. 6",
         statement="In between, the Lyapunov candidate does not exceed its values at half periods",
-        published=True,
         measure=lambda: _for_all(_largest_at_the_ends),
     ),
     AnalysisClaim(
@@ -214,7 +207,6 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 11, Sec. 6, Remark 10",
         statement="It grows by more nowhere in the zone",
-        published=True,
         measure=lambda: _for_all(lambda state: lyapunov_growth(_SWING, state) <= 0.75 + 1e-12),
     ),
     AnalysisClaim(
@@ -226,20 +218,17 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 11, Secs. 6-7, Prop. 2, Figs. 24, 31",
         statement="The error along y stays bounded: the oscillation is stable",
-        published=True,
         measure=_cycle_attracts,
     ),
     FlightClaim(
         source="ch. 11, Sec. 7, Figs. 25-26",
         statement="With the large swing inputs saturate from time to time, not always",
-        published=True,
         flights=(_LARGE,),
         measure=_saturates_intermittently,
     ),
     FlightClaim(
         source="ch. 11, Sec. 8, Prop. 7, Eq. (77)",
         statement="The candidate stays below L_critical + 3/4 (here 2.56 m²/s²)",
-        published=True,
         flights=(_LARGE,),
         measure=_is_bounded,
     ),
