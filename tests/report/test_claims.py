@@ -7,10 +7,7 @@ import random
 import numpy as np
 import pytest
 
-from tiltsim.report.claims import registered_claims
-from tiltsim.report.claims.ch03 import EQ_17, EQ_19
-from tiltsim.report.measures import determinant_coefficients
-from tiltsim.report.model import (
+from tiltsim.report.claim import (
     AnalysisClaim,
     ClaimVerdict,
     FlightClaim,
@@ -18,6 +15,9 @@ from tiltsim.report.model import (
     scenario_claims,
     verdict_on,
 )
+from tiltsim.report.claims import registered_claims
+from tiltsim.report.claims.ch03 import EQ_17, EQ_19
+from tiltsim.report.measures import determinant_coefficients
 from tiltsim.scenario.library import library_entries
 from tiltsim.scenario.loading import load_scenario
 from tiltsim_controllers.analysis.singularity import residuals

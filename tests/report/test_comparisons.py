@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from tiltsim.report.comparisons import other_address
+from tiltsim.report.html_page import page
 from tiltsim.report.making import make_report
 from tiltsim.report.markdown import markdown
-from tiltsim.report.page import page
 from tiltsim.scenario.library import library_entries
 from tiltsim.scenario.loading import load_scenario
 

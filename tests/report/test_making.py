@@ -14,16 +14,16 @@ from PIL import Image
 from tiltsim.cli import main
 from tiltsim.exit_codes import EXPECTATION_FAILED, INVALID_INPUT
 from tiltsim.report import flights, store
+from tiltsim.report.claim import ClaimVerdict
+from tiltsim.report.claim_rows import count
 from tiltsim.report.content import Group, failure_text, measured_text, published_text
 from tiltsim.report.drawing import DPI, Drawing, png
 from tiltsim.report.findings import FINDINGS
 from tiltsim.report.flights import FlightRecord, Unsupported, fly, report_entries
+from tiltsim.report.html_page import page
 from tiltsim.report.making import make_report
 from tiltsim.report.markdown import markdown
-from tiltsim.report.model import ClaimVerdict
-from tiltsim.report.page import page
 from tiltsim.report.pictures import AnalysisPicture
-from tiltsim.report.rows import count
 from tiltsim.report.store import flight_key
 from tiltsim.studies.checking import collect
 from tiltsim.views.figures.style import CYCLE, new_figure

@@ -42,11 +42,11 @@ def add_parser(subparsers: Subparsers) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Fly, evaluate, write."""
     from tiltsim.commands.progress import progress_bar
+    from tiltsim.report.claim_rows import count
     from tiltsim.report.content import failure_text
+    from tiltsim.report.html_page import page
     from tiltsim.report.making import make_report
     from tiltsim.report.markdown import markdown
-    from tiltsim.report.page import page
-    from tiltsim.report.rows import count
     from tiltsim.system.files import prepare_file, prepare_folder
 
     out: Path = arguments.out

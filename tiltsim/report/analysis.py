@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from tiltsim.report.claim import AnalysisClaim, Value, plain
 from tiltsim.report.claims import registered_claims
-from tiltsim.report.model import AnalysisClaim, Value, plain
 from tiltsim.report.store import code_digest, sources_digest, store
 from tiltsim.report.workers import results
 

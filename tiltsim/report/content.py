@@ -9,11 +9,11 @@ from itertools import groupby
 from math import floor, isfinite, log10
 from typing import TYPE_CHECKING, Final
 
+from tiltsim.report.claim import Claim, ClaimVerdict, ExpectationClaim
+from tiltsim.report.claim_rows import Cell, Failure, Row
 from tiltsim.report.comparisons import Comparison
 from tiltsim.report.drawing import Drawing
 from tiltsim.report.findings import FINDINGS, Finding
-from tiltsim.report.model import Claim, ClaimVerdict, ExpectationClaim
-from tiltsim.report.rows import Cell, Failure, Row
 
 if TYPE_CHECKING:
     from tiltsim.report.flights import Flights, ReportEntry

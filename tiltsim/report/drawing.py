@@ -10,8 +10,8 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from tiltsim.report.claim import Metrics
 from tiltsim.report.flights import FlightRecord, Flights, Plant, ReportEntry
-from tiltsim.report.model import Metrics
 from tiltsim.report.pictures import PICTURES, AnalysisPicture, Picture
 from tiltsim.report.store import code_digest, sources_digest, store
 from tiltsim.report.workers import results

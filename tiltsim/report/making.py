@@ -6,12 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tiltsim.report.analysis import analyze
+from tiltsim.report.claim_rows import failures, make_rows
 from tiltsim.report.comparisons import compare
 from tiltsim.report.content import Report
 from tiltsim.report.drawing import draw_all
 from tiltsim.report.findings import FINDINGS
 from tiltsim.report.flights import fly, report_entries
-from tiltsim.report.rows import failures, make_rows
 from tiltsim.resources import shipped_folder
 from tiltsim.studies.checking import collect
 

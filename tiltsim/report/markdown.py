@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from tiltsim.report import comparisons
+from tiltsim.report.claim import ClaimVerdict
+from tiltsim.report.claim_rows import Row, count
 from tiltsim.report.content import (
     CHAPTERS,
     MEANINGS,
@@ -19,8 +21,6 @@ from tiltsim.report.content import (
     why_of,
 )
 from tiltsim.report.flights import PLANTS
-from tiltsim.report.model import ClaimVerdict
-from tiltsim.report.rows import Row, count
 
 
 def markdown(report: Report) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from tiltsim.report.model import Metrics
+from tiltsim.report.claim import Metrics
 from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS, robustness
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.analysis.stability import third_order_loop

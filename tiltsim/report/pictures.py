@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
+from tiltsim.report.claim import Metrics
 from tiltsim.report.flights import PLANTS, Plant, variant_for
-from tiltsim.report.model import Metrics
 from tiltsim.report.store import flight_key
 from tiltsim_controllers.analysis.published_gaits import PATHS, PUBLISHED_GAITS
 from tiltsim_controllers.vehicle.parameters import PRESETS

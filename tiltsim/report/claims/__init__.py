@@ -2,7 +2,7 @@
 
 One module per chapter, found by its name; each has a tuple ``CLAIMS``, in the order of the text::
 
-    from tiltsim.report.model import AnalysisClaim, FlightClaim
+    from tiltsim.report.claim import AnalysisClaim, FlightClaim
 
     CLAIMS = (
         AnalysisClaim(
@@ -36,7 +36,7 @@ from pkgutil import iter_modules
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tiltsim.report.model import AnalysisClaim, FlightClaim
+    from tiltsim.report.claim import AnalysisClaim, FlightClaim
 
 
 def registered_claims() -> list[AnalysisClaim | FlightClaim]:

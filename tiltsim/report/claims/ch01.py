@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
 from tiltsim_controllers.analysis.singularity import torque_free_direction
 from tiltsim_controllers.vehicle.parameters import PRESETS
 

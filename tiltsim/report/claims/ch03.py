@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
 from tiltsim.report.measures import (
     PRINTED,
     Coefficients,
@@ -17,7 +18,6 @@ from tiltsim.report.measures import (
     terms_hold,
     worst_coefficient,
 )
-from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
 from tiltsim_controllers.analysis.published_gaits import DETERMINANT_CASES, TRIANGLE
 from tiltsim_controllers.analysis.singularity import decoupling_matrix, determinant, residuals
 from tiltsim_controllers.vehicle.parameters import PRESETS

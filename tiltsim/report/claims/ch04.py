@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
 from tiltsim.report.measures import (
     every_flight_completed,
     falls,
@@ -18,7 +19,6 @@ from tiltsim.report.measures import (
     routh_holds,
     tracking_error,
 )
-from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.laws.decouplers import conventional_decoupler, modified_decoupler
 from tiltsim_controllers.laws.gains import GAIN_SETS

@@ -14,6 +14,7 @@ from typing import Final
 
 import numpy as np
 
+from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
 from tiltsim.report.claims.ch03 import EQ_17, EQ_19
 from tiltsim.report.measures import (
     PRINTED,
@@ -25,7 +26,6 @@ from tiltsim.report.measures import (
     tracking_error,
     worst_coefficient,
 )
-from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
 from tiltsim_controllers.analysis.published_gaits import smallest_margin
 from tiltsim_controllers.analysis.singularity import determinant
 from tiltsim_controllers.gaits import plans

@@ -9,9 +9,9 @@ from typing import Final
 
 import numpy as np
 
+from tiltsim.report.claim import AnalysisClaim
 from tiltsim.report.claims.ch03 import EQ_17, EQ_19
 from tiltsim.report.measures import is_more_robust, terms, terms_hold
-from tiltsim.report.model import AnalysisClaim
 from tiltsim_controllers.analysis.published_gaits import (
     PUBLISHED_GAITS,
     Robustness,

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Final
 
+from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
 from tiltsim.report.claims.ch06 import RANK
 from tiltsim.report.measures import is_more_robust, no_rotor_stops, tracking_error
-from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
 from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS, robustness
 
 _SHAPES: Final = "The figures are not available: place and color as described, size ours. "

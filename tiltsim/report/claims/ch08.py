@@ -7,10 +7,10 @@ from typing import Final
 
 import numpy as np
 
+from tiltsim.report.claim import AnalysisClaim
 from tiltsim.report.claims.ch03 import EQ_19
 from tiltsim.report.claims.ch06 import RANK
 from tiltsim.report.measures import is_more_robust, terms_hold
-from tiltsim.report.model import AnalysisClaim
 from tiltsim_controllers.analysis.published_gaits import PATHS, PUBLISHED_GAITS, robustness
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.analysis.two_color_map import curve_l, delta, point_p, red_residual, region

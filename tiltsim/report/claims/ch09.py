@@ -9,10 +9,10 @@ from typing import Final
 
 import numpy as np
 
+from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
 from tiltsim.report.claims.ch03 import EQ_19
 from tiltsim.report.claims.ch06 import RANK
 from tiltsim.report.measures import terms_hold, tracking_error
-from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
 from tiltsim_controllers.analysis.attainable import (
     AttainableSet,
     attainable_accelerations,

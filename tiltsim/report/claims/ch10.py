@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
 from tiltsim_controllers.tilt_car.state_drift import drift_rate, orbit
 from tiltsim_controllers.tilt_car.third_derivative import input_columns
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, counter_yaw_per_tilt, turn_per_tilt

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from tiltsim.report.model import AnalysisClaim, FlightClaim, Metrics
+from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
 from tiltsim_controllers.tilt_car.penguin_cycle import (
     LyapunovBound,
     State,

@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
+from tiltsim.report.claim import AnalysisClaim
 from tiltsim.report.claims.ch08 import DIGITS
 from tiltsim.report.measures import determinant_coefficients, terms, terms_hold
-from tiltsim.report.model import AnalysisClaim
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.analysis.two_color_map import (
     curve_l,

@@ -7,9 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from tiltsim.flight.verdicts import Verdict, judge
-from tiltsim.report.claims import registered_claims
-from tiltsim.report.flights import PLANTS, FlightRecord, Flights, Plant, ReportEntry
-from tiltsim.report.model import (
+from tiltsim.report.claim import (
     Claim,
     ClaimVerdict,
     ExpectationClaim,
@@ -20,6 +18,8 @@ from tiltsim.report.model import (
     verdict_on,
     worst,
 )
+from tiltsim.report.claims import registered_claims
+from tiltsim.report.flights import PLANTS, FlightRecord, Flights, Plant, ReportEntry
 from tiltsim.scenario.scenario import Scenario
 
 if TYPE_CHECKING:

@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Final
 
 from tiltsim.report import comparisons
+from tiltsim.report.claim import ClaimVerdict
+from tiltsim.report.claim_rows import Cell, Row, count
 from tiltsim.report.content import (
     CHAPTERS,
     MEANINGS,
@@ -29,8 +31,6 @@ from tiltsim.report.content import (
 from tiltsim.report.drawing import DPI, Drawing
 from tiltsim.report.findings import Finding
 from tiltsim.report.flights import PLANTS
-from tiltsim.report.model import ClaimVerdict
-from tiltsim.report.rows import Cell, Row, count
 
 _CLASSES: Final = {
     ClaimVerdict.REPRODUCED: "reproduced",
@@ -44,7 +44,7 @@ _SHOWN_DPI: Final = 108
 
 def page(report: Report) -> str:
     """The whole page."""
-    style = (Path(__file__).parent / "page.css").read_text(encoding="utf-8")
+    style = (Path(__file__).parent / "html_page.css").read_text(encoding="utf-8")
     return "\n".join(
         [
             "<!doctype html>",

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tiltsim.errors import InputError
-from tiltsim.report.claims import registered_claims
-from tiltsim.report.model import (
+from tiltsim.report.claim import (
     AnalysisClaim,
     Claim,
     ClaimVerdict,
@@ -19,6 +18,7 @@ from tiltsim.report.model import (
     verdict_on,
     worst,
 )
+from tiltsim.report.claims import registered_claims
 from tiltsim.scenario.loading import parse_scenario
 
 
