@@ -5,8 +5,12 @@ from __future__ import annotations
 from functools import cache
 
 import tiltsim
+from tiltsim.vehicles.rotorcraft import OBSERVED_FIELDS
 
 BASE = {"simulation": {"duration": 1.2, "timestep": 0.002, "engine": "python"}}
+SAMPLE_FIELDS = ("time", *OBSERVED_FIELDS)
+"""What a sample of any rotorcraft begins with; a law's own states follow."""
+
 FIXED = {"gait": {"type": "fixed", "angles": [-0.65, -0.65, 0.65, 0.65]}}
 TROT = {
     "title": "A trot around a circle",

@@ -11,11 +11,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from tests.flights import SAMPLE_FIELDS
 from tiltsim.errors import InputError
 from tiltsim.flight.end import End
-from tiltsim.flight.flight import SAMPLE_FIELDS, Flight
+from tiltsim.flight.flight import Flight
 from tiltsim.flight.reading import load_flight
-from tiltsim.flight.writing import metrics_json, save_flight
+from tiltsim.flight.writing import metrics_json
 from tiltsim.scenario.document import scenario_toml, without_none
 from tiltsim.scenario.loading import parse_scenario
 from tiltsim.system import files
@@ -32,7 +33,7 @@ def flight(x=0.0):
     samples[:, SAMPLE_FIELDS.index("x")] = x
     samples[:, -8:-4] = (-300.0, 300.0, -300.0, 300.0)
     end = End("singular", 0.5, "why it ended")
-    return Flight(parse_scenario(SCENARIO, "by/hand"), samples, end, "python", 0.1)
+    return Flight.of_scenario(parse_scenario(SCENARIO, "by/hand"), samples, end, "python", 0.1)
 
 
 def contents(folder):
@@ -46,9 +47,9 @@ def test_saving_writes_three_files_and_nothing_else(tmp_path):
 
 
 def test_saving_again_replaces_all_three(tmp_path):
-    save_flight(flight(x=1.0), tmp_path)
+    flight(x=1.0).save(tmp_path)
     before = contents(tmp_path)
-    save_flight(flight(x=2.0), tmp_path)
+    flight(x=2.0).save(tmp_path)
     after = contents(tmp_path)
     assert set(after) == NAMES
     assert json.loads(after["metrics.json"])["final_position_error_x"] == -2.0
@@ -58,7 +59,7 @@ def test_saving_again_replaces_all_three(tmp_path):
 @pytest.mark.parametrize("writer", ["write_table", "metrics_json", "scenario_toml"])
 @pytest.mark.parametrize("failure", [OSError(28, "No space left on device"), KeyboardInterrupt()])
 def test_a_write_that_fails_leaves_the_old_file_whole(tmp_path, monkeypatch, writer, failure):
-    save_flight(flight(x=1.0), tmp_path)
+    flight(x=1.0).save(tmp_path)
     before = contents(tmp_path)
 
     def half_written(_content, path=None, **_options):
@@ -68,7 +69,7 @@ def test_a_write_that_fails_leaves_the_old_file_whole(tmp_path, monkeypatch, wri
 
     monkeypatch.setattr(pq if writer == "write_table" else files, writer, half_written)
     with pytest.raises(type(failure)):
-        save_flight(flight(x=2.0), tmp_path)
+        flight(x=2.0).save(tmp_path)
     after = contents(tmp_path)
     file = {"write_table": "flight.parquet", "metrics_json": "metrics.json"}
     failed = file.get(writer, "scenario.toml")
@@ -79,7 +80,7 @@ def test_a_write_that_fails_leaves_the_old_file_whole(tmp_path, monkeypatch, wri
 def test_files_get_the_permissions_that_the_user_asked_for(tmp_path):
     previous = os.umask(0o027)
     try:
-        save_flight(flight(), tmp_path)
+        flight().save(tmp_path)
     finally:
         os.umask(previous)
     modes = {path.name: path.stat().st_mode & 0o777 for path in tmp_path.iterdir()}

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.flights import SAMPLE_FIELDS
 from tiltsim.commands.schema import scenario_schema
 from tiltsim.flight.end import End
-from tiltsim.flight.flight import SAMPLE_FIELDS, Flight
+from tiltsim.flight.flight import Flight
 from tiltsim.scenario.loading import parse_scenario
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS, METRICS, unit_of
 from tiltsim.vehicles.rotorcraft import COLUMN_UNITS
@@ -28,7 +29,7 @@ def fly(scenario=None, *, times=None, end=COMPLETED, wall_time=2.0, **columns):
     samples = np.zeros((len(times), len(SAMPLE_FIELDS)))
     for name, values in ({"time": times} | HOVER | columns).items():
         samples[:, SAMPLE_FIELDS.index(name)] = values
-    return Flight(parse_scenario(scenario or {}), samples, end, "python", wall_time)
+    return Flight.of_scenario(parse_scenario(scenario or {}), samples, end, "python", wall_time)
 
 
 TIMES = np.arange(0.0, 30.25, 0.25)  # binary fractions, exact

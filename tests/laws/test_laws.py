@@ -12,7 +12,7 @@ from scipy.linalg import expm
 import tiltsim
 from tiltsim.errors import InputError
 from tiltsim.flight.reading import load_flight
-from tiltsim.laws.assembling import LOOPS, loop_of
+from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 from tiltsim.plants.factory import make_plant
 from tiltsim.plants.mujoco_plant import MujocoPlant
@@ -135,12 +135,12 @@ def test_engines_fly_the_same_flight(law, plant, control_timestep):
 def test_a_saved_state_restarts_bit_identically(law, plant, control_timestep):
     simulation = {"plant": plant, "engine": "python", "control_timestep": control_timestep}
     wanted = scenario(law, simulation)
-    straight = make_plant(wanted)
+    straight = make_plant(assemble(wanted))
     straight.advance(100)
     saved, seen = straight.state, straight.observe()
     straight.advance(50)
 
-    restarted = make_plant(wanted)
+    restarted = make_plant(assemble(wanted))
     restarted.advance(17)
     restarted.state = saved
     assert restarted.observe() == seen
@@ -151,7 +151,7 @@ def test_a_saved_state_restarts_bit_identically(law, plant, control_timestep):
 
 @each_law
 def test_observing_changes_nothing(law):
-    plant = make_plant(scenario(law, {"engine": "python"}))
+    plant = make_plant(assemble(scenario(law, {"engine": "python"})))
     before = plant.state
     assert plant.observe() == plant.observe()
     np.testing.assert_array_equal(plant.state, before)
@@ -540,7 +540,7 @@ def test_a_negative_number_of_law_states_is_refused():
 
 
 def test_the_extension_starts_at_the_weight():
-    plant = MujocoPlant(scenario("yaw_position"))
+    plant = MujocoPlant(assemble(scenario("yaw_position")))
     vehicle = PRESETS["ar_drone_2_unrounded"]
     np.testing.assert_array_equal(plant.data.act[4:], [vehicle.mass * vehicle.gravity, 0.0])
 

@@ -305,7 +305,7 @@ def test_the_recording_has_both_thrusts_and_the_cars_series(tmp_path):
     assert {"/world/vehicle/top/thrust_1", "/world/vehicle/top/thrust_2"} <= entities
     assert {"/direction/middle", "/inputs/square_2", "/lyapunov/candidate"} <= entities
     assert not any(entity.startswith("/plane") for entity in entities)
-    assert ground_height(visible_model(this.scenario)) == pytest.approx(-0.0125)
+    assert ground_height(visible_model(this.assembly)) == pytest.approx(-0.0125)
 
 
 def test_run_check_and_plot_from_the_command_line(tmp_path, capsys):

@@ -8,6 +8,7 @@ import pytest
 
 import tiltsim
 from tiltsim.errors import InputError
+from tiltsim.laws.assembling import assemble
 from tiltsim.models.parts import Ground
 from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 from tiltsim.plants.flight_model import flight_model
@@ -51,7 +52,7 @@ def test_friction_holds_up_to_its_share_of_the_weight(friction):
     scenario = tiltsim.parse_scenario(
         {**tables, "ground": ground, "initial": {"position": [0, 0, 1]}}
     )
-    model = flight_model(scenario, 100)
+    model = flight_model(assemble(scenario))
     share = 0.8 if friction is None else friction
 
     def acceleration(push):

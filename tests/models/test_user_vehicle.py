@@ -12,6 +12,7 @@ import pytest
 import tiltsim
 from tiltsim.cli import main
 from tiltsim.errors import InputError
+from tiltsim.laws.assembling import assemble
 from tiltsim.models.user_vehicle import read_user_vehicle
 from tiltsim.plants.command import Command
 from tiltsim.plants.flight_model import build_model
@@ -110,7 +111,7 @@ def test_a_file_placed_askew_is_measured_in_the_bodys_own_axes(write):
 def test_the_compiled_model_has_the_mass_and_inertia_asked_for(write, own):
     this = scenario(write(), vehicle=own)
     wanted = this.rotorcraft.resolve()
-    model = build_model(this)
+    model = build_model(assemble(this))
     mass, inertia = total_inertia(model)
     assert mass == pytest.approx(wanted.mass, rel=1e-9)
     np.testing.assert_allclose(inertia, np.diag(wanted[1:4]), atol=1e-9)
@@ -124,7 +125,7 @@ def test_a_centre_of_mass_off_the_origin_stays_where_it_is(write):
     heavy = '<geom name="camera" type="sphere" size="0.02" pos="0.05 0.02 -0.03" mass="0.1"/>'
     text = changed('<site name="imu"/>', heavy + '<site name="imu"/>')
     path = write(text)
-    before, after = (build_model(scenario(path, vehicle=v)) for v in ({}, {"mass": 0.85}))
+    before, after = (build_model(assemble(scenario(path, vehicle=v))) for v in ({}, {"mass": 0.85}))
     centers = []
     for model in (before, after):
         data = mujoco.MjData(model)
@@ -148,7 +149,7 @@ SKEW = "".join(
 @pytest.mark.parametrize("vehicle", [{}, {"mass": 0.9}, {"inertia": [4e-3, 5e-3, 8e-3]}])
 def test_products_of_inertia_stay_the_files(write, vehicle):
     path = write(changed('<site name="imu"/>', SKEW + '<site name="imu"/>'))
-    _, inertia = total_inertia(build_model(scenario(path, vehicle=vehicle)))
+    _, inertia = total_inertia(build_model(assemble(scenario(path, vehicle=vehicle))))
     products = [inertia[0, 1], inertia[0, 2], inertia[1, 2]]
     np.testing.assert_allclose(products, [-2.5e-4, -1.5e-4, -1.5e-4], atol=1e-9)
 
@@ -214,7 +215,7 @@ def test_a_centre_of_mass_to_the_side_costs_what_the_documentation_says(write):
 
 def test_the_servo_is_the_scenarios(write):
     servo = {"natural_frequency": 40.0, "damping_ratio": 0.7, "max_angle": 0.5}
-    model = build_model(scenario(write(), vehicle={"tilt_servo": servo}))
+    model = build_model(assemble(scenario(write(), vehicle={"tilt_servo": servo})))
     inertia = model.dof_M0[6]
     assert model.actuator("tilt_1").gainprm[0] == pytest.approx(1600.0 * inertia)
     assert model.actuator("tilt_1").biasprm[2] == pytest.approx(-2.0 * 0.7 * 40.0 * inertia)
@@ -242,7 +243,7 @@ def test_meshes_beside_the_file_are_found(write, tmp_path):
         "<worldbody>", '<asset><mesh name="wing" file="wing.obj"/></asset>\n  <worldbody>'
     )
     text = text.replace('<site name="imu"/>', '<site name="imu"/><geom type="mesh" mesh="wing"/>')
-    assert build_model(scenario(write(text))).nmesh == 1
+    assert build_model(assemble(scenario(write(text)))).nmesh == 1
 
 
 def test_an_edited_file_is_read_again(write):
@@ -250,7 +251,7 @@ def test_an_edited_file_is_read_again(write):
     assert scenario(path).rotorcraft.resolve().mass == pytest.approx(0.68)
     path = write(changed('mass="0.5"', 'mass="0.6"'))
     assert scenario(path).rotorcraft.resolve().mass == pytest.approx(0.78)
-    assert total_inertia(build_model(scenario(path)))[0] == pytest.approx(0.78)
+    assert total_inertia(build_model(assemble(scenario(path))))[0] == pytest.approx(0.78)
 
 
 def rename(name):
@@ -351,7 +352,7 @@ def test_scenarios_that_contradict_the_file_are_refused(write, vehicle, words):
 )
 def test_a_mass_that_no_body_makes_up_for_is_refused(write, vehicle, words):
     with pytest.raises(InputError, match=words):
-        build_model(scenario(write(), vehicle=vehicle))
+        build_model(assemble(scenario(write(), vehicle=vehicle)))
 
 
 def test_ones_own_controller_flies_any_layout(write):
@@ -372,6 +373,6 @@ def test_a_ground_needs_geoms_to_touch_it(write):
     with pytest.raises(InputError, match=r"ground.*needs a geom 'ground', and geoms"):
         scenario(write(), ground={"height": -1.0})
     path = write(changed('<geom name="hull" type', '<geom name="hull_collision" type'))
-    model = build_model(scenario(path, ground={"height": -1.0}))
+    model = build_model(assemble(scenario(path, ground={"height": -1.0})))
     assert model.geom("hull_collision").contype[0] == 1
     assert model.geom("ground").pos[2] == -1.0

@@ -17,7 +17,7 @@ import tiltsim
 from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.flight.reading import load_flight
-from tiltsim.laws.assembling import control_setup, loop_of
+from tiltsim.laws.assembling import assemble, loop_of
 from tiltsim.laws.commanded import COMMANDED_LOOPS
 from tiltsim.laws.tiltrotor import tiltrotor_state
 from tiltsim.plants.command import Command, checked
@@ -177,7 +177,7 @@ def test_a_shipped_law_flown_as_a_users_own_flies_the_same_flight(layers):
     }
     ideal = tiltsim.parse_scenario(tables)
     shipped = tiltsim.parse_scenario(merged(tables, *LAYERS[layers]))
-    parameters = control_setup(shipped).parameters
+    parameters = assemble(shipped).setup.parameters
     while not isinstance(parameters, Parameters):
         parameters = parameters.law
 
@@ -461,7 +461,7 @@ def test_a_moment_is_lived_through_once_even_where_the_flight_is_lost(latency):
 @pytest.mark.parametrize("layers", ["ideal", "everything"])
 def test_a_saved_state_restarts_under_held_accelerations(layers):
     tables = merged({"simulation": {"control_timestep": 0.002}}, *LAYERS[layers])
-    plant = CommandedPlant(scenario(**tables))
+    plant = CommandedPlant(assemble(scenario(**tables)))
 
     def tell(speed):
         told = Command(rotor_speeds=[speed] * 4, tilt_angles=[0.1, 0.0, 0.0, speed / 1e4])

@@ -11,7 +11,7 @@ import pytest
 
 import tiltsim
 import tiltsim.engines.rows
-import tiltsim.plants.mujoco_plant
+import tiltsim.plants.engine_choice
 import tiltsim.simulation.batch
 from tests.laws.layers.test_actuation import EVERYTHING
 from tests.laws.layers.test_air import STORM
@@ -19,7 +19,7 @@ from tests.laws.test_laws import GUST, LAWS
 from tiltsim.engines.native_engine import compile_callbacks
 from tiltsim.engines.native_stepper import compile_stepper
 from tiltsim.flight.end import End
-from tiltsim.laws.assembling import LOOPS, control_setup, loop_of
+from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.air import with_air
 from tiltsim.laws.layers.on_equations import on_equations
@@ -120,7 +120,7 @@ def test_every_gait_flies_the_same_three_ways_with_continuous_and_held_control()
         for held in (0.0, 0.005)
     ]
     # Rows have tables of different lengths, though one layout.
-    assert len({len(control_setup(s).knots) for s in scenarios}) > 2
+    assert len({len(assemble(s).setup.knots) for s in scenarios}) > 2
     three_ways(scenarios)
 
 
@@ -342,7 +342,7 @@ def test_what_decides_the_model_tells_models_apart(change):
     change = {"disturbance": change} if change is GUST else change
     tables = {**LAYERED, "simulation": {"timestep": 0.002, "duration": 0.3}}
     plain, changed = map(tiltsim.parse_scenario, (tables, merge(tables, change)))
-    models = [saved_model(flight_model(wanted, 40)) for wanted in (plain, changed)]
+    models = [saved_model(flight_model(assemble(wanted), 40)) for wanted in (plain, changed)]
     same_key = model_cache_key(plain) == model_cache_key(changed)
     assert same_key == (models[0] == models[1])
 
@@ -417,8 +417,8 @@ def test_all_kinds_of_flights_together():
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
 def test_many_short_flights_are_worth_the_native_engine(plant, monkeypatch):
     wanted = [scenario({}, engine="auto", plant=plant, duration=0.05)] * 6
-    monkeypatch.setattr(tiltsim.plants.mujoco_plant, "MIN_STEPS_TO_LOAD", 300)
-    monkeypatch.setattr(tiltsim.plants.mujoco_plant, "MIN_STEPS_TO_COMPILE", 300)
+    monkeypatch.setattr(tiltsim.plants.engine_choice, "MIN_STEPS_TO_LOAD", 300)
+    monkeypatch.setattr(tiltsim.plants.engine_choice, "MIN_STEPS_TO_COMPILE", 300)
     results = list(fly(wanted, keep_samples=True))
     assert {result.flight.engine for result in results} == {"native"}
     assert [result.scenario for result in results] == wanted
@@ -436,7 +436,7 @@ def test_no_flights_give_no_results():
 def test_native_watching_sees_what_python_watches(law):
     """Every watched number is there, and what else is there never ends a flight."""
     wanted = scenario(ALL_LAWS[law], engine="python")
-    plant, loop, setup = make_plant(wanted), LOOPS[law], control_setup(wanted)
+    plant, loop, setup = make_plant(assemble(wanted)), LOOPS[law], assemble(wanted).setup
     for _ in range(5):
         plant.advance(20)
         values = plant.observe()
@@ -480,7 +480,7 @@ def test_columns_beside_a_state_out_of_all_bounds_raise_nothing():
 
 
 def test_a_row_without_a_result_is_no_number():
-    setup = control_setup(scenario({}))
+    setup = assemble(scenario({})).setup
     rows = tiltsim.engines.rows.evaluate_over_samples(
         lambda time, state, _parameters, _table: (state[0], time / state[0]),
         *(2, np.array([1.0, 2.0]), np.array([[0.0], [4.0]]), setup),
@@ -520,13 +520,14 @@ def test_each_plant_tells_what_it_compiles(monkeypatch, tmp_path, plant):
 
 
 def test_all_that_processes_fly_with_is_compiled_for_them_once(monkeypatch):
-    import tiltsim.studies.checking as checking
+    import tiltsim.simulation.shared_engine as shared_engine
 
     calls = []
 
     class Recorded:
-        def __init__(self, wanted):
-            calls.append(wanted.simulation.plant)
+        def __init__(self, assembly, engine):
+            assert engine == "native"
+            calls.append(assembly.scenario.simulation.plant)
 
         def record(self, samples, steps):
             calls.append("record")
@@ -534,9 +535,9 @@ def test_all_that_processes_fly_with_is_compiled_for_them_once(monkeypatch):
         def advance(self, steps):
             calls.append("advance")
 
-    monkeypatch.setattr(checking, "make_plant", Recorded)
+    monkeypatch.setattr(shared_engine, "make_plant", Recorded)
     flights = [scenario({}, plant="thesis", duration=1000.0) for _ in range(2)]
-    assert checking.shared_engine(flights) == "native"
+    assert shared_engine.shared_engine(flights) == "native"
     assert calls == ["thesis", "record", "advance"]
 
 
@@ -546,12 +547,12 @@ def test_whether_native_code_is_cached_is_known_by_law_and_plant(monkeypatch, tm
 
     monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
     wanted = scenario({}, engine="auto", duration=20.0)  # 20,000 steps: worth loading only
-    assert choose_engine(wanted) == "python"
+    assert choose_engine(wanted, loop_of(wanted)) == "python"
     cache.mark_native_code_compiled(LOOPS["full_pose"].native_name("mujoco"))
     cache.mark_native_code_compiled(LOOPS["attitude_altitude"].native_name("thesis"))
-    assert choose_engine(wanted) == "python"
+    assert choose_engine(wanted, loop_of(wanted)) == "python"
     cache.mark_native_code_compiled(LOOPS["attitude_altitude"].native_name("mujoco"))
-    assert choose_engine(wanted) == "native"
+    assert choose_engine(wanted, loop_of(wanted)) == "native"
 
 
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tiltsim
-from tiltsim.laws.assembling import control_setup
+from tiltsim.laws.assembling import assemble
 from tiltsim.plants.flight_model import build_model
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
@@ -31,7 +31,7 @@ def parse(error, **tables):
 
 def test_the_plant_has_the_error_and_the_law_has_not():
     scenario = parse(ERROR)
-    model = build_model(scenario)
+    model = build_model(assemble(scenario))
     assert model.body("vehicle").subtreemass[0] == pytest.approx(1.07 * NOMINAL.mass, rel=1e-9)
     inertia = model.body("vehicle").inertia
     wanted = np.array([1.1, 0.9, 0.95]) * NOMINAL[1:4]
@@ -42,7 +42,7 @@ def test_the_plant_has_the_error_and_the_law_has_not():
     assert model.site("rotor_1").pos[0] + model.body("pod_1").pos[0] == pytest.approx(
         1.02 * NOMINAL.arm_length
     )
-    assert control_setup(scenario).parameters.law.vehicle == NOMINAL
+    assert assemble(scenario).setup.parameters.law.vehicle == NOMINAL
 
 
 def test_the_flight_begins_with_the_true_acceleration():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tiltsim
-from tiltsim.laws.assembling import loop_of
+from tiltsim.laws.assembling import assemble
 from tiltsim.plants.factory import make_plant
 from tiltsim.simulation.monitor import TerminationMonitor
 
@@ -16,15 +16,15 @@ from tiltsim.simulation.monitor import TerminationMonitor
 @pytest.fixture
 def judged():
     """The end that a first sample with some fields changed calls for."""
-    scenario = tiltsim.parse_scenario({"simulation": {"engine": "python"}})
-    plant, fields = make_plant(scenario), loop_of(scenario).sample_fields
+    assembly = assemble(tiltsim.parse_scenario({"simulation": {"engine": "python"}}))
+    plant, fields = make_plant(assembly), assembly.loop.sample_fields
     first = np.array([plant.time, *plant.observe()])
 
     def end(**changed):
         sample = first.copy()
         for name, value in changed.items():
             sample[fields.index(name)] = value
-        return TerminationMonitor(scenario).judge(plant, sample)
+        return TerminationMonitor(assembly).judge(plant, sample)
 
     return end
 

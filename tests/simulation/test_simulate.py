@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tiltsim
+from tiltsim.laws.assembling import assemble
 from tiltsim.laws.attitude_altitude import TILTROTOR
 from tiltsim.plants.factory import make_plant
 from tiltsim.plants.mujoco_plant import MujocoPlant
@@ -190,12 +191,12 @@ def test_saved_state_restarts_bit_identically(plant, engine, control_timestep):
         controller=EXACT,
         simulation={"plant": plant, "engine": engine, "control_timestep": control_timestep},
     )
-    straight = make_plant(wanted)
+    straight = make_plant(assemble(wanted))
     straight.advance(150)
     saved = straight.state
     straight.advance(150)
 
-    restarted = make_plant(wanted)
+    restarted = make_plant(assemble(wanted))
     restarted.advance(33)  # somewhere else, so that the state has to do all the work
     restarted.state = saved
     restarted.advance(150)
@@ -360,7 +361,7 @@ def test_foreign_model_is_left_alone_by_the_callbacks(userdata):
     from tiltsim.engines.callback import control_callback
     from tiltsim.engines.factory import make_engine
 
-    plant = MujocoPlant(scenario())
+    plant = MujocoPlant(assemble(scenario()))
     other = mujoco.MjModel.from_xml_string(
         "<mujoco><worldbody><body><freejoint/><geom size='1'/><site name='s'/></body></worldbody>"
         "<actuator><general name='a' site='s'/></actuator>"
@@ -382,9 +383,11 @@ def test_state_of_another_flight_brings_its_parameters_along():
     for engine in ENGINES:
         plants = [
             make_plant(
-                scenario(
-                    reference={"type": "setpoint", "position": [x, 0.0, 0.0]},
-                    simulation={"engine": engine},
+                assemble(
+                    scenario(
+                        reference={"type": "setpoint", "position": [x, 0.0, 0.0]},
+                        simulation={"engine": engine},
+                    )
                 )
             )
             for x in (0.0, 1.0)

@@ -7,9 +7,8 @@ from dataclasses import replace
 import pytest
 
 import tiltsim
-from tests.flights import flight
+from tests.flights import SAMPLE_FIELDS, flight
 from tiltsim.flight.end import End
-from tiltsim.flight.flight import SAMPLE_FIELDS
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.views.events import EventDetector, rotorcraft_conditions, tilt_car_conditions
 

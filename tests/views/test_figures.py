@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 import tiltsim
-from tests.flights import BASE, RECIPES, flight, saved
+from tests.flights import BASE, RECIPES, SAMPLE_FIELDS, flight, saved
 from tiltsim.cli import main
 from tiltsim.flight.end import End
-from tiltsim.flight.flight import SAMPLE_FIELDS
 from tiltsim.views.figures import style
 from tiltsim.views.figures.comparison import comparison_figure
 from tiltsim.views.figures.flight import flight_figure

@@ -33,7 +33,7 @@ FOREIGN = """
 
 def test_a_flight_puts_the_vehicle_where_it_was():
     this = flight("trot")
-    model = visible_model(this.scenario)
+    model = visible_model(this.assembly)
     qpos = joint_positions(model, this.columns)
     poses = world_poses(model, qpos)
     vehicle = model.body("vehicle").id
@@ -47,7 +47,7 @@ def test_a_flight_puts_the_vehicle_where_it_was():
 
 def test_up_of_the_last_pose_is_that_of_the_attitude():
     this = flight("trot")
-    model = visible_model(this.scenario)
+    model = visible_model(this.assembly)
     poses = world_poses(model, joint_positions(model, this.columns))
     up = rotate(poses.quaternion[-1, model.body("vehicle").id], np.array([0.0, 0.0, 1.0]))
     expected = np.cos(this["roll"][-1]) * np.cos(this["pitch"][-1])
@@ -78,7 +78,7 @@ def test_poses_in_parents_lead_back_to_the_world():
 
 def test_arrows_are_about_as_long_as_the_arms_at_hover():
     this = flight("fixed")
-    model = visible_model(this.scenario)
+    model = visible_model(this.assembly)
     assert set(thrust_sites(model).values()) == {f"thrust_{i}" for i in (1, 2, 3, 4)}
     assert vehicle_radius(model) == pytest.approx(0.1785)
     assert thrust_scale(model) == pytest.approx(0.2)

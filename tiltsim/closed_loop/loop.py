@@ -16,6 +16,7 @@ from tiltsim_controllers.mathematics.records import flatten, record_dtype, recor
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 
 if TYPE_CHECKING:
+    from tiltsim.scenario.flight_plan import FlightPlan
     from tiltsim.scenario.scenario import Scenario
 
 
@@ -61,7 +62,7 @@ class Equations:
         Scalar function ``(time, state, inputs, parameters, knots, disturbance) -> derivative`` of
         the state; the disturbance is an acceleration (m/s^2, world).
     initial
-        ``(scenario, setup) -> state`` at time zero.
+        ``(plan, setup) -> state`` at time zero.
     observe
         Scalar function ``(time, state, inputs, parameters, knots) -> values`` of the loop's
         `sample_fields` after the time; ``inputs`` are those in force.
@@ -73,7 +74,7 @@ class Equations:
     inputs: Callable[..., Values]
     inputs_size: int
     rates: Callable[..., Values]
-    initial: Callable[[Scenario, ControlSetup], Vector]
+    initial: Callable[[FlightPlan, ControlSetup], Vector]
     observe: Callable[..., Values]
     settled: Callable[..., list[float]] | None = None
 
@@ -101,9 +102,9 @@ class ClosedLoop:
         Scalar function ``(time, qpos, qvel, act, ctrl, parameters) -> ctrl`` in place of
         ``refresh``, where more than the activations decides what moves between samples.
     setup
-        ``(scenario, signature) -> ControlSetup``.
+        ``(plan, signature) -> ControlSetup``.
     initial_activations
-        ``(scenario, setup) -> act`` at time zero.
+        ``(plan, setup) -> act`` at time zero.
     observe
         Scalar function ``(qpos, qvel, act, ctrl) -> values`` of the kind's fields and
         ``law_fields``; ``ctrl`` are the controls in force if it ``observes_controls``.
@@ -141,8 +142,8 @@ class ClosedLoop:
     parameters: type[tuple[Any, ...]]
     controls: Callable[..., Values]
     refresh: Callable[..., Values]
-    setup: Callable[[Scenario, float], ControlSetup]
-    initial_activations: Callable[[Scenario, ControlSetup], Vector]
+    setup: Callable[[FlightPlan, float], ControlSetup]
+    initial_activations: Callable[[FlightPlan, ControlSetup], Vector]
     observe: Callable[..., Values]
     derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
     watched: Callable[[Mapping[str, float], ControlSetup], tuple[SignCheck, ...]]

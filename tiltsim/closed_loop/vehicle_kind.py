@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     import mujoco
 
     from tiltsim.models.parts import ExtraActuators
+    from tiltsim.scenario.flight_plan import FlightPlan
     from tiltsim.scenario.scenario import Scenario
 
 
@@ -33,11 +34,14 @@ class VehicleKind:
         ``(scenario, law_states, extra_actuators, userdata_size, visuals) -> model``. Raises
         `ValueError` where MuJoCo cannot build it.
     initial_motion
-        ``(scenario) -> qpos, qvel`` at time zero.
+        ``(plan) -> qpos, qvel`` at time zero.
     limit_exceeded
         Scalar function ``(time, values, reference, knots, follows_position) -> code`` of the first
         limit of `tiltsim.closed_loop.limits` that a sample exceeds; ``values`` begin with the
         observed fields.
+    metrics
+        ``(columns, scenario, follows_position) -> metrics`` of a flight, but for those that do not
+        depend on the kind.
     """
 
     name: str
@@ -45,8 +49,9 @@ class VehicleKind:
     columns: Mapping[str, str]
     thrusts: Callable[[Mapping[str, Floats], Scenario], dict[str, Floats]]
     compile: Callable[[Scenario, int, tuple[ExtraActuators, ...], int, bool], mujoco.MjModel]
-    initial_motion: Callable[[Scenario], tuple[Vector, Vector]]
+    initial_motion: Callable[[FlightPlan], tuple[Vector, Vector]]
     limit_exceeded: Callable[..., int]
+    metrics: Callable[[Mapping[str, Floats], Scenario, bool], dict[str, float | bool]]
 
     @property
     def rotors(self) -> tuple[int, ...]:

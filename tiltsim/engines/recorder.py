@@ -10,8 +10,8 @@ import numpy as np
 from numba import carray
 from numba.extending import register_jitable
 
+from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.limits import SINGULAR, WITHIN_LIMITS
-from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.engines.native_memory import _bytes_at, _floats_at
 from tiltsim.engines.numba_setup import _INNER
 from tiltsim_controllers.mathematics.records import flatten, record_dtype, record_size
@@ -27,7 +27,7 @@ class RecorderHead(NamedTuple):
     last_interval: float  # evaluations between the last two samples
     samples: float  # taken so far
     capacity: float  # samples that there is room for
-    lost: float  # 1 from the first sample on that ends the flight
+    terminated: float  # 1 from the first sample on that ends the flight
     follows_position: float  # whether the horizontal position counts
     reference: ReferenceParameters
 
@@ -57,7 +57,7 @@ def _record(recorder, time, values, watched, limit_exceeded, knots):  # type: ig
     head = carray(_bytes_at(recorder), (1,), _RECORDER)
     samples = int(head[0].samples)
     capacity = int(head[0].capacity)
-    if samples >= capacity or head[0].lost != 0.0:
+    if samples >= capacity or head[0].terminated != 0.0:
         return
     width = 1 + len(values)
     rest = carray(_floats_at(recorder + 8 * _RECORDER_SIZE), (SIDES + capacity * width,))
@@ -76,7 +76,7 @@ def _record(recorder, time, values, watched, limit_exceeded, knots):  # type: ig
         if side == 0.0 or side != rest[index]:
             lost = True
     if lost:
-        head[0].lost = 1.0
+        head[0].terminated = 1.0
     head[0].samples = samples + 1.0
     interval = head[0].interval if samples + 2 < capacity else head[0].last_interval
     head[0].left = interval - 1.0
@@ -85,51 +85,54 @@ def _record(recorder, time, values, watched, limit_exceeded, knots):  # type: ig
 @register_jitable(**_INNER)
 def _recording_is_over(recorder):  # type: ignore[no-untyped-def]
     head = carray(_bytes_at(recorder), (1,), _RECORDER)
-    return head[0].lost != 0.0 or head[0].samples == head[0].capacity
+    return head[0].terminated != 0.0 or head[0].samples == head[0].capacity
 
 
 class Recorder:
-    """Memory for the samples of one flight, to which the callback writes by itself.
+    """Memory for the samples of one flight, to which native code writes.
 
     The callback takes a sample before every so many steps, the first after a full interval. Once
-    there is no room for more, or a sample shows that the flight is lost, it asks for controls that
-    are no numbers: MuJoCo warns of them and a batch stops there.
+    there is no room for more, or a sample ends the flight, it returns NaN controls: MuJoCo warns of
+    them and a batch stops there.
 
     Parameters
     ----------
-    loop
-        What flies.
+    assembly
+        The flight.
     samples
         How many to take.
     interval, last_interval
         Evaluations of the control step between samples, and between the last two.
-    reference, follows_position
-        For the limits; see `tiltsim.closed_loop.vehicle_kind.VehicleKind`.
-    watched
-        The numbers that the loop watches as they are now: each must keep its sign.
+    checked
+        The numbers that must keep their signs, as they are now; see `ClosedLoop.watch`.
     """
 
     def __init__(
         self,
-        loop: ClosedLoop,
+        assembly: Assembly,
         samples: int,
         interval: int,
         last_interval: int,
-        reference: ReferenceParameters,
-        follows_position: bool,
-        watched: Sequence[float],
+        checked: Sequence[float],
     ) -> None:
+        loop = assembly.loop
         self._width = len(loop.sample_fields)
         self._memory = np.zeros(_RECORDER_SIZE + SIDES + samples * self._width)
         self._head = self._memory[:_RECORDER_SIZE].view(_RECORDER)
-        first = interval if samples > 1 else last_interval
         head = RecorderHead(
-            *(first, interval, last_interval, 0.0, samples, 0.0, follows_position, reference)
+            left=interval if samples > 1 else last_interval,
+            interval=interval,
+            last_interval=last_interval,
+            samples=0.0,
+            capacity=samples,
+            terminated=0.0,
+            follows_position=assembly.follows_position,
+            reference=assembly.reference,
         )
         self._memory[:_RECORDER_SIZE] = list(flatten(head))
-        if len(watched) > SIDES:
-            raise ValueError(f"{loop.model}: {len(watched)} numbers watched, at most {SIDES}")
-        for index, value in enumerate(watched):
+        if len(checked) > SIDES:
+            raise ValueError(f"{loop.model}: {len(checked)} sign checks, at most {SIDES}")
+        for index, value in enumerate(checked):
             self._memory[_RECORDER_SIZE + index] = copysign(1.0, value)
 
     @property
@@ -145,9 +148,9 @@ class Recorder:
         return self._memory[start : start + taken * self._width].reshape(taken, self._width)
 
     @property
-    def lost(self) -> bool:
+    def terminated(self) -> bool:
         """Whether the last sample ends the flight."""
-        return bool(self._head["lost"][0])
+        return bool(self._head["terminated"][0])
 
     @property
     def full(self) -> bool:

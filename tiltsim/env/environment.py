@@ -22,6 +22,7 @@ from tiltsim.env.task import Reward, Task, hover_reward
 from tiltsim.errors import InputError
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
+from tiltsim.laws.assembling import assemble
 from tiltsim.plants.command import Command, Observation, checked
 from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.scenario.loading import load_scenario, parse_scenario
@@ -72,13 +73,13 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
         """Begin a new episode. Raises `InputError` if its drawn scenario cannot be flown."""
         scenario = self.task.initialize_episode(self._generator)
         if self._plant is None or self._initial_state is None or scenario is not self._scenario:
-            self._scenario = scenario
-            self._plant = CommandedPlant(scenario)
+            self._scenario, self._assembly = scenario, assemble(scenario)
+            self._plant = CommandedPlant(self._assembly)
             self._initial_state = self._plant.state
         else:
             self._plant.state = self._initial_state
         self._steps_left = scenario.simulation.steps
-        self._monitor = TerminationMonitor(scenario)
+        self._monitor = TerminationMonitor(self._assembly)
         self._end = None
         self._samples = [_sample(self._plant)]
         self._wall_time = 0.0
@@ -139,11 +140,11 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
         """
         plant = self._begun()
         end = self._end or End("interrupted", plant.time, "the episode has not ended")
-        return Flight(self._scenario, np.array(self._samples), end, "python", self._wall_time)
+        return Flight(self._assembly, np.array(self._samples), end, "python", self._wall_time)
 
     def observe(self) -> Observation:
         """The observation that `tiltsim.simulate` would pass to a controller now."""
-        return self._begun().seen()
+        return self._begun().observation()
 
     def action(self, command: Command) -> Floats:
         """The action that corresponds to a controller's command of thrusts or rotor speeds.

@@ -101,7 +101,7 @@ class Task:
 
     def get_observation(self, plant: CommandedPlant) -> dict[str, Floats]:
         """The observation of the plant's state, through the scenario's sensors."""
-        return observation_arrays(plant.seen(), tilting=self._tilting)
+        return observation_arrays(plant.observation(), tilting=self._tilting)
 
     def get_reward(self, observation: Mapping[str, Floats], action: Floats) -> float:
         """The reward of a step that took ``action`` to ``observation``."""

@@ -27,7 +27,7 @@ from tiltsim_controllers.mathematics.scalar import Quad, Triple, Values, Vector,
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.flight_plan import FlightPlan
 
 Wrench = tuple[float, float, float, float, float, float]
 """Force (N) and torque (N m) on the body, body axes."""
@@ -44,8 +44,9 @@ class Mechanics(NamedTuple):
     max_speed: float
 
 
-def mechanics(scenario: Scenario) -> Mechanics:
+def mechanics(plan: FlightPlan) -> Mechanics:
     """The mechanics of a scenario's rotorcraft."""
+    scenario = plan.scenario
     vehicle = scenario.rotorcraft
     servo = vehicle.tilt_servo
     min_speed, max_speed = vehicle.speeds_along_spin
@@ -79,7 +80,7 @@ class Driven(NamedTuple):
     settled: Callable[
         [list[float], Mechanics], list[float]
     ]  # see `tiltsim.closed_loop.loop.Equations`
-    initial: Callable[[Scenario], Values]  # motion
+    initial: Callable[[FlightPlan], Values]  # motion
 
 
 # --- tiltrotor ---------------------------------------------------------------------------------
@@ -163,10 +164,10 @@ def settled_tiltrotor(state: list[float], mechanics: Mechanics) -> list[float]:
     return settled
 
 
-def initial_tiltrotor(scenario: Scenario) -> Values:
+def initial_tiltrotor(plan: FlightPlan) -> Values:
     """The motion at time zero; pods as in MuJoCo."""
-    initial = scenario.initial
-    tilts, tilt_rates = initial_tilts(scenario)
+    initial = plan.scenario.initial
+    tilts, tilt_rates = initial_tilts(plan)
     motion = (*initial.position, *initial.velocity)
     rotation = rotation_from_euler(*initial.attitude)
     return (*motion, *rotation, *initial.angular_velocity, *tilts, *tilt_rates)
@@ -231,7 +232,7 @@ ACTUATOR_PLANTS: Final[dict[str, Driven]] = {
         qvel=quadrotor_qvel,
         rates=quadrotor_rates,
         settled=settled_quadrotor,
-        initial=initial_state,
+        initial=lambda plan: initial_state(plan.scenario),
     ),
 }
 """By the vehicle's model."""

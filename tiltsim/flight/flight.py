@@ -11,25 +11,23 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from tiltsim.flight.end import End
-from tiltsim.laws.assembling import control_setup, loop_of
+from tiltsim.flight.metrics import compute_metrics
+from tiltsim.flight.writing import write_flight
+from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.messages import did_you_mean
-from tiltsim.vehicles.rotorcraft import COLUMN_UNITS as COLUMN_UNITS
-from tiltsim.vehicles.rotorcraft import OBSERVED_FIELDS
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     import pyarrow
 
+    from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.engines.base import EngineName
+    from tiltsim.flight.end import End
     from tiltsim.scenario.scenario import Scenario
-
-SAMPLE_FIELDS: Final = ("time", *OBSERVED_FIELDS)
-"""What a recorded sample of any rotorcraft begins with; a law's own states follow."""
 
 
 def _far_out() -> np.errstate:
@@ -39,16 +37,32 @@ def _far_out() -> np.errstate:
 
 @dataclass(frozen=True, repr=False)
 class Flight:
-    """The record of one flight."""
+    """The record of one flight; it pickles without its assembly, which is then built anew."""
 
-    scenario: Scenario
-    samples: Floats  # (N, len(loop.sample_fields))
+    assembly: Assembly
+    samples: Floats  # (N, len(assembly.loop.sample_fields))
     end: End
     engine: EngineName
     wall_time: float  # s, integration alone
 
     def __post_init__(self) -> None:
-        self.samples.setflags(write=False)  # what is derived from them is kept
+        self.samples.setflags(write=False)  # derived columns are cached
+
+    @classmethod
+    def of_scenario(
+        cls, scenario: Scenario, samples: Floats, end: End, engine: EngineName, wall_time: float
+    ) -> Self:
+        """A flight of a scenario that is assembled here; the other fields as above."""
+        return cls(assemble(scenario), samples, end, engine, wall_time)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        fields = (self.scenario, self.samples, self.end, self.engine, self.wall_time)
+        return type(self).of_scenario, fields
+
+    @property
+    def scenario(self) -> Scenario:
+        """What was flown."""
+        return self.assembly.scenario
 
     def __repr__(self) -> str:
         """One line: what was flown, and how it ended."""
@@ -70,24 +84,22 @@ class Flight:
     @cached_property
     def units(self) -> dict[str, str]:
         """The columns of this flight and their units, in order."""
-        return loop_of(self.scenario).units
+        return self.assembly.loop.units
 
     @cached_property
     def columns(self) -> dict[str, Floats]:
         """All columns by name, each of shape (N,), in the order of `units`."""
-        loop = loop_of(self.scenario)
+        loop = self.assembly.loop
         known = dict(zip(loop.sample_fields, self.samples.T, strict=True))
         with _far_out():
-            known |= loop.derive(known, control_setup(self.scenario))
+            known |= loop.derive(known, self.assembly.setup)
             known |= loop.kind.thrusts(known, self.scenario)
         return {name: known[name] for name in self.units}
 
     @cached_property
     def _metrics(self) -> dict[str, float | bool]:
-        from tiltsim.flight.metrics import compute_metrics
-
         with _far_out():
-            return compute_metrics(self)
+            return compute_metrics(self.columns, self.assembly, self.end, self.wall_time)
 
     def metrics(self) -> dict[str, float | bool]:
         """The flight in numbers; names and meanings in `tiltsim.scenario.metric_names.METRICS`."""
@@ -120,6 +132,4 @@ class Flight:
 
     def save(self, folder: str | Path) -> None:
         """Write metrics.json, flight.parquet and the resolved scenario.toml into a folder."""
-        from tiltsim.flight.writing import save_flight
-
-        save_flight(self, Path(folder))
+        write_flight(Path(folder), self.to_arrow(), self.metrics(), self.scenario)

@@ -34,7 +34,7 @@ def load_flight(path: str | Path) -> Flight:
     import pyarrow.parquet as pq
 
     from tiltsim.flight.flight import Flight
-    from tiltsim.laws.assembling import loop_of
+    from tiltsim.laws.assembling import assemble
     from tiltsim.scenario.loading import parse_scenario
 
     file = _flight_file(Path(path))
@@ -53,7 +53,8 @@ def load_flight(path: str | Path) -> Flight:
         scenario = parse_scenario(without_none(document), origin.get("address", ""))
     except InputError as error:
         raise InputError(f"{file}: its scenario is not valid: {error}") from error
-    fields = loop_of(scenario).sample_fields
+    assembly = assemble(scenario)
+    fields = assembly.loop.sample_fields
     missing = [name for name in fields if name not in table.column_names]
     if missing:
         raise InputError(f"{file}: not a flight of tiltsim's: no column {', '.join(missing)}")
@@ -70,7 +71,7 @@ def load_flight(path: str | Path) -> Flight:
             raise InputError(f"{file}: damaged: {name} has values that are no finite numbers")
     if (np.diff(samples[:, 0]) <= 0.0).any():
         raise InputError(f"{file}: damaged: its times do not increase")
-    return Flight(scenario, samples, end, engine, wall_time)
+    return Flight(assembly, samples, end, engine, wall_time)
 
 
 def _flight_file(path: Path) -> Path:

@@ -6,23 +6,45 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from tiltsim.flight.flight import Flight
-    from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.document import scenario_toml
 from tiltsim.system.files import replacing
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
-def save_flight(flight: Flight, folder: Path) -> None:
-    """Write a flight into a folder; each file appears whole or not at all."""
+    import pyarrow
+
+    from tiltsim.scenario.scenario import Scenario
+
+
+def write_flight(
+    folder: Path,
+    table: pyarrow.Table,
+    metrics: Mapping[str, float | bool],
+    scenario: Scenario,
+) -> None:
+    """Write a flight into a folder; each file appears whole or not at all.
+
+    Parameters
+    ----------
+    folder
+        Where to; created if missing.
+    table
+        The columns, for flight.parquet.
+    metrics
+        For metrics.json.
+    scenario
+        For scenario.toml, with all defaults filled in; the file of a user's controller is copied.
+    """
     import pyarrow.parquet as pq
 
     folder.mkdir(parents=True, exist_ok=True)
     with replacing(folder / "flight.parquet") as path:
-        pq.write_table(flight.to_arrow(), path, compression="zstd")
+        pq.write_table(table, path, compression="zstd")
     with replacing(folder / "metrics.json") as path:
-        path.write_text(metrics_json(flight.metrics()), encoding="utf-8")
-    scenario = with_controller_copied(flight.scenario, folder)
+        path.write_text(metrics_json(metrics), encoding="utf-8")
+    scenario = with_controller_copied(scenario, folder)
     with replacing(folder / "scenario.toml") as path:
         path.write_text(scenario_toml(scenario), encoding="utf-8")
 
@@ -30,11 +52,8 @@ def save_flight(flight: Flight, folder: Path) -> None:
 def with_controller_copied(scenario: Scenario, folder: Path) -> Scenario:
     """Copy the file of a user's controller into a folder; the scenario that names the copy.
 
-    A user's file changes more often than any other. A scenario that names no such file stays as it
-    is.
+    A scenario without such a file is returned unchanged.
     """
-    from tiltsim.scenario.controller import PythonController
-
     table = scenario.controller
     if not isinstance(table, PythonController) or table.file is None or not table.file.is_file():
         return scenario
@@ -46,6 +65,6 @@ def with_controller_copied(scenario: Scenario, folder: Path) -> Scenario:
     return scenario.model_copy(update={"controller": named})
 
 
-def metrics_json(metrics: dict[str, float | bool]) -> str:
+def metrics_json(metrics: Mapping[str, float | bool]) -> str:
     """Metrics as a flat JSON object in the order of `METRICS`, with all their digits."""
-    return json.dumps(metrics, indent=2, allow_nan=False) + "\n"
+    return json.dumps(dict(metrics), indent=2, allow_nan=False) + "\n"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.laws.attitude_altitude import TILTROTOR
 from tiltsim.laws.commanded import COMMANDED_LOOPS
 from tiltsim.laws.full_pose import FULL_POSE
@@ -18,9 +19,10 @@ from tiltsim.laws.tilt_car_fourth_derivative import FOURTH_DERIVATIVE
 from tiltsim.laws.tilt_car_planned_direction import PLANNED_DIRECTION
 from tiltsim.laws.tilt_car_third_derivative import THIRD_DERIVATIVE
 from tiltsim.laws.yaw_position import YAW_POSITION
+from tiltsim.scenario.flight_plan import plan_flight
 
 if TYPE_CHECKING:
-    from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
+    from tiltsim.closed_loop.loop import ClosedLoop
     from tiltsim.scenario.scenario import Scenario
 
 LOOPS: Final[dict[str, ClosedLoop]] = {
@@ -55,12 +57,17 @@ def loop_of(scenario: Scenario) -> ClosedLoop:
     return on_equations(loop) if by_controls else loop
 
 
-def control_setup(scenario: Scenario) -> ControlSetup:
-    """Everything the control step of a scenario needs to know."""
-    loop = loop_of(scenario)
-    return loop.setup(scenario, loop.signature)
-
-
 def follows_position(scenario: Scenario) -> bool:
     """Whether the law of a scenario follows the reference's horizontal position."""
     return loop_of(scenario).follows_position(scenario)
+
+
+def assemble(scenario: Scenario) -> Assembly:
+    """Plan the flight of a scenario and set up its closed loop."""
+    plan, loop = plan_flight(scenario), loop_of(scenario)
+    return Assembly(
+        **vars(plan),
+        loop=loop,
+        setup=loop.setup(plan, loop.signature),
+        follows_position=loop.follows_position(scenario),
+    )

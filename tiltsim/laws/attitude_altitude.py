@@ -27,6 +27,7 @@ from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines, tor
 from tiltsim_controllers.vehicle.parameters import drag_ratio
 
 if TYPE_CHECKING:
+    from tiltsim.scenario.flight_plan import FlightPlan
     from tiltsim.scenario.scenario import Scenario
 from tiltsim.laws.tiltrotor import (
     determinant_check,
@@ -86,26 +87,25 @@ def law_rates(
     return rotor_accelerations(time, state, parameters.law, knots)
 
 
-def _setup(scenario: Scenario, signature: float) -> ControlSetup:
-    controller = scenario.controller
+def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
+    controller = plan.scenario.controller
     assert isinstance(controller, AttitudeAltitudeController)
-    vehicle = scenario.rotorcraft.resolve()
-    gait = scenario.gait.plan(vehicle)
-    reference, knots = scenario.reference_and_knots()
+    rotorcraft = plan.scenario.rotorcraft
+    vehicle = rotorcraft.resolve()
     parameters = LoopParameters(
         signature,
-        servo_lead(scenario.rotorcraft.tilt_servo),
+        servo_lead(rotorcraft.tilt_servo),
         law=Parameters(
             vehicle=vehicle,
             gains=controller.resolve_gains(),
-            gait=gait.parameters,
-            reference=reference,
+            gait=plan.gait.parameters,
+            reference=plan.reference,
             decoupler=DECOUPLERS[controller.decoupler],
             decoupling=DECOUPLINGS[controller.decoupling],
         ),
         supervisor=controller.resolve_supervisor(vehicle),
     )
-    return ControlSetup(parameters, knots)
+    return ControlSetup(parameters, plan.knots)
 
 
 @scalar
@@ -209,7 +209,7 @@ TILTROTOR: Final = ClosedLoop(
     controls=tiltrotor_controls,
     refresh=refreshed_controls,
     setup=_setup,
-    initial_activations=lambda scenario, _setup: initial_signed_rotor_speeds(scenario),
+    initial_activations=lambda plan, _setup: initial_signed_rotor_speeds(plan.scenario),
     observe=observe_tiltrotor,
     derive=_derive,
     watched=_watched,
@@ -219,7 +219,9 @@ TILTROTOR: Final = ClosedLoop(
         inputs=equation_inputs,
         inputs_size=4,
         rates=equation_rates,
-        initial=lambda s, _setup: initial_state(s, initial_signed_rotor_speeds(s)),
+        initial=lambda plan, _setup: initial_state(
+            plan.scenario, initial_signed_rotor_speeds(plan.scenario)
+        ),
         observe=observe_equations,
     ),
 )

@@ -32,6 +32,7 @@ from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
+    from tiltsim.scenario.flight_plan import FlightPlan
     from tiltsim.scenario.scenario import Scenario
 
 
@@ -92,16 +93,12 @@ def refreshed_quadrotor_controls(ctrl: Vector, act: Vector) -> Values:
     return (*rotor_thrust_controls(act), ctrl[4], ctrl[5], ctrl[6], ctrl[7])
 
 
-def _setup(scenario: Scenario, signature: float) -> ControlSetup:
-    vehicle = scenario.rotorcraft.resolve()
-    gait = scenario.gait.plan(vehicle)
-    reference, knots = scenario.reference_and_knots()
-    lead = servo_lead(scenario.rotorcraft.tilt_servo)
-    tilts = gait_servo_commands(0.0, lead, gait.parameters, knots)
-    told = HeldCommand(*tilts)
-    return ControlSetup(
-        LoopParameters(signature, lead, vehicle, gait.parameters, reference, told), knots
-    )
+def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
+    rotorcraft, gait = plan.scenario.rotorcraft, plan.gait.parameters
+    lead = servo_lead(rotorcraft.tilt_servo)
+    held = HeldCommand(*gait_servo_commands(0.0, lead, gait, plan.knots))
+    parameters = LoopParameters(signature, lead, rotorcraft.resolve(), gait, plan.reference, held)
+    return ControlSetup(parameters, plan.knots)
 
 
 def with_command(parameters: Any, told: HeldCommand) -> Any:
@@ -169,7 +166,7 @@ TILTROTOR: Final = ClosedLoop(
     controls=commanded_tiltrotor_controls,
     refresh=refreshed_controls,
     setup=_setup,
-    initial_activations=lambda scenario, _setup: initial_signed_rotor_speeds(scenario),
+    initial_activations=lambda plan, _setup: initial_signed_rotor_speeds(plan.scenario),
     observe=observe_commanded_tiltrotor,
     derive=_derive_tiltrotor,
     watched=lambda _sample, _setup: (),
@@ -187,7 +184,7 @@ QUADROTOR: Final = ClosedLoop(
     controls=commanded_quadrotor_controls,
     refresh=refreshed_quadrotor_controls,
     setup=_setup,
-    initial_activations=lambda scenario, _setup: initial_signed_rotor_speeds(scenario),
+    initial_activations=lambda plan, _setup: initial_signed_rotor_speeds(plan.scenario),
     observe=observe_commanded_quadrotor,
     derive=_derive_quadrotor,
     watched=lambda _sample, _setup: (),

@@ -25,7 +25,7 @@ from tiltsim_controllers.laws.full_pose import Parameters, full_pose_inputs, lim
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values, Vector, scalar
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.flight_plan import FlightPlan
 
 TILT_COMMANDS: Final = tuple(f"tilt_command_{rotor}" for rotor in (1, 2, 3, 4))
 """The law's own states: the tilt angles that the servos are told, but for their lead."""
@@ -79,21 +79,21 @@ def watch_rotor_stops(values: Vector, parameters: LoopParameters) -> Quad:
     return rotor_speeds_along_spin(values)
 
 
-def _setup(scenario: Scenario, signature: float) -> ControlSetup:
-    controller = scenario.controller
+def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
+    controller = plan.scenario.controller
     assert isinstance(controller, FullPoseController)
-    vehicle = scenario.rotorcraft.resolve()
-    reference, knots = scenario.reference_and_knots()
+    rotorcraft = plan.scenario.rotorcraft
+    vehicle = rotorcraft.resolve()
     law = Parameters(
         vehicle,
         controller.resolve_gains(),
-        reference,
+        plan.reference,
         controller.resolve_limits(),
         controller.resolve_tilt_weight(vehicle),
         controller.resolve_failure(),
     )
-    lead = servo_lead(scenario.rotorcraft.tilt_servo)
-    return ControlSetup(LoopParameters(signature, lead, law), knots)
+    lead = servo_lead(rotorcraft.tilt_servo)
+    return ControlSetup(LoopParameters(signature, lead, law), plan.knots)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -155,7 +155,10 @@ FULL_POSE: Final = ClosedLoop(
     controls=full_pose_controls,
     refresh=refreshed_controls,
     setup=_setup,
-    initial_activations=lambda s, _setup: (*initial_signed_rotor_speeds(s), *initial_tilts(s)[0]),
+    initial_activations=lambda plan, _setup: (
+        *initial_signed_rotor_speeds(plan.scenario),
+        *initial_tilts(plan)[0],
+    ),
     observe=observe_full_pose,
     derive=_derive,
     watched=lambda sample, _setup: rotor_speed_checks(sample),
@@ -164,9 +167,9 @@ FULL_POSE: Final = ClosedLoop(
         inputs=equation_inputs,
         inputs_size=8,
         rates=equation_rates,
-        initial=lambda s, _setup: (
-            *initial_state(s, initial_signed_rotor_speeds(s)),
-            *initial_tilts(s)[0],
+        initial=lambda plan, _setup: (
+            *initial_state(plan.scenario, initial_signed_rotor_speeds(plan.scenario)),
+            *initial_tilts(plan)[0],
         ),
         observe=observe_equations,
     ),

@@ -34,7 +34,7 @@ from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vecto
 from tiltsim_controllers.references.trajectories import position_reference
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.flight_plan import FlightPlan
 
 TILT_RATE_COLUMNS: Final = tuple(f"alpha_rate_{rotor}" for rotor in (1, 2, 3, 4))
 
@@ -78,12 +78,11 @@ def gait_feedforward_controls(
     )
 
 
-def _setup(scenario: Scenario, signature: float) -> ControlSetup:
+def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
+    scenario, gait = plan.scenario, plan.gait
     controller = scenario.controller
     assert isinstance(controller, AttitudeAltitudeController)
     vehicle = scenario.rotorcraft.resolve()
-    gait = scenario.gait.plan(vehicle)
-    reference, knots = scenario.reference_and_knots()
     law = Parameters(
         vehicle=vehicle,
         gains=controller.resolve_gains(),
@@ -96,12 +95,12 @@ def _setup(scenario: Scenario, signature: float) -> ControlSetup:
             gyroscopic_torque=scenario.simulation.plant != "thesis"
         ),
         gait=gait.parameters,
-        reference=reference,
+        reference=plan.reference,
         decoupler=DECOUPLERS[controller.decoupler],
         supervisor=controller.resolve_supervisor(vehicle),
     )
     lead = servo_lead(scenario.rotorcraft.tilt_servo)
-    return ControlSetup(LoopParameters(signature, lead, law), knots)
+    return ControlSetup(LoopParameters(signature, lead, law), plan.knots)
 
 
 @scalar
@@ -229,7 +228,12 @@ GAIT_FEEDFORWARD: Final = ClosedLoop(
     controls=gait_feedforward_controls,
     refresh=refreshed_controls,
     setup=_setup,
-    initial_activations=lambda s, _setup: (*initial_signed_rotor_speeds(s), 0.0, 0.0, 0.0),
+    initial_activations=lambda plan, _setup: (
+        *initial_signed_rotor_speeds(plan.scenario),
+        0.0,
+        0.0,
+        0.0,
+    ),
     observe=observe_gait_feedforward,
     derive=_derive,
     watched=_watched,
@@ -238,8 +242,8 @@ GAIT_FEEDFORWARD: Final = ClosedLoop(
         inputs=equation_inputs,
         inputs_size=7,
         rates=equation_rates,
-        initial=lambda s, _setup: (
-            *initial_state(s, initial_signed_rotor_speeds(s)),
+        initial=lambda plan, _setup: (
+            *initial_state(plan.scenario, initial_signed_rotor_speeds(plan.scenario)),
             0.0,
             0.0,
             0.0,

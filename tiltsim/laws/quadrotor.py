@@ -28,7 +28,7 @@ from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.quadrotor_mixer import speed_along_spin, thrust_controls
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.flight_plan import FlightPlan
 
 SIZES: Final = Sizes(qpos=7, qvel=6, act=6, ctrl=10)
 """With the thrust and its rate, the states of the yaw-position law."""
@@ -73,9 +73,9 @@ def held_extended_controls(ctrl: Vector, act: Vector) -> Values:
     )
 
 
-def extended_activations(scenario: Scenario, _setup: ControlSetup) -> Values:
+def extended_activations(plan: FlightPlan, _setup: ControlSetup) -> Values:
     """The extension starts with the thrust of hover, at rest."""
-    vehicle = scenario.rotorcraft.resolve()
+    vehicle = plan.scenario.rotorcraft.resolve()
     return 0.0, 0.0, 0.0, 0.0, vehicle.mass * vehicle.gravity, 0.0
 
 
@@ -137,9 +137,9 @@ def equations(
     """
     law_states = inputs_size - 4
 
-    def initial(scenario: Scenario, setup: ControlSetup) -> Values:
-        extension = extended_activations(scenario, setup)[4:][:law_states]
-        return (*initial_state(scenario), *extension)
+    def initial(plan: FlightPlan, setup: ControlSetup) -> Values:
+        extension = extended_activations(plan, setup)[4:][:law_states]
+        return (*initial_state(plan.scenario), *extension)
 
     return Equations(inputs, inputs_size, rates, initial, observe)
 
@@ -155,7 +155,7 @@ def extended_loop(
     controls: Callable[..., Values],
     on_equations: Equations,
     *,
-    setup: Callable[[Scenario, float], ControlSetup],
+    setup: Callable[[FlightPlan, float], ControlSetup],
     derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]],
     watched: Callable[[Mapping[str, float], ControlSetup], tuple[SignCheck, ...]],
     watch: Callable[..., Values],

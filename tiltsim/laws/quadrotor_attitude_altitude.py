@@ -28,7 +28,7 @@ from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.quadrotor_mixer import thrust_controls
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.flight_plan import FlightPlan
 
 
 class LoopParameters(NamedTuple):
@@ -62,11 +62,11 @@ def held_controls(ctrl: Vector, act: Vector) -> Values:
     return ctrl[0], ctrl[1], ctrl[2], ctrl[3], ctrl[4], ctrl[5], ctrl[6], ctrl[7]
 
 
-def _setup(scenario: Scenario, signature: float) -> ControlSetup:
-    controller = scenario.controller
+def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
+    controller = plan.scenario.controller
     assert isinstance(controller, QuadrotorAttitudeAltitudeController)
-    vehicle, gains = scenario.rotorcraft.resolve(), controller.resolve_gains()
-    return ControlSetup(LoopParameters(signature, vehicle, gains, scenario.reference.parameters))
+    vehicle, gains = plan.scenario.rotorcraft.resolve(), controller.resolve_gains()
+    return ControlSetup(LoopParameters(signature, vehicle, gains, plan.reference))
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -119,7 +119,7 @@ QUADROTOR_ATTITUDE_ALTITUDE: Final = ClosedLoop(
     controls=attitude_altitude_controls,
     refresh=held_controls,
     setup=_setup,
-    initial_activations=lambda _scenario, _setup: (0.0, 0.0, 0.0, 0.0),
+    initial_activations=lambda _plan, _setup: (0.0, 0.0, 0.0, 0.0),
     observe=observe_quadrotor,
     observes_controls=True,
     derive=_derive,

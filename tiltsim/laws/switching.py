@@ -32,7 +32,7 @@ from tiltsim_controllers.laws.switching import (
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.flight_plan import FlightPlan
 
 
 class LoopParameters(NamedTuple):
@@ -52,20 +52,19 @@ def switching_controls(
     return extended_controls(switching_inputs(time, state, law, knots), law.yaw_position.vehicle)
 
 
-def _setup(scenario: Scenario, signature: float) -> ControlSetup:
-    controller = scenario.controller
+def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
+    controller = plan.scenario.controller
     assert isinstance(controller, SwitchingController)
-    reference, knots = scenario.reference_and_knots()
     law = Parameters(
         yaw_position.Parameters(
-            scenario.rotorcraft.resolve(), controller.resolve_gains(), reference
+            plan.scenario.rotorcraft.resolve(), controller.resolve_gains(), plan.reference
         ),
         controller.resolve_attitude_gains(),
         Zone(*controller.zone.roll, *controller.zone.pitch),
         EXTENSIONS[controller.extension],
         controller.extension_rate,
     )
-    return ControlSetup(LoopParameters(signature, law), knots)
+    return ControlSetup(LoopParameters(signature, law), plan.knots)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:

@@ -15,6 +15,7 @@ from tiltsim_controllers.references.trajectories import ReferenceParameters, ref
 from tiltsim_controllers.tilt_car.vehicle import TiltCar
 
 if TYPE_CHECKING:
+    from tiltsim.scenario.flight_plan import FlightPlan
     from tiltsim.scenario.scenario import Scenario
 
 CarState = tuple[float, float, float, float, float, float, float, float]
@@ -91,11 +92,11 @@ def initial_motion(scenario: Scenario) -> tuple[float, float, float, float]:
 
 
 def car_setup(
-    parameters: Callable[..., Any], scenario: Scenario, signature: float, **own: Any
+    parameters: Callable[..., Any], plan: FlightPlan, signature: float, **own: Any
 ) -> ControlSetup:
     """What every loop around the car begins with, and its ``own`` fields by name."""
-    lead = servo_lead(scenario.tilt_car.tilt_servo)
-    heading = float(scenario.initial.attitude[2])
+    lead = servo_lead(plan.scenario.tilt_car.tilt_servo)
+    heading = float(plan.scenario.initial.attitude[2])
     return ControlSetup(parameters(signature, servo_lead=lead, heading=heading, **own))
 
 
@@ -105,7 +106,7 @@ def integrating_loop(
     refresh: Callable[..., Values],
     observe: Callable[..., Values],
     *,
-    setup: Callable[[Scenario, float], ControlSetup],
+    setup: Callable[[FlightPlan, float], ControlSetup],
     law_states: int,
     law_fields: tuple[str, ...],
     own_columns: Mapping[str, str] | None = None,
@@ -127,9 +128,9 @@ def integrating_loop(
         controls=controls,
         refresh=refresh,
         setup=setup,
-        initial_activations=lambda s, _setup: (
-            *_initial_rotor_speeds(s),
-            *(initial_tilt(s)[0], *further),
+        initial_activations=lambda plan, _setup: (
+            *_initial_rotor_speeds(plan.scenario),
+            *(initial_tilt(plan)[0], *further),
         ),
         observe=observe,
         derive=_derive,
@@ -139,10 +140,10 @@ def integrating_loop(
             inputs=inputs,
             inputs_size=3,
             rates=rates,
-            initial=lambda s, _setup: (
-                *initial_motion(s),
-                initial_tilt(s)[0],
-                *_initial_rotor_speeds(s),
+            initial=lambda plan, _setup: (
+                *initial_motion(plan.scenario),
+                initial_tilt(plan)[0],
+                *_initial_rotor_speeds(plan.scenario),
                 *further,
             ),
             observe=observe_equations,

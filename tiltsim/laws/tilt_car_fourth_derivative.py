@@ -22,7 +22,7 @@ from tiltsim_controllers.tilt_car.fourth_derivative import (
 )
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.flight_plan import FlightPlan
 
 ACCELERATIONS: Final = ("rotor_acceleration_1", "rotor_acceleration_2")
 SPEEDS: Final = ("law_speed_1", "law_speed_2")
@@ -125,17 +125,17 @@ def fourth_derivative_equation_rates(
     )
 
 
-def _setup(scenario: Scenario, signature: float) -> ControlSetup:
-    controller = scenario.controller
+def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
+    controller = plan.scenario.controller
     assert isinstance(controller, FourthDerivativeController)
     law = Parameters(
-        scenario.tilt_car.resolve(),
+        plan.scenario.tilt_car.resolve(),
         controller.resolve_gains(),
-        scenario.reference.parameters,
+        plan.reference,
         DECOUPLINGS[controller.decoupling],
         float(controller.anti_windup),
     )
-    return car_setup(LoopParameters, scenario, signature, law=law)
+    return car_setup(LoopParameters, plan, signature, law=law)
 
 
 @scalar

@@ -32,7 +32,7 @@ from tiltsim_controllers.tilt_car.planned_direction import (
 )
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.flight_plan import FlightPlan
 
 
 class LoopParameters(NamedTuple):
@@ -100,13 +100,13 @@ def planned_direction_equation_rates(
     return equations_of_motion(state, direction, inputs[0], inputs[1], car, disturbance)
 
 
-def _setup(scenario: Scenario, signature: float) -> ControlSetup:
-    controller = scenario.controller
+def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
+    controller = plan.scenario.controller
     assert isinstance(controller, PlannedDirectionController)
-    car = scenario.tilt_car.resolve()
-    gait = scenario.gait.plan(car).parameters
-    law = Parameters(car, controller.resolve_gains(), scenario.reference.parameters)
-    return car_setup(LoopParameters, scenario, signature, gait=gait, law=law)
+    car = plan.scenario.tilt_car.resolve()
+    gait = plan.gait.parameters
+    law = Parameters(car, controller.resolve_gains(), plan.reference)
+    return car_setup(LoopParameters, plan, signature, gait=gait, law=law)
 
 
 @scalar
@@ -174,7 +174,7 @@ PLANNED_DIRECTION: Final = ClosedLoop(
     controls=planned_direction_controls,
     refresh=held_planned_direction_controls,
     setup=_setup,
-    initial_activations=lambda _scenario, _setup: (0.0, 0.0),
+    initial_activations=lambda _plan, _setup: (0.0, 0.0),
     observe=observe_planned_direction,
     observes_controls=True,
     derive=_derive,
@@ -184,7 +184,7 @@ PLANNED_DIRECTION: Final = ClosedLoop(
         inputs=planned_direction_equation_inputs,
         inputs_size=2,
         rates=planned_direction_equation_rates,
-        initial=lambda s, _setup: initial_motion(s),
+        initial=lambda plan, _setup: initial_motion(plan.scenario),
         observe=observe_planned_direction_equations,
     ),
     extra_columns={

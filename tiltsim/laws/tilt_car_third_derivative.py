@@ -19,7 +19,7 @@ from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scala
 from tiltsim_controllers.tilt_car.third_derivative import Parameters, third_derivative_inputs
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.flight_plan import FlightPlan
 
 
 class LoopParameters(NamedTuple):
@@ -94,16 +94,16 @@ def third_derivative_equation_rates(
     )
 
 
-def _setup(scenario: Scenario, signature: float) -> ControlSetup:
-    controller = scenario.controller
+def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
+    controller = plan.scenario.controller
     assert isinstance(controller, ThirdDerivativeController)
     law = Parameters(
-        scenario.tilt_car.resolve(),
+        plan.scenario.tilt_car.resolve(),
         controller.resolve_gains(),
-        scenario.reference.parameters,
+        plan.reference,
         controller.restoring_rate,
     )
-    return car_setup(LoopParameters, scenario, signature, law=law)
+    return car_setup(LoopParameters, plan, signature, law=law)
 
 
 @scalar

@@ -23,7 +23,7 @@ from tiltsim_controllers.laws.yaw_position import Parameters, yaw_position_input
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.flight_plan import FlightPlan
 
 
 class LoopParameters(NamedTuple):
@@ -43,12 +43,11 @@ def yaw_position_controls(
     return extended_controls(yaw_position_inputs(time, state, law, knots), law.vehicle)
 
 
-def _setup(scenario: Scenario, signature: float) -> ControlSetup:
-    controller = scenario.controller
+def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
+    controller = plan.scenario.controller
     assert isinstance(controller, YawPositionController)
-    reference, knots = scenario.reference_and_knots()
-    law = Parameters(scenario.rotorcraft.resolve(), controller.resolve_gains(), reference)
-    return ControlSetup(LoopParameters(signature, law), knots)
+    law = Parameters(plan.scenario.rotorcraft.resolve(), controller.resolve_gains(), plan.reference)
+    return ControlSetup(LoopParameters(signature, law), plan.knots)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:

@@ -1,8 +1,8 @@
 """The MuJoCo plant under commands: from a user's own controller, or step by step from outside.
 
-The commands and what is seen go through the same layers as those of the shipped laws. Only their
-latency is another: a rotor may be told a speed, to be taken at once, and no line of activations
-(`tiltsim.laws.layers.actuation`) can hand on a jump. So commands under way are a state of this
+Commands and observations pass the same layers as those of the shipped controllers. Only the latency
+differs: a rotor may be commanded a speed that it takes at once, and a chain of activations
+(`tiltsim.laws.layers.actuation`) cannot pass on a jump. So delayed commands are a state of this
 plant.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import nan, sqrt
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import mujoco
 import numpy as np
@@ -19,46 +19,42 @@ from tiltsim.engines.callback import control_callback
 from tiltsim.laws.commanded import COMMANDED_LOOPS, HeldCommand, commanded_parameters, with_command
 from tiltsim.laws.layers.actuation import measured_qpos, measured_qvel, sensor_parameters
 from tiltsim.laws.tiltrotor import gait_servo_commands
-from tiltsim.plants.command import (
-    CheckedCommand,
-    ControllerError,
-    Observation,
-    Reference,
-    observation,
-)
+from tiltsim.plants.command import CheckedCommand, ControllerError, Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant, quiet_warnings
-from tiltsim.scenario.scenario import Scenario
+from tiltsim.plants.plant import record_step_by_step
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim_controllers.gaits.tilts import tilt_reference
-from tiltsim_controllers.mathematics.records import flatten, slotted
+from tiltsim_controllers.mathematics.records import slotted
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, clipped
 from tiltsim_controllers.references.trajectories import reference_derivatives
 from tiltsim_controllers.vehicle.parameters import SPIN
 
+if TYPE_CHECKING:
+    from tiltsim.closed_loop.assembly import Assembly
+    from tiltsim.engines.base import EngineName
 
-class _Sent(NamedTuple):
-    """A command as it travels: numbers alone."""
-
-    speeds: float  # whether the rotors are told speeds, not accelerations
-    rotors: Quad  # rad/s or rad/s^2, with their signs
-    tilts: Quad  # rad
+_NONE: Final = (0.0, 0.0, 0.0, 0.0)
 
 
-class CommandedPlant(MujocoPlant):
-    """A vehicle that does what it was told, a latency ago.
+class CommandedPlant:
+    """A vehicle that follows commands, each after the scenario's latency.
 
-    MuJoCo steps by itself as long as no layer has a say and the rotors keep their speeds; else the
+    MuJoCo steps alone as long as there is no layer and the rotors keep their speeds; else the
     control callback holds the commands.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
-        super().__init__(scenario)
-        vehicle = scenario.rotorcraft
+    engine: EngineName = "python"
+
+    def __init__(self, assembly: Assembly) -> None:
+        self._plant = MujocoPlant(assembly, engine="python")
+        self.model, self.data = self._plant.model, self._plant.data
+        self._loop, self._setup = assembly.loop, assembly.setup
+        vehicle = assembly.scenario.rotorcraft
         self.tilting = vehicle.model == "tiltrotor"
-        self._slowest, self._fastest = vehicle.speeds_along_spin
+        self._min_speed, self._max_speed = vehicle.speeds_along_spin
         self._commanded = commanded_parameters(self._setup.parameters)
-        self._sensors = sensor_parameters(scenario)
+        self._sensors = sensor_parameters(assembly.scenario)
         self._slotted = slotted(self._setup.parameters)
         self._layered = self._loop is not COMMANDED_LOOPS[vehicle.model]
         first = 8 if self.tilting else 4  # after servos and thrusts
@@ -68,93 +64,94 @@ class CommandedPlant(MujocoPlant):
         first = 0 if vehicle.rotor_time_constant is None else 4
         self._speeds = slice(first, first + 4)
         # Before the first command arrives the servos hold the pods where they are.
-        waiting = _Sent(0.0, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))
-        if self.tilting:
-            waiting = waiting._replace(tilts=initial_tilts(scenario)[0])
-        self._under_way = [waiting] * scenario.simulation.latency_steps  # the oldest first
-        self._write_controls(self._commanded.told)
+        tilts = initial_tilts(assembly)[0] if self.tilting else _NONE
+        waiting = CheckedCommand("rotor_accelerations", _NONE, tilts)
+        self._delayed = [waiting] * assembly.scenario.simulation.latency_steps  # oldest first
+        self._hold_command(self._commanded.told)
+
+    @property
+    def time(self) -> float:
+        """See `Plant.time`."""
+        return self._plant.time
 
     @property
     def state(self) -> Floats:
-        """See `Plant.state`: MuJoCo's, and the commands under way."""
-        return np.array([*super().state, *flatten(tuple(self._under_way))])
+        """See `Plant.state`: MuJoCo's, and the delayed commands."""
+        delayed = [number for command in self._delayed for number in _as_numbers(command)]
+        return np.array([*self._plant.state, *delayed])
 
     @state.setter
     def state(self, value: Floats) -> None:
-        length = len(value) - 9 * len(self._under_way)
-        MujocoPlant.state.fset(self, value[:length])  # type: ignore[attr-defined]
-        self._under_way = [
-            _Sent(speeds, (r1, r2, r3, r4), (a1, a2, a3, a4))
-            for speeds, r1, r2, r3, r4, a1, a2, a3, a4 in value[length:].reshape(-1, 9).tolist()
-        ]
+        length = len(value) - _NUMBERS * len(self._delayed)
+        self._plant.state = value[:length]
+        self._delayed = list(map(_from_numbers, value[length:].reshape(-1, _NUMBERS).tolist()))
 
-    def apply(self, orders: CheckedCommand) -> None:
-        """Send a command, once a control sample, and obey the one that arrives until the next.
+    def apply(self, command: CheckedCommand) -> None:
+        """Send a command, once per control sample, and hold the one that arrives until the next.
 
-        Rotors take a commanded speed at once, unless they lag: the plant's observed state has it.
+        Rotors take a commanded speed at once, unless they lag: the observed state has it.
         """
-        self._under_way.append(self._sent(orders))
-        arrived = self._under_way.pop(0)
-        rates = arrived.rotors
-        if arrived.speeds:
-            self.data.act[self._speeds] = arrived.rotors
-            rates = (0.0, 0.0, 0.0, 0.0)
-        self._write_controls(HeldCommand(*arrived.tilts, *rates))
+        self._delayed.append(self._completed(command))
+        arrived = self._delayed.pop(0)
+        assert arrived.tilt_angles is not None
+        rates = _NONE
+        if arrived.kind == "rotor_speeds":
+            self.data.act[self._speeds] = _flip_by_spin(arrived.rotors)
+        else:
+            rates = _flip_by_spin(arrived.rotors)
+        self._hold_command(HeldCommand(*arrived.tilt_angles, *rates))
 
-    def _sent(self, orders: CheckedCommand) -> _Sent:
-        tilts = orders.tilt_angles
+    def _completed(self, command: CheckedCommand) -> CheckedCommand:
+        """The command of speeds or accelerations, with tilt angles, that a command amounts to."""
+        tilts = command.tilt_angles
         if tilts is None:
-            tilts = self._planned_servo_commands() if self.tilting else (0.0, 0.0, 0.0, 0.0)
-        if orders.kind == "rotor_accelerations":
-            return _Sent(0.0, _signed(orders.rotors), tilts)
-        return _Sent(1.0, _signed(self._along_spin(orders)), tilts)
+            tilts = self._gait_servo_commands() if self.tilting else _NONE
+        if command.kind == "rotor_accelerations":
+            return CheckedCommand(command.kind, command.rotors, tilts)
+        return CheckedCommand("rotor_speeds", self._limited_speeds(command), tilts)
 
-    def _write_controls(self, told: HeldCommand) -> None:
+    def _hold_command(self, command: HeldCommand) -> None:
         data, knots = self.data, self._setup.knots
         state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
-        parameters = with_command(self._setup.parameters, told)
+        parameters = with_command(self._setup.parameters, command)
         try:
             data.ctrl[:] = self._loop.controls(float(data.time), *state, parameters, knots)
         except (ArithmeticError, ValueError):
             data.ctrl[:] = nan  # as the engines do; MuJoCo reports it
 
-    def thrusts_and_tilts(self, orders: CheckedCommand) -> Floats:
-        """What orders come to as thrusts (N) and tilt angles (rad), shape (8,) or (4,).
+    def thrusts_and_tilts(self, command: CheckedCommand) -> Floats:
+        """A command as thrusts (N) and tilt angles (rad), shape (8,) or (4,).
 
-        Raises `ControllerError` for accelerations, which are no thrust yet.
+        Raises
+        ------
+        ControllerError
+            If it commands accelerations, which have no thrust yet.
         """
-        if orders.kind == "rotor_accelerations":
-            raise ControllerError(
-                "commanded rotor_accelerations; thrusts or rotor_speeds are wanted"
-            )
+        if command.kind == "rotor_accelerations":
+            raise ControllerError("commanded rotor_accelerations; expected thrusts or rotor_speeds")
         coefficient = self._commanded.vehicle.thrust_coefficient
-        thrusts = [coefficient * speed * abs(speed) for speed in self._along_spin(orders)]
+        thrusts = [coefficient * speed * abs(speed) for speed in self._limited_speeds(command)]
         if not self.tilting:
             return np.array(thrusts)
-        return np.array([*thrusts, *(orders.tilt_angles or self._planned_servo_commands())])
+        return np.array([*thrusts, *(command.tilt_angles or self._gait_servo_commands())])
 
-    def _planned_servo_commands(self) -> Quad:
+    def _gait_servo_commands(self) -> Quad:
         lead, gait = self._commanded.servo_lead, self._commanded.gait
-        return gait_servo_commands(float(self.data.time), lead, gait, self._setup.knots)
+        return gait_servo_commands(self.time, lead, gait, self._setup.knots)
 
-    def _along_spin(self, orders: CheckedCommand) -> Quad:
-        """Commanded speeds, within the rotors' limits."""
-        first, second, third, fourth = orders.rotors
-        if orders.kind == "thrusts":
+    def _limited_speeds(self, command: CheckedCommand) -> Quad:
+        """Commanded speeds along the spin (rad/s), within the rotors' limits."""
+        speeds: Sequence[float] = command.rotors
+        if command.kind == "thrusts":
             coefficient = self._commanded.vehicle.thrust_coefficient
-            first, second, third, fourth = (
+            speeds = [
                 sqrt(abs(thrust) / coefficient) * (1.0 if thrust >= 0.0 else -1.0)
-                for thrust in orders.rotors
-            )
-        return (
-            self._limited(first),
-            self._limited(second),
-            self._limited(third),
-            self._limited(fourth),
+                for thrust in command.rotors
+            ]
+        first, second, third, fourth = (
+            clipped(speed, self._min_speed, self._max_speed) for speed in speeds
         )
-
-    def _limited(self, speed: float) -> float:
-        return clipped(speed, self._slowest, self._fastest)
+        return first, second, third, fourth
 
     def advance(self, steps: int) -> None:
         """See `Plant.advance`."""
@@ -163,7 +160,7 @@ class CommandedPlant(MujocoPlant):
             mujoco.mj_step(self.model, self.data, nstep=steps)
 
     def _hold(self, _model: mujoco.MjModel, called: mujoco.MjData) -> None:
-        """Let the thrusts follow the rotor speeds, and layers do what they do, between commands."""
+        """Between commands, let the thrusts follow the rotor speeds and the layers act."""
         data = self.data
         if called is not data:
             return
@@ -173,40 +170,76 @@ class CommandedPlant(MujocoPlant):
         except (ArithmeticError, ValueError):
             data.ctrl[:] = nan
 
+    def record(self, samples: int, steps: int) -> Floats | None:
+        """See `Plant.record`."""
+        return record_step_by_step(self, samples, steps)
+
+    def observe(self) -> tuple[float, ...]:
+        """See `Plant.observe`."""
+        return self._plant.observe()
+
+    def fault(self) -> str:
+        """See `Plant.fault`."""
+        return self._plant.fault()
+
     @property
     def steps_taken(self) -> int:
         """Physics steps since time zero."""
-        return round(float(self.data.time) / float(self.model.opt.timestep))
+        return round(self.time / float(self.model.opt.timestep))
 
-    def seen(self) -> Observation:
+    def observation(self) -> Observation:
         """The present state as a controller sees it, through the scenario's sensors."""
-        data, parameters = self.data, self._commanded
-        time, qpos, qvel = float(data.time), data.qpos, data.qvel
+        time, qpos, qvel = self.time, self.data.qpos, self.data.qvel
         if self._sensors.active:
             qpos = np.array(measured_qpos(time, qpos.tolist(), self._sensors))
             qvel = np.array(measured_qvel(time, qvel.tolist(), self._sensors))
-        motion = np.array(reference_derivatives(time, parameters.reference, self._setup.knots)[:9])
-        wanted = parameters.reference
+        tilts, tilt_rates = qpos[7:11], qvel[6:10]
+        return Observation(
+            time=time,
+            position=qpos[:3].copy(),
+            velocity=qvel[:3].copy(),
+            attitude=np.array(euler_from_quaternion(*qpos[3:7].tolist())),
+            quaternion=qpos[3:7].copy(),
+            body_rates=qvel[3:6].copy(),
+            tilt_angles=tilts.copy() if self.tilting else np.zeros(4),
+            tilt_rates=tilt_rates.copy() if self.tilting else np.zeros(4),
+            rotor_speeds=np.array(_flip_by_spin(self.data.act[:4].tolist())),
+            reference=self._reference(),
+            vehicle=self._commanded.vehicle,
+        )
+
+    def _reference(self) -> Reference:
+        time, knots, reference = self.time, self._setup.knots, self._commanded.reference
+        motion = np.array(reference_derivatives(time, reference, knots)[:9])
         planned = np.zeros(8)
         if self.tilting:
-            planned[:] = tilt_reference(time, parameters.gait, self._setup.knots)
-        reference = Reference(
+            planned[:] = tilt_reference(time, self._commanded.gait, knots)
+        return Reference(
             position=motion[:3],
             velocity=motion[3:6],
             acceleration=motion[6:],
-            attitude=np.array((wanted.roll, wanted.pitch, wanted.yaw)),
+            attitude=np.array((reference.roll, reference.pitch, reference.yaw)),
             tilt_angles=planned[:4],
             tilt_rates=planned[4:],
         )
-        attitude = euler_from_quaternion(*qpos[3:7].tolist())
-        speeds = _signed(data.act[:4].tolist())
-        return observation(time, qpos, qvel, speeds, attitude, reference, parameters.vehicle)
-
-    def _controls_in_force(self, *_state: Sequence[float]) -> Sequence[float]:
-        return list(self.data.ctrl.tolist())
 
 
-def _signed(values: Sequence[float]) -> Quad:
+def _flip_by_spin(values: Sequence[float]) -> Quad:
     """Speeds along the spin from signed ones, and back."""
     first, second, third, fourth = values
     return SPIN[0] * first, SPIN[1] * second, SPIN[2] * third, SPIN[3] * fourth
+
+
+_NUMBERS: Final = 9
+"""How many numbers of a state are one delayed command."""
+
+
+def _as_numbers(command: CheckedCommand) -> tuple[float, ...]:
+    assert command.tilt_angles is not None
+    return (float(command.kind == "rotor_speeds"), *command.rotors, *command.tilt_angles)
+
+
+def _from_numbers(numbers: Sequence[float]) -> CheckedCommand:
+    are_speeds, r1, r2, r3, r4, a1, a2, a3, a4 = numbers
+    kind = "rotor_speeds" if are_speeds else "rotor_accelerations"
+    return CheckedCommand(kind, (r1, r2, r3, r4), (a1, a2, a3, a4))

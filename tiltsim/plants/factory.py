@@ -1,25 +1,50 @@
-"""Make the plant that a scenario names."""
+"""Building the plant of a flight."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 from tiltsim.plants.mujoco_plant import MujocoPlant
-from tiltsim.plants.plant import Plant
 from tiltsim.plants.thesis_plant import ThesisPlant
-from tiltsim.scenario.scenario import Scenario
+from tiltsim.plants.user_controlled_plant import UserControlledPlant
 from tiltsim.system.interrupts import reraise_swallowed_interrupts
 
+if TYPE_CHECKING:
+    from tiltsim.closed_loop.assembly import Assembly
+    from tiltsim.engines.base import EngineName
+    from tiltsim.plants.command import Controller
+    from tiltsim.plants.plant import Plant
 
-def make_plant(scenario: Scenario, controller: Any = None) -> Plant:
-    """The plant that a scenario asks for, at its initial state.
 
-    ``controller`` is a user's own, for scenarios whose law is ``python``.
+def make_plant(
+    assembly: Assembly,
+    controller: Controller | type | None = None,
+    engine: EngineName | None = None,
+) -> Plant:
+    """The plant that a scenario requests, at its initial state.
+
+    Parameters
+    ----------
+    assembly
+        The flight.
+    controller
+        A user's own, for scenarios whose law is ``python``; default: the one that it names.
+    engine
+        In place of the scenario's.
+
+    Returns
+    -------
+    Plant
+        `MujocoPlant`, `ThesisPlant` or `UserControlledPlant`.
+
+    Raises
+    ------
+    InputError
+        If MuJoCo cannot compile the vehicle, or the user's controller cannot be loaded.
     """
-    if scenario.controller.law == "python":
-        from tiltsim.plants.user_controlled_plant import UserControlledPlant
-
-        return UserControlledPlant(scenario, controller)
-    thesis = scenario.simulation.plant == "thesis"
+    if assembly.scenario.controller.law == "python":
+        return UserControlledPlant(assembly, controller)
     with reraise_swallowed_interrupts():  # it may compile
-        return ThesisPlant(scenario) if thesis else MujocoPlant(scenario)
+        if assembly.scenario.simulation.plant == "thesis":
+            return ThesisPlant(assembly, engine)
+        return MujocoPlant(assembly, engine=engine)

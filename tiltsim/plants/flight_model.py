@@ -1,69 +1,99 @@
-"""The compiled MuJoCo model of a scenario."""
+"""The MuJoCo model that a flight integrates."""
 
 from __future__ import annotations
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import mujoco
 
 from tiltsim.closed_loop.userdata import HEADER_SIZE
 from tiltsim.errors import InputError
-from tiltsim.laws.assembling import loop_of
-from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Triple
 
+if TYPE_CHECKING:
+    from tiltsim.closed_loop.assembly import Assembly
+    from tiltsim.scenario.scenario import Scenario
 
-def flight_model(scenario: Scenario, parameters: int) -> mujoco.MjModel:
-    """The model that a scenario flies, with room for as many floats of parameters.
+_TABLES_WITHOUT_EFFECT: Final = frozenset(
+    (
+        "title",
+        "source",
+        "without",
+        "simulation",
+        "initial",
+        "gait",
+        "reference",
+        "sensors",
+        "expect",
+    )
+)
+"""Tables of a scenario that do not change the model, but for two keys of ``simulation``."""
 
-    Raises `InputError` where MuJoCo cannot build it.
+
+def flight_model(assembly: Assembly, knots: int | None = None) -> mujoco.MjModel:
+    """The model of a flight.
+
+    Parameters
+    ----------
+    assembly
+        The flight.
+    knots
+        Room for the knots in ``userdata``, for a model that several flights share; default: those
+        of this flight.
+
+    Raises
+    ------
+    InputError
+        If MuJoCo cannot compile it.
     """
-    model = build_model(scenario, userdata_size=HEADER_SIZE + parameters)
+    model = build_model(assembly, knots=knots)
     # A diverged state must stay visible; by default MuJoCo would silently start over.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return model
 
 
-_FLOWN_IN_ANY_MODEL: Final = frozenset(
-    {
-        *("title", "source", "without", "simulation", "initial", "gait", "reference", "sensors"),
-        "expect",
-    }
-)
-"""Tables of a scenario that are parameters or initial state of a flight, or no part of it."""
-
-
 def model_cache_key(scenario: Scenario) -> str:
-    """Equal only for scenarios that `flight_model` builds equal models for, if one loop flies."""
+    """Equal only for scenarios whose models are equal, provided that they fly the same loop."""
     simulation = scenario.simulation
-    tables = [value for name, value in scenario if name not in _FLOWN_IN_ANY_MODEL]
+    tables = [value for name, value in scenario if name not in _TABLES_WITHOUT_EFFECT]
     return repr((tables, simulation.timestep, simulation.integrator))
 
 
 def evaluations_per_step(model: mujoco.MjModel) -> int:
-    """How often MuJoCo's integrator asks for controls in a step."""
+    """How often MuJoCo's integrator evaluates the controls in a step."""
     return 4 if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else 1
 
 
-def disturbing_acceleration(scenario: Scenario) -> Triple:
+def disturbance_acceleration(scenario: Scenario) -> Triple:
     """The sum of a scenario's disturbances, m/s^2, world."""
     x, y, z = (sum(d.value[axis] for d in scenario.disturbance) for axis in range(3))
     return float(x), float(y), float(z)
 
 
 def build_model(
-    scenario: Scenario, *, userdata_size: int = 0, visuals: bool = False
+    assembly: Assembly, *, knots: int | None = None, visuals: bool = False
 ) -> mujoco.MjModel:
-    """Compile the scenario's vehicle, with what is drawn of it only if asked.
+    """Compile the vehicle of a flight.
 
-    Raises `InputError` where MuJoCo cannot build it.
+    Parameters
+    ----------
+    assembly
+        The flight.
+    knots
+        See `flight_model`.
+    visuals
+        Whether the model has the parts that are only drawn.
+
+    Raises
+    ------
+    InputError
+        If MuJoCo cannot compile it.
     """
-    loop = loop_of(scenario)
+    loop, scenario = assembly.loop, assembly.scenario
+    size = HEADER_SIZE + loop.record_size + (len(assembly.setup.knots) if knots is None else knots)
     try:
-        model = loop.kind.compile(
-            scenario, loop.law_states, loop.extra_actuators, userdata_size, visuals
-        )
+        model = loop.kind.compile(scenario, loop.law_states, loop.extra_actuators, size, visuals)
     except ValueError as error:
         raise InputError(f"{scenario.address or 'scenario'}: vehicle: {error}") from error
-    model.opt.gravity += disturbing_acceleration(scenario)
+    model.opt.gravity += disturbance_acceleration(scenario)
     return model

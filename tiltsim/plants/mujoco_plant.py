@@ -1,4 +1,4 @@
-"""The two plants behind one interface: MuJoCo, and the thesis' own equations."""
+"""MuJoCo as the plant."""
 
 from __future__ import annotations
 
@@ -10,45 +10,55 @@ from typing import TYPE_CHECKING, Any, Final
 import mujoco
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.closed_loop.userdata import EVALUATIONS, HEADER_SIZE, RECORDER, Header
-from tiltsim.engines.base import EngineName
 from tiltsim.engines.callback import control_callback
 from tiltsim.engines.factory import make_engine
-from tiltsim.laws.assembling import control_setup, loop_of
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.flight_model import evaluations_per_step, flight_model
-from tiltsim.scenario.scenario import Scenario
+from tiltsim.plants.plant import natively_checked_values, record_step_by_step
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
+    from tiltsim.closed_loop.assembly import Assembly
+    from tiltsim.engines.base import EngineName
     from tiltsim.engines.recorder import Recorder
 
 
 class MujocoPlant:
-    """The compiled MJCF model in MuJoCo, with the control step in its control callback."""
+    """The compiled MJCF model in MuJoCo, with the control step in its control callback.
 
-    def __init__(self, scenario: Scenario, model: mujoco.MjModel | None = None) -> None:
-        """Build the plant, or take a ``model`` that `flight_model` built for such a scenario."""
-        self._loop, self._setup = loop_of(scenario), control_setup(scenario)
-        if model is None:
-            model = flight_model(scenario, len(self._setup.userdata))
-        self.model = model
+    Parameters
+    ----------
+    assembly
+        The flight.
+    model
+        Its model; default: the one that `flight_model` compiles.
+    engine
+        Default: the one that the scenario requests.
+    """
+
+    def __init__(
+        self,
+        assembly: Assembly,
+        model: mujoco.MjModel | None = None,
+        engine: EngineName | None = None,
+    ) -> None:
+        self._assembly, self._loop, self._setup = assembly, assembly.loop, assembly.setup
+        self.model = flight_model(assembly) if model is None else model
         self.data = mujoco.MjData(self.model)
-        self._reference, _ = scenario.reference_and_knots()
-        self._follows_position = self._loop.follows_position(scenario)
-        self._set_initial_state(scenario, self._setup)
-        self.engine: EngineName = choose_engine(scenario)
+        self._set_initial_state()
+        self.engine: EngineName = engine or choose_engine(assembly.scenario, self._loop)
         self._engine = make_engine(self.engine, self._loop, self.model, self.data)
 
-    def _set_initial_state(self, scenario: Scenario, setup: ControlSetup) -> None:
-        data = self.data
-        period = evaluations_per_step(self.model) * scenario.simulation.control_steps
+    def _set_initial_state(self) -> None:
+        assembly, data = self._assembly, self.data
+        control_steps = assembly.scenario.simulation.control_steps
+        period = evaluations_per_step(self.model) * control_steps
         data.userdata[:HEADER_SIZE] = Header(control_period=period)
-        parameters = setup.userdata  # a model made for several gaits may have room for more
+        parameters = self._setup.userdata  # a shared model may have room for more
         data.userdata[HEADER_SIZE : HEADER_SIZE + len(parameters)] = parameters
-        data.qpos[:], data.qvel[:] = self._loop.kind.initial_motion(scenario)
-        data.act[:] = self._loop.initial_activations(scenario, setup)
+        data.qpos[:], data.qvel[:] = self._loop.kind.initial_motion(assembly)
+        data.act[:] = self._loop.initial_activations(assembly, self._setup)
         mujoco.mj_forward(self.model, data)
 
     @property
@@ -80,15 +90,11 @@ class MujocoPlant:
         """See `Plant.record`: natively, all but the last sample come from the callback."""
         if self.engine == "native":
             return self._record_natively(samples, steps)
-        rows = []
-        for _ in range(samples):
-            self.advance(steps)
-            rows.append((self.time, *self.observe()))
-        return None if self.fault() else np.array(rows)
+        return record_step_by_step(self, samples, steps)
 
     @property
     def callback(self) -> Any:
-        """What MuJoCo is to call for controls; see `tiltsim.engines.base.Engine.callback`."""
+        """The control callback for MuJoCo; see `tiltsim.engines.base.Engine.callback`."""
         return self._engine.callback()
 
     @property
@@ -98,17 +104,24 @@ class MujocoPlant:
         return int(mujoco.mj_stateSize(self.model, _INTEGRATION & before))
 
     def recorder(self, samples: int, steps: int, last_steps: int) -> Recorder:
-        """Memory for samples every so many steps, the last one after ``last_steps``.
+        """Memory for the samples of the native engine; its address goes to ``userdata[RECORDER]``.
 
-        Its address goes to `RECORDER` in `userdata`. Only for the native engine.
+        Parameters
+        ----------
+        samples
+            Number of samples.
+        steps, last_steps
+            Physics steps between samples, and before the last one.
         """
         from tiltsim.engines.recorder import Recorder
 
         evaluations = evaluations_per_step(self.model)
         return Recorder(
-            *(self._loop, samples, steps * evaluations, last_steps * evaluations),
-            *(self._reference, self._follows_position),
-            watched_now(self._loop, self._setup, self.observe()),
+            self._assembly,
+            samples,
+            steps * evaluations,
+            last_steps * evaluations,
+            natively_checked_values(self._assembly, self.observe()),
         )
 
     def _record_natively(self, samples: int, steps: int) -> Floats | None:
@@ -118,7 +131,7 @@ class MujocoPlant:
             self.advance(samples * steps)
         finally:
             self.data.userdata[RECORDER] = 0.0
-        if recorder.lost or self.fault():
+        if recorder.terminated or self.fault():
             return None
         return np.vstack([recorder.samples, (self.time, *self.observe())])
 
@@ -126,32 +139,29 @@ class MujocoPlant:
         """See `Plant.observe`."""
         data = self.data
         state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
-        return self._loop.observe(*state, self._controls_in_force(*state))
+        # MuJoCo keeps the controls of its last integrator stage.
+        stale = data.userdata[EVALUATIONS] == 0.0 and self._loop.observes_controls
+        ctrl = self.controls(*state) if stale else data.ctrl.tolist()
+        return self._loop.observe(*state, ctrl)
 
-    def _controls_in_force(self, *state: Sequence[float]) -> Sequence[float]:
-        """The controls at the present state; MuJoCo keeps those of its last integrator stage."""
-        data = self.data
-        if data.userdata[EVALUATIONS] != 0.0 or not self._loop.observes_controls:
-            return list(data.ctrl.tolist())
+    def controls(
+        self, qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float]
+    ) -> Sequence[float]:
+        """The controls for a state of MuJoCo's at the present time; NaN where there are none."""
+        setup = self._setup
         try:
-            setup = self._setup
-            return self._loop.controls(data.time, *state, setup.parameters, setup.knots)
+            return self._loop.controls(
+                self.data.time, qpos, qvel, act, setup.parameters, setup.knots
+            )
         except (ArithmeticError, ValueError):
-            return [nan] * len(data.ctrl)
+            return [nan] * len(self.data.ctrl)
 
     def fault(self) -> str:
         """See `Plant.fault`: MuJoCo resets an unstable state silently but counts its warnings."""
-        for warning, words in _WARNINGS.items():
+        for warning, text in _WARNINGS.items():
             if self.data.warning[warning].number:
-                return words
+                return text
         return ""
-
-
-def watched_now(
-    loop: ClosedLoop, setup: ControlSetup, values: Sequence[float]
-) -> tuple[float, ...]:
-    """The numbers that a loop watches natively; none where it leaves that to Python."""
-    return () if loop.watch is None else loop.watch(values, setup.parameters)
 
 
 @contextmanager

@@ -1,9 +1,13 @@
-"""The interface of a plant."""
+"""The interface of the plants."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
+import numpy as np
+
+from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.engines.base import EngineName
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -28,14 +32,39 @@ class Plant(Protocol):
         """Take physics steps."""
 
     def record(self, samples: int, steps: int) -> Floats | None:
-        """Take ``samples`` times ``steps`` physics steps and a sample after each time.
+        """Take a sample after every few physics steps.
 
-        None where a sample or the physics engine tells that something has gone wrong on the way;
-        what state the plant is in then is open.
+        Parameters
+        ----------
+        samples
+            Number of samples.
+        steps
+            Physics steps before each of them.
+
+        Returns
+        -------
+        Floats or None
+            The samples, shape (samples, fields). None where a sample or the physics engine shows
+            that the flight ended on the way; the state of the plant is then undefined.
         """
 
     def observe(self) -> tuple[float, ...]:
-        """The values of a sample after its time; see `ClosedLoop.sample_fields`."""
+        """The present values of a sample's fields after the time; see `Loop.sample_fields`."""
 
     def fault(self) -> str:
-        """What the physics engine has found wrong so far, in a few words; else empty."""
+        """The fault that the physics engine has reported so far, in a few words; else empty."""
+
+
+def record_step_by_step(plant: Plant, samples: int, steps: int) -> Floats | None:
+    """`Plant.record` by alternating `Plant.advance` and `Plant.observe`."""
+    rows = []
+    for _ in range(samples):
+        plant.advance(steps)
+        rows.append((plant.time, *plant.observe()))
+    return None if plant.fault() else np.array(rows)
+
+
+def natively_checked_values(assembly: Assembly, values: Sequence[float]) -> tuple[float, ...]:
+    """The numbers whose signs native code checks; none where the loop leaves that to Python."""
+    watch = assembly.loop.watch
+    return () if watch is None else watch(values, assembly.setup.parameters)

@@ -1,44 +1,50 @@
-"""The plant that integrates the thesis's own equations with its solver, ode3."""
+"""The thesis's own equations of motion as the plant."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from math import nan
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tiltsim.engines.base import EngineName
 from tiltsim.engines.cache import mark_native_code_compiled
-from tiltsim.equations import ode3 as thesis_plant
-from tiltsim.laws.assembling import control_setup, loop_of
+from tiltsim.equations.ode3 import Stepper, make_stepper
 from tiltsim.plants.engine_choice import choose_engine
-from tiltsim.plants.flight_model import disturbing_acceleration
-from tiltsim.plants.mujoco_plant import watched_now
-from tiltsim.scenario.scenario import Scenario
+from tiltsim.plants.flight_model import disturbance_acceleration
+from tiltsim.plants.plant import natively_checked_values, record_step_by_step
 from tiltsim_controllers.mathematics.records import slotted
 from tiltsim_controllers.mathematics.scalar import Floats
 
+if TYPE_CHECKING:
+    from tiltsim.closed_loop.assembly import Assembly
+    from tiltsim.engines.base import EngineName
+
 
 class ThesisPlant:
-    """The thesis' equations with ode3; see `tiltsim.equations.ode3`."""
+    """The thesis's equations, integrated with ode3; see `tiltsim.equations.ode3`.
 
-    def __init__(self, scenario: Scenario) -> None:
-        simulation = scenario.simulation
-        loop, setup = loop_of(scenario), control_setup(scenario)
-        assert loop.equations is not None  # scenarios that ask for others are refused
-        self._loop, self._equations, self._setup = loop, loop.equations, setup
-        self._reference, _ = scenario.reference_and_knots()
-        self._follows_position = loop.follows_position(scenario)
-        self._disturbance = disturbing_acceleration(scenario)
-        self._timestep = simulation.timestep
-        self._control_steps = simulation.control_steps
+    Parameters
+    ----------
+    assembly
+        The flight; its loop has equations.
+    engine
+        Default: the one that the scenario requests.
+    """
+
+    def __init__(self, assembly: Assembly, engine: EngineName | None = None) -> None:
+        scenario, loop, setup = assembly.scenario, assembly.loop, assembly.setup
+        assert loop.equations is not None  # other scenarios are refused
+        self._assembly, self._equations, self._setup = assembly, loop.equations, setup
+        self._disturbance = disturbance_acceleration(scenario)
+        self._timestep = scenario.simulation.timestep
+        self._control_steps = scenario.simulation.control_steps
         self._step_index = 0
-        self._state = list(map(float, self._equations.initial(scenario, setup)))
+        self._state = list(map(float, self._equations.initial(assembly, setup)))
         self._held = (0.0,) * self._equations.inputs_size
         self._fault = ""
-        self.engine: EngineName = choose_engine(scenario)
-        self._advance: thesis_plant.Stepper
+        self.engine: EngineName = engine or choose_engine(scenario, loop)
+        self._advance: Stepper
         self._law: tuple[Any, Any]  # parameters and knots, as the stepper reads them
         if self.engine == "native":
             from tiltsim.engines.native_stepper import compile_stepper, native_record
@@ -46,7 +52,7 @@ class ThesisPlant:
             self._advance, self._record = compile_stepper(loop)
             self._law = native_record(loop, setup.userdata)
         else:
-            self._advance = thesis_plant.make_stepper(self._equations)
+            self._advance = make_stepper(self._equations)
             self._law = slotted(setup.parameters), setup.knots
 
     @property
@@ -58,7 +64,7 @@ class ThesisPlant:
     def state(self) -> Floats:
         """See `Plant.state`: the step count, the inputs held and the state of the equations.
 
-        The parameters are the scenario's and stay with the plant.
+        The parameters are not part of it.
         """
         return np.array([self._step_index, *self._held, *self._state])
 
@@ -75,8 +81,14 @@ class ThesisPlant:
         state: Any = np.array(self._state) if self.engine == "native" else self._state
         try:
             state, self._held = self._advance(
-                *(self._step_index, state, self._held, self._timestep, steps),
-                *(self._control_steps, *self._law, self._disturbance),
+                self._step_index,
+                state,
+                self._held,
+                self._timestep,
+                steps,
+                self._control_steps,
+                *self._law,
+                self._disturbance,
             )
             self._state = list(map(float, state))  # numpy's own floats would warn of infinity
         except (ArithmeticError, ValueError):
@@ -89,28 +101,29 @@ class ThesisPlant:
         """See `Plant.record`."""
         if self.engine == "native":
             return self._record_natively(samples, steps)
-        rows = []
-        for _ in range(samples):
-            self.advance(steps)
-            rows.append((self.time, *self.observe()))
-        return None if self.fault() else np.array(rows)
+        return record_step_by_step(self, samples, steps)
 
     def _record_natively(self, samples: int, steps: int) -> Floats | None:
         from tiltsim.engines.recorder import Recorder
 
-        recorder = Recorder(
-            *(self._loop, samples, steps, steps, self._reference, self._follows_position),
-            watched_now(self._loop, self._setup, self.observe()),
-        )
+        checked = natively_checked_values(self._assembly, self.observe())
+        recorder = Recorder(self._assembly, samples, steps, steps, checked)
         state, self._held = self._record(
-            *(int(recorder.address), samples),
-            *(self._step_index, np.array(self._state), self._held, self._timestep, steps),
-            *(self._control_steps, *self._law, self._disturbance),
+            int(recorder.address),
+            samples,
+            self._step_index,
+            np.array(self._state),
+            self._held,
+            self._timestep,
+            steps,
+            self._control_steps,
+            *self._law,
+            self._disturbance,
         )
         self._state = state.tolist()
-        mark_native_code_compiled(self._loop.native_name("thesis"))
+        mark_native_code_compiled(self._assembly.loop.native_name("thesis"))
         self._step_index += samples * steps
-        return None if recorder.lost else recorder.samples
+        return None if recorder.terminated else recorder.samples
 
     def observe(self) -> tuple[float, ...]:
         """See `Plant.observe`."""
@@ -120,7 +133,7 @@ class ThesisPlant:
                 self.time, self._state, self._inputs_in_force(), setup.parameters, setup.knots
             )
         except (ArithmeticError, ValueError):
-            return (nan,) * (len(self._loop.sample_fields) - 1)
+            return (nan,) * (len(self._assembly.loop.sample_fields) - 1)
 
     def _inputs_in_force(self) -> Sequence[float]:
         every = self._control_steps

@@ -1,47 +1,56 @@
-"""A plant that flies a user's own controller."""
+"""A vehicle that a user's own controller flies."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
-from tiltsim.plants.command import CheckedCommand
 from tiltsim.plants.commanded_plant import CommandedPlant
-from tiltsim.plants.user_controller import own_controller
-from tiltsim.scenario.scenario import Scenario
+from tiltsim.plants.user_controller import load_controller
+
+if TYPE_CHECKING:
+    from tiltsim.closed_loop.assembly import Assembly
+    from tiltsim.plants.command import CheckedCommand, Controller
 
 
 class UserControlledPlant(CommandedPlant):
-    """A vehicle under a user's own controller, which is asked at every control sample.
+    """A vehicle under a user's own controller, which is called at every control sample.
 
-    An interval may be repeated from a saved state, to find the step on which a flight was lost.
-    Answers are kept for that, so that a controller with a memory lives through each moment once.
+    An interval may be repeated from a saved state, to find the step on which a flight ended. The
+    commands are kept for that, so that a controller with a memory is called once per sample.
+
+    Parameters
+    ----------
+    assembly
+        The flight.
+    controller
+        Default: the one that the scenario names.
     """
 
-    def __init__(self, scenario: Scenario, controller: Any = None) -> None:
-        super().__init__(scenario)
-        self._controller = own_controller(scenario, controller)
-        self._scenario = scenario
-        self._asked = False
-        self._every = max(1, scenario.simulation.control_steps)
-        self._answers: dict[int, CheckedCommand] = {}
+    def __init__(self, assembly: Assembly, controller: Controller | type | None = None) -> None:
+        super().__init__(assembly)
+        self._controller = load_controller(assembly.scenario, controller)
+        self._scenario = assembly.scenario
+        self._was_reset = False
+        self._every = max(1, assembly.scenario.simulation.control_steps)
+        self._commands: dict[int, CheckedCommand] = {}  # by step
 
     def advance(self, steps: int) -> None:
         """See `Plant.advance`. Raises `ControllerError` at the time the controller fails."""
         step = self.steps_taken
-        self._answers = {known: answer for known, answer in self._answers.items() if known >= step}
+        self._commands = {known: c for known, c in self._commands.items() if known >= step}
         end = step + steps
         while step < end:
             if step % self._every == 0:
-                self.apply(self._answer(step))
+                self.apply(self._command(step))
             chunk = min(end - step, self._every - step % self._every)
             super().advance(chunk)
             step += chunk
 
-    def _answer(self, step: int) -> CheckedCommand:
-        if not self._asked:
-            self._asked = True
+    def _command(self, step: int) -> CheckedCommand:
+        if not self._was_reset:
+            self._was_reset = True
             self._controller.reset(self._scenario)
-        if step not in self._answers:
-            orders = self._controller.orders(self.seen(), tilting=self.tilting)
-            self._answers[step] = orders
-        return self._answers[step]
+        if step not in self._commands:
+            command = self._controller.command(self.observation(), tilting=self.tilting)
+            self._commands[step] = command
+        return self._commands[step]

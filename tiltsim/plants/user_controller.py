@@ -41,8 +41,8 @@ class UserController:
         if reset is not None:
             self._call(reset, scenario)
 
-    def orders(self, observation: Observation, *, tilting: bool) -> CheckedCommand:
-        """Ask for a command. Raises `ControllerError`."""
+    def command(self, observation: Observation, *, tilting: bool) -> CheckedCommand:
+        """Call for a command. Raises `ControllerError`."""
         command = self._call(self._controller, observation)
         try:
             return checked(command, tilting=tilting)
@@ -111,7 +111,7 @@ def _name_of(controller: object) -> str:
     return f"{named.__module__}.{named.__qualname__}"
 
 
-def own_controller(scenario: Scenario, controller: Any = None) -> UserController:
+def load_controller(scenario: Scenario, controller: Any = None) -> UserController:
     """The controller that flies a scenario: the one given, else the one that its table names.
 
     A class is called without arguments to make one. Raises `InputError` where there is none.

@@ -29,7 +29,6 @@ from tiltsim.scenario.vehicle import (
     VehicleTable,
     VehicleUnion,
 )
-from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 # --- [simulation] and [initial] ----------------------------------------------------------------
@@ -138,11 +137,6 @@ class Scenario(Table):
     def _check(self) -> Self:
         check_scenario(self)
         return self
-
-    def reference_and_knots(self) -> tuple[ReferenceParameters, tuple[float, ...]]:
-        """The reference's record, and the table of the flight: the gait's and the reference's."""
-        gait = self.gait.plan(self.vehicle.resolve())
-        return self.reference.placed(gait.knots)
 
 
 class Variant(Table):

@@ -12,24 +12,25 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final
 
 import mujoco
 import numpy as np
 
+from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.userdata import RECORDER
 from tiltsim.engines.callback import control_callback
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
-from tiltsim.laws.assembling import control_setup, loop_of
+from tiltsim.laws.assembling import assemble
 from tiltsim.plants.engine_choice import native_pays_off
 from tiltsim.plants.factory import make_plant
 from tiltsim.plants.flight_model import flight_model, model_cache_key
 from tiltsim.plants.mujoco_plant import MujocoPlant, quiet_warnings
 from tiltsim.simulation.monitor import TerminationMonitor
-from tiltsim.simulation.simulate import fly_chunk, simulate
+from tiltsim.simulation.simulate import fly_chunk, simulate_assembly
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
@@ -101,21 +102,21 @@ def fly(
     native = native_pays_off(scenarios)
     with ThreadPoolExecutor(threads) as pool:
         for start in range(0, len(scenarios), WINDOW):
-            window = scenarios[start : start + WINDOW]
+            window = [assemble(scenario) for scenario in scenarios[start : start + WINDOW]]
             yield from _fly_window(window, native, threads, pool, keep_samples)
 
 
 def _fly_window(
-    scenarios: Sequence[Scenario],
+    assemblies: Sequence[Assembly],
     native: bool,
     threads: int,
     pool: ThreadPoolExecutor,
     keep_samples: bool,
 ) -> Iterator[FlightResult]:
-    """Fly scenarios group by group, and put the results back into their order."""
+    """Fly group by group, and put the results back into their order."""
     groups: dict[object, list[int]] = {}
-    for index, scenario in enumerate(scenarios):
-        groups.setdefault(_way_to_fly(scenario, native), []).append(index)
+    for index, assembly in enumerate(assemblies):
+        groups.setdefault(_way_to_fly(assembly, native), []).append(index)
     done: dict[int, FlightResult] = {}
     following = 0
 
@@ -126,14 +127,18 @@ def _fly_window(
         return FlightResult(flight.scenario, flight.end, flight.metrics(), kept)
 
     for way, indices in groups.items():
-        chosen = [scenarios[index] for index in indices]
+        chosen = [assemblies[index] for index in indices]
         flown: Iterator[tuple[int, FlightResult]]
         if way == "alone":
-            flown = ((index, result(simulate(s))) for index, s in enumerate(chosen))
+            flown = ((index, result(simulate_assembly(a))) for index, a in enumerate(chosen))
         elif way == "thesis":
-            for one_of_each in {loop_of(s): s for s in chosen}.values():
-                make_plant(_natively(one_of_each))  # prepares native code before threads do
-            flown = enumerate(_in_order(lambda s: result(_fly_natively(s)), chosen, threads, pool))
+            for one_of_each in {assembly.loop: assembly for assembly in chosen}.values():
+                make_plant(one_of_each, engine="native")  # prepares native code before threads do
+            flown = enumerate(
+                _in_order(
+                    lambda a: result(simulate_assembly(a, engine="native")), chosen, threads, pool
+                )
+            )
         else:
             flown = _BatchFlight(chosen, threads, pool, result).results()
         for place, outcome in flown:
@@ -143,11 +148,12 @@ def _fly_window(
                 following += 1
 
 
-def _way_to_fly(scenario: Scenario, native: bool) -> object:
+def _way_to_fly(assembly: Assembly, native: bool) -> object:
     """``alone``, on the ``thesis`` plant in threads, or what the rows of a batch have in common."""
-    simulation, loop = scenario.simulation, loop_of(scenario)
-    wanted = simulation.engine == "native" or (simulation.engine == "auto" and native)
-    if not wanted or loop.watch is None or scenario.controller.law == "python":
+    scenario, loop = assembly.scenario, assembly.loop
+    simulation = scenario.simulation
+    natively = simulation.engine == "native" or (simulation.engine == "auto" and native)
+    if not natively or loop.watch is None or scenario.controller.law == "python":
         return "alone"
     if simulation.plant == "thesis":
         return "thesis"
@@ -157,27 +163,16 @@ def _way_to_fly(scenario: Scenario, native: bool) -> object:
     return loop, scenario.vehicle.tilt_servo.stops, scenario.ground is not None, file
 
 
-def _natively(scenario: Scenario) -> Scenario:
-    """The same scenario, on the native engine."""
-    simulation = scenario.simulation.model_copy(update={"engine": "native"})
-    return scenario.model_copy(update={"simulation": simulation})
-
-
-def _fly_natively(scenario: Scenario) -> Flight:
-    """A flight of its own that many others make worth the native engine."""
-    return replace(simulate(_natively(scenario)), scenario=scenario)
-
-
 def _in_order(
-    fly: Callable[[Scenario], FlightResult],
-    scenarios: Sequence[Scenario],
+    fly: Callable[[Assembly], FlightResult],
+    assemblies: Sequence[Assembly],
     threads: int,
     pool: ThreadPoolExecutor,
 ) -> Iterator[FlightResult]:
     """Results of flights that do not need MuJoCo's callback, some of them under way at a time."""
     waiting: deque[Future[FlightResult]] = deque()
-    for scenario in scenarios:
-        waiting.append(pool.submit(fly, scenario))
+    for assembly in assemblies:
+        waiting.append(pool.submit(fly, assembly))
         if len(waiting) > 2 * threads:
             yield waiting.popleft().result()
     while waiting:
@@ -187,12 +182,12 @@ def _in_order(
 class _Row:
     """One flight under way in a row of a batch."""
 
-    def __init__(self, index: int, scenario: Scenario, plant: MujocoPlant) -> None:
-        self.index, self.scenario, self.plant = index, scenario, plant
-        self.watch = TerminationMonitor(scenario)
+    def __init__(self, index: int, assembly: Assembly, plant: MujocoPlant) -> None:
+        self.index, self.assembly, self.plant = index, assembly, plant
+        self.watch = TerminationMonitor(assembly)
         self.first = np.array([plant.time, *plant.observe()])
         self.end = self.watch.judge(plant, self.first)
-        simulation = scenario.simulation
+        simulation = assembly.scenario.simulation
         self.interval = simulation.record_steps
         full, rest = divmod(simulation.steps, self.interval)
         self.intervals = [self.interval] * full + [rest] * (rest > 0)
@@ -209,20 +204,20 @@ class _Row:
 
     def save(self, state: Floats) -> None:
         """Keep where a call begins."""
-        time, timestep = float(state[0]), self.scenario.simulation.timestep
+        time, timestep = float(state[0]), self.assembly.scenario.simulation.timestep
         state = state.copy()
         self.saved = [self.saved[-1], (round(time / timestep), state)]
 
     def finish(self) -> Flight:
         """The flight; the end of a lost one is looked for step by step, as a single flight does."""
         samples = list(self.recorder.samples)
-        if self.recorder.lost:
+        if self.recorder.terminated:
             samples.pop()
         if self.end is None and len(samples) < len(self.intervals):
             samples = self._look_for_the_end(samples)
         end = self.end or End("completed", float(samples[-1][0]))
         everything = np.array([self.first, *samples])
-        return Flight(self.scenario, everything, end, "native", self.wall_time)
+        return Flight(self.assembly, everything, end, "native", self.wall_time)
 
     def _look_for_the_end(self, samples: list[Floats]) -> list[Floats]:
         steps, state = self.saved[0]
@@ -245,19 +240,19 @@ class _BatchFlight:
 
     def __init__(
         self,
-        scenarios: Sequence[Scenario],
+        assemblies: Sequence[Assembly],
         threads: int,
         pool: ThreadPoolExecutor,
         result: Callable[[Flight], FlightResult],
     ) -> None:
-        self._waiting = deque(enumerate(scenarios))
+        self._waiting = deque(enumerate(assemblies))
         self._threads, self._pool, self._result = threads, pool, result
-        self._parameters = max(len(control_setup(s).userdata) for s in scenarios)
+        self._knots = max(len(assembly.setup.knots) for assembly in assemblies)
         self._models: dict[str, mujoco.MjModel] = {}
-        loop = loop_of(scenarios[0])
-        largest = max(s.simulation.steps // s.simulation.record_steps for s in scenarios) + 2
-        fitting = MEMORY // (8 * len(loop.sample_fields) * largest)
-        self._size = max(1, min(len(scenarios), ROWS_PER_THREAD * threads, fitting))
+        simulations = [assembly.scenario.simulation for assembly in assemblies]
+        largest = max(s.steps // s.record_steps for s in simulations) + 2
+        fitting = MEMORY // (8 * len(assemblies[0].loop.sample_fields) * largest)
+        self._size = max(1, min(len(assemblies), ROWS_PER_THREAD * threads, fitting))
 
     def results(self) -> Iterator[tuple[int, FlightResult]]:
         """Pairs of a scenario's place and its result, in the order in which they come."""
@@ -283,10 +278,10 @@ class _BatchFlight:
             if flying:
                 steps = self._fly(batch, flying, steps)
                 for place, row in flying.items():
-                    if row.recorder.full or row.recorder.lost or batch.warning[place].any():
+                    if row.recorder.full or row.recorder.terminated or batch.warning[place].any():
                         batch.warning[place] = 0
                         rows[place] = None
-                        lost = not row.recorder.full or row.recorder.lost
+                        lost = not row.recorder.full or row.recorder.terminated
                         if lost:  # its end is looked for with MuJoCo's callback, which is global
                             flight = row.finish()
                             future = self._pool.submit(self._result, flight)
@@ -303,15 +298,14 @@ class _BatchFlight:
                 return
 
     def _take_next(self) -> _Row:
-        index, scenario = self._waiting.popleft()
-        native, key = _natively(scenario), model_cache_key(scenario)
+        index, assembly = self._waiting.popleft()
+        key = model_cache_key(assembly.scenario)
         model = self._models.get(key)
         if model is None:
             if len(self._models) > 2 * self._size:
                 self._models.clear()
-            model = self._models[key] = flight_model(native, self._parameters)
-        plant = MujocoPlant(native, model)
-        return _Row(index, scenario, plant)
+            model = self._models[key] = flight_model(assembly, self._knots)
+        return _Row(index, assembly, MujocoPlant(assembly, model, "native"))
 
     def _hand_over(self, row: _Row) -> Future[FlightResult]:
         return self._pool.submit(lambda: self._result(row.finish()))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import copysign, isfinite
 
+from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.limits import (
     ALTITUDE_ERROR,
     BODY_RATE,
@@ -15,19 +16,17 @@ from tiltsim.closed_loop.limits import (
     horizontal_error,
 )
 from tiltsim.flight.end import End
-from tiltsim.laws.assembling import control_setup, loop_of
 from tiltsim.plants.plant import Plant
-from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
 
 
 class TerminationMonitor:
     """Decides from the samples of one flight whether it is lost, and why."""
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._loop, self._setup = loop_of(scenario), control_setup(scenario)
-        self._reference, self._knots = scenario.reference_and_knots()
-        self._follows_position = self._loop.follows_position(scenario)
+    def __init__(self, assembly: Assembly) -> None:
+        self._loop, self._setup = assembly.loop, assembly.setup
+        self._reference, self._knots = assembly.reference, assembly.knots
+        self._follows_position = assembly.follows_position
         self._sides: dict[int, float] = {}
 
     def judge(self, plant: Plant, sample: Floats) -> End | None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tiltsim.engines.base import EngineName
-from tiltsim.laws.assembling import loop_of
-from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE, with_engine
+from tiltsim.laws.assembling import assemble, loop_of
+from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE
 from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.interrupts import reraise_swallowed_interrupts
@@ -27,7 +27,7 @@ def shared_engine(scenarios: Sequence[Scenario], steps: int | None = None) -> En
         kind = (loop_of(scenario), scenario.simulation.plant)
         if kind not in ready and scenario.controller.law != "python":
             with reraise_swallowed_interrupts():
-                plant = make_plant(with_engine(scenario, "native"))
+                plant = make_plant(assemble(scenario), engine="native")
                 plant.record(1, 1)  # on the thesis plant compiled apart from `advance`
                 plant.advance(1)
             ready.add(kind)

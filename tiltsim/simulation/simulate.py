@@ -8,8 +8,11 @@ from typing import Final
 
 import numpy as np
 
+from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.engines.base import EngineName
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
+from tiltsim.laws.assembling import assemble
 from tiltsim.plants.command import Controller, ControllerError
 from tiltsim.plants.factory import make_plant
 from tiltsim.plants.plant import Plant
@@ -59,9 +62,30 @@ def simulate(
     """
     if controller is not None:
         scenario = with_controller(scenario, controller)
-    simulation = scenario.simulation
-    plant = make_plant(scenario, controller)
-    watch = TerminationMonitor(scenario)
+    return simulate_assembly(assemble(scenario), observer, controller=controller)
+
+
+def simulate_assembly(
+    assembly: Assembly,
+    observer: Observer | None = None,
+    *,
+    controller: Controller | type | None = None,
+    engine: EngineName | None = None,
+) -> Flight:
+    """As `simulate`, for a flight that is assembled already.
+
+    Parameters
+    ----------
+    assembly
+        The flight; under a ``controller`` of the user's its scenario's law is ``python``.
+    observer, controller
+        See `simulate`.
+    engine
+        In place of the scenario's.
+    """
+    simulation = assembly.scenario.simulation
+    plant = make_plant(assembly, controller, engine)
+    watch = TerminationMonitor(assembly)
     samples: list[Floats] = []
 
     def keep(sample: Floats) -> None:
@@ -98,7 +122,7 @@ def simulate(
     wall_time = perf_counter() - start
     if end is None:
         end = End("completed", plant.time)
-    return Flight(scenario, np.array(samples), end, plant.engine, wall_time)
+    return Flight(assembly, np.array(samples), end, plant.engine, wall_time)
 
 
 def _sample(plant: Plant) -> Floats:

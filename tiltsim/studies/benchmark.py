@@ -22,6 +22,7 @@ from tiltsim.engines.base import EngineName
 from tiltsim.engines.callback import control_callback
 from tiltsim.engines.factory import make_engine
 from tiltsim.engines.native_engine import compile_empty
+from tiltsim.laws.assembling import assemble
 from tiltsim.laws.attitude_altitude import TILTROTOR
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.loading import parse_scenario
@@ -50,14 +51,13 @@ Rows = list[dict[str, Any]]
 
 def flying_plant(integrator: str) -> MujocoPlant:
     """A tiltrotor in steady flight with tilted rotors, so that every part of the loop is active."""
-    plant = MujocoPlant(
-        parse_scenario(
-            {
-                "simulation": {"integrator": integrator, "engine": "native"},
-                "gait": {"type": "fixed", "angles": [-0.65, -0.65, 0.65, 0.65]},
-            }
-        )
+    scenario = parse_scenario(
+        {
+            "simulation": {"integrator": integrator, "engine": "native"},
+            "gait": {"type": "fixed", "angles": [-0.65, -0.65, 0.65, 0.65]},
+        }
     )
+    plant = MujocoPlant(assemble(scenario))
     plant.advance(10_000)
     return plant
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from tiltsim.closed_loop.limits import rotorcraft_limit_exceeded
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
+from tiltsim.vehicles.rotorcraft_metrics import rotorcraft_metrics
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import STATE_FIELDS
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     import mujoco
 
     from tiltsim.models.parts import ExtraActuators
+    from tiltsim.scenario.flight_plan import FlightPlan
     from tiltsim.scenario.scenario import Scenario
     from tiltsim.scenario.vehicle import VehicleTable
 
@@ -100,23 +102,23 @@ def _compile(
     return compile_model(spec, visuals=visuals)
 
 
-def initial_tilts(scenario: Scenario) -> tuple[Quad, Quad]:
+def initial_tilts(plan: FlightPlan) -> tuple[Quad, Quad]:
     """Tilt angles (rad) and tilt rates (rad/s) of a tiltrotor at time zero: its gait's.
 
     A flight begins in the midst of its gait, as the thesis has it, whose angles follow the plan
     exactly. So nothing swings in, and no pod is faster than its servo can be.
     """
-    gait = scenario.gait.plan(scenario.rotorcraft.resolve())
+    gait = plan.gait
     a1, a2, a3, a4, *planned = tilt_reference(0.0, gait.parameters, gait.knots)
-    fastest = scenario.rotorcraft.tilt_servo.max_rate or inf
+    fastest = plan.scenario.rotorcraft.tilt_servo.max_rate or inf
     rate_1, rate_2, rate_3, rate_4 = (clipped(rate, -fastest, fastest) for rate in planned)
     return (a1, a2, a3, a4), (rate_1, rate_2, rate_3, rate_4)
 
 
-def _initial_motion(scenario: Scenario) -> tuple[Vector, Vector]:
-    initial = scenario.initial
-    tilting = scenario.rotorcraft.model == "tiltrotor"
-    angles, rates = initial_tilts(scenario) if tilting else ((), ())
+def _initial_motion(plan: FlightPlan) -> tuple[Vector, Vector]:
+    initial = plan.scenario.initial
+    tilting = plan.scenario.rotorcraft.model == "tiltrotor"
+    angles, rates = initial_tilts(plan) if tilting else ((), ())
     return (
         (*initial.position, *quaternion_from_euler(*initial.attitude), *angles),
         (*initial.velocity, *initial.angular_velocity, *rates),
@@ -131,5 +133,6 @@ ROTORCRAFT: Final = VehicleKind(
     compile=_compile,
     initial_motion=_initial_motion,
     limit_exceeded=rotorcraft_limit_exceeded,
+    metrics=rotorcraft_metrics,
 )
 """Tiltrotor and quadrotor."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from tiltsim.closed_loop.limits import tilt_car_limit_exceeded
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
+from tiltsim.vehicles.tilt_car_metrics import tilt_car_metrics
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.tilt_car.vehicle import counter_yaw_per_tilt
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     import mujoco
 
     from tiltsim.models.parts import ExtraActuators
+    from tiltsim.scenario.flight_plan import FlightPlan
     from tiltsim.scenario.scenario import Scenario
 
 ROTORS: Final = (1, 2)
@@ -79,18 +81,17 @@ def _compile(
     return compile_tilt_car(spec, visuals=visuals)
 
 
-def initial_tilt(scenario: Scenario) -> tuple[float, float]:
+def initial_tilt(plan: FlightPlan) -> tuple[float, float]:
     """Tilt angle (rad) and its rate (rad/s) at time zero: the gait's."""
-    gait = scenario.gait.plan(scenario.tilt_car.resolve())
-    angles = tilt_reference(0.0, gait.parameters, gait.knots)
+    angles = tilt_reference(0.0, plan.gait.parameters, plan.gait.knots)
     return angles[0], angles[4]
 
 
-def _initial_motion(scenario: Scenario) -> tuple[Vector, Vector]:
+def _initial_motion(plan: FlightPlan) -> tuple[Vector, Vector]:
     """The car turned out of zero tilt at ``initial.attitude``'s yaw, angular momentum conserved."""
-    initial = scenario.initial
-    share = counter_yaw_per_tilt(scenario.tilt_car.resolve())
-    tilt, rate = initial_tilt(scenario)
+    initial = plan.scenario.initial
+    share = counter_yaw_per_tilt(plan.scenario.tilt_car.resolve())
+    tilt, rate = initial_tilt(plan)
     x, y, _ = initial.position
     vx, vy, _ = initial.velocity
     yaw, r = initial.attitude[2], initial.angular_velocity[2]
@@ -105,5 +106,6 @@ TILT_CAR: Final = VehicleKind(
     compile=_compile,
     initial_motion=_initial_motion,
     limit_exceeded=tilt_car_limit_exceeded,
+    metrics=tilt_car_metrics,
 )
 """The tilt-car."""

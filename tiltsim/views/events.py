@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from tiltsim.flight.saturation import at_lower_limit, at_upper_limit
 from tiltsim.laws.assembling import loop_of
 from tiltsim.laws.layers.supervision import SUPERVISION
+from tiltsim.vehicles.saturation import at_lower_limit, at_upper_limit
 from tiltsim.views.attitude_plane import SUPERVISION_THRESHOLD, margin_threshold
 from tiltsim.views.titles import describe_controller
 from tiltsim_controllers.mathematics.scalar import Floats

@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import mujoco
 import numpy as np
 
-from tiltsim.closed_loop.userdata import HEADER_SIZE
-from tiltsim.laws.assembling import control_setup
 from tiltsim.plants.flight_model import build_model
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import position_reference
 
 if TYPE_CHECKING:
+    from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.scenario.scenario import Scenario
 
 Columns = Mapping[str, Floats]
@@ -37,11 +36,9 @@ class Poses(NamedTuple):
     quaternion: Floats  # (N, nbody, 4), scalar first
 
 
-def visible_model(scenario: Scenario) -> mujoco.MjModel:
-    """The compiled model of a scenario's vehicle, visual geometry included."""
-    # The same arguments as for the flight, so that the compiled model is found in the cache.
-    userdata_size = HEADER_SIZE + len(control_setup(scenario).userdata)
-    return build_model(scenario, userdata_size=userdata_size, visuals=True)
+def visible_model(assembly: Assembly) -> mujoco.MjModel:
+    """The compiled model of a flight's vehicle, visual geometry included."""
+    return build_model(assembly, visuals=True)
 
 
 def joint_positions(model: mujoco.MjModel, columns: Columns) -> Floats:

@@ -7,8 +7,9 @@ import pytest
 
 import tiltsim
 from tiltsim.errors import InputError
-from tiltsim.laws.assembling import LOOPS, loop_of
+from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.factory import make_plant
+from tiltsim.scenario.flight_plan import plan_flight
 from tiltsim_controllers.analysis.stability import delay_margin, is_hurwitz, longest_lag
 from tiltsim_controllers.laws.gains import GAIN_SETS
 
@@ -85,12 +86,12 @@ def test_engines_fly_the_same_flight(timing):
 @continuous_and_late
 def test_a_saved_state_restarts_bit_identically(timing):
     wanted = scenario(EVERYTHING, simulation=timing)
-    straight = make_plant(wanted)
+    straight = make_plant(assemble(wanted))
     straight.advance(101)
     saved, seen = straight.state, straight.observe()
     straight.advance(60)
 
-    restarted = make_plant(wanted)
+    restarted = make_plant(assemble(wanted))
     restarted.advance(13)
     restarted.state = saved
     assert restarted.observe() == seen
@@ -141,7 +142,7 @@ def test_full_pose_tells_no_pod_more_than_its_limit(plant):
 def test_rotors_follow_the_speeds_they_are_told_with_a_first_order_lag():
     lag = 0.03
     plant = make_plant(
-        scenario(vehicle={"rotor_time_constant": lag}, simulation={"timestep": 0.0005})
+        assemble(scenario(vehicle={"rotor_time_constant": lag}, simulation={"timestep": 0.0005}))
     )
     speeds, told = [], []
     for _ in range(200):
@@ -283,8 +284,8 @@ def test_allocation_from_a_lean_does_not_hang_on_a_last_bit():
 
 def test_commands_take_effect_after_the_latency():
     late = scenario(simulation=LATE)
-    plant, law = make_plant(late), LOOPS["attitude_altitude"]
-    setup = loop_of(late).setup(late, 0.0)
+    plant, law = make_plant(assemble(late)), LOOPS["attitude_altitude"]
+    setup = loop_of(late).setup(plan_flight(late), 0.0)
     asked, in_force = [], []
     for _ in range(30):
         data = plant.data

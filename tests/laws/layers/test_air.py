@@ -11,7 +11,7 @@ import pytest
 import tiltsim
 from tiltsim.engines.callback import control_callback
 from tiltsim.errors import InputError
-from tiltsim.laws.assembling import LOOPS, loop_of
+from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.factory import make_plant
 from tiltsim_controllers.vehicle.air import dryden_velocity, ground_effect
 
@@ -70,11 +70,11 @@ def test_the_quadrotor_flies_the_same_flight_natively():
 
 @pytest.mark.parametrize("timing", [{}, LATE], ids=["continuous", "late"])
 def test_a_saved_state_restarts_bit_identically(timing):
-    straight = make_plant(scenario(STORM, timing))
+    straight = make_plant(assemble(scenario(STORM, timing)))
     straight.advance(51)
     saved, seen = straight.state, straight.observe()
     straight.advance(40)
-    restarted = make_plant(scenario(STORM, timing))
+    restarted = make_plant(assemble(scenario(STORM, timing)))
     restarted.advance(13)
     restarted.state = saved
     assert restarted.observe() == seen
@@ -99,11 +99,11 @@ def test_a_steady_wind_is_leant_against_and_held_by_position_error():
 def test_a_falling_body_feels_drag_alone():
     """Early in a flight along x: m v' = -(c + rho A v / 2) v."""
     air = {"drag": {"linear": [0.3, 0.3, 0.3], "area": [0.05, 0.05, 0.05]}}
-    plant = make_plant(scenario(air))
+    plant = make_plant(assemble(scenario(air)))
     plant.data.qvel[:3] = [4.0, 0.0, 0.0]
     plant.data.ctrl[:] = 0.0
     plant.advance(1)
-    without = make_plant(scenario({}))
+    without = make_plant(assemble(scenario({})))
     without.data.qvel[:3] = [4.0, 0.0, 0.0]
     without.advance(1)
     change = (plant.data.qvel[0] - without.data.qvel[0]) / 0.004
@@ -114,7 +114,7 @@ def test_a_falling_body_feels_drag_alone():
 def test_turbulence_is_logged_as_it_blows():
     flight = fly(STORM)
     states = np.stack([flight[f"dryden_{i}"] for i in range(1, 6)], axis=-1)
-    turbulence = loop_of(flight.scenario).setup(flight.scenario, 0.0).parameters.layer.air
+    turbulence = flight.assembly.setup.parameters.layer.air
     x, y, z = dryden_velocity(tuple(states[0]), turbulence.turbulence)
     start = [flight[name][0] for name in ("air_vx", "air_vy", "air_vz")]
     np.testing.assert_allclose(start, [4.0 + x, 1.0 + y, z])
@@ -123,7 +123,7 @@ def test_turbulence_is_logged_as_it_blows():
 
 def accelerations(air, height, roll):
     """Linear and angular (world, body) of a tiltrotor in hover at a height, from its model."""
-    plant = make_plant(scenario(air, tables={**TILTROTOR, "gait": {"type": "fixed"}}))
+    plant = make_plant(assemble(scenario(air, tables={**TILTROTOR, "gait": {"type": "fixed"}})))
     hover = 361.3829880001334
     plant.data.qpos[:7] = [0.0, 0.0, height, np.cos(roll / 2.0), np.sin(roll / 2.0), 0.0, 0.0]
     plant.data.act[:4] = [-hover, hover, -hover, hover]

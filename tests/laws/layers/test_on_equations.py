@@ -10,8 +10,8 @@ import pytest
 import tiltsim
 from tiltsim.equations.driven import ACTUATOR_PLANTS
 from tiltsim.errors import InputError
-from tiltsim.laws.assembling import LOOPS, loop_of
-from tiltsim.plants import mujoco_plant as plants
+from tiltsim.laws import assembling
+from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.factory import make_plant
 from tiltsim_controllers.laws.yaw_position import gyroscopic_acceleration
 
@@ -101,7 +101,7 @@ def gyroscopic_torque(monkeypatch):
         turns = wanted.simulation.plant == "thesis" and wanted.vehicle.model == "tiltrotor"
         return with_gyroscopic_torque(loop) if turns else loop
 
-    monkeypatch.setattr(plants, "loop_of", found)
+    monkeypatch.setattr(assembling, "loop_of", found)
 
 
 def furthest(flights, names):
@@ -189,11 +189,11 @@ def test_engines_fly_the_same_flight(name):
 @on_layered_flights
 def test_a_saved_state_restarts_bit_identically(name):
     wanted = scenario(*LAYERED[name], {"simulation": {"plant": "thesis"}})
-    straight = make_plant(wanted)
+    straight = make_plant(assemble(wanted))
     straight.advance(51)
     saved, seen = straight.state, straight.observe()
     straight.advance(40)
-    restarted = make_plant(wanted)
+    restarted = make_plant(assemble(wanted))
     restarted.advance(13)
     restarted.state = saved
     assert restarted.observe() == seen
@@ -207,7 +207,7 @@ def test_a_saved_state_restarts_bit_identically(name):
 @pytest.mark.parametrize("base", [TILTROTOR, QUADROTOR])
 def test_a_state_that_has_overflowed_is_seen_as_no_number(base):
     """The last addition of a step may give infinity, of which floats have no sine."""
-    plant = make_plant(scenario(base, STORM, {"simulation": {"plant": "thesis"}}))
+    plant = make_plant(assemble(scenario(base, STORM, {"simulation": {"plant": "thesis"}})))
     state, motion = (
         plant.state,
         ACTUATOR_PLANTS[base.get("vehicle", {}).get("model", "tiltrotor")].motion,

@@ -7,6 +7,7 @@ import pytest
 
 import tiltsim
 from tiltsim.errors import InputError
+from tiltsim.laws.assembling import assemble
 from tiltsim.plants.factory import make_plant
 from tiltsim.simulation.batch import fly
 from tiltsim_controllers.analysis.singularity import determinant
@@ -77,11 +78,11 @@ def test_engines_batches_and_restarts_agree(law, strategy):
     (row,) = fly([compiled], keep_samples=True)
     np.testing.assert_array_equal(row.flight.samples, python.samples)
 
-    straight = make_plant(wanted)
+    straight = make_plant(assemble(wanted))
     straight.advance(300)
     saved = straight.state
     straight.advance(60)
-    restarted = make_plant(wanted)
+    restarted = make_plant(assemble(wanted))
     restarted.state = saved
     restarted.advance(60)
     np.testing.assert_array_equal(restarted.state, straight.state)

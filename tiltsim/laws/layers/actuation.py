@@ -47,6 +47,7 @@ from tiltsim_controllers.vehicle.sensors import (
 )
 
 if TYPE_CHECKING:
+    from tiltsim.scenario.flight_plan import FlightPlan
     from tiltsim.scenario.scenario import Scenario
 
 COMMANDS: Final = 8
@@ -307,9 +308,9 @@ def with_actuation(loop: ClosedLoop, latency_steps: int) -> ClosedLoop:
 
     controls.__qualname__ = f"with_actuation.{latency_steps}.{loop.controls.__qualname__}"
 
-    def initial_activations(scenario: Scenario, setup: ControlSetup) -> Vector:
-        law_states = layered.initial_activations(scenario, setup)
-        waiting = (*initial_tilts(scenario)[0], 0.0, 0.0, 0.0, 0.0) * latency_steps
+    def initial_activations(plan: FlightPlan, setup: ControlSetup) -> Vector:
+        law_states = layered.initial_activations(plan, setup)
+        waiting = (*initial_tilts(plan)[0], 0.0, 0.0, 0.0, 0.0) * latency_steps
         return (*law_states, *law_states[:ROTORS], *waiting)
 
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -332,7 +333,8 @@ def with_actuation(loop: ClosedLoop, latency_steps: int) -> ClosedLoop:
     )
 
 
-def _actuation(scenario: Scenario) -> Actuation:
+def _actuation(plan: FlightPlan) -> Actuation:
+    scenario = plan.scenario
     vehicle, simulation, controller = scenario.rotorcraft, scenario.simulation, scenario.controller
     low, high = vehicle.min_rotor_speed, vehicle.max_rotor_speed
     slowest, fastest = vehicle.speeds_along_spin
@@ -352,7 +354,7 @@ def _actuation(scenario: Scenario) -> Actuation:
         fastest=fastest,
         rotor_pole=0.0 if time_constant is None else 1.0 / time_constant,
         servo_reach=inf if max_rate is None else servo_lead(vehicle.tilt_servo) * max_rate,
-        faults=_faults(scenario),
+        faults=_faults(plan),
     )
 
 
@@ -371,10 +373,10 @@ def sensor_parameters(scenario: Scenario) -> Sensors:
     )
 
 
-def _faults(scenario: Scenario) -> Faults:
+def _faults(plan: FlightPlan) -> Faults:
     faults = [RotorFault()] * ROTORS
-    gait = scenario.gait.plan(scenario.vehicle.resolve())
-    for table in scenario.fault:
+    gait = plan.gait
+    for table in plan.scenario.fault:
         fault = faults[table.rotor - 1]
         if table.type == "stuck_servo":
             planned = tilt_reference(table.time, gait.parameters, gait.knots)[table.rotor - 1]

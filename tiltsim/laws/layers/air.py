@@ -38,7 +38,7 @@ from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.flight_plan import FlightPlan
 
 WRENCH: Final = 6
 AIR_COLUMNS: Final = ("air_vx", "air_vy", "air_vz")
@@ -165,9 +165,9 @@ def with_air(loop: ClosedLoop) -> ClosedLoop:
 
     controls.__qualname__ = f"with_air.{loop.controls.__qualname__}"
 
-    def initial_activations(scenario: Scenario, setup: ControlSetup) -> Vector:
+    def initial_activations(plan: FlightPlan, setup: ControlSetup) -> Vector:
         turbulence = setup.parameters.layer.air.turbulence
-        return (*layered.initial_activations(scenario, setup), *stationary_states(turbulence))
+        return (*layered.initial_activations(plan, setup), *stationary_states(turbulence))
 
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
         columns = layered.derive(samples, setup)
@@ -199,7 +199,8 @@ def with_air(loop: ClosedLoop) -> ClosedLoop:
     )
 
 
-def _surroundings(scenario: Scenario) -> Surroundings:
+def _surroundings(plan: FlightPlan) -> Surroundings:
+    scenario = plan.scenario
     table = scenario.air
     turbulence = Turbulence()
     if table.turbulence is not None:

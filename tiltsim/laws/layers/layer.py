@@ -11,11 +11,11 @@ from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.flight_plan import FlightPlan
 
 
 def around(
-    loop: ClosedLoop, record: type[tuple[Any, ...]], read: Callable[[Scenario], Any]
+    loop: ClosedLoop, record: type[tuple[Any, ...]], read: Callable[[FlightPlan], Any]
 ) -> ClosedLoop:
     """A loop whose parameters hold those of a layer, too: the fields ``layer`` and ``law``.
 
@@ -29,7 +29,7 @@ def around(
     record
         The type of the field ``layer``.
     read
-        ``(scenario) -> layer``.
+        ``(plan) -> layer``.
     """
     parameters_type = make_record_type(
         f"{record.__name__}Parameters", signature=float, layer=record, law=loop.parameters
@@ -54,17 +54,15 @@ def around(
         watched: Values = inner_watch(values, parameters.law)
         return watched
 
-    def setup(scenario: Scenario, signature: float) -> ControlSetup:
-        inner = loop.setup(scenario, loop.signature)
-        return ControlSetup(
-            parameters_type(signature, read(scenario), inner.parameters), inner.knots
-        )
+    def setup(plan: FlightPlan, signature: float) -> ControlSetup:
+        inner = loop.setup(plan, loop.signature)
+        return ControlSetup(parameters_type(signature, read(plan), inner.parameters), inner.knots)
 
     def within(setup: ControlSetup) -> ControlSetup:
         return ControlSetup(setup.parameters.law, setup.knots)
 
-    def initial_activations(scenario: Scenario, setup: ControlSetup) -> Vector:
-        return loop.initial_activations(scenario, within(setup))
+    def initial_activations(plan: FlightPlan, setup: ControlSetup) -> Vector:
+        return loop.initial_activations(plan, within(setup))
 
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
         return loop.derive(samples, within(setup))

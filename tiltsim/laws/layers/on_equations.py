@@ -19,7 +19,7 @@ from tiltsim.models.parts import ExtraActuators
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.flight_plan import FlightPlan
 
 ROTORS = 4
 
@@ -120,8 +120,8 @@ def on_equations(loop: ClosedLoop) -> ClosedLoop:
     equation_inputs.__qualname__ = f"on_equations.{loop.controls.__qualname__}"
     layered = around(loop, Mechanics, mechanics)
 
-    def initial(scenario: Scenario, setup: ControlSetup) -> Vector:
-        return (*driven.initial(scenario), *layered.initial_activations(scenario, setup))
+    def initial(plan: FlightPlan, setup: ControlSetup) -> Vector:
+        return (*driven.initial(plan), *layered.initial_activations(plan, setup))
 
     return replace(
         layered,

@@ -38,7 +38,7 @@ from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values,
 from tiltsim_controllers.vehicle.parameters import drag_ratio
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.flight_plan import FlightPlan
 
 SUPERVISION: Final = "supervision"
 """A column: how much the supervisor does, 0 nothing to 1 all it can.
@@ -215,8 +215,8 @@ def _with_states(loop: ClosedLoop) -> ClosedLoop:
             | {SUPERVISION: supervision}
         )
 
-    def initial_activations(scenario: Scenario, setup: ControlSetup) -> Vector:
-        return (*loop.initial_activations(scenario, setup), 0.0, 0.0)
+    def initial_activations(plan: FlightPlan, setup: ControlSetup) -> Vector:
+        return (*loop.initial_activations(plan, setup), 0.0, 0.0)
 
     controls.__qualname__ = f"supervised.{loop.controls.__qualname__}"
     return replace(

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltsim.errors import InputError
-from tiltsim.laws.assembling import follows_position
 from tiltsim.laws.layers.supervision import SUPERVISION
 from tiltsim.views.attitude_plane import margin_threshold
 from tiltsim.views.figures import style
@@ -108,5 +107,5 @@ def _supervision(axes: Any, flight: Flight) -> Any:
 
 
 def _error(axes: Any, flight: Flight) -> Any:
-    names = "xyz" if follows_position(flight.scenario) else "z"
+    names = "xyz" if flight.assembly.follows_position else "z"
     return np.linalg.norm([flight[f"{axis}_ref"] - flight[axis] for axis in names], axis=0)

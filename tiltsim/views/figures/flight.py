@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
-from tiltsim.laws.assembling import loop_of
 from tiltsim.views.figures.rotorcraft import rotorcraft_figure
 from tiltsim.views.figures.tilt_car import tilt_car_figure
 
@@ -23,4 +22,4 @@ FIGURES: Final[dict[str, Callable[[Flight], Figure]]] = {
 
 def flight_figure(flight: Flight) -> Figure:
     """The page of a flight, with the panels of its kind of vehicle."""
-    return FIGURES[loop_of(flight.scenario).kind.name](flight)
+    return FIGURES[flight.assembly.loop.kind.name](flight)

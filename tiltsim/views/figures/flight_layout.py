@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.laws.assembling import follows_position
 from tiltsim.views.figures import style
 from tiltsim.views.titles import describe_controller, describe_gait
 
@@ -57,7 +56,7 @@ FAR_BEYOND: Final = 4.0
 def plan_view(axes: Any, flight: Flight) -> None:
     """The path seen from above."""
     x, y = flight["x"], flight["y"]
-    if follows_position(flight.scenario):
+    if flight.assembly.follows_position:
         reference = flight["x_ref"], flight["y_ref"]
         if np.ptp(reference[0]) + np.ptp(reference[1]) > 0.0:
             axes.plot(*reference, color=style.INK, ls=":", lw=1.1, label="reference")

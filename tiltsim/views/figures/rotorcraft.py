@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.laws.assembling import follows_position
 from tiltsim.laws.layers.supervision import SUPERVISION
 from tiltsim.views.attitude_plane import (
     HALF_WIDTH,
@@ -87,7 +86,7 @@ def _altitude(axes: Any, flight: Flight) -> None:
 
 
 def _position_error(axes: Any, flight: Flight) -> None:
-    follows = follows_position(flight.scenario)
+    follows = flight.assembly.follows_position
     axes.axhline(0.0, color=style.GREY, lw=0.7)
     for axis, look in zip("xyz", style.AXIS_LINES):
         if follows or axis == "z":

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import rerun as rr
 
-from tiltsim.laws.assembling import loop_of
+from tiltsim.laws.assembling import assemble, loop_of
 from tiltsim.views.events import Event, EventDetector
 from tiltsim.views.replay import visible_model
 from tiltsim.views.rerun import palette
@@ -67,7 +67,8 @@ class FlightRecorder:
         suffix = f"/{part}" if name else ""
         self.name = name
         self.scenario = scenario
-        self.model = visible_model(scenario)
+        self.assembly = assemble(scenario)
+        self.model = visible_model(self.assembly)
         self.display = display = DISPLAYS[loop_of(scenario).kind.name]
         self.scene = Scene(recording, scenario, self.model, f"world{suffix}", color, name)
         self.plane = None

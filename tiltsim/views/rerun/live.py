@@ -111,7 +111,9 @@ class LiveStream:
             pass
         if samples:
             now = float(samples[-1][0])
-            piece = Flight(self._scenario, np.array(samples), End("completed", now), "python", 0.0)
+            piece = Flight(
+                self._recorder.assembly, np.array(samples), End("completed", now), "python", 0.0
+            )
             self._recorder.append(piece)
 
 

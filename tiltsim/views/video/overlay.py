@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 import numpy as np
 
-from tiltsim.laws.assembling import loop_of
 from tiltsim.views.attitude_plane import (
     MOVING_TRAIL_TIME,
     curve_is_constant,
@@ -115,4 +114,4 @@ _ASPECTS: Final[dict[str, type[RotorcraftAspect] | type[TiltCarAspect]]] = {
 
 def aspect_of(flight: Flight, height: int) -> Aspect:
     """How a flight is filmed in frames of a height (pixels)."""
-    return _ASPECTS[loop_of(flight.scenario).kind.name](flight, height)
+    return _ASPECTS[flight.assembly.loop.kind.name](flight, height)

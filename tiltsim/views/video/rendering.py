@@ -11,7 +11,6 @@ import mujoco
 import numpy as np
 
 from tiltsim.errors import InputError
-from tiltsim.laws.assembling import follows_position
 from tiltsim.system.files import replacing
 from tiltsim.views.replay import (
     first_free_body,
@@ -101,14 +100,14 @@ class _Stage:
     def __init__(self, flight: Flight, form: Format) -> None:
         self._flight = flight
         self._pace = "" if form.speed == 1.0 else f", {form.speed:g}x"
-        self._model = model = visible_model(flight.scenario)
+        self._model = model = visible_model(flight.assembly)
         self._data = mujoco.MjData(model)
         self._qpos = joint_positions(model, flight.columns)
         self._body = first_free_body(model)
         self._radius = vehicle_radius(model)
         self._arrow_scale = thrust_scale(model)
         self._reference: Floats | None = None
-        if follows_position(flight.scenario):
+        if flight.assembly.follows_position:
             path = reference_path(flight.scenario, float(flight["time"][-1]), REFERENCE_POINTS)
             self._reference = path if np.ptp(path, axis=0).max() > 0.0 else path[:1]
         self._targets = reference_positions(flight.columns)

@@ -1,0 +1,33 @@
+"""Everything that is prepared for one flight, once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tiltsim.scenario.flight_plan import FlightPlan
+
+if TYPE_CHECKING:
+    from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly(FlightPlan):
+    """A planned flight with its closed loop.
+
+    `tiltsim.laws.assembling.assemble` builds it; plants, engines, the termination monitor, flights,
+    metrics and views read it.
+
+    Attributes
+    ----------
+    loop
+        The controller around the vehicle, with all layers.
+    setup
+        What the control step reads besides the state.
+    follows_position
+        Whether the controller follows the reference's horizontal position.
+    """
+
+    loop: ClosedLoop
+    setup: ControlSetup
+    follows_position: bool

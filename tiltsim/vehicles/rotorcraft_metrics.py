@@ -1,0 +1,118 @@
+"""Metrics of the flights of tiltrotors and quadrotors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from tiltsim.vehicles.saturation import at_lower_limit, at_upper_limit
+from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
+from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from tiltsim.scenario.scenario import Scenario
+
+SETTLED_ALTITUDE: Final = 0.005  # m
+SETTLED: Final = 20.0  # s, from when on the supremum of the position error is taken
+
+
+def rotorcraft_metrics(
+    columns: Mapping[str, Floats], scenario: Scenario, follows_position: bool
+) -> dict[str, float | bool]:
+    """See `tiltsim.closed_loop.vehicle_kind.VehicleKind.metrics`."""
+    time = columns["time"]
+    spins = np.array([sign * columns[f"rotor_speed_{i}"] for i, sign in enumerate(SPIN, start=1)])
+    limits = scenario.rotorcraft
+    saturated = at_upper_limit(spins, limits.max_rotor_speed)
+    saturated |= at_lower_limit(spins, limits.min_rotor_speed)
+    rates = [np.abs(columns[f"alpha_rate_{i}"]).max() for i in (1, 2, 3, 4)]
+    vehicle = limits.resolve()
+    return {
+        **_position_metrics(columns, scenario, follows_position),
+        **_attitude_metrics(columns),
+        "min_rotor_speed": float(spins.min()),
+        "max_rotor_speed": float(spins.max()),
+        **_altitude_metrics(time, columns["z_ref"] - columns["z"]),
+        **_singular_zone_metrics(columns),
+        "max_tilt_rate": float(max(rates)),
+        "min_singularity_margin": float(columns["singularity_margin"].min()),
+        "min_decoupling_condition": _min_decoupling_condition(columns, vehicle),
+        "saturated_fraction": float(saturated.any(axis=0).mean()),
+    }
+
+
+def _position_metrics(
+    columns: Mapping[str, Floats], scenario: Scenario, follows_position: bool
+) -> dict[str, float | bool]:
+    time, metrics = columns["time"], {}
+    last_second, settled = time >= time[-1] - 1.0, time >= SETTLED
+    errors = {axis: columns[f"{axis}_ref"] - columns[axis] for axis in ("x", "y", "z")}
+    for axis, error in errors.items():
+        if follows_position or axis == "z":
+            metrics[f"final_position_error_{axis}"] = float(np.mean(error[last_second]))
+    if not follows_position or not settled.any():
+        return metrics
+    horizontal = np.hypot(errors["x"], errors["y"])
+    metrics["sup_position_error_after_20s"] = float(horizontal[settled].max())
+    metrics["least_position_error_after_20s"] = float(horizontal[settled].min())
+    if scenario.reference.type == "circle":
+        centre_x, centre_y, _ = scenario.reference.position
+        orbit = np.hypot(columns["x"] - centre_x, columns["y"] - centre_y)[settled]
+        metrics["max_orbit_radius_after_20s"] = float(orbit.max())
+        metrics["min_orbit_radius_after_20s"] = float(orbit.min())
+    return metrics
+
+
+def _attitude_metrics(columns: Mapping[str, Floats]) -> dict[str, float | bool]:
+    time, angles, metrics = columns["time"], ("roll", "pitch", "yaw"), {}
+    last_second = time >= time[-1] - 1.0
+    for angle in angles:
+        # Near half a revolution samples of one direction have both signs.
+        metrics[f"final_{angle}"] = float(np.mean(np.unwrap(columns[angle][last_second])))
+    metrics["final_attitude_error"] = max(
+        float(np.abs(_wrapped(columns[f"{angle}_ref"] - columns[angle])[last_second]).max())
+        for angle in angles
+    )
+    for angle in ("roll", "pitch"):
+        metrics[f"max_abs_{angle}"] = float(np.abs(columns[angle]).max())
+    return metrics
+
+
+def _wrapped(angle: Floats) -> Floats:
+    """An angle within half a turn of zero."""
+    return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
+
+
+def _altitude_metrics(time: Floats, error: Floats) -> dict[str, float | bool]:
+    metrics = {"altitude_overshoot": max(0.0, float(-error.min()))}
+    outside = np.flatnonzero(np.abs(error) > SETTLED_ALTITUDE)
+    if not outside.size or outside[-1] < len(time) - 1:
+        metrics["altitude_settling_time"] = float(time[outside[-1] + 1]) if outside.size else 0.0
+    return metrics
+
+
+def _singular_zone_metrics(columns: Mapping[str, Floats]) -> dict[str, float | bool]:
+    """Chapter 2's determinant and the switches between its laws, where a flight has them."""
+    metrics = {}
+    if "published_determinant" in columns:
+        metrics["max_published_determinant"] = float(columns["published_determinant"].max())
+        metrics["min_published_determinant"] = float(columns["published_determinant"].min())
+    if "attitude_zone" in columns:
+        switches = np.flatnonzero(np.diff(columns["attitude_zone"]))
+        metrics["switches"] = float(switches.size)
+        if switches.size:
+            metrics["first_switch_time"] = float(columns["time"][switches[0] + 1])
+    return metrics
+
+
+def _min_decoupling_condition(columns: Mapping[str, Floats], vehicle: Vehicle) -> float:
+    tilts = np.stack([columns[f"alpha_{rotor}"] for rotor in (1, 2, 3, 4)], axis=-1)
+    up = world_up(columns["roll"], columns["pitch"])
+    lift = np.einsum("ni,nij->nj", up, force_matrix(tilts))[:, np.newaxis]
+    torque = torque_matrix(tilts, vehicle)
+    values = np.linalg.svd(np.concatenate([torque, lift], axis=1), compute_uv=False)
+    return float((values[:, -1] / values[:, 0]).min())

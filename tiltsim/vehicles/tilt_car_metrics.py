@@ -1,0 +1,43 @@
+"""Metrics of the flights of the tilt-car."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tiltsim.vehicles.rotorcraft_metrics import SETTLED
+from tiltsim.vehicles.saturation import at_lower_limit
+from tiltsim_controllers.mathematics.scalar import Floats
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from tiltsim.scenario.scenario import Scenario
+
+
+def tilt_car_metrics(
+    columns: Mapping[str, Floats], _scenario: Scenario, _follows_position: bool
+) -> dict[str, float | bool]:
+    """See `tiltsim.closed_loop.vehicle_kind.VehicleKind.metrics`."""
+    time, metrics = columns["time"], {}
+    last_second, settled = time >= time[-1] - 1.0, time >= SETTLED
+    errors = {axis: columns[f"{axis}_ref"] - columns[axis] for axis in ("x", "y")}
+    speeds = np.array([columns["rotor_speed_1"], columns["rotor_speed_2"]])
+    for axis, error in errors.items():
+        metrics[f"final_position_error_{axis}"] = float(np.mean(error[last_second]))
+    if settled.any():
+        horizontal = np.hypot(errors["x"], errors["y"])
+        metrics["sup_position_error_after_20s"] = float(horizontal[settled].max())
+    for axis, error in errors.items():
+        metrics[f"max_abs_error_{axis}"] = float(np.abs(error).max())
+    if "lyapunov" in columns:
+        metrics["max_lyapunov"] = float(columns["lyapunov"].max())
+    metrics["final_input_split"] = float(np.mean(columns["input_split"][last_second]))
+    metrics["final_yaw"] = float(np.mean(columns["yaw"][last_second]))
+    metrics["min_rotor_speed"] = float(speeds.min())
+    metrics["max_rotor_speed"] = float(speeds.max())
+    metrics["max_tilt_rate"] = float(np.abs(columns["alpha_rate"]).max())
+    # A thrust cannot pull: at rest a rotor is at its limit.
+    metrics["saturated_fraction"] = float(at_lower_limit(speeds, 0.0).any(axis=0).mean())
+    return metrics
