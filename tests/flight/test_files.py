@@ -13,13 +13,13 @@ import pytest
 
 from tests.flights import SAMPLE_FIELDS
 from tiltsim.errors import InputError
+from tiltsim.flight import writing
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.flight.reading import load_flight
 from tiltsim.flight.writing import metrics_json
 from tiltsim.scenario.document import scenario_toml, without_none
 from tiltsim.scenario.loading import parse_scenario
-from tiltsim.system import files
 from tiltsim.system.files import prepare_folder
 from tiltsim.vehicles.rotorcraft import COLUMN_UNITS
 
@@ -67,7 +67,7 @@ def test_a_write_that_fails_leaves_the_old_file_whole(tmp_path, monkeypatch, wri
             path.write_bytes(b"half")
         raise failure
 
-    monkeypatch.setattr(pq if writer == "write_table" else files, writer, half_written)
+    monkeypatch.setattr(pq if writer == "write_table" else writing, writer, half_written)
     with pytest.raises(type(failure)):
         flight(x=2.0).save(tmp_path)
     after = contents(tmp_path)

@@ -536,7 +536,7 @@ def returning(value):
         (returning(Command(thrusts=[10**400] * 4)), ["; 4 numbers are wanted"]),
         (returning(MuteError()), ["returned a MuteError; a tiltsim.Command is wanted"]),
         (leaves, ["leaves raised SystemExit: 5"]),
-        (raises_unspeakably, ["raises_unspeakably raised MuteError (test_own_controller.py"]),
+        (raises_unspeakably, ["raises_unspeakably raised MuteError (test_user_controller.py"]),
     ],
 )
 def test_a_failing_controller_ends_the_flight_with_one_line_and_a_log(law, words):

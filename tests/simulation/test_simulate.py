@@ -412,7 +412,7 @@ def test_compiled_callbacks_are_loaded_by_the_next_process():
         pytest.skip("the cache folder is not writable")
     compile_callbacks(TILTROTOR)
     program = (
-        "from tiltsim.laws.tiltrotor import TILTROTOR\n"
+        "from tiltsim.laws.attitude_altitude import TILTROTOR\n"
         "from tiltsim.engines.native_engine import compile_callbacks\n"
         "print([callback.cache_hits for callback in compile_callbacks(TILTROTOR)])"
     )
