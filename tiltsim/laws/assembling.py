@@ -36,7 +36,7 @@ LOOPS: Final[dict[str, ClosedLoop]] = {
     "tilt_car_fourth_derivative": FOURTH_DERIVATIVE,
     "tilt_car_planned_direction": PLANNED_DIRECTION,
 }
-"""Loops by the name of their law; see `tiltsim.scenario.controller_table.ControllerTable.loop_name`."""
+"""Loops by their names; see `tiltsim.scenario.controller_table.ControllerTable.loop_name`."""
 
 
 def loop_of(scenario: Scenario) -> ClosedLoop:
