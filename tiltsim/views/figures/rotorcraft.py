@@ -115,7 +115,7 @@ def _begin_of_gait(flight: Flight) -> float:
     vehicle, end = flight.scenario.vehicle.resolve(), float(flight["time"][-1])
     if not isinstance(vehicle, Vehicle) or SUPERVISION in flight.columns:
         return 0.0
-    period = flight.scenario.gait.plan(vehicle).period
+    period = flight.assembly.gait.period
     return 0.0 if period is None or end <= MANY * period else end - LAST * period
 
 
