@@ -364,7 +364,7 @@ def test_the_quadrotor_leans_into_the_gust():
 MISTAKES = {
     "law of another vehicle": (
         {"vehicle": QUADROTOR},
-        'controller.law = "attitude_altitude": flies the tiltrotor, and vehicle.model = '
+        'controller.law = "attitude_altitude": controls the tiltrotor, and vehicle.model = '
         "'quadrotor'; choose yaw_position, switching, quadrotor_attitude_altitude",
     ),
     "unknown law": ({"controller": {"law": "pid"}}, 'controller.law = "pid": choose attitude'),
@@ -374,31 +374,32 @@ MISTAKES = {
     ),
     "unstable gains": (
         {"vehicle": QUADROTOR, "controller": {"law": "yaw_position", "gains": "ch02"}},
-        "unstable under the exact decoupling matrix by Routh: position [10.0, 20.0, 50.0, 500.0]",
+        "fails the Routh-Hurwitz criterion under the exact decoupling matrix: "
+        "position [10.0, 20.0, 50.0, 500.0]",
     ),
     "gait of a quadrotor": (
         {**LAWS["yaw_position"], "gait": {"type": "fixed", "angles": [0.1, 0.0, 0.0, 0.0]}},
-        "the quadrotor has no use for it",
+        "not supported for the quadrotor",
     ),
     "rotor speed of a quadrotor": (
         {**LAWS["yaw_position"], "initial": {"rotor_speed": 200.0}},
-        "initial.rotor_speed = 200.0: the quadrotor has no use for it",
+        "initial.rotor_speed = 200.0: not supported for the quadrotor",
     ),
     "moving gait under full pose": (
         {"controller": {"law": "full_pose"}, "gait": LAWS["attitude_altitude"]["gait"]},
-        'gait.type = "trot_continuous": the full_pose law moves the pods itself',
+        'gait.type = "trot_continuous": the full_pose law commands the tilts itself',
     ),
     "attitude for a position law": (
         {**LAWS["yaw_position"], "reference": {"type": "setpoint", "pitch": 0.1}},
-        "reference.pitch = 0.1: roll and pitch are no outputs of the yaw_position law",
+        "reference.pitch = 0.1: roll and pitch are not outputs of the yaw_position law",
     ),
     "reference of another law": (
         {**LAWS["yaw_position"], "reference": {"type": "attitude_altitude"}},
-        'reference.type = "attitude_altitude": the yaw_position law cannot follow it',
+        'reference.type = "attitude_altitude": the yaw_position law cannot track it',
     ),
     "feed-forward without a choice": (
         {**LAWS["yaw_position"], "reference": {**CIRCLE, "acceleration_feedforward": True}},
-        "follows all derivatives anyway",
+        "always includes all derivatives",
     ),
     "rotorcraft's key for a tilt-car": (
         {"vehicle": {"model": "tilt_car", "arm_length": 0.2}},
@@ -426,30 +427,30 @@ MISTAKES = {
     ),
     "a gait for a law that moves the tilt": (
         {**LAWS["tilt_car_third_derivative"], "gait": {"type": "rotating", "rate": 1.0}},
-        "the tilt_car_third_derivative law takes none",
+        "the tilt_car_third_derivative law does not use a gait",
     ),
     "a tilt-car in the air": (
         {**LAWS["tilt_car_third_derivative"], "initial": {"position": [0.0, 0.0, 1.0]}},
-        "initial.position = [0.0, 0.0, 1.0]: the tilt_car stays on its plane",
+        "initial.position = [0.0, 0.0, 1.0]: the tilt_car stays in its plane",
     ),
     "a tilt-car's reference in the air": (
         {
             **LAWS["tilt_car_third_derivative"],
             "reference": {"type": "setpoint", "position": [0.0, 0.0, 1.0]},
         },
-        "reference.position = [0.0, 0.0, 1.0]: the tilt_car stays on its plane",
+        "reference.position = [0.0, 0.0, 1.0]: the tilt_car stays in its plane",
     ),
     "four speeds for two rotors": (
         {**LAWS["tilt_car_third_derivative"], "initial": {"rotor_speed": [1.0, 2.0, 3.0, 4.0]}},
-        "the tilt_car has 2 rotors; give one or all",
+        "the tilt_car has 2 rotors; give one value or one each",
     ),
     "two speeds for four rotors": (
         {"initial": {"rotor_speed": [100.0, 200.0]}},
-        "the tiltrotor has 4 rotors; give one or all",
+        "the tiltrotor has 4 rotors; give one value or one each",
     ),
     "a tilt-car's yaw": (
         {**LAWS["tilt_car_third_derivative"], "reference": {"type": "setpoint", "yaw": 0.5}},
-        "yaw is no output of the tilt_car's laws",
+        "yaw is not an output of the tilt_car's laws",
     ),
     "no circle": (
         {"reference": {"type": "circle", "radius": 0.0, "angular_frequency": 1.0}},

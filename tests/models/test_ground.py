@@ -91,7 +91,7 @@ def test_engines_take_off_alike():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"simulation.plant": "thesis"}, "its equations know no contact with ground"),
+        ({"simulation.plant": "thesis"}, "its equations have no ground contact"),
         ({"initial.position": [0.0, 0.0, -0.1]}, "below ground.height = 0.0"),
         ({"ground.friction": 0.0}, "ground.friction = 0.0"),
     ],

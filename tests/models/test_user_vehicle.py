@@ -303,7 +303,7 @@ def rename(name):
         (lambda: changed('axis="0 1 0"', 'axis="0 -1 0"'), ["'tilt_2' turns about (0, -1, 0)"]),
         (
             lambda: changed('<site name="rotor_4"/>', '<site name="rotor_4" euler="0.2 0 0"/>'),
-            ["z axis of site 'rotor_4'", "attitude_altitude law is for four equal arms"],
+            ["z axis of site 'rotor_4'", "attitude_altitude law needs four equal arms"],
         ),
     ],
 )
@@ -331,8 +331,8 @@ def test_the_actuators_order_counts(write):
 @pytest.mark.parametrize(
     ("vehicle", "words"),
     [
-        ({"arm_length": 0.3}, ["vehicle.arm_length", "mjcf has its own"]),
-        ({"pod": {"mass": 0.1, "inertia": 1e-4}}, ["vehicle.pod", "mjcf has its own"]),
+        ({"arm_length": 0.3}, ["vehicle.arm_length", "defined by vehicle.mjcf"]),
+        ({"pod": {"mass": 0.1, "inertia": 1e-4}}, ["vehicle.pod", "defined by vehicle.mjcf"]),
         ({"mjcf": "nowhere.xml"}, ["cannot be read: No such file"]),
         ({"model": "quadrotor"}, ["no actuator", "joint 'tilt_1' is not one of a quadrotor"]),
     ],

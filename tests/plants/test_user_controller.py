@@ -596,19 +596,19 @@ def test_a_controller_must_be_callable():
 @pytest.mark.parametrize(
     ("tables", "words"),
     [
-        ({"simulation": {"plant": "thesis"}}, ["simulation.plant", "mujoco alone"]),
-        ({"simulation": {"engine": "native"}}, ["simulation.engine", "python alone"]),
+        ({"simulation": {"plant": "thesis"}}, ["simulation.plant", "mujoco plant only"]),
+        ({"simulation": {"engine": "native"}}, ["simulation.engine", "python engine only"]),
         ({"controller": {"law": "python"}}, ["controller.function: missing"]),
         (
             {
                 "vehicle": {"model": "quadrotor"},
                 "simulation": {"control_timestep": 0.01, "control_latency": 0.02},
             },
-            ["control_latency", "the quadrotor flies without"],
+            ["control_latency", "not supported for the quadrotor"],
         ),
         (
             {"vehicle": {"model": "quadrotor"}, "gait": {"type": "fixed", "angles": [0.1] * 4}},
-            ["gait", "quadrotor has no use"],
+            ["gait", "not supported for the quadrotor"],
         ),
     ],
 )

@@ -162,7 +162,7 @@ MISTAKES = {
     "inertia of no body": (
         "[vehicle]\ninertia = [1.0, 3.0, 1.0]",
         "vehicle.inertia = ",
-        "two moments must exceed the third",
+        "must satisfy the triangle inequality",
     ),
     "trot beyond the servo": (
         trot("0.65", more="[vehicle.tilt_servo]\nmax_angle = 0.5"),
@@ -241,7 +241,7 @@ MISTAKES = {
     "attitude reference with a decoupler": (
         '[reference]\ntype = "attitude_altitude"',
         'controller.decoupler = "modified"',
-        "'attitude_altitude' takes none",
+        "'attitude_altitude' needs none",
     ),
     "duration no multiple of the timestep": (
         "[simulation]\nduration = 1.0\ntimestep = 0.003",

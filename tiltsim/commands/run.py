@@ -130,7 +130,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _warn_unmodeled_properties(scenario: Scenario) -> None:
     """Warn of properties of a user's vehicle that the built-in controllers do not model."""
     own = scenario.rotorcraft.user_vehicle
-    if own is not None and own.unmodeled_properties and scenario.controller.law != "python":
+    if own is not None and own.unmodeled_properties and not scenario.controller.is_external:
         print(
             f"tiltsim: warning: vehicle.mjcf: the {scenario.controller.law} controller assumes the "
             "centre of mass at the body's origin and a diagonal inertia; it does not model "

@@ -40,7 +40,7 @@ _TILT_OBSERVATIONS: Final = ("tilt_angles", "tilt_rates")
 
 def has_tilts(scenario: Scenario) -> bool:
     """Whether the scenario's vehicle has tilt servos."""
-    return scenario.vehicle.model == "tiltrotor"
+    return scenario.vehicle.has_tilting_rotors
 
 
 def action_spec(scenario: Scenario) -> specs.BoundedArray:

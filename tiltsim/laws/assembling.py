@@ -41,12 +41,12 @@ LOOPS: Final[dict[str, ClosedLoop]] = {
 
 def loop_of(scenario: Scenario) -> ClosedLoop:
     """The loop that a scenario flies: its law, within layers for what is not ideal."""
-    own, latency = scenario.controller.law == "python", scenario.simulation.latency_steps
+    own, latency = scenario.controller.is_external, scenario.simulation.latency_steps
     loop = COMMANDED_LOOPS[scenario.vehicle.model] if own else LOOPS[scenario.controller.loop_name]
-    supervisor = getattr(scenario.controller, "supervisor", None)
+    supervisor = scenario.controller.supervision
     if supervisor is not None:
         loop = with_supervisor(loop, supervisor.strategy)
-    if scenario.has_real_actuators:
+    if scenario.needs_actuation_layer:
         # Commands from outside are under way in their plant, `tiltsim.plants.commanded_plant`.
         loop = with_actuation(loop, 0 if own else latency)
     if scenario.has_air:

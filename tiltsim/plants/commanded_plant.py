@@ -51,7 +51,7 @@ class CommandedPlant:
         self.model, self.data = self._plant.model, self._plant.data
         self._loop, self._setup = assembly.loop, assembly.setup
         vehicle = assembly.scenario.rotorcraft
-        self.tilting = vehicle.model == "tiltrotor"
+        self.tilting = vehicle.has_tilting_rotors
         self._min_speed, self._max_speed = vehicle.speeds_along_spin
         self._commanded = commanded_parameters(self._setup.parameters)
         self._sensors = sensor_parameters(assembly.scenario)

@@ -26,7 +26,7 @@ def choose_engine(scenario: Scenario, loop: ClosedLoop) -> EngineName:
     ``auto`` weighs the flight's length against the start-up time of the native engine. A user's
     own controller always flies in Python.
     """
-    if scenario.controller.law == "python":
+    if scenario.controller.is_external:
         return "python"
     if scenario.simulation.engine != "auto":
         return scenario.simulation.engine
@@ -50,7 +50,7 @@ def _pays_off(steps: int, names: Iterable[str]) -> bool:
 
 def with_engine(scenario: Scenario, engine: EngineName) -> Scenario:
     """The scenario with another engine; a user's own controller keeps its own, Python."""
-    if scenario.controller.law == "python":
+    if scenario.controller.is_external:
         return scenario
     simulation = scenario.simulation.model_copy(update={"engine": engine})
     return scenario.model_copy(update={"simulation": simulation})

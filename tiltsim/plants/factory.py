@@ -42,7 +42,7 @@ def make_plant(
     InputError
         If MuJoCo cannot compile the vehicle, or the user's controller cannot be loaded.
     """
-    if assembly.scenario.controller.law == "python":
+    if assembly.scenario.controller.is_external:
         return UserControlledPlant(assembly, controller)
     with reraise_swallowed_interrupts():  # it may compile
         if assembly.scenario.simulation.plant == "thesis":

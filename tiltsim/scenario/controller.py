@@ -1,13 +1,13 @@
-"""The ``[controller]`` table of a scenario: one model a law, with the keys that the law knows."""
+"""The ``[controller]`` table of a scenario: one model per law, with the keys of that law."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, get_args
 
 from pydantic import Discriminator, Field, Tag
 
-from tiltsim.scenario.controller_table import ANY_ROTORCRAFT, ControllerTable
+from tiltsim.scenario.controller_table import ControllerTable
 from tiltsim.scenario.quadrotor_controllers import (
     QuadrotorAttitudeAltitudeController,
     SwitchingController,
@@ -19,33 +19,22 @@ from tiltsim.scenario.tilt_car_controllers import (
     ThirdDerivativeController,
 )
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController, FullPoseController
-from tiltsim_controllers.analysis.stability import (
-    ErrorLoop,
-)
+from tiltsim_controllers.analysis.stability import ErrorLoop
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 DEFAULT_LAW: Final = "attitude_altitude"
 
 
-# --- tiltrotor ---------------------------------------------------------------------------------
-
-
-# --- quadrotor ---------------------------------------------------------------------------------
-
-
-# --- a user's own ------------------------------------------------------------------------------
-
-
 class PythonController(ControllerTable):
     """A user's own controller in Python; see `tiltsim.plants.user_controller`."""
 
-    vehicle_model = ANY_ROTORCRAFT
+    vehicle_models = ("tiltrotor", "quadrotor")
     reference_kinds = ("position", "pose", "attitude_altitude")
+    is_external = True
 
     law: Literal["python"]
     function: str = Field(
-        description="FILE.py:NAME of a function or class; the file is looked for beside the "
-        "scenario's"
+        description="FILE.py:NAME of a function or class; FILE is relative to the scenario's folder"
     )
 
     @property
@@ -64,15 +53,9 @@ class PythonController(ControllerTable):
         return []
 
 
-# --- tilt-car ----------------------------------------------------------------------------------
-
-
-# --- the table, told apart by its law ----------------------------------------------------------
-
-
 def _law(value: Any) -> str:
     if isinstance(value, ControllerTable):
-        return str(getattr(value, "law"))  # noqa: B009
+        return value.law
     law = value.get("law", DEFAULT_LAW) if isinstance(value, dict) else DEFAULT_LAW
     return law if isinstance(law, str) else ""
 
@@ -89,4 +72,10 @@ Controller = Annotated[
     | Annotated[PlannedDirectionController, Tag("tilt_car_planned_direction")],
     Discriminator(_law),
 ]
-"""The ``[controller]`` table, told apart by its law."""
+"""The ``[controller]`` table, discriminated by its law."""
+
+
+def laws_for(model: str) -> list[str]:
+    """The laws that control a vehicle, given ``vehicle.model``."""
+    options = [get_args(option) for option in get_args(get_args(Controller)[0])]
+    return [tag.tag for table, tag in options if model in table.vehicle_models]

@@ -1,48 +1,82 @@
-"""What the tables of all control laws share."""
+"""What the tables of all controllers share."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar, Final, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
+from tiltsim.scenario.supervisor_table import SupervisorTable
 from tiltsim.scenario.table import Table
-from tiltsim_controllers.analysis.stability import (
-    ErrorLoop,
-)
-
-ANY_ROTORCRAFT: Final = "tiltrotor or quadrotor"
-"""The vehicle of a law that flies either."""
-
+from tiltsim_controllers.analysis.stability import ErrorLoop
 
 ReferenceKind = Literal["position", "attitude_altitude", "pose"]
-"""What a law can follow: position and yaw, attitude and altitude, or position and attitude."""
+"""What a controller tracks: position and yaw, attitude and altitude, or position and attitude."""
 
 
 class ControllerTable(Table, ABC):
-    """What every law can be told."""
+    """What every controller has; properties are neutral where a controller lacks the feature."""
 
-    vehicle_model: ClassVar[str]
+    vehicle_models: ClassVar[tuple[str, ...]]
     reference_kinds: ClassVar[tuple[ReferenceKind, ...]]
-    gait_types: ClassVar[tuple[str, ...]] = ("fixed",)  # of laws around the tilt-car
+    gait_types: ClassVar[tuple[str, ...]] = ("fixed",)  # of the tilt-car's controllers
+    is_external: ClassVar[bool] = False  # commands come from Python code, not from a built-in law
+    commands_tilts: ClassVar[bool] = False  # the tilt angles are inputs, not planned by a gait
 
-    allow_unstable: bool = Field(False, description="fly gains that fail the Routh condition")
+    allow_unstable: bool = Field(False, description="accept gains that fail the Routh condition")
+    law: str
 
     @abstractmethod
     def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
-        """The linear closed loops that the gains make."""
+        """The linear closed loops that the gains make around a vehicle's parameters."""
 
     @property
     def linearization(self) -> str:
-        """Under what the closed loops are linear, in words."""
+        """The condition under which the closed loops are linear, for messages."""
         return "the exact decoupling matrix"
 
     @property
     def loop_name(self) -> str:
-        """The name of the loop that flies the law, in `tiltsim.laws.assembling.LOOPS`."""
-        return str(getattr(self, "law"))  # noqa: B009
+        """The name of the controller's closed loop in `tiltsim.laws.assembling.LOOPS`."""
+        return self.law
+
+    @property
+    def supervision(self) -> SupervisorTable | None:
+        """The supervisor of the gait, if there is one."""
+        return None
+
+    @property
+    def feeds_tilt_rates_forward(self) -> bool:
+        """Whether the control law takes the gait's tilt rates into account."""
+        return False
+
+    @property
+    def omits_reference_acceleration(self) -> bool:
+        """Whether the law leaves the reference's acceleration out unless the reference says so."""
+        return False
+
+    @property
+    def lateral_decoupler(self) -> str:
+        """How a controller that leans to move sideways computes the lean; ``none`` for others."""
+        return "none"
+
+    @property
+    def prioritizes_attitude(self) -> bool:
+        """Whether rotor limits are shared out with attitude first."""
+        return False
+
+    @property
+    def allocation_window(self) -> float:
+        """Time (s) for which prioritized allocation keeps within the rotor limits."""
+        return 1.0
+
+    @property
+    def rotors_stop_at_zero(self) -> bool:
+        """Whether rotor speeds that the law integrates stop at zero."""
+        return True
 
 
-def _gain_kind(value: object) -> str:
+def gain_kind(value: object) -> str:
+    """The tag of a controller's gains: ``named`` for a set, ``table`` for numbers."""
     return "named" if isinstance(value, str) else "table"

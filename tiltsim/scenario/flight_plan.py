@@ -1,14 +1,13 @@
-"""What a scenario plans for a flight: its tilt angles and its reference over time."""
+"""The plan of a flight: its tilt angles and its reference over time."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
-    from tiltsim_controllers.gaits.plans import Gait
-    from tiltsim_controllers.references.trajectories import ReferenceParameters
+from tiltsim.scenario.scenario import Scenario
+from tiltsim_controllers.gaits.plans import Gait
+from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.references.trajectories import ReferenceParameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,10 +29,10 @@ class FlightPlan:
     scenario: Scenario
     gait: Gait
     reference: ReferenceParameters
-    knots: tuple[float, ...]
+    knots: Values
 
 
 def plan_flight(scenario: Scenario) -> FlightPlan:
-    """Plan the gait of a scenario and place its reference behind it."""
+    """Plan a scenario's gait, and place the knots of its reference after the gait's."""
     gait = scenario.gait.plan(scenario.vehicle.resolve())
-    return FlightPlan(scenario, gait, *scenario.reference.placed(gait.knots))
+    return FlightPlan(scenario, gait, *scenario.reference.after_gait(gait.knots))

@@ -1,4 +1,4 @@
-"""Controller tables of the quadrotor's laws."""
+"""The ``[controller]`` tables of the quadrotor."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 import tiltsim_controllers.laws.quadrotor_attitude_altitude as quadrotor_attitude_altitude
 import tiltsim_controllers.laws.yaw_position as yaw_position
-from tiltsim.scenario.controller_table import ControllerTable, _gain_kind
+from tiltsim.scenario.controller_table import ControllerTable, gain_kind
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.table import Gains2, Positive, Table
+from tiltsim.scenario.table import Gains2, Gains4, Positive, Table
 from tiltsim_controllers.analysis.stability import (
     ErrorLoop,
     linear_loop,
@@ -20,32 +20,30 @@ from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
 class YawPositionGainTable(Table):
-    """Gains of yaw-position control written out."""
+    """Explicit gains of yaw-position control."""
 
-    position: Annotated[tuple[float, float, float, float], Field(strict=False)] = Field(
-        description="k_1 to k_4, on jerk, acceleration, velocity and position"
-    )
+    position: Gains4 = Field(description="k_1 to k_4, on jerk, acceleration, velocity and position")
     yaw: Gains2 = Field((5.0, 5.0), description="on the rate and on yaw")
 
 
 YawPositionGains = Annotated[
     Annotated[Literal["ch02", "stable"], Tag("named")]
     | Annotated[YawPositionGainTable, Tag("table")],
-    Discriminator(_gain_kind),
+    Discriminator(gain_kind),
 ]
 
 
 class YawPositionController(ControllerTable):
     """Yaw-position control of the quadrotor with dynamic extension (ch. 2)."""
 
-    vehicle_model = "quadrotor"
+    vehicle_models = ("quadrotor",)
     reference_kinds = ("position",)
 
     law: Literal["yaw_position"]
     gains: YawPositionGains = "stable"
 
     def resolve_gains(self) -> yaw_position.Gains:
-        """The numbers behind a named set or a table."""
+        """The gains of a named set or a table."""
         return _yaw_position_gains(self.gains)
 
     def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
@@ -54,7 +52,7 @@ class YawPositionController(ControllerTable):
 
 
 class QuadrotorAttitudeGainTable(Table):
-    """Gains of the quadrotor's attitude-altitude control written out."""
+    """Explicit gains of the quadrotor's attitude-altitude control."""
 
     altitude: Gains2 = Field(description="on the rate and on the altitude")
     attitude: Gains2 = Field(description="on the rates and on roll, pitch and yaw")
@@ -62,21 +60,21 @@ class QuadrotorAttitudeGainTable(Table):
 
 QuadrotorAttitudeGains = Annotated[
     Annotated[Literal["ch02"], Tag("named")] | Annotated[QuadrotorAttitudeGainTable, Tag("table")],
-    Discriminator(_gain_kind),
+    Discriminator(gain_kind),
 ]
 
 
 class QuadrotorAttitudeAltitudeController(ControllerTable):
     """Attitude-altitude control of the quadrotor (ch. 2, Appendix B)."""
 
-    vehicle_model = "quadrotor"
+    vehicle_models = ("quadrotor",)
     reference_kinds = ("attitude_altitude",)
 
     law: Literal["quadrotor_attitude_altitude"]
     gains: QuadrotorAttitudeGains = "ch02"
 
     def resolve_gains(self) -> quadrotor_attitude_altitude.Gains:
-        """The numbers behind a named set or a table."""
+        """The gains of a named set or a table."""
         return _attitude_gains(self.gains)
 
     def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
@@ -85,7 +83,7 @@ class QuadrotorAttitudeAltitudeController(ControllerTable):
 
 
 class ZoneTable(Table):
-    """Attitudes at which the attitude-altitude law flies, edges included; Eq. (47)."""
+    """Attitudes at which attitude-altitude control is active, edges included; Eq. (47)."""
 
     roll: Gains2 = Field((PUBLISHED_ZONE.roll_min, PUBLISHED_ZONE.roll_max), description="rad")
     pitch: Gains2 = Field((PUBLISHED_ZONE.pitch_min, PUBLISHED_ZONE.pitch_max), description="rad")
@@ -102,29 +100,30 @@ class ZoneTable(Table):
 
 
 class SwitchingController(ControllerTable):
-    """Yaw-position control that hands over to attitude-altitude control in a zone (ch. 2)."""
+    """Yaw-position control that switches to attitude-altitude control in a zone (ch. 2)."""
 
-    vehicle_model = "quadrotor"
+    vehicle_models = ("quadrotor",)
     reference_kinds = ("pose",)
 
     law: Literal["switching"]
-    gains: YawPositionGains = Field("stable", description="of the yaw-position law")
+    gains: YawPositionGains = Field("stable", description="gains of the yaw-position law")
     attitude_gains: QuadrotorAttitudeGains = "ch02"
     zone: ZoneTable = ZoneTable()
     extension: Literal["bumpless", "held", "running"] = Field(
         "bumpless",
-        description="what the yaw-position law's own states do while the other law flies",
+        description="states of the yaw-position law while the other law is active: following the "
+        "thrust, held, or running on",
     )
     extension_rate: Positive = Field(
-        100.0, description="1/s, how fast bumpless states reach the flown thrust"
+        100.0, description="rate at which bumpless states converge to the actual thrust, 1/s"
     )
 
     def resolve_gains(self) -> yaw_position.Gains:
-        """The yaw-position law's numbers."""
+        """The gains of the yaw-position law."""
         return _yaw_position_gains(self.gains)
 
     def resolve_attitude_gains(self) -> quadrotor_attitude_altitude.Gains:
-        """The attitude-altitude law's numbers."""
+        """The gains of the attitude-altitude law."""
         return _attitude_gains(self.attitude_gains)
 
     def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:

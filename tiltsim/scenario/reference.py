@@ -1,4 +1,4 @@
-"""The ``[reference]`` table of a scenario: what to follow."""
+"""The ``[reference]`` table of a scenario: the motion to track."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from tiltsim.scenario.controller_table import ReferenceKind
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import Angle, Angles3, Positive, Table, Vector3
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
+from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
 from tiltsim_controllers.references.waypoints import minimum_snap_knots
 
@@ -20,7 +21,12 @@ Tilt = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
 
 
 class _Reference(Table, ABC):
-    """What every reference can tell of itself."""
+    """What every reference has."""
+
+    @property
+    @abstractmethod
+    def kind(self) -> ReferenceKind:
+        """What a controller must be able to track."""
 
     @property
     @abstractmethod
@@ -28,28 +34,40 @@ class _Reference(Table, ABC):
         """The record that the law reads."""
 
     @property
-    def table(self) -> tuple[float, ...]:
-        """The numbers beside the record, for references of any length."""
+    def knots(self) -> Values:
+        """The numbers of references of any length, which the record does not hold."""
         return NO_KNOTS
 
-    def placed(self, table: tuple[float, ...]) -> tuple[ReferenceParameters, tuple[float, ...]]:
-        """Record and table where a gait's table lies before the reference's own."""
-        if self.table == NO_KNOTS:
-            return self.parameters, table
-        return self.parameters._replace(offset=float(len(table))), (*table, *self.table)
+    @property
+    def adds_acceleration(self) -> bool:
+        """Whether ``acceleration_feedforward`` is set."""
+        return False
+
+    def after_gait(self, gait: Values) -> tuple[ReferenceParameters, Values]:
+        """The record, and the knots of a flight: those of its gait, then the reference's own."""
+        if self.knots == NO_KNOTS:
+            return self.parameters, gait
+        return self.parameters._replace(offset=float(len(gait))), (*gait, *self.knots)
 
 
 class _PositionReference(_Reference):
-    roll: Tilt = Field(0.0, description="rad, for laws of the whole pose and for switching")
-    pitch: Tilt = Field(0.0, description="rad, likewise")
+    """A position, and the attitude at it."""
+
+    roll: Tilt = Field(0.0, description="rad; needs a law that tracks the full pose, or switching")
+    pitch: Tilt = Field(0.0, description="rad; as roll")
     yaw: Angle = 0.0
     acceleration_feedforward: bool = Field(
-        False, description="ch. 4 leaves it out; laws of higher order always have it"
+        False, description="ch. 4 omits it; laws of higher order always include it"
     )
 
     @property
+    def adds_acceleration(self) -> bool:
+        """See `_Reference.adds_acceleration`."""
+        return self.acceleration_feedforward
+
+    @property
     def kind(self) -> ReferenceKind:
-        """What the reference asks of a law."""
+        """See `_Reference.kind`."""
         return "position" if self.roll == self.pitch == 0.0 else "pose"
 
     def _parameters(self, kind: str, position: Vector3, **own: float) -> ReferenceParameters:
@@ -138,7 +156,7 @@ class LissajousReference(_PositionReference):
 
 
 class FigureEightReference(_PositionReference):
-    """A lying eight, from its crossing towards +x and +y; a lissajous of one to two."""
+    """A horizontal figure eight, from its crossing towards +x and +y; a 1:2 lissajous."""
 
     type: Literal["figure_eight"]
     position: Vector3 = Field((0.0, 0.0, 0.0), description="where it crosses itself, m")
@@ -159,14 +177,14 @@ class FigureEightReference(_PositionReference):
 
 
 class WaypointReference(_PositionReference):
-    """From rest to rest through points at given times, with the least snap."""
+    """Minimum-snap motion from rest to rest through points at given times."""
 
     type: Literal["waypoints"]
     positions: Annotated[tuple[Vector3, ...], Field(min_length=2, max_length=50, strict=False)] = (
         Field(description="m; the first is the start")
     )
     times: Annotated[tuple[float, ...], Field(strict=False)] = Field(
-        description="s, one a point, from 0; after the last the reference rests"
+        description="s, one per point, from 0; after the last the reference rests"
     )
 
     @property
@@ -175,20 +193,20 @@ class WaypointReference(_PositionReference):
         return self._parameters(self.type, (0.0, 0.0, 0.0), segments=float(len(self.times)))
 
     @property
-    def table(self) -> tuple[float, ...]:
+    def knots(self) -> Values:
         """Polynomials; see `tiltsim_controllers.references.waypoints.minimum_snap_knots`."""
-        return _minimum_snap_table(self.positions, self.times)
+        return _minimum_snap_knots(self.positions, self.times)
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         try:
-            _ = self.table
+            _ = self.knots
         except ValueError as error:
             raise InvalidValueError("reference.times", self.times, str(error)) from None
         return self
 
 
-_minimum_snap_table = lru_cache(maxsize=64)(minimum_snap_knots)
+_minimum_snap_knots = lru_cache(maxsize=64)(minimum_snap_knots)
 
 
 def _by_axis(name: str, values: tuple[float, float, float]) -> dict[str, float]:
@@ -196,10 +214,10 @@ def _by_axis(name: str, values: tuple[float, float, float]) -> dict[str, float]:
 
 
 class AttitudeAltitudeReference(_Reference):
-    """Attitude and altitude to hold (ch. 3); x = y = 0 for laws that steer them as well.
+    """Attitude and altitude to hold (ch. 3); x = y = 0 for laws that control them as well.
 
-    Four rotors under a planned gait, and a quadrotor, leave the horizontal position free. The
-    full_pose law has six outputs and holds it.
+    Four rotors under a planned gait, and a quadrotor, leave the horizontal position free; the
+    full_pose law has six outputs and controls it.
     """
 
     type: Literal["attitude_altitude"]
@@ -210,7 +228,7 @@ class AttitudeAltitudeReference(_Reference):
 
     @property
     def kind(self) -> ReferenceKind:
-        """What the reference asks of a law."""
+        """See `_Reference.kind`."""
         return "attitude_altitude"
 
     @property
@@ -235,3 +253,4 @@ Reference = Annotated[
     | AttitudeAltitudeReference,
     Field(discriminator="type"),
 ]
+"""The ``[reference]`` table, discriminated by its type."""

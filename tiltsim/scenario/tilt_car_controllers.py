@@ -1,4 +1,4 @@
-"""Controller tables of the tilt-car's laws."""
+"""The ``[controller]`` tables of the tilt-car."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import Discriminator, Field, Tag
 import tiltsim_controllers.tilt_car.fourth_derivative as fourth_derivative
 import tiltsim_controllers.tilt_car.planned_direction as planned_direction
 import tiltsim_controllers.tilt_car.third_derivative as third_derivative
-from tiltsim.scenario.controller_table import ControllerTable, _gain_kind
+from tiltsim.scenario.controller_table import ControllerTable, gain_kind
 from tiltsim.scenario.table import Gains2, Gains4, NonNegative, Table, Vector3
 from tiltsim_controllers.analysis.stability import (
     ErrorLoop,
@@ -20,20 +20,22 @@ from tiltsim_controllers.analysis.stability import (
 class ThirdDerivativeController(ControllerTable):
     """Third-derivative feedback linearization of the tilt-car (ch. 10, Sec. 3.1)."""
 
-    vehicle_model = "tilt_car"
+    vehicle_models = ("tilt_car",)
     reference_kinds = ("position",)
 
     law: Literal["tilt_car_third_derivative"]
     gains: Annotated[
         Annotated[Literal["ch10"], Tag("named")] | Annotated[Vector3, Tag("table")],
-        Discriminator(_gain_kind),
+        Discriminator(gain_kind),
     ] = Field("ch10", description="a set by name, or gains on acceleration, velocity and position")
     restoring_rate: NonNegative = Field(
-        0.0, description="1/s, of turning the thrusts' middle to the acceleration; 0 as published"
+        0.0,
+        description="rate of turning the mean thrust direction towards the acceleration, 1/s; "
+        "0 as published",
     )
 
     def resolve_gains(self) -> third_derivative.Gains:
-        """The numbers behind a named set or a list."""
+        """The gains of a named set or a list."""
         if isinstance(self.gains, str):
             return third_derivative.GAIN_SETS[self.gains]
         return third_derivative.Gains(*self.gains)
@@ -46,25 +48,25 @@ class ThirdDerivativeController(ControllerTable):
 class FourthDerivativeController(ControllerTable):
     """Fourth-derivative feedback linearization of the tilt-car (ch. 10, Sec. 6.1)."""
 
-    vehicle_model = "tilt_car"
+    vehicle_models = ("tilt_car",)
     reference_kinds = ("position",)
 
     law: Literal["tilt_car_fourth_derivative"]
     decoupling: Literal["published", "exact"] = Field(
-        "exact", description="the tilt's column as printed, or with the yaw's answer"
+        "exact", description="the tilt's column as published, or with the yaw's reaction"
     )
     anti_windup: bool = Field(
-        False, description="whether the rotor speeds that the law integrates stop at zero"
+        False, description="stop the rotor speeds that the law integrates at zero"
     )
     gains: Annotated[
         Annotated[Literal["ch10"], Tag("named")] | Annotated[Gains4, Tag("table")],
-        Discriminator(_gain_kind),
+        Discriminator(gain_kind),
     ] = Field(
         "ch10", description="a set by name, or gains on jerk, acceleration, velocity and position"
     )
 
     def resolve_gains(self) -> fourth_derivative.Gains:
-        """The numbers behind a named set or a list."""
+        """The gains of a named set or a list."""
         if isinstance(self.gains, str):
             return fourth_derivative.GAIN_SETS[self.gains]
         return fourth_derivative.Gains(*self.gains)
@@ -73,18 +75,23 @@ class FourthDerivativeController(ControllerTable):
         """See `ControllerTable.error_loops`."""
         return [linear_loop("position", self.resolve_gains())]
 
+    @property
+    def rotors_stop_at_zero(self) -> bool:
+        """See `ControllerTable.rotors_stop_at_zero`."""
+        return self.anti_windup
+
 
 class PlannedDirectionGainTable(Table):
-    """Gains of the planned-direction law written out."""
+    """Explicit gains of the planned-direction law."""
 
     x: Gains2 = Field(description="K_X1, K_X2, on velocity and position")
     y: Gains2 = Field(description="K_Y1, K_Y2, on velocity and position")
 
 
 class PlannedDirectionController(ControllerTable):
-    """Control of the tilt-car with its thrusts' direction planned (ch. 10, Sec. 5; ch. 11)."""
+    """Control of the tilt-car under a planned thrust direction (ch. 10, Sec. 5; ch. 11)."""
 
-    vehicle_model = "tilt_car"
+    vehicle_models = ("tilt_car",)
     reference_kinds = ("position",)
     gait_types = ("penguin_small", "penguin_large", "rotating")
 
@@ -92,11 +99,11 @@ class PlannedDirectionController(ControllerTable):
     gains: Annotated[
         Annotated[Literal["ch10", "ch11"], Tag("named")]
         | Annotated[PlannedDirectionGainTable, Tag("table")],
-        Discriminator(_gain_kind),
+        Discriminator(gain_kind),
     ] = "ch11"
 
     def resolve_gains(self) -> planned_direction.Gains:
-        """The numbers behind a named set or a table."""
+        """The gains of a named set or a table."""
         if isinstance(self.gains, PlannedDirectionGainTable):
             return planned_direction.Gains(*self.gains.x, *self.gains.y)
         return planned_direction.GAIN_SETS[self.gains]

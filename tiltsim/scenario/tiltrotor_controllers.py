@@ -1,15 +1,16 @@
-"""Controller tables of the tiltrotor's laws."""
+"""The ``[controller]`` tables of the tiltrotor."""
 
 from __future__ import annotations
 
-from math import atan, inf, pi
-from typing import Annotated, Literal, Self
+from math import inf, pi
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
 import tiltsim_controllers.laws.full_pose as full_pose
-from tiltsim.scenario.controller_table import ControllerTable, _gain_kind
+from tiltsim.scenario.controller_table import ControllerTable, gain_kind
 from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.supervisor_table import SupervisorTable
 from tiltsim.scenario.table import Gains2, NonNegative, Positive, Table, Vector3
 from tiltsim_controllers.analysis.stability import (
     ErrorLoop,
@@ -17,7 +18,6 @@ from tiltsim_controllers.analysis.stability import (
     feedforward_loops,
     linear_loop,
 )
-from tiltsim_controllers.gaits.red_gait import determinant_at_clearance
 from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS, Gains
 from tiltsim_controllers.laws.gains import (
     GAIN_SETS,
@@ -27,19 +27,19 @@ from tiltsim_controllers.laws.gains import (
     gains_from_rows,
 )
 from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms
-from tiltsim_controllers.laws.supervisor import STRATEGIES, Supervisor
-from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
+from tiltsim_controllers.laws.supervisor import Supervisor
+from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
 def _attitude_altitude_gain_kind(value: object) -> str:
     if isinstance(value, PolePlacementTable):
         return "poles"
     loops = value.values() if isinstance(value, dict) else ()
-    return "poles" if any(isinstance(loop, dict) for loop in loops) else _gain_kind(value)
+    return "poles" if any(isinstance(loop, dict) for loop in loops) else gain_kind(value)
 
 
 class GainTable(Table):
-    """Gains written out; see `tiltsim_controllers.laws.gains.gains_from_rows`."""
+    """Explicit gains; see `tiltsim_controllers.laws.gains.gains_from_rows`."""
 
     attitude: Annotated[tuple[Vector3, Vector3, Vector3], Field(strict=False)] = Field(
         description="diagonals of K_P1, K_P2, K_P3, each roll, pitch, yaw"
@@ -49,23 +49,29 @@ class GainTable(Table):
 
 
 class PoleTable(Table):
-    """The poles of one closed loop: a pair, and at its bandwidth a real one where third order."""
+    """The poles of one closed loop: a pair, and for third order a real one at its bandwidth."""
 
     bandwidth: Positive = Field(description="natural frequency, rad/s")
     damping: Positive = Field(1.0, description="damping ratio of the pair")
 
     @property
     def poles(self) -> Poles:
-        """The poles as the design takes them."""
-        return Poles(self.bandwidth, self.damping, getattr(self, "integral", 0.0))
+        """The poles as `gains_from_poles` takes them."""
+        return Poles(self.bandwidth, self.damping)
 
 
 class IntegralPoleTable(PoleTable):
-    """The poles of a loop that may have an integral."""
+    """The poles of a loop that may have integral action."""
 
     integral: NonNegative = Field(
-        0.0, description="pole of integral action, rad/s; 0: none. Needs gait_rate_feedforward"
+        0.0,
+        description="pole of integral action, rad/s; 0 disables it; needs gait_rate_feedforward",
     )
+
+    @property
+    def poles(self) -> Poles:
+        """See `PoleTable.poles`."""
+        return Poles(self.bandwidth, self.damping, self.integral)
 
 
 class PolePlacementTable(Table):
@@ -77,7 +83,7 @@ class PolePlacementTable(Table):
     position: IntegralPoleTable = IntegralPoleTable(bandwidth=1.0, damping=0.5)
 
     def resolve(self) -> tuple[Gains, IntegralGains]:
-        """The numbers of the law."""
+        """The gains of the control law and of its integrals."""
         yaw = self.yaw or self.attitude
         return gains_from_poles(
             self.attitude.poles, yaw.poles, self.altitude.poles, self.position.poles
@@ -94,80 +100,10 @@ FeedforwardTerm = Literal[
 ]
 
 
-class SupervisorTable(Table):
-    """Keeps a gait away from singular matrices; see `tiltsim_controllers.laws.supervisor`."""
-
-    strategy: Literal["scale", "hold", "return_to_red"] = Field(
-        "scale", description="shrink the gait, stop its clock, or go to the nearest red gait"
-    )
-    min_margin: Annotated[float, Field(ge=0.0, lt=pi / 2)] = Field(
-        0.2, description="singularity margin to keep, rad; 0: none"
-    )
-    min_determinant: Annotated[float, Field(ge=0.0, lt=4.0)] = Field(
-        0.5, description="determinant to keep, 4 for a level untilted vehicle; 0: none"
-    )
-    horizon: Annotated[float, Field(gt=0.0, le=10.0)] = Field(
-        0.5, description="s of the gait to look ahead; needs hold or return_to_red"
-    )
-    max_tilt_rate: Positive = Field(
-        1.0, description="rad/s on the way to red and back, the gait's own rate aside; likewise"
-    )
-    clearance: Annotated[float, Field(gt=0.0, lt=pi / 4)] = Field(
-        0.1,
-        description="rad to keep on red from where rotors stop, next to the curve L, below "
-        "atan(r); needs return_to_red",
-    )
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        needs = {
-            "horizon": ("hold", "return_to_red"),
-            "max_tilt_rate": ("return_to_red",),
-            "clearance": ("return_to_red",),
-        }
-        for key, strategies in needs.items():
-            value = getattr(self, key)
-            if self.strategy not in strategies and value != type(self).model_fields[key].default:
-                raise InvalidValueError(
-                    f"controller.supervisor.{key}",
-                    value,
-                    f"needs controller.supervisor.strategy = {' or '.join(strategies)}",
-                )
-        return self
-
-    def resolve(self, vehicle: Vehicle) -> Supervisor:
-        """The numbers of the law.
-
-        Raises `InvalidValueError` where red gaits at the clearance have too small a determinant,
-        or not even the untilted vehicle keeps it.
-        """
-        if self.strategy == "return_to_red":
-            ratio = drag_ratio(vehicle)
-            delta, reached = atan(ratio), determinant_at_clearance(self.clearance, ratio)
-            mistake = ""
-            if self.clearance >= delta:
-                mistake = f"must be below {delta:.4g}, which the untilted vehicle keeps"
-            elif reached < self.min_determinant:
-                mistake = (
-                    f"so near to L the determinant is {reached:.3g}, below min_determinant = "
-                    f"{self.min_determinant:g}; keep further away"
-                )
-            if mistake:
-                raise InvalidValueError("controller.supervisor.clearance", self.clearance, mistake)
-        return Supervisor(
-            self.min_margin,
-            self.min_determinant,
-            STRATEGIES[self.strategy],
-            self.horizon,
-            self.max_tilt_rate,
-            self.clearance,
-        )
-
-
 class AttitudeAltitudeController(ControllerTable):
-    """Attitude-altitude control of the tiltrotor, the gait planned (ch. 3 to 9)."""
+    """Attitude-altitude control of the tiltrotor under a planned gait (ch. 3 to 9)."""
 
-    vehicle_model = "tiltrotor"
+    vehicle_models = ("tiltrotor",)
     reference_kinds = ("position", "attitude_altitude")
 
     law: Literal["attitude_altitude"] = "attitude_altitude"
@@ -180,56 +116,55 @@ class AttitudeAltitudeController(ControllerTable):
         Discriminator(_attitude_altitude_gain_kind),
     ] = Field(
         "ch04",
-        description="a set by name, gains, or poles; yaw has little torque, and exact stops a "
-        "rotor at a step of 0.39 rad: see docs/beyond.md",
+        description="a named set, gains, or poles; yaw torque is small, and the set exact stops a "
+        "rotor at a yaw step of 0.39 rad: see docs/beyond.md",
     )
     allocation: Literal["inversion", "prioritized"] = Field(
-        "inversion", description="within rotor limits: each for itself, or attitude first"
+        "inversion",
+        description="at rotor limits: each rotor saturates alone, or attitude has priority",
     )
     allocation_horizon: Positive = Field(
-        0.02, description="s for which prioritized allocation keeps within the limits"
+        0.02, description="time for which prioritized allocation keeps within the limits, s"
     )
     supervisor: SupervisorTable | None = Field(
         None, description="acts on the gait before its decoupling matrix becomes singular"
     )
     gait_rate_feedforward: bool = Field(
-        False, description="count the gait's rates in: the exact law with integral action"
+        False, description="feed the tilt rates forward: the exact law with integral action"
     )
     max_acceleration: Positive = Field(
         3.0,
-        description="m/s^2, horizontal, of the position feedback; integrators stop there; needs "
-        "gait_rate_feedforward",
+        description="limit on the horizontal acceleration of the position feedback, at which its "
+        "integrators stop, m/s^2; needs gait_rate_feedforward",
     )
     max_angular_acceleration: Positive = Field(
         60.0,
-        description="rad/s^2, each axis, asked of the body; needs gait_rate_feedforward",
+        description="limit on the demanded angular acceleration of each axis, rad/s^2; needs "
+        "gait_rate_feedforward",
     )
     anticipation: NonNegative = Field(
         0.12,
-        description="s before and after a corner of the gait in which the body turns, at most half "
-        "of the gait's shortest line; needs gait_rate_feedforward",
+        description="time before and after a corner of the gait in which the body turns, s, at "
+        "most half of the gait's shortest segment; needs gait_rate_feedforward",
     )
     leave_out: Annotated[tuple[FeedforwardTerm, ...], Field(strict=False)] = Field(
-        (), description="ingredients of gait_rate_feedforward to fly without, for comparison"
+        (), description="terms of gait_rate_feedforward to omit, for comparison"
     )
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         if not self.gait_rate_feedforward:
-            for key in (
-                *("leave_out", "anticipation", "max_acceleration", "max_angular_acceleration"),
-            ):
-                if getattr(self, key) != type(self).model_fields[key].default:
+            for key in _NEED_GAIT_RATES:
+                value = getattr(self, key)
+                if value != type(self).model_fields[key].default:
                     raise InvalidValueError(
-                        f"controller.{key}",
-                        getattr(self, key),
-                        "needs controller.gait_rate_feedforward = true",
+                        f"controller.{key}", value, "needs controller.gait_rate_feedforward = true"
                     )
             if any(self.resolve_integral_gains()):
                 raise InvalidValueError(
                     "controller.gains",
                     self.model_dump()["gains"],
-                    "an integral needs controller.gait_rate_feedforward = true",
+                    "integral action needs controller.gait_rate_feedforward = true",
                 )
             return self
         for key, choices in (("decoupling", ("exact",)), ("decoupler", ("exact", "none"))):
@@ -242,7 +177,7 @@ class AttitudeAltitudeController(ControllerTable):
         return self
 
     def resolve_gains(self) -> Gains:
-        """The numbers behind a named set, a table or poles."""
+        """The gains of a named set, a table or poles."""
         if isinstance(self.gains, GainTable):
             return gains_from_rows(self.gains.attitude, self.gains.altitude, self.gains.position)
         if isinstance(self.gains, PolePlacementTable):
@@ -250,19 +185,19 @@ class AttitudeAltitudeController(ControllerTable):
         return GAIN_SETS[self.gains]
 
     def resolve_integral_gains(self) -> IntegralGains:
-        """The gains on the integrals, zero unless poles ask for them."""
+        """The gains on the integrals, zero unless given by poles."""
         if isinstance(self.gains, PolePlacementTable):
             return self.gains.resolve()[1]
         return IntegralGains()
 
     def resolve_supervisor(self, vehicle: Vehicle) -> Supervisor:
-        """The numbers of the supervisor, thresholds of zero without one."""
+        """The supervisor's parameters for a vehicle, thresholds of zero without one."""
         return self.supervisor.resolve(vehicle) if self.supervisor else Supervisor()
 
     def resolve_feedforward_terms(self, *, gyroscopic_torque: bool) -> FeedforwardTerms:
-        """What the law counts in, on a plant with or without gyroscopic torque."""
-        ingredients = FeedforwardTerms(gyroscopic_torque=float(gyroscopic_torque))
-        return ingredients._replace(**dict.fromkeys(self.leave_out, 0.0))
+        """The terms of the law on a plant with or without gyroscopic torque."""
+        terms = FeedforwardTerms(gyroscopic_torque=float(gyroscopic_torque))
+        return terms._replace(**dict.fromkeys(self.leave_out, 0.0))
 
     def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
         """See `ControllerTable.error_loops`."""
@@ -280,63 +215,103 @@ class AttitudeAltitudeController(ControllerTable):
         """See `ControllerTable.linearization`."""
         return f"the {self.decoupling} decoupling matrix"
 
+    @property
+    def supervision(self) -> SupervisorTable | None:
+        """See `ControllerTable.supervision`."""
+        return self.supervisor
+
+    @property
+    def feeds_tilt_rates_forward(self) -> bool:
+        """See `ControllerTable.feeds_tilt_rates_forward`."""
+        return self.gait_rate_feedforward
+
+    @property
+    def omits_reference_acceleration(self) -> bool:
+        """See `ControllerTable.omits_reference_acceleration`."""
+        return not self.gait_rate_feedforward
+
+    @property
+    def lateral_decoupler(self) -> str:
+        """See `ControllerTable.lateral_decoupler`."""
+        return self.decoupler
+
+    @property
+    def prioritizes_attitude(self) -> bool:
+        """See `ControllerTable.prioritizes_attitude`."""
+        return self.allocation == "prioritized"
+
+    @property
+    def allocation_window(self) -> float:
+        """See `ControllerTable.allocation_window`."""
+        return self.allocation_horizon
+
+
+_NEED_GAIT_RATES: Final = (
+    "leave_out",
+    "anticipation",
+    "max_acceleration",
+    "max_angular_acceleration",
+)
+"""Keys of `AttitudeAltitudeController` that only gait_rate_feedforward reads."""
+
 
 class FullPoseGainTable(Table):
-    """Gains of full-pose control written out."""
+    """Explicit gains of full-pose control."""
 
     position: Vector3 = Field(description="on acceleration, velocity and position")
     attitude: Vector3 = Field(description="on angular acceleration, body rates and attitude")
 
 
 class FullPoseController(ControllerTable):
-    """Position and attitude of the tiltrotor at once, the tilt angles inputs, too (ch. 3)."""
+    """Position and attitude control of the tiltrotor with the tilt angles as inputs (ch. 3)."""
 
-    vehicle_model = "tiltrotor"
+    vehicle_models = ("tiltrotor",)
     reference_kinds = ("position", "pose", "attitude_altitude")
+    commands_tilts = True
 
     law: Literal["full_pose"]
     gains: Annotated[
         Annotated[Literal["ch03"], Tag("named")] | Annotated[FullPoseGainTable, Tag("table")],
-        Discriminator(_gain_kind),
+        Discriminator(gain_kind),
     ] = "ch03"
     tilt_weight: Literal["even", "published"] = Field(
         "even",
-        description="of tilt rates in the norm: by the force they move, or number for number",
+        description="weight of tilt rates in the norm: by the force that they change, or as "
+        "published, by number",
     )
     failed_rotor: Annotated[int, Field(ge=1, le=4)] | None = Field(
-        None, description="a rotor that the law knows to be lost and does not count on"
+        None, description="a rotor that the law knows to have failed and does not use"
     )
-    failure_known_from: NonNegative = Field(0.0, description="s, since when failed_rotor is known")
-    max_tilt_rate: Positive | None = Field(None, description="rad/s, held by the law")
+    failure_known_from: NonNegative = Field(
+        0.0, description="time from which failed_rotor is known, s"
+    )
+    max_tilt_rate: Positive | None = Field(None, description="limit enforced by the law, rad/s")
     max_tilt_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
-        None, description="rad, held by the law"
+        None, description="limit enforced by the law, rad"
     )
 
     def resolve_gains(self) -> full_pose.Gains:
-        """The numbers behind a named set or a table."""
+        """The gains of a named set or a table."""
         if isinstance(self.gains, FullPoseGainTable):
             return full_pose.Gains(*self.gains.position, *self.gains.attitude)
         return full_pose.GAIN_SETS[self.gains]
 
     def resolve_tilt_weight(self, vehicle: Vehicle) -> float:
-        """The number behind a weight's name, (rad/s)^2/rad."""
+        """The weight for a vehicle, (rad/s)^2/rad."""
         if self.tilt_weight == "published":
             return full_pose.PUBLISHED_TILT_WEIGHT
         return full_pose.force_balanced_tilt_weight(vehicle)
 
     def resolve_failure(self) -> full_pose.Failure:
-        """What the law knows of a lost rotor."""
+        """The failed rotor that the law knows of."""
         if self.failed_rotor is None:
             return full_pose.Failure()
         return full_pose.Failure(float(self.failed_rotor), self.failure_known_from)
 
     def resolve_limits(self) -> full_pose.Limits:
-        """The limits that the law holds, infinite where there are none."""
+        """The limits that the law enforces, infinite where there are none."""
         rate, angle = self.max_tilt_rate, self.max_tilt_angle
-        return full_pose.Limits(
-            inf if rate is None else rate,
-            inf if angle is None else angle,
-        )
+        return full_pose.Limits(inf if rate is None else rate, inf if angle is None else angle)
 
     def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
         """See `ControllerTable.error_loops`."""

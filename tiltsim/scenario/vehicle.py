@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from math import inf, pi
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -18,15 +19,15 @@ if TYPE_CHECKING:
 
 
 class ServoTable(Table):
-    """A position servo: second order, ideal but for what is given here."""
+    """A position servo of second order, ideal but for the keys given."""
 
     natural_frequency: Positive = Field(TiltServo.natural_frequency, description="rad/s")
     damping_ratio: Positive = TiltServo.damping_ratio
 
     @property
-    def stops(self) -> bool:
-        """Whether the servo has mechanical stops."""
-        return False
+    def angle_limit(self) -> float | None:
+        """Largest tilt angle either way, rad; None without mechanical stops."""
+        return None
 
 
 class TiltServoTable(ServoTable):
@@ -38,30 +39,74 @@ class TiltServoTable(ServoTable):
     )
 
     @property
-    def stops(self) -> bool:
-        """Whether the servo has mechanical stops."""
-        return self.max_angle is not None
+    def angle_limit(self) -> float | None:
+        """See `ServoTable.angle_limit`."""
+        return self.max_angle
 
 
 class PodTable(Table):
     """Mass properties of one rotor pod; nearly massless by default, as in the thesis."""
 
-    # MuJoCo refuses moving bodies a decade below.
+    # MuJoCo refuses moving bodies below a tenth of these bounds.
     mass: Annotated[float, Field(ge=1e-14)] = Field(Pod.mass, description="kg")
     inertia: Annotated[float, Field(ge=1e-14)] = Field(
         Pod.inertia, description="kg m^2, about each axis of the pod"
     )
 
 
-class VehicleTable(Table):
-    """A rotorcraft: a preset and what differs from it."""
+def require_physical_inertia(key: str, value: object, moments: tuple[float, ...]) -> None:
+    """Refuse principal moments of inertia that no body can have.
+
+    Parameters
+    ----------
+    key, value
+        What the message names: the key of the scenario and its value.
+    moments
+        Principal moments, kg m^2.
+
+    Raises
+    ------
+    InvalidValueError
+        If they violate the triangle inequality.
+    """
+    a, b, c = sorted(moments)
+    if a + b < c:
+        raise InvalidValueError(
+            key,
+            value,
+            "not physically realizable: principal moments must satisfy the triangle inequality",
+        )
+
+
+class AnyVehicleTable(Table, ABC):
+    """What every vehicle has."""
+
+    rotor_count: ClassVar[int]
+    is_planar: ClassVar[bool] = False  # moves on a plane, without gravity, air or ground
+
+    model: str
+
+    @property
+    def has_tilting_rotors(self) -> bool:
+        """Whether servos tilt the rotors."""
+        return self.model != "quadrotor"
+
+    @abstractmethod
+    def resolve(self) -> Vehicle | TiltCar:
+        """The physical parameters."""
+
+
+class VehicleTable(AnyVehicleTable):
+    """A rotorcraft: a preset, and the parameters that differ from it."""
+
+    rotor_count = 4
 
     model: Literal["tiltrotor", "quadrotor"] = "tiltrotor"
     preset: Literal["ar_drone_2", "ar_drone_2_unrounded", "luukkonen"] = "ar_drone_2"
     mjcf: str | None = Field(
         None,
-        description="a file with the vehicle, beside the scenario's, in place of the shipped one; "
-        "it has the parameters that are not given here, and the preset none",
+        description="an MJCF file, relative to the scenario's folder, in place of the shipped "
+        "one; parameters that are not given here are the file's instead of the preset's",
     )
     mass: Positive | None = Field(None, description="kg, pods included")
     inertia: Annotated[tuple[Positive, Positive, Positive], Field(strict=False)] | None = Field(
@@ -72,17 +117,17 @@ class VehicleTable(Table):
     drag_coefficient: NotTiny | None = Field(None, description="N m s^2/rad^2")
     gravity: Positive | None = Field(None, description="m/s^2")
     min_rotor_speed: NonNegative | None = Field(
-        None, description="rad/s, absolute value; at 0 a rotor may stop, but not reverse"
+        None, description="rad/s, absolute value; at 0 a rotor may stop but not reverse"
     )
     max_rotor_speed: Positive | None = Field(None, description="rad/s, absolute value")
     rotor_time_constant: Positive | None = Field(
-        None, description="s, of the lag between the speed a rotor is told and its own"
+        None, description="time constant of the lag between commanded and actual rotor speed, s"
     )
     tilt_servo: TiltServoTable = TiltServoTable()
     pod: PodTable = PodTable()
 
     def resolve(self) -> Vehicle:
-        """The physical parameters: the preset's or the file's, but for the keys given."""
+        """The physical parameters: the preset's or the file's, overridden by the keys given."""
         given = {
             key: getattr(self, key)
             for key in ("mass", "arm_length", "thrust_coefficient", "drag_coefficient", "gravity")
@@ -92,20 +137,25 @@ class VehicleTable(Table):
                 zip(("inertia_xx", "inertia_yy", "inertia_zz"), self.inertia, strict=True)
             )
         known = {key: value for key, value in given.items() if value is not None}
-        own = self.user_vehicle
-        base = PRESETS[self.preset] if own is None else own.vehicle
+        user_vehicle = self.user_vehicle
+        base = PRESETS[self.preset] if user_vehicle is None else user_vehicle.vehicle
         return base._replace(**known)
 
     @property
     def speeds_along_spin(self) -> tuple[float, float]:
-        """Least and greatest speed (rad/s) of a rotor along its spin; infinite without limits."""
+        """Lowest and highest speed (rad/s) of a rotor along its spin; infinite without limits."""
         low, high = self.min_rotor_speed, self.max_rotor_speed
-        greatest = inf if high is None else high
-        return -greatest if low is None else low, greatest
+        highest = inf if high is None else high
+        return -highest if low is None else low, highest
+
+    @property
+    def has_rotor_limits(self) -> bool:
+        """Whether the rotor speeds are limited."""
+        return self.min_rotor_speed is not None or self.max_rotor_speed is not None
 
     @property
     def user_vehicle(self) -> UserVehicle | None:
-        """The user's own file as measured; None for the shipped vehicles."""
+        """The user's MJCF file as measured; None for the shipped vehicles."""
         if self.mjcf is None:
             return None
         from tiltsim.models.user_vehicle import read_user_vehicle
@@ -115,25 +165,22 @@ class VehicleTable(Table):
         except ValueError as error:
             raise InvalidValueError("vehicle.mjcf", self.mjcf, str(error)) from None
 
-    def _check_own(self) -> None:
+    def _check_mjcf(self) -> None:
         for key, value, default in (
             ("arm_length", self.arm_length, None),
             ("pod", self.pod.model_dump(), PodTable().model_dump()),
         ):
             if value != default:
                 raise InvalidValueError(
-                    f"vehicle.{key}", value, "vehicle.mjcf has its own; leave it out"
+                    f"vehicle.{key}", value, "defined by vehicle.mjcf; remove it"
                 )
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.mjcf is not None:
-            self._check_own()
-        a, b, c = sorted(self.resolve()[1:4])
-        if a + b < c:
-            raise InvalidValueError(
-                "vehicle.inertia", [a, b, c], "no body has it: two moments must exceed the third"
-            )
+            self._check_mjcf()
+        moments = self.resolve()[1:4]
+        require_physical_inertia("vehicle.inertia", sorted(moments), moments)
         low, high = self.min_rotor_speed, self.max_rotor_speed
         if low is not None and high is not None and low >= high:
             raise InvalidValueError(
@@ -142,8 +189,11 @@ class VehicleTable(Table):
         return self
 
 
-class TiltCarTable(Table):
+class TiltCarTable(AnyVehicleTable):
     """The tilt-car of ch. 10; defaults: `tiltsim_controllers.tilt_car.vehicle.THESIS_CAR`."""
+
+    rotor_count = 2
+    is_planar = True
 
     model: Literal["tilt_car"]
     mass: Positive = Field(THESIS_CAR.mass, description="kg; the thesis does not give it")
@@ -152,10 +202,11 @@ class TiltCarTable(Table):
     )
     bottom_inertia: Positive = Field(
         THESIS_CAR.bottom_inertia,
-        description="of the bottom disc alone about the axis, kg m^2; I_B is both discs'",
+        description="of the bottom disc alone about the axis, kg m^2; I_B is that of both discs",
     )
     half_angle: Annotated[float, Field(gt=0.0, lt=pi / 2)] = Field(
-        THESIS_CAR.half_angle, description="theta, from the middle of the thrusts to either, rad"
+        THESIS_CAR.half_angle,
+        description="theta, between the mean thrust direction and either thrust, rad",
     )
     thrust_coefficient: Positive = Field(
         THESIS_CAR.thrust_coefficient, description="K_F, N s^2/rad^2"
@@ -174,9 +225,10 @@ class TiltCarTable(Table):
 
 
 def _model(value: Any) -> str:
-    if isinstance(value, VehicleTable | TiltCarTable):
-        return "tilt_car" if isinstance(value, TiltCarTable) else "tiltrotor"
-    model = value.get("model", "tiltrotor") if isinstance(value, dict) else "tiltrotor"
+    if isinstance(value, AnyVehicleTable):
+        model: object = value.model
+    else:
+        model = value.get("model", "tiltrotor") if isinstance(value, dict) else "tiltrotor"
     if not isinstance(model, str):
         return ""
     return "tiltrotor" if model == "quadrotor" else model
@@ -186,25 +238,25 @@ VehicleUnion = Annotated[
     Annotated[VehicleTable, Tag("tiltrotor")] | Annotated[TiltCarTable, Tag("tilt_car")],
     Discriminator(_model),
 ]
-"""The ``[vehicle]`` table, told apart by its model."""
+"""The ``[vehicle]`` table, discriminated by its model."""
 
 
-Share = Annotated[float, Field(ge=0.01, le=100.0)]
+ScaleFactor = Annotated[float, Field(ge=0.01, le=100.0)]
 
 
 class ModelErrorTable(Table):
-    """By what factors the vehicle that flies differs from the ``[vehicle]`` that the law knows."""
+    """Factors between the simulated vehicle and the ``[vehicle]`` that the controller assumes."""
 
-    mass: Share = 1.0
-    inertia: Annotated[tuple[Share, Share, Share], Field(strict=False)] = Field(
-        (1.0, 1.0, 1.0), description="one factor a principal moment"
+    mass: ScaleFactor = 1.0
+    inertia: Annotated[tuple[ScaleFactor, ScaleFactor, ScaleFactor], Field(strict=False)] = Field(
+        (1.0, 1.0, 1.0), description="one factor per principal moment"
     )
-    arm_length: Share = 1.0
-    thrust_coefficient: Share = 1.0
-    drag_coefficient: Share = 1.0
+    arm_length: ScaleFactor = 1.0
+    thrust_coefficient: ScaleFactor = 1.0
+    drag_coefficient: ScaleFactor = 1.0
 
     def apply(self, vehicle: Vehicle) -> Vehicle:
-        """The vehicle that flies, where the law knows ``vehicle``."""
+        """The simulated vehicle, where the controller assumes ``vehicle``."""
         xx, yy, zz = self.inertia
         return vehicle._replace(
             mass=self.mass * vehicle.mass,

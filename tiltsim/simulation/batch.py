@@ -29,6 +29,7 @@ from tiltsim.plants.engine_choice import native_pays_off
 from tiltsim.plants.factory import make_plant
 from tiltsim.plants.flight_model import flight_model, model_cache_key
 from tiltsim.plants.mujoco_plant import MujocoPlant, quiet_warnings
+from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.simulation.monitor import TerminationMonitor
 from tiltsim.simulation.simulate import fly_chunk, simulate_assembly
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -153,14 +154,15 @@ def _way_to_fly(assembly: Assembly, native: bool) -> object:
     scenario, loop = assembly.scenario, assembly.loop
     simulation = scenario.simulation
     natively = simulation.engine == "native" or (simulation.engine == "auto" and native)
-    if not natively or loop.watch is None or scenario.controller.law == "python":
+    if not natively or loop.watch is None or scenario.controller.is_external:
         return "alone"
     if simulation.plant == "thesis":
         return "thesis"
     # A stop of the tilt servos is a constraint, which gives a state more numbers, and ground gives
     # the model more shapes; a law with a layer around it has states and controls of its own.
-    file = getattr(scenario.vehicle, "mjcf", None)
-    return loop, scenario.vehicle.tilt_servo.stops, scenario.ground is not None, file
+    vehicle = scenario.vehicle
+    file = vehicle.mjcf if isinstance(vehicle, VehicleTable) else None
+    return loop, vehicle.tilt_servo.angle_limit is not None, scenario.ground is not None, file
 
 
 def _in_order(

@@ -25,7 +25,7 @@ def shared_engine(scenarios: Sequence[Scenario], steps: int | None = None) -> En
     ready: set[tuple[object, str]] = set()
     for scenario in scenarios:
         kind = (loop_of(scenario), scenario.simulation.plant)
-        if kind not in ready and scenario.controller.law != "python":
+        if kind not in ready and not scenario.controller.is_external:
             with reraise_swallowed_interrupts():
                 plant = make_plant(assemble(scenario), engine="native")
                 plant.record(1, 1)  # on the thesis plant compiled apart from `advance`

@@ -117,7 +117,7 @@ def initial_tilts(plan: FlightPlan) -> tuple[Quad, Quad]:
 
 def _initial_motion(plan: FlightPlan) -> tuple[Vector, Vector]:
     initial = plan.scenario.initial
-    tilting = plan.scenario.rotorcraft.model == "tiltrotor"
+    tilting = plan.scenario.rotorcraft.has_tilting_rotors
     angles, rates = initial_tilts(plan) if tilting else ((), ())
     return (
         (*initial.position, *quaternion_from_euler(*initial.attitude), *angles),

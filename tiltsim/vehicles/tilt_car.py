@@ -76,7 +76,7 @@ def _compile(
         userdata_size=userdata_size,
         tilt_servo=TiltServo(car.tilt_servo.natural_frequency, car.tilt_servo.damping_ratio),
         law_states=law_states,
-        rotor_floor=getattr(scenario.controller, "anti_windup", True),
+        rotor_floor=scenario.controller.rotors_stop_at_zero,
     )
     return compile_tilt_car(spec, visuals=visuals)
 

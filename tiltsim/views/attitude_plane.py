@@ -49,13 +49,13 @@ _TINY: Final = 1e-12
 
 def margin_threshold(scenario: Scenario) -> float:
     """The margin (rad) that a flight should keep: its supervisor's, else `MARGIN_THRESHOLD`."""
-    supervisor = getattr(scenario.controller, "supervisor", None)
+    supervisor = scenario.controller.supervision
     return supervisor.min_margin if supervisor is not None else MARGIN_THRESHOLD
 
 
 def curve_is_constant(scenario: Scenario) -> bool:
     """Whether the curve of singular attitudes is the same throughout a scenario's flights."""
-    if scenario.vehicle.model == "quadrotor":
+    if not scenario.vehicle.has_tilting_rotors:
         return True
     return scenario.controller.law == "attitude_altitude" and scenario.gait.type == "fixed"
 

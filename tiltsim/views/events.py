@@ -120,7 +120,7 @@ def rotorcraft_conditions(piece: Flight) -> Iterator[Condition]:
     threshold = margin_threshold(scenario)
     near = np.abs(piece["singularity_margin"]) < threshold
     yield f"singularity margin below {threshold:g} rad", time, near
-    supervisor = getattr(scenario.controller, "supervisor", None)
+    supervisor = scenario.controller.supervision
     if supervisor is not None:
         active = piece[SUPERVISION] > SUPERVISION_THRESHOLD
         yield _SUPERVISOR_MESSAGES[supervisor.strategy], time, active

@@ -155,7 +155,7 @@ def reference_path(scenario: Scenario, end: float, points: int) -> Floats:
     points
         Number of times.
     """
-    reference, table = scenario.reference.parameters, scenario.reference.table
+    reference, table = scenario.reference.parameters, scenario.reference.knots
     times = np.linspace(0.0, end, points).tolist()
     return np.array([position_reference(time, reference, table)[:3] for time in times])
 

@@ -74,7 +74,7 @@ def describe_controller(scenario: Scenario) -> list[str]:
     """The controller of a scenario for titles, most specific part first."""
     controller = scenario.controller
     parts = [f"{controller.law.replace('_', '-')} controller"]
-    if getattr(controller, "gait_rate_feedforward", False):
+    if controller.feeds_tilt_rates_forward:
         parts.append("tilt-rate feed-forward")
-    decoupler = getattr(controller, "decoupler", "none")
+    decoupler = controller.lateral_decoupler
     return parts if decoupler == "none" else [f"{decoupler} decoupler", *parts]

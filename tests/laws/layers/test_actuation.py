@@ -364,7 +364,7 @@ MISTAKES = {
     ),
     "nothing to allocate": (
         {"controller": {"allocation": "prioritized"}},
-        "allocation.*nothing limits the rotors",
+        "allocation.*needs rotor limits",
     ),
     "the same rotor twice": (
         {

@@ -338,13 +338,12 @@ def _actuation(plan: FlightPlan) -> Actuation:
     vehicle, simulation, controller = scenario.rotorcraft, scenario.simulation, scenario.controller
     low, high = vehicle.min_rotor_speed, vehicle.max_rotor_speed
     slowest, fastest = vehicle.speeds_along_spin
-    allocation = getattr(controller, "allocation", "inversion")
     max_rate, time_constant = vehicle.tilt_servo.max_rate, vehicle.rotor_time_constant
     return Actuation(
         sensors=sensor_parameters(scenario),
         allocation=Allocation(
-            active=float(allocation == "prioritized"),
-            horizon=getattr(controller, "allocation_horizon", 1.0),
+            active=float(controller.prioritizes_attitude),
+            horizon=controller.allocation_window,
             min_speed=low or 0.0,
             max_speed=inf if high is None else high,
             vehicle=vehicle.resolve(),

@@ -93,7 +93,7 @@ def _margin(axes: Any, flight: Flight) -> Any:
 
 
 def _determinant(axes: Any, flight: Flight) -> Any:
-    supervisor = getattr(flight.scenario.controller, "supervisor", None)
+    supervisor = flight.scenario.controller.supervision
     if supervisor is not None:
         axes.axhline(supervisor.min_determinant, color=style.GREY, ls="--", lw=0.9)
     line = np.maximum(flight["determinant"], 0.0)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from tiltsim.scenario.gait import PenguinGait
 from tiltsim.views.figures import style
 from tiltsim.views.figures.flight_layout import SIZE, add_headings, label, plan_view, widen
 
@@ -109,9 +110,8 @@ def _portrait(axes: Any, flight: Flight) -> None:
     axes.axvline(0.0, color=style.GREY, lw=0.7)
     axes.plot(error, rate, color=style.BLUE, lw=1.0, label="path")
     gait = flight.scenario.gait
-    period = getattr(gait, "period", None)
-    if period is not None:
-        half = flight["time"] / (0.5 * period)
+    if isinstance(gait, PenguinGait):
+        half = flight["time"] / (0.5 * gait.period)
         at = (np.abs(half - np.round(half)) < 1e-6) & (half > 0.5)
         axes.plot(error[at], rate[at], "o", color=style.RED, ms=4.5, zorder=4, label="at n T/2")
     axes.plot(error[0], rate[0], "o", color=style.INK, mfc="white", ms=5, label="start")

@@ -93,7 +93,7 @@ PANELS: Final = (
 
 def panels(scenario: Scenario) -> tuple[Panel, ...]:
     """The plots of a scenario's flights; a quadrotor has no tilt angles."""
-    tilts = scenario.vehicle.model != "quadrotor"
+    tilts = scenario.vehicle.has_tilting_rotors
     return tuple(panel for panel in PANELS if tilts or panel.path != "tilt_angles")
 
 

@@ -1,0 +1,121 @@
+"""The tables of a scenario together, and what follows from several of them."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, PrivateAttr
+
+from tiltsim.scenario.controller import Controller
+from tiltsim.scenario.expectation import Expectation
+from tiltsim.scenario.gait import FixedGait, Gait
+from tiltsim.scenario.reference import Reference, SetpointReference
+from tiltsim.scenario.simulation_table import InitialTable, SimulationTable
+from tiltsim.scenario.surroundings import AirTable, Disturbance, Fault, GroundTable, SensorTable
+from tiltsim.scenario.table import Table
+from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
+from tiltsim.scenario.vehicle import (
+    ModelErrorTable,
+    TiltCarTable,
+    TiltServoTable,
+    VehicleTable,
+    VehicleUnion,
+)
+from tiltsim_controllers.vehicle.parameters import Vehicle
+
+
+class ScenarioTables(Table):
+    """One flight, fully specified; `tiltsim.scenario.scenario.Scenario` adds the checks."""
+
+    title: str = ""
+    source: str = ""
+    without: str = Field(
+        "",
+        description="address of the same flight without the feature that this one shows, #NAME in "
+        "the same file: tiltsim report compares the two",
+    )
+    vehicle: VehicleUnion = VehicleTable()
+    model_error: ModelErrorTable = ModelErrorTable()
+    simulation: SimulationTable = SimulationTable()
+    initial: InitialTable = InitialTable()
+    controller: Controller = AttitudeAltitudeController()
+    gait: Gait = FixedGait()
+    reference: Reference = SetpointReference()
+    ground: GroundTable | None = None
+    disturbance: Annotated[tuple[Disturbance, ...], Field(strict=False)] = ()
+    air: AirTable = AirTable()
+    sensors: SensorTable = SensorTable()
+    fault: Annotated[tuple[Fault, ...], Field(strict=False)] = ()
+    expect: Annotated[tuple[Expectation, ...], Field(strict=False)] = ()
+
+    _address: str = PrivateAttr("")
+
+    @property
+    def address(self) -> str:
+        """The scenario's address on the command line; empty if it was built in Python."""
+        return self._address
+
+    @property
+    def actuator_options(self) -> list[tuple[str, object, object]]:
+        """Settings of the actuation layer: key, value and the value of ideal actuators."""
+        controller, vehicle = self.controller, self.vehicle
+        options: list[tuple[str, object, object]] = [
+            ("simulation.control_latency", self.simulation.control_latency, 0.0),
+            ("sensors", self.sensors.have_errors, False),
+            ("fault", [fault.type for fault in self.fault], []),
+            ("controller.allocation", controller.prioritizes_attitude, False),
+        ]
+        if isinstance(vehicle, VehicleTable):
+            options = [
+                ("vehicle.rotor_time_constant", vehicle.rotor_time_constant, None),
+                ("vehicle.tilt_servo.max_rate", vehicle.tilt_servo.max_rate, None),
+                *options,
+            ]
+        return options
+
+    @property
+    def needs_actuation_layer(self) -> bool:
+        """Whether anything between control law and vehicle is not ideal."""
+        return any(value != ideal for _, value, ideal in self.actuator_options)
+
+    @property
+    def has_air(self) -> bool:
+        """Whether the air acts on the vehicle."""
+        return self.air != AirTable()
+
+    @property
+    def has_ideal_actuators_in_still_air(self) -> bool:
+        """Whether pods and rotors follow their commands exactly and no air acts, as in the thesis.
+
+        Otherwise `tiltsim.laws.layers.on_equations` wraps the controller for the thesis plant.
+        """
+        vehicle = self.vehicle
+        if not isinstance(vehicle, VehicleTable):
+            return True
+        return not (
+            vehicle.has_rotor_limits
+            or vehicle.tilt_servo != TiltServoTable()
+            or self.model_error != ModelErrorTable()
+            or self.controller.supervision is not None
+            or self.needs_actuation_layer
+            or self.has_air
+        )
+
+    @property
+    def rotorcraft(self) -> VehicleTable:
+        """The vehicle of a tiltrotor or quadrotor. Raises TypeError for other vehicles."""
+        if not isinstance(self.vehicle, VehicleTable):
+            raise TypeError(f"the {self.vehicle.model} is not a rotorcraft")
+        return self.vehicle
+
+    @property
+    def true_rotorcraft(self) -> Vehicle:
+        """The simulated vehicle; the controller assumes ``rotorcraft.resolve()``."""
+        return self.model_error.apply(self.rotorcraft.resolve())
+
+    @property
+    def tilt_car(self) -> TiltCarTable:
+        """The vehicle of a tilt-car. Raises TypeError for other vehicles."""
+        if not isinstance(self.vehicle, TiltCarTable):
+            raise TypeError(f"the {self.vehicle.model} is not a tilt-car")
+        return self.vehicle
