@@ -23,7 +23,7 @@ from tiltsim.cli import main
 from tiltsim.commands import run as run_command
 from tiltsim.commands.progress import announce_compilation
 from tiltsim.engines.cache import before_compiling
-from tiltsim.engines.native_engine import compile_callbacks
+from tiltsim.engines.native_engine import compile_control
 from tiltsim.laws.attitude_altitude import TILTROTOR
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.vehicles.rotorcraft import COLUMN_UNITS
@@ -284,7 +284,7 @@ def test_check_survives_a_file_that_cannot_be_read_as_toml(tmp_path, capsys):
 def test_interrupt_ends_a_whole_check_at_once_and_keeps_what_is_finished(
     tmp_path, jobs, signal_, code
 ):
-    compile_callbacks(TILTROTOR)  # so that the interrupt falls into the flights
+    compile_control(TILTROTOR)  # so that the interrupt falls into the flights
     (tmp_path / "a.toml").write_text("[simulation]\nduration = 0.01\n")
     for name in ("b", "c"):
         endless = "[simulation]\nduration = 2000.0\nrecord_timestep = 1.0\n"
@@ -316,7 +316,7 @@ def test_interrupt_ends_a_whole_check_at_once_and_keeps_what_is_finished(
 
 
 def test_interrupted_run_keeps_its_files_and_says_so(tmp_path, capsys, monkeypatch):
-    compile_callbacks(TILTROTOR)  # so that the interrupt falls into the flight
+    compile_control(TILTROTOR)  # so that the interrupt falls into the flight
 
     @contextmanager
     def no_bar(*_arguments, **_options):

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import tiltsim
-import tiltsim.engines.rows
+import tiltsim.engines.sample_evaluation
 import tiltsim.plants.engine_choice
 import tiltsim.simulation.batch
 from tests.laws.layers.test_actuation import EVERYTHING
 from tests.laws.layers.test_air import STORM
 from tests.laws.test_laws import GUST, LAWS
-from tiltsim.engines.native_engine import compile_callbacks
+from tiltsim.engines.native_engine import compile_control
 from tiltsim.engines.native_stepper import compile_stepper
 from tiltsim.flight.end import End
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
@@ -453,7 +453,7 @@ def test_references_are_the_same_floats_natively(gait, decoupler, monkeypatch):
     tables = {"gait": {"type": gait, **GAITS[gait]}, "controller": {"decoupler": decoupler}}
     flight = tiltsim.simulate(scenario(tables, engine="python", duration=0.1))
     in_python = dict(flight.columns)
-    monkeypatch.setattr(tiltsim.engines.rows, "MIN_ROWS_TO_COMPILE", 0)
+    monkeypatch.setattr(tiltsim.engines.sample_evaluation, "MIN_ROWS_TO_COMPILE", 0)
     del flight.__dict__["columns"]
     for name, column in flight.columns.items():
         np.testing.assert_array_equal(column, in_python[name])
@@ -462,7 +462,7 @@ def test_references_are_the_same_floats_natively(gait, decoupler, monkeypatch):
 def test_references_of_the_law_with_gait_rates_are_the_same_floats_natively(monkeypatch):
     flight = tiltsim.simulate(scenario(LAWS["gait_feedforward"], engine="python", duration=0.1))
     in_python = dict(flight.columns)
-    monkeypatch.setattr(tiltsim.engines.rows, "MIN_ROWS_TO_COMPILE", 0)
+    monkeypatch.setattr(tiltsim.engines.sample_evaluation, "MIN_ROWS_TO_COMPILE", 0)
     del flight.__dict__["columns"]
     for name, column in flight.columns.items():
         np.testing.assert_array_equal(column, in_python[name])
@@ -481,7 +481,7 @@ def test_columns_beside_a_state_out_of_all_bounds_raise_nothing():
 
 def test_a_row_without_a_result_is_no_number():
     setup = assemble(scenario({})).setup
-    rows = tiltsim.engines.rows.evaluate_over_samples(
+    rows = tiltsim.engines.sample_evaluation.evaluate_over_samples(
         lambda time, state, _parameters, _table: (state[0], time / state[0]),
         *(2, np.array([1.0, 2.0]), np.array([[0.0], [4.0]]), setup),
     )
@@ -514,7 +514,7 @@ def test_each_plant_tells_what_it_compiles(monkeypatch, tmp_path, plant):
     monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
     monkeypatch.setattr(cache, "before_compiling", [stop])
     loop = LOOPS["attitude_altitude"]
-    compiling = compile_callbacks if plant == "mujoco" else compile_stepper
+    compiling = compile_control if plant == "mujoco" else compile_stepper
     with pytest.raises(ToldError, match=re.escape(loop.native_name(plant))):
         compiling.__wrapped__(loop)
 

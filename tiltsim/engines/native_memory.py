@@ -7,7 +7,7 @@ from typing import Any
 from numba import carray, types
 from numba.extending import intrinsic, register_jitable
 
-from tiltsim.engines.numba_setup import _INNER
+from tiltsim.engines.compiling import INNER
 
 
 def _cast(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -15,30 +15,30 @@ def _cast(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
 
 
 @intrinsic
-def _floats_at(_typing: Any, address: Any) -> Any:
+def floats_at(_typing: Any, address: Any) -> Any:
     """An address as a pointer to floats."""
     return types.CPointer(types.float64)(address), _cast
 
 
 @intrinsic
-def _bytes_at(_typing: Any, address: Any) -> Any:
+def bytes_at(_typing: Any, address: Any) -> Any:
     """An address as a pointer to anything."""
     return types.voidptr(address), _cast
 
 
 @intrinsic
-def _addresses_at(_typing: Any, address: Any) -> Any:
+def addresses_at(_typing: Any, address: Any) -> Any:
     """An address as a pointer to addresses."""
     return types.CPointer(types.intp)(address), _cast
 
 
 @intrinsic
-def _integers_at(_typing: Any, address: Any) -> Any:
+def integers_at(_typing: Any, address: Any) -> Any:
     """An address as a pointer to C integers."""
     return types.CPointer(types.int32)(address), _cast
 
 
-@register_jitable(**_INNER)
-def _array(place, size):  # type: ignore[no-untyped-def]
-    """The array of floats whose address lies at a place in mjData."""
-    return carray(_floats_at(_addresses_at(place)[0]), (size,))
+@register_jitable(**INNER)
+def array_at(place, size):  # type: ignore[no-untyped-def]
+    """The array of floats whose address is stored at a place in mjData."""
+    return carray(floats_at(addresses_at(place)[0]), (size,))

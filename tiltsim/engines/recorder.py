@@ -12,8 +12,8 @@ from numba.extending import register_jitable
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.limits import SINGULAR, WITHIN_LIMITS
-from tiltsim.engines.native_memory import _bytes_at, _floats_at
-from tiltsim.engines.numba_setup import _INNER
+from tiltsim.engines.compiling import INNER
+from tiltsim.engines.native_memory import bytes_at, floats_at
 from tiltsim_controllers.mathematics.records import flatten, record_dtype, record_size
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import ReferenceParameters
@@ -33,58 +33,57 @@ class RecorderHead(NamedTuple):
 
 
 SIDES: Final = 8
-"""How many numbers a law may have watched."""
-
+"""How many sign checks a loop may have."""
 
 _RECORDER: Final = record_dtype(RecorderHead)
-
-
 _RECORDER_SIZE: Final = record_size(RecorderHead)
 
 
-@register_jitable(**_INNER)
-def _sample_is_due(recorder):  # type: ignore[no-untyped-def]
+@register_jitable(**INNER)
+def sample_is_due(recorder):  # type: ignore[no-untyped-def]
     """Count an evaluation."""
-    head = carray(_bytes_at(recorder), (1,), _RECORDER)
+    head = carray(bytes_at(recorder), (1,), _RECORDER)
     left = head[0].left
     head[0].left = left - 1.0
     return left == 0.0
 
 
-@register_jitable(**_INNER)
-def _record(recorder, time, values, watched, limit_exceeded, knots):  # type: ignore[no-untyped-def]
-    """Keep a sample and judge it as `tiltsim.simulation.monitor.TerminationMonitor` does."""
-    head = carray(_bytes_at(recorder), (1,), _RECORDER)
+@register_jitable(**INNER)
+def record_sample(recorder, time, values, checked, limit_exceeded, knots):  # type: ignore[no-untyped-def]
+    """Record a sample; end the recording where the `TerminationMonitor` would end the flight."""
+    head = carray(bytes_at(recorder), (1,), _RECORDER)
     samples = int(head[0].samples)
     capacity = int(head[0].capacity)
     if samples >= capacity or head[0].terminated != 0.0:
         return
     width = 1 + len(values)
-    rest = carray(_floats_at(recorder + 8 * _RECORDER_SIZE), (SIDES + capacity * width,))
+    rest = carray(floats_at(recorder + 8 * _RECORDER_SIZE), (SIDES + capacity * width,))
     start = SIDES + samples * width
     rest[start] = time
     finite = True
     for index in range(len(values)):
         rest[start + 1 + index] = values[index]
         finite = finite and isfinite(values[index])
-    lost = not finite
+    terminated = not finite
     if finite:
         reference, follows_position = head[0].reference, head[0].follows_position
-        lost = limit_exceeded(time, values, reference, knots, follows_position) != WITHIN_LIMITS
-    for index in range(len(watched)):
-        side = 0.0 if abs(watched[index]) < SINGULAR else copysign(1.0, watched[index])
+        code = limit_exceeded(time, values, reference, knots, follows_position)
+        terminated = code != WITHIN_LIMITS
+    for index in range(len(checked)):
+        side = 0.0 if abs(checked[index]) < SINGULAR else copysign(1.0, checked[index])
         if side == 0.0 or side != rest[index]:
-            lost = True
-    if lost:
+            terminated = True
+    if terminated:
         head[0].terminated = 1.0
     head[0].samples = samples + 1.0
     interval = head[0].interval if samples + 2 < capacity else head[0].last_interval
     head[0].left = interval - 1.0
 
 
-@register_jitable(**_INNER)
-def _recording_is_over(recorder):  # type: ignore[no-untyped-def]
-    head = carray(_bytes_at(recorder), (1,), _RECORDER)
+@register_jitable(**INNER)
+def recording_is_over(recorder):  # type: ignore[no-untyped-def]
+    """Whether there is no room for another sample, or the last one ended the flight."""
+    head = carray(bytes_at(recorder), (1,), _RECORDER)
     return head[0].terminated != 0.0 or head[0].samples == head[0].capacity
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from tiltsim.closed_loop.loop import ControlSetup, SignCheck
-from tiltsim.engines.rows import evaluate_over_samples
+from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.vehicles.rotorcraft import OBSERVED_FIELDS
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
 from tiltsim_controllers.gaits.parameters import GaitParameters

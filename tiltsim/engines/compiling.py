@@ -1,0 +1,142 @@
+"""Compile scalar functions with numba, into a cache of our own.
+
+Numba's settings and classes stay as they are for other code of the process: our functions are
+compiled with a cache object that has its own folder and lock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from threading import Lock
+from typing import Any, Final
+
+from numba import njit, types
+from numba.core import sigutils
+from numba.core.caching import (
+    CompileResultCacheImpl,
+    FunctionCache,
+    IndexDataCacheFile,
+    UserProvidedCacheLocator,
+)
+from numba.core.ccallback import CFunc
+from numba.core.typing.templates import infer, infer_global, make_overload_template
+
+from tiltsim.engines.cache import native_code_folder, native_code_is_cacheable
+from tiltsim.system.locks import locked
+from tiltsim_controllers.mathematics.scalar import scalar, scalar_functions
+
+ERROR_MODEL: Final = {"error_model": "numpy"}
+"""Division by zero gives infinity or NaN, as in C; MuJoCo then reports a bad control."""
+
+INNER: Final = {**ERROR_MODEL, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""Options of what only compiled code calls; without entry points it compiles a sixth faster."""
+
+
+class _Locator(UserProvidedCacheLocator):  # type: ignore[misc]
+    """Places the code of a function in `native_code_folder`."""
+
+    def __init__(self, function: Callable[..., Any], file: str) -> None:
+        self._py_file, self._lineno = file, function.__code__.co_firstlineno
+        self._cache_path = str(native_code_folder() / self.get_suitable_cache_subpath(file))
+
+    @classmethod
+    def from_function(cls, function: Callable[..., Any], file: str) -> _Locator:
+        return cls(function, file)
+
+
+class _CacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
+    _locator_classes = (_Locator,)
+
+
+class _LockedIndex(IndexDataCacheFile):  # type: ignore[misc]
+    """An index that processes extend one after the other.
+
+    Numba reads, extends and writes it as if there were no other process: of two that compile at
+    once, both could take the same file name, and each load the other's code.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        with locked(Path(f"{self._index_path}.lock"), wait=True):
+            super().save(key, data)
+
+
+class NativeCodeCache(FunctionCache):  # type: ignore[misc]
+    """Numba's cache of a function's compiled code, in our folder and locked."""
+
+    _impl_class = _CacheImpl
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        stamp = self._impl.locator.get_source_stamp()
+        self._cache_file = _LockedIndex(self._cache_path, self._impl.filename_base, stamp)
+
+
+def _cached(compiled: Any, function: Callable[..., Any]) -> Any:
+    """Give a dispatcher or C callback our cache, if the folder is writable."""
+    if native_code_is_cacheable():
+        compiled._cache = NativeCodeCache(function)
+    return compiled
+
+
+def compiled(function: Callable[..., Any]) -> Any:
+    """Compile a function for calls from Python, without holding Python's lock."""
+    return _cached(njit(nogil=True, **ERROR_MODEL)(function), function)
+
+
+def compiled_callback(signature: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Compile a function as a C callback of a numba signature."""
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        normalized = sigutils.normalize_signature(signature)
+        callback = _cached(CFunc(function, normalized, {}, dict(ERROR_MODEL)), function)
+        callback.compile()
+        return callback
+
+    return decorate
+
+
+def callable_natively(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Let compiled code call a Python function, as `numba.extending.register_jitable` does.
+
+    Its code is cached separately, since controllers share most of their functions; but not that of
+    a closure, which has no name of its own.
+    """
+
+    def implementation(*_args: Any, **_keywords: Any) -> Callable[..., Any]:
+        return function
+
+    template = make_overload_template(function, implementation, INNER, False, "never")
+
+    class Template(template):  # type: ignore[misc, valid-type]
+        def _get_jit_decorator(self) -> Callable[..., Any]:
+            return _decorator_of_inner
+
+    infer(Template)
+    infer_global(function, types.Function(Template))
+    return function
+
+
+def _decorator_of_inner(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    def decorate(function: Callable[..., Any]) -> Any:
+        dispatcher = njit(**options)(function)
+        return dispatcher if function.__closure__ else _cached(dispatcher, function)
+
+    return decorate
+
+
+def register_scalar_functions() -> None:
+    """Let compiled code call every scalar function defined so far."""
+    with _registering:  # batches build plants in threads
+        for function in scalar_functions()[len(_registered) :]:
+            _registered.append(callable_natively(function))
+
+
+_registered: Final[list[Callable[..., Any]]] = []
+_registering: Final = Lock()
+
+
+@scalar
+def no_sign_checks(values: Any, parameters: Any) -> tuple[float]:
+    """For loops that leave the sign checks to Python."""
+    return (1.0,)
