@@ -441,8 +441,8 @@ def test_native_watching_sees_what_python_watches(law):
         plant.advance(20)
         values = plant.observe()
         sample = dict(zip(loop.sample_fields, (plant.time, *values), strict=True))
-        watched = [number.value for number in loop.watched(sample, setup)]
-        numbers = loop.watch(values, setup.parameters)
+        watched = [number.value for number in loop.monitoring.sign_checks(sample, setup)]
+        numbers = loop.monitoring.sign_check_values(values, setup.parameters)
         assert list(numbers[: len(watched)]) == watched
         assert set(numbers[len(watched) :]) <= {1.0}
 
@@ -560,9 +560,9 @@ def test_no_two_control_steps_share_a_name_of_native_code(plant):
     """Else an automatic engine takes one law for compiled where another is."""
     tilting = [LOOPS["attitude_altitude"], LOOPS["gait_feedforward"]]
     laws = [*LOOPS.values(), *(with_supervisor(loop, "hold") for loop in tilting)]
-    tiltrotors = [loop for loop in laws if loop.model == "tiltrotor"]
+    tiltrotors = [loop for loop in laws if loop.dynamics.model == "tiltrotor"]
     real = [with_actuation(loop, steps) for loop in tiltrotors for steps in (0, 2)]
-    aired = [with_air(loop) for loop in [*laws, *real] if loop.model != "tilt_car"]
+    aired = [with_air(loop) for loop in [*laws, *real] if loop.dynamics.model != "tilt_car"]
     loops = [*laws, *real, *aired]
     if plant == "thesis":
         loops = [*laws[: len(LOOPS)], *map(on_equations, [*laws[len(LOOPS) :], *real, *aired])]

@@ -1,4 +1,8 @@
-"""Closed loops: a control law, as scalar code, around one of the MuJoCo models."""
+"""A closed loop: a controller, as scalar code, around the model of a vehicle.
+
+What every closed loop has, whichever controller it holds, in four records: the model's `Dynamics`,
+the `Sampling` of the controller, the `Columns` of a flight and the `Monitoring` of its end.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class Sizes(NamedTuple):
-    """Lengths of the vectors that a loop reads and writes."""
+    """Lengths of MuJoCo's vectors."""
 
     qpos: int
     qvel: int
@@ -33,7 +37,7 @@ class ControlSetup(NamedTuple):
     """What the control step of one flight reads besides the state."""
 
     parameters: Any  # the loop's record
-    knots: Values = ()  # keyframes of the gait, then waypoints of the reference
+    knots: tuple[float, ...] = ()  # keyframes of the gait, then waypoints of the reference
 
     @property
     def userdata(self) -> Floats:
@@ -42,22 +46,123 @@ class ControlSetup(NamedTuple):
 
 
 class SignCheck(NamedTuple):
-    """A number that must keep its sign, or the flight is over, and what to say if it does not."""
+    """A number that has to keep its sign; where it reaches zero the flight ends for this cause."""
 
     value: float
     cause: str
 
 
 @dataclass(frozen=True, eq=False)
+class Dynamics:
+    """The model in MuJoCo and its state.
+
+    Attributes
+    ----------
+    model
+        Name of the MJCF model.
+    sizes
+        Lengths of its vectors, the controller's own states among the activations.
+    initial_activations
+        ``(plan, setup) -> act`` at time zero.
+    controller_states
+        Number of activations that are states of the controller.
+    extra_actuators
+        What layers around the controller append to the model's actuators, innermost first.
+    """
+
+    model: str
+    sizes: Sizes
+    initial_activations: Callable[[FlightPlan, ControlSetup], Vector]
+    controller_states: int = 0
+    extra_actuators: tuple[ExtraActuators, ...] = ()
+
+
+@scalar
+def held_controls(
+    time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: Any
+) -> Values:
+    """For controllers whose controls stay as they were sampled."""
+    return (*ctrl,)
+
+
+@dataclass(frozen=True, eq=False)
+class Sampling:
+    """The control step, at the samples of the controller and between them.
+
+    Attributes
+    ----------
+    controls
+        Scalar function ``(time, qpos, qvel, act, parameters, knots) -> ctrl``: the whole step.
+    hold
+        Scalar function ``(time, qpos, qvel, act, ctrl, parameters) -> ctrl``: what still changes
+        between the samples of a held controller.
+    """
+
+    controls: Callable[..., Values]
+    hold: Callable[..., Values] = held_controls
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """What a flight records, and what is derived from it.
+
+    Attributes
+    ----------
+    observe
+        Scalar function ``(qpos, qvel, act, ctrl) -> values`` of the kind's fields and ``fields``.
+    derive
+        ``(samples by field, setup) -> columns``: references, determinant, margin and those of
+        ``units``.
+    fields
+        Fields of a sample beyond those of the vehicle's kind.
+    units
+        Columns of a flight beyond those of the vehicle's kind, with their units.
+    observe_reads_controls
+        Whether ``observe`` needs the controls in force.
+    """
+
+    observe: Callable[..., Values]
+    derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
+    fields: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
+    observe_reads_controls: bool = False
+
+
+def no_sign_checks(_sample: Mapping[str, float], _setup: ControlSetup) -> tuple[SignCheck, ...]:
+    """For controllers that are singular nowhere."""
+    return ()
+
+
+@dataclass(frozen=True, eq=False)
+class Monitoring:
+    """Where the controller becomes singular.
+
+    Attributes
+    ----------
+    sign_checks
+        ``(sample by field, setup) -> SignCheck, ...``.
+    sign_check_values
+        Scalar function ``(values, parameters) -> numbers``: at least the values of
+        ``sign_checks``, from ``values`` as `Columns.observe` returns them. None leaves the check
+        to Python.
+    """
+
+    sign_checks: Callable[[Mapping[str, float], ControlSetup], tuple[SignCheck, ...]] = (
+        no_sign_checks
+    )
+    sign_check_values: Callable[..., Values] | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Equations:
-    """A law around the equations of motion that the thesis prints for its vehicle.
+    """A controller on the equations of motion that the thesis prints for its vehicle.
 
     Attributes
     ----------
     inputs
-        Scalar function ``(time, state, parameters, knots) -> inputs``: the law.
+        Scalar function ``(time, state, parameters, knots) -> inputs``: the controller.
     inputs_size
-        How many inputs there are.
+        Number of inputs.
     rates
         Scalar function ``(time, state, inputs, parameters, knots, disturbance) -> derivative`` of
         the state; the disturbance is an acceleration (m/s^2, world).
@@ -66,9 +171,9 @@ class Equations:
     observe
         Scalar function ``(time, state, inputs, parameters, knots) -> values`` of the loop's
         `sample_fields` after the time; ``inputs`` are those in force.
-    settled
-        Scalar function ``(state, parameters) -> state`` for the end of each step: what has run
-        past a limit is put back. None where there is none.
+    project_onto_limits
+        Scalar function ``(state, parameters) -> state`` for the end of each step: puts back what
+        has passed a limit. None where there are no limits.
     """
 
     inputs: Callable[..., Values]
@@ -76,113 +181,70 @@ class Equations:
     rates: Callable[..., Values]
     initial: Callable[[FlightPlan, ControlSetup], Vector]
     observe: Callable[..., Values]
-    settled: Callable[..., list[float]] | None = None
+    project_onto_limits: Callable[..., list[float]] | None = None
+
+
+class SupervisedLaw(NamedTuple):
+    """What a supervisor (`tiltsim.laws.layers.supervision`) needs of a controller, as scalar code.
+
+    ``motion`` is the supervisor's state with its rate and acceleration.
+    """
+
+    controls: Callable[..., Values]
+    """``(time, state, qvel, act, motion, parameters, knots)``: the controls from the rotor
+    accelerations on."""
+    references: Callable[..., Values]
+    """``(time, sample, motion, parameters, knots)``: columns of position and attitude reference."""
+    fields: tuple[str, ...]  # of a sample, those that the references need
 
 
 @dataclass(frozen=True, eq=False)
 class ClosedLoop:
-    """A law around a model, for all that is the same whichever law flies.
-
-    Scalar functions, for the engines:
+    """A controller around the model of a vehicle.
 
     Attributes
     ----------
-    model
-        Name of the MJCF model.
-    sizes
-        Lengths of its vectors, the law's own states among the activations.
-    parameters
-        Record at the head of `userdata`; its first field is ``signature``. The knots of
-        gaits of any length, may follow it.
-    controls
-        Scalar function ``(time, qpos, qvel, act, parameters, knots) -> ctrl``: the whole step.
-    refresh
-        Scalar function ``(ctrl, act) -> ctrl``: what moves between the samples of a held law.
-    hold
-        Scalar function ``(time, qpos, qvel, act, ctrl, parameters) -> ctrl`` in place of
-        ``refresh``, where more than the activations decides what moves between samples.
-    setup
-        ``(plan, signature) -> ControlSetup``.
-    initial_activations
-        ``(plan, setup) -> act`` at time zero.
-    observe
-        Scalar function ``(qpos, qvel, act, ctrl) -> values`` of the kind's fields and
-        ``law_fields``; ``ctrl`` are the controls in force if it ``observes_controls``.
-    derive
-        ``(samples by field, setup) -> columns``: references, determinant, margin and
-        ``extra_columns``.
-    watched
-        ``(sample by field, setup) -> SignCheck, ...``: where the law ends.
-    watch
-        Scalar function ``(values, parameters) -> numbers``: at least the numbers of ``watched``,
-        from ``values`` as ``observe`` gives them. None leaves watching to Python.
-    observes_controls
-        Whether ``observe`` reads the controls in force.
-    law_states
-        Number of activations that are states of the law.
-    extra_actuators
-        What layers around the law append to the model's actuators, the innermost first.
-    law_fields
-        Fields of a sample beyond those of the vehicle's kind.
-    extra_columns
-        Columns of a flight that other loops do not have, with their units.
-    follows_position
-        Whether a scenario has the law follow the reference's horizontal position.
-    equations
-        The same law on the thesis's own equations; None where it flies on MuJoCo alone, or, with a
-        layer around it, by `tiltsim.laws.layers.on_equations`.
     kind
         What holds for all loops around such a vehicle.
+    parameters
+        Record at the head of `userdata`; its first field is ``signature``. The knots of gait and
+        reference follow it.
+    setup
+        ``(plan, signature) -> ControlSetup``.
+    dynamics, sampling, columns, monitoring
+        See there.
+    equations
+        The same controller on the thesis's equations; None where it is supported in MuJoCo only
+        or, inside a layer, by `tiltsim.laws.layers.on_equations`.
+    supervised
+        What a supervisor needs of the controller; None where it cannot be supervised.
+    follows_position
+        Whether a scenario has the controller follow the reference's horizontal position.
     uses_gait
         Whether the scenario's gait has a part in the flight.
     """
 
-    model: str
-    sizes: Sizes
-    parameters: type[tuple[Any, ...]]
-    controls: Callable[..., Values]
-    refresh: Callable[..., Values]
-    setup: Callable[[FlightPlan, float], ControlSetup]
-    initial_activations: Callable[[FlightPlan, ControlSetup], Vector]
-    observe: Callable[..., Values]
-    derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
-    watched: Callable[[Mapping[str, float], ControlSetup], tuple[SignCheck, ...]]
     kind: VehicleKind
+    parameters: type[tuple[Any, ...]]
+    setup: Callable[[FlightPlan, float], ControlSetup]
+    dynamics: Dynamics
+    sampling: Sampling
+    columns: Columns
+    monitoring: Monitoring = field(default_factory=Monitoring)
     equations: Equations | None = None
-    watch: Callable[..., Values] | None = None
-    observes_controls: bool = False
-    law_states: int = 0
-    extra_actuators: tuple[ExtraActuators, ...] = ()
-    law_fields: tuple[str, ...] = ()
-    extra_columns: Mapping[str, str] = field(default_factory=dict)
+    supervised: SupervisedLaw | None = None
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
-    hold: Callable[..., Values] | None = None
     uses_gait: bool = True
 
     @cached_property
     def signature(self) -> float:
         """A checksum of the layout of `userdata`, which tells our models from foreign ones."""
-        layout = (self.model, self.sizes, record_dtype(self.parameters))
+        layout = (self.dynamics.model, self.dynamics.sizes, record_dtype(self.parameters))
         return float(zlib.crc32(repr(layout).encode()))
 
-    @cached_property
-    def held(self) -> Callable[..., Values]:
-        """``hold``, or ``refresh`` in its form."""
-        if self.hold is not None:
-            return self.hold
-        refresh = self.refresh
-
-        @scalar
-        def only_refresh(
-            time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: Any
-        ) -> Values:
-            return refresh(ctrl, act)
-
-        return only_refresh
-
     def native_name(self, plant: str) -> str:
-        """Name of the loop's compiled code on a plant, as a file's name."""
-        step = self.controls
+        """File name of the loop's compiled code on a plant, "mujoco" or "thesis"."""
+        step = self.sampling.controls
         if plant == "thesis" and self.equations is not None:
             step = self.equations.inputs
         return f"{plant}.{step.__module__}.{step.__qualname__}"
@@ -194,10 +256,10 @@ class ClosedLoop:
 
     @cached_property
     def sample_fields(self) -> tuple[str, ...]:
-        """What a recorded sample holds, in order."""
-        return ("time", *self.kind.observed_fields, *self.law_fields)
+        """The fields of a recorded sample, in order."""
+        return ("time", *self.kind.observed_fields, *self.columns.fields)
 
     @cached_property
     def units(self) -> dict[str, str]:
         """The columns of a flight and their units, in order."""
-        return dict(self.kind.columns) | dict(self.extra_columns)
+        return {**self.kind.columns, **self.columns.units}

@@ -39,8 +39,8 @@ def check_model(loop: ClosedLoop, model: mujoco.MjModel, data: mujoco.MjData) ->
     sizes = Sizes(model.nq, model.nv, model.na, model.nu)
     head = HEADER_SIZE + loop.record_size
     signed = model.nuserdata >= head and data.userdata[HEADER_SIZE] == loop.signature
-    if sizes != loop.sizes or not signed:
+    if sizes != loop.dynamics.sizes or not signed:
         raise ValueError(
-            f"not a flight of the {loop.model}: {sizes}, expected {loop.sizes} with the "
-            "parameters in userdata"
+            f"not a flight of the {loop.dynamics.model}: {sizes}, expected {loop.dynamics.sizes} "
+            "with the parameters in userdata"
         )

@@ -48,11 +48,11 @@ def compile_control(loop: ClosedLoop) -> Any:
     long as MuJoCo may call it.
     """
     announce_native_code(loop.native_name("mujoco"))
-    controls, hold, signature = loop.controls, loop.held, loop.signature
-    observe, watch = loop.observe, loop.watch or no_sign_checks
+    controls, hold, signature = loop.sampling.controls, loop.sampling.hold, loop.signature
+    observe, watch = loop.columns.observe, loop.monitoring.sign_check_values or no_sign_checks
     register_scalar_functions()
     limit_exceeded = loop.kind.limit_exceeded
-    nq, nv, na, nu = loop.sizes
+    nq, nv, na, nu = loop.dynamics.sizes
     at = mjdata_layout()
     head = HEADER_SIZE + loop.record_size
     layout = record_dtype(loop.parameters)

@@ -37,7 +37,7 @@ def compile_stepper(loop: ClosedLoop) -> tuple[Any, Any]:
     register_scalar_functions()
     assert loop.equations is not None
     inputs, observe = loop.equations.inputs, loop.equations.observe
-    watch = loop.watch or no_sign_checks
+    watch = loop.monitoring.sign_check_values or no_sign_checks
     limit_exceeded = loop.kind.limit_exceeded
     stepper = register_jitable(**INNER)(make_stepper(loop.equations))
 

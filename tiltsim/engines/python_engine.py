@@ -20,7 +20,7 @@ class PythonEngine:
 
     def __init__(self, loop: ClosedLoop, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         check_model(loop, model, data)
-        controls, refresh = loop.controls, loop.refresh
+        controls, hold = loop.sampling.controls, loop.sampling.hold
         # Parameters never change during a flight: read once what native code reads at every call.
         values = data.userdata[HEADER_SIZE:].tolist()
         parameters = slotted(unflatten(loop.parameters, values))
@@ -43,15 +43,13 @@ class PythonEngine:
                 write_controls(ctrl, 0, *(nan,) * len(ctrl))
 
         def between_samples() -> tuple[float, ...]:
-            if loop.hold is None:
-                return refresh(ctrl.tolist(), act.tolist())
             try:
                 state = data.time, qpos.tolist(), qvel.tolist(), act.tolist()
-                return loop.hold(*state, ctrl.tolist(), parameters)
+                return hold(*state, ctrl.tolist(), parameters)
             except (ArithmeticError, ValueError):
                 return (nan,) * len(ctrl)
 
-        def hold(model: mujoco.MjModel, called: mujoco.MjData) -> None:
+        def sample_and_hold(model: mujoco.MjModel, called: mujoco.MjData) -> None:
             if called is not data:
                 return
             period, evaluations, _ = header.tolist()
@@ -61,7 +59,7 @@ class PythonEngine:
                 write_controls(ctrl, 0, *between_samples())
             header[EVALUATIONS] = evaluations + 1.0 if evaluations + 1.0 < period else 0.0
 
-        self._callback = hold if header[CONTROL_PERIOD] > 0.0 else sample
+        self._callback = sample_and_hold if header[CONTROL_PERIOD] > 0.0 else sample
 
     def callback(self) -> Callback:
         """See `Engine.callback`."""

@@ -130,7 +130,7 @@ class Recorder:
         )
         self._memory[:_RECORDER_SIZE] = list(flatten(head))
         if len(checked) > SIDES:
-            raise ValueError(f"{loop.model}: {len(checked)} sign checks, at most {SIDES}")
+            raise ValueError(f"{loop.dynamics.model}: {len(checked)} sign checks, at most {SIDES}")
         for index, value in enumerate(checked):
             self._memory[_RECORDER_SIZE + index] = copysign(1.0, value)
 

@@ -22,8 +22,8 @@ def stage(state: Vector, step: float, rates: Vector) -> list[float]:
 
 
 @scalar
-def as_it_is(state: list[float], parameters: Any) -> list[float]:
-    """For equations in which nothing stops."""
+def identity(state: list[float], parameters: Any) -> list[float]:
+    """For equations without limits."""
     return state
 
 
@@ -35,7 +35,8 @@ def make_stepper(equations: Equations) -> Stepper:
     evaluate it at every stage. It returns the new state and the inputs held since the last control
     sample; the caller counts the steps.
     """
-    inputs, rates, settled = equations.inputs, equations.rates, equations.settled or as_it_is
+    inputs, rates = equations.inputs, equations.rates
+    project_onto_limits = equations.project_onto_limits or identity
 
     def advance(
         step_index: int,
@@ -68,7 +69,7 @@ def make_stepper(equations: Equations) -> Stepper:
                 value + timestep * (2.0 / 9.0 * a + 1.0 / 3.0 * b + 4.0 / 9.0 * c)
                 for value, a, b, c in zip(state, k1, k2, k3)
             ]
-            state = settled(state, parameters)
+            state = project_onto_limits(state, parameters)
         return state, held
 
     return advance

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tiltsim_controllers.laws.yaw_position import State, euler_rates, gyroscopic_acceleration
+from tiltsim_controllers.laws.yaw_position import euler_rates, gyroscopic_acceleration
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.vehicle.parameters import Vehicle
@@ -19,21 +19,10 @@ if TYPE_CHECKING:
 
 
 @scalar
-def rigid_body(state: Vector) -> State:
-    """State of laws without states: `tiltsim_controllers.laws.yaw_position.STATE_FIELDS`."""
-    return (
-        *(state[0], state[1], state[2], state[3], state[4], state[5], state[6]),
-        *(state[7], state[8], state[9], state[10], state[11], 0.0, 0.0),
-    )
-
-
-@scalar
-def law_state(state: Vector) -> State:
-    """The laws' state as `rigid_body`, for laws with states of their own."""
-    return (
-        *(state[0], state[1], state[2], state[3], state[4], state[5], state[6]),
-        *(state[7], state[8], state[9], state[10], state[11], state[12], state[13]),
-    )
+def rigid_body(state: Vector) -> Values:
+    """The twelve states of the rigid body."""
+    x, y, z, vx, vy, vz = state[0], state[1], state[2], state[3], state[4], state[5]
+    return x, y, z, vx, vy, vz, state[6], state[7], state[8], state[9], state[10], state[11]
 
 
 @scalar
@@ -45,28 +34,26 @@ def equations_of_motion(
     ``inputs`` are the thrust (N) and the torques (N m, body axes). ``disturbance`` is an
     acceleration (m/s^2, world) that the law does not know of.
     """
-    roll, pitch, yaw, p, q, r = state[6], state[7], state[8], state[9], state[10], state[11]
+    _, _, _, vx, vy, vz, roll, pitch, yaw, p, q, r = rigid_body(state)
     gust_x, gust_y, gust_z = disturbance
     _, _, up_x, _, _, up_y, _, _, up_z = rotation_from_euler(roll, pitch, yaw)
     lift = inputs[0] / vehicle.mass
     roll_rate, pitch_rate, yaw_rate = euler_rates(roll, pitch, p, q, r)
     p_drift, q_drift, r_drift = gyroscopic_acceleration(p, q, r, vehicle)
     return (
-        *(state[3], state[4], state[5]),
-        *(lift * up_x + gust_x, lift * up_y + gust_y, lift * up_z - vehicle.gravity + gust_z),
-        *(roll_rate, pitch_rate, yaw_rate),
+        vx,
+        vy,
+        vz,
+        lift * up_x + gust_x,
+        lift * up_y + gust_y,
+        lift * up_z - vehicle.gravity + gust_z,
+        roll_rate,
+        pitch_rate,
+        yaw_rate,
         p_drift + inputs[1] / vehicle.inertia_xx,
         q_drift + inputs[2] / vehicle.inertia_yy,
         r_drift + inputs[3] / vehicle.inertia_zz,
     )
-
-
-@scalar
-def extended_equations_of_motion(
-    state: Vector, inputs: Vector, vehicle: Vehicle, disturbance: Triple
-) -> Values:
-    """As `equations_of_motion`, followed by the law's own two states."""
-    return (*equations_of_motion(state, inputs, vehicle, disturbance), inputs[4], inputs[5])
 
 
 def initial_state(scenario: Scenario) -> Values:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, SignCheck, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, SignCheck
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
@@ -20,7 +20,6 @@ from tiltsim_controllers.laws.attitude_altitude import (
     rotor_accelerations,
 )
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
-from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import position_reference
 from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines, torque_entries
@@ -29,6 +28,7 @@ from tiltsim_controllers.vehicle.parameters import drag_ratio
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
     from tiltsim.scenario.scenario import Scenario
+from tiltsim.closed_loop.loop import Columns, Monitoring, Sampling, SupervisedLaw
 from tiltsim.laws.tiltrotor import (
     determinant_check,
     gait_servo_commands,
@@ -42,8 +42,10 @@ from tiltsim.laws.tiltrotor import (
     scaled_determinant,
     servo_lead,
     singularity_columns,
+    tiltrotor_dynamics,
     tiltrotor_state,
 )
+from tiltsim.vehicles.rotorcraft.layout import ALPHA_1, ALPHA_2, ALPHA_3, ALPHA_4
 
 
 class LoopParameters(NamedTuple):
@@ -52,7 +54,6 @@ class LoopParameters(NamedTuple):
     signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
     servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
     law: Parameters
-    supervisor: Supervisor = Supervisor()
 
 
 @scalar
@@ -74,12 +75,12 @@ def tiltrotor_controls(
 
 
 @scalar
-def law_rates(
+def supervised_controls(
     time: float,
     state: State,
     qvel: Vector,
     act: Vector,
-    supervisor_motion: Triple,
+    motion: Triple,
     parameters: LoopParameters,
     knots: Vector,
 ) -> Quad:
@@ -88,24 +89,18 @@ def law_rates(
 
 
 def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
-    controller = plan.scenario.controller
+    controller, rotorcraft = plan.scenario.controller, plan.scenario.rotorcraft
     assert isinstance(controller, AttitudeAltitudeController)
-    rotorcraft = plan.scenario.rotorcraft
-    vehicle = rotorcraft.resolve()
-    parameters = LoopParameters(
-        signature,
-        servo_lead(rotorcraft.tilt_servo),
-        law=Parameters(
-            vehicle=vehicle,
-            gains=controller.resolve_gains(),
-            gait=plan.gait.parameters,
-            reference=plan.reference,
-            decoupler=DECOUPLERS[controller.decoupler],
-            decoupling=DECOUPLINGS[controller.decoupling],
-        ),
-        supervisor=controller.resolve_supervisor(vehicle),
+    law = Parameters(
+        vehicle=rotorcraft.resolve(),
+        gains=controller.resolve_gains(),
+        gait=plan.gait.parameters,
+        reference=plan.reference,
+        decoupler=DECOUPLERS[controller.decoupler],
+        decoupling=DECOUPLINGS[controller.decoupling],
     )
-    return ControlSetup(parameters, plan.knots)
+    lead = servo_lead(rotorcraft.tilt_servo)
+    return ControlSetup(LoopParameters(signature, lead, law), plan.knots)
 
 
 @scalar
@@ -115,7 +110,7 @@ def reference_values(
     """`REFERENCE_COLUMNS` and `TILT_REFERENCE_COLUMNS` at a time and state of the law."""
     law = parameters.law
     ratio = drag_ratio(law.vehicle)
-    trig = sines_and_cosines(state[12], state[13], state[14], state[15])
+    trig = sines_and_cosines(state[ALPHA_1], state[ALPHA_2], state[ALPHA_3], state[ALPHA_4])
     torque = torque_entries(trig, ratio)
     x, y, z, _, _, _, _, _, _ = position_reference(time, law.reference, knots)
     roll, pitch, yaw, _, _, _ = attitude_reference(time, state, trig, torque, law, knots)
@@ -125,7 +120,7 @@ def reference_values(
 
 @scalar
 def supervised_reference_values(
-    time: float, state: State, supervisor_motion: Triple, parameters: LoopParameters, knots: Vector
+    time: float, state: State, motion: Triple, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """`REFERENCE_COLUMNS`, for `tiltsim.laws.layers.supervision`."""
     return reference_values(time, state, parameters, knots)[:6]
@@ -137,7 +132,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 
 
 @scalar
-def watch_tiltrotor(
+def sign_check_values(
     values: Vector, parameters: LoopParameters
 ) -> tuple[float, float, float, float, float]:
     """The determinant of the decoupling matrix, and the rotor speeds where it vanishes with them.
@@ -152,7 +147,7 @@ def watch_tiltrotor(
     return matrix, 1.0, 1.0, 1.0, 1.0
 
 
-def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[SignCheck, ...]:
+def _sign_checks(sample: Mapping[str, float], setup: ControlSetup) -> tuple[SignCheck, ...]:
     law = setup.parameters.law
     matrix = determinant_check(sample, law.vehicle)
     return (
@@ -203,18 +198,12 @@ def follows_position(scenario: Scenario) -> bool:
 
 TILTROTOR: Final = ClosedLoop(
     kind=ROTORCRAFT,
-    model="tiltrotor",
-    sizes=Sizes(qpos=11, qvel=10, act=4, ctrl=12),
     parameters=LoopParameters,
-    controls=tiltrotor_controls,
-    refresh=refreshed_controls,
     setup=_setup,
-    initial_activations=lambda plan, _setup: initial_signed_rotor_speeds(plan.scenario),
-    observe=observe_tiltrotor,
-    derive=_derive,
-    watched=_watched,
-    watch=watch_tiltrotor,
-    follows_position=follows_position,
+    dynamics=tiltrotor_dynamics(),
+    sampling=Sampling(tiltrotor_controls, refreshed_controls),
+    columns=Columns(observe_tiltrotor, _derive),
+    monitoring=Monitoring(_sign_checks, sign_check_values),
     equations=Equations(
         inputs=equation_inputs,
         inputs_size=4,
@@ -224,5 +213,7 @@ TILTROTOR: Final = ClosedLoop(
         ),
         observe=observe_equations,
     ),
+    supervised=SupervisedLaw(supervised_controls, supervised_reference_values, STATE_FIELDS),
+    follows_position=follows_position,
 )
-"""The attitude-altitude law around the tiltrotor."""
+"""The attitude-altitude controller of the tiltrotor."""

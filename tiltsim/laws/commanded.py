@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, Columns, ControlSetup, Dynamics, Sampling, Sizes
 from tiltsim.laws.full_pose import TILT_COMMANDS
 from tiltsim.laws.quadrotor import references, rigid_body_state, upright_margin
 from tiltsim.laws.tiltrotor import (
@@ -24,6 +24,7 @@ from tiltsim.laws.tiltrotor import (
     rotor_thrust_controls,
     servo_lead,
     singularity_columns,
+    tiltrotor_dynamics,
 )
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.gaits.parameters import GaitParameters
@@ -57,9 +58,7 @@ class LoopParameters(NamedTuple):
     vehicle: Vehicle
     gait: GaitParameters
     reference: ReferenceParameters
-    told: HeldCommand = (
-        HeldCommand()
-    )  # changes with every command, in the plant's copy of the parameters
+    command: HeldCommand = HeldCommand()  # the plant replaces it in its copy of the record
 
 
 @scalar
@@ -67,11 +66,17 @@ def commanded_tiltrotor_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """All twelve controls of the tiltrotor."""
-    told = parameters.told
+    command = parameters.command
     return (
-        *(told.tilt_1, told.tilt_2, told.tilt_3, told.tilt_4),
+        command.tilt_1,
+        command.tilt_2,
+        command.tilt_3,
+        command.tilt_4,
         *rotor_thrust_controls(act),
-        *(told.acceleration_1, told.acceleration_2, told.acceleration_3, told.acceleration_4),
+        command.acceleration_1,
+        command.acceleration_2,
+        command.acceleration_3,
+        command.acceleration_4,
     )
 
 
@@ -80,16 +85,21 @@ def commanded_quadrotor_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """All eight controls of the quadrotor."""
-    told = parameters.told
+    command = parameters.command
     return (
         *rotor_thrust_controls(act),
-        *(told.acceleration_1, told.acceleration_2, told.acceleration_3, told.acceleration_4),
+        command.acceleration_1,
+        command.acceleration_2,
+        command.acceleration_3,
+        command.acceleration_4,
     )
 
 
 @scalar
-def refreshed_quadrotor_controls(ctrl: Vector, act: Vector) -> Values:
-    """Held controls with the thrusts that belong to the present rotor speeds."""
+def refreshed_quadrotor_controls(
+    time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: LoopParameters
+) -> Values:
+    """Held controls with the thrusts of the present rotor speeds."""
     return (*rotor_thrust_controls(act), ctrl[4], ctrl[5], ctrl[6], ctrl[7])
 
 
@@ -101,18 +111,18 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
     return ControlSetup(parameters, plan.knots)
 
 
-def with_command(parameters: Any, told: HeldCommand) -> Any:
-    """Parameters of a vehicle under commands, whatever the layers around it, told otherwise."""
-    if isinstance(parameters, LoopParameters):
-        return parameters._replace(told=told)
-    return parameters._replace(law=with_command(parameters.law, told))
-
-
 def commanded_parameters(parameters: Any) -> LoopParameters:
     """The parameters of the vehicle under commands within those of its layers."""
-    while not isinstance(parameters, LoopParameters):
-        parameters = parameters.law
-    return parameters
+    if isinstance(parameters, LoopParameters):
+        return parameters
+    return commanded_parameters(parameters.inner)
+
+
+def with_command(parameters: Any, command: HeldCommand) -> Any:
+    """Parameters of a vehicle under commands, whatever the layers around it, with this one."""
+    if isinstance(parameters, LoopParameters):
+        return parameters._replace(command=command)
+    return parameters._replace(inner=with_command(parameters.inner, command))
 
 
 @scalar
@@ -160,34 +170,31 @@ def _follows_position(scenario: Scenario) -> bool:
 
 TILTROTOR: Final = ClosedLoop(
     kind=ROTORCRAFT,
-    model="tiltrotor",
-    sizes=Sizes(qpos=11, qvel=10, act=4, ctrl=12),
     parameters=LoopParameters,
-    controls=commanded_tiltrotor_controls,
-    refresh=refreshed_controls,
     setup=_setup,
-    initial_activations=lambda plan, _setup: initial_signed_rotor_speeds(plan.scenario),
-    observe=observe_commanded_tiltrotor,
-    derive=_derive_tiltrotor,
-    watched=lambda _sample, _setup: (),
-    law_fields=TILT_COMMANDS,
-    extra_columns=dict.fromkeys(TILT_COMMANDS, "rad"),
+    dynamics=tiltrotor_dynamics(),
+    sampling=Sampling(commanded_tiltrotor_controls, refreshed_controls),
+    columns=Columns(
+        observe_commanded_tiltrotor,
+        _derive_tiltrotor,
+        fields=TILT_COMMANDS,
+        units=dict.fromkeys(TILT_COMMANDS, "rad"),
+    ),
     follows_position=_follows_position,
 )
-"""The tiltrotor under commands; what its servos are told is part of a sample."""
+"""The tiltrotor under commands; those of its servos are part of a sample."""
 
 QUADROTOR: Final = ClosedLoop(
     kind=ROTORCRAFT,
-    model="quadrotor",
-    sizes=Sizes(qpos=7, qvel=6, act=4, ctrl=8),
     parameters=LoopParameters,
-    controls=commanded_quadrotor_controls,
-    refresh=refreshed_quadrotor_controls,
     setup=_setup,
-    initial_activations=lambda plan, _setup: initial_signed_rotor_speeds(plan.scenario),
-    observe=observe_commanded_quadrotor,
-    derive=_derive_quadrotor,
-    watched=lambda _sample, _setup: (),
+    dynamics=Dynamics(
+        "quadrotor",
+        Sizes(qpos=7, qvel=6, act=4, ctrl=8),
+        lambda plan, _setup: initial_signed_rotor_speeds(plan.scenario),
+    ),
+    sampling=Sampling(commanded_quadrotor_controls, refreshed_quadrotor_controls),
+    columns=Columns(observe_commanded_quadrotor, _derive_quadrotor),
     follows_position=_follows_position,
     uses_gait=False,
 )

@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Sizes
+from tiltsim.closed_loop.loop import (
+    ClosedLoop,
+    Columns,
+    ControlSetup,
+    Equations,
+    Monitoring,
+    Sampling,
+)
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.laws.quadrotor import references
 from tiltsim.laws.tiltrotor import (
@@ -17,6 +24,7 @@ from tiltsim.laws.tiltrotor import (
     rotor_thrust_controls,
     servo_lead,
     singularity_columns,
+    tiltrotor_dynamics,
     tiltrotor_state,
 )
 from tiltsim.scenario.tiltrotor_controllers import FullPoseController
@@ -74,15 +82,14 @@ def observe_full_pose(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> 
 
 
 @scalar
-def watch_rotor_stops(values: Vector, parameters: LoopParameters) -> Quad:
+def sign_check_values(values: Vector, parameters: LoopParameters) -> Quad:
     """The rotor speeds along their spin."""
     return rotor_speeds_along_spin(values)
 
 
 def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
-    controller = plan.scenario.controller
+    controller, rotorcraft = plan.scenario.controller, plan.scenario.rotorcraft
     assert isinstance(controller, FullPoseController)
-    rotorcraft = plan.scenario.rotorcraft
     vehicle = rotorcraft.resolve()
     law = Parameters(
         vehicle,
@@ -149,20 +156,14 @@ def observe_equations(
 
 FULL_POSE: Final = ClosedLoop(
     kind=ROTORCRAFT,
-    model="tiltrotor",
-    sizes=Sizes(qpos=11, qvel=10, act=8, ctrl=16),
     parameters=LoopParameters,
-    controls=full_pose_controls,
-    refresh=refreshed_controls,
     setup=_setup,
-    initial_activations=lambda plan, _setup: (
-        *initial_signed_rotor_speeds(plan.scenario),
-        *initial_tilts(plan)[0],
+    dynamics=tiltrotor_dynamics(len(TILT_COMMANDS), lambda plan: initial_tilts(plan)[0]),
+    sampling=Sampling(full_pose_controls, refreshed_controls),
+    columns=Columns(
+        observe_full_pose, _derive, fields=TILT_COMMANDS, units=dict.fromkeys(TILT_COMMANDS, "rad")
     ),
-    observe=observe_full_pose,
-    derive=_derive,
-    watched=lambda sample, _setup: rotor_speed_checks(sample),
-    watch=watch_rotor_stops,
+    monitoring=Monitoring(lambda sample, _setup: rotor_speed_checks(sample), sign_check_values),
     equations=Equations(
         inputs=equation_inputs,
         inputs_size=8,
@@ -173,8 +174,5 @@ FULL_POSE: Final = ClosedLoop(
         ),
         observe=observe_equations,
     ),
-    law_states=4,
-    law_fields=TILT_COMMANDS,
-    extra_columns=dict.fromkeys(TILT_COMMANDS, "rad"),
 )
-"""Full-pose control around the tiltrotor."""
+"""Full-pose control of the tiltrotor."""

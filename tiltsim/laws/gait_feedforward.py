@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, SignCheck, Sizes
+from tiltsim.closed_loop.loop import (
+    ClosedLoop,
+    Columns,
+    ControlSetup,
+    Equations,
+    Monitoring,
+    Sampling,
+    SignCheck,
+    SupervisedLaw,
+)
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.laws.attitude_altitude import follows_position
 from tiltsim.laws.tiltrotor import (
@@ -21,6 +30,7 @@ from tiltsim.laws.tiltrotor import (
     scaled_determinant,
     servo_lead,
     singularity_columns,
+    tiltrotor_dynamics,
     tiltrotor_state,
 )
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
@@ -48,20 +58,18 @@ class LoopParameters(NamedTuple):
 
 
 @scalar
-def law_rates(
+def supervised_controls(
     time: float,
     state: State,
     qvel: Vector,
     act: Vector,
-    supervisor_motion: Triple,
+    motion: Triple,
     parameters: LoopParameters,
     knots: Vector,
 ) -> Values:
     """The law's part of the controls: rotor accelerations, rates of the integrals."""
     tilt_rates, integrals = (qvel[6], qvel[7], qvel[8], qvel[9]), (act[4], act[5], act[6])
-    return tracking_inputs(
-        *(time, state, tilt_rates, integrals, parameters.law, knots, supervisor_motion)
-    )[:7]
+    return tracking_inputs(*(time, state, tilt_rates, integrals, parameters.law, knots, motion))[:7]
 
 
 @scalar
@@ -74,7 +82,7 @@ def gait_feedforward_controls(
     return (
         *gait_servo_commands(time, parameters.servo_lead, law.gait, knots),
         *rotor_thrust_controls(act),
-        *law_rates(time, state, qvel, act, SUPERVISOR_AT_REST, parameters, knots),
+        *supervised_controls(time, state, qvel, act, SUPERVISOR_AT_REST, parameters, knots),
     )
 
 
@@ -105,9 +113,9 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
 
 @scalar
 def supervised_reference_values(
-    time: float, state: Vector, supervisor_motion: Triple, parameters: LoopParameters, knots: Vector
+    time: float, state: Vector, motion: Triple, parameters: LoopParameters, knots: Vector
 ) -> tuple[float, float, float, float, float, float]:
-    """Position (m) and attitude (rad) to track at a time: the state is `SEEN`."""
+    """Position (m) and attitude (rad) to track at a time: the state is `REFERENCE_FIELDS`."""
     law = parameters.law
     x, y, z, _, _, _, _, _, _ = position_reference(time, law.reference, knots)
     _, _, _, _, _, _, _, roll, pitch, yaw = tracking_inputs(
@@ -121,7 +129,7 @@ def supervised_reference_values(
         (state[24], state[25], state[26]),
         law,
         knots,
-        supervisor_motion,
+        motion,
     )
     return x, y, z, roll, pitch, yaw
 
@@ -130,7 +138,7 @@ def supervised_reference_values(
 def reference_values(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
-    """Columns of references at a time: the state is `SEEN`."""
+    """Columns of references at a time: the state is `REFERENCE_FIELDS`."""
     a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, parameters.law.gait, knots)
     return (
         *supervised_reference_values(time, state, SUPERVISOR_AT_REST, parameters, knots),
@@ -141,12 +149,12 @@ def reference_values(
     )
 
 
-SEEN: Final = (*STATE_FIELDS, *TILT_RATE_COLUMNS, *INTEGRAL_FIELDS)
+REFERENCE_FIELDS: Final = (*STATE_FIELDS, *TILT_RATE_COLUMNS, *INTEGRAL_FIELDS)
 """Of a sample, what references are made from."""
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    columns = reference_columns(reference_values, SEEN, samples, setup)
+    columns = reference_columns(reference_values, REFERENCE_FIELDS, samples, setup)
     return columns | singularity_columns(samples, setup.parameters.law.vehicle)
 
 
@@ -157,7 +165,7 @@ def observe_gait_feedforward(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vect
 
 
 @scalar
-def watch_gait_feedforward(
+def sign_check_values(
     values: Vector, parameters: LoopParameters
 ) -> tuple[float, float, float, float, float]:
     """The determinant of the decoupling matrix, and the rotor speeds with which it vanishes."""
@@ -165,7 +173,7 @@ def watch_gait_feedforward(
     return scaled_determinant(values, parameters.law.vehicle), spin_1, spin_2, spin_3, spin_4
 
 
-def _watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[SignCheck, ...]:
+def _sign_checks(sample: Mapping[str, float], setup: ControlSetup) -> tuple[SignCheck, ...]:
     return (determinant_check(sample, setup.parameters.law.vehicle), *rotor_speed_checks(sample))
 
 
@@ -222,22 +230,17 @@ def observe_equations(
 
 GAIT_FEEDFORWARD: Final = ClosedLoop(
     kind=ROTORCRAFT,
-    model="tiltrotor",
-    sizes=Sizes(qpos=11, qvel=10, act=7, ctrl=15),
     parameters=LoopParameters,
-    controls=gait_feedforward_controls,
-    refresh=refreshed_controls,
     setup=_setup,
-    initial_activations=lambda plan, _setup: (
-        *initial_signed_rotor_speeds(plan.scenario),
-        0.0,
-        0.0,
-        0.0,
+    dynamics=tiltrotor_dynamics(len(INTEGRAL_FIELDS), lambda _plan: (0.0, 0.0, 0.0)),
+    sampling=Sampling(gait_feedforward_controls, refreshed_controls),
+    columns=Columns(
+        observe_gait_feedforward,
+        _derive,
+        fields=INTEGRAL_FIELDS,
+        units=dict.fromkeys(INTEGRAL_FIELDS, "m s"),
     ),
-    observe=observe_gait_feedforward,
-    derive=_derive,
-    watched=_watched,
-    watch=watch_gait_feedforward,
+    monitoring=Monitoring(_sign_checks, sign_check_values),
     equations=Equations(
         inputs=equation_inputs,
         inputs_size=7,
@@ -250,9 +253,7 @@ GAIT_FEEDFORWARD: Final = ClosedLoop(
         ),
         observe=observe_equations,
     ),
-    law_states=3,
-    law_fields=INTEGRAL_FIELDS,
-    extra_columns=dict.fromkeys(INTEGRAL_FIELDS, "m s"),
+    supervised=SupervisedLaw(supervised_controls, supervised_reference_values, REFERENCE_FIELDS),
     follows_position=follows_position,
 )
-"""The attitude-altitude law with gait-rate feed-forward around the tiltrotor."""
+"""The attitude-altitude controller with tilt-rate feed-forward, of the tiltrotor."""

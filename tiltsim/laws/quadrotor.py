@@ -12,17 +12,28 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, SignCheck, Sizes
-from tiltsim.equations.quadrotor import initial_state
+from tiltsim.closed_loop.loop import (
+    ClosedLoop,
+    Columns,
+    ControlSetup,
+    Dynamics,
+    Equations,
+    Monitoring,
+    Sampling,
+    SignCheck,
+    Sizes,
+)
+from tiltsim.equations.quadrotor import equations_of_motion, initial_state, rigid_body
 from tiltsim.laws.tiltrotor import REFERENCE_COLUMNS, TILT_REFERENCE_COLUMNS
-from tiltsim.vehicles.rotorcraft import OBSERVED_FIELDS, ROTORCRAFT
+from tiltsim.vehicles.rotorcraft import ROTORCRAFT
+from tiltsim.vehicles.rotorcraft.layout import OBSERVED_FIELDS, PITCH, ROLL
 from tiltsim_controllers.analysis.quadrotor_singularity import (
     normalized_determinant,
     published_determinant,
 )
 from tiltsim_controllers.laws.yaw_position import State
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
-from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.quadrotor_mixer import speed_along_spin, thrust_controls
@@ -30,10 +41,7 @@ from tiltsim_controllers.vehicle.quadrotor_mixer import speed_along_spin, thrust
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
 
-SIZES: Final = Sizes(qpos=7, qvel=6, act=6, ctrl=10)
-"""With the thrust and its rate, the states of the yaw-position law."""
-
-LAW_FIELDS: Final = ("extension_thrust", "extension_thrust_rate")
+EXTENSION_FIELDS: Final = ("extension_thrust", "extension_thrust_rate")
 """The law's own states, ``zeta`` and ``xi``, in a sample."""
 
 EXTENSION_COLUMNS: Final = {
@@ -65,30 +73,22 @@ def extended_controls(inputs: Values, vehicle: Vehicle) -> Values:
 
 
 @scalar
-def held_extended_controls(ctrl: Vector, act: Vector) -> Values:
-    """Controls as they were sampled: rotors and law states go on with what they were told."""
-    return (
-        *(ctrl[0], ctrl[1], ctrl[2], ctrl[3], ctrl[4]),
-        *(ctrl[5], ctrl[6], ctrl[7], ctrl[8], ctrl[9]),
-    )
-
-
-def extended_activations(plan: FlightPlan, _setup: ControlSetup) -> Values:
-    """The extension starts with the thrust of hover, at rest."""
-    vehicle = plan.scenario.rotorcraft.resolve()
-    return 0.0, 0.0, 0.0, 0.0, vehicle.mass * vehicle.gravity, 0.0
-
-
-@scalar
 def sample_values(body: Vector, thrusts: Vector) -> Values:
     """What a sample holds, from the rigid body's twelve states and the thrust controls."""
     return (
-        *(body[0], body[1], body[2], body[3], body[4], body[5]),
-        *(body[6], body[7], body[8], body[9], body[10], body[11]),
-        *(0.0, 0.0, 0.0, 0.0),
-        *(-speed_along_spin(thrusts[0]), speed_along_spin(thrusts[1])),
-        *(-speed_along_spin(thrusts[2]), speed_along_spin(thrusts[3])),
-        *(0.0, 0.0, 0.0, 0.0),
+        *rigid_body(body),
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        -speed_along_spin(thrusts[0]),
+        speed_along_spin(thrusts[1]),
+        -speed_along_spin(thrusts[2]),
+        speed_along_spin(thrusts[3]),
+        0.0,
+        0.0,
+        0.0,
+        0.0,
     )
 
 
@@ -96,20 +96,6 @@ def sample_values(body: Vector, thrusts: Vector) -> Values:
 def observe_quadrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """The rigid body, no tilt, rotor speeds from the thrusts in force."""
     return sample_values(rigid_body_state(qpos, qvel, 0.0, 0.0), ctrl)
-
-
-@scalar
-def observe_equations(state: Vector, inputs: Vector, vehicle: Vehicle) -> Values:
-    """The same of ch. 2's equations: thrust and torques in force tell the rotor speeds."""
-    return sample_values(
-        state, thrust_controls(inputs[0], inputs[1], inputs[2], inputs[3], vehicle)
-    )
-
-
-@scalar
-def observe_extended_equations(state: Vector, inputs: Vector, vehicle: Vehicle) -> Values:
-    """As `observe_equations`, followed by the law's own states."""
-    return (*observe_equations(state, inputs, vehicle), state[12], state[13])
 
 
 @scalar
@@ -121,27 +107,41 @@ def observe_extended_quadrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Ve
 @scalar
 def thrust_tilt_cosine(values: Vector) -> float:
     """The cosine of the thrust axis' tilt, from what `observe_quadrotor` gives."""
-    return cos(values[6]) * cos(values[7])
+    return cos(values[ROLL]) * cos(values[PITCH])
 
 
-def equations(
-    inputs: Callable[..., Values],
-    inputs_size: int,
-    rates: Callable[..., Values],
-    observe: Callable[..., Values],
-) -> Equations:
-    """A law on ch. 2's equations; the functions are those of `tiltsim.closed_loop.loop.Equations`.
+@scalar
+def equation_rates(
+    time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector, disturbance: Triple
+) -> Values:
+    """Ch. 2's equations of motion."""
+    return equations_of_motion(state, inputs, parameters.vehicle, disturbance)
 
-    A law whose inputs go on after thrust and torques has states of its own, which these integrate;
-    they start as in MuJoCo.
-    """
-    law_states = inputs_size - 4
 
-    def initial(plan: FlightPlan, setup: ControlSetup) -> Values:
-        extension = extended_activations(plan, setup)[4:][:law_states]
-        return (*initial_state(plan.scenario), *extension)
+@scalar
+def observe_equations(
+    time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
+) -> Values:
+    """A sample of ch. 2's equations; the rotor speeds follow from thrust and torques."""
+    thrusts = thrust_controls(inputs[0], inputs[1], inputs[2], inputs[3], parameters.vehicle)
+    return sample_values(state, thrusts)
 
-    return Equations(inputs, inputs_size, rates, initial, observe)
+
+@scalar
+def extended_equation_rates(
+    time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector, disturbance: Triple
+) -> Values:
+    """Ch. 2's equations of motion, followed by the controller's own two states."""
+    body = equations_of_motion(state, inputs, parameters.vehicle, disturbance)
+    return (*body, inputs[4], inputs[5])
+
+
+@scalar
+def observe_extended_equations(
+    time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
+) -> Values:
+    """As `observe_equations`, followed by the controller's own states."""
+    return (*observe_equations(time, state, inputs, parameters, knots), state[12], state[13])
 
 
 @scalar
@@ -152,41 +152,51 @@ def thrust_axis_value(values: Vector, parameters: object) -> tuple[float]:
 
 def extended_loop(
     parameters: type[tuple[Any, ...]],
-    controls: Callable[..., Values],
-    on_equations: Equations,
-    *,
     setup: Callable[[FlightPlan, float], ControlSetup],
-    derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]],
-    watched: Callable[[Mapping[str, float], ControlSetup], tuple[SignCheck, ...]],
-    watch: Callable[..., Values],
-    own_columns: Mapping[str, str] | None = None,
-    follows_position: bool = True,
+    controls: Callable[..., Values],
+    inputs: Callable[..., Values],
+    columns: Columns,
+    monitoring: Monitoring,
 ) -> ClosedLoop:
-    """Close the loop around a law that integrates its thrust twice.
+    """A closed loop around a control law that integrates its thrust twice.
 
-    ``own_columns`` are those beyond the `EXTENSION_COLUMNS`, with their units.
+    Parameters
+    ----------
+    parameters
+        Record with the fields ``signature`` and ``vehicle`` at least.
+    setup, controls, columns, monitoring
+        As in `tiltsim.closed_loop.loop.ClosedLoop`.
+    inputs
+        The control law on ch. 2's equations; see `tiltsim.closed_loop.loop.Equations`.
     """
     return ClosedLoop(
         kind=ROTORCRAFT,
-        model="quadrotor",
-        sizes=SIZES,
         parameters=parameters,
-        controls=controls,
-        refresh=held_extended_controls,
         setup=setup,
-        initial_activations=extended_activations,
-        observe=observe_extended_quadrotor,
-        observes_controls=True,
-        derive=derive,
-        watched=watched,
-        watch=watch,
+        dynamics=Dynamics(
+            "quadrotor",
+            Sizes(qpos=7, qvel=6, act=6, ctrl=10),
+            lambda plan, _setup: (0.0, 0.0, 0.0, 0.0, *_hover_thrust(plan)),
+            controller_states=2,
+        ),
+        sampling=Sampling(controls),
+        columns=columns,
+        monitoring=monitoring,
+        equations=Equations(
+            inputs=inputs,
+            inputs_size=6,
+            rates=extended_equation_rates,
+            initial=lambda plan, _setup: (*initial_state(plan.scenario), *_hover_thrust(plan)),
+            observe=observe_extended_equations,
+        ),
         uses_gait=False,
-        law_states=2,
-        law_fields=LAW_FIELDS,
-        extra_columns={**EXTENSION_COLUMNS, **(own_columns or {})},
-        follows_position=lambda _scenario: follows_position,
-        equations=on_equations,
     )
+
+
+def _hover_thrust(plan: FlightPlan) -> tuple[float, float]:
+    """The extension starts with the thrust of hover (N), at rest."""
+    vehicle = plan.scenario.rotorcraft.resolve()
+    return vehicle.mass * vehicle.gravity, 0.0
 
 
 def references(
@@ -223,7 +233,7 @@ def extended_singularity_columns(
         "determinant": exact,
         "singularity_margin": upright_margin(samples),
         "published_determinant": published_determinant(*attitude),
-        **{name: samples[name] for name in LAW_FIELDS},
+        **{name: samples[name] for name in EXTENSION_FIELDS},
     }
 
 

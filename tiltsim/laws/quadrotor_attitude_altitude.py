@@ -7,10 +7,19 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Sizes
-from tiltsim.equations.quadrotor import equations_of_motion, rigid_body
+from tiltsim.closed_loop.loop import (
+    ClosedLoop,
+    Columns,
+    ControlSetup,
+    Dynamics,
+    Equations,
+    Monitoring,
+    Sampling,
+    Sizes,
+)
+from tiltsim.equations.quadrotor import initial_state, rigid_body
 from tiltsim.laws.quadrotor import (
-    equations,
+    equation_rates,
     observe_equations,
     observe_quadrotor,
     references,
@@ -22,7 +31,7 @@ from tiltsim.laws.quadrotor import (
 from tiltsim.scenario.quadrotor_controllers import QuadrotorAttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.laws.quadrotor_attitude_altitude import Gains, attitude_altitude_inputs
-from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.quadrotor_mixer import thrust_controls
@@ -47,19 +56,16 @@ def attitude_altitude_controls(
     """All eight controls: thrusts, idle rotor states."""
     vehicle = parameters.vehicle
     thrust, roll_torque, pitch_torque, yaw_torque = attitude_altitude_inputs(
-        *(time, rigid_body_state(qpos, qvel, 0.0, 0.0), vehicle),
-        *(parameters.gains, parameters.reference),
+        time,
+        rigid_body_state(qpos, qvel, 0.0, 0.0),
+        vehicle,
+        parameters.gains,
+        parameters.reference,
     )
     return (
         *thrust_controls(thrust, roll_torque, pitch_torque, yaw_torque, vehicle),
         *(0.0, 0.0, 0.0, 0.0),
     )
-
-
-@scalar
-def held_controls(ctrl: Vector, act: Vector) -> Values:
-    """Controls as they were sampled."""
-    return ctrl[0], ctrl[1], ctrl[2], ctrl[3], ctrl[4], ctrl[5], ctrl[6], ctrl[7]
 
 
 def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
@@ -86,47 +92,34 @@ def equation_inputs(
 ) -> Values:
     """The law on the thesis's equations."""
     return attitude_altitude_inputs(
-        *(time, rigid_body(state), parameters.vehicle), *(parameters.gains, parameters.reference)
+        time,
+        (*rigid_body(state), 0.0, 0.0),
+        parameters.vehicle,
+        parameters.gains,
+        parameters.reference,
     )
-
-
-@scalar
-def equation_rates(
-    time: float,
-    state: Vector,
-    inputs: Vector,
-    parameters: LoopParameters,
-    knots: Vector,
-    disturbance: Triple,
-) -> Values:
-    """The thesis's equations under this law."""
-    return equations_of_motion(state, inputs, parameters.vehicle, disturbance)
-
-
-@scalar
-def observe_in_equations(
-    time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
-) -> Values:
-    """What a sample holds, from the state of the thesis's equations."""
-    return observe_equations(state, inputs, parameters.vehicle)
 
 
 QUADROTOR_ATTITUDE_ALTITUDE: Final = ClosedLoop(
     kind=ROTORCRAFT,
-    model="quadrotor",
-    sizes=Sizes(qpos=7, qvel=6, act=4, ctrl=8),
     parameters=LoopParameters,
-    controls=attitude_altitude_controls,
-    refresh=held_controls,
     setup=_setup,
-    initial_activations=lambda _plan, _setup: (0.0, 0.0, 0.0, 0.0),
-    observe=observe_quadrotor,
-    observes_controls=True,
-    derive=_derive,
-    watched=lambda sample, _setup: (thrust_axis_check(sample),),
-    watch=thrust_axis_value,
+    dynamics=Dynamics(
+        "quadrotor",
+        Sizes(qpos=7, qvel=6, act=4, ctrl=8),
+        lambda _plan, _setup: (0.0, 0.0, 0.0, 0.0),
+    ),
+    sampling=Sampling(attitude_altitude_controls),
+    columns=Columns(observe_quadrotor, _derive, observe_reads_controls=True),
+    monitoring=Monitoring(lambda sample, _setup: (thrust_axis_check(sample),), thrust_axis_value),
+    equations=Equations(
+        inputs=equation_inputs,
+        inputs_size=4,
+        rates=equation_rates,
+        initial=lambda plan, _setup: initial_state(plan.scenario),
+        observe=observe_equations,
+    ),
     follows_position=lambda _scenario: False,
-    equations=equations(equation_inputs, 4, equation_rates, observe_in_equations),
     uses_gait=False,
 )
-"""The attitude-altitude law around the quadrotor."""
+"""The attitude-altitude controller of the quadrotor."""

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 import tiltsim_controllers.laws.yaw_position as yaw_position
-from tiltsim.closed_loop.loop import ControlSetup, SignCheck
-from tiltsim.equations.quadrotor import extended_equations_of_motion, law_state
+from tiltsim.closed_loop.loop import Columns, ControlSetup, Monitoring
+from tiltsim.equations.quadrotor import rigid_body
 from tiltsim.laws.quadrotor import (
-    equations,
+    EXTENSION_COLUMNS,
+    EXTENSION_FIELDS,
     extended_controls,
     extended_loop,
     extended_singularity_columns,
-    observe_extended_equations,
+    observe_extended_quadrotor,
     references,
     rigid_body_state,
     thrust_axis_check,
@@ -29,7 +31,8 @@ from tiltsim_controllers.laws.switching import (
     in_attitude_zone,
     switching_inputs,
 )
-from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
+from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
@@ -39,6 +42,7 @@ class LoopParameters(NamedTuple):
     """The head of `userdata`."""
 
     signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
+    vehicle: Vehicle
     law: Parameters
 
 
@@ -55,16 +59,15 @@ def switching_controls(
 def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
     controller = plan.scenario.controller
     assert isinstance(controller, SwitchingController)
+    vehicle = plan.scenario.rotorcraft.resolve()
     law = Parameters(
-        yaw_position.Parameters(
-            plan.scenario.rotorcraft.resolve(), controller.resolve_gains(), plan.reference
-        ),
+        yaw_position.Parameters(vehicle, controller.resolve_gains(), plan.reference),
         controller.resolve_attitude_gains(),
         Zone(*controller.zone.roll, *controller.zone.pitch),
         EXTENSIONS[controller.extension],
         controller.extension_rate,
     )
-    return ControlSetup(LoopParameters(signature, law), plan.knots)
+    return ControlSetup(LoopParameters(signature, vehicle, law), plan.knots)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -82,52 +85,31 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     }
 
 
-def _watched(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[SignCheck, ...]:
-    # Not the extension's thrust: while the other law flies it may be anything.
-    return (thrust_axis_check(sample),)
-
-
 @scalar
 def equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """The law on the thesis's equations."""
-    return switching_inputs(time, law_state(state), parameters.law, knots)
+    return switching_inputs(time, (*rigid_body(state), state[12], state[13]), parameters.law, knots)
 
 
-@scalar
-def equation_rates(
-    time: float,
-    state: Vector,
-    inputs: Vector,
-    parameters: LoopParameters,
-    knots: Vector,
-    disturbance: Triple,
-) -> Values:
-    """The thesis's equations under this law."""
-    return extended_equations_of_motion(
-        state, inputs, parameters.law.yaw_position.vehicle, disturbance
-    )
-
-
-@scalar
-def observe_in_equations(
-    time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
-) -> Values:
-    """What a sample holds, from the state of the thesis's equations."""
-    return observe_extended_equations(state, inputs, parameters.law.yaw_position.vehicle)
-
-
-SWITCHING: Final = extended_loop(
-    LoopParameters,
-    switching_controls,
-    equations(equation_inputs, 6, equation_rates, observe_in_equations),
-    setup=_setup,
-    derive=_derive,
-    watched=_watched,
-    watch=thrust_axis_value,
-    own_columns={"attitude_zone": "1"},
-    # In the zone, where the law is meant to end up, the position is free.
-    follows_position=False,
+SWITCHING: Final = replace(
+    extended_loop(
+        LoopParameters,
+        _setup,
+        switching_controls,
+        equation_inputs,
+        Columns(
+            observe_extended_quadrotor,
+            _derive,
+            fields=EXTENSION_FIELDS,
+            units={**EXTENSION_COLUMNS, "attitude_zone": "1"},
+            observe_reads_controls=True,
+        ),
+        # The thrust of the extension may be anything while the other controller is active.
+        Monitoring(lambda sample, _setup: (thrust_axis_check(sample),), thrust_axis_value),
+    ),
+    # In the zone, where the vehicle is meant to end up, the position is free.
+    follows_position=lambda _scenario: False,
 )
 """Switching between yaw-position and attitude-altitude control of the quadrotor."""

@@ -7,9 +7,19 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, SignCheck, Sizes
+from tiltsim.closed_loop.loop import (
+    ClosedLoop,
+    Columns,
+    ControlSetup,
+    Dynamics,
+    Equations,
+    Monitoring,
+    Sampling,
+    SignCheck,
+    Sizes,
+)
 from tiltsim.laws.tiltrotor import servo_lead
-from tiltsim.vehicles.tilt_car import TILT_CAR, initial_tilt
+from tiltsim.vehicles.tilt_car import SPEED_1, SPEED_2, TILT_CAR, initial_tilt
 from tiltsim_controllers.mathematics.scalar import Floats, Pair, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
 from tiltsim_controllers.tilt_car.vehicle import TiltCar
@@ -72,16 +82,16 @@ def derived_columns(
     }
 
 
-def rotors_at_rest(sample: Mapping[str, float]) -> tuple[SignCheck, ...]:
+def rotors_at_rest(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[SignCheck, ...]:
     """Both rotors' squares: the inputs' matrix loses its rank where both are at rest."""
     squares = sample["rotor_speed_1"] ** 2 + sample["rotor_speed_2"] ** 2
     return (SignCheck(squares, "the decoupling matrix became singular: both rotors came to rest"),)
 
 
 @scalar
-def squares_of_speeds(values: Vector, parameters: object) -> tuple[float]:
+def sum_of_squared_speeds(values: Vector, parameters: object) -> tuple[float]:
     """What `rotors_at_rest` watches, from what a loop around the car observes."""
-    return (values[8] * values[8] + values[9] * values[9],)
+    return (values[SPEED_1] * values[SPEED_1] + values[SPEED_2] * values[SPEED_2],)
 
 
 def initial_motion(scenario: Scenario) -> tuple[float, float, float, float]:
@@ -102,40 +112,45 @@ def car_setup(
 
 def integrating_loop(
     parameters: type[tuple[Any, ...]],
-    controls: Callable[..., Values],
-    refresh: Callable[..., Values],
-    observe: Callable[..., Values],
-    *,
     setup: Callable[[FlightPlan, float], ControlSetup],
-    law_states: int,
-    law_fields: tuple[str, ...],
-    own_columns: Mapping[str, str] | None = None,
-    equations: tuple[Callable[..., Values], ...],
+    sampling: Sampling,
+    columns: Columns,
+    *,
+    inputs: Callable[..., Values],
+    rates: Callable[..., Values],
+    observe: Callable[..., Values],
+    controller_states: int,
 ) -> ClosedLoop:
-    """A loop whose law integrates both rotor speeds and the tilt angle that the servo is told.
+    """A closed loop whose control law integrates both rotor speeds and the servo's command.
 
-    The angle is the first of its ``law_states``, which start at zero but for it. ``equations`` are
-    the functions of inputs, rates and what to observe of `tiltsim.closed_loop.loop.Equations`;
-    their state is position, velocity, tilt angle, rotor speeds and the further law states. The rest
-    is as `tiltsim.closed_loop.loop.ClosedLoop` says.
+    Parameters
+    ----------
+    parameters, setup, sampling, columns
+        As in `tiltsim.closed_loop.loop.ClosedLoop`.
+    inputs, rates, observe
+        As in `tiltsim.closed_loop.loop.Equations`; the state is position, velocity, tilt angle,
+        rotor speeds and the further states of the controller.
+    controller_states
+        How many there are, the servo's command (rad) the first; the others start at zero.
     """
-    further = (0.0,) * (law_states - 1)
-    inputs, rates, observe_equations = equations
+    further = (0.0,) * (controller_states - 1)
     return ClosedLoop(
-        model="tilt_car",
-        sizes=Sizes(qpos=4, qvel=4, act=2 + law_states, ctrl=5 + law_states),
+        kind=TILT_CAR,
         parameters=parameters,
-        controls=controls,
-        refresh=refresh,
         setup=setup,
-        initial_activations=lambda plan, _setup: (
-            *_initial_rotor_speeds(plan.scenario),
-            *(initial_tilt(plan)[0], *further),
+        dynamics=Dynamics(
+            "tilt_car",
+            Sizes(qpos=4, qvel=4, act=2 + controller_states, ctrl=5 + controller_states),
+            lambda plan, _setup: (
+                *plan.scenario.initial.rotor_speeds(2),
+                initial_tilt(plan)[0],
+                *further,
+            ),
+            controller_states,
         ),
-        observe=observe,
-        derive=_derive,
-        watched=lambda sample, _setup: rotors_at_rest(sample),
-        watch=squares_of_speeds,
+        sampling=sampling,
+        columns=columns,
+        monitoring=Monitoring(rotors_at_rest, sum_of_squared_speeds),
         equations=Equations(
             inputs=inputs,
             inputs_size=3,
@@ -143,25 +158,17 @@ def integrating_loop(
             initial=lambda plan, _setup: (
                 *initial_motion(plan.scenario),
                 initial_tilt(plan)[0],
-                *_initial_rotor_speeds(plan.scenario),
+                *plan.scenario.initial.rotor_speeds(2),
                 *further,
             ),
-            observe=observe_equations,
+            observe=observe,
         ),
-        law_states=law_states,
-        law_fields=law_fields,
-        extra_columns=own_columns or {},
-        kind=TILT_CAR,
         uses_gait=False,
     )
 
 
-def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+def derive_columns(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    """See `tiltsim.closed_loop.loop.Columns`; the thrusts are to bracket the reference."""
     law = setup.parameters.law
     reference = reference_columns(samples, law.reference)
     return derived_columns(samples, reference, (reference[6], reference[7]), law.car)
-
-
-def _initial_rotor_speeds(scenario: Scenario) -> tuple[float, float]:
-    speed_1, speed_2 = scenario.initial.rotor_speeds(2)
-    return speed_1, speed_2

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tiltsim.closed_loop.loop import ControlSetup
+from tiltsim.closed_loop.loop import Columns, ControlSetup, Sampling
 from tiltsim.equations.tilt_car import equations_of_motion, limited_rate, yaw_of
 from tiltsim.laws.tilt_car import (
     car_setup,
     car_state,
+    derive_columns,
     integrating_loop,
     running_speed,
     speed_squares,
@@ -69,7 +70,9 @@ def fourth_derivative_controls(
 
 
 @scalar
-def refreshed_fourth_derivative_controls(ctrl: Vector, act: Vector) -> Values:
+def refreshed_fourth_derivative_controls(
+    time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: LoopParameters
+) -> Values:
     """Held second derivatives; what integrates them goes on."""
     return (ctrl[0], *speed_squares(act), *(act[4], act[5], act[3], ctrl[6], ctrl[7], ctrl[8]))
 
@@ -164,21 +167,21 @@ def observe_fourth_derivative_equations(
 
 FOURTH_DERIVATIVE: Final = integrating_loop(
     LoopParameters,
-    fourth_derivative_controls,
-    refreshed_fourth_derivative_controls,
-    observe_fourth_derivative,
-    setup=_setup,
-    law_states=4,
-    law_fields=("alpha_ref", "alpha_ref_rate", *ACCELERATIONS, *SPEEDS),
-    own_columns={
-        "alpha_ref_rate": "rad/s",
-        **dict.fromkeys(ACCELERATIONS, "rad/s^2"),
-        **dict.fromkeys(SPEEDS, "rad/s"),
-    },
-    equations=(
-        fourth_derivative_equation_inputs,
-        fourth_derivative_equation_rates,
-        observe_fourth_derivative_equations,
+    _setup,
+    Sampling(fourth_derivative_controls, refreshed_fourth_derivative_controls),
+    Columns(
+        observe_fourth_derivative,
+        derive_columns,
+        fields=("alpha_ref", "alpha_ref_rate", *ACCELERATIONS, *SPEEDS),
+        units={
+            "alpha_ref_rate": "rad/s",
+            **dict.fromkeys(ACCELERATIONS, "rad/s^2"),
+            **dict.fromkeys(SPEEDS, "rad/s"),
+        },
     ),
+    inputs=fourth_derivative_equation_inputs,
+    rates=fourth_derivative_equation_rates,
+    observe=observe_fourth_derivative_equations,
+    controller_states=4,
 )
-"""Fourth-derivative feedback linearization around the tilt-car."""
+"""Fourth-derivative feedback linearization of the tilt-car."""

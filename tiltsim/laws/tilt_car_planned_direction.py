@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Sizes
+from tiltsim.closed_loop.loop import (
+    ClosedLoop,
+    Columns,
+    ControlSetup,
+    Dynamics,
+    Equations,
+    Monitoring,
+    Sampling,
+    Sizes,
+)
 from tiltsim.equations.tilt_car import equations_of_motion, yaw_of
 from tiltsim.laws.tilt_car import (
     CarState,
@@ -57,12 +66,6 @@ def planned_direction_controls(
     state = car_state(qpos, qvel, 0.0, 0.0)
     square_1, square_2 = planned_direction_inputs(time, state, parameters.law)
     return tilt + parameters.servo_lead * tilt_rate, square_1, square_2, 0.0, 0.0
-
-
-@scalar
-def held_planned_direction_controls(ctrl: Vector, act: Vector) -> Values:
-    """Controls as they were sampled."""
-    return ctrl[0], ctrl[1], ctrl[2], ctrl[3], ctrl[4]
 
 
 @scalar
@@ -140,7 +143,7 @@ def observe_planned_direction_equations(
 
 
 @scalar
-def nothing_to_watch(values: Vector, parameters: LoopParameters) -> tuple[float]:
+def sign_check_values(values: Vector, parameters: LoopParameters) -> tuple[float]:
     """The law ends nowhere."""
     return (1.0,)
 
@@ -168,18 +171,24 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 
 
 PLANNED_DIRECTION: Final = ClosedLoop(
-    model="tilt_car",
-    sizes=Sizes(qpos=4, qvel=4, act=2, ctrl=5),
+    kind=TILT_CAR,
     parameters=LoopParameters,
-    controls=planned_direction_controls,
-    refresh=held_planned_direction_controls,
     setup=_setup,
-    initial_activations=lambda _plan, _setup: (0.0, 0.0),
-    observe=observe_planned_direction,
-    observes_controls=True,
-    derive=_derive,
-    watched=lambda _sample, _setup: (),
-    watch=nothing_to_watch,
+    dynamics=Dynamics(
+        "tilt_car", Sizes(qpos=4, qvel=4, act=2, ctrl=5), lambda _plan, _setup: (0.0, 0.0)
+    ),
+    sampling=Sampling(planned_direction_controls),
+    columns=Columns(
+        observe_planned_direction,
+        _derive,
+        units={
+            **{f"wanted_square_{rotor}": "rad^2/s^2" for rotor in ROTORS},
+            **{f"switch_{rotor}": "1" for rotor in ROTORS},
+            "lyapunov": "m^2/s^2",
+        },
+        observe_reads_controls=True,
+    ),
+    monitoring=Monitoring(sign_check_values=sign_check_values),
     equations=Equations(
         inputs=planned_direction_equation_inputs,
         inputs_size=2,
@@ -187,12 +196,6 @@ PLANNED_DIRECTION: Final = ClosedLoop(
         initial=lambda plan, _setup: initial_motion(plan.scenario),
         observe=observe_planned_direction_equations,
     ),
-    extra_columns={
-        **{f"wanted_square_{rotor}": "rad^2/s^2" for rotor in ROTORS},
-        **{f"switch_{rotor}": "1" for rotor in ROTORS},
-        "lyapunov": "m^2/s^2",
-    },
-    kind=TILT_CAR,
 )
 """The tilt-car with its thrusts' direction planned.
 

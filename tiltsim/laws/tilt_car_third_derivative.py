@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tiltsim.closed_loop.loop import ControlSetup
+from tiltsim.closed_loop.loop import Columns, ControlSetup, Sampling
 from tiltsim.equations.tilt_car import equations_of_motion, limited_rate, yaw_of
 from tiltsim.laws.tilt_car import (
     CarState,
     car_setup,
     car_state,
+    derive_columns,
     integrating_loop,
     running_speed,
     speed_squares,
@@ -49,7 +50,9 @@ def third_derivative_controls(
 
 
 @scalar
-def refreshed_third_derivative_controls(ctrl: Vector, act: Vector) -> Values:
+def refreshed_third_derivative_controls(
+    time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: LoopParameters
+) -> Values:
     """Held controls with the thrusts that belong to the present rotor speeds."""
     return (ctrl[0], *speed_squares(act), ctrl[3], ctrl[4], ctrl[5])
 
@@ -126,16 +129,12 @@ def observe_third_derivative_equations(
 
 THIRD_DERIVATIVE: Final = integrating_loop(
     LoopParameters,
-    third_derivative_controls,
-    refreshed_third_derivative_controls,
-    observe_third_derivative,
-    setup=_setup,
-    law_states=1,
-    law_fields=("alpha_ref",),
-    equations=(
-        third_derivative_equation_inputs,
-        third_derivative_equation_rates,
-        observe_third_derivative_equations,
-    ),
+    _setup,
+    Sampling(third_derivative_controls, refreshed_third_derivative_controls),
+    Columns(observe_third_derivative, derive_columns, fields=("alpha_ref",)),
+    inputs=third_derivative_equation_inputs,
+    rates=third_derivative_equation_rates,
+    observe=observe_third_derivative_equations,
+    controller_states=1,
 )
-"""Third-derivative feedback linearization around the tilt-car."""
+"""Third-derivative feedback linearization of the tilt-car."""

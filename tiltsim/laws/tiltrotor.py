@@ -8,13 +8,29 @@ every engine. It is a pure function of time, `qpos`, `qvel`, `act` and the param
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ControlSetup, SignCheck
+from tiltsim.closed_loop.loop import ControlSetup, Dynamics, SignCheck, Sizes
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
-from tiltsim.vehicles.rotorcraft import OBSERVED_FIELDS
+from tiltsim.vehicles.rotorcraft.layout import (
+    ALPHA_1,
+    ALPHA_2,
+    ALPHA_3,
+    ALPHA_4,
+    OBSERVED_FIELDS,
+    PITCH,
+    ROLL,
+    SPEED_1,
+    SPEED_2,
+    SPEED_3,
+    SPEED_4,
+    TILT_RATE_1,
+    TILT_RATE_2,
+    TILT_RATE_3,
+    TILT_RATE_4,
+)
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.gaits.tilts import tilt_reference
@@ -29,6 +45,7 @@ from tiltsim_controllers.vehicle.decoupling_matrix import (
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle, drag_ratio
 
 if TYPE_CHECKING:
+    from tiltsim.scenario.flight_plan import FlightPlan
     from tiltsim.scenario.scenario import Scenario
     from tiltsim.scenario.vehicle import ServoTable
 
@@ -74,8 +91,10 @@ def gait_servo_commands(time: float, lead: float, gait: GaitParameters, knots: V
 
 
 @scalar
-def refreshed_controls(ctrl: Vector, act: Vector) -> Values:
-    """Held controls, however many, with the thrusts that belong to the present rotor speeds."""
+def refreshed_controls(
+    time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: Any
+) -> Values:
+    """Held controls with the thrusts of the present rotor speeds."""
     return (*ctrl[:4], *rotor_thrust_controls(act), *ctrl[8:])
 
 
@@ -89,10 +108,36 @@ def initial_signed_rotor_speeds(scenario: Scenario) -> Values:
     return tuple(s * speed for s, speed in zip(SPIN, scenario.initial.rotor_speeds(4), strict=True))
 
 
+def tiltrotor_dynamics(
+    controller_states: int = 0, initial: Callable[[FlightPlan], Vector] = lambda _plan: ()
+) -> Dynamics:
+    """The model of the tiltrotor.
+
+    Parameters
+    ----------
+    controller_states
+        Number of states of the controller.
+    initial
+        ``(plan) -> states`` at time zero.
+    """
+    return Dynamics(
+        "tiltrotor",
+        Sizes(qpos=11, qvel=10, act=4 + controller_states, ctrl=12 + controller_states),
+        lambda plan, _setup: (*initial_signed_rotor_speeds(plan.scenario), *initial(plan)),
+        controller_states,
+    )
+
+
+@scalar
+def tilt_rates(qvel: Vector) -> Quad:
+    """Tilt rates (rad/s)."""
+    return qvel[TILT_RATE_1], qvel[TILT_RATE_2], qvel[TILT_RATE_3], qvel[TILT_RATE_4]
+
+
 @scalar
 def observe_tiltrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """Rigid body, tilts, rotor speeds and tilt rates: all of them states of the simulation."""
-    return (*tiltrotor_state(qpos, qvel, act), qvel[6], qvel[7], qvel[8], qvel[9])
+    return (*tiltrotor_state(qpos, qvel, act), *tilt_rates(qvel))
 
 
 def singularity_columns(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict[str, Floats]:
@@ -132,16 +177,16 @@ def rotor_speed_checks(sample: Mapping[str, float]) -> tuple[SignCheck, ...]:
 @scalar
 def rotor_speeds_along_spin(values: Vector) -> Quad:
     """Rotor speeds along their spin, from what `observe_tiltrotor` gives."""
-    return -values[16], values[17], -values[18], values[19]
+    return -values[SPEED_1], values[SPEED_2], -values[SPEED_3], values[SPEED_4]
 
 
 @scalar
 def scaled_determinant(values: Vector, vehicle: Vehicle) -> float:
     """The determinant of the decoupling matrix but for the rotor speeds, of a sample's values."""
     ratio = drag_ratio(vehicle)
-    trig = sines_and_cosines(values[12], values[13], values[14], values[15])
+    trig = sines_and_cosines(values[ALPHA_1], values[ALPHA_2], values[ALPHA_3], values[ALPHA_4])
     nx, ny, nz = torque_free_force(trig, torque_entries(trig, ratio), ratio)
-    ux, uy, uz = world_up_in_body(values[6], values[7])
+    ux, uy, uz = world_up_in_body(values[ROLL], values[PITCH])
     return nx * ux + ny * uy + nz * uz
 
 

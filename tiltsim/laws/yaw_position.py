@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tiltsim.closed_loop.loop import ControlSetup, SignCheck
-from tiltsim.equations.quadrotor import extended_equations_of_motion, law_state
+from tiltsim.closed_loop.loop import Columns, ControlSetup, Monitoring, SignCheck
+from tiltsim.equations.quadrotor import rigid_body
 from tiltsim.laws.quadrotor import (
-    equations,
+    EXTENSION_COLUMNS,
+    EXTENSION_FIELDS,
     extended_controls,
     extended_loop,
     extended_singularity_columns,
-    observe_extended_equations,
+    observe_extended_quadrotor,
     references,
     rigid_body_state,
     thrust_axis_check,
@@ -20,7 +21,8 @@ from tiltsim.laws.quadrotor import (
 )
 from tiltsim.scenario.quadrotor_controllers import YawPositionController
 from tiltsim_controllers.laws.yaw_position import Parameters, yaw_position_inputs
-from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
+from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
@@ -30,6 +32,7 @@ class LoopParameters(NamedTuple):
     """The head of `userdata`."""
 
     signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
+    vehicle: Vehicle
     law: Parameters
 
 
@@ -46,8 +49,9 @@ def yaw_position_controls(
 def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
     controller = plan.scenario.controller
     assert isinstance(controller, YawPositionController)
-    law = Parameters(plan.scenario.rotorcraft.resolve(), controller.resolve_gains(), plan.reference)
-    return ControlSetup(LoopParameters(signature, law), plan.knots)
+    vehicle = plan.scenario.rotorcraft.resolve()
+    law = Parameters(vehicle, controller.resolve_gains(), plan.reference)
+    return ControlSetup(LoopParameters(signature, vehicle, law), plan.knots)
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -59,7 +63,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 
 
 @scalar
-def watch_attitude_and_extension(values: Vector, parameters: LoopParameters) -> tuple[float, float]:
+def sign_check_values(values: Vector, parameters: LoopParameters) -> tuple[float, float]:
     """The cosine of the thrust axis' tilt and the extension's thrust."""
     return thrust_tilt_cosine(values), values[24]
 
@@ -75,37 +79,26 @@ def equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """The law on the thesis's equations."""
-    return yaw_position_inputs(time, law_state(state), parameters.law, knots)
-
-
-@scalar
-def equation_rates(
-    time: float,
-    state: Vector,
-    inputs: Vector,
-    parameters: LoopParameters,
-    knots: Vector,
-    disturbance: Triple,
-) -> Values:
-    """The thesis's equations under this law."""
-    return extended_equations_of_motion(state, inputs, parameters.law.vehicle, disturbance)
-
-
-@scalar
-def observe_in_equations(
-    time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
-) -> Values:
-    """What a sample holds, from the state of the thesis's equations."""
-    return observe_extended_equations(state, inputs, parameters.law.vehicle)
+    return yaw_position_inputs(
+        time, (*rigid_body(state), state[12], state[13]), parameters.law, knots
+    )
 
 
 YAW_POSITION: Final = extended_loop(
     LoopParameters,
+    _setup,
     yaw_position_controls,
-    equations(equation_inputs, 6, equation_rates, observe_in_equations),
-    setup=_setup,
-    derive=_derive,
-    watched=lambda sample, _setup: (thrust_axis_check(sample), extension_thrust_check(sample)),
-    watch=watch_attitude_and_extension,
+    equation_inputs,
+    Columns(
+        observe_extended_quadrotor,
+        _derive,
+        fields=EXTENSION_FIELDS,
+        units=EXTENSION_COLUMNS,
+        observe_reads_controls=True,
+    ),
+    Monitoring(
+        lambda sample, _setup: (thrust_axis_check(sample), extension_thrust_check(sample)),
+        sign_check_values,
+    ),
 )
-"""The yaw-position law around the quadrotor."""
+"""The yaw-position controller of the quadrotor."""

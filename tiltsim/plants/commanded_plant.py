@@ -67,7 +67,7 @@ class CommandedPlant:
         tilts = initial_tilts(assembly)[0] if self.tilting else _NONE
         waiting = CheckedCommand("rotor_accelerations", _NONE, tilts)
         self._delayed = [waiting] * assembly.scenario.simulation.latency_steps  # oldest first
-        self._hold_command(self._commanded.told)
+        self._hold_command(self._commanded.command)
 
     @property
     def time(self) -> float:
@@ -115,7 +115,7 @@ class CommandedPlant:
         state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
         parameters = with_command(self._setup.parameters, command)
         try:
-            data.ctrl[:] = self._loop.controls(float(data.time), *state, parameters, knots)
+            data.ctrl[:] = self._loop.sampling.controls(float(data.time), *state, parameters, knots)
         except (ArithmeticError, ValueError):
             data.ctrl[:] = nan  # as the engines do; MuJoCo reports it
 
@@ -166,7 +166,7 @@ class CommandedPlant:
             return
         state = float(data.time), data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
         try:
-            data.ctrl[:] = self._loop.held(*state, data.ctrl.tolist(), self._slotted)
+            data.ctrl[:] = self._loop.sampling.hold(*state, data.ctrl.tolist(), self._slotted)
         except (ArithmeticError, ValueError):
             data.ctrl[:] = nan
 

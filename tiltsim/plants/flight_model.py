@@ -92,7 +92,9 @@ def build_model(
     loop, scenario = assembly.loop, assembly.scenario
     size = HEADER_SIZE + loop.record_size + (len(assembly.setup.knots) if knots is None else knots)
     try:
-        model = loop.kind.compile(scenario, loop.law_states, loop.extra_actuators, size, visuals)
+        model = loop.kind.compile(
+            scenario, loop.dynamics.controller_states, loop.dynamics.extra_actuators, size, visuals
+        )
     except ValueError as error:
         raise InputError(f"{scenario.address or 'scenario'}: vehicle: {error}") from error
     model.opt.gravity += disturbance_acceleration(scenario)

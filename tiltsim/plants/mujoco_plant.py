@@ -58,7 +58,7 @@ class MujocoPlant:
         parameters = self._setup.userdata  # a shared model may have room for more
         data.userdata[HEADER_SIZE : HEADER_SIZE + len(parameters)] = parameters
         data.qpos[:], data.qvel[:] = self._loop.kind.initial_motion(assembly)
-        data.act[:] = self._loop.initial_activations(assembly, self._setup)
+        data.act[:] = self._loop.dynamics.initial_activations(assembly, self._setup)
         mujoco.mj_forward(self.model, data)
 
     @property
@@ -140,9 +140,9 @@ class MujocoPlant:
         data = self.data
         state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
         # MuJoCo keeps the controls of its last integrator stage.
-        stale = data.userdata[EVALUATIONS] == 0.0 and self._loop.observes_controls
+        stale = data.userdata[EVALUATIONS] == 0.0 and self._loop.columns.observe_reads_controls
         ctrl = self.controls(*state) if stale else data.ctrl.tolist()
-        return self._loop.observe(*state, ctrl)
+        return self._loop.columns.observe(*state, ctrl)
 
     def controls(
         self, qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float]
@@ -150,7 +150,7 @@ class MujocoPlant:
         """The controls for a state of MuJoCo's at the present time; NaN where there are none."""
         setup = self._setup
         try:
-            return self._loop.controls(
+            return self._loop.sampling.controls(
                 self.data.time, qpos, qvel, act, setup.parameters, setup.knots
             )
         except (ArithmeticError, ValueError):

@@ -66,5 +66,5 @@ def record_step_by_step(plant: Plant, samples: int, steps: int) -> Floats | None
 
 def natively_checked_values(assembly: Assembly, values: Sequence[float]) -> tuple[float, ...]:
     """The numbers whose signs native code checks; none where the loop leaves that to Python."""
-    watch = assembly.loop.watch
+    watch = assembly.loop.monitoring.sign_check_values
     return () if watch is None else watch(values, assembly.setup.parameters)

@@ -49,7 +49,7 @@ class TerminationMonitor:
         A plant that records natively has judged all but the last; see
         `tiltsim.engines.recorder.Recorder`.
         """
-        if plant.engine == "native" and self._loop.watch is not None:
+        if plant.engine == "native" and self._loop.monitoring.sign_check_values is not None:
             samples = samples[-1:]
         return all(self.judge(plant, sample) is None for sample in samples)
 
@@ -74,7 +74,8 @@ class TerminationMonitor:
         return End("diverged", time, cause)
 
     def _judge_singularity(self, time: float, state: dict[str, float]) -> End | None:
-        for index, (value, cause) in enumerate(self._loop.watched(state, self._setup)):
+        checks = self._loop.monitoring.sign_checks(state, self._setup)
+        for index, (value, cause) in enumerate(checks):
             # What changes its sign between two samples was zero in between.
             side = 0.0 if abs(value) < SINGULAR else copysign(1.0, value)
             if side == 0.0 or side != self._sides.setdefault(index, side):

@@ -284,13 +284,14 @@ def test_allocation_from_a_lean_does_not_hang_on_a_last_bit():
 
 def test_commands_take_effect_after_the_latency():
     late = scenario(simulation=LATE)
-    plant, law = make_plant(assemble(late)), LOOPS["attitude_altitude"]
+    plant = make_plant(assemble(late))
+    controls = LOOPS["attitude_altitude"].sampling.controls
     setup = loop_of(late).setup(plan_flight(late), 0.0)
     asked, in_force = [], []
     for _ in range(30):
         data = plant.data
         state = data.qpos.tolist(), data.qvel.tolist(), data.act[:4].tolist()
-        ctrl = law.controls(plant.time, *state, setup.parameters.law, setup.knots)
+        ctrl = controls(plant.time, *state, setup.parameters.inner, setup.knots)
         asked.append([*ctrl[:4], *ctrl[8:12]])
         plant.advance(1)
         in_force.append(plant.data.ctrl[-8:].copy())

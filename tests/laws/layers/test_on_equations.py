@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tiltsim
-from tiltsim.equations.driven import ACTUATOR_PLANTS
+from tiltsim.equations.actuator_level import ACTUATOR_PLANTS
 from tiltsim.errors import InputError
 from tiltsim.laws import assembling
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of

@@ -12,8 +12,7 @@ that restarts anywhere, and a scenario that has none of this flies without the l
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable
 from functools import cache
 from math import inf
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -21,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.laws.layers.layer import around
+from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
 from tiltsim.laws.tiltrotor import rotor_thrust_controls, servo_lead
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.vehicles.rotorcraft import initial_tilts
@@ -56,7 +55,7 @@ COMMANDS: Final = 8
 LAW_CONTROLS: Final = 12
 """Controls of the tiltrotor before those of its law's own states: servos, thrusts, rotor speeds."""
 
-ROTORS: Final = 4
+ROTOR_STATES: Final = 4
 THRUST_FACTORS: Final = tuple(f"thrust_factor_{rotor}" for rotor in (1, 2, 3, 4))
 
 DEFAULT_SAMPLE_TIME: Final = 0.01
@@ -177,7 +176,7 @@ def motor_controls(
 
 
 @scalar
-def told_rates(
+def speed_command_rates(
     act: Vector, first: int, commands: Vector, actuation: Actuation
 ) -> tuple[float, float, float, float]:
     """Rates (rad/s^2) of the speeds that the motors are told, activations from ``first`` on."""
@@ -246,23 +245,18 @@ def _delay_line(first: int, steps: int) -> tuple[Callable[..., Any], Callable[..
 
 @cache
 def with_actuation(loop: ClosedLoop, latency_steps: int) -> ClosedLoop:
-    """A law of the tiltrotor with the layer around it.
+    """A loop around the tiltrotor with real sensors and actuators.
 
     ``latency_steps`` is the number of control steps between a reading and its command taking
     effect.
     """
-    layered = around(loop, Actuation, _actuation)
-    law_controls, law_observe = loop.controls, loop.observe
-    law_act, law_ctrl = loop.sizes.act, loop.sizes.ctrl
-    line = law_act + ROTORS  # after the speeds that the motors are told
+    law_controls = loop.sampling.controls
+    law_act, law_ctrl = loop.dynamics.sizes.act, loop.dynamics.sizes.ctrl
     under_way = COMMANDS * latency_steps
-    after_told = law_ctrl + ROTORS  # the delay line's controls
-    memory = after_told + under_way  # the commands in force, last of the controls
-    extra = ExtraActuators(states=ROTORS + under_way, memories=COMMANDS)
-    sizes = loop.sizes._replace(
-        act=law_act + extra.states, ctrl=law_ctrl + extra.states + extra.memories
-    )
-    delivered, line_rates = _delay_line(line, latency_steps)
+    line_ctrl = law_ctrl + ROTOR_STATES  # the delay line's controls
+    memory = line_ctrl + under_way  # the commands in force, last of the controls
+    # The delay line follows the speeds that the motors are commanded.
+    delivered, line_rates = _delay_line(law_act + ROTOR_STATES, latency_steps)
 
     @scalar
     def controls(
@@ -271,18 +265,18 @@ def with_actuation(loop: ClosedLoop, latency_steps: int) -> ClosedLoop:
         actuation = parameters.layer
         seen_qpos = measured_qpos(time, qpos, actuation.sensors)
         seen_qvel = measured_qvel(time, qvel, actuation.sensors)
-        asked = law_controls(time, seen_qpos, seen_qvel, act, parameters.law, knots)
+        ctrl = law_controls(time, seen_qpos, seen_qvel, act, parameters.inner, knots)
         u1, u2, u3, u4 = allocated_accelerations(
-            (asked[8], asked[9], asked[10], asked[11]), seen_qpos, act, actuation.allocation
+            (ctrl[8], ctrl[9], ctrl[10], ctrl[11]), seen_qpos, act, actuation.allocation
         )
-        sent = (asked[0], asked[1], asked[2], asked[3], u1, u2, u3, u4)
+        sent = (ctrl[0], ctrl[1], ctrl[2], ctrl[3], u1, u2, u3, u4)
         commands = delivered(act, sent)
         return (
             *servo_controls(time, qpos, commands, actuation),
             *thrust_controls(time, act, actuation.faults),
             *motor_controls(act, law_act, commands, actuation),
-            *asked[LAW_CONTROLS:],
-            *told_rates(act, law_act, commands, actuation),
+            *ctrl[LAW_CONTROLS:],
+            *speed_command_rates(act, law_act, commands, actuation),
             *line_rates(act, sent, actuation.control_timestep),
             *commands,
         )
@@ -298,39 +292,37 @@ def with_actuation(loop: ClosedLoop, latency_steps: int) -> ClosedLoop:
             *thrust_controls(time, act, actuation.faults),
             *motor_controls(act, law_act, commands, actuation),
             *ctrl[LAW_CONTROLS:law_ctrl],
-            *told_rates(act, law_act, commands, actuation),
-            *ctrl[after_told:],
+            *speed_command_rates(act, law_act, commands, actuation),
+            *ctrl[line_ctrl:],
         )
 
-    @scalar
-    def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-        return law_observe(qpos, qvel, act[:law_act], ctrl[:law_ctrl])
-
-    controls.__qualname__ = f"with_actuation.{latency_steps}.{loop.controls.__qualname__}"
-
-    def initial_activations(plan: FlightPlan, setup: ControlSetup) -> Vector:
-        law_states = layered.initial_activations(plan, setup)
+    def initial_activations(plan: FlightPlan, _layer: Actuation, inner: Vector) -> Vector:
         waiting = (*initial_tilts(plan)[0], 0.0, 0.0, 0.0, 0.0) * latency_steps
-        return (*law_states, *law_states[:ROTORS], *waiting)
+        return (*inner[:ROTOR_STATES], *waiting)
 
-    def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-        columns = layered.derive(samples, setup)
-        for rotor, fault in enumerate(setup.parameters.layer.faults, start=1):
-            factors = [thrust_factor(time, fault) for time in samples["time"].tolist()]
-            columns[f"thrust_factor_{rotor}"] = np.array(factors)
-        return columns
-
-    return replace(
-        layered,
-        sizes=sizes,
+    layer = Layer(
+        f"with_actuation.{latency_steps}",
+        Actuation,
+        _actuation,
         controls=controls,
         hold=hold,
+        actuators=ExtraActuators(states=ROTOR_STATES + under_way, memories=COMMANDS),
         initial_activations=initial_activations,
-        observe=observe,
-        derive=derive,
-        extra_actuators=(*loop.extra_actuators, extra),
-        extra_columns={**loop.extra_columns, **dict.fromkeys(THRUST_FACTORS, "1")},
+        derive=_derive,
+        units=dict.fromkeys(THRUST_FACTORS, "1"),
     )
+    return wrap_loop(loop, layer)
+
+
+def _derive(
+    inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
+) -> dict[str, Floats]:
+    time = samples["time"].tolist()
+    faults = zip(THRUST_FACTORS, setup.parameters.layer.faults, strict=True)
+    return {
+        **inner(),
+        **{name: np.array([thrust_factor(t, fault) for t in time]) for name, fault in faults},
+    }
 
 
 def _actuation(plan: FlightPlan) -> Actuation:
@@ -373,7 +365,7 @@ def sensor_parameters(scenario: Scenario) -> Sensors:
 
 
 def _faults(plan: FlightPlan) -> Faults:
-    faults = [RotorFault()] * ROTORS
+    faults = [RotorFault()] * ROTOR_STATES
     gait = plan.gait
     for table in plan.scenario.fault:
         fault = faults[table.rotor - 1]

@@ -7,8 +7,7 @@ filters of turbulence are activations, so a flight restarts anywhere, gusts and 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable
 from functools import cache
 from math import atan2, hypot
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -16,8 +15,9 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.laws.layers.layer import around
+from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
 from tiltsim.models.parts import ExtraActuators
+from tiltsim.vehicles.rotorcraft.layout import QUADROTOR_THRUSTS, TILTROTOR_THRUSTS
 from tiltsim_controllers.mathematics.rotation import rotation_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Values, Vector, scalar
 from tiltsim_controllers.vehicle.air import (
@@ -116,87 +116,60 @@ def air_wrench(
 @cache
 def with_air(loop: ClosedLoop) -> ClosedLoop:
     """A loop in air that moves, drags and feels the ground."""
-    layered = around(loop, Surroundings, _surroundings)
-    inner_controls, inner_hold, inner_observe = loop.controls, loop.held, loop.observe
-    first, inner_ctrl = loop.sizes.act, loop.sizes.ctrl
-    tilting = loop.model == "tiltrotor"
+    inner_controls, inner_hold = loop.sampling.controls, loop.sampling.hold
+    first, inner_ctrl = loop.dynamics.sizes.act, loop.dynamics.sizes.ctrl
+    tilting = loop.dynamics.model == "tiltrotor"
     tilts_of: Callable[..., Quad] = pod_tilts if tilting else no_tilts
-    thrust = 4 if tilting else 0  # the first of the thrust actuators
-    extra = ExtraActuators(states=DRYDEN_STATES, wrench=True)
-    sizes = loop.sizes._replace(act=first + DRYDEN_STATES, ctrl=inner_ctrl + DRYDEN_STATES + WRENCH)
+    thrust = TILTROTOR_THRUSTS if tilting else QUADROTOR_THRUSTS
 
     @scalar
     def air_controls(
-        time: float,
-        qpos: Vector,
-        qvel: Vector,
-        act: Vector,
-        ctrl: Vector,
-        surroundings: Surroundings,
+        time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, air: Surroundings
     ) -> Values:
         states = (act[first], act[first + 1], act[first + 2], act[first + 3], act[first + 4])
         thrusts = (ctrl[thrust], ctrl[thrust + 1], ctrl[thrust + 2], ctrl[thrust + 3])
         return (
-            *dryden_rates(time, states, surroundings.air.turbulence),
-            *air_wrench(time, qpos, qvel, states, tilts_of(qpos), thrusts, surroundings),
+            *dryden_rates(time, states, air.air.turbulence),
+            *air_wrench(time, qpos, qvel, states, tilts_of(qpos), thrusts, air),
         )
 
     @scalar
     def controls(
         time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
     ) -> Values:
-        inner = inner_controls(time, qpos, qvel, act, parameters.law, knots)
+        inner = inner_controls(time, qpos, qvel, act, parameters.inner, knots)
         return (*inner, *air_controls(time, qpos, qvel, act, inner, parameters.layer))
 
     @scalar
     def hold(
         time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: Any
     ) -> Values:
-        inner = inner_hold(time, qpos, qvel, act, ctrl[:inner_ctrl], parameters.law)
+        inner = inner_hold(time, qpos, qvel, act, ctrl[:inner_ctrl], parameters.inner)
         return (*inner, *air_controls(time, qpos, qvel, act, inner, parameters.layer))
 
-    @scalar
-    def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-        seen = inner_observe(qpos, qvel, act[:first], ctrl[:inner_ctrl])
-        return (
-            *seen,
-            *(act[first], act[first + 1], act[first + 2], act[first + 3], act[first + 4]),
-        )
-
-    controls.__qualname__ = f"with_air.{loop.controls.__qualname__}"
-
-    def initial_activations(plan: FlightPlan, setup: ControlSetup) -> Vector:
-        turbulence = setup.parameters.layer.air.turbulence
-        return (*layered.initial_activations(plan, setup), *stationary_states(turbulence))
-
-    def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-        columns = layered.derive(samples, setup)
-        air = setup.parameters.layer.air
-        states = np.stack([samples[name] for name in DRYDEN_FIELDS], axis=-1)
-        velocity = np.array(
-            [
-                air_velocity(time, tuple(state), air)
-                for time, state in zip(samples["time"].tolist(), states.tolist(), strict=True)
-            ]
-        )
-        return columns | dict(zip(AIR_COLUMNS, velocity.T, strict=True))
-
-    return replace(
-        layered,
-        sizes=sizes,
+    layer = Layer(
+        "with_air",
+        Surroundings,
+        _surroundings,
         controls=controls,
         hold=hold,
-        initial_activations=initial_activations,
-        observe=observe,
-        derive=derive,
-        extra_actuators=(*loop.extra_actuators, extra),
-        law_fields=(*loop.law_fields, *DRYDEN_FIELDS),
-        extra_columns={
-            **loop.extra_columns,
-            **dict.fromkeys(AIR_COLUMNS, "m/s"),
-            **dict.fromkeys(DRYDEN_FIELDS, "1/s^0.5"),
-        },
+        actuators=ExtraActuators(states=DRYDEN_STATES, wrench=True),
+        initial_activations=lambda _plan, air, _inner: stationary_states(air.air.turbulence),
+        derive=_derive,
+        fields=DRYDEN_FIELDS,
+        units={**dict.fromkeys(AIR_COLUMNS, "m/s"), **dict.fromkeys(DRYDEN_FIELDS, "1/s^0.5")},
     )
+    return wrap_loop(loop, layer)
+
+
+def _derive(
+    inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
+) -> dict[str, Floats]:
+    air = setup.parameters.layer.air
+    states = np.stack([samples[name] for name in DRYDEN_FIELDS], axis=-1)
+    rows = zip(samples["time"].tolist(), states.tolist(), strict=True)
+    velocity = np.array([air_velocity(time, tuple(state), air) for time, state in rows])
+    return {**inner(), **dict(zip(AIR_COLUMNS, velocity.T, strict=True))}
 
 
 def _surroundings(plan: FlightPlan) -> Surroundings:

@@ -1,84 +1,212 @@
-"""What all layers around a loop have in common: parameters of their own, all else as within."""
+"""Layers around a closed loop: stages between the controller and its vehicle.
+
+A layer has parameters and states of its own and replaces the functions that it is about; all else
+stays as in the loop within. `wrap_loop` is the one place where that is put together.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import TYPE_CHECKING, Any, Final
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, SignCheck
+from tiltsim.closed_loop.loop import (
+    ClosedLoop,
+    ControlSetup,
+    Equations,
+    Monitoring,
+    Sampling,
+    SignCheck,
+)
+from tiltsim.models.parts import ExtraActuators
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
 
+WRENCH_SIZE: Final = 6
+_NO_ACTUATORS: Final = ExtraActuators()
 
-def around(
-    loop: ClosedLoop, record: type[tuple[Any, ...]], read: Callable[[FlightPlan], Any]
-) -> ClosedLoop:
-    """A loop whose parameters hold those of a layer, too: the fields ``layer`` and ``law``.
+Samples = Mapping[str, Floats]
+Derive = Callable[[Callable[[], dict[str, Floats]], Samples, ControlSetup], dict[str, Floats]]
 
-    It flies as the loop within does until the layer replaces the functions that it is about. It has
-    no equations: those of the loop within know nothing of the layer.
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """What a layer adds to a closed loop, or does in place of it.
+
+    Its functions see parameters with the fields ``layer``, its own, and ``inner``, those of the
+    loop within. Where one is None, the loop within goes on unchanged.
+
+    Attributes
+    ----------
+    name
+        Part of the name of compiled code.
+    parameters
+        The type of the layer's parameters.
+    read
+        ``(plan) -> parameters``.
+    controls, hold
+        As in `tiltsim.closed_loop.loop.Sampling`.
+    actuators
+        What the layer appends to the model's actuators.
+    initial_activations
+        ``(plan, parameters, inner activations) -> activations`` of these actuators at time
+        zero.
+    derive
+        ``(inner columns, samples by field, setup) -> columns``; the first is a function.
+    fields
+        Fields of a sample: the first activations of the layer's actuators.
+    units
+        Columns of a flight that the layer adds, with their units.
+    equations
+        As in `ClosedLoop`, for these parameters. The equations of the loop within are not used:
+        they do not know the layer.
+    """
+
+    name: str
+    parameters: type[tuple[Any, ...]]
+    read: Callable[[FlightPlan], Any]
+    controls: Callable[..., Values] | None = None
+    hold: Callable[..., Values] | None = None
+    actuators: ExtraActuators = _NO_ACTUATORS
+    initial_activations: Callable[[FlightPlan, Any, Vector], Vector] = (
+        lambda _plan, _parameters, _inner: ()
+    )
+    derive: Derive = lambda inner, _samples, _setup: inner()
+    fields: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
+    equations: Equations | None = None
+
+
+def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
+    """A closed loop with one more layer around it.
 
     Parameters
     ----------
-    loop
-        The loop within; its parameters become the field ``law``.
-    record
-        The type of the field ``layer``.
-    read
-        ``(plan) -> layer``.
+    inner
+        The loop within.
+    layer
+        What to put around it.
+
+    Returns
+    -------
+    ClosedLoop
+        Its parameters hold the signature, the ``layer``'s and those of the ``inner`` loop.
     """
-    parameters_type = make_record_type(
-        f"{record.__name__}Parameters", signature=float, layer=record, law=loop.parameters
+    record = make_record_type(
+        f"{layer.parameters.__name__}Parameters",
+        signature=float,
+        layer=layer.parameters,
+        inner=inner.parameters,
     )
-    inner_controls, inner_hold = loop.controls, loop.held
-    inner_watch: Any = loop.watch
+    dynamics, added = inner.dynamics, layer.actuators
+    sizes = dynamics.sizes._replace(
+        act=dynamics.sizes.act + added.states,
+        ctrl=dynamics.sizes.ctrl + added.states + added.memories + WRENCH_SIZE * added.wrench,
+    )
+    controls, hold, observe, sign_check_values = _functions_within(inner, len(layer.fields))
+    controls = layer.controls or controls
+    controls.__qualname__ = f"{layer.name}.{inner.sampling.controls.__qualname__}"
+
+    def setup(plan: FlightPlan, signature: float) -> ControlSetup:
+        parameters, knots = inner.setup(plan, inner.signature)
+        return ControlSetup(record(signature, layer.read(plan), parameters), knots)
+
+    def within(setup: ControlSetup) -> ControlSetup:
+        return ControlSetup(setup.parameters.inner, setup.knots)
+
+    def initial_activations(plan: FlightPlan, setup: ControlSetup) -> Vector:
+        before = dynamics.initial_activations(plan, within(setup))
+        return (*before, *layer.initial_activations(plan, setup.parameters.layer, before))
+
+    def derive(samples: Samples, setup: ControlSetup) -> dict[str, Floats]:
+        return layer.derive(lambda: inner.columns.derive(samples, within(setup)), samples, setup)
+
+    def sign_checks(sample: Mapping[str, float], setup: ControlSetup) -> tuple[SignCheck, ...]:
+        return inner.monitoring.sign_checks(sample, within(setup))
+
+    columns = replace(
+        inner.columns,
+        observe=observe,
+        derive=derive,
+        fields=(*inner.columns.fields, *layer.fields),
+        units={**inner.columns.units, **layer.units},
+    )
+    return replace(
+        inner,
+        parameters=record,
+        setup=setup,
+        dynamics=replace(
+            dynamics,
+            sizes=sizes,
+            initial_activations=initial_activations,
+            extra_actuators=(*dynamics.extra_actuators, *([added] if any(added) else ())),
+        ),
+        sampling=Sampling(controls, layer.hold or hold),
+        columns=columns,
+        monitoring=Monitoring(sign_checks, sign_check_values),
+        equations=layer.equations,
+        supervised=None,
+    )
+
+
+def _functions_within(
+    inner: ClosedLoop, fields: int
+) -> tuple[Callable[..., Values], Callable[..., Values], Callable[..., Values], Any]:
+    """Controls, hold, observe and sign check values of a loop, for a layer around it.
+
+    They read the parameters ``inner`` and the first entries of ``act`` and ``ctrl``, hold what the
+    layer adds to ``ctrl``, and observe as many ``fields`` of what it adds to ``act``.
+    """
+    inner_controls, inner_hold = inner.sampling.controls, inner.sampling.hold
+    inner_observe = inner.columns.observe
+    inner_check: Any = inner.monitoring.sign_check_values
+    act_size, ctrl_size = inner.dynamics.sizes.act, inner.dynamics.sizes.ctrl
+    activations = _entries(act_size, fields)
 
     @scalar
     def controls(
         time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
     ) -> Values:
-        return inner_controls(time, qpos, qvel, act, parameters.law, knots)
+        return inner_controls(time, qpos, qvel, act, parameters.inner, knots)
 
     @scalar
     def hold(
         time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: Any
     ) -> Values:
-        return inner_hold(time, qpos, qvel, act, ctrl, parameters.law)
+        held = inner_hold(time, qpos, qvel, act, ctrl[:ctrl_size], parameters.inner)
+        return (*held, *ctrl[ctrl_size:])
 
     @scalar
-    def watch(values: Vector, parameters: Any) -> Values:
-        watched: Values = inner_watch(values, parameters.law)
-        return watched
+    def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
+        return (*inner_observe(qpos, qvel, act[:act_size], ctrl[:ctrl_size]), *activations(act))
 
-    def setup(plan: FlightPlan, signature: float) -> ControlSetup:
-        inner = loop.setup(plan, loop.signature)
-        return ControlSetup(parameters_type(signature, read(plan), inner.parameters), inner.knots)
+    @scalar
+    def sign_check_values(values: Vector, parameters: Any) -> Values:
+        checked: Values = inner_check(values, parameters.inner)
+        return checked
 
-    def within(setup: ControlSetup) -> ControlSetup:
-        return ControlSetup(setup.parameters.law, setup.knots)
+    return controls, hold, observe, None if inner_check is None else sign_check_values
 
-    def initial_activations(plan: FlightPlan, setup: ControlSetup) -> Vector:
-        return loop.initial_activations(plan, within(setup))
 
-    def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-        return loop.derive(samples, within(setup))
+@cache
+def _entries(first: int, count: int) -> Callable[[Vector], Values]:
+    """Scalar code that reads so many entries of a vector, which native code may have as a list."""
+    if count == 0:
 
-    def watched(sample: Mapping[str, float], setup: ControlSetup) -> tuple[SignCheck, ...]:
-        return loop.watched(sample, within(setup))
+        @scalar
+        def nothing(vector: Vector) -> Values:
+            return ()
 
-    return replace(
-        loop,
-        parameters=parameters_type,
-        controls=controls,
-        hold=hold,
-        setup=setup,
-        initial_activations=initial_activations,
-        derive=derive,
-        watched=watched,
-        watch=None if inner_watch is None else watch,
-        equations=None,
-    )
+        return nothing
+
+    further = _entries(first + 1, count - 1)
+
+    @scalar
+    def entries(vector: Vector) -> Values:
+        return (vector[first], *further(vector))
+
+    return entries

@@ -2,26 +2,25 @@
 
 The loop stays what it is in MuJoCo, a function from time, `qpos`, `qvel` and `act` to controls, and
 so does the order in which it reads its sensors, draws its noise and hands on its commands. Only
-what the controls act upon is another: `tiltsim.equations.driven`.
+what the controls act upon is another: `tiltsim.equations.actuator_level`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations
-from tiltsim.equations.driven import ACTUATOR_PLANTS, Mechanics, Wrench, mechanics
-from tiltsim.laws.layers.layer import around
+from tiltsim.equations.actuator_level import ACTUATOR_PLANTS, Mechanics, Wrench, mechanics
+from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.models.parts import ExtraActuators
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
 
-ROTORS = 4
+ROTOR_STATES: Final = 4
 
 
 @cache
@@ -70,24 +69,28 @@ def _read_actuators(
 
 @cache
 def on_equations(loop: ClosedLoop) -> ClosedLoop:
-    """A loop with equations that do what its controls say.
+    """A loop with equations in which its controls act on the thesis's rigid body.
 
     Their inputs are the controls, their state is the vehicle's motion followed by the activations.
     """
-    driven = ACTUATOR_PLANTS[loop.model]
-    first, qpos_of, qvel_of = driven.motion, driven.qpos, driven.qvel
-    motion_rates, motion_settled = driven.rates, driven.settled
-    controls, held, observe = loop.controls, loop.held, loop.observe
-    own = ExtraActuators(states=ROTORS + loop.law_states)
-    activation_rates, wrench = _read_actuators((own, *loop.extra_actuators), driven.rotor_states)
+    dynamics = loop.dynamics
+    plant = ACTUATOR_PLANTS[dynamics.model]
+    first, qpos_of, qvel_of = plant.motion, plant.qpos, plant.qvel
+    motion_rates, project_motion = plant.rates, plant.project_onto_limits
+    controls, held = loop.sampling.controls, loop.sampling.hold
+    observe = loop.columns.observe
+    own = ExtraActuators(states=ROTOR_STATES + dynamics.controller_states)
+    activation_rates, wrench = _read_actuators((own, *dynamics.extra_actuators), plant.rotor_states)
 
     @scalar
     def equation_inputs(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
-        return controls(time, qpos_of(state), qvel_of(state), state[first:], parameters.law, knots)
+        return controls(
+            time, qpos_of(state), qvel_of(state), state[first:], parameters.inner, knots
+        )
 
     @scalar
     def controls_in_force(time: float, state: Vector, inputs: Vector, parameters: Any) -> Values:
-        return held(time, qpos_of(state), qvel_of(state), state[first:], inputs, parameters.law)
+        return held(time, qpos_of(state), qvel_of(state), state[first:], inputs, parameters.inner)
 
     @scalar
     def equation_rates(
@@ -99,7 +102,7 @@ def on_equations(loop: ClosedLoop) -> ClosedLoop:
         disturbance: Triple,
     ) -> Values:
         # A stage may have carried a rotor past its limit by what one step adds.
-        state = motion_settled(state, parameters.layer)
+        state = project_motion(state, parameters.layer)
         ctrl = controls_in_force(time, state, inputs, parameters)
         return (
             *motion_rates(state, ctrl, wrench(ctrl), parameters.layer, disturbance),
@@ -114,23 +117,20 @@ def on_equations(loop: ClosedLoop) -> ClosedLoop:
         return observe(qpos_of(state), qvel_of(state), state[first:], ctrl)
 
     @scalar
-    def settled(state: list[float], parameters: Any) -> list[float]:
-        return motion_settled(state, parameters.layer)
-
-    equation_inputs.__qualname__ = f"on_equations.{loop.controls.__qualname__}"
-    layered = around(loop, Mechanics, mechanics)
+    def project_onto_limits(state: list[float], parameters: Any) -> list[float]:
+        return project_motion(state, parameters.layer)
 
     def initial(plan: FlightPlan, setup: ControlSetup) -> Vector:
-        return (*driven.initial(plan), *layered.initial_activations(plan, setup))
+        inner = ControlSetup(setup.parameters.inner, setup.knots)
+        return (*plant.initial(plan), *dynamics.initial_activations(plan, inner))
 
-    return replace(
-        layered,
-        equations=Equations(
-            inputs=equation_inputs,
-            inputs_size=loop.sizes.ctrl,
-            rates=equation_rates,
-            initial=initial,
-            observe=observe_equations,
-            settled=settled,
-        ),
+    equation_inputs.__qualname__ = f"on_equations.{controls.__qualname__}"
+    equations = Equations(
+        inputs=equation_inputs,
+        inputs_size=dynamics.sizes.ctrl,
+        rates=equation_rates,
+        initial=initial,
+        observe=observe_equations,
+        project_onto_limits=project_onto_limits,
     )
+    return wrap_loop(loop, Layer("on_equations", Mechanics, mechanics, equations=equations))

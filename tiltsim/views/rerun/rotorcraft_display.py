@@ -115,7 +115,7 @@ def rotorcraft_series(scenario: Scenario) -> list[Series]:
         series.append(Series(f"rotor_speeds/{name}", f"rotor {rotor}", color, values, width))
     margin = column("singularity_margin")
     series.append(Series("singularity/margin", "margin", AMBER, margin, 2.5))
-    if SUPERVISION in loop_of(scenario).extra_columns:
+    if SUPERVISION in loop_of(scenario).columns.units:
         path, label = f"singularity/{SUPERVISION}", "supervisor, 0 to 1"
         series.append(Series(path, label, SKY, column(SUPERVISION)))
     for axis in error_axes(scenario):

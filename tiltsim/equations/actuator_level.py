@@ -61,14 +61,16 @@ def mechanics(plan: FlightPlan) -> Mechanics:
 
 
 @scalar
-def pushed(rotation: Vector, wrench: Wrench, mass: float, disturbance: Triple) -> Triple:
+def external_acceleration(
+    rotation: Vector, wrench: Wrench, mass: float, disturbance: Triple
+) -> Triple:
     """The acceleration (m/s^2, world) by a wrench's force and a disturbance (m/s^2, world)."""
     force_x, force_y, force_z = to_world(rotation, (wrench[0], wrench[1], wrench[2]))
     gust_x, gust_y, gust_z = disturbance
     return gust_x + force_x / mass, gust_y + force_y / mass, gust_z + force_z / mass
 
 
-class Driven(NamedTuple):
+class ActuatorPlant(NamedTuple):
     """A vehicle whose state is that of its motion, followed by MuJoCo's activations."""
 
     motion: int  # how many numbers come before the activations
@@ -77,7 +79,7 @@ class Driven(NamedTuple):
     qvel: Callable[[Vector], Values]
     rates: Callable[[Vector, Vector, Wrench, Mechanics, Triple], Values]
     """Time derivative of the motion: state, controls, wrench, mechanics, disturbance (m/s^2)."""
-    settled: Callable[
+    project_onto_limits: Callable[
         [list[float], Mechanics], list[float]
     ]  # see `tiltsim.closed_loop.loop.Equations`
     initial: Callable[[FlightPlan], Values]  # motion
@@ -116,11 +118,11 @@ def tiltrotor_qvel(state: Vector) -> Values:
 
 
 @scalar
-def servo_acceleration(told: float, angle: float, rate: float, mechanics: Mechanics) -> float:
-    """``omega^2 (told - alpha) - 2 zeta omega alpha'`` (rad/s^2) of a pod without mass."""
+def servo_acceleration(command: float, angle: float, rate: float, mechanics: Mechanics) -> float:
+    """``omega^2 (command - alpha) - 2 zeta omega alpha'`` (rad/s^2) of a pod without mass."""
     omega, limit = mechanics.servo_frequency, mechanics.max_tilt
-    told = clipped(told, -limit, limit)
-    return omega * omega * (told - angle) - 2.0 * mechanics.servo_damping * omega * rate
+    command = clipped(command, -limit, limit)
+    return omega * omega * (command - angle) - 2.0 * mechanics.servo_damping * omega * rate
 
 
 @scalar
@@ -131,7 +133,7 @@ def tiltrotor_rates(
     vehicle = mechanics.vehicle
     _, _, _, torque_x, torque_y, torque_z = wrench
     tilts: Quad = (state[18], state[19], state[20], state[21])
-    push = pushed(rotation_of(state), wrench, vehicle.mass, disturbance)
+    push = external_acceleration(rotation_of(state), wrench, vehicle.mass, disturbance)
     turn = (
         torque_x / vehicle.inertia_xx,
         torque_y / vehicle.inertia_yy,
@@ -150,18 +152,18 @@ def tiltrotor_rates(
 
 
 @scalar
-def settled_tiltrotor(state: list[float], mechanics: Mechanics) -> list[float]:
+def project_tiltrotor(state: list[float], mechanics: Mechanics) -> list[float]:
     """Rotors within their limits, pods not beyond their stops."""
     low, high, stop = mechanics.min_speed, mechanics.max_speed, mechanics.max_tilt
-    settled = state[:]
+    projected = state[:]
     for rotor in range(4):
         spin = -1.0 if rotor % 2 == 0 else 1.0
-        settled[26 + rotor] = spin * clipped(spin * state[26 + rotor], low, high)
+        projected[26 + rotor] = spin * clipped(spin * state[26 + rotor], low, high)
         tilt, rate = state[18 + rotor], state[22 + rotor]
         if abs(tilt) > stop:
-            settled[18 + rotor] = stop if tilt > 0.0 else -stop
-            settled[22 + rotor] = 0.0 if tilt * rate > 0.0 else rate
-    return settled
+            projected[18 + rotor] = stop if tilt > 0.0 else -stop
+            projected[22 + rotor] = 0.0 if tilt * rate > 0.0 else rate
+    return projected
 
 
 def initial_tiltrotor(plan: FlightPlan) -> Values:
@@ -198,7 +200,7 @@ def quadrotor_rates(
     vehicle = mechanics.vehicle
     _, _, _, torque_x, torque_y, torque_z = wrench
     rotation = rotation_from_euler(state[6], state[7], state[8])
-    push = pushed(rotation, wrench, vehicle.mass, disturbance)
+    push = external_acceleration(rotation, wrench, vehicle.mass, disturbance)
     lever = vehicle.arm_length * vehicle.thrust_coefficient
     inputs = (
         vehicle.thrust_coefficient * (ctrl[0] + ctrl[1] + ctrl[2] + ctrl[3]),
@@ -210,28 +212,28 @@ def quadrotor_rates(
 
 
 @scalar
-def settled_quadrotor(state: list[float], mechanics: Mechanics) -> list[float]:
+def project_quadrotor(state: list[float], mechanics: Mechanics) -> list[float]:
     """As it is: its rotors make any thrust."""
     return state
 
 
-ACTUATOR_PLANTS: Final[dict[str, Driven]] = {
-    "tiltrotor": Driven(
+ACTUATOR_PLANTS: Final[dict[str, ActuatorPlant]] = {
+    "tiltrotor": ActuatorPlant(
         motion=26,
         rotor_states=8,
         qpos=tiltrotor_qpos,
         qvel=tiltrotor_qvel,
         rates=tiltrotor_rates,
-        settled=settled_tiltrotor,
+        project_onto_limits=project_tiltrotor,
         initial=initial_tiltrotor,
     ),
-    "quadrotor": Driven(
+    "quadrotor": ActuatorPlant(
         motion=12,
         rotor_states=4,
         qpos=quadrotor_qpos,
         qvel=quadrotor_qvel,
         rates=quadrotor_rates,
-        settled=settled_quadrotor,
+        project_onto_limits=project_quadrotor,
         initial=lambda plan: initial_state(plan.scenario),
     ),
 }

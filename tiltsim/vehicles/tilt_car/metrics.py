@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tiltsim.vehicles.rotorcraft_metrics import SETTLED
+from tiltsim.vehicles.rotorcraft.metrics import SETTLED
 from tiltsim.vehicles.saturation import at_lower_limit
 from tiltsim_controllers.mathematics.scalar import Floats
 

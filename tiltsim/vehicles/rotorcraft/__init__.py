@@ -8,13 +8,25 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.limits import rotorcraft_limit_exceeded
+from tiltsim.closed_loop.limits import (
+    ALTITUDE_ERROR,
+    BODY_RATE,
+    HORIZONTAL_ERROR,
+    MAX_BODY_RATE,
+    MAX_POSITION_ERROR,
+    MAX_ROTOR_SPEED,
+    ROTOR_SPEED,
+    WITHIN_LIMITS,
+    altitude_error,
+    horizontal_error,
+)
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
-from tiltsim.vehicles.rotorcraft_metrics import rotorcraft_metrics
+from tiltsim.vehicles.rotorcraft.layout import OBSERVED_FIELDS, ROTORS, SPEED_1, P
+from tiltsim.vehicles.rotorcraft.metrics import rotorcraft_metrics
 from tiltsim_controllers.gaits.tilts import tilt_reference
-from tiltsim_controllers.laws.attitude_altitude import STATE_FIELDS
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
-from tiltsim_controllers.mathematics.scalar import Floats, Quad, Vector, clipped
+from tiltsim_controllers.mathematics.scalar import Floats, Quad, Vector, clipped, scalar
+from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.parameters import SPIN
 
 if TYPE_CHECKING:
@@ -25,27 +37,49 @@ if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
     from tiltsim.scenario.vehicle import VehicleTable
 
-_FOUR: Final = (1, 2, 3, 4)
-
-OBSERVED_FIELDS: Final = (*STATE_FIELDS, *(f"alpha_rate_{rotor}" for rotor in _FOUR))
-"""What every loop can tell of its rotorcraft: rigid body, tilts, rotor speeds, tilt rates."""
-
 COLUMN_UNITS: Final = {
     "time": "s",
     **dict.fromkeys(("x", "y", "z"), "m"),
     **dict.fromkeys(("vx", "vy", "vz"), "m/s"),
     **dict.fromkeys(("roll", "pitch", "yaw"), "rad"),
     **dict.fromkeys(("p", "q", "r"), "rad/s"),
-    **{f"alpha_{i}": "rad" for i in _FOUR},
-    **{f"alpha_ref_{i}": "rad" for i in _FOUR},
-    **{f"alpha_rate_{i}": "rad/s" for i in _FOUR},
-    **{f"rotor_speed_{i}": "rad/s" for i in _FOUR},
-    **{f"thrust_{i}": "N" for i in _FOUR},
+    **{f"alpha_{i}": "rad" for i in ROTORS},
+    **{f"alpha_ref_{i}": "rad" for i in ROTORS},
+    **{f"alpha_rate_{i}": "rad/s" for i in ROTORS},
+    **{f"rotor_speed_{i}": "rad/s" for i in ROTORS},
+    **{f"thrust_{i}": "N" for i in ROTORS},
     **dict.fromkeys(("x_ref", "y_ref", "z_ref"), "m"),
     **dict.fromkeys(("roll_ref", "pitch_ref", "yaw_ref"), "rad"),
     "singularity_margin": "rad",
     "determinant": "1",
 }
+
+
+@scalar
+def rotorcraft_limit_exceeded(
+    time: float,
+    values: Vector,
+    reference: ReferenceParameters,
+    knots: Vector,
+    follows_position: float,
+) -> int:
+    """The code of the first limit that a sample of a rotorcraft exceeds, `WITHIN_LIMITS` if none.
+
+    ``values`` begin as `OBSERVED_FIELDS`; ``follows_position`` is 0
+    where the horizontal position is free.
+    """
+    away = follows_position * horizontal_error(time, values, reference, knots)
+    if away > MAX_POSITION_ERROR:
+        return HORIZONTAL_ERROR
+    if altitude_error(time, values, reference, knots) > MAX_POSITION_ERROR:
+        return ALTITUDE_ERROR
+    for axis in range(3):
+        if abs(values[P + axis]) > MAX_BODY_RATE:
+            return BODY_RATE + axis
+    for rotor in range(4):
+        if abs(values[SPEED_1 + rotor]) > MAX_ROTOR_SPEED:
+            return ROTOR_SPEED + rotor
+    return WITHIN_LIMITS
 
 
 def rotor_thrusts(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str, Floats]:
@@ -57,7 +91,7 @@ def rotor_thrusts(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str
         * columns[f"rotor_speed_{i}"]
         * np.abs(columns[f"rotor_speed_{i}"])
         * columns.get(f"thrust_factor_{i}", 1.0)  # of a fault
-        for i, sign in zip(_FOUR, SPIN, strict=True)
+        for i, sign in zip(ROTORS, SPIN, strict=True)
     }
 
 

@@ -5,11 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
-from tiltsim.closed_loop.limits import tilt_car_limit_exceeded
+from tiltsim.closed_loop.limits import (
+    HORIZONTAL_ERROR,
+    MAX_POSITION_ERROR,
+    MAX_ROTOR_SPEED,
+    ROTOR_SPEED,
+    WITHIN_LIMITS,
+    horizontal_error,
+)
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
-from tiltsim.vehicles.tilt_car_metrics import tilt_car_metrics
+from tiltsim.vehicles.tilt_car.metrics import tilt_car_metrics
 from tiltsim_controllers.gaits.tilts import tilt_reference
-from tiltsim_controllers.mathematics.scalar import Floats, Vector
+from tiltsim_controllers.mathematics.scalar import Floats, Vector, scalar
+from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.tilt_car.vehicle import counter_yaw_per_tilt
 
 if TYPE_CHECKING:
@@ -25,7 +33,10 @@ OBSERVED_FIELDS: Final = (
     *("x", "y", "vx", "vy", "yaw", "r"),
     *("alpha", "alpha_rate", "rotor_speed_1", "rotor_speed_2"),
 )
-"""What every loop can tell of its car: both discs and the rotor speeds."""
+"""A sample of any tilt-car after its time: both discs and the rotor speeds."""
+
+SPEED_1, SPEED_2 = 8, 9
+"""Where in a sample the rotor speeds lie."""
 
 COLUMN_UNITS: Final = {
     "time": "s",
@@ -49,6 +60,24 @@ COLUMN_UNITS: Final = {
 direction of the acceleration that the law wants or the reference has, each written as the angle
 nearest to ``direction``. ``input_split`` is ``omega_1^2 - omega_2^2``.
 """
+
+
+@scalar
+def tilt_car_limit_exceeded(
+    time: float,
+    values: Vector,
+    reference: ReferenceParameters,
+    knots: Vector,
+    follows_position: float,
+) -> int:
+    """The code of the first limit that a sample of the car exceeds, see `VehicleKind`."""
+    away = follows_position * horizontal_error(time, values, reference, knots)
+    if away > MAX_POSITION_ERROR:
+        return HORIZONTAL_ERROR
+    for rotor in range(2):
+        if abs(values[SPEED_1 + rotor]) > MAX_ROTOR_SPEED:
+            return ROTOR_SPEED + rotor
+    return WITHIN_LIMITS
 
 
 def _thrusts(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str, Floats]:
