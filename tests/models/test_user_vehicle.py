@@ -163,10 +163,10 @@ def off_centre(x):
     [
         ("", None),
         (off_centre(1e-4), None),  # 7 micrometres: less than what must be aligned may be off
-        (off_centre(0.073), "does not know of its centre of mass at (0.005, 0, 0) m\n"),
+        (off_centre(0.073), "not modeled: its centre of mass at (0.005, 0, 0) m\n"),
         (
             SKEW,
-            "does not know of its products of inertia (xy, xz, yz) = "
+            "not modeled: its products of inertia (xy, xz, yz) = "
             "(-0.00025, -0.00015, -0.00015) kg m^2\n",
         ),
         (SKEW + off_centre(0.083), "(0.005, 0, 0) m and its products of inertia"),

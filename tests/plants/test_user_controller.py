@@ -666,8 +666,8 @@ def test_a_failing_controller_exits_3_and_leaves_its_log(tmp_path, capsys):
     assert main(command) == 3
     error = capsys.readouterr().err
     assert error == (
-        "tiltsim: flight failed at t = 0.100 s: the controller bad.py:law returned thrusts of "
-        "shape (3,); (4,) is wanted\n"
+        "tiltsim: flight terminated early at t = 0.100 s (failed): the controller bad.py:law "
+        "returned thrusts of shape (3,); (4,) is wanted\n"
     )
     assert json.loads((out / "metrics.json").read_text())["duration"] == pytest.approx(0.1)
     assert load_flight(out).end.kind == "failed"

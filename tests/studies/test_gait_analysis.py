@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from tiltsim.commands import gait as gait_command
+from tiltsim.commands import gait_selection
 from tiltsim.commands import map as map_command
 from tiltsim.commands.angles import parse_vehicle
 from tiltsim.commands.text import json_text, number
@@ -637,7 +638,7 @@ def test_a_bad_target_is_noticed_before_any_work(tmp_path, monkeypatch) -> None:
     def work(*_: object, **__: object) -> None:
         raise AssertionError("worked")
 
-    monkeypatch.setattr(gait_command, "select_gait", work)
+    monkeypatch.setattr(gait_selection, "select_gait", work)
     monkeypatch.setattr(map_command, "parse_vehicle", work)
     closed = tmp_path / "closed.png"
     closed.touch()

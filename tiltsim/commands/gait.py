@@ -6,15 +6,13 @@ import argparse
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.commands.angles import allow_negative_lists, parse_angle, parse_vehicle
-from tiltsim.commands.gait_figures import FIGURES, attainable_warnings, draw_gait
-from tiltsim.commands.gait_selection import select_gait
-from tiltsim.commands.gait_text import determinant_text, gait_text, list_text
 from tiltsim.commands.options import Subparsers, add_json, add_plot, add_vehicle, prepare_figure
 from tiltsim.commands.text import json_text, print_figure_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+FIGURES: Final = ("roll_pitch", "comparison", "margin", "attainable", "determinant", "faults")
 CASES: Final = ("equal", "half", "negative", "negative_half")
 
 OPPOSITE_SPEED_RATIO: Final = 0.7
@@ -86,6 +84,10 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyze, draw, print."""
+    from tiltsim.commands.gait_figures import attainable_warnings, draw_gait
+    from tiltsim.commands.gait_selection import select_gait
+    from tiltsim.commands.gait_text import gait_text, list_text
+
     _check_options(arguments)
     if arguments.list:
         _print(arguments, _list_report(), list_text)
@@ -147,6 +149,7 @@ def _check_options(arguments: argparse.Namespace) -> None:
 
 def _run_determinant(arguments: argparse.Namespace) -> int:
     """Draw the restrictions of ch. 3, Sec. 5.1, and print how far from singular they are."""
+    from tiltsim.commands.gait_text import determinant_text
     from tiltsim.studies.gait_analysis import determinant_report
     from tiltsim.views.figures.determinant import determinant_figure
     from tiltsim.views.figures.style import save

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from tiltsim.commands.angles import parse_speed_limits
 from tiltsim.errors import InputError
@@ -12,11 +12,9 @@ if TYPE_CHECKING:
 
     from tiltsim.commands.gait_selection import SelectedGait
 
-FIGURES: Final = ("roll_pitch", "comparison", "margin", "attainable", "determinant", "faults")
-
 
 def draw_gait(selected: SelectedGait, kind: str | None, speed_limits: str | None) -> Figure:
-    """A figure of a gait: one of `FIGURES`, but for determinant, which does not show a gait.
+    """The ``--figure`` of a gait, by default its roll-pitch diagram.
 
     ``speed_limits`` is for the attainable figure; see `parse_speed_limits`.
     """

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 from tiltsim.commands.options import Subparsers, add_overrides, add_quiet
 from tiltsim.commands.progress import progress_bar
+from tiltsim.commands.text import table
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INTERRUPTED, VEHICLE_LOST
 from tiltsim.system.interrupts import defer_interrupts
-from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tiltsim.scenario.expectation import Expectation
     from tiltsim.scenario.scenario import Scenario
     from tiltsim.views.rerun.live import LiveStream
+    from tiltsim_controllers.mathematics.scalar import Floats
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -110,11 +111,9 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.out is not None:
             print(f"written to {arguments.out}")
         if arguments.rerun is not None:
-            print(
-                f"recording written to {arguments.rerun}; open with: tiltsim view {arguments.rerun}"
-            )
+            print(f"recording written to {arguments.rerun}; open it with tiltsim view")
     if flight.end.kind != "completed":
-        print(f"tiltsim: {lost(flight)}", file=sys.stderr)
+        print(f"tiltsim: {flight.end.message}", file=sys.stderr)
         return VEHICLE_LOST
     failed = [verdict for verdict in verdicts if not verdict.holds]
     if arguments.quiet:
@@ -133,7 +132,7 @@ def _warn_unmodeled_properties(scenario: Scenario) -> None:
     if own is not None and own.unmodeled_properties and not scenario.controller.is_external:
         print(
             f"tiltsim: warning: vehicle.mjcf: the {scenario.controller.law} controller assumes the "
-            "centre of mass at the body's origin and a diagonal inertia; it does not model "
+            "centre of mass at the body's origin and a diagonal inertia; not modeled: "
             f"{own.unmodeled_properties}",
             file=sys.stderr,
         )
@@ -167,11 +166,6 @@ def fly(scenario: Scenario, arguments: argparse.Namespace) -> Flight:
         if live is not None:
             live.finish(flight.end)
     return flight
-
-
-def lost(flight: Flight) -> str:
-    """One line on a flight that ended early: kind, time, cause."""
-    return f"flight {flight.end.kind} at t = {flight.end.time:.3f} s: {flight.end.cause}"
 
 
 def summary(flight: Flight, verdicts: list[Verdict]) -> str:
@@ -227,19 +221,15 @@ def _published(expectation: Expectation) -> str:
 
 def expectation_lines(verdicts: list[Verdict]) -> list[str]:
     """A table of expectations: verdict, metric, measured, published, bounds."""
-    rows = [("", "expected", "measured", "published", "bounds")]
-    for verdict in verdicts:
-        rows.append(
-            (
-                "ok" if verdict.holds else "FAILED",
-                verdict.expectation.metric,
-                _measured(verdict),
-                _published(verdict.expectation),
-                verdict.bounds,
-            )
+    rows = [
+        (
+            "ok" if verdict.holds else "FAILED",
+            verdict.expectation.metric,
+            _measured(verdict),
+            _published(verdict.expectation),
+            verdict.bounds,
         )
-    widths = [max(len(row[column]) for row in rows) for column in range(5)]
-    return [
-        "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip()
-        for row in rows
+        for verdict in verdicts
     ]
+    text = table(("", "expected", "measured", "published", "bounds"), rows, frozenset())
+    return [f"  {line}" for line in text.splitlines()]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
-from typing import Any
+from typing import Any, Final
 
 from tiltsim.commands.options import Subparsers
-from tiltsim.scenario.scenario import Scenario, Variant
+
+DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -23,8 +24,6 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the schema."""
-    pass
-
     print(json.dumps(sweep_schema() if arguments.sweep else scenario_schema(), indent=2))
     return 0
 
@@ -32,11 +31,13 @@ def run(arguments: argparse.Namespace) -> int:
 def scenario_schema() -> dict[str, Any]:
     """The schema of a scenario file: a base, and variants that may change any of its tables.
 
-    A variant names only what differs from the base, so nothing in it is required but its name.
+    A variant lists only the differences from the base, so that only its name is required.
     """
+    from tiltsim.scenario.scenario import Scenario, Variant
+
     schema = Scenario.model_json_schema()
     schema["title"] = "tiltsim scenario"
-    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    schema["$schema"] = DIALECT
     variant = Variant.model_json_schema()
     variant["properties"] |= {
         key: value if key in {"title", "source", "expect", "disturbance"} else {"type": "object"}
@@ -54,5 +55,5 @@ def sweep_schema() -> dict[str, Any]:
 
     schema = Sweep.model_json_schema()
     schema["title"] = "tiltsim sweep"
-    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    schema["$schema"] = DIALECT
     return schema

@@ -18,3 +18,8 @@ class End:
     kind: EndKind
     time: float
     cause: str = ""
+
+    @property
+    def message(self) -> str:
+        """One line on a flight that was not completed."""
+        return f"flight terminated early at t = {self.time:.3f} s ({self.kind}): {self.cause}"

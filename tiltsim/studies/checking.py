@@ -95,8 +95,7 @@ def check_one(
     # A scenario that may end early has an expectation on `diverged`.
     may_end_early = any(v.expectation.metric == "diverged" for v in verdicts)
     if flight.end.kind != "completed" and not may_end_early:
-        message = f"flight {flight.end.kind} at t = {flight.end.time:.3f} s: {flight.end.cause}"
-        return CheckResult(address, "lost", message, verdicts, wall_time)
+        return CheckResult(address, "lost", flight.end.message, verdicts, wall_time)
     failed = [v for v in verdicts if not v.holds]
     message = "; ".join(
         f"{v.expectation.metric} = {_number(v.measured)}, expected {v.bounds}" for v in failed
