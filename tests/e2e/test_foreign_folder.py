@@ -1,0 +1,89 @@
+"""A flight from a folder whose own packages have the names of this repository's folders."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import sysconfig
+import venv
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).parents[2]
+SETPOINT = "ch04_tracking/setpoint#rho_065_modified"
+SCRIPT = f"""
+import controllers
+import scenarios
+import tests
+import tiltsim
+
+scenario = tiltsim.load_scenario("{SETPOINT}", {{"simulation.duration": 0.2}})
+flight = tiltsim.simulate(scenario)
+print(flight.end.kind, len(flight), tiltsim.__file__, sep="\\n")
+print(*(package.OWNER for package in (controllers, scenarios, tests)))
+"""
+
+
+def run(*command, cwd):
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    done = subprocess.run(
+        command, cwd=cwd, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def pip(*words, cwd):
+    """Run pip without network: the build backend is that of this environment."""
+    offline = ("--no-index", "--no-deps", "--no-build-isolation", "--disable-pip-version-check")
+    run(sys.executable, "-m", "pip", *words, *offline, cwd=cwd)
+
+
+@pytest.fixture
+def python(tmp_path):
+    """The interpreter of a new environment that sees the packages of this one, tiltsim excepted."""
+    folder = tmp_path / "venv"
+    venv.create(folder, symlinks=True)
+    paths = {"base": str(folder), "platbase": str(folder)}
+    site = Path(sysconfig.get_path("purelib", "venv", vars=paths))
+    # Path lines only: .pth files in these folders, as of an editable install, are not read.
+    shared = [path for path in sys.path if Path(path).name in {"site-packages", "dist-packages"}]
+    (site / "shared.pth").write_text("\n".join(shared), encoding="utf-8")
+    return Path(sysconfig.get_path("scripts", "venv", vars=paths)) / "python"
+
+
+@pytest.fixture
+def project(tmp_path):
+    """A user's project with packages of its own and a script that flies."""
+    folder = tmp_path / "project"
+    for name in ("controllers", "scenarios", "tests"):
+        (folder / name).mkdir(parents=True)
+        (folder / name / "__init__.py").write_text('OWNER = "user"\n', encoding="utf-8")
+    (folder / "fly.py").write_text(SCRIPT, encoding="utf-8")
+    return folder
+
+
+@pytest.mark.parametrize("kind", ["editable", "wheel"])
+def test_a_users_own_packages_do_not_shadow_those_of_tiltsim(kind, python, project, tmp_path):
+    pytest.importorskip("hatchling", reason="builds without network need the build backend")
+    if kind == "wheel":
+        pip("wheel", "--wheel-dir", str(tmp_path / "dist"), str(ROOT), cwd=tmp_path)
+        (wheel,) = (tmp_path / "dist").glob("tiltsim-*.whl")
+        target = [str(wheel)]
+    else:
+        target = ["--editable", str(ROOT)]
+    pip("--python", str(python), "install", "--force-reinstall", *target, cwd=tmp_path)
+
+    end, samples, file, owners = run(python, "fly.py", cwd=project).splitlines()
+    assert (end, owners) == ("completed", "user user user")
+    assert int(samples) > 1
+    installed = Path(file).is_relative_to(python.parents[1])
+    assert installed == (kind == "wheel")
+    # `python -m` puts the current folder first on the path, too.
+    options = ["--set", "simulation.duration=0.2", "--set", "expect=[]", "--out", "flight"]
+    run(python, "-m", "tiltsim", "run", SETPOINT, "--quiet", *options, cwd=project)
+    assert (project / "flight" / "flight.parquet").is_file()
