@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -175,3 +176,8 @@ def test_every_public_definition_has_a_docstring(module):
     assert ast.get_docstring(TREES[module]), "the module has none"
     bare = [name for name, node in public_definitions(TREES[module]) if not ast.get_docstring(node)]
     assert bare == []
+
+
+def test_the_page_on_the_architecture_lists_all_folders_in_their_order():
+    page = (ROOT.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
+    assert re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE) == [*CONTROLLERS, *FLYING, *SHOWING]
