@@ -42,49 +42,18 @@ def compile_stepper(loop: ClosedLoop) -> tuple[Any, Any]:
     stepper = register_jitable(**INNER)(make_stepper(loop.equations))
 
     @compiled
-    def advance(  # type: ignore[no-untyped-def]
-        step_index, state, held, timestep, steps, control_steps, parameters, knots, disturbance
-    ):
-        values, held = stepper(
-            step_index,
-            list(state),
-            held,
-            timestep,
-            steps,
-            control_steps,
-            parameters,
-            knots,
-            disturbance,
-        )
+    def advance(step_index, state, held, steps, integration):  # type: ignore[no-untyped-def]
+        values, held = stepper(step_index, list(state), held, steps, integration)
         return np.array(values), held
 
     @compiled
     def record(  # type: ignore[no-untyped-def]
-        recorder,
-        samples,
-        step_index,
-        state,
-        held,
-        timestep,
-        steps,
-        control_steps,
-        parameters,
-        knots,
-        disturbance,
+        recorder, samples, step_index, state, held, steps, integration
     ):
+        timestep, control_steps, parameters, knots, _ = integration
         values = list(state)
         for _ in range(samples):
-            values, held = stepper(
-                step_index,
-                values,
-                held,
-                timestep,
-                steps,
-                control_steps,
-                parameters,
-                knots,
-                disturbance,
-            )
+            values, held = stepper(step_index, values, held, steps, integration)
             step_index += steps
             time = step_index * timestep
             force = held

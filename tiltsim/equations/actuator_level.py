@@ -1,11 +1,10 @@
-"""The vehicles on the thesis's equations, driven as MuJoCo drives them: by the controls of a model.
+"""The thesis's vehicles at the level of their actuators: moved by the controls of MuJoCo's model.
 
-The thesis's vehicles do as they are told: pods stand at the gait's angles, rotors take any speed.
-With a layer around the law (`tiltsim.laws.layers.layer`) they do not, and what the layer says, it
-says as controls and activations of the MuJoCo model. Here these controls act on the thesis's rigid
-body, on pods without mass that follow the equation of their servo, and on rotors with limits.
-Nothing of MuJoCo is in it but the order of the controls, so that its flights can be checked against
-these.
+The thesis's vehicles have ideal actuators: pods follow the gait exactly, rotors take any speed. A
+layer around the controller (`tiltsim.laws.layers.layer`) changes that through controls and
+activations of the MuJoCo model. Here these controls act on the thesis's rigid body, on massless
+pods that follow the equation of their servo, and on rotors with limits. Only the order of the
+controls is MuJoCo's, so these flights can check MuJoCo's.
 """
 
 from __future__ import annotations
@@ -15,7 +14,25 @@ from math import inf
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from tiltsim.equations.quadrotor import equations_of_motion, initial_state
-from tiltsim.equations.tiltrotor import rigid_body
+from tiltsim.equations.quadrotor import rigid_body as quadrotor_body
+from tiltsim.equations.tiltrotor import (
+    R11,
+    R12,
+    R13,
+    R21,
+    R22,
+    R23,
+    R31,
+    R32,
+    R33,
+    VX,
+    VY,
+    VZ,
+    P,
+    Q,
+    R,
+    rigid_body,
+)
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim_controllers.mathematics.rotation import (
     quaternion_from_euler,
@@ -23,7 +40,7 @@ from tiltsim_controllers.mathematics.rotation import (
     rotation_from_euler,
     to_world,
 )
-from tiltsim_controllers.mathematics.scalar import Quad, Triple, Values, Vector, clipped, scalar
+from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, clipped, scalar
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
@@ -34,29 +51,26 @@ Wrench = tuple[float, float, float, float, float, float]
 
 
 class Mechanics(NamedTuple):
-    """What the controls drive."""
+    """What the controls act on."""
 
-    vehicle: Vehicle  # that flies, not the one that the law knows
+    vehicle: Vehicle  # the true one, not the controller's
     servo_frequency: float  # rad/s, natural
     servo_damping: float  # ratio
-    max_tilt: float  # rad, where the servos stop
+    max_tilt: float  # rad, at the stops of the servos
     min_speed: float  # rad/s, along a rotor's spin
     max_speed: float
 
 
 def mechanics(plan: FlightPlan) -> Mechanics:
-    """The mechanics of a scenario's rotorcraft."""
-    scenario = plan.scenario
-    vehicle = scenario.rotorcraft
-    servo = vehicle.tilt_servo
-    min_speed, max_speed = vehicle.speeds_along_spin
+    """The mechanics of a planned flight's rotorcraft."""
+    rotorcraft = plan.scenario.rotorcraft
+    servo = rotorcraft.tilt_servo
     return Mechanics(
-        scenario.true_rotorcraft,
+        plan.scenario.true_rotorcraft,
         servo.natural_frequency,
         servo.damping_ratio,
-        max_tilt=inf if servo.max_angle is None else servo.max_angle,
-        min_speed=min_speed,
-        max_speed=max_speed,
+        inf if servo.max_angle is None else servo.max_angle,
+        *rotorcraft.speeds_along_spin,
     )
 
 
@@ -71,31 +85,32 @@ def external_acceleration(
 
 
 class ActuatorPlant(NamedTuple):
-    """A vehicle whose state is that of its motion, followed by MuJoCo's activations."""
+    """A vehicle whose state is its motion, followed by MuJoCo's activations."""
 
-    motion: int  # how many numbers come before the activations
-    rotor_states: int  # which of the controls is the first that an activation integrates
-    qpos: Callable[[Vector], Values]  # of the state, as MuJoCo has them
+    motion: int  # numbers before the activations
+    rotor_states: int  # index of the first control that an activation integrates
+    qpos: Callable[[Vector], Values]  # MuJoCo's, from the state
     qvel: Callable[[Vector], Values]
     rates: Callable[[Vector, Vector, Wrench, Mechanics, Triple], Values]
     """Time derivative of the motion: state, controls, wrench, mechanics, disturbance (m/s^2)."""
-    project_onto_limits: Callable[
-        [list[float], Mechanics], list[float]
-    ]  # see `tiltsim.closed_loop.loop.Equations`
+    project_onto_limits: Callable[[list[float], Mechanics], list[float]]
+    """See `tiltsim.closed_loop.loop.Equations`."""
     initial: Callable[[FlightPlan], Values]  # motion
 
 
 # --- tiltrotor ---------------------------------------------------------------------------------
-# Eighteen numbers of the rigid body as in `tiltsim.equations.tiltrotor`, tilts, tilt rates.
+# The rigid body as in `tiltsim.equations.tiltrotor`, tilts, tilt rates, then the activations.
+TILT_1, TILT_2, TILT_3, TILT_4, RATE_1, RATE_2, RATE_3, RATE_4, SPEED_1 = range(18, 27)
 
 
 @scalar
 def rotation_of(state: Vector) -> Values:
     """The nine entries, rows first, of the body-to-world rotation."""
     return (
-        *(state[6], state[7], state[8], state[9], state[10], state[11]),
-        *(state[12], state[13], state[14]),
-    )
+        state[R11], state[R12], state[R13],
+        state[R21], state[R22], state[R23],
+        state[R31], state[R32], state[R33],
+    )  # fmt: skip
 
 
 @scalar
@@ -103,23 +118,23 @@ def tiltrotor_qpos(state: Vector) -> Values:
     """Position, quaternion and tilts."""
     qw, qx, qy, qz = quaternion_from_rotation(rotation_of(state))
     return (
-        *(state[0], state[1], state[2], qw, qx, qy, qz),
-        *(state[18], state[19], state[20], state[21]),
-    )
+        state[0], state[1], state[2], qw, qx, qy, qz,
+        state[TILT_1], state[TILT_2], state[TILT_3], state[TILT_4],
+    )  # fmt: skip
 
 
 @scalar
 def tiltrotor_qvel(state: Vector) -> Values:
     """Velocity, body rates and tilt rates."""
     return (
-        *(state[3], state[4], state[5], state[15], state[16], state[17]),
-        *(state[22], state[23], state[24], state[25]),
-    )
+        state[VX], state[VY], state[VZ], state[P], state[Q], state[R],
+        state[RATE_1], state[RATE_2], state[RATE_3], state[RATE_4],
+    )  # fmt: skip
 
 
 @scalar
 def servo_acceleration(command: float, angle: float, rate: float, mechanics: Mechanics) -> float:
-    """``omega^2 (command - alpha) - 2 zeta omega alpha'`` (rad/s^2) of a pod without mass."""
+    """``omega^2 (command - alpha) - 2 zeta omega alpha'`` (rad/s^2) of a massless pod."""
     omega, limit = mechanics.servo_frequency, mechanics.max_tilt
     command = clipped(command, -limit, limit)
     return omega * omega * (command - angle) - 2.0 * mechanics.servo_damping * omega * rate
@@ -129,12 +144,13 @@ def servo_acceleration(command: float, angle: float, rate: float, mechanics: Mec
 def tiltrotor_rates(
     state: Vector, ctrl: Vector, wrench: Wrench, mechanics: Mechanics, disturbance: Triple
 ) -> Values:
-    """Chapter 3's rigid body under thrusts, servos and a wrench."""
+    """Chapter 3's rigid body under thrusts, servos and a wrench; see `ActuatorPlant.rates`."""
     vehicle = mechanics.vehicle
+    a1, a2, a3, a4 = state[TILT_1], state[TILT_2], state[TILT_3], state[TILT_4]
+    rate_1, rate_2, rate_3, rate_4 = state[RATE_1], state[RATE_2], state[RATE_3], state[RATE_4]
     _, _, _, torque_x, torque_y, torque_z = wrench
-    tilts: Quad = (state[18], state[19], state[20], state[21])
-    push = external_acceleration(rotation_of(state), wrench, vehicle.mass, disturbance)
-    turn = (
+    acceleration = external_acceleration(rotation_of(state), wrench, vehicle.mass, disturbance)
+    angular_acceleration = (
         torque_x / vehicle.inertia_xx,
         torque_y / vehicle.inertia_yy,
         torque_z / vehicle.inertia_zz,
@@ -142,27 +158,30 @@ def tiltrotor_rates(
     # The controls are s varpi |varpi| with s = (-1, 1, -1, 1), the equations' are without s.
     squares = (-ctrl[4], ctrl[5], -ctrl[6], ctrl[7])
     return (
-        *rigid_body(state, tilts, squares, vehicle, push, turn),
-        *(state[22], state[23], state[24], state[25]),
-        servo_acceleration(ctrl[0], state[18], state[22], mechanics),
-        servo_acceleration(ctrl[1], state[19], state[23], mechanics),
-        servo_acceleration(ctrl[2], state[20], state[24], mechanics),
-        servo_acceleration(ctrl[3], state[21], state[25], mechanics),
+        *rigid_body(state, (a1, a2, a3, a4), squares, vehicle, acceleration, angular_acceleration),
+        rate_1,
+        rate_2,
+        rate_3,
+        rate_4,
+        servo_acceleration(ctrl[0], a1, rate_1, mechanics),
+        servo_acceleration(ctrl[1], a2, rate_2, mechanics),
+        servo_acceleration(ctrl[2], a3, rate_3, mechanics),
+        servo_acceleration(ctrl[3], a4, rate_4, mechanics),
     )
 
 
 @scalar
 def project_tiltrotor(state: list[float], mechanics: Mechanics) -> list[float]:
-    """Rotors within their limits, pods not beyond their stops."""
+    """Rotors within their speed limits, pods within their stops."""
     low, high, stop = mechanics.min_speed, mechanics.max_speed, mechanics.max_tilt
     projected = state[:]
     for rotor in range(4):
         spin = -1.0 if rotor % 2 == 0 else 1.0
-        projected[26 + rotor] = spin * clipped(spin * state[26 + rotor], low, high)
-        tilt, rate = state[18 + rotor], state[22 + rotor]
+        projected[SPEED_1 + rotor] = spin * clipped(spin * state[SPEED_1 + rotor], low, high)
+        tilt, rate = state[TILT_1 + rotor], state[RATE_1 + rotor]
         if abs(tilt) > stop:
-            projected[18 + rotor] = stop if tilt > 0.0 else -stop
-            projected[22 + rotor] = 0.0 if tilt * rate > 0.0 else rate
+            projected[TILT_1 + rotor] = stop if tilt > 0.0 else -stop
+            projected[RATE_1 + rotor] = 0.0 if tilt * rate > 0.0 else rate
     return projected
 
 
@@ -182,25 +201,28 @@ def initial_tiltrotor(plan: FlightPlan) -> Values:
 @scalar
 def quadrotor_qpos(state: Vector) -> Values:
     """Position and quaternion."""
-    qw, qx, qy, qz = quaternion_from_euler(state[6], state[7], state[8])
-    return state[0], state[1], state[2], qw, qx, qy, qz
+    x, y, z, _, _, _, roll, pitch, yaw, _, _, _ = quadrotor_body(state)
+    qw, qx, qy, qz = quaternion_from_euler(roll, pitch, yaw)
+    return x, y, z, qw, qx, qy, qz
 
 
 @scalar
 def quadrotor_qvel(state: Vector) -> Values:
     """Velocity and body rates."""
-    return state[3], state[4], state[5], state[9], state[10], state[11]
+    _, _, _, vx, vy, vz, _, _, _, p, q, r = quadrotor_body(state)
+    return vx, vy, vz, p, q, r
 
 
 @scalar
 def quadrotor_rates(
     state: Vector, ctrl: Vector, wrench: Wrench, mechanics: Mechanics, disturbance: Triple
 ) -> Values:
-    """Chapter 2's rigid body under thrusts and a wrench."""
+    """Chapter 2's rigid body under thrusts and a wrench; see `ActuatorPlant.rates`."""
     vehicle = mechanics.vehicle
     _, _, _, torque_x, torque_y, torque_z = wrench
-    rotation = rotation_from_euler(state[6], state[7], state[8])
-    push = external_acceleration(rotation, wrench, vehicle.mass, disturbance)
+    _, _, _, _, _, _, roll, pitch, yaw, _, _, _ = quadrotor_body(state)
+    rotation = rotation_from_euler(roll, pitch, yaw)
+    acceleration = external_acceleration(rotation, wrench, vehicle.mass, disturbance)
     lever = vehicle.arm_length * vehicle.thrust_coefficient
     inputs = (
         vehicle.thrust_coefficient * (ctrl[0] + ctrl[1] + ctrl[2] + ctrl[3]),
@@ -208,12 +230,12 @@ def quadrotor_rates(
         lever * (ctrl[2] - ctrl[0]) + torque_y,
         vehicle.drag_coefficient * (ctrl[0] - ctrl[1] + ctrl[2] - ctrl[3]) + torque_z,
     )
-    return equations_of_motion(state, inputs, vehicle, push)
+    return equations_of_motion(state, inputs, vehicle, acceleration)
 
 
 @scalar
 def project_quadrotor(state: list[float], mechanics: Mechanics) -> list[float]:
-    """As it is: its rotors make any thrust."""
+    """The state as it is: the rotors make any thrust."""
     return state
 
 

@@ -1,18 +1,28 @@
-"""The thesis's fixed-step solver, ode3, for the equations of motion of any loop.
+"""The thesis's fixed-step solver, ode3, for the equations of any closed loop.
 
-The equations are those that the thesis prints (`tiltsim.equations`): they leave out what the thesis
-leaves out. The same law runs here and in MuJoCo: the difference between the two plants is a result.
+The equations are those that the thesis prints (`tiltsim.equations`), with its omissions. The same
+controller runs here and in MuJoCo: the difference between the two plants is a result.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from tiltsim.closed_loop.loop import Equations
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 
 Stepper = Callable[..., tuple[list[float], Values]]
+
+
+class Integration(NamedTuple):
+    """What stays the same over the steps of a flight."""
+
+    timestep: float  # s
+    control_steps: int  # steps for which the inputs are held; 0: evaluated at every stage
+    parameters: Any
+    knots: Any
+    disturbance: Triple  # m/s^2, world axes
 
 
 @scalar
@@ -28,27 +38,22 @@ def identity(state: list[float], parameters: Any) -> list[float]:
 
 
 def make_stepper(equations: Equations) -> Stepper:
-    """The solver around a loop's equations, as scalar code.
+    """The solver for a loop's equations, as scalar code.
 
-    The stepper integrates ``steps`` fixed steps with ode3, the third-order method of Bogacki and
-    Shampine. ``control_steps`` is the number of steps for which the law's output is held, 0 to
-    evaluate it at every stage. It returns the new state and the inputs held since the last control
-    sample; the caller counts the steps.
+    Returns
+    -------
+    Stepper
+        ``(step_index, state, held, steps, integration) -> state, held``: integrates as many steps
+        with ode3, the third-order method of Bogacki and Shampine, from a step on. ``held`` are the
+        inputs since the last control sample.
     """
     inputs, rates = equations.inputs, equations.rates
     project_onto_limits = equations.project_onto_limits or identity
 
     def advance(
-        step_index: int,
-        state: list[float],
-        held: Values,
-        timestep: float,
-        steps: int,
-        control_steps: int,
-        parameters: Any,
-        knots: Vector,
-        disturbance: Triple,
+        step_index: int, state: list[float], held: Values, steps: int, integration: Integration
     ) -> tuple[list[float], Values]:
+        timestep, control_steps, parameters, knots, disturbance = integration
         continuous = control_steps == 0
         for index in range(step_index, step_index + steps):
             time = index * timestep

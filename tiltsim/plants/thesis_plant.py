@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tiltsim.engines.cache import mark_native_code_compiled
-from tiltsim.equations.ode3 import Stepper, make_stepper
+from tiltsim.equations.ode3 import Integration, Stepper, make_stepper
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.plants.plant import natively_checked_values, record_step_by_step
@@ -36,29 +36,29 @@ class ThesisPlant:
         scenario, loop, setup = assembly.scenario, assembly.loop, assembly.setup
         assert loop.equations is not None  # other scenarios are refused
         self._assembly, self._equations, self._setup = assembly, loop.equations, setup
-        self._disturbance = disturbance_acceleration(scenario)
-        self._timestep = scenario.simulation.timestep
-        self._control_steps = scenario.simulation.control_steps
         self._step_index = 0
         self._state = list(map(float, self._equations.initial(assembly, setup)))
         self._held = (0.0,) * self._equations.inputs_size
         self._fault = ""
         self.engine: EngineName = engine or choose_engine(scenario, loop)
         self._advance: Stepper
-        self._law: tuple[Any, Any]  # parameters and knots, as the stepper reads them
         if self.engine == "native":
             from tiltsim.engines.native_stepper import compile_stepper, native_record
 
             self._advance, self._record = compile_stepper(loop)
-            self._law = native_record(loop, setup.userdata)
+            record: tuple[Any, Any] = native_record(loop, setup.userdata)
         else:
             self._advance = make_stepper(self._equations)
-            self._law = slotted(setup.parameters), setup.knots
+            record = slotted(setup.parameters), setup.knots
+        simulation, disturbance = scenario.simulation, disturbance_acceleration(scenario)
+        self._integration = Integration(
+            simulation.timestep, simulation.control_steps, *record, disturbance
+        )
 
     @property
     def time(self) -> float:
         """See `Plant.time`."""
-        return self._step_index * self._timestep
+        return self._step_index * self._integration.timestep
 
     @property
     def state(self) -> Floats:
@@ -81,14 +81,7 @@ class ThesisPlant:
         state: Any = np.array(self._state) if self.engine == "native" else self._state
         try:
             state, self._held = self._advance(
-                self._step_index,
-                state,
-                self._held,
-                self._timestep,
-                steps,
-                self._control_steps,
-                *self._law,
-                self._disturbance,
+                self._step_index, state, self._held, steps, self._integration
             )
             self._state = list(map(float, state))  # numpy's own floats would warn of infinity
         except (ArithmeticError, ValueError):
@@ -114,11 +107,8 @@ class ThesisPlant:
             self._step_index,
             np.array(self._state),
             self._held,
-            self._timestep,
             steps,
-            self._control_steps,
-            *self._law,
-            self._disturbance,
+            self._integration,
         )
         self._state = state.tolist()
         mark_native_code_compiled(self._assembly.loop.native_name("thesis"))
@@ -136,7 +126,7 @@ class ThesisPlant:
             return (nan,) * (len(self._assembly.loop.sample_fields) - 1)
 
     def _inputs_in_force(self) -> Sequence[float]:
-        every = self._control_steps
+        every = self._integration.control_steps
         if every > 0 and self._step_index % every != 0:
             return self._held
         try:
