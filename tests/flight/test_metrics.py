@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from math import asin, atan, cos, pi, sin
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.flights import SAMPLE_FIELDS
+from tests.flights import SAMPLE_FIELDS, flight
 from tiltsim.commands.schema import scenario_schema
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
@@ -339,3 +340,12 @@ def test_units_are_those_of_the_metrics():
     assert unit_of("max_rotor_speed") == "rad/s"
     assert unit_of("duration") == "s"
     assert unit_of("switches") == unit_of("diverged") == unit_of("saturated_fraction") == ""
+
+
+@pytest.mark.parametrize(
+    ("kind", "diverged"),
+    [("completed", False), ("interrupted", False), ("diverged", True), ("singular", True)],
+)
+def test_diverged_means_the_same_for_the_tilt_car(kind, diverged):
+    ended = replace(flight("tilt_car"), end=End(kind, 1.2, "of a test"))
+    assert ended.metrics()["diverged"] is diverged

@@ -88,6 +88,19 @@ def test_engines_batches_and_restarts_agree(law, strategy):
     np.testing.assert_array_equal(restarted.state, straight.state)
 
 
+def test_scaling_shows_the_share_of_the_gait_that_it_takes_away():
+    angles = np.array([-0.8, 0.1, 0.9, -0.2])
+    supervisor = {"strategy": "scale", "min_determinant": 2.4}
+    tables = tiltrotor(
+        gait={"type": "fixed", "angles": angles.tolist()}, controller={"supervisor": supervisor}
+    )
+    tables["simulation"]["duration"] = 0.2
+    flight = tiltsim.simulate(tiltsim.parse_scenario(tables))
+    flown = np.stack([flight[f"alpha_ref_{rotor}"] for rotor in (1, 2, 3, 4)], axis=-1)
+    assert 0.05 < flight["supervision"].min() <= flight["supervision"].max() < 0.95
+    np.testing.assert_allclose(flown, np.outer(1.0 - flight["supervision"], angles), rtol=1e-12)
+
+
 @pytest.mark.parametrize("strategy", ["scale", *WITH_STATES])
 def test_both_plants_fly_it_alike(strategy):
     tables = tiltrotor(
