@@ -10,14 +10,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from tiltsim_controllers.mathematics.noise import normal
 from tiltsim_controllers.vehicle.actuators import (
+    Faults,
     RotorFault,
+    limited_speed_command_rate,
     rate_limited_command,
     servo_command,
     thrust_factor,
 )
 from tiltsim_controllers.vehicle.sensors import (
     Sensor,
+    Sensors,
     reading_error,
     reading_index,
     rotate_by_small_angle,
@@ -62,3 +66,43 @@ def test_faults_begin_at_their_time():
     assert [thrust_factor(t, fault) for t in (0.0, 1.999, 2.0, 9.0)] == [1.0, 1.0, 0.3, 0.3]
     assert [servo_command(t, 0.5, fault) for t in (0.999, 1.0)] == [0.5, 0.2]
     assert thrust_factor(1e9, RotorFault()) == 1.0
+
+
+@pytest.mark.parametrize("spin", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("speed", "rate", "passes"),
+    [
+        (499.0, 10.0, True),
+        (500.0, 10.0, False),
+        (501.0, 10.0, False),
+        (500.0, -10.0, True),
+        (501.0, -10.0, True),
+        (101.0, -10.0, True),
+        (100.0, -10.0, False),
+        (99.0, -10.0, False),
+        (100.0, 10.0, True),
+        (99.0, 10.0, True),
+    ],
+)
+def test_a_speed_command_stops_at_its_limits_and_comes_back(spin, speed, rate, passes):
+    found = limited_speed_command_rate(spin * speed, spin * rate, spin, 100.0, 500.0)
+    assert found == (spin * rate if passes else 0.0)
+
+
+@pytest.mark.parametrize("channel", [0.0, 3.0])
+def test_every_axis_has_noise_of_its_own(channel):
+    sensor = Sensor(0.3)
+    errors = reading_error(sensor, 5.0, channel, 17.0)
+    alone = [0.3 * normal(5.0, channel + axis, 17.0) for axis in (0.0, 1.0, 2.0)]
+    assert errors == pytest.approx(alone, rel=1e-15)
+    assert len(set(errors)) == 3
+
+
+def test_by_default_nothing_errs_and_nothing_fails():
+    for sensor in (Sensor(), Sensors().position, Sensors().velocity, Sensors().attitude):
+        assert reading_error(sensor, 5.0, 0.0, 1.0) == (0.0, 0.0, 0.0)
+    assert (Sensors().active, Sensors().seed, Sensors().period) == (0.0, 0.0, 1.0)
+    for fault in Faults():
+        assert (thrust_factor(1e9, fault), servo_command(1e9, 0.3, fault)) == (1.0, 0.3)
+    assert thrust_factor(1.0, RotorFault(thrust_time=0.5)) == 1.0
+    assert servo_command(1.0, 0.3, RotorFault(stuck_time=0.5)) == 0.0

@@ -10,9 +10,12 @@ from scipy import integrate, linalg, signal
 
 from tiltsim_controllers.vehicle.air import (
     FOOT,
+    Air,
     Drag,
+    GroundEffect,
     Gust,
     Turbulence,
+    air_velocity,
     drag_force,
     dryden_rates,
     dryden_velocity,
@@ -188,3 +191,61 @@ def test_ground_effect_is_cheeseman_and_bennetts():
     assert ground_effect(1e6, 0.1) == pytest.approx(1.0)
     assert ground_effect(-1.0, 0.1) == ground_effect(0.05, 0.1) == pytest.approx(4.0 / 3.0)
     assert ground_effect(0.1, 0.0) == 1.0
+
+
+# --- the air as a whole ------------------------------------------------------------------------
+
+
+def test_the_airs_velocity_is_wind_gust_and_turbulence_together():
+    gust = Gust(start=1.0, rise=2.0, x=4.0, y=-2.0, z=6.0)
+    states = (0.3, -0.2, 0.5, 0.1, -0.4)
+    air = Air(0.5, -1.5, 0.25, gust=gust, turbulence=TURBULENCE)
+    turbulent = np.array(dryden_velocity(states, TURBULENCE))
+    assert np.abs(turbulent).min() > 0.01
+    expected = np.array([0.5, -1.5, 0.25]) + 0.5 * np.array([4.0, -2.0, 6.0]) + turbulent
+    np.testing.assert_allclose(air_velocity(2.0, states, air), expected, rtol=1e-12)
+
+
+def test_air_at_rest_is_the_default():
+    assert Air() == Air(0.0, 0.0, 0.0, Drag(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.225))
+    air = Air(turbulence=TURBULENCE._replace(intensity_u=0.0, intensity_w=0.0))
+    for time in (0.0, 0.5, 3.0):
+        assert air_velocity(time, (1.0, 2.0, 3.0, 4.0, 5.0), air) == (0.0, 0.0, 0.0)
+        assert air_velocity(time, (1.0, 2.0, 3.0, 4.0, 5.0), Air()) == (0.0, 0.0, 0.0)
+        assert dryden_rates(time, (1.0, 2.0, 3.0, 4.0, 5.0), Turbulence()) == (0.0,) * 5
+    assert ground_effect(0.01, GroundEffect().rotor_radius) == 1.0
+    assert GroundEffect().height == 0.0
+    # What is switched on later begins at time zero, takes a second and stays; it blows along x.
+    assert Gust(x=1.0) == Gust(start=0.0, rise=1.0, duration=0.0, x=1.0, y=0.0, z=0.0)
+    assert gust_profile(0.5, Gust()) == pytest.approx(0.5)
+    along = dryden_velocity((1.0, 0.0, 0.0, 0.0, 0.0), Turbulence(intensity_u=1.0))
+    assert along == pytest.approx((2.0**0.5, 0.0, 0.0))
+
+
+def test_turbulence_blows_along_its_direction():
+    """Its first state drives what is along the mean wind, the next two what is across."""
+    made = low_altitude_turbulence(6.0, 12.0, speed=6.0, direction=0.5, seed=4.0)
+    along = np.array(dryden_velocity((1.0, 0.0, 0.0, 0.0, 0.0), made))
+    across = np.array(dryden_velocity((0.0, 1.0, 0.0, 0.0, 0.0), made))
+    heading = [np.cos(0.5), np.sin(0.5), 0.0]
+    np.testing.assert_allclose(along / np.linalg.norm(along), heading, atol=1e-15)
+    sideways = [-np.sin(0.5), np.cos(0.5), 0.0]
+    np.testing.assert_allclose(across / np.linalg.norm(across), sideways, atol=1e-15)
+    assert (made.sample_time, made.seed) == (0.01, 4.0)
+    plain = low_altitude_turbulence(6.0, 12.0, speed=6.0)
+    assert (plain.along_x, plain.along_y, plain.seed) == (1.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(("height", "feet"), [(0.0, 10.0), (1.0, 10.0), (400.0, 1000.0)])
+def test_the_low_altitude_model_is_held_to_its_range(height, feet):
+    assert low_altitude_turbulence(5.0, height, speed=5.0).length_w == pytest.approx(feet * FOOT)
+
+
+def test_a_draw_of_the_noise_is_held_for_its_sample_time():
+    for index in (0, 1, 7, 1000):
+        at = [index * 0.01 + shift for shift in (0.0, 0.004, 0.0099)]
+        assert len({white_noise(time, 20.0, TURBULENCE) for time in at}) == 1
+    draws = [white_noise(index * 0.01, 20.0, TURBULENCE) for index in range(2000)]
+    assert len(set(draws)) == 2000
+    # The integral over a sample has the variance of its length.
+    assert np.var(0.01 * np.array(draws)) == pytest.approx(0.01, rel=0.1)
