@@ -14,10 +14,10 @@ from tiltsim.plants.factory import make_plant
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.vehicles.rotorcraft import COLUMN_UNITS
 from tiltsim_controllers.analysis.statics import setpoint_error
-from tiltsim_controllers.laws.attitude_altitude import STATE_FIELDS
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.gains import GAIN_SETS
 from tiltsim_controllers.vehicle.parameters import PRESETS
+from tiltsim_controllers.vehicle.states import TILTROTOR_FIELDS
 
 PLANTS = ("mujoco", "thesis")
 ENGINES = ("python", "native")
@@ -212,7 +212,7 @@ def test_plants_agree_where_they_model_the_same():
         tiltsim.simulate(scenario(simulation={"plant": plant, "engine": "native", "duration": 5.0}))
         for plant in PLANTS
     ]
-    states = [flight.samples[-1, 1 : 1 + len(STATE_FIELDS)] for flight in flights]
+    states = [flight.samples[-1, 1 : 1 + len(TILTROTOR_FIELDS)] for flight in flights]
     np.testing.assert_allclose(states[0], states[1], rtol=1e-9, atol=1e-8)
 
 

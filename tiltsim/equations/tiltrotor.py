@@ -9,7 +9,6 @@ from __future__ import annotations
 from math import asin, atan2
 from typing import TYPE_CHECKING, Final
 
-from tiltsim_controllers.laws.attitude_altitude import State
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.mathematics.scalar import Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.vehicle.decoupling_matrix import (
@@ -30,8 +29,8 @@ FURTHER: Final = 22  # the states of the controller
 
 
 @scalar
-def law_state(state: Vector, tilts: Quad) -> State:
-    """State of the control laws, `tiltsim_controllers.laws.attitude_altitude.STATE_FIELDS`."""
+def law_state(state: Vector, tilts: Quad) -> Values:
+    """State of the control laws, `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`."""
     sin_pitch = min(1.0, max(-1.0, -state[R31]))  # rounding may carry the sine past one
     roll, pitch, yaw = atan2(state[R32], state[R33]), asin(sin_pitch), atan2(state[R21], state[R11])
     return (

@@ -13,9 +13,7 @@ from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import (
     DECOUPLINGS,
     EXACT_DECOUPLING,
-    STATE_FIELDS,
     Parameters,
-    State,
     attitude_reference,
     rotor_accelerations,
 )
@@ -24,6 +22,7 @@ from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values,
 from tiltsim_controllers.references.trajectories import position_reference
 from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines, torque_entries
 from tiltsim_controllers.vehicle.parameters import drag_ratio
+from tiltsim_controllers.vehicle.states import TILTROTOR_FIELDS
 
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
@@ -77,7 +76,7 @@ def tiltrotor_controls(
 @scalar
 def supervised_controls(
     time: float,
-    state: State,
+    state: Values,
     qvel: Vector,
     act: Vector,
     motion: Triple,
@@ -105,7 +104,7 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
 
 @scalar
 def reference_values(
-    time: float, state: State, parameters: LoopParameters, knots: Vector
+    time: float, state: Values, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """`REFERENCE_COLUMNS` and `TILT_REFERENCE_COLUMNS` at a time and state of the law."""
     law = parameters.law
@@ -120,14 +119,14 @@ def reference_values(
 
 @scalar
 def supervised_reference_values(
-    time: float, state: State, motion: Triple, parameters: LoopParameters, knots: Vector
+    time: float, state: Values, motion: Triple, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """`REFERENCE_COLUMNS`, for `tiltsim.laws.layers.supervision`."""
     return reference_values(time, state, parameters, knots)[:6]
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    columns = reference_columns(reference_values, STATE_FIELDS, samples, setup)
+    columns = reference_columns(reference_values, TILTROTOR_FIELDS, samples, setup)
     return columns | singularity_columns(samples, setup.parameters.law.vehicle)
 
 
@@ -213,7 +212,7 @@ TILTROTOR: Final = ClosedLoop(
         ),
         observe=observe_equations,
     ),
-    supervised=SupervisedLaw(supervised_controls, supervised_reference_values, STATE_FIELDS),
+    supervised=SupervisedLaw(supervised_controls, supervised_reference_values, TILTROTOR_FIELDS),
     follows_position=follows_position,
 )
 """The attitude-altitude controller of the tiltrotor."""

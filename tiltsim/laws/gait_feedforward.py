@@ -36,12 +36,12 @@ from tiltsim.laws.tiltrotor import (
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.gaits.tilts import tilt_reference
-from tiltsim_controllers.laws.attitude_altitude import STATE_FIELDS, State
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.gait_feedforward import INTEGRAL_FIELDS, Parameters, tracking_inputs
 from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import position_reference
+from tiltsim_controllers.vehicle.states import TILTROTOR_FIELDS
 
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
@@ -60,7 +60,7 @@ class LoopParameters(NamedTuple):
 @scalar
 def supervised_controls(
     time: float,
-    state: State,
+    state: Values,
     qvel: Vector,
     act: Vector,
     motion: Triple,
@@ -99,7 +99,7 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
         max_angular_acceleration=controller.max_angular_acceleration,
         anticipation=min(controller.anticipation, 0.5 * gait.min_segment_time),
         # The thesis's own equations leave the gyroscopic torque out.
-        ingredients=controller.resolve_feedforward_terms(
+        terms=controller.resolve_feedforward_terms(
             gyroscopic_torque=scenario.simulation.plant != "thesis"
         ),
         gait=gait.parameters,
@@ -149,7 +149,7 @@ def reference_values(
     )
 
 
-REFERENCE_FIELDS: Final = (*STATE_FIELDS, *TILT_RATE_COLUMNS, *INTEGRAL_FIELDS)
+REFERENCE_FIELDS: Final = (*TILTROTOR_FIELDS, *TILT_RATE_COLUMNS, *INTEGRAL_FIELDS)
 """Of a sample, what references are made from."""
 
 

@@ -31,7 +31,6 @@ from tiltsim_controllers.analysis.quadrotor_singularity import (
     normalized_determinant,
     published_determinant,
 )
-from tiltsim_controllers.laws.yaw_position import State
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
@@ -52,8 +51,8 @@ EXTENSION_COLUMNS: Final = {
 
 
 @scalar
-def rigid_body_state(qpos: Vector, qvel: Vector, thrust: float, thrust_rate: float) -> State:
-    """The laws' state (`tiltsim_controllers.laws.yaw_position.STATE_FIELDS`) from MuJoCo's."""
+def rigid_body_state(qpos: Vector, qvel: Vector, thrust: float, thrust_rate: float) -> Values:
+    """The laws' state (`tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`) from MuJoCo's."""
     x, y, z, qw, qx, qy, qz = qpos
     vx, vy, vz, p, q, r = qvel
     roll, pitch, yaw = euler_from_quaternion(qw, qx, qy, qz)

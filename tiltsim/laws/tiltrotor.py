@@ -34,7 +34,6 @@ from tiltsim.vehicles.rotorcraft.layout import (
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.gaits.tilts import tilt_reference
-from tiltsim_controllers.laws.attitude_altitude import State
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion, world_up_in_body
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Values, Vector, scalar
 from tiltsim_controllers.vehicle.decoupling_matrix import (
@@ -55,8 +54,8 @@ TILT_REFERENCE_COLUMNS: Final = tuple(f"alpha_ref_{rotor}" for rotor in (1, 2, 3
 
 
 @scalar
-def tiltrotor_state(qpos: Vector, qvel: Vector, act: Vector) -> State:
-    """The law's state (`tiltsim_controllers.laws.attitude_altitude.STATE_FIELDS`) from MuJoCo's.
+def tiltrotor_state(qpos: Vector, qvel: Vector, act: Vector) -> Values:
+    """The law's state (`tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`) from MuJoCo's.
 
     MuJoCo gives the body's position, its quaternion and the tilt angles in ``qpos``, the velocity
     in world axes, the body rates in body axes and the tilt rates in ``qvel``.

@@ -72,10 +72,8 @@ def even_load_gait(acceleration: Triple, vehicle: Vehicle) -> Quad:
 
     Parameters
     ----------
-    acceleration : tuple
-        Constant acceleration that acts on the vehicle, m/s^2, world axes at yaw 0.
-    vehicle : Vehicle
-        Of which gravity alone matters.
+    acceleration : constant acceleration that acts on the vehicle, m/s^2, world axes at yaw 0
+    vehicle : of which gravity alone matters
 
     Returns
     -------
@@ -108,10 +106,8 @@ def rotor_loads(tilts: Quad, vehicle: Vehicle) -> Quad:
 
     Parameters
     ----------
-    tilts : tuple
-        The four tilt angles in rad.
-    vehicle : Vehicle
-        Of which the drag ratio matters.
+    tilts : the four tilt angles in rad
+    vehicle : of which the drag ratio matters
     """
     first, second, third, fourth = _loads(np.array(tilts, dtype=float), drag_ratio(vehicle))
     return float(first), float(second), float(third), float(fourth)
@@ -133,10 +129,8 @@ def balanced_gait(
     acceleration : tuple
         Constant acceleration that acts on the vehicle, m/s^2, world axes at yaw 0; a gust along +x
         is ``(1, 0, 0)``.
-    vehicle : Vehicle
-        The tiltrotor.
-    max_tilt : float
-        Largest tilt angle of a pod, rad.
+    vehicle : the tiltrotor
+    max_tilt : largest tilt angle of a pod, rad
     min_lever : float
         Smallest A and B, the yaw levers of the two pairs of rotors, 1 being those without tilt.
 

@@ -93,10 +93,8 @@ def three_rotor_hover(lost: int, vehicle: Vehicle, *, opposite_speed: float) -> 
 
     Parameters
     ----------
-    lost : int
-        The lost rotor, 1 to 4.
-    vehicle : Vehicle
-        The tiltrotor.
+    lost : the lost rotor, 1 to 4
+    vehicle : the tiltrotor
     opposite_speed : float
         Speed of the rotor opposite the lost one, rad/s; the more, the more authority over the
         torque that only it can make. At 0 the other two hover alone.
@@ -182,10 +180,8 @@ def minimum_hover_speed(
 
     Parameters
     ----------
-    vehicle : Vehicle
-        The tiltrotor.
-    factors : tuple
-        What is left of each rotor's thrust and drag torque; 0 for a lost one.
+    vehicle : the tiltrotor
+    factors : what is left of each rotor's thrust and drag torque; 0 for a lost one
     stuck : tuple, optional
         A rotor, 1 to 4, and the angle (rad) its servo holds.
 

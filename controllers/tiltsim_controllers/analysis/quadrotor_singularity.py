@@ -71,8 +71,7 @@ def exact_determinant(
         Attitudes in rad.
     thrust : array_like
         Total thrust ``zeta`` in N.
-    vehicle : Vehicle
-        The quadrotor; ``d`` is its arm length.
+    vehicle : the quadrotor; ``d`` is its arm length
     """
     roll, pitch = np.asarray(roll, dtype=float), np.asarray(pitch, dtype=float)
     inertia = vehicle.inertia_xx * vehicle.inertia_yy * vehicle.inertia_zz
@@ -91,8 +90,7 @@ def normalized_determinant(
         Attitudes in rad.
     thrust : array_like
         Total thrust ``zeta`` in N.
-    vehicle : Vehicle
-        The quadrotor.
+    vehicle : the quadrotor
     """
     hover = vehicle.mass * vehicle.gravity
     level = exact_determinant(0.0, 0.0, hover, vehicle)

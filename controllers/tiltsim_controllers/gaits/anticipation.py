@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from tiltsim_controllers.gaits.parameters import FIXED, TWO_COLOR_CIRCLE, GaitParameters
-from tiltsim_controllers.gaits.tilts import tilt_acceleration, tilt_reference
-from tiltsim_controllers.mathematics.jets import Jet
-from tiltsim_controllers.mathematics.scalar import clipped, scalar
+from tiltsim_controllers.gaits.tilts import planned_jets, tilt_reference
+from tiltsim_controllers.mathematics.jets import Jet, Jets4
+from tiltsim_controllers.mathematics.scalar import Vector, clipped, scalar
 
 
 @scalar
@@ -41,12 +39,9 @@ def rounded_corner(
 
     Parameters
     ----------
-    start, stop
-        Values at the ends of the window.
-    start_rate, stop_rate
-        Rates at its ends, 1/s.
-    half
-        Half the length of the window, s.
+    start, stop : values at the ends of the window
+    start_rate, stop_rate : rates at its ends, 1/s
+    half : half the length of the window, s
     """
     middle = start + half * start_rate
     bend = stop_rate - start_rate
@@ -58,9 +53,7 @@ def rounded_corner(
 
 
 @scalar
-def anticipated_tilts(
-    time: float, gait: GaitParameters, knots: Sequence[float], half: float
-) -> tuple[Jet, Jet, Jet, Jet]:
+def anticipated_tilts(time: float, gait: GaitParameters, knots: Vector, half: float) -> Jets4:
     """The planned tilt angles with rounded corners, for the attitude.
 
     The rates of a piecewise linear gait jump at its corners, which the body cannot follow. The
@@ -70,12 +63,9 @@ def anticipated_tilts(
 
     Parameters
     ----------
-    time
-        s.
-    gait, knots
-        As for `tilt_reference`.
-    half
-        Time before and after a corner, s.
+    time : s
+    gait, knots : as for `tilt_reference`
+    half : time before and after a corner, s
 
     Returns
     -------
@@ -83,9 +73,7 @@ def anticipated_tilts(
         Four jets, rad and s.
     """
     if half <= 0.0 or gait.type == FIXED or gait.type == TWO_COLOR_CIRCLE:
-        a1, a2, a3, a4, v1, v2, v3, v4 = tilt_reference(time, gait, knots)
-        b1, b2, b3, b4 = tilt_acceleration(time, gait)
-        return (a1, v1, b1), (a2, v2, b2), (a3, v3, b3), (a4, v4, b4)
+        return planned_jets(time, gait, knots)
     a1, a2, a3, a4, v1, v2, v3, v4 = tilt_reference(time - half, gait, knots)
     b1, b2, b3, b4, w1, w2, w3, w4 = tilt_reference(time + half, gait, knots)
     return (

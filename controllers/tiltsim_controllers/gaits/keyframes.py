@@ -8,19 +8,18 @@ angles in both; two rows of equal phase make a jump.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import floor
 from typing import Final
 
 from tiltsim_controllers.gaits.parameters import TiltsAndRates
-from tiltsim_controllers.mathematics.scalar import scalar
+from tiltsim_controllers.mathematics.scalar import Vector, scalar
 
 ROW: Final = 5
 """Floats per keyframe."""
 
 
 @scalar
-def keyframe_row(phase: float, rows: int, knots: Sequence[float]) -> int:
+def keyframe_row(phase: float, rows: int, knots: Vector) -> int:
     """Index of the last of the ``rows - 1`` segments that starts at or before ``phase``.
 
     ``knots`` are the keyframes.
@@ -36,17 +35,14 @@ def keyframe_row(phase: float, rows: int, knots: Sequence[float]) -> int:
 
 
 @scalar
-def keyframe_gait(time: float, period: float, rows: float, knots: Sequence[float]) -> TiltsAndRates:
+def keyframe_gait(time: float, period: float, rows: float, knots: Vector) -> TiltsAndRates:
     """Tilt angles (rad) and rates (rad/s) of a gait through keyframes.
 
     Parameters
     ----------
-    time, period
-        s.
-    rows
-        Number of keyframes.
-    knots
-        The keyframes; further floats may follow.
+    time, period : s
+    rows : number of keyframes
+    knots : the keyframes; further floats may follow
     """
     turns = time / period
     phase = turns - floor(turns)

@@ -199,13 +199,11 @@ def cat(name: str, amplitude: float, period: float, lean: float = 0.0) -> Gait:
 
     Parameters
     ----------
-    name
-        A name in `FOOTFALLS`.
+    name : a name in `FOOTFALLS`
     amplitude, lean
         The legs swing by ``amplitude`` to either side of ``lean`` (forward), rad;
         `tiltsim_controllers.gaits.cat.SWINGS` has the values reconstructed from ch. 5.
-    period
-        s.
+    period : s
 
     Raises
     ------
@@ -225,12 +223,9 @@ def waypoints(
 
     Parameters
     ----------
-    angles
-        Waypoints of four tilt angles, rad; the last segment leads back to the first.
-    period
-        s.
-    phases
-        When each waypoint is reached, as a fraction of the period; evenly spaced by default.
+    angles : waypoints of four tilt angles, rad; the last segment leads back to the first
+    period : s
+    phases : when each waypoint is reached, as a fraction of the period; evenly spaced by default
 
     Raises
     ------
@@ -255,12 +250,9 @@ def keyframes(
 
     Parameters
     ----------
-    rows
-        ``(phase, alpha_1, ..., alpha_4)``, phase from 0 to 1, angles in rad.
-    period
-        s.
-    name, source
-        Name and origin of the gait.
+    rows : ``(phase, alpha_1, ..., alpha_4)``, phase from 0 to 1, angles in rad
+    period : s
+    name, source : name and origin of the gait
 
     Raises
     ------
@@ -299,16 +291,11 @@ def two_color_circle(
 
     Parameters
     ----------
-    centre, radius
-        ``(alpha_1, alpha_2)`` of the centre and the radius, rad.
-    color
-        ``red`` or ``blue``.
-    period
-        s.
-    vehicle
-        Its drag ratio sets the offset of the blue lines.
-    name, source
-        Name and origin of the gait.
+    centre, radius : ``(alpha_1, alpha_2)`` of the centre and the radius, rad
+    color : ``red`` or ``blue``
+    period : s
+    vehicle : its drag ratio sets the offset of the blue lines
+    name, source : name and origin of the gait
 
     Raises
     ------

@@ -24,10 +24,8 @@ from __future__ import annotations
 
 from math import atan, cos, pi, sin
 
-from tiltsim_controllers.mathematics.jets import Jet, jet_sum
+from tiltsim_controllers.mathematics.jets import Jet, Jets4, jet_sum
 from tiltsim_controllers.mathematics.scalar import scalar
-
-Jets4 = tuple[Jet, Jet, Jet, Jet]
 
 
 @scalar

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import cos, pi, sin
 
 from tiltsim_controllers.gaits.keyframes import keyframe_gait
@@ -20,11 +19,12 @@ from tiltsim_controllers.gaits.parameters import (
 from tiltsim_controllers.gaits.penguin import penguin_swing, rotating
 from tiltsim_controllers.gaits.trot import continuous_trot, instant_trot
 from tiltsim_controllers.gaits.two_color import RED, two_color_circle
-from tiltsim_controllers.mathematics.scalar import Quad, scalar
+from tiltsim_controllers.mathematics.jets import Jets4
+from tiltsim_controllers.mathematics.scalar import Quad, Vector, scalar
 
 
 @scalar
-def planned_angles(time: float, gait: GaitParameters, knots: Sequence[float]) -> TiltsAndRates:
+def planned_angles(time: float, gait: GaitParameters, knots: Vector) -> TiltsAndRates:
     """The gait before scale and bias; arguments and result as for `tilt_reference`."""
     if gait.type == FIXED:
         return gait.angle_1, gait.angle_2, gait.angle_3, gait.angle_4, 0.0, 0.0, 0.0, 0.0
@@ -42,9 +42,7 @@ def planned_angles(time: float, gait: GaitParameters, knots: Sequence[float]) ->
 
 
 @scalar
-def tilt_reference(
-    time: float, gait: GaitParameters, knots: Sequence[float] = NO_KNOTS
-) -> TiltsAndRates:
+def tilt_reference(time: float, gait: GaitParameters, knots: Vector = NO_KNOTS) -> TiltsAndRates:
     """The planned tilt angles (rad) and their rates (rad/s).
 
     At a jump and at a corner the values after it hold, except that the first half of a trot's
@@ -52,10 +50,8 @@ def tilt_reference(
 
     Parameters
     ----------
-    time
-        s.
-    gait
-        Type and parameters.
+    time : s
+    gait : type and parameters
     knots
         The keyframes of gaits that have them (`tiltsim_controllers.gaits.keyframes`): a flat tuple
         of floats in Python, a one-dimensional array in native code. Other gaits do not read it.
@@ -93,3 +89,11 @@ def tilt_acceleration(time: float, gait: GaitParameters) -> Quad:
     front_1, front_2 = inward * cos(turning * time), inward * sin(turning * time)
     slope = gait.bias if gait.color == RED else -gait.bias
     return front_1, front_2, slope * front_1, slope * front_2
+
+
+@scalar
+def planned_jets(time: float, gait: GaitParameters, knots: Vector) -> Jets4:
+    """The planned tilt angles with rates and accelerations; arguments as for `tilt_reference`."""
+    a1, a2, a3, a4, v1, v2, v3, v4 = tilt_reference(time, gait, knots)
+    b1, b2, b3, b4 = tilt_acceleration(time, gait)
+    return (a1, v1, b1), (a2, v2, b2), (a3, v3, b3), (a4, v4, b4)

@@ -29,12 +29,9 @@ def colored_angles(
 
     Parameters
     ----------
-    alpha_1, alpha_2
-        rad.
-    color
-        `RED` or `BLUE`.
-    drag_ratio
-        ``r = K_m / (L K_f)``.
+    alpha_1, alpha_2 : rad
+    color : `RED` or `BLUE`
+    drag_ratio : ``r = K_m / (L K_f)``
     """
     if color == RED:
         return alpha_1, alpha_2

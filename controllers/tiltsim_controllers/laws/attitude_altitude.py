@@ -1,14 +1,12 @@
 """Attitude-altitude feedback linearization of the tiltrotor (ch. 3, Sec. 3; ch. 4, Sec. 3).
 
-Outputs are roll, pitch, yaw and altitude; inputs the four rotor accelerations, reached by the
-third derivative. Position is steered through roll and pitch by a decoupler. The law is one
-function of time and state, built from the steps below in the order in which a reader of ch. 4
-meets them.
+Outputs are roll, pitch, yaw and altitude; inputs the four rotor accelerations, which appear in the
+third derivatives. The horizontal position is controlled through roll and pitch by a decoupler. The
+control law is one function of time and state; its steps follow the order of ch. 4.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import nan
 from typing import Final, NamedTuple
 
@@ -22,7 +20,7 @@ from tiltsim_controllers.laws.decouplers import (
     modified_decoupler,
 )
 from tiltsim_controllers.mathematics.rotation import world_up_in_body, wrap_angle
-from tiltsim_controllers.mathematics.scalar import Octet, Quad, scalar
+from tiltsim_controllers.mathematics.scalar import Octet, Quad, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     body_force,
@@ -33,16 +31,17 @@ from tiltsim_controllers.vehicle.decoupling_matrix import (
     vertical_force_entries,
 )
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
+from tiltsim_controllers.vehicle.states import VX, VY, X, Y
 
 PUBLISHED_DECOUPLING: Final = 0.0
 EXACT_DECOUPLING: Final = 1.0
 
 DECOUPLINGS: Final = {"published": PUBLISHED_DECOUPLING, "exact": EXACT_DECOUPLING}
-"""Forms of the decoupling matrix by the name a scenario gives them."""
+"""Forms of the decoupling matrix by their name in a scenario."""
 
 
 class Gains(NamedTuple):
-    """Gains of the third-order laws and of the position loop (ch. 4, Eqs. 26-28).
+    """Gains of the third-order error dynamics and of the position loop (ch. 4, Eqs. 26-28).
 
     ``1`` multiplies the error of the second derivative, ``2`` of the first, ``3`` of the output;
     in the position loop ``1`` multiplies the velocity error and ``2`` the position error.
@@ -65,7 +64,7 @@ class Gains(NamedTuple):
 
 
 class Parameters(NamedTuple):
-    """All that the law needs to know besides time and state."""
+    """Parameters of the controller."""
 
     vehicle: Vehicle
     gains: Gains
@@ -75,43 +74,41 @@ class Parameters(NamedTuple):
     decoupling: float
 
 
-State = tuple[float, ...]
-
-STATE_FIELDS: Final = (
-    *("x", "y", "z", "vx", "vy", "vz"),  # 0-5: m and m/s, world axes
-    *("roll", "pitch", "yaw", "p", "q", "r"),  # 6-11: rad; body rates, rad/s
-    *("alpha_1", "alpha_2", "alpha_3", "alpha_4"),  # 12-15: rad
-    *("rotor_speed_1", "rotor_speed_2", "rotor_speed_3", "rotor_speed_4"),  # 16-19: rad/s, signed
-)
-"""The vehicle's state as the law takes it: one float per name, in this order."""
-
-
 @scalar
 def attitude_reference(
     time: float,
-    state: State,
+    state: Values,
     trig: Octet,
     torque: Octet,
     parameters: Parameters,
-    table: Sequence[float] = NO_KNOTS,
+    knots: Vector = NO_KNOTS,
 ) -> tuple[float, float, float, float, float, float]:
     """Attitude and altitude to track, with the altitude's derivatives (ch. 4, Eqs. 28-30).
 
-    ``trig`` are the `sines_and_cosines` of the tilt angles, ``torque`` their `torque_entries`.
-    Returns ``(roll, pitch, yaw, z, vz, az)`` in rad and SI units.
+    Parameters
+    ----------
+    time : s
+    state : `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`
+    trig, torque : `sines_and_cosines` and `torque_entries` of the tilt angles
+    parameters, knots : of the controller, and of gait and reference
+
+    Returns
+    -------
+    tuple
+        ``(roll, pitch, yaw, z, vz, az)``, rad, m and s.
     """
     reference = parameters.reference
     x_ref, y_ref, z_ref, vx_ref, vy_ref, vz_ref, ax_ref, ay_ref, az_ref = position_reference(
-        time, reference, table
+        time, reference, knots
     )
     yaw_ref = reference.yaw
     if parameters.decoupler == NONE:
         return reference.roll, reference.pitch, yaw_ref, z_ref, vz_ref, az_ref
 
-    # Eq. (28): the horizontal acceleration that would take the vehicle to its reference.
+    # Eq. (28): the desired horizontal acceleration.
     gains = parameters.gains
-    ax = ax_ref + gains.position_1 * (vx_ref - state[3]) + gains.position_2 * (x_ref - state[0])
-    ay = ay_ref + gains.position_1 * (vy_ref - state[4]) + gains.position_2 * (y_ref - state[1])
+    ax = ax_ref + gains.position_1 * (vx_ref - state[VX]) + gains.position_2 * (x_ref - state[X])
+    ay = ay_ref + gains.position_1 * (vy_ref - state[VY]) + gains.position_2 * (y_ref - state[Y])
 
     gravity = parameters.vehicle.gravity
     if parameters.decoupler == CONVENTIONAL:
@@ -128,14 +125,14 @@ def attitude_reference(
 
 @scalar
 def rotor_accelerations(
-    time: float, state: State, parameters: Parameters, table: Sequence[float] = NO_KNOTS
+    time: float, state: Values, parameters: Parameters, knots: Vector = NO_KNOTS
 ) -> Quad:
-    """The rotor accelerations (rad/s^2) of the feedback linearization at a time and state.
+    """The rotor accelerations (rad/s^2) of the feedback linearization.
 
-    Third-order laws (ch. 4, Eqs. 26-27) on the outputs give the wanted third derivatives; the
-    decoupling matrix and ``Ma`` (Eq. 18) turn them into inputs (Eq. 19). Body rates stand for
-    the rates of roll, pitch and yaw (ch. 3, Eq. 8), second derivatives come from the model. NaN
-    where the decoupling matrix is singular.
+    Third-order error dynamics (ch. 4, Eqs. 26-27) give the desired third derivatives of the
+    outputs; the decoupling matrix and ``Ma`` (Eq. 18) convert them to inputs (Eq. 19). Body rates
+    are used for the rates of roll, pitch and yaw (ch. 3, Eq. 8), second derivatives come from the
+    model. NaN where the decoupling matrix is singular. Arguments as for `attitude_reference`.
     """
     _x, _y, z, _vx, _vy, vz, roll, pitch, yaw, p, q, r, a1, a2, a3, a4, s1, s2, s3, s4 = state
     vehicle = parameters.vehicle
@@ -145,11 +142,11 @@ def rotor_accelerations(
     torque = torque_entries(trig, drag_ratio(vehicle))
     x2, x4, y1, y3, z1, z2, z3, z4 = torque
     roll_ref, pitch_ref, yaw_ref, z_ref, vz_ref, az_ref = attitude_reference(
-        time, state, trig, torque, parameters, table
+        time, state, trig, torque, parameters, knots
     )
 
-    # What the rotors do now, from w_i = varpi_i |varpi_i|: second derivatives of the outputs, Eq.
-    # (10), as torques in units of L K_f and forces in units of K_f, the decoupling matrix's own.
+    # Second derivatives of the outputs, Eq. (10), from w_i = varpi_i |varpi_i|: torques in units of
+    # L K_f and forces in units of K_f, those of the decoupling matrix.
     ux, uy, uz = world_up_in_body(roll, pitch)
     h1, h2, h3, h4 = vertical_force_entries(trig, ux, uy, uz)
     size_1, size_2, size_3, size_4 = abs(s1), abs(s2), abs(s3), abs(s4)
@@ -163,8 +160,8 @@ def rotor_accelerations(
     fx, fy, fz = body_force(trig, w1, w2, w3, w4)
     turning = ux * (q * fz - r * fy) + uy * (r * fx - p * fz) + uz * (p * fy - q * fx)
 
-    # Third-order laws, Eqs. (26)-(27), as rates of those torques and of the lift; the references
-    # of roll, pitch and yaw are held constant.
+    # Third-order error dynamics, Eqs. (26)-(27), as rates of those torques and of the lift; the
+    # references of roll, pitch and yaw are treated as constant.
     per_torque = 1.0 / (vehicle.arm_length * vehicle.thrust_coefficient)
     roll_rate = (
         vehicle.inertia_xx * per_torque * (gains.roll_3 * (roll_ref - roll) - gains.roll_2 * p)
@@ -191,8 +188,8 @@ def rotor_accelerations(
         - turning
     )
 
-    # Eq. (19). The published matrix has the factor 2 |varpi_i| in its last row alone; the exact one
-    # has it in every row, so that it can be taken out of the matrix and divided out of the answer.
+    # Eq. (19). The published matrix has the factor 2 |varpi_i| only in its last row, the exact one
+    # in every row, so that the solution can be divided by it instead.
     f1, f2, f3, f4 = 2.0 * size_1, 2.0 * size_2, 2.0 * size_3, 2.0 * size_4
     if parameters.decoupling == PUBLISHED_DECOUPLING:
         published = (h1 * f1, h2 * f2, h3 * f3, h4 * f4)

@@ -16,13 +16,12 @@ author's public model of this vehicle. Like ch. 3's own law, it leaves out the g
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import copysign, inf, nan
 from typing import Final, NamedTuple
 
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
-from tiltsim_controllers.mathematics.scalar import Octet, Quad, Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Octet, Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     body_force,
@@ -31,7 +30,6 @@ from tiltsim_controllers.vehicle.decoupling_matrix import (
 )
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
-State = tuple[float, ...]
 Sextet = tuple[Octet, Octet, Octet, Octet, Octet, Octet]
 
 LOST_RANK: Final = 1e-24
@@ -91,7 +89,7 @@ def force_balanced_tilt_weight(vehicle: Vehicle) -> float:
 
 
 @scalar
-def attitude_error(rotation: tuple[float, ...], wanted: tuple[float, ...]) -> Triple:
+def attitude_error(rotation: Values, wanted: Values) -> Triple:
     """``(R^T R_d - R_d^T R)^vee / 2``, body axes: the sine of the angle to go, along its axis.
 
     Both rotations are body to world, nine entries, rows first. The error vanishes half a
@@ -250,11 +248,11 @@ def limited_tilt_rate(rate: float, angle: float, limits: Limits) -> float:
 
 @scalar
 def full_pose_inputs(
-    time: float, state: State, parameters: Parameters, table: Sequence[float] = NO_KNOTS
+    time: float, state: Values, parameters: Parameters, knots: Vector = NO_KNOTS
 ) -> Octet:
     """The rotor accelerations (rad/s^2) and tilt rates (rad/s), four each, at a time and state.
 
-    ``state`` is that of `tiltsim_controllers.laws.attitude_altitude.STATE_FIELDS`, world z up. The
+    ``state`` is that of `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`, world z up. The
     reference gives position, roll, pitch and yaw; one of attitude and altitude gives x = y = 0. All
     NaN where the 6 x 8 matrix has lost rank or a rotor stands still, as its acceleration does not
     move its thrust there.
@@ -293,7 +291,7 @@ def full_pose_inputs(
     r_rate = per_yaw * (z1 * w1 + z2 * w2 + z3 * w3 + z4 * w4)
 
     # Third-order laws; the attitude to reach is constant.
-    ref = reference_derivatives(time, reference, table)
+    ref = reference_derivatives(time, reference, knots)
     k1, k2, k3 = gains.position_1, gains.position_2, gains.position_3
     jx = ref[9] + k1 * (ref[6] - ax) + k2 * (ref[3] - vx) + k3 * (ref[0] - x)
     jy = ref[10] + k1 * (ref[7] - ay) + k2 * (ref[4] - vy) + k3 * (ref[1] - y)

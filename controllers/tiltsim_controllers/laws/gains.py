@@ -13,30 +13,25 @@ if TYPE_CHECKING:
 def gains_from_rows(
     attitude: Sequence[Sequence[float]], altitude: Sequence[float], position: Sequence[float]
 ) -> Gains:
-    """Gains in the thesis' own layout.
+    """Gains in the layout of the thesis.
 
-    ``attitude`` holds the diagonals of K_P1, K_P2 and K_P3, each (roll, pitch, yaw); ``altitude``
-    is (K_PZ1, K_PZ2, K_PZ3) and ``position`` (K_X1, K_X2).
+    ``attitude`` contains the diagonals of K_P1, K_P2 and K_P3, each (roll, pitch, yaw);
+    ``altitude`` is (K_PZ1, K_PZ2, K_PZ3) and ``position`` (K_X1, K_X2).
     """
     (roll_1, pitch_1, yaw_1), (roll_2, pitch_2, yaw_2), (roll_3, pitch_3, yaw_3) = attitude
-    return Gains(
-        *(roll_1, roll_2, roll_3),
-        *(pitch_1, pitch_2, pitch_3),
-        *(yaw_1, yaw_2, yaw_3),
-        *altitude,
-        *position,
-    )
+    roll, pitch, yaw = (roll_1, roll_2, roll_3), (pitch_1, pitch_2, pitch_3), (yaw_1, yaw_2, yaw_3)
+    return Gains(*roll, *pitch, *yaw, *altitude, *position)
 
 
 class IntegralGains(NamedTuple):
-    """Gains on the integrals of the position error, for laws that have them."""
+    """Gains on the integrals of the position error."""
 
     position: float = 0.0  # 1/s^3, x and y
     altitude: float = 0.0  # 1/s^4
 
 
 class Poles(NamedTuple):
-    """Where the poles of a closed loop shall lie."""
+    """The desired poles of a closed loop."""
 
     bandwidth: float  # [omega] natural frequency of its pair of poles, rad/s
     damping: float = 1.0  # [zeta] of the pair
@@ -63,10 +58,12 @@ def third_order_gains(poles: Poles) -> tuple[float, float, float, float]:
 def gains_from_poles(
     attitude: Poles, yaw: Poles, altitude: Poles, position: Poles
 ) -> tuple[Gains, IntegralGains]:
-    """Gains by pole placement, under the exact decoupling matrix.
+    """Gains by pole placement, for the exact decoupling matrix.
 
-    Attitude (roll and pitch), yaw and altitude are loops of third order, with a real pole at the
-    bandwidth beside the pair; position is of second order. An integral adds a pole of its own.
+    Parameters
+    ----------
+    attitude, yaw, altitude : poles of third-order loops, with a real pole at the bandwidth
+    position : poles of a second-order loop
     """
     lean, turn = third_order_gains(attitude)[:3], third_order_gains(yaw)[:3]
     *climb, climb_integral = third_order_gains(altitude)
@@ -86,4 +83,4 @@ GAIN_SETS: Final = {
     # for gait-rate feed-forward: attitude poles at -25, yaw's and the altitude's at -10, -1.5
     "feedforward": gains_from_poles(Poles(25.0), Poles(10.0), Poles(10.0), Poles(1.5))[0],
 }
-"""Named gain sets; `exact` and `feedforward` are ours, the others are published."""
+"""Named gain sets; `exact` and `feedforward` are ours, the others published."""

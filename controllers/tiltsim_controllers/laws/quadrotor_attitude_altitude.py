@@ -7,14 +7,13 @@ roll or pitch of 90 degrees.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import cos, nan, sin
 from typing import Final, NamedTuple
 
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
-from tiltsim_controllers.laws.yaw_position import State, euler_rates, gyroscopic_acceleration
+from tiltsim_controllers.laws.yaw_position import euler_rates, gyroscopic_acceleration
 from tiltsim_controllers.mathematics.rotation import wrap_angle
-from tiltsim_controllers.mathematics.scalar import Quad, scalar
+from tiltsim_controllers.mathematics.scalar import Quad, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
@@ -35,15 +34,15 @@ GAIN_SETS: Final = {"ch02": Gains(10.0, 10.0, 10.0, 10.0)}
 @scalar
 def attitude_altitude_inputs(
     time: float,
-    state: State,
+    state: Values,
     vehicle: Vehicle,
     gains: Gains,
     reference: ReferenceParameters,
-    table: Sequence[float] = NO_KNOTS,
+    knots: Vector = NO_KNOTS,
 ) -> Quad:
     """Thrust (N) and the three torques (N m, body axes) of the law (ch. 2, Eq. A7).
 
-    ``state`` is that of `tiltsim_controllers.laws.yaw_position.STATE_FIELDS`, of which the
+    ``state`` is that of `tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`, of which the
     extension is not read; the references are constants. NaN at a roll or pitch of 90 degrees.
     """
     z, vz, roll, pitch, yaw = state[2], state[5], state[6], state[7], state[8]
@@ -52,7 +51,7 @@ def attitude_altitude_inputs(
     sin_pitch, cos_pitch = sin(pitch), cos(pitch)
     if cos_roll == 0.0 or cos_pitch == 0.0:
         return nan, nan, nan, nan
-    _, _, z_ref, _, _, vz_ref, _, _, _ = position_reference(time, reference, table)
+    _, _, z_ref, _, _, vz_ref, _, _, _ = position_reference(time, reference, knots)
 
     lift = vehicle.gravity + gains.altitude_1 * (vz_ref - vz) + gains.altitude_2 * (z_ref - z)
     thrust = vehicle.mass * lift / (cos_roll * cos_pitch)

@@ -1,40 +1,38 @@
 """A supervisor that keeps a planned gait away from singular decoupling matrices.
 
-The matrix is singular where ``n(alpha) . r3 = 0``
-(`tiltsim_controllers.vehicle.decoupling_matrix`). The supervisor keeps two numbers above their
-thresholds: the singularity margin (rad, how far the attitude is from a singular one) and the
-determinant ``n . r3`` itself (4 for a level untilted vehicle), which alone sees a gait come to the
-curve L of the Two Color Map, where ``n`` vanishes whatever its direction. There are three ways to
-do it.
+The matrix is singular where ``n(alpha) . r3 = 0`` (`vehicle.decoupling_matrix`). The supervisor
+keeps two numbers above their thresholds: the singularity margin (rad, the distance of the attitude
+from a singular one) and the determinant ``n . r3`` itself (4 for a level untilted vehicle). Only
+the determinant shows that a gait approaches the curve L of the Two Color Map, where ``n`` vanishes
+whatever its direction. There are three strategies.
 
-* ``SCALE`` lets as much of the gait pass as keeps both: all tilt angles are scaled towards zero,
-  where ``n`` is vertical. A function of planned angles and attitude, without memory.
-* ``HOLD`` looks at the gait ahead and slows the gait's clock down until it stands where the
-  thresholds would be missed at the present attitude; it goes on when they would not. Its state is
-  the delay (s) of the gait behind its plan.
+* ``SCALE`` scales all tilt angles towards zero, where ``n`` is vertical, as little as satisfies
+  both thresholds. A function of planned angles and attitude, without memory.
+* ``HOLD`` looks ahead and slows the gait's clock until it stops where the thresholds would be
+  violated at the present attitude; it continues when they would not. Its state is the delay (s) of
+  the gait behind its plan.
 * ``RETURN_TO_RED`` looks ahead, too, and moves the tilts from the planned gait towards the nearest
-  red one (`tiltsim_controllers.gaits.red_gait`), where ``n`` is vertical, at a rate that servos can
-  follow, and back when there is room. Its state is the share of the way.
+  red one (`gaits.red_gait`), where ``n`` is vertical, at a rate that servos can follow, and back
+  when the thresholds allow. Its state is the fraction of the path.
 
-The last two have a state and its rate, which start at rest and stay at zero as long as there is
-room: such a flight is the unsupervised one, bit for bit. Both are states of the simulation, and
-everything else is a pure function of them, time and attitude, so that a saved state restarts and
-the same source runs in every engine. The rate has a lag, so that the tilts have accelerations for
-the laws that count them in.
+The last two have a state and its rate, which start at rest and stay exactly zero while the
+thresholds are not approached: such a flight is bit-identical to the unsupervised one. Both are
+states of the simulation, and everything else is a pure function of them, time and attitude, so that
+a saved state restarts and the same source runs in every engine. The rate has a lag, so that the
+tilts have accelerations for the controllers that use them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import asin, pi, sqrt
 from typing import Final, NamedTuple
 
 from tiltsim_controllers.gaits.parameters import GaitParameters, TiltsAndRates
-from tiltsim_controllers.gaits.red_gait import Jets4, nearest_red_angles
-from tiltsim_controllers.gaits.tilts import tilt_acceleration, tilt_reference
-from tiltsim_controllers.mathematics.jets import Jet, jet_product, jet_scaled, jet_sum
+from tiltsim_controllers.gaits.red_gait import nearest_red_angles
+from tiltsim_controllers.gaits.tilts import planned_jets
+from tiltsim_controllers.mathematics.jets import Jet, Jets4, jet_product, jet_scaled, jet_sum
 from tiltsim_controllers.mathematics.rotation import world_up_in_body
-from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Quad, Triple, Vector, scalar
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     sines_and_cosines,
     torque_entries,
@@ -47,32 +45,32 @@ HOLD: Final = 1.0
 RETURN_TO_RED: Final = 2.0
 
 STRATEGIES: Final = {"scale": SCALE, "hold": HOLD, "return_to_red": RETURN_TO_RED}
-"""What a supervisor can do, by the name a scenario gives it."""
+"""Strategies by their name in a scenario."""
 
-STEPS: Final = 16
-"""Scales that are looked at, from nothing of the gait to all of it."""
+SCALE_GRID: Final = 16
+"""Intervals of the scale that are checked, from zero to the whole gait."""
 
-HALVINGS: Final = 20
-"""How often the last step is halved: the scale is exact to 1e-7."""
+BISECTIONS: Final = 20
+"""Bisections of the last interval: the scale is exact to 1e-7."""
 
-GLANCES: Final = 8
-"""Instants of the gait ahead that are looked at, evenly spaced up to the horizon."""
+LOOKAHEAD_SAMPLES: Final = 8
+"""Instants ahead at which the gait is checked, evenly spaced up to the horizon."""
 
 BAND: Final = 0.1
-"""Share of the room above a threshold within which the supervisor begins to act."""
+"""`threshold_clearance` below which the supervisor acts."""
 
 LAG: Final = 0.025
-"""s, with which the supervisor's rate follows what it wants."""
+"""Time constant of the supervisor's rate, s."""
 
 NEAR: Final = 0.05
-"""rad: a planned gait nearer to red than this goes there as if it were this far away."""
+"""rad: the distance from red, for the speed of the return, is at least this."""
 
 SUPERVISOR_AT_REST: Final = (0.0, 0.0, 0.0)
-"""A supervisor that does nothing: its state, rate and acceleration."""
+"""State, rate and acceleration of a supervisor that does not act."""
 
 
 class Supervisor(NamedTuple):
-    """What the supervisor keeps, both 0 to leave it out, and how."""
+    """Thresholds, both 0 for no supervisor, and strategy."""
 
     min_margin: float = 0.0  # rad, below a right angle
     min_determinant: float = 0.0  # 4 for a level untilted vehicle
@@ -84,7 +82,7 @@ class Supervisor(NamedTuple):
 
 @scalar
 def margin_and_determinant(tilts: Quad, up: Triple, drag_ratio: float) -> tuple[float, float]:
-    """Singularity margin (rad) and determinant of tilts; ``up`` is `world_up_in_body`."""
+    """Singularity margin (rad) and determinant of ``tilts`` (rad); ``up`` is `world_up_in_body`."""
     trig = sines_and_cosines(tilts[0], tilts[1], tilts[2], tilts[3])
     nx, ny, nz = torque_free_force(trig, torque_entries(trig, drag_ratio), drag_ratio)
     along = nx * up[0] + ny * up[1] + nz * up[2]
@@ -98,10 +96,10 @@ def margin_and_determinant(tilts: Quad, up: Triple, drag_ratio: float) -> tuple[
 
 
 @scalar
-def is_allowed(
+def _is_allowed(
     scale: float, tilts: Quad, up: Triple, supervisor: Supervisor, drag_ratio: float
 ) -> bool:
-    """Whether the tilts times ``scale`` are regular enough; ``up`` is `world_up_in_body`."""
+    """Whether the tilts times ``scale`` satisfy the thresholds."""
     a1, a2, a3, a4 = tilts
     scaled = (scale * a1, scale * a2, scale * a3, scale * a4)
     margin, determinant = margin_and_determinant(scaled, up, drag_ratio)
@@ -112,23 +110,29 @@ def is_allowed(
 def allowed_scale(
     tilts: Quad, roll: float, pitch: float, supervisor: Supervisor, drag_ratio: float
 ) -> float:
-    """The largest scale up to which the gait is allowed all the way from zero.
+    """The largest scale such that it and every smaller one satisfy the thresholds.
 
-    Where not even the untilted vehicle meets the thresholds, as it leans too far, 0: the best that
-    a gait can do.
+    0 where not even the untilted vehicle satisfies them, as it leans too far.
+
+    Parameters
+    ----------
+    tilts : planned tilt angles, rad
+    roll, pitch : rad
+    supervisor : thresholds
+    drag_ratio : ``r = K_m / (L K_f)``
     """
     up = world_up_in_body(roll, pitch)
     low, high = 0.0, 1.0
-    for step in range(STEPS + 1):
-        high = step / STEPS
-        if not is_allowed(high, tilts, up, supervisor, drag_ratio):
+    for step in range(SCALE_GRID + 1):
+        high = step / SCALE_GRID
+        if not _is_allowed(high, tilts, up, supervisor, drag_ratio):
             break
         low = high
     if low == high or high == 0.0:
         return low
-    for _ in range(HALVINGS):
+    for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        if is_allowed(middle, tilts, up, supervisor, drag_ratio):
+        if _is_allowed(middle, tilts, up, supervisor, drag_ratio):
             low = middle
         else:
             high = middle
@@ -139,7 +143,14 @@ def allowed_scale(
 def supervised_gait_scale(
     planned: TiltsAndRates, roll: float, pitch: float, supervisor: Supervisor, vehicle: Vehicle
 ) -> float:
-    """How much of a planned gait passes at an attitude: 1 where nothing is scaled."""
+    """The factor of a planned gait at an attitude, 1 unless the strategy is ``SCALE``.
+
+    Parameters
+    ----------
+    planned : `tiltsim_controllers.gaits.tilts.tilt_reference`
+    roll, pitch : rad
+    supervisor, vehicle : thresholds and drag ratio
+    """
     if supervisor.strategy != SCALE:
         return 1.0
     if supervisor.min_margin <= 0.0 and supervisor.min_determinant <= 0.0:
@@ -152,8 +163,18 @@ def supervised_gait_scale(
 
 
 @scalar
-def room(tilts: Quad, up: Triple, supervisor: Supervisor, drag_ratio: float) -> float:
-    """What is left above the thresholds, as a share of the most there could be; negative below."""
+def threshold_clearance(
+    tilts: Quad, up: Triple, supervisor: Supervisor, drag_ratio: float
+) -> float:
+    """Distance above the thresholds relative to the largest possible; negative below them.
+
+    Parameters
+    ----------
+    tilts : rad
+    up : `world_up_in_body`
+    supervisor : thresholds
+    drag_ratio : ``r = K_m / (L K_f)``
+    """
     margin, determinant = margin_and_determinant(tilts, up, drag_ratio)
     return min(
         (margin - supervisor.min_margin) / (0.5 * pi - supervisor.min_margin),
@@ -162,102 +183,96 @@ def room(tilts: Quad, up: Triple, supervisor: Supervisor, drag_ratio: float) -> 
 
 
 @scalar
-def planned_tilts(time: float, gait: GaitParameters, table: Sequence[float]) -> Jets4:
-    """The planned tilt angles with their rates and accelerations."""
-    a1, a2, a3, a4, v1, v2, v3, v4 = tilt_reference(time, gait, table)
-    b1, b2, b3, b4 = tilt_acceleration(time, gait)
-    return (a1, v1, b1), (a2, v2, b2), (a3, v3, b3), (a4, v4, b4)
+def gait_time(time: float, motion: Triple, supervisor: Supervisor) -> float:
+    """The time (s) of the gait's clock, which the strategy ``HOLD`` delays."""
+    return time - motion[0] if supervisor.strategy == HOLD else time
 
 
 @scalar
-def gait_time(time: float, supervisor_motion: Triple, supervisor: Supervisor) -> float:
-    """The time of the gait's clock, which may have been held."""
-    return time - supervisor_motion[0] if supervisor.strategy == HOLD else time
+def _time_scaled(tilt: Jet, motion: Triple) -> Jet:
+    """A tilt on the gait's clock as a function of time: the clock runs at one minus the rate."""
+    speed = 1.0 - motion[1]
+    return tilt[0], tilt[1] * speed, tilt[2] * speed * speed - tilt[1] * motion[2]
 
 
 @scalar
-def slowed(tilt: Jet, supervisor_motion: Triple) -> Jet:
-    """A tilt that moves with the gait's clock, by time: the clock runs at one less the rate."""
-    speed = 1.0 - supervisor_motion[1]
-    return tilt[0], tilt[1] * speed, tilt[2] * speed * speed - tilt[1] * supervisor_motion[2]
-
-
-@scalar
-def moved(tilt: Jet, red: Jet, share: Jet) -> Jet:
-    """A tilt on its way to red."""
+def _towards(tilt: Jet, red: Jet, share: Jet) -> Jet:
+    """A tilt moved by a fraction of the path to red."""
     return jet_sum(1.0, tilt, 1.0, jet_product(share, jet_sum(1.0, red, -1.0, tilt)))
 
 
 @scalar
 def supervised_tilts(
-    planned: Jets4,
-    share: float,
-    supervisor_motion: Triple,
-    supervisor: Supervisor,
-    drag_ratio: float,
+    planned: Jets4, scale: float, motion: Triple, supervisor: Supervisor, drag_ratio: float
 ) -> Jets4:
-    """The tilts that the supervisor commands, with rates and accelerations.
+    """The supervised tilts with rates and accelerations, rad and s.
 
-    ``planned`` is the gait at its `gait_time`, ``share`` the `supervised_gait_scale`, and
-    ``supervisor_motion`` the supervisor's state with its rate and acceleration.
+    Parameters
+    ----------
+    planned : the gait at its `gait_time`
+    scale : `supervised_gait_scale`
+    motion : the supervisor's state with its rate and acceleration
+    supervisor : strategy and clearance
+    drag_ratio : ``r = K_m / (L K_f)``
     """
     a1, a2, a3, a4 = planned
     if supervisor.strategy == HOLD:
         return (
-            slowed(a1, supervisor_motion),
-            slowed(a2, supervisor_motion),
-            slowed(a3, supervisor_motion),
-            slowed(a4, supervisor_motion),
+            _time_scaled(a1, motion),
+            _time_scaled(a2, motion),
+            _time_scaled(a3, motion),
+            _time_scaled(a4, motion),
         )
     if supervisor.strategy == RETURN_TO_RED:
         red_1, red_2 = nearest_red_angles(planned, drag_ratio, supervisor.clearance)
         return (
-            moved(a1, red_1, supervisor_motion),
-            moved(a2, red_2, supervisor_motion),
-            moved(a3, red_1, supervisor_motion),
-            moved(a4, red_2, supervisor_motion),
+            _towards(a1, red_1, motion),
+            _towards(a2, red_2, motion),
+            _towards(a3, red_1, motion),
+            _towards(a4, red_2, motion),
         )
     return (
-        jet_scaled(share, a1),
-        jet_scaled(share, a2),
-        jet_scaled(share, a3),
-        jet_scaled(share, a4),
+        jet_scaled(scale, a1),
+        jet_scaled(scale, a2),
+        jet_scaled(scale, a3),
+        jet_scaled(scale, a4),
     )
 
 
 @scalar
-def least_room_ahead(
+def _min_clearance_ahead(
     time: float,
     up: Triple,
     state: float,
     gait: GaitParameters,
-    table: Sequence[float],
+    knots: Vector,
     supervisor: Supervisor,
     drag_ratio: float,
 ) -> float:
-    """The least `room` from now to the horizon, with the supervisor's state as it is."""
-    least = 1.0
+    """The smallest `threshold_clearance` up to the horizon at the supervisor's present state."""
+    smallest = 1.0
     frozen = (state, 0.0, 0.0)
     start = gait_time(time, frozen, supervisor)
-    for glance in range(GLANCES + 1):
-        ahead = start + supervisor.horizon * glance / GLANCES
+    for sample in range(LOOKAHEAD_SAMPLES + 1):
+        ahead = start + supervisor.horizon * sample / LOOKAHEAD_SAMPLES
         a1, a2, a3, a4 = supervised_tilts(
-            planned_tilts(ahead, gait, table), 1.0, frozen, supervisor, drag_ratio
+            planned_jets(ahead, gait, knots), 1.0, frozen, supervisor, drag_ratio
         )
-        least = min(least, room((a1[0], a2[0], a3[0], a4[0]), up, supervisor, drag_ratio))
-    return least
+        tilts = (a1[0], a2[0], a3[0], a4[0])
+        smallest = min(smallest, threshold_clearance(tilts, up, supervisor, drag_ratio))
+    return smallest
 
 
 @scalar
-def return_speed(
+def _return_speed(
     time: float,
     gait: GaitParameters,
-    table: Sequence[float],
+    knots: Vector,
     supervisor: Supervisor,
     drag_ratio: float,
 ) -> float:
-    """Share of the way to red (1/s) that keeps the fastest tilt at its greatest rate."""
-    a1, a2, a3, a4 = planned = planned_tilts(time, gait, table)
+    """Rate (1/s) along the path to red at which the fastest tilt has its maximum rate."""
+    a1, a2, a3, a4 = planned = planned_jets(time, gait, knots)
     red_1, red_2 = nearest_red_angles(planned, drag_ratio, supervisor.clearance)
     front = max(abs(red_1[0] - a1[0]), abs(red_2[0] - a2[0]))
     rear = max(abs(red_1[0] - a3[0]), abs(red_2[0] - a4[0]))
@@ -272,22 +287,32 @@ def supervised_derivative(
     state: float,
     rate: float,
     gait: GaitParameters,
-    table: Sequence[float],
+    knots: Vector,
     supervisor: Supervisor,
     drag_ratio: float,
 ) -> Triple:
-    """The supervisor's state, its rate, and the acceleration that they and the gait ahead ask for.
+    """The supervisor's state, its rate and the resulting acceleration.
 
-    Held: with room to spare the clock runs (rate 0), without it stands (rate 1). On the way to red:
-    to it where the thresholds are missed, back where there is room, gently towards both ends.
+    ``HOLD``: the clock runs (rate 0) with sufficient clearance and stops (rate 1) without any.
+    ``RETURN_TO_RED``: towards red where the thresholds would be violated, back where they allow it,
+    slowing down towards both ends.
+
+    Parameters
+    ----------
+    time : s
+    roll, pitch : rad
+    state, rate : of the supervisor, s or a fraction
+    gait, knots : as for `tilt_reference`
+    supervisor : thresholds and strategy
+    drag_ratio : ``r = K_m / (L K_f)``
     """
     up = world_up_in_body(roll, pitch)
-    least = least_room_ahead(time, up, state, gait, table, supervisor, drag_ratio)
+    smallest = _min_clearance_ahead(time, up, state, gait, knots, supervisor, drag_ratio)
     if supervisor.strategy == HOLD:
-        wanted = 1.0 - min(1.0, max(0.0, least / BAND))
+        desired = 1.0 - min(1.0, max(0.0, smallest / BAND))
     else:
-        speed = return_speed(time, gait, table, supervisor, drag_ratio)
-        wanted = -speed * min(1.0, max(-1.0, least / BAND))
+        speed = _return_speed(time, gait, knots, supervisor, drag_ratio)
+        desired = -speed * min(1.0, max(-1.0, smallest / BAND))
         # Four lags: the motion to either end is critically damped.
-        wanted = min((1.0 - state) / (4.0 * LAG), max(-state / (4.0 * LAG), wanted))
-    return state, rate, (wanted - rate) / LAG
+        desired = min((1.0 - state) / (4.0 * LAG), max(-state / (4.0 * LAG), desired))
+    return state, rate, (desired - rate) / LAG

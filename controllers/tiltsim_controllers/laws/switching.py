@@ -11,7 +11,6 @@ rate go on without a step when the yaw-position law takes over again.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import cos, nan, tan
 from typing import Final, NamedTuple
 
@@ -19,8 +18,8 @@ import tiltsim_controllers.laws.quadrotor_attitude_altitude as attitude_altitude
 import tiltsim_controllers.laws.yaw_position as yaw_position
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.laws.quadrotor_attitude_altitude import attitude_altitude_inputs
-from tiltsim_controllers.laws.yaw_position import Inputs, State, euler_rates, yaw_position_inputs
-from tiltsim_controllers.mathematics.scalar import scalar
+from tiltsim_controllers.laws.yaw_position import Inputs, euler_rates, yaw_position_inputs
+from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import reference_derivatives
 
 RUNNING: Final = 0.0
@@ -68,15 +67,15 @@ def in_attitude_zone(roll: float, pitch: float, zone: Zone) -> bool:
 @scalar
 def attitude_altitude_thrust_rate(
     time: float,
-    state: State,
+    state: Values,
     thrust: float,
     parameters: Parameters,
-    table: Sequence[float] = NO_KNOTS,
+    knots: Vector = NO_KNOTS,
 ) -> float:
     """Rate (N/s) of the thrust that the attitude-altitude law makes, ``thrust`` in N."""
     vz, roll, pitch = state[5], state[6], state[7]
     vehicle, gains = parameters.yaw_position.vehicle, parameters.attitude_altitude
-    reference = reference_derivatives(time, parameters.yaw_position.reference, table)
+    reference = reference_derivatives(time, parameters.yaw_position.reference, knots)
     vz_ref, az_ref = reference[5], reference[8]
     upright = cos(roll) * cos(pitch)
     if upright == 0.0:
@@ -91,21 +90,21 @@ def attitude_altitude_thrust_rate(
 
 @scalar
 def switching_inputs(
-    time: float, state: State, parameters: Parameters, table: Sequence[float] = NO_KNOTS
+    time: float, state: Values, parameters: Parameters, knots: Vector = NO_KNOTS
 ) -> Inputs:
     """Thrust, torques and the rates of the extension's states (`INPUT_FIELDS`), world z up."""
     law = parameters.yaw_position
     if not in_attitude_zone(state[6], state[7], parameters.zone):
-        return yaw_position_inputs(time, state, law, table)
+        return yaw_position_inputs(time, state, law, knots)
     thrust, roll_torque, pitch_torque, yaw_torque = attitude_altitude_inputs(
-        time, state, law.vehicle, parameters.attitude_altitude, law.reference, table
+        time, state, law.vehicle, parameters.attitude_altitude, law.reference, knots
     )
     zeta, xi = state[12], state[13]
     zeta_rate, xi_rate = 0.0, 0.0
     if parameters.extension == RUNNING:
-        _, _, _, _, zeta_rate, xi_rate = yaw_position_inputs(time, state, law, table)
+        _, _, _, _, zeta_rate, xi_rate = yaw_position_inputs(time, state, law, knots)
     elif parameters.extension == BUMPLESS:
-        thrust_rate = attitude_altitude_thrust_rate(time, state, thrust, parameters, table)
+        thrust_rate = attitude_altitude_thrust_rate(time, state, thrust, parameters, knots)
         zeta_rate = thrust_rate + parameters.extension_rate * (thrust - zeta)
         xi_rate = parameters.extension_rate * (thrust_rate - xi)
     return thrust, roll_torque, pitch_torque, yaw_torque, zeta_rate, xi_rate

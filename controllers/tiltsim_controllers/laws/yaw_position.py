@@ -13,13 +13,12 @@ the axes are ch. 2's, z down; `yaw_position_inputs` takes and returns ours.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import cos, nan, sin
 from typing import Final, NamedTuple
 
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler, wrap_angle
-from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.z_down import (
     flip_attitude,
     flip_state,
@@ -28,7 +27,6 @@ from tiltsim_controllers.mathematics.z_down import (
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
-State = tuple[float, ...]
 Inputs = tuple[float, float, float, float, float, float]
 
 STATE_FIELDS: Final = (
@@ -91,7 +89,7 @@ def gyroscopic_acceleration(p: float, q: float, r: float, vehicle: Vehicle) -> T
 
 
 @scalar
-def acceleration_and_jerk(z_down: State, vehicle: Vehicle) -> tuple[float, ...]:
+def acceleration_and_jerk(z_down: Values, vehicle: Vehicle) -> Values:
     """Second and third derivative of the position (ch. 2, Eqs. 15-18 and 24), three floats each."""
     p, q, thrust, thrust_rate = z_down[9], z_down[10], z_down[12], z_down[13]
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_from_euler(
@@ -109,7 +107,7 @@ def acceleration_and_jerk(z_down: State, vehicle: Vehicle) -> tuple[float, ...]:
 
 
 @scalar
-def drift(z_down: State, vehicle: Vehicle) -> Quad:
+def drift(z_down: Values, vehicle: Vehicle) -> Quad:
     """``Ma`` of ch. 2, Eq. (20): what the outputs' derivatives are at zero input.
 
     Returns the fourth derivative of the position (m/s^4) and the second of yaw (rad/s^2).
@@ -140,7 +138,7 @@ def drift(z_down: State, vehicle: Vehicle) -> Quad:
 
 
 @scalar
-def decoupling_matrix(z_down: State, vehicle: Vehicle) -> tuple[float, ...]:
+def decoupling_matrix(z_down: Values, vehicle: Vehicle) -> Values:
     """``Delta`` of ch. 2, Eqs. (20) and (42), rows first; NaN at a pitch of 90 degrees.
 
     Yaw torque does not turn the thrust, so the upper three entries of the last column are zero;
@@ -166,7 +164,7 @@ def decoupling_matrix(z_down: State, vehicle: Vehicle) -> tuple[float, ...]:
 
 
 @scalar
-def solve_decoupling(z_down: State, vehicle: Vehicle, wanted: Quad) -> Quad:
+def solve_decoupling(z_down: Values, vehicle: Vehicle, wanted: Quad) -> Quad:
     """The inputs ``u`` with ``Delta u = wanted`` (Eq. A1), NaN where ``Delta`` is singular.
 
     Seen from the body, ``Delta`` is triangular: along the thrust acts ``u_1`` alone, across it
@@ -196,14 +194,14 @@ def solve_decoupling(z_down: State, vehicle: Vehicle, wanted: Quad) -> Quad:
 
 @scalar
 def wanted_derivatives(
-    time: float, z_down: State, parameters: Parameters, table: Sequence[float] = NO_KNOTS
+    time: float, z_down: Values, parameters: Parameters, knots: Vector = NO_KNOTS
 ) -> Quad:
     """The fourth derivative of the position and the second of yaw to ask for (Eqs. A2-A6)."""
     x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r, _, _ = z_down
     gains = parameters.gains
     k1, k2, k3, k4 = gains.position_1, gains.position_2, gains.position_3, gains.position_4
     ax, ay, az, jx, jy, jz = acceleration_and_jerk(z_down, parameters.vehicle)
-    reference = reference_derivatives(time, parameters.reference, table)
+    reference = reference_derivatives(time, parameters.reference, knots)
     x_ref, y_ref, z_ref = flip_vector(reference[0], reference[1], reference[2])
     vx_ref, vy_ref, vz_ref = flip_vector(reference[3], reference[4], reference[5])
     ax_ref, ay_ref, az_ref = flip_vector(reference[6], reference[7], reference[8])
@@ -221,7 +219,7 @@ def wanted_derivatives(
 
 @scalar
 def yaw_position_inputs(
-    time: float, state: State, parameters: Parameters, table: Sequence[float] = NO_KNOTS
+    time: float, state: Values, parameters: Parameters, knots: Vector = NO_KNOTS
 ) -> Inputs:
     """Thrust, torques and the rates of the law's own states (`INPUT_FIELDS`), world z up.
 
@@ -230,7 +228,7 @@ def yaw_position_inputs(
     """
     z_down = flip_state(state)
     vehicle = parameters.vehicle
-    sx, sy, sz, yaw_acceleration = wanted_derivatives(time, z_down, parameters, table)
+    sx, sy, sz, yaw_acceleration = wanted_derivatives(time, z_down, parameters, knots)
     drift_x, drift_y, drift_z, drift_yaw = drift(z_down, vehicle)
     wanted = (sx - drift_x, sy - drift_y, sz - drift_z, yaw_acceleration - drift_yaw)
     u1, u2, u3, u4 = solve_decoupling(z_down, vehicle, wanted)

@@ -12,6 +12,8 @@ from math import atan2, cos, sin, sqrt
 from tiltsim_controllers.mathematics.scalar import scalar
 
 Jet = tuple[float, float, float]
+Jets3 = tuple[Jet, Jet, Jet]
+Jets4 = tuple[Jet, Jet, Jet, Jet]
 
 
 @scalar
@@ -20,10 +22,8 @@ def jet_sum(a: float, x: Jet, b: float, y: Jet) -> Jet:
 
     Parameters
     ----------
-    a, b
-        Constant factors.
-    x, y
-        The jets.
+    a, b : constant factors
+    x, y : the jets
     """
     return a * x[0] + b * y[0], a * x[1] + b * y[1], a * x[2] + b * y[2]
 

@@ -14,8 +14,7 @@ def euler_from_quaternion(w: float, x: float, y: float, z: float) -> Triple:
 
     Parameters
     ----------
-    w, x, y, z
-        The components, real part first.
+    w, x, y, z : the components, real part first
     """
     sin_pitch = 2.0 * (w * y - z * x)
     # Rounding may carry the sine past one at pitch = +-90 degrees.
@@ -82,8 +81,7 @@ def rotation_from_quaternion(w: float, x: float, y: float, z: float) -> tuple[fl
 
     Parameters
     ----------
-    w, x, y, z
-        The components, real part first.
+    w, x, y, z : the components, real part first
     """
     return (
         1.0 - 2.0 * (y * y + z * z),

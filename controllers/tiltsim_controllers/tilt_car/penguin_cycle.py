@@ -35,14 +35,10 @@ class Swing:
 
     Attributes
     ----------
-    half_angle
-        ``theta``, rad.
-    half_period
-        ``T / 2``, s.
-    gains
-        The law's.
-    reference_acceleration
-        Along x, m/s^2.
+    half_angle : ``theta``, rad
+    half_period : ``T / 2``, s
+    gains : the law's
+    reference_acceleration : along x, m/s^2
     """
 
     half_angle: float
@@ -198,10 +194,8 @@ class LyapunovBound:
     ----------
     critical
         ``L_critical``: the largest candidate from which the next half period may still raise it.
-    largest_gain
-        The largest growth over a half period; the chapter rounds it up to 3/4 (Eq. 71).
-    at
-        The state of ``L_critical``.
+    largest_gain : the largest growth over a half period; the chapter rounds it up to 3/4 (Eq. 71).
+    at : the state of ``L_critical``
     """
 
     critical: float

@@ -39,14 +39,10 @@ def limited_speed_command_rate(
 
     Parameters
     ----------
-    speed_command
-        The present command, rad/s.
-    rate
-        The requested rate, rad/s^2.
-    spin
-        Sign of the rotor's nominal rotation.
-    min_speed, max_speed
-        Limits along the spin, rad/s.
+    speed_command : the present command, rad/s
+    rate : the requested rate, rad/s^2
+    spin : sign of the rotor's nominal rotation
+    min_speed, max_speed : limits along the spin, rad/s
     """
     if spin * speed_command >= max_speed and spin * rate > 0.0:
         return 0.0

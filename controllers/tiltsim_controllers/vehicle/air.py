@@ -116,18 +116,12 @@ def low_altitude_turbulence(
 
     Parameters
     ----------
-    wind_at_20_ft : float
-        Mean wind 6 m above the ground, m/s.
-    height : float
-        Above the ground, m; limited to 10 to 1000 ft.
-    speed : float
-        Airspeed of the vehicle, m/s; in hover that of the mean wind.
-    direction : float
-        Direction into which the mean wind blows, rad from +x towards +y.
-    sample_time : float
-        Time for which a draw of the noise is held, s.
-    seed : float
-        A whole number.
+    wind_at_20_ft : mean wind 6 m above the ground, m/s
+    height : above the ground, m; limited to 10 to 1000 ft
+    speed : airspeed of the vehicle, m/s; in hover that of the mean wind
+    direction : direction into which the mean wind blows, rad from +x towards +y
+    sample_time : time for which a draw of the noise is held, s
+    seed : a whole number
     """
     feet = min(1000.0, max(10.0, height / FOOT))
     base = 0.177 + 0.000823 * feet

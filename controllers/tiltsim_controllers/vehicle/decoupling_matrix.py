@@ -29,8 +29,7 @@ def sines_and_cosines(alpha_1: float, alpha_2: float, alpha_3: float, alpha_4: f
 
     Parameters
     ----------
-    alpha_1, alpha_2, alpha_3, alpha_4
-        Tilt angles, rad.
+    alpha_1, alpha_2, alpha_3, alpha_4 : tilt angles, rad
     """
     return (
         sin(alpha_1),
@@ -71,10 +70,8 @@ def body_force(trig: Octet, w1: float, w2: float, w3: float, w4: float) -> Tripl
 
     Parameters
     ----------
-    trig
-        `sines_and_cosines` of the tilt angles.
-    w1, w2, w3, w4
-        Rotor inputs, rad^2/s^2.
+    trig : `sines_and_cosines` of the tilt angles
+    w1, w2, w3, w4 : rotor inputs, rad^2/s^2
     """
     s1, c1, s2, c2, s3, c3, s4, c4 = trig
     return (
@@ -90,10 +87,8 @@ def body_torque(torque: Octet, w1: float, w2: float, w3: float, w4: float) -> Tr
 
     Parameters
     ----------
-    torque
-        `torque_entries` of the tilt angles.
-    w1, w2, w3, w4
-        Rotor inputs, rad^2/s^2.
+    torque : `torque_entries` of the tilt angles
+    w1, w2, w3, w4 : rotor inputs, rad^2/s^2
     """
     x2, x4, y1, y3, z1, z2, z3, z4 = torque
     return x2 * w2 + x4 * w4, y1 * w1 + y3 * w3, z1 * w1 + z2 * w2 + z3 * w3 + z4 * w4
@@ -107,10 +102,8 @@ def vertical_force_entries(trig: Octet, ux: float, uy: float, uz: float) -> Quad
 
     Parameters
     ----------
-    trig
-        `sines_and_cosines` of the tilt angles.
-    ux, uy, uz
-        The direction, body axes.
+    trig : `sines_and_cosines` of the tilt angles
+    ux, uy, uz : the direction, body axes
     """
     s1, c1, s2, c2, s3, c3, s4, c4 = trig
     return (
@@ -171,12 +164,9 @@ def solve_by_pairs(
 
     Parameters
     ----------
-    torque
-        `torque_entries` of the tilt angles.
-    force
-        The four entries of the last row, `vertical_force_entries`.
-    roll, pitch, yaw, lift
-        The right-hand side, in units of ``L K_f`` and ``K_f``.
+    torque : `torque_entries` of the tilt angles
+    force : the four entries of the last row, `vertical_force_entries`
+    roll, pitch, yaw, lift : the right-hand side, in units of ``L K_f`` and ``K_f``
 
     Returns
     -------

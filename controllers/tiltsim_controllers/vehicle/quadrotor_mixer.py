@@ -22,12 +22,9 @@ def thrust_controls(
 
     Parameters
     ----------
-    thrust
-        N.
-    roll_torque, pitch_torque, yaw_torque
-        N m, body axes, z up.
-    vehicle
-        The quadrotor.
+    thrust : N
+    roll_torque, pitch_torque, yaw_torque : n m, body axes, z up
+    vehicle : the quadrotor
     """
     lever = vehicle.arm_length * vehicle.thrust_coefficient
     lift = thrust / vehicle.thrust_coefficient

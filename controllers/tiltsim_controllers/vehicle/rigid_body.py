@@ -19,10 +19,8 @@ def euler_derivatives(
 
     Parameters
     ----------
-    roll, pitch
-        rad.
-    omega, omega_rate
-        Body rates (rad/s) and their rates (rad/s^2).
+    roll, pitch : rad
+    omega, omega_rate : body rates (rad/s) and their rates (rad/s^2)
     """
     p, q, r = omega
     sr, cr, sp, cp = sin(roll), cos(roll), sin(pitch), cos(pitch)
@@ -57,10 +55,8 @@ def angular_jerk(roll: Jet, pitch: Jet, yaw: Jet, jerk: Triple) -> Triple:
 
     Parameters
     ----------
-    roll, pitch, yaw
-        The angles with their first two derivatives, rad and s.
-    jerk
-        Third derivatives of the three angles, rad/s^3.
+    roll, pitch, yaw : the angles with their first two derivatives, rad and s
+    jerk : third derivatives of the three angles, rad/s^3
     """
     sin_roll, cos_roll = jet_sine(roll), jet_cosine(roll)
     sin_pitch, cos_pitch = jet_sine(pitch), jet_cosine(pitch)
@@ -80,6 +76,28 @@ def cross(a: Triple, b: Triple) -> Triple:
 
 
 @scalar
+def angular_acceleration(
+    torque: Triple, omega: Triple, inertia: Triple, gyroscopic: float
+) -> Triple:
+    """The angular acceleration ``I^-1 (torque - gyroscopic omega x I omega)`` (rad/s^2).
+
+    Parameters
+    ----------
+    torque : n m, body axes
+    omega : body rates, rad/s
+    inertia : principal moments of inertia, kg m^2
+    gyroscopic : factor of the gyroscopic torque, 1 or 0
+    """
+    ixx, iyy, izz = inertia
+    cx, cy, cz = cross(omega, (ixx * omega[0], iyy * omega[1], izz * omega[2]))
+    return (
+        (torque[0] - gyroscopic * cx) / ixx,
+        (torque[1] - gyroscopic * cy) / iyy,
+        (torque[2] - gyroscopic * cz) / izz,
+    )
+
+
+@scalar
 def torque_rate(
     omega: Triple, omega_rate: Triple, jerk: Triple, inertia: Triple, gyroscopic: float
 ) -> Triple:
@@ -87,12 +105,9 @@ def torque_rate(
 
     Parameters
     ----------
-    omega, omega_rate, jerk
-        Body rates (rad/s) and their first two derivatives.
-    inertia
-        Principal moments of inertia, kg m^2.
-    gyroscopic
-        Factor of the gyroscopic torque ``omega x I omega``, 1 or 0.
+    omega, omega_rate, jerk : body rates (rad/s) and their first two derivatives
+    inertia : principal moments of inertia, kg m^2
+    gyroscopic : factor of the gyroscopic torque ``omega x I omega``, 1 or 0
     """
     ixx, iyy, izz = inertia
     mx, my, mz = cross(omega_rate, (ixx * omega[0], iyy * omega[1], izz * omega[2]))

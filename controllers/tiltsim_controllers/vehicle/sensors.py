@@ -40,10 +40,8 @@ def reading_error(sensor: Sensor, seed: float, channel: float, index: float) -> 
 
     Parameters
     ----------
-    sensor
-        Noise and bias.
-    seed, channel, index
-        As for `normal`; the sensor uses ``channel`` and the next two.
+    sensor : noise and bias
+    seed, channel, index : as for `normal`; the sensor uses ``channel`` and the next two
     """
     x, y, z = sensor.bias_x, sensor.bias_y, sensor.bias_z
     noise = sensor.noise
@@ -70,10 +68,8 @@ def rotate_by_small_angle(
 
     Parameters
     ----------
-    qw, qx, qy, qz
-        The quaternion, scalar first.
-    x, y, z
-        The rotation vector in body axes, rad.
+    qw, qx, qy, qz : the quaternion, scalar first
+    x, y, z : the rotation vector in body axes, rad
     """
     x, y, z = 0.5 * x, 0.5 * y, 0.5 * z
     scale = 1.0 / sqrt(1.0 + x * x + y * y + z * z)

@@ -11,8 +11,8 @@ from scipy.optimize import linprog
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
 from tiltsim_controllers.laws.allocation import (
     allocate_accelerations,
+    allocate_by_priority,
     largest_feasible_scale,
-    prioritized,
 )
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
 
@@ -57,7 +57,9 @@ def test_the_answer_is_in_the_box_and_wanted_where_allowed(
     assume(any(direction))
     low, high = -np.array(below), np.array(above)
     found = np.array(
-        prioritized(tilting, turning, direction, lift, tuple(low.tolist()), tuple(high.tolist()))
+        allocate_by_priority(
+            tilting, turning, direction, lift, tuple(low.tolist()), tuple(high.tolist())
+        )
     )
     assert (found >= low - 1e-9).all()
     assert (found <= high + 1e-9).all()

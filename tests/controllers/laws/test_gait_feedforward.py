@@ -18,6 +18,8 @@ from tiltsim_controllers.gaits.plans import continuous_trot, fixed, keyframes, t
 from tiltsim_controllers.gaits.tilts import tilt_acceleration, tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import Gains
 from tiltsim_controllers.laws.decouplers import DECOUPLERS, exact_decoupler
+from tiltsim_controllers.laws.feedback import attitude_jerk, integrator_rate, limited_acceleration
+from tiltsim_controllers.laws.force_motion import exact_decoupler_jet, torque_free_force_jet
 from tiltsim_controllers.laws.gains import (
     IntegralGains,
     Poles,
@@ -28,11 +30,6 @@ from tiltsim_controllers.laws.gains import (
 from tiltsim_controllers.laws.gait_feedforward import (
     FeedforwardTerms,
     Parameters,
-    attitude_jerk,
-    exact_decoupler_jet,
-    integrator_rate,
-    limited_acceleration,
-    torque_free_force_jet,
     tracking_inputs,
 )
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
@@ -79,7 +76,7 @@ def test_the_torque_free_force_moves_with_the_tilts(vehicle):
     for _ in range(CASES):
         jets, paths = zip(*(path(random, 1.2, 3.0) for _ in range(4)))
         expected = differences(lambda t, paths=paths: force([p(t) for p in paths]))
-        found = np.transpose(torque_free_force_jet(*jets, ratio))
+        found = np.transpose(torque_free_force_jet(jets, ratio))
         for value, wanted, tolerance in zip(found, expected, (1e-12, 1e-8, 1e-5)):
             np.testing.assert_allclose(value, wanted, rtol=0, atol=tolerance * 100)
 
@@ -98,7 +95,7 @@ def test_the_exact_decouplers_attitude_moves_with_its_arguments(side):
         n = [tuple(side * value for value in jet) for jet in jets[4:]]
         n[2] = (n[2][0] + side * 2.0, *n[2][1:])
         lift = (g + jets[2][0], *jets[2][1:])
-        found = np.transpose(exact_decoupler_jet(jets[0], jets[1], lift, jets[3], *n))
+        found = np.transpose(exact_decoupler_jet(jets[0], jets[1], lift, jets[3], n))
         for value, wanted, tolerance in zip(found, differences(attitude), (1e-13, 1e-9, 1e-6)):
             np.testing.assert_allclose(value, wanted, rtol=0, atol=tolerance)
 
@@ -106,7 +103,7 @@ def test_the_exact_decouplers_attitude_moves_with_its_arguments(side):
 def test_out_of_reach_the_decoupler_rests_at_the_nearest_roll():
     n = ((3.0, 0.1, 0.0), (0.2, 0.0, 0.0), (1.0, 0.0, 0.0))
     still = [(value, 0.0, 0.0) for value in (1.0, 12.0, VEHICLE.gravity, 0.4)]
-    roll, _ = exact_decoupler_jet(*still, *n)
+    roll, _ = exact_decoupler_jet(*still, n)
     expected, _ = exact_decoupler(1.0, 12.0, 0.0, 0.4, VEHICLE.gravity, (3.0, 0.2, 1.0))
     assert roll == pytest.approx((expected, 0.0, 0.0), abs=1e-14)
 
@@ -114,7 +111,7 @@ def test_out_of_reach_the_decoupler_rests_at_the_nearest_roll():
 def test_without_a_force_the_decoupler_has_no_answer():
     still = [(value, 0.0, 0.0) for value in (1.0, 0.0, VEHICLE.gravity, 0.0)]
     zero = (0.0, 0.0, 0.0)
-    assert isnan(exact_decoupler_jet(*still, (1.0, 0.0, 0.0), zero, zero)[0][0])
+    assert isnan(exact_decoupler_jet(*still, ((1.0, 0.0, 0.0), zero, zero))[0][0])
 
 
 # --- rigid-body motion -------------------------------------------------------------------------
@@ -174,7 +171,7 @@ def parameters(**changed):
         max_acceleration=3.0,
         max_angular_acceleration=1e6,
         anticipation=0.1,
-        ingredients=FeedforwardTerms(),
+        terms=FeedforwardTerms(),
         gait=GaitParameters(GAIT_TYPES["fixed"]),
         reference=HOVER,
         decoupler=DECOUPLERS["none"],
@@ -264,10 +261,10 @@ def test_roll_pitch_yaw_and_altitude_get_the_third_derivatives_that_the_gains_as
         np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-5 * scale, err_msg=f"{seed}")
 
 
-@pytest.mark.parametrize("ingredient", ["gait_rates", "euler_rates", "gyroscopic_torque"])
-def test_each_ingredient_of_the_linearization_is_needed_for_that(ingredient):
+@pytest.mark.parametrize("term", ["gait_rates", "euler_rates", "gyroscopic_torque"])
+def test_each_term_of_the_linearization_is_needed_for_that(term):
     random = np.random.default_rng(6)
-    law = parameters(ingredients=FeedforwardTerms()._replace(**{ingredient: 0.0}))
+    law = parameters(terms=FeedforwardTerms()._replace(**{term: 0.0}))
     state, tilt_rates = random_state(random), (3.0, -2.0, 1.0, 4.0)
     inputs = tracking_inputs(0.3, state, tilt_rates, (0.0, 0.0, 0.0), law)[:4]
     wanted = demanded(state, parameters(), 0.0)
@@ -317,7 +314,7 @@ def test_the_attitude_asked_for_points_the_gaits_force_along_the_wanted_accelera
 @quick
 @given(small, small, small, small)
 def test_within_its_limit_the_attitude_law_is_linear(angle, rate, acceleration, wanted):
-    found = attitude_jerk((wanted, 0.1, -0.2), (angle, rate, acceleration), 30.0, 300.0, 1e3, 1e4)
+    found = attitude_jerk((wanted, 0.1, -0.2), (angle, rate, acceleration), (30.0, 300.0, 1e3), 1e4)
     expected = 30 * (-0.2 - acceleration) + 300 * (0.1 - rate) + 1e3 * (wanted - angle)
     assert found == pytest.approx(expected, abs=1e-9)
 
@@ -325,7 +322,7 @@ def test_within_its_limit_the_attitude_law_is_linear(angle, rate, acceleration, 
 @quick
 @given(st.floats(-50, 50), st.floats(-50, 50), st.floats(-50, 50))
 def test_no_error_asks_for_more_than_the_limit(angle, rate, ahead):
-    found = attitude_jerk((angle, rate, ahead), (0.0, 0.0, 0.0), 30.0, 300.0, 1e3, 8.0)
+    found = attitude_jerk((angle, rate, ahead), (0.0, 0.0, 0.0), (30.0, 300.0, 1e3), 8.0)
     assert abs(found) <= 30.0 * 8.0 * (1 + 1e-12)
 
 
@@ -447,4 +444,4 @@ def test_the_closed_loops_are_those_of_the_poles():
 def test_a_reference_that_is_no_number_asks_for_no_number(place):
     wanted = [0.1, 0.2, 0.3]
     wanted[place] = float("nan")
-    assert isnan(attitude_jerk(tuple(wanted), (0.0, 0.0, 0.0), 40.0, 600.0, 4000.0, 50.0))
+    assert isnan(attitude_jerk(tuple(wanted), (0.0, 0.0, 0.0), (40.0, 600.0, 4000.0), 50.0))

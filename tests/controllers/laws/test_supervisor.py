@@ -23,10 +23,10 @@ from tiltsim_controllers.laws.supervisor import (
     STRATEGIES,
     Supervisor,
     allowed_scale,
-    room,
     supervised_derivative,
     supervised_gait_scale,
     supervised_tilts,
+    threshold_clearance,
 )
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
@@ -108,9 +108,9 @@ def test_room_is_what_is_left_above_the_thresholds(tilts, roll, pitch):
     supervisor = watch("hold")
     margin = margin_over_gait(np.array([tilts]), VEHICLE, roll, pitch)[0]
     value = determinant(np.array(tilts), roll, pitch, VEHICLE)
-    left = room(tilts, tuple(world_up(roll, pitch)), supervisor, RATIO)
+    left = threshold_clearance(tilts, tuple(world_up(roll, pitch)), supervisor, RATIO)
     assert (left >= 0.0) == (value >= 0.5 and np.sign(value) * abs(margin) >= 0.3)
-    assert room((0.0,) * 4, (0.0, 0.0, 1.0), supervisor, RATIO) == pytest.approx(1.0)
+    assert threshold_clearance((0.0,) * 4, (0.0, 0.0, 1.0), supervisor, RATIO) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("strategy", WITH_STATES)
@@ -163,7 +163,7 @@ def test_the_clock_slows_down_within_the_band():
             time, 0.0, 0.0, 0.0, 0.0, gait.parameters, gait.knots, supervisor, RATIO
         )[2]
         ahead = tilt_reference(time + 0.5, gait.parameters, gait.knots)[:4]
-        left = room(ahead, (0.0, 0.0, 1.0), supervisor, RATIO)
+        left = threshold_clearance(ahead, (0.0, 0.0, 1.0), supervisor, RATIO)
         state, asked_rates = left, acceleration * LAG
         assert asked_rates == pytest.approx(min(1.0, max(0.0, 1.0 - left / BAND)), abs=1e-9)
         if left < 0.0:

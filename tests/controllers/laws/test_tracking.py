@@ -23,11 +23,8 @@ from tests.controllers.laws.test_gait_feedforward import (
 from tests.thesis import force_matrix, torque_matrix
 from tiltsim_controllers.gaits.plans import two_color_circle
 from tiltsim_controllers.laws.decouplers import DECOUPLERS, exact_decoupler
-from tiltsim_controllers.laws.gait_feedforward import (
-    FeedforwardTerms,
-    attitude_jerk,
-    tracking_inputs,
-)
+from tiltsim_controllers.laws.feedback import attitude_jerk
+from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms, tracking_inputs
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
 
 TIME = 0.7
@@ -107,7 +104,7 @@ class Motion:
 
 def attitude_references(motion, law, euler_yaw):
     """Roll and pitch references as jets, from the exact decoupler's answer along the motion."""
-    terms = law.ingredients
+    terms = law.terms
 
     def demanded(t):
         integral, error, rate = motion.errors(t, terms)
@@ -145,8 +142,8 @@ def demanded_third_derivatives(motion, law):
         k1 * (goal[2] - real[2]) + k2 * (goal[1] - real[1]) + k3 * (goal[0] - real[0])
         for goal, real, (k1, k2, k3) in zip(wanted, actual, (gains[0:3], gains[3:6], gains[6:9]))
     ]
-    integral, error, rate = (value[2] for value in motion.errors(0.0, law.ingredients))
-    known, counted = law.ingredients.reference_derivatives, law.ingredients.integral_action
+    integral, error, rate = (value[2] for value in motion.errors(0.0, law.terms))
+    known, counted = law.terms.reference_derivatives, law.terms.integral_action
     climb = (
         known * reference(TIME, 3)[2]
         + gains.altitude_1 * (known * reference(TIME, 2)[2] - motion.acceleration(0.0)[2])
@@ -167,9 +164,9 @@ LAWS = {
     "feed-forward alone": law_for(gains=NO_FEEDBACK, integral=INTEGRAL._replace(position=0.0)),
     "with feedback": law_for(),
     "with limited feedback": law_for(max_acceleration=0.5),
-    "attitude at rest": law_for(ingredients=FeedforwardTerms(attitude_rates=0.0)),
-    "reference at rest": law_for(ingredients=FeedforwardTerms(reference_derivatives=0.0)),
-    "without integrals": law_for(ingredients=FeedforwardTerms(integral_action=0.0)),
+    "attitude at rest": law_for(terms=FeedforwardTerms(attitude_rates=0.0)),
+    "reference at rest": law_for(terms=FeedforwardTerms(reference_derivatives=0.0)),
+    "without integrals": law_for(terms=FeedforwardTerms(integral_action=0.0)),
 }
 
 
@@ -215,8 +212,8 @@ def test_far_from_its_reference_the_attitude_turns_at_the_rate_that_it_can_brake
     k1, k2, k3, limit = 30.0, 300.0, 1000.0, 8.0
     cruise = side * limit * k1 / k2  # from here the limit stops the body within 1 / (k2 / k1)
     far = (side * 50.0, 0.0, 0.0)
-    assert attitude_jerk(far, (0.0, cruise, 0.0), k1, k2, k3, limit) == pytest.approx(0.0)
-    slower = attitude_jerk(far, (0.0, cruise - 0.1 * side, 0.0), k1, k2, k3, limit)
+    assert attitude_jerk(far, (0.0, cruise, 0.0), (k1, k2, k3), limit) == pytest.approx(0.0)
+    slower = attitude_jerk(far, (0.0, cruise - 0.1 * side, 0.0), (k1, k2, k3), limit)
     assert slower == pytest.approx(side * 0.1 * k2)
-    at_limit = attitude_jerk(far, (0.0, -9.0 * side, 0.0), k1, k2, k3, limit)
+    at_limit = attitude_jerk(far, (0.0, -9.0 * side, 0.0), (k1, k2, k3), limit)
     assert at_limit == pytest.approx(side * k1 * limit)

@@ -17,7 +17,6 @@ from tiltsim_controllers.analysis.quadrotor_singularity import (
 from tiltsim_controllers.analysis.stability import is_hurwitz
 from tiltsim_controllers.laws.yaw_position import (
     GAIN_SETS,
-    STATE_FIELDS,
     Parameters,
     decoupling_matrix,
     drift,
@@ -30,6 +29,7 @@ from tiltsim_controllers.references.trajectories import (
     reference_derivatives,
 )
 from tiltsim_controllers.vehicle.parameters import PRESETS
+from tiltsim_controllers.vehicle.states import EXTENDED_QUADROTOR_FIELDS
 
 QUADROTOR = PRESETS["ar_drone_2_unrounded"]
 WEIGHT = QUADROTOR.mass * QUADROTOR.gravity
@@ -204,7 +204,7 @@ def test_the_outputs_move_as_appendix_b_demands(gains):
     ids=["no thrust", "unknown thrust"],
 )
 def test_inputs_are_nan_where_the_matrix_is_singular(change):
-    state = dict(zip(STATE_FIELDS, START)) | change
+    state = dict(zip(EXTENDED_QUADROTOR_FIELDS, START)) | change
     inputs = yaw_position_inputs(0.0, tuple(state.values()), PARAMETERS["stable"])
     assert all(isnan(value) for value in inputs[1:4])
 

@@ -21,12 +21,11 @@ from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft.layout import PITCH, QW, QX, QY, QZ, ROLL
 from tiltsim_controllers.gaits.parameters import GaitParameters
-from tiltsim_controllers.gaits.tilts import tilt_reference
+from tiltsim_controllers.gaits.tilts import planned_jets, tilt_reference
 from tiltsim_controllers.laws.supervisor import (
     HOLD,
     Supervisor,
     gait_time,
-    planned_tilts,
     supervised_derivative,
     supervised_gait_scale,
     supervised_tilts,
@@ -82,7 +81,7 @@ def supervised_servo_commands(
         s, of the servos.
     """
     clock = gait_time(time, motion, supervisor)
-    planned = planned_tilts(clock, gait, knots)
+    planned = planned_jets(clock, gait, knots)
     a1, a2, a3, a4 = supervised_tilts(planned, 1.0, motion, supervisor, ratio)
     return (a1[0] + lead * a1[1], a2[0] + lead * a2[1], a3[0] + lead * a3[1], a4[0] + lead * a4[1])
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Final
 
-from tiltsim_controllers.laws.attitude_altitude import STATE_FIELDS
+from tiltsim_controllers.vehicle.states import TILTROTOR_FIELDS
 
 ROTORS: Final = (1, 2, 3, 4)
 
-OBSERVED_FIELDS: Final = (*STATE_FIELDS, *(f"alpha_rate_{rotor}" for rotor in ROTORS))
+OBSERVED_FIELDS: Final = (*TILTROTOR_FIELDS, *(f"alpha_rate_{rotor}" for rotor in ROTORS))
 """A sample of any rotorcraft after its time: rigid body, tilts, rotor speeds, tilt rates."""
 
 # Of a sample; the control laws' state begins alike.

@@ -1,0 +1,24 @@
+"""Names and indices of the vehicles' states."""
+
+from __future__ import annotations
+
+from typing import Final
+
+X, Y, Z, VX, VY, VZ, ROLL, PITCH, YAW, P, Q, R = range(12)
+ALPHA_1, ALPHA_2, ALPHA_3, ALPHA_4, SPEED_1, SPEED_2, SPEED_3, SPEED_4 = range(12, 20)
+THRUST, THRUST_RATE = range(12, 14)
+
+BODY_FIELDS: Final = ("x", "y", "z", "vx", "vy", "vz", "roll", "pitch", "yaw", "p", "q", "r")
+"""A rigid body: position (m) and velocity (m/s), world axes; rad; body rates, rad/s."""
+
+TILT_FIELDS: Final = ("alpha_1", "alpha_2", "alpha_3", "alpha_4")
+"""Tilt angles, rad."""
+
+ROTOR_FIELDS: Final = ("rotor_speed_1", "rotor_speed_2", "rotor_speed_3", "rotor_speed_4")
+"""Rotor speeds, rad/s, signed."""
+
+TILTROTOR_FIELDS: Final = (*BODY_FIELDS, *TILT_FIELDS, *ROTOR_FIELDS)
+"""The state of the tiltrotor: one float per name, in this order."""
+
+EXTENDED_QUADROTOR_FIELDS: Final = (*BODY_FIELDS, "thrust", "thrust_rate")
+"""The state of the quadrotor and of the dynamic extension of ch. 2, [zeta] N and [xi] N/s."""
