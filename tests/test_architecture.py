@@ -181,3 +181,5 @@ def test_every_public_definition_has_a_docstring(module):
 def test_the_page_on_the_architecture_lists_all_folders_in_their_order():
     page = (ROOT.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
     assert re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE) == [*CONTROLLERS, *FLYING, *SHOWING]
+    paths = set(re.findall(r"`((?:tiltsim|controllers|tests)/[a-z_/]+(?:\.py)?)`", page))
+    assert [path for path in sorted(paths) if not (ROOT.parent / path).exists()] == []
