@@ -288,7 +288,7 @@ def test_a_controller_written_for_simulate_flies_here():
     np.testing.assert_allclose(action[:4], 8.048e-6 * np.array([300, 310, 320, 330.0]) ** 2)
     np.testing.assert_array_equal(action[4:], [0.1, 0.2, 0.3, 0.4])
     np.testing.assert_allclose(env.step(action).observation["rotor_speeds"], [300, 310, 320, 330])
-    with pytest.raises(ControllerError, match="thrusts or rotor_speeds are wanted"):
+    with pytest.raises(ControllerError, match="expected thrusts or rotor_speeds"):
         env.action(Command(rotor_accelerations=[0.0] * 4))
     with pytest.raises(ControllerError, match=r"thrusts of shape \(3,\)"):
         env.action(Command(thrusts=[1.0] * 3))

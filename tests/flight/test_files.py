@@ -214,7 +214,7 @@ def test_a_foreign_parquet_file_is_an_input_error(tmp_path):
         ("engine", "steam", "engine 'steam' is unknown"),
         ("end", "bored", "end 'bored' is unknown"),
         ("end_time", "late", "not a flight"),
-        ("wall_time", None, "lack 'wall_time'"),
+        ("wall_time", None, "no 'wall_time' in its metadata"),
     ],
 )
 def test_wrong_metadata_are_an_input_error(tmp_path, key, value, words):

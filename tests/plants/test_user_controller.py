@@ -20,7 +20,7 @@ from tiltsim.flight.reading import load_flight
 from tiltsim.laws.assembling import assemble, loop_of
 from tiltsim.laws.commanded import COMMANDED_LOOPS
 from tiltsim.laws.tiltrotor import tiltrotor_state
-from tiltsim.plants.command import Command, checked
+from tiltsim.plants.command import Command, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import Parameters, rotor_accelerations
@@ -179,7 +179,7 @@ def test_a_shipped_law_flown_as_a_users_own_flies_the_same_flight(layers):
     shipped = tiltsim.parse_scenario(merged(tables, *LAYERS[layers]))
     parameters = assemble(shipped).setup.parameters
     while not isinstance(parameters, Parameters):
-        parameters = parameters.law
+        parameters = getattr(parameters, "inner", None) or parameters.law
 
     def own(seen):
         state = tiltrotor_state(
@@ -465,9 +465,9 @@ def test_a_saved_state_restarts_under_held_accelerations(layers):
 
     def tell(speed):
         told = Command(rotor_speeds=[speed] * 4, tilt_angles=[0.1, 0.0, 0.0, speed / 1e4])
-        plant.apply(checked(told, tilting=True))
+        plant.apply(check_command(told, tilting=True))
         plant.advance(2)
-        plant.apply(checked(Command(rotor_accelerations=[5.0, -5.0, 3.0, 1.0]), tilting=True))
+        plant.apply(check_command(Command(rotor_accelerations=[5.0, -5.0, 3.0, 1.0]), tilting=True))
         plant.advance(1)
 
     for speed in (300.0, 310.0, 320.0):
@@ -518,23 +518,26 @@ def returning(value):
     ("law", "words"),
     [
         (raises, ["raises raised ZeroDivisionError: float division by zero", "line "]),
-        (returning(None), ["returned None; a tiltsim.Command is wanted"]),
-        (returning([1, 2, 3, 4]), ["returned [1, 2, 3, 4]; a tiltsim.Command"]),
-        (returning(Command()), ["nothing for the rotors; one of thrusts, rotor_speeds"]),
+        (returning(None), ["returned None; expected a tiltsim.Command"]),
+        (returning([1, 2, 3, 4]), ["returned [1, 2, 3, 4]; expected a tiltsim.Command"]),
+        (returning(Command()), ["nothing for the rotors; expected one of thrusts, rotor_speeds"]),
         (
             returning(Command(thrusts=[1] * 4, rotor_speeds=[1] * 4)),
-            ["returned thrusts and rotor_speeds; one of"],
+            ["returned thrusts and rotor_speeds; expected one of"],
         ),
-        (returning(Command(thrusts=[1.0] * 3)), ["thrusts of shape (3,); (4,) is wanted"]),
+        (returning(Command(thrusts=[1.0] * 3)), ["thrusts of shape (3,); expected shape (4,)"]),
         (returning(Command(thrusts=1.0)), ["thrusts of shape ()"]),
-        (returning(Command(thrusts=["a"] * 4)), ["thrusts = ['a', 'a', 'a', 'a']; 4 numbers"]),
-        (returning(Command(rotor_speeds=[1, 2, np.nan, 4])), ["rotor_speeds[2] = nan; it must"]),
+        (
+            returning(Command(thrusts=["a"] * 4)),
+            ["thrusts = ['a', 'a', 'a', 'a']; expected 4 numbers"],
+        ),
+        (returning(Command(rotor_speeds=[1, 2, np.nan, 4])), ["rotor_speeds[2] = nan; must be"]),
         (
             returning(Command(thrusts=[1] * 4, tilt_angles=[0, 0, 0, np.inf])),
             ["tilt_angles[3] = inf"],
         ),
-        (returning(Command(thrusts=[10**400] * 4)), ["; 4 numbers are wanted"]),
-        (returning(MuteError()), ["returned a MuteError; a tiltsim.Command is wanted"]),
+        (returning(Command(thrusts=[10**400] * 4)), ["; expected 4 numbers"]),
+        (returning(MuteError()), ["returned a MuteError; expected a tiltsim.Command"]),
         (leaves, ["leaves raised SystemExit: 5"]),
         (raises_unspeakably, ["raises_unspeakably raised MuteError (test_user_controller.py"]),
     ],
@@ -667,7 +670,7 @@ def test_a_failing_controller_exits_3_and_leaves_its_log(tmp_path, capsys):
     error = capsys.readouterr().err
     assert error == (
         "tiltsim: flight terminated early at t = 0.100 s (failed): the controller bad.py:law "
-        "returned thrusts of shape (3,); (4,) is wanted\n"
+        "returned thrusts of shape (3,); expected shape (4,)\n"
     )
     assert json.loads((out / "metrics.json").read_text())["duration"] == pytest.approx(0.1)
     assert load_flight(out).end.kind == "failed"
@@ -681,7 +684,11 @@ def test_a_failing_controller_exits_3_and_leaves_its_log(tmp_path, capsys):
         (HOVER, "not_callable", ["not_callable is not callable; it has law, Slow"]),
         ("import tiltsim\nlaw = (\n", "law", ["was never closed", "broken.py, line 2"]),
         ("import nonexistent_module", "law", ["ModuleNotFoundError", "broken.py, line 1"]),
-        ("class Law:\n    def __init__(self, gain): pass", "Law", ["TypeError", "when made"]),
+        (
+            "class Law:\n    def __init__(self, gain): pass",
+            "Law",
+            ["TypeError", "when it was made"],
+        ),
         ("import sys; sys.exit(3)", "law", ["raised SystemExit: 3", "broken.py, line 1"]),
         ("\0", "law", ["null bytes (broken.py)"]),
     ],

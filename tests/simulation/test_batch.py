@@ -12,7 +12,7 @@ import pytest
 import tiltsim
 import tiltsim.engines.sample_evaluation
 import tiltsim.plants.engine_choice
-import tiltsim.simulation.batch
+import tiltsim.simulation.native_batch
 from tests.laws.layers.test_actuation import EVERYTHING
 from tests.laws.layers.test_air import STORM
 from tests.laws.test_laws import GUST, LAWS
@@ -219,7 +219,7 @@ def test_the_end_of_a_lost_row_is_looked_for_from_the_last_calls_on(monkeypatch)
         return advance(plant, steps, *rest)
 
     lost = scenario(LATE_LOSS, duration=3600.0, record_timestep=0.05)
-    monkeypatch.setattr(tiltsim.simulation.batch, "CALL_TIME", 0.0)
+    monkeypatch.setattr(tiltsim.simulation.native_batch, "CALL_TIME", 0.0)
     monkeypatch.setattr(MujocoPlant, "advance", counted)
     (row,) = fly([lost], keep_samples=True)
     assert 2.0 < row.end.time < 2.1

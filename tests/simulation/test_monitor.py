@@ -24,7 +24,7 @@ def judged():
         sample = first.copy()
         for name, value in changed.items():
             sample[fields.index(name)] = value
-        return TerminationMonitor(assembly).judge(plant, sample)
+        return TerminationMonitor(assembly).check(plant, sample)
 
     return end
 

@@ -15,8 +15,8 @@ from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INTERRUPTED, VEHICLE_LO
 from tiltsim.system.interrupts import defer_interrupts
 
 if TYPE_CHECKING:
+    from tiltsim.flight.expectations import Verdict
     from tiltsim.flight.flight import Flight
-    from tiltsim.flight.verdicts import Verdict
     from tiltsim.scenario.expectation import Expectation
     from tiltsim.scenario.scenario import Scenario
     from tiltsim.views.rerun.live import LiveStream
@@ -60,7 +60,7 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fly, save, evaluate."""
-    from tiltsim.flight.verdicts import judge
+    from tiltsim.flight.expectations import check_expectations
     from tiltsim.scenario.loading import load_scenario, parse_override
     from tiltsim.system.files import prepare_file, prepare_folder
 
@@ -105,7 +105,7 @@ def run(arguments: argparse.Namespace) -> int:
             f"{metrics['min_rotor_speed']:.4g} rad/s)",
             file=sys.stderr,
         )
-    verdicts = judge(scenario, metrics)
+    verdicts = check_expectations(scenario, metrics)
     if not arguments.quiet:
         print(summary(flight, verdicts))
         if arguments.out is not None:

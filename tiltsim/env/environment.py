@@ -23,7 +23,7 @@ from tiltsim.errors import InputError
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
-from tiltsim.plants.command import Command, Observation, checked
+from tiltsim.plants.command import Command, Observation, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.scenario.loading import load_scenario, parse_scenario
 from tiltsim.scenario.scenario import Scenario
@@ -104,7 +104,7 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
         if np.isfinite(sample).all():
             self._samples.append(sample)
             self._observation = self.task.get_observation(self._plant)
-        self._end = self._monitor.judge(self._plant, sample)
+        self._end = self._monitor.check(self._plant, sample)
         if self._end is None:
             self._end = self.task.get_termination(sample, self._observation)
         if self._end is None and self._steps_left == 0:
@@ -152,7 +152,7 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
         Raises `ControllerError` if the command is invalid or gives rotor accelerations.
         """
         plant = self._begun()
-        return plant.thrusts_and_tilts(checked(command, tilting=has_tilts(self._scenario)))
+        return plant.thrusts_and_tilts(check_command(command, tilting=has_tilts(self._scenario)))
 
     def _begun(self) -> CommandedPlant:
         if self._plant is None:

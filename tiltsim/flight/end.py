@@ -5,18 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from tiltsim.vehicles.rotorcraft import COLUMN_UNITS as COLUMN_UNITS
-
 EndKind = Literal["completed", "diverged", "singular", "interrupted", "failed"]
-"""A flight fails where a user's own controller does."""
+"""``singular``: at a singular decoupling matrix; ``failed``: a user's own controller failed."""
 
 
 @dataclass(frozen=True)
 class End:
-    """How a flight ended: ``kind``, when (s), and in words why."""
+    """How, when and why a flight ended."""
 
     kind: EndKind
-    time: float
+    time: float  # s
     cause: str = ""
 
     @property

@@ -1,7 +1,7 @@
-"""A flight: what was observed, sample by sample, and all that follows from it.
+"""A flight: its recorded samples, and the columns and metrics derived from them.
 
 The samples hold the vehicle's state; references, thrusts and singularity margins are derived from
-them with the same functions that the control law uses. One `Flight` feeds metrics, files, plots
+them with the same functions that the control law uses. One `Flight` feeds metrics, files, figures
 and Rerun.
 """
 
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
 
 
-def _far_out() -> np.errstate:
-    """For arithmetic with a last sample that may lie beyond what squares of floats can hold."""
+def _overflow_ignored() -> np.errstate:
+    """For arithmetic with the last sample of a diverged flight, whose squares may overflow."""
     return np.errstate(over="ignore", invalid="ignore")
 
 
@@ -65,7 +65,7 @@ class Flight:
         return self.assembly.scenario
 
     def __repr__(self) -> str:
-        """One line: what was flown, and how it ended."""
+        """The scenario and the end, in one line."""
         name = self.scenario.address or self.scenario.title
         end = f"{self.end.kind} at {self.end.time:g} s"
         return f"<Flight of {name}: {end}, {len(self)} samples of {len(self.units)} columns>"
@@ -91,22 +91,22 @@ class Flight:
         """All columns by name, each of shape (N,), in the order of `units`."""
         loop = self.assembly.loop
         known = dict(zip(loop.sample_fields, self.samples.T, strict=True))
-        with _far_out():
+        with _overflow_ignored():
             known |= loop.columns.derive(known, self.assembly.setup)
             known |= loop.kind.thrusts(known, self.scenario)
         return {name: known[name] for name in self.units}
 
     @cached_property
     def _metrics(self) -> dict[str, float | bool]:
-        with _far_out():
+        with _overflow_ignored():
             return compute_metrics(self.columns, self.assembly, self.end, self.wall_time)
 
     def metrics(self) -> dict[str, float | bool]:
-        """The flight in numbers; names and meanings in `tiltsim.scenario.metric_names.METRICS`."""
+        """The metrics of the flight by name; see `tiltsim.scenario.metric_names.METRICS`."""
         return dict(self._metrics)
 
     def to_arrow(self) -> pyarrow.Table:
-        """The flight as an Arrow table: units in the fields' metadata, origin in the schema's."""
+        """The columns as an Arrow table; units and `origin` are its metadata."""
         import pyarrow as pa
 
         fields = [
@@ -117,7 +117,7 @@ class Flight:
         return pa.table(list(self.columns.values()), schema=schema)
 
     def origin(self) -> dict[str, str]:
-        """Where the flight comes from: scenario (JSON), versions, seed, engine, end, wall time."""
+        """The metadata of the file: scenario (JSON), versions, seed, engine, end, wall time (s)."""
         return {
             "scenario": self.scenario.model_dump_json(),
             "address": self.scenario.address,

@@ -27,7 +27,7 @@ def load_flight(path: str | Path) -> Flight:
     Raises
     ------
     InputError
-        If there is no such file, or it is not a whole flight of tiltsim's.
+        If there is no such file, or it is not a complete flight of tiltsim.
     """
     import numpy as np
     import pyarrow as pa
@@ -48,16 +48,16 @@ def load_flight(path: str | Path) -> Flight:
         engine, end = _engine_and_end(origin)
         wall_time = float(origin["wall_time"])
     except (KeyError, ValueError, TypeError) as error:
-        raise InputError(f"{file}: not a flight of tiltsim's: {_first_line(error)}") from error
+        raise InputError(f"{file}: not a flight of tiltsim: {_first_line(error)}") from error
     try:
         scenario = parse_scenario(without_none(document), origin.get("address", ""))
     except InputError as error:
-        raise InputError(f"{file}: its scenario is not valid: {error}") from error
+        raise InputError(f"{file}: its scenario is invalid: {error}") from error
     assembly = assemble(scenario)
     fields = assembly.loop.sample_fields
     missing = [name for name in fields if name not in table.column_names]
     if missing:
-        raise InputError(f"{file}: not a flight of tiltsim's: no column {', '.join(missing)}")
+        raise InputError(f"{file}: not a flight of tiltsim: no column {', '.join(missing)}")
     if len(table) == 0:
         raise InputError(f"{file}: the flight has no samples")
     try:
@@ -65,12 +65,12 @@ def load_flight(path: str | Path) -> Flight:
             [np.asarray(table[name].to_numpy(), dtype=np.float64) for name in fields]
         )
     except (ValueError, TypeError) as error:
-        raise InputError(f"{file}: not a flight of tiltsim's: {_first_line(error)}") from error
+        raise InputError(f"{file}: not a flight of tiltsim: {_first_line(error)}") from error
     for name, values in zip(fields, samples.T, strict=True):
         if not np.isfinite(values).all():
-            raise InputError(f"{file}: damaged: {name} has values that are no finite numbers")
+            raise InputError(f"{file}: damaged: {name} contains non-finite values")
     if (np.diff(samples[:, 0]) <= 0.0).any():
-        raise InputError(f"{file}: damaged: its times do not increase")
+        raise InputError(f"{file}: damaged: timestamps are not strictly increasing")
     return Flight(assembly, samples, end, engine, wall_time)
 
 
@@ -88,7 +88,7 @@ def _flight_file(path: Path) -> Path:
 def _origin(file: Path, table: pyarrow.Table) -> dict[str, str]:
     metadata = table.schema.metadata or {}
     if b"scenario" not in metadata:
-        raise InputError(f"{file}: not a flight of tiltsim's: its metadata name no scenario")
+        raise InputError(f"{file}: not a flight of tiltsim: no scenario in its metadata")
     return {key.decode(): value.decode(errors="replace") for key, value in metadata.items()}
 
 
@@ -107,5 +107,5 @@ def _engine_and_end(origin: dict[str, str]) -> tuple[Any, End]:
 
 def _first_line(error: Exception) -> str:
     if isinstance(error, KeyError):
-        return f"its metadata lack {error.args[0]!r}"
+        return f"no {error.args[0]!r} in its metadata"
     return str(error).partition("\n")[0]

@@ -1,8 +1,8 @@
-"""Observations and commands of a user's own controller."""
+"""Observations and commands of a user's own controller, and of vehicles commanded from outside."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Final
@@ -16,14 +16,13 @@ from tiltsim_controllers.vehicle.parameters import Vehicle
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-
 ROTOR_COMMANDS: Final = ("thrusts", "rotor_speeds", "rotor_accelerations")
-"""What the rotors can be told; a command gives one of them."""
+"""Commands for the rotors; a `Command` gives one of them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """Where the vehicle should be at the time of an observation; world axes."""
+    """The desired motion at the time of an observation; world axes."""
 
     position: Floats  # (3,), m
     velocity: Floats  # (3,), m/s
@@ -35,9 +34,9 @@ class Reference:
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """What a controller sees: the vehicle's state as arrays, its reference, its parameters.
+    """The input of a controller: the vehicle's state, its reference and its parameters.
 
-    The state is what the scenario's sensors say of it. The arrays are copies: a controller may keep
+    The state is as measured by the scenario's sensors. The arrays are copies: a controller may keep
     or change them.
     """
 
@@ -56,21 +55,20 @@ class Observation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Command:
-    """What a controller tells the vehicle: one of the three for the rotors, and tilt angles.
+    """The output of a controller: one of three commands for the rotors, and tilt angles.
 
     It takes effect after the scenario's latency; speeds then at once, or with the rotors' lag.
 
     Attributes
     ----------
     thrusts
-        (4,), N, along each rotor's axis, as speeds.
+        (4,), N, along each rotor's axis; they set its speed.
     rotor_speeds
         (4,), rad/s, positive along each rotor's spin.
     rotor_accelerations
-        (4,), rad/s^2, likewise; the speeds grow evenly until the next sample.
+        (4,), rad/s^2, likewise, held until the next sample.
     tilt_angles
-        (4,), rad, for the tilt servos. Left out, the servos follow the planned gait. The quadrotor
-        has none.
+        (4,), rad, for the tilt servos; default: the planned gait. The quadrotor has none.
     """
 
     thrusts: npt.ArrayLike | None = None
@@ -80,37 +78,44 @@ class Command:
 
 
 Controller = Callable[[Observation], Command]
-"""A function from what is seen to what is done; one with a memory may have ``reset(scenario)``."""
+"""A function from observation to command; one with a memory may have ``reset(scenario)``."""
 
 
 class ControllerError(TiltsimError):
-    """A controller raised, or returned what is no command; the message says what was wrong."""
+    """A controller raised an exception or returned an invalid command."""
 
 
 @dataclass(frozen=True, slots=True)
 class CheckedCommand:
-    """A command found valid: floats, and which of `ROTOR_COMMANDS` the four rotor values are."""
+    """A valid command, from the controller to the rotors and servos."""
 
-    kind: str
-    rotors: Quad
-    tilt_angles: Quad | None
+    kind: str  # of `ROTOR_COMMANDS`
+    rotors: Quad  # N, rad/s or rad/s^2, along each rotor's spin
+    tilt_angles: Quad | None  # rad; None follows the planned gait
 
 
-def checked(command: object, *, tilting: bool) -> CheckedCommand:
-    """The numbers of a command.
+def check_command(command: object, *, tilting: bool) -> CheckedCommand:
+    """Check what a controller returned.
+
+    Parameters
+    ----------
+    command
+        Expected to be a `Command`.
+    tilting
+        Whether the vehicle has tilt servos.
 
     Raises
     ------
     ControllerError
-        If it is no `Command`, gives not exactly one of `ROTOR_COMMANDS`, or has an entry of the
-        wrong shape or one that is no finite number; tilt angles need a vehicle that tilts.
+        If it is not a `Command`, does not give exactly one of `ROTOR_COMMANDS`, has an entry of the
+        wrong shape or a non-finite one, or gives tilt angles to a vehicle without tilt servos.
     """
     if not isinstance(command, Command):
-        raise ControllerError(f"returned {_short(command)}; a tiltsim.Command is wanted")
+        raise ControllerError(f"returned {short_repr(command)}; expected a tiltsim.Command")
     given = [name for name in ROTOR_COMMANDS if getattr(command, name) is not None]
     if len(given) != 1:
         what = " and ".join(given) if given else "nothing for the rotors"
-        raise ControllerError(f"returned {what}; one of {', '.join(ROTOR_COMMANDS)} is wanted")
+        raise ControllerError(f"returned {what}; expected one of {', '.join(ROTOR_COMMANDS)}")
     if command.tilt_angles is not None and not tilting:
         raise ControllerError("returned tilt_angles; this vehicle has no tilt servos")
     tilts = None if command.tilt_angles is None else _four("tilt_angles", command.tilt_angles)
@@ -121,45 +126,21 @@ def _four(name: str, value: Any) -> Quad:
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
-        raise ControllerError(f"returned {name} = {_short(value)}; 4 numbers are wanted") from None
+        text = f"returned {name} = {short_repr(value)}; expected 4 numbers"
+        raise ControllerError(text) from None
     if array.shape != (4,):
-        raise ControllerError(f"returned {name} of shape {array.shape}; (4,) is wanted")
+        raise ControllerError(f"returned {name} of shape {array.shape}; expected shape (4,)")
     first, second, third, fourth = values = array.tolist()
     for index, number in enumerate(values):
         if not isfinite(number):
-            raise ControllerError(f"returned {name}[{index}] = {number}; it must be finite")
+            raise ControllerError(f"returned {name}[{index}] = {number}; must be finite")
     return first, second, third, fourth
 
 
-def _short(value: object) -> str:
+def short_repr(value: object) -> str:
+    """A value in at most 60 characters of one line, even if its ``repr`` raises."""
     try:
         text = " ".join(repr(value).split())
     except Exception:
         text = f"a {type(value).__name__}"
     return text if len(text) <= 60 else text[:57] + "..."
-
-
-def observation(
-    time: float,
-    qpos: Floats,
-    qvel: Floats,
-    speeds_along_spin: Sequence[float],
-    attitude: Sequence[float],
-    reference: Reference,
-    vehicle: Vehicle,
-) -> Observation:
-    """An observation from MuJoCo's state; without hinges, tilt angles and rates are zeros."""
-    tilts, rates = qpos[7:11], qvel[6:10]
-    return Observation(
-        time=time,
-        position=qpos[:3].copy(),
-        velocity=qvel[:3].copy(),
-        attitude=np.array(attitude),
-        quaternion=qpos[3:7].copy(),
-        body_rates=qvel[3:6].copy(),
-        tilt_angles=tilts.copy() if len(tilts) else np.zeros(4),
-        tilt_rates=rates.copy() if len(rates) else np.zeros(4),
-        rotor_speeds=np.array(speeds_along_spin),
-        reference=reference,
-        vehicle=vehicle,
-    )

@@ -1,8 +1,8 @@
-"""A user's own controller: what it sees, what it commands, and what is said when it fails.
+"""Loading and calling a user's own controller, and the messages when it fails.
 
 A controller is anything that takes an `Observation` and returns a `Command`: a function, or an
-object with ``__call__`` for one with a memory. It is asked at every control sample, and its command
-is held until the next.
+object with ``__call__`` for one with a memory. It is called at every control sample, and its
+command is held until the next.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from tiltsim.plants.command import (
     Controller,
     ControllerError,
     Observation,
-    _short,
-    checked,
+    check_command,
+    short_repr,
 )
 from tiltsim.scenario.controller import PythonController
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 class UserController:
-    """A user's controller in a flight: every mistake of it becomes a `ControllerError`."""
+    """A user's controller in a flight: whatever fails in it is raised as a `ControllerError`."""
 
     def __init__(self, controller: Controller, name: str) -> None:
         self._controller, self._name = controller, name
@@ -42,10 +42,10 @@ class UserController:
             self._call(reset, scenario)
 
     def command(self, observation: Observation, *, tilting: bool) -> CheckedCommand:
-        """Call for a command. Raises `ControllerError`."""
+        """The checked command for an observation. Raises `ControllerError`."""
         command = self._call(self._controller, observation)
         try:
-            return checked(command, tilting=tilting)
+            return check_command(command, tilting=tilting)
         except ControllerError as error:
             raise ControllerError(f"the controller {self._name} {error}") from None
 
@@ -53,11 +53,13 @@ class UserController:
         try:
             return function(argument)
         except (Exception, SystemExit) as error:
-            raise ControllerError(f"the controller {self._name} raised {_said(error)}") from error
+            raise ControllerError(
+                f"the controller {self._name} raised {_describe(error)}"
+            ) from error
 
 
-def _said(error: BaseException) -> str:
-    """An error in one line: its type, what it says, and where it came from."""
+def _describe(error: BaseException) -> str:
+    """An error in one line: its type, its message, and the line of the controller's code."""
     try:
         text = " ".join(str(error).split())[:200]
     except Exception:
@@ -66,7 +68,7 @@ def _said(error: BaseException) -> str:
 
 
 def _place(error: BaseException) -> str:
-    """File and line of the controller's own code that an error went through last."""
+    """The innermost file and line of the controller's own code in an error's traceback."""
     frames = traceback.extract_tb(error.__traceback__)[1:]  # without our own call
     if not frames:
         return ""
@@ -75,24 +77,36 @@ def _place(error: BaseException) -> str:
 
 
 def with_controller(scenario: Scenario, controller: object) -> Scenario:
-    """The scenario with a controller given in Python in place of its own law.
+    """The scenario with a controller given in Python in place of its own.
 
-    Raises `InputError` where it is not callable, or the scenario is one that no controller of a
-    user's can fly.
+    Raises
+    ------
+    InputError
+        If the controller is not callable, or the scenario does not support a user's controller.
     """
     if not callable(controller):
-        raise InputError(f"controller = {_short(controller)}: must be callable")
+        raise InputError(f"controller = {short_repr(controller)}: must be callable")
     return with_external_commands(scenario, _name_of(controller))
 
 
 def with_external_commands(
     scenario: Scenario, name: str, simulation: Mapping[str, Any] | None = None
 ) -> Scenario:
-    """The scenario with commands from outside in place of its law.
+    """The scenario with commands from outside in place of its controller.
 
-    ``name`` tells from where they come; ``simulation`` has keys to replace in that table.
+    Parameters
+    ----------
+    scenario
+        The scenario.
+    name
+        The source of the commands, for ``controller.function``.
+    simulation
+        Keys to replace in ``[simulation]``.
 
-    Raises `InputError` where the scenario is one that takes none.
+    Raises
+    ------
+    InputError
+        If the scenario does not support them.
     """
     from tiltsim.scenario.document import without_none
     from tiltsim.scenario.loading import parse_scenario
@@ -111,10 +125,23 @@ def _name_of(controller: object) -> str:
     return f"{named.__module__}.{named.__qualname__}"
 
 
-def load_controller(scenario: Scenario, controller: Any = None) -> UserController:
-    """The controller that flies a scenario: the one given, else the one that its table names.
+def load_controller(
+    scenario: Scenario, controller: Controller | type | None = None
+) -> UserController:
+    """The controller of a scenario under the law ``python``.
 
-    A class is called without arguments to make one. Raises `InputError` where there is none.
+    Parameters
+    ----------
+    scenario
+        The scenario.
+    controller
+        The controller, or a class that makes one without arguments; default: the one that the
+        scenario names.
+
+    Raises
+    ------
+    InputError
+        If it cannot be loaded or made.
     """
     table = scenario.controller
     assert isinstance(table, PythonController)
@@ -126,16 +153,19 @@ def load_controller(scenario: Scenario, controller: Any = None) -> UserControlle
         try:
             controller = controller()
         except (Exception, SystemExit) as error:
-            raise InputError(f"controller {name}: when made raised {_said(error)}") from error
+            raise InputError(
+                f"controller {name}: raised when it was made: {_describe(error)}"
+            ) from error
     return UserController(controller, name)
 
 
 def _load(address: str, table: PythonController) -> Any:
-    """What a file defines under a name."""
+    """The callable that a file defines under a name."""
     start = f'{address}: controller.function = "{table.function}"'
     if table.file is None:
         raise InputError(
-            f"{start}: names no file; write FILE.py:NAME, or pass controller= to tiltsim.simulate"
+            f"{start}: does not name a file; write FILE.py:NAME, or pass "
+            "controller= to tiltsim.simulate"
         )
     if not table.file.is_file():
         raise InputError(f"{start}: no such file")
@@ -153,17 +183,17 @@ def _load(address: str, table: PythonController) -> Any:
 
 
 def _run_file(start: str, file: Path) -> Any:
-    """A module of a file's own, made anew for every flight."""
+    """The module of a file, executed anew for every flight."""
     spec = importlib.util.spec_from_file_location(f"tiltsim_controller_{file.stem}", file)
     assert spec is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # dataclasses and pickles look their module up
     try:
-        # Compiled from its text, for a cached compilation may be older than a quick edit.
+        # Compiled from its text, because cached bytecode may be older than a quick edit.
         exec(compile(file.read_bytes(), str(file), "exec"), module.__dict__)
     except SyntaxError as error:
         line = f", line {error.lineno}" if error.lineno else ""
         raise InputError(f"{start}: {error.msg} ({file.name}{line})") from None
     except (Exception, SystemExit) as error:
-        raise InputError(f"{start}: raised {_said(error)}") from error
+        raise InputError(f"{start}: raised {_describe(error)}") from error
     return module

@@ -145,7 +145,7 @@ class ExpectationClaim(Claim):
 
     def measure(self, metrics: Metrics) -> Value | None:
         """The measured value, or whether the bounds hold if the thesis gives a yes/no answer."""
-        from tiltsim.flight.verdicts import Verdict
+        from tiltsim.flight.expectations import Verdict
 
         value = metrics.get(self.expectation.metric)
         if value is None or isinstance(value, bool) or not isinstance(self.published, bool):

@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from tiltsim.flight.verdicts import Verdict, judge
+from tiltsim.flight.expectations import Verdict, check_expectations
 from tiltsim.report.claim import (
     Claim,
     ClaimVerdict,
@@ -148,7 +148,7 @@ def failures(entries: list[ReportEntry], flights: Flights) -> list[Failure]:
         for plant, scenario in entry.plants.items()
         if isinstance(scenario, Scenario)
         and isinstance(record := flights[entry.address, plant], FlightRecord)
-        for verdict in judge(scenario, record.metrics)
+        for verdict in check_expectations(scenario, record.metrics)
         if not verdict.holds
     ]
 

@@ -1,4 +1,4 @@
-"""Decide from the samples whether a flight has to end."""
+"""The conditions that end a flight, checked on its samples."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tiltsim_controllers.mathematics.scalar import Floats
 
 
 class TerminationMonitor:
-    """Decides from the samples of one flight whether it is lost, and why."""
+    """Decides from the samples of one flight whether it ends early, and why."""
 
     def __init__(self, assembly: Assembly) -> None:
         self._loop, self._setup = assembly.loop, assembly.setup
@@ -29,31 +29,38 @@ class TerminationMonitor:
         self._follows_position = assembly.follows_position
         self._sides: dict[int, float] = {}
 
-    def judge(self, plant: Plant, sample: Floats) -> End | None:
-        """The end that a sample spells, None while the flight goes on."""
+    def check(self, plant: Plant, sample: Floats) -> End | None:
+        """The termination that a sample implies, or None.
+
+        Parameters
+        ----------
+        plant
+            The plant that the sample was taken from, in the same state.
+        sample
+            The sample, shape (fields,); see `ClosedLoop.sample_fields`.
+        """
         state = dict(zip(self._loop.sample_fields, sample.tolist(), strict=True))
         time = state["time"]
         finite = all(map(isfinite, state.values()))
         fault = plant.fault()
         if fault:
-            singular = self._judge_singularity(time, state) if finite else None
+            singular = self._check_signs(time, state) if finite else None
             return singular or End("diverged", time, fault)
         if not finite:
             name = next(name for name, value in state.items() if not isfinite(value))
-            return End("diverged", time, f"{name} is no longer a finite number")
-        return self._judge_limits(time, state) or self._judge_singularity(time, state)
+            return End("diverged", time, f"{name} is no longer finite")
+        return self._check_limits(time, state) or self._check_signs(time, state)
 
-    def finds_nothing(self, plant: Plant, samples: Floats) -> bool:
-        """Whether the flight goes on after samples that the plant found sound when recording them.
+    def passes(self, plant: Plant, samples: Floats) -> bool:
+        """Whether none of the samples that `Plant.record` returned ends the flight.
 
-        A plant that records natively has judged all but the last; see
-        `tiltsim.engines.recorder.Recorder`.
+        Native code has checked all but the last; see `tiltsim.engines.recorder.Recorder`.
         """
         if plant.engine == "native" and self._loop.monitoring.sign_check_values is not None:
             samples = samples[-1:]
-        return all(self.judge(plant, sample) is None for sample in samples)
+        return all(self.check(plant, sample) is None for sample in samples)
 
-    def _judge_limits(self, time: float, state: dict[str, float]) -> End | None:
+    def _check_limits(self, time: float, state: dict[str, float]) -> End | None:
         values = list(state.values())[1:]
         limits = self._reference, self._knots, self._follows_position
         code = self._loop.kind.limit_exceeded(time, values, *limits)
@@ -73,10 +80,10 @@ class TerminationMonitor:
             cause = f"rotor {rotor} at {state[f'rotor_speed_{rotor}']:.3g} rad/s"
         return End("diverged", time, cause)
 
-    def _judge_singularity(self, time: float, state: dict[str, float]) -> End | None:
+    def _check_signs(self, time: float, state: dict[str, float]) -> End | None:
         checks = self._loop.monitoring.sign_checks(state, self._setup)
         for index, (value, cause) in enumerate(checks):
-            # What changes its sign between two samples was zero in between.
+            # A number that changes its sign between two samples was zero in between.
             side = 0.0 if abs(value) < SINGULAR else copysign(1.0, value)
             if side == 0.0 or side != self._sides.setdefault(index, side):
                 return End("singular", time, cause)

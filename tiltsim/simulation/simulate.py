@@ -1,4 +1,4 @@
-"""Simulate a scenario: advance the plant, record samples, notice when the flight is lost."""
+"""Simulate a scenario: advance the plant, record samples, find the end."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tiltsim.system.interrupts import reraise_swallowed_interrupts
 from tiltsim_controllers.mathematics.scalar import Floats
 
 CHUNK_TIME: Final = 0.1
-"""How long (s) native code flies before Python looks at the samples and at the keyboard."""
+"""Wall time (s) of native code between checks of the samples and the keyboard."""
 
 FIRST_CHUNK: Final = 8  # samples
 LARGEST_CHUNK: Final = 100_000
@@ -47,18 +47,24 @@ def simulate(
         Called with every sample (floats in the order of `ClosedLoop.sample_fields`) as it is
         recorded.
     controller
-        A controller of your own in place of the scenario's law: a function from
+        A controller of your own in place of the scenario's: a function from
         `tiltsim.Observation` to `tiltsim.Command`, an object with ``__call__`` and, if it has a
         memory, ``reset(scenario)``, or a class of such objects.
 
     Returns
     -------
     Flight
-        All samples up to the end. A flight that diverges or meets a singular decoupling matrix
-        is a result, not an error: its log is complete up to there, and ``flight.end`` names the
-        cause and, to one physics step, the time. So is a flight interrupted from outside, or
-        by a controller of your own that raises or returns what is no command. An interrupt before
-        the first sample raises KeyboardInterrupt.
+        All samples up to the end. A flight that diverges or reaches a singular decoupling matrix
+        is a result, not an error: its log is complete up to there, and ``flight.end`` gives the
+        cause and, to one physics step, the time. The same holds for a flight that is interrupted,
+        or whose controller of your own raises an exception or returns an invalid command.
+
+    Raises
+    ------
+    InputError
+        If the vehicle cannot be built, or your controller cannot be used.
+    KeyboardInterrupt
+        If interrupted before the first sample.
     """
     if controller is not None:
         scenario = with_controller(scenario, controller)
@@ -85,27 +91,27 @@ def simulate_assembly(
     """
     simulation = assembly.scenario.simulation
     plant = make_plant(assembly, controller, engine)
-    watch = TerminationMonitor(assembly)
+    monitor = TerminationMonitor(assembly)
     samples: list[Floats] = []
 
-    def keep(sample: Floats) -> None:
+    def record(sample: Floats) -> None:
         samples.append(sample)
         if observer is not None:
             observer(sample)
 
     start = perf_counter()
     try:
-        keep(_sample(plant))
-        end = watch.judge(plant, samples[0])
+        record(_sample(plant))
+        end = monitor.check(plant, samples[0])
         steps_left, chunk = simulation.steps, FIRST_CHUNK if plant.engine == "native" else 1
         while steps_left > 0 and end is None:
             steps = min(simulation.record_steps, steps_left)
             count = max(1, min(chunk, steps_left // steps))
             began = perf_counter()
             with reraise_swallowed_interrupts():
-                flown, end = fly_chunk(plant, watch, count, steps)
+                flown, end = fly_chunk(plant, monitor, count, steps)
             for sample in flown:
-                keep(sample)
+                record(sample)
             steps_left -= count * steps
             if plant.engine == "native":
                 pace = CHUNK_TIME / max(perf_counter() - began, 1e-9)
@@ -116,9 +122,9 @@ def simulate_assembly(
         end = End("interrupted", float(samples[-1][0]), "interrupted from outside")
     except ControllerError as error:
         sample = _sample(plant)
-        end = watch.judge(plant, sample) or End("failed", plant.time, str(error))
+        end = monitor.check(plant, sample) or End("failed", plant.time, str(error))
         if sample[0] > samples[-1][0] and np.isfinite(sample).all():
-            keep(sample)
+            record(sample)
     wall_time = perf_counter() - start
     if end is None:
         end = End("completed", plant.time)
@@ -130,43 +136,57 @@ def _sample(plant: Plant) -> Floats:
 
 
 def fly_chunk(
-    plant: Plant, watch: TerminationMonitor, samples: int, steps: int
+    plant: Plant, monitor: TerminationMonitor, samples: int, steps: int
 ) -> tuple[Iterable[Floats], End | None]:
-    """Fly ``samples`` intervals of ``steps`` steps; the samples, and the end if it came.
+    """Fly one or more recording intervals.
 
-    Where something goes wrong on the way the flight is repeated, sample by sample and in the end
-    step by step, to find the very step.
+    If the flight ends within them, they are repeated sample by sample, and the last one step by
+    step, to find the exact step.
+
+    Parameters
+    ----------
+    plant, monitor
+        The plant, which is advanced, and the monitor of its flight.
+    samples
+        Number of intervals.
+    steps
+        Physics steps of each.
+
+    Returns
+    -------
+    samples, end
+        The finite samples, and the end if the flight ended.
     """
     before = plant.state
     if samples > 1:
         flown = plant.record(samples, steps)
-        if flown is not None and watch.finds_nothing(plant, flown):
+        if flown is not None and monitor.passes(plant, flown):
             return flown, None
         plant.state = before
-    kept = []
+    recorded = []
     for _ in range(samples):
         before = plant.state
         plant.advance(steps)
         sample = _sample(plant)
-        end = watch.judge(plant, sample)
+        end = monitor.check(plant, sample)
         if end is not None:
             plant.state = before
-            sample, end = _first_bad_step(plant, watch, steps, sample, end)
+            sample, end = _first_bad_step(plant, monitor, steps, sample, end)
         if np.isfinite(sample).all():
-            kept.append(sample)
+            recorded.append(sample)
         if end is not None:
-            return kept, end
-    return kept, None
+            return recorded, end
+    return recorded, None
 
 
 def _first_bad_step(
-    plant: Plant, watch: TerminationMonitor, steps: int, sample: Floats, end: End
+    plant: Plant, monitor: TerminationMonitor, steps: int, sample: Floats, end: End
 ) -> tuple[Floats, End]:
-    """Repeat a recording interval step by step to find the very step on which it went wrong."""
+    """Repeat a recording interval step by step to find the step on which the flight ended."""
     for _ in range(steps):
         plant.advance(1)
         this = _sample(plant)
-        verdict = watch.judge(plant, this)
-        if verdict is not None:
-            return this, verdict
+        exact = monitor.check(plant, this)
+        if exact is not None:
+            return this, exact
     return sample, end

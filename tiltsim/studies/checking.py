@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
-from tiltsim.flight.verdicts import Verdict, judge
+from tiltsim.flight.expectations import Verdict, check_expectations
 from tiltsim.plants.engine_choice import with_engine
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.library import closest_in_library, library_name, read_toml, scenario_files
@@ -90,7 +90,7 @@ def check_one(
         return CheckResult(address, "invalid", str(error))
     if flight.end.kind == "interrupted":
         raise KeyboardInterrupt
-    verdicts = tuple(judge(scenario, flight.metrics()))
+    verdicts = tuple(check_expectations(scenario, flight.metrics()))
     wall_time = perf_counter() - start
     # A scenario that may end early has an expectation on `diverged`.
     may_end_early = any(v.expectation.metric == "diverged" for v in verdicts)

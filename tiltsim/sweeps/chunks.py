@@ -10,7 +10,7 @@ from typing import Any
 
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
-from tiltsim.flight.verdicts import Verdict
+from tiltsim.flight.expectations import Verdict
 from tiltsim.plants.engine_choice import with_engine
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.sweeps.columns import installed_versions, make_row, rows_to_table

@@ -7,7 +7,7 @@ from math import inf, nan, nextafter
 import pytest
 
 from tiltsim.commands.run import expectation_lines
-from tiltsim.flight.verdicts import Verdict, judge
+from tiltsim.flight.expectations import Verdict, check_expectations
 from tiltsim.scenario.expectation import Expectation
 from tiltsim.scenario.scenario import Scenario
 
@@ -81,7 +81,9 @@ def test_every_expectation_is_judged_in_order():
             {"metric": "final_yaw", "max": 1.0},
         ]
     )
-    verdicts = judge(scenario, {"final_roll": 2.0, "final_yaw": 0.5, "diverged": False})
+    verdicts = check_expectations(
+        scenario, {"final_roll": 2.0, "final_yaw": 0.5, "diverged": False}
+    )
     assert [verdict.expectation for verdict in verdicts] == list(scenario.expect)
     assert [verdict.measured for verdict in verdicts] == [0.5, False, 2.0, 0.5]
     assert [verdict.holds for verdict in verdicts] == [True, True, False, True]
@@ -89,7 +91,7 @@ def test_every_expectation_is_judged_in_order():
 
 def test_a_metric_that_the_flight_does_not_have_fails_its_expectation():
     scenario = Scenario(expect=[{"metric": "sup_position_error_after_20s", "max": 1.0}])
-    (verdict,) = judge(scenario, {"final_roll": 0.0})
+    (verdict,) = check_expectations(scenario, {"final_roll": 0.0})
     assert verdict.measured is None
     assert not verdict.holds
 
@@ -104,7 +106,7 @@ def test_an_expectation_may_speak_of_one_plant_alone(plant, judged):
             {"metric": "final_roll", "max": 0.3, "plant": "thesis"},
         ],
     )
-    verdicts = judge(scenario, {"final_roll": 0.0})
+    verdicts = check_expectations(scenario, {"final_roll": 0.0})
     assert [verdict.expectation.max for verdict in verdicts] == judged
 
 

@@ -1,0 +1,208 @@
+"""Flights with one closed loop, stepped together by all cores.
+
+A row of the batch is a flight with a model and parameters of its own. It records its own samples
+and stops when it has all of them or ends early; its place goes to the next flight at once. So
+memory holds as many flights as there are rows, however many are flown.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
+
+import mujoco
+import numpy as np
+
+from tiltsim.closed_loop.userdata import RECORDER
+from tiltsim.engines.callback import control_callback
+from tiltsim.flight.end import End
+from tiltsim.flight.flight import Flight
+from tiltsim.plants.flight_model import flight_model, model_cache_key
+from tiltsim.plants.mujoco_plant import MujocoPlant, quiet_warnings
+from tiltsim.simulation.monitor import TerminationMonitor
+from tiltsim.simulation.simulate import fly_chunk
+
+if TYPE_CHECKING:
+    from tiltsim.closed_loop.assembly import Assembly
+    from tiltsim_controllers.mathematics.scalar import Floats
+
+ROWS_PER_THREAD: Final = 24
+"""Rows of a batch: so many that no thread waits long for the last one of a call."""
+
+MEMORY: Final = 256 * 2**20
+"""Bytes of the samples of all rows together."""
+
+CALL_TIME: Final = 0.25
+"""Wall time (s) of a batch between checks of the rows and the keyboard."""
+
+Result = TypeVar("Result")
+
+
+class _Row:
+    """A flight in a row of a batch."""
+
+    def __init__(self, index: int, assembly: Assembly, plant: MujocoPlant) -> None:
+        self.index, self.assembly, self.plant = index, assembly, plant
+        self.monitor = TerminationMonitor(assembly)
+        self.first = np.array([plant.time, *plant.observe()])
+        self.end = self.monitor.check(plant, self.first)
+        simulation = assembly.scenario.simulation
+        self.interval = simulation.record_steps
+        full, rest = divmod(simulation.steps, self.interval)
+        self.intervals = [self.interval] * full + [rest] * (rest > 0)
+        last = self.intervals[-1]
+        self.recorder = plant.recorder(len(self.intervals), self.interval, last)
+        self.saved = [(0, plant.state)]  # steps and state at the start of the last two calls
+        self.wall_time = 0.0
+
+    @property
+    def steps(self) -> int:
+        """Physics steps up to the last sample."""
+        taken = len(self.recorder.samples)
+        return sum(self.intervals) if self.recorder.full else taken * self.interval
+
+    def save(self, state: Floats) -> None:
+        """Save the state at the start of a call."""
+        time, timestep = float(state[0]), self.assembly.scenario.simulation.timestep
+        state = state.copy()
+        self.saved = [self.saved[-1], (round(time / timestep), state)]
+
+    def finish(self) -> Flight:
+        """The flight; an early end is located step by step, as for a single flight."""
+        samples = list(self.recorder.samples)
+        if self.recorder.terminated:
+            samples.pop()
+        if self.end is None and len(samples) < len(self.intervals):
+            samples = self._locate_end(samples)
+        end = self.end or End("completed", float(samples[-1][0]))
+        everything = np.array([self.first, *samples])
+        return Flight(self.assembly, everything, end, "native", self.wall_time)
+
+    def _locate_end(self, samples: list[Floats]) -> list[Floats]:
+        steps, state = self.saved[0]
+        plant = self.plant
+        header = plant.header_offset
+        state = state.copy()
+        state[header + RECORDER] = 0.0
+        plant.state = state
+        plant.advance(sum(self.intervals[: len(samples)]) - steps)
+        for interval in self.intervals[len(samples) :]:
+            found, self.end = fly_chunk(plant, self.monitor, 1, interval)
+            samples.extend(found)
+            if self.end is not None:
+                break
+        return samples
+
+
+class NativeBatch(Generic[Result]):
+    """Flights with one closed loop in a `mujoco.batch.Batch`.
+
+    Parameters
+    ----------
+    assemblies
+        The flights, in the order of their places.
+    threads
+        How many step rows.
+    pool
+        Where the results are computed.
+    result
+        Makes the result of a flight.
+    """
+
+    def __init__(
+        self,
+        assemblies: Sequence[Assembly],
+        threads: int,
+        pool: ThreadPoolExecutor,
+        result: Callable[[Flight], Result],
+    ) -> None:
+        self._waiting = deque(enumerate(assemblies))
+        self._threads, self._pool, self._result = threads, pool, result
+        self._knots = max(len(assembly.setup.knots) for assembly in assemblies)
+        self._models: dict[str, mujoco.MjModel] = {}
+        simulations = [assembly.scenario.simulation for assembly in assemblies]
+        largest = max(s.steps // s.record_steps for s in simulations) + 2
+        fitting = MEMORY // (8 * len(assemblies[0].loop.sample_fields) * largest)
+        self._size = max(1, min(len(assemblies), ROWS_PER_THREAD * threads, fitting))
+
+    def results(self) -> Iterator[tuple[int, Result]]:
+        """Pairs of a flight's place and its result, in the order in which they become available."""
+        from mujoco.batch import Batch
+
+        unfinished: deque[tuple[int, Future[Result]]] = deque()
+        rows: list[_Row | None] = [None] * self._size
+        batch: Any = None
+        steps = 256
+        while True:
+            for place in range(self._size):
+                while rows[place] is None and self._waiting:
+                    new = self._take_next()
+                    if new.end is not None:
+                        unfinished.append((new.index, self._hand_over(new)))
+                        continue
+                    if batch is None:
+                        batch = Batch(new.plant.model, self._size, self._threads)
+                    rows[place] = new
+                    batch.state[place] = new.saved[-1][1]
+                    batch.state[place, new.plant.header_offset + RECORDER] = new.recorder.address
+            flying = {place: row for place, row in enumerate(rows) if row is not None}
+            if flying:
+                steps = self._fly(batch, flying, steps)
+                for place, row in flying.items():
+                    if row.recorder.full or row.recorder.terminated or batch.warning[place].any():
+                        batch.warning[place] = 0
+                        rows[place] = None
+                        if row.recorder.terminated or not row.recorder.full:
+                            # Its end is located with MuJoCo's callback, which is global.
+                            flight = row.finish()
+                            future = self._pool.submit(self._result, flight)
+                        else:
+                            future = self._hand_over(row)
+                        unfinished.append((row.index, future))
+            while unfinished and (unfinished[0][1].done() or not flying):
+                index, future = unfinished.popleft()
+                yield index, future.result()
+            if len(unfinished) > 2 * self._size:  # the pool cannot keep up: wait
+                index, future = unfinished.popleft()
+                yield index, future.result()
+            if not flying and not self._waiting:
+                return
+
+    def _take_next(self) -> _Row:
+        index, assembly = self._waiting.popleft()
+        key = model_cache_key(assembly.scenario)
+        model = self._models.get(key)
+        if model is None:
+            if len(self._models) > 2 * self._size:
+                self._models.clear()
+            model = self._models[key] = flight_model(assembly, self._knots)
+        return _Row(index, assembly, MujocoPlant(assembly, model, "native"))
+
+    def _hand_over(self, row: _Row) -> Future[Result]:
+        return self._pool.submit(lambda: self._result(row.finish()))
+
+    def _fly(self, batch: Any, flying: dict[int, _Row], steps: int) -> int:
+        """Fly every row for some steps; returns how many to take next."""
+        places = np.array(list(flying), dtype=np.int32)
+        any_model = next(iter(flying.values())).plant.model
+        by_place = [
+            row.plant.model if row else any_model for row in map(flying.get, range(self._size))
+        ]
+        batch.set_models(by_place)
+        steps = max(steps, *(row.interval for row in flying.values()), 1)
+        for place, row in flying.items():
+            row.save(batch.state[place])
+        before = batch.bind("time")[places].copy()
+        callback = next(iter(flying.values())).plant.callback
+        start = perf_counter()
+        with control_callback(callback), quiet_warnings():
+            batch.rollout(steps, record=(), ids=places)
+        seconds = perf_counter() - start
+        flown = batch.bind("time")[places] - before
+        share = seconds * min(self._threads, len(flying)) / max(float(flown.sum()), 1e-9)
+        for row, time in zip(flying.values(), flown.tolist(), strict=True):
+            row.wall_time += share * time
+        return max(64, min(int(steps * CALL_TIME / max(seconds, 1e-9)), 2 * steps))
