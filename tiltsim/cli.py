@@ -16,21 +16,8 @@ from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT, TERMINATED
 from tiltsim.system.interrupts import terminations_as_interrupts
 
-COMMANDS: Final = (
-    "run",
-    "check",
-    "sweep",
-    "list",
-    "view",
-    "plot",
-    "video",
-    "gait",
-    "map",
-    "singularity",
-    "report",
-    "bench",
-    "schema",
-)
+FLIGHT_COMMANDS: Final = ("run", "check", "sweep", "list", "view", "plot", "video")
+OTHER_COMMANDS: Final = ("gait", "map", "singularity", "report", "bench", "schema")
 
 
 def printable(text: str) -> str:
@@ -68,7 +55,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for name in COMMANDS:
+    for name in (*FLIGHT_COMMANDS, *OTHER_COMMANDS):
         import_module(f"tiltsim.commands.{name}").add_parser(subparsers)
     return parser
 

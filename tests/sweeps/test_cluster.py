@@ -100,7 +100,7 @@ def test_what_is_no_address_is_refused_at_once(tmp_path, capsys, address):
     file = short_sweep(tmp_path / "sweep.toml")
     options = ["--cluster", address, "--out", str(tmp_path / "out"), "--quiet"]
     assert main(["sweep", str(file), *options]) == 2
-    assert capsys.readouterr().err.endswith("expected for example tcp://192.168.0.1:8786\n")
+    assert capsys.readouterr().err.endswith("such as tcp://192.168.0.1:8786\n")
 
 
 def test_without_dask_the_extra_is_named(tmp_path, capsys, monkeypatch):

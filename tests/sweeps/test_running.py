@@ -20,7 +20,8 @@ from tiltsim.scenario.loading import parse_scenario
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.simulation import batch
 from tiltsim.simulation.simulate import simulate
-from tiltsim.sweeps import chunks, executing, running
+from tiltsim.sweeps import chunks, running
+from tiltsim.sweeps.chunks import ChunkWork
 from tiltsim.sweeps.dataset import load_results
 from tiltsim.sweeps.folder import open_sweep_folder, write_durably
 from tiltsim.sweeps.loading import load_sweep
@@ -150,15 +151,14 @@ def test_a_file_appears_whole_or_not_at_all(tmp_path, monkeypatch):
 
 
 def test_a_bad_flight_becomes_a_row(tmp_path, monkeypatch):
-    original = executing.simulate
+    original = batch.simulate_assembly
 
-    def simulate(scenario):
-        if scenario.initial.attitude[0] > 0.0:
+    def simulate(assembly):
+        if assembly.scenario.initial.attitude[0] > 0.0:
             raise RuntimeError("no such luck")
-        return original(scenario)
+        return original(assembly)
 
-    monkeypatch.setattr(executing, "simulate", simulate)
-    monkeypatch.setattr(batch, "simulate", simulate)
+    monkeypatch.setattr(batch, "simulate_assembly", simulate)
     run_sweep(load_sweep(short_sweep(tmp_path / "sweep.toml")), tmp_path / "out")
     for row in rows(tmp_path / "out"):
         bad = row["initial.attitude[0]"] > 0.0
@@ -260,7 +260,7 @@ def test_all_processes_may_die_at_once_but_not_again_and_again(times, monkeypatc
             yield item, future
 
     monkeypatch.setattr(running, "in_processes", in_processes)
-    flown = running.fly_on_processes("", [0, 1, 2, 3], 4, None)
+    flown = running.fly_on_processes(ChunkWork("", None), [0, 1, 2, 3], 4)
     if times == 2:
         assert list(flown) == [0, 1, 2, 3]
     else:

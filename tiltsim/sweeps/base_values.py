@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
-from tiltsim.errors import InputError
 from tiltsim.scenario.loading import parse_scenario, split_key
 from tiltsim.scenario.messages import show
 from tiltsim.scenario.vehicle import VehicleTable
@@ -16,23 +15,6 @@ from tiltsim.sweeps.definition import SweepDefinition
 def is_number(value: object) -> bool:
     """Whether a TOML value is an integer or a float."""
     return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def mistake(definition: SweepDefinition, key: str, value: object, allowed: str) -> InputError:
-    """The error for a key of the sweep file, to be raised by the caller.
-
-    Parameters
-    ----------
-    definition
-        The sweep.
-    key
-        Dotted key of the sweep file.
-    value
-        The value there.
-    allowed
-        Why it is refused, or what is allowed.
-    """
-    return InputError(f"{definition.address}: {key} = {show(value)}: {allowed}")
 
 
 class BaseValues:
@@ -71,10 +53,10 @@ class BaseValues:
     def _scaled(self, key: str, factor: Any) -> Any:
         base = self.look_up(key)
         if not is_number(factor):
-            raise mistake(self._definition, "axis.values", factor, "relative values are numbers")
+            raise self._definition.mistake("axis.values", factor, "relative values are numbers")
         if is_number(base):
             return float(base * factor)
         if isinstance(base, list) and all(map(is_number, base)):
             return [float(value * factor) for value in base]
         allowed = f"{key} = {show(base)} in the base scenario is not a number"
-        raise mistake(self._definition, "axis.relative", True, allowed)
+        raise self._definition.mistake("axis.relative", True, allowed)

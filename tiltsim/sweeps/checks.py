@@ -7,7 +7,6 @@ from typing import Any, Final
 
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.sweeps.base_values import mistake
 from tiltsim.sweeps.definition import VERSIONS
 from tiltsim.sweeps.expressions import names
 from tiltsim.sweeps.points import SweepPoints
@@ -44,11 +43,11 @@ def _check_types(points: SweepPoints, first: Mapping[str, Any], values: Mapping[
     for key, value in values.items():
         if isinstance(value, dict):
             allowed = f"{key} is a table; vary its keys one by one"
-            raise mistake(points.definition, "axis.values", value, allowed)
+            raise points.definition.mistake("axis.values", value, allowed)
     for key, value in values.items():
         if type(value) is not type(first[key]):
             both = [first[key], value]
-            raise mistake(points.definition, "axis.values", both, f"{key} changes its type")
+            raise points.definition.mistake("axis.values", both, f"{key} changes its type")
 
 
 def _check_search(points: SweepPoints, values: Mapping[str, Any]) -> None:
@@ -60,7 +59,7 @@ def _check_search(points: SweepPoints, values: Mapping[str, Any]) -> None:
     steps = abs(stop - bisect.start) / bisect.step
     if steps > MAX_SEARCH:
         allowed = f"{steps:.3g} steps to stop = {stop:g}; at most {MAX_SEARCH}"
-        raise mistake(points.definition, "bisect.step", bisect.step, allowed)
+        raise points.definition.mistake("bisect.step", bisect.step, allowed)
 
 
 def _check_names(points: SweepPoints) -> None:
@@ -74,7 +73,7 @@ def _check_names(points: SweepPoints) -> None:
     taken = {*RESERVED, *METRICS, *(f"{name}_version" for name in VERSIONS)}
     for key in (*targets, *sweep.derive):
         if key in taken:
-            raise mistake(definition, "axis.key", key, "is a column of every result; rename it")
+            raise definition.mistake("axis.key", key, "is a column of every result; rename it")
     named = {axis.key for axis in points.cases}
     for key in targets:
         if "." not in key and key not in read | named:
@@ -82,12 +81,11 @@ def _check_names(points: SweepPoints) -> None:
                 "a name without a dot must be used in [derive] or [plot]; keys of the scenario "
                 "have one, as gait.period"
             )
-            raise mistake(definition, "axis.key", key, allowed)
+            raise definition.mistake("axis.key", key, allowed)
     for key in sweep.derive:
         if "." not in key:
-            raise mistake(
-                definition, "derive", key, "must be a key of the scenario, as gait.angles"
-            )
+            allowed = "must be a key of the scenario, as gait.angles"
+            raise definition.mistake("derive", key, allowed)
 
 
 def _names_in(rule: Any) -> set[str]:

@@ -47,26 +47,22 @@ class FinishedChunk:
     versions: dict[str, str]
 
 
-def fly_sweep_chunk(number: int, definition_json: str, engine: EngineName | None) -> FinishedChunk:
-    """Fly one chunk of a sweep.
+@dataclass(frozen=True)
+class ChunkWork:
+    """Flies chunks of a sweep by number, in this process or, pickled, in another."""
 
-    Parameters
-    ----------
-    number
-        Of the chunk.
-    definition_json
-        The sweep, see `SweepDefinition.to_json`.
-    engine
-        For scenarios whose engine is auto; None lets each choose.
-    """
-    points = _points(definition_json)
-    rows, flights = fly_points(points, points.chunk(number), engine)
-    table = rows_to_table(points, rows)
-    import pyarrow.parquet as pq
+    definition_json: str  # see `SweepDefinition.to_json`
+    engine: EngineName | None  # for scenarios whose engine is auto; None lets each choose
 
-    buffer = BytesIO()
-    pq.write_table(table, buffer, compression="zstd")
-    return FinishedChunk(number, len(rows), buffer.getvalue(), flights, installed_versions())
+    def __call__(self, number: int) -> FinishedChunk:
+        """Fly one chunk."""
+        import pyarrow.parquet as pq
+
+        points = _points(self.definition_json)
+        rows, flights = fly_points(points, points.chunk(number), self.engine)
+        buffer = BytesIO()
+        pq.write_table(rows_to_table(points, rows), buffer, compression="zstd")
+        return FinishedChunk(number, len(rows), buffer.getvalue(), flights, installed_versions())
 
 
 @lru_cache(maxsize=2)

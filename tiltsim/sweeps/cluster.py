@@ -8,47 +8,28 @@ import re
 from collections.abc import Iterator
 from typing import Any, Final
 
-from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
-from tiltsim.sweeps.chunks import FinishedChunk, fly_sweep_chunk
+from tiltsim.sweeps.chunks import ChunkWork, FinishedChunk
 from tiltsim.sweeps.columns import installed_versions
 
 CONNECT_TIMEOUT: Final = 10.0  # s
 
 
-def fly_on_cluster(
-    definition: str, numbers: list[int], address: str, engine: EngineName | None
-) -> Iterator[FinishedChunk]:
+def fly_on_cluster(work: ChunkWork, numbers: list[int], address: str) -> Iterator[FinishedChunk]:
     """Fly chunks on the workers of a Dask scheduler, yielding each when it is finished.
 
-    Workers may come and go.
-
-    Parameters
-    ----------
-    definition
-        The sweep, see `SweepDefinition.to_json`.
-    numbers
-        Of the chunks.
-    address
-        Of the scheduler.
-    engine
-        For scenarios whose engine is auto; None lets each choose.
-
-    Raises
-    ------
-    InputError
-        If Dask is not installed, the scheduler does not answer or has no workers, or a worker fails
-        or has other versions of the packages.
+    Workers may come and go. Raises `InputError` if Dask is not installed, the scheduler does not
+    answer or has no workers, or a worker fails or has other versions of the packages.
     """
     client = _connect(address)
     with client:
-        yield from _fly(client, definition, numbers, address, engine)
+        yield from _fly(client, work, numbers, address)
 
 
 def _connect(address: str) -> Any:
     if not re.fullmatch(r"((tcp|tls|ucx|wss?)://)?[^/]*[\w\]]:\d+", address):
         raise InputError(
-            f"--cluster {address}: not a scheduler address; expected for example tcp://192.168.0.1:8786"
+            f"--cluster {address}: not a scheduler address, such as tcp://192.168.0.1:8786"
         )
     try:
         from distributed import Client
@@ -70,18 +51,16 @@ def _connect(address: str) -> Any:
     return client
 
 
-def _fly(
-    client: Any, definition: str, numbers: list[int], address: str, engine: EngineName | None
-) -> Iterator[FinishedChunk]:
+def _fly(client: Any, work: ChunkWork, numbers: list[int], address: str) -> Iterator[FinishedChunk]:
     from distributed import as_completed
 
-    digest = hashlib.sha256(definition.encode()).hexdigest()[:16]
+    digest = hashlib.sha256(work.definition_json.encode()).hexdigest()[:16]
     waiting = list(reversed(numbers))
 
     def submit() -> Any:
         number = waiting.pop()
         key = f"tiltsim-{digest}-{number}"
-        return client.submit(fly_sweep_chunk, number, definition, engine, key=key)
+        return client.submit(work, number, key=key)
 
     first = [submit() for _ in range(min(len(waiting), _window(client)))]
     submitted = as_completed(first, loop=client.loop)

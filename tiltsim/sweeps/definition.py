@@ -51,6 +51,10 @@ class SweepDefinition:
         """The inverse of `to_json`. Raises ValueError or TypeError for any other text."""
         return SweepDefinition(**json.loads(text))
 
+    def mistake(self, key: str, value: object, allowed: str) -> InputError:
+        """The error, to be raised by the caller, for a key of the sweep file."""
+        return InputError(f"{self.address}: {key} = {show(value)}: {allowed}")
+
     def difference(self, other: SweepDefinition) -> str:
         """The first difference by which another definition would give other rows, or "".
 

@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Final
 
 from tiltsim.errors import InputError
 from tiltsim.simulation.batch import fly
-from tiltsim.simulation.simulate import simulate
 
 if TYPE_CHECKING:
-    from tiltsim.flight.end import End
     from tiltsim.flight.flight import Flight
     from tiltsim.scenario.scenario import Scenario
 
@@ -41,29 +39,32 @@ def fly_scenarios(
     """
     with _ONE_FLIGHT_AT_A_TIME:
         try:
-            results = list(fly(scenarios, threads=1, keep_samples=keep_flights))
+            return _fly(scenarios, keep_flights)
         except Exception:
             # One bad flight must not end the others: find it by flying one at a time.
             return [_fly_alone(scenario, keep_flights) for scenario in scenarios]
-    return [_result(result.metrics, result.end, result.flight) for result in results]
+
+
+def _fly(scenarios: Sequence[Scenario], keep_flights: bool) -> list[ScenarioResult]:
+    return [
+        ScenarioResult(
+            result.metrics,
+            result.end.kind,
+            result.end.time,
+            result.end.cause,
+            None if result.flight is None else _flight_file(result.flight),
+        )
+        for result in fly(scenarios, threads=1, keep_samples=keep_flights)
+    ]
 
 
 def _fly_alone(scenario: Scenario, keep_flight: bool) -> ScenarioResult:
     try:
-        flight = simulate(scenario)
-        metrics = flight.metrics()
+        return _fly([scenario], keep_flight)[0]
     except InputError as error:
         return ScenarioResult({}, "invalid", None, str(error))
     except Exception as error:
         return ScenarioResult({}, "crashed", None, f"{type(error).__name__}: {error}")
-    if flight.end.kind == "interrupted":
-        raise KeyboardInterrupt
-    return _result(metrics, flight.end, flight if keep_flight else None)
-
-
-def _result(metrics: Mapping[str, float | bool], end: End, flight: Flight | None) -> ScenarioResult:
-    table = None if flight is None else _flight_file(flight)
-    return ScenarioResult(metrics, end.kind, end.time, end.cause, table)
 
 
 def _flight_file(flight: Flight) -> bytes:

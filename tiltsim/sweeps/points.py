@@ -15,7 +15,7 @@ from typing import Any, Final
 from tiltsim.scenario.loading import apply_overrides, merge, parse_scenario, split_key
 from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.sweeps.base_values import BaseValues, is_number, mistake
+from tiltsim.sweeps.base_values import BaseValues, is_number
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.expressions import evaluate
 from tiltsim.sweeps.sampling import draw_samples
@@ -169,10 +169,10 @@ class SweepPoints:
             try:
                 return evaluate(rule, values)
             except ValueError as error:
-                raise mistake(self.definition, key, rule, str(error)) from None
+                raise self.definition.mistake(key, rule, str(error)) from None
         if is_number(rule):
             return float(rule)
-        raise mistake(self.definition, key, rule, "must be an expression or a list of them")
+        raise self.definition.mistake(key, rule, "must be an expression or a list of them")
 
     def _check_count(self) -> None:
         """Refuse more points than a sweep may have, before any of them is made."""
@@ -184,7 +184,7 @@ class SweepPoints:
                 points *= axis.length
                 groups |= {axis.group} if axis.group else set()
         if points > MAX_POINTS:
-            raise mistake(self.definition, "axis", points, f"more than {MAX_POINTS} points")
+            raise self.definition.mistake("axis", points, f"more than {MAX_POINTS} points")
 
     def _make_groups(self) -> list[list[dict[str, Any]]]:
         members: dict[str, list[list[dict[str, Any]]]] = {}
@@ -199,7 +199,7 @@ class SweepPoints:
             lengths = [len(rows) for rows in axes]
             if len(set(lengths)) > 1:
                 allowed = f"its axes have {lengths} values"
-                raise mistake(self.definition, "axis.group", name, allowed)
+                raise self.definition.mistake("axis.group", name, allowed)
             groups.append(
                 [
                     {key: value for part in parts for key, value in part.items()}

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final
 
-from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
-from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.shared_engine import shared_engine
 from tiltsim.sweeps.checks import check_points
-from tiltsim.sweeps.chunks import FinishedChunk, fly_sweep_chunk
+from tiltsim.sweeps.chunks import ChunkWork, FinishedChunk
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.folder import open_sweep_folder
 from tiltsim.sweeps.points import SweepPoints
@@ -74,50 +71,27 @@ def run_sweep(
 def _fly(
     points: SweepPoints, numbers: list[int], jobs: int, cluster: str | None
 ) -> Iterator[FinishedChunk]:
-    definition = points.definition.to_json()
     examples = check_points(points)
     count = sum(len(points.chunk(number)) for number in numbers)
     steps = count * max(example.simulation.steps for example in examples)
+    # A cluster's workers compile for themselves, so nothing is compiled here.
+    engine = shared_engine([] if cluster is not None else examples, steps)
+    work = ChunkWork(points.definition.to_json(), engine)
     if cluster is not None:
         from tiltsim.sweeps.cluster import fly_on_cluster
 
-        return fly_on_cluster(definition, numbers, cluster, worthwhile_engine(steps))
-    engine = shared_engine(examples, steps)
+        return fly_on_cluster(work, numbers, cluster)
     if jobs == 1 or len(numbers) == 1:
-        return (fly_sweep_chunk(number, definition, engine) for number in numbers)
-    return fly_on_processes(definition, numbers, jobs, engine)
+        return map(work, numbers)
+    return fly_on_processes(work, numbers, jobs)
 
 
-def worthwhile_engine(steps: int) -> EngineName | None:
-    """The engine for flights of ``steps`` in total, without compiling anything here."""
-    examples: Sequence[Scenario] = ()
-    return shared_engine(examples, steps)
-
-
-def fly_on_processes(
-    definition: str, numbers: list[int], jobs: int, engine: EngineName | None
-) -> Iterator[FinishedChunk]:
+def fly_on_processes(work: ChunkWork, numbers: list[int], jobs: int) -> Iterator[FinishedChunk]:
     """Fly chunks on several processes, yielding each when it is finished.
 
-    A process that dies is replaced, and its chunk flown again.
-
-    Parameters
-    ----------
-    definition
-        The sweep, see `SweepDefinition.to_json`.
-    numbers
-        Of the chunks.
-    jobs
-        Number of processes.
-    engine
-        For scenarios whose engine is auto; None lets each choose.
-
-    Raises
-    ------
-    InputError
-        If processes keep dying.
+    A process that dies is replaced, and its chunk flown again. Raises `InputError` if processes
+    keep dying.
     """
-    work = partial(fly_sweep_chunk, definition_json=definition, engine=engine)
     waiting, deaths, most = numbers, 0, MAX_DEATHS * min(jobs, len(numbers))
     while waiting:
         died: list[int] = []
