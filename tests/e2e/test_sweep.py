@@ -198,7 +198,7 @@ def test_lost_flights_lie_below_the_lines_in_the_order_of_the_legend(grid, tmp_p
     axes = sweep_figure(results, ("max_abs_roll",)).axes[0]
     named = [line for line in axes.lines if not line.get_label().startswith("_")]
     assert [line.get_label() for line in named] == [
-        *("conventional", "modified", "lost, rows in this order"),
+        *("conventional", "modified", "terminated early, in this order"),
     ]
     rows = [line for line in axes.lines if line.get_marker() == "x" and len(line.get_xdata())]
     first, second = (line.get_ydata()[0] for line in rows)
@@ -295,7 +295,7 @@ def test_groups_of_a_distribution_are_told_apart_without_colour(tmp_path):
     ("old", "new", "words"),
     [
         ("", '[plot]\nkind = "map"', "needs two axes of numbers, or x and y"),
-        ('title = "short flights"', "metrics = []", "none is kept, so there is nothing to draw"),
+        ('title = "short flights"', "metrics = []", "the sweep has no metric to plot"),
         (
             "",
             '[plot]\nx = "initial.atitude[0]"\nkind = "lines"',
@@ -399,4 +399,4 @@ def test_plot_draws_an_unfinished_sweep(tmp_path):
     (out / "parts" / "000001.parquet").unlink()
     results = load_results(out)
     assert results.columns["index"].tolist() == [0, 1, 2, 6, 7, 8, 9, 10, 11]
-    assert "3 of 12 points still to come" in sweep_figure(results).get_suptitle()
+    assert "3 of 12 points missing" in sweep_figure(results).get_suptitle()

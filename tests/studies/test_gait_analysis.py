@@ -593,7 +593,7 @@ def test_nothing_attainable_is_said_in_words(tmp_path, capsys) -> None:
     assert words not in capsys.readouterr().out
 
 
-ALL_MARKS = ["acceptable at all times", "unacceptable", "level"]
+ALL_MARKS = ["reachable at all times", "singular", "level"]
 
 
 @pytest.mark.parametrize(
@@ -601,7 +601,7 @@ ALL_MARKS = ["acceptable at all times", "unacceptable", "level"]
     [
         (plans.continuous_trot(0.65, 1.0), ALL_MARKS, True),
         (PUBLISHED_GAITS["ch08_gait_1"].gait, ["level"], False),
-        (plans.fixed([0.0] * 4), ["acceptable", "level"], False),
+        (plans.fixed([0.0] * 4), ["reachable", "level"], False),
     ],
 )
 def test_the_legend_explains_what_there_is(gait, marks, bar) -> None:

@@ -17,10 +17,8 @@ from tiltsim.views.figures.comparison import comparison_figure
 from tiltsim.views.figures.flight import flight_figure
 
 SIGNATURES = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
-PANELS = {
-    *("Attitude", "Altitude", "Position error", "Tilt angles", "Rotor speeds", "Plan view"),
-}
-PLANES = {f"Attitudes flown; {words} of reach" for words in ("shaded: out", "none is out")}
+PANELS = {"Attitude", "Altitude", "Position error", "Tilt angles", "Rotor speeds", "Plan view"}
+PLANES = {"Attitudes flown; shaded: unreachable", "Attitudes flown; all reachable"}
 
 
 def axes_by_title(figure):
@@ -34,7 +32,7 @@ def test_every_flight_can_be_drawn(name):
     titles = set(axes_by_title(figure))
     assert titles >= PANELS
     assert titles & PLANES
-    assert any(title.startswith("Singularity margin, least") for title in titles)
+    assert any(title.startswith("Singularity margin, minimum") for title in titles)
 
 
 def test_the_lines_are_the_flights_columns():
@@ -86,18 +84,18 @@ def test_rotor_limits_are_drawn_where_there_are_some():
 
 def test_the_closest_approach_is_marked():
     this = flight("trot")
-    plane = axes_by_title(flight_figure(this))["Attitudes flown; shaded: out of reach"]
+    plane = axes_by_title(flight_figure(this))["Attitudes flown; shaded: unreachable"]
     closest = int(np.argmin(np.abs(this["singularity_margin"])))
     dots = [line.get_xydata()[0] for line in plane.lines if len(line.get_xdata()) == 1]
     np.testing.assert_allclose(dots, [[this["roll"][closest], this["pitch"][closest]]])
     (words,) = [text.get_text() for text in plane.texts]
     assert words == (
-        f"closest: {abs(this['singularity_margin'][closest]):.2f} rad"
+        f"minimum margin {abs(this['singularity_margin'][closest]):.2f} rad"
         f" at {this['time'][closest]:.2f} s"
     )
 
 
-def test_drawing_leaves_no_trace_in_matplotlib():
+def test_drawing_does_not_change_matplotlibs_parameters():
     before = dict(matplotlib.rcParams)
     flight_figure(flight("fixed"))
     assert dict(matplotlib.rcParams) == before
@@ -129,7 +127,7 @@ def test_a_bad_target_is_one_line_and_exit_code_2(out, words, tmp_path, capsys):
     assert words in line
 
 
-def test_the_blow_up_of_a_lost_flight_does_not_flatten_what_came_before():
+def test_a_diverged_flight_is_scaled_by_the_time_before_its_divergence():
     whole = flight("fixed")
     samples = whole.samples.copy()
     columns = [i for i, name in enumerate(SAMPLE_FIELDS) if name.startswith("rotor_speed")]
@@ -155,10 +153,10 @@ def test_a_flight_of_one_sample_is_drawn_without_a_warning(recwarn):
     assert not recwarn.list
 
 
-def test_a_red_gait_puts_no_attitude_out_of_reach():
+def test_all_attitudes_of_a_red_gait_are_reachable():
     red = BASE | {"gait": {"type": "fixed", "angles": [-0.3, 0.3, -0.3, 0.3]}}
     panels = axes_by_title(flight_figure(tiltsim.simulate(tiltsim.parse_scenario(red))))
-    plane = panels["Attitudes flown; none is out of reach"]
+    plane = panels["Attitudes flown; all reachable"]
     assert [len(line.get_xdata()) > 1 for line in plane.lines].count(True) == 1  # what was flown
 
 
@@ -169,7 +167,7 @@ def supervised():
     return flight("supervised")
 
 
-def test_the_margin_shows_its_threshold_and_when_the_supervisor_acts():
+def test_the_margin_shows_its_threshold_and_when_the_supervisor_is_active():
     this = supervised()
     assert 0.0 < this["supervision"].max() <= 1.0
     panels = axes_by_title(flight_figure(this))
@@ -177,11 +175,11 @@ def test_the_margin_shows_its_threshold_and_when_the_supervisor_acts():
     axes = panels[title]
     levels = {line.get_ydata()[0] for line in axes.lines if len(set(line.get_ydata())) == 1}
     assert 0.9 in levels
-    assert "shaded: supervisor acts" in {text.get_text() for text in axes.texts}
+    assert "shaded: supervisor active" in {text.get_text() for text in axes.texts}
     plain = next(
         v for k, v in axes_by_title(flight_figure(flight("trot"))).items() if "margin" in k
     )
-    assert "shaded: supervisor acts" not in {text.get_text() for text in plain.texts}
+    assert "shaded: supervisor active" not in {text.get_text() for text in plain.texts}
 
 
 def test_flights_are_compared_by_margin_determinant_and_error():
@@ -192,7 +190,7 @@ def test_flights_are_compared_by_margin_determinant_and_error():
     assert list(panels) == [
         "Singularity margin",
         "Determinant, 4 for a level untilted vehicle",
-        "What the supervisor takes away",
+        "Supervisor output",
         "Distance from the reference",
     ]
     for axes, column in zip(
@@ -200,8 +198,8 @@ def test_flights_are_compared_by_margin_determinant_and_error():
     ):
         drawn = [line.get_ydata() for line in axes.lines if len(line.get_ydata()) > 2]
         columns = [this.columns[column] for this in flights if column in this.columns]
-        for line, wanted in zip(drawn, columns, strict=True):
-            np.testing.assert_array_equal(line, np.maximum(wanted, 0.0))
+        for line, expected in zip(drawn, columns, strict=True):
+            np.testing.assert_array_equal(line, np.maximum(expected, 0.0))
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()] == [
         "jumps",
@@ -210,10 +208,10 @@ def test_flights_are_compared_by_margin_determinant_and_error():
     assert legend.get_title().get_text() == "2 flights compared"
 
 
-def test_a_lost_flight_says_so_in_a_comparison():
+def test_a_comparison_says_where_a_flight_terminated():
     lost = replace(flight("jumps"), end=End("singular", 0.7, "why"))
     (legend,) = comparison_figure([lost, supervised()]).legends
-    assert legend.get_texts()[0].get_text() == "jumps, lost at 0.70 s"
+    assert legend.get_texts()[0].get_text() == "jumps, singular at 0.70 s"
 
 
 def test_the_command_compares_several_flights(tmp_path, capsys):
@@ -253,4 +251,4 @@ def test_a_vehicle_without_a_margin_is_not_compared(tmp_path, capsys):
     folders = [str(saved(name, tmp_path)) for name in ("tilt_car", "jumps")]
     assert main(["plot", *folders]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "the tilt_car has no margin to compare" in line
+    assert "the tilt_car has no singularity margin to compare" in line

@@ -1,5 +1,5 @@
-"""Figures that a paper could print; one module a subject, one style for all.
+"""Figures in print quality, one module per subject, in one style.
 
-Every function returns a matplotlib `Figure` that belongs to nobody else: no global state, no
-window. matplotlib is imported when a figure is drawn, not before.
+Every function returns an independent matplotlib `Figure`, without global state or windows.
+matplotlib is imported when a figure is drawn.
 """

@@ -29,8 +29,14 @@ def attainable_figure(
 ) -> Figure:
     """Roll torque, pitch torque and thrust at zero yaw torque; accelerations at hover thrust.
 
-    For a constant gait. ``speed_limits`` are the least and greatest rotor speed (rad/s); by default
-    those of ch. 9.
+    Parameters
+    ----------
+    gait
+        A constant gait.
+    vehicle
+        The vehicle.
+    speed_limits
+        Minimum and maximum rotor speed, rad/s; by default those of ch. 9.
     """
     limits = speed_limits or published_speed_limits(vehicle)
     angles = gait.angles(0.0)
@@ -65,7 +71,7 @@ def _legend(figure: Figure) -> None:
     from matplotlib.patches import Patch
 
     handles = [
-        Patch(color=style.SKY, alpha=0.3, lw=0.0, label="all that is attainable"),
+        Patch(color=style.SKY, alpha=0.3, lw=0.0, label="attainable set"),
         Patch(facecolor=style.BLUE, edgecolor=style.INK, alpha=0.45, label="at one thrust $F_Z$"),
         Patch(facecolor=style.PALE, edgecolor=style.BLUE, label="accelerations"),
     ]
@@ -77,19 +83,19 @@ def _conditions(limits: tuple[float, float]) -> str:
 
 
 def _empty_figure(gait: Gait, limits: tuple[float, float]) -> Figure:
-    """What there is to say where no rotor speeds make zero yaw torque."""
+    """A note in place of an empty attainable set."""
     figure = style.new_figure(5.0, 1.2)
     axes: Any = figure.subplots()
     axes.set_axis_off()
     axes.set_title(f"Torque and thrust at zero yaw torque, {gait.name}")
-    reason = "Nothing is attainable: no rotor speeds within the limits make zero yaw torque."
+    reason = "Empty set: no rotor speeds within the limits give zero yaw torque."
     axes.text(0.0, 0.6, reason, transform=axes.transAxes)
     axes.text(0.0, 0.1, _conditions(limits), transform=axes.transAxes, fontsize=8)
     return figure
 
 
 def _outline(space: Any, found: AttainableSet) -> None:
-    """Faces of the polytope as a faint shell."""
+    """The faces of the polytope, transparent."""
     from scipy.spatial import ConvexHull
 
     if found.dimension < 3:
@@ -118,8 +124,7 @@ def _slice(space: Any, found: AttainableSet) -> None:
 
 def _accelerations(plane: Any, found: AttainableSet) -> None:
     if not found.is_empty:
-        plane.axhline(0.0, color=style.GREY, lw=0.7)
-        plane.axvline(0.0, color=style.GREY, lw=0.7)
+        style.zero_lines(plane)
     if found.is_empty:
         plane.set_axis_off()
         plane.text(0.5, 0.5, "none", transform=plane.transAxes, ha="center")

@@ -12,18 +12,18 @@ from tiltsim_controllers.analysis.singularity import residuals
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
+    from tiltsim_controllers.mathematics.scalar import Floats
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
+_LIMIT: Final = 2.0  # rad
+_SAMPLES: Final = 121  # per axis
 _TICKS: Final = (-2, -1, 0, 1, 2)
 
 
-def determinant_grid(
-    alpha_1: float, alpha_3: float, vehicle: Vehicle, samples: int = 121, limit: float = 2.0
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _grid(alpha_1: float, alpha_3: float, vehicle: Vehicle) -> tuple[Floats, Floats, Floats]:
     """``alpha_2``, ``alpha_4`` (rad) and ``R``, each of shape (samples, samples)."""
-    side = np.linspace(-limit, limit, samples)
+    side = np.linspace(-_LIMIT, _LIMIT, _SAMPLES)
     alpha_2, alpha_4 = np.meshgrid(side, side)
     angles = np.stack(
         [np.full_like(alpha_2, alpha_1), alpha_2, np.full_like(alpha_2, alpha_3), alpha_4], axis=-1
@@ -34,15 +34,15 @@ def determinant_grid(
 def determinant_figure(case: str, vehicle: Vehicle) -> Figure:
     """The five surfaces ``R(alpha_2, alpha_4)`` of a case, their zero curves, and sections.
 
-    The surfaces nearly coincide, so each stands by itself; the sections run in the directions of
-    ch. 3, Eqs. (23)-(25).
+    The surfaces nearly coincide, so that each has axes of its own. ``case`` is a key of
+    `DETERMINANT_CASES`; the sections are along the directions of ch. 3, Eqs. (23)-(25).
     """
     from matplotlib import colormaps
 
     restriction, pairs = DETERMINANT_CASES[case]
     shades = colormaps[style.SEQUENTIAL](np.linspace(0.0, 0.9, len(pairs)))
     looks = ["-", (0, (6, 2)), "-", (0, (3, 1.5)), (0, (1, 1))]
-    grids = [determinant_grid(*pair, vehicle) for pair in pairs]
+    grids = [_grid(*pair, vehicle) for pair in pairs]
     largest = max(float(np.abs(R).max()) for _, _, R in grids)
     with style.paper_style():
         figure = style.new_figure(9.2, 5.6)
@@ -70,7 +70,7 @@ def determinant_figure(case: str, vehicle: Vehicle) -> Figure:
             axes.set(xlabel="α₂ (rad)", ylabel="R", title=title)
             axes.margins(x=0.0)
         handles, labels = falling.get_legend_handles_labels()
-        # Equal and opposite alpha_1 may give one curve: short dashes over long ones show both.
+        # Opposite values of alpha_1 may give equal curves: short dashes over long ones show both.
         lower.legend(handles, labels, loc="outside lower center", ncols=len(pairs))
         return figure
 
@@ -78,7 +78,9 @@ def determinant_figure(case: str, vehicle: Vehicle) -> Figure:
 def _surface(surface: Any, cells: Any, largest: float) -> None:
     alpha_2, alpha_4, R = cells
     surface.plot_surface(
-        *(alpha_2, alpha_4, R),
+        alpha_2,
+        alpha_4,
+        R,
         cmap=style.SEQUENTIAL,
         vmin=-largest,
         vmax=largest,
@@ -87,7 +89,7 @@ def _surface(surface: Any, cells: Any, largest: float) -> None:
         lw=0.0,
         antialiased=False,
     )
-    # Drawn at the foot, where nothing hides it.
+    # Below the surface, where it is visible.
     foot = -1.15 * largest
     surface.contour(
         alpha_2, alpha_4, R, [0.0], zdir="z", offset=foot, colors=[style.INK], linewidths=[1.0]

@@ -1,4 +1,4 @@
-"""The figure of a random set of flights: how many come through, how well, and what decides it."""
+"""The figure of randomly sampled flights: completed share, metrics, effect of the samples."""
 
 from __future__ import annotations
 
@@ -23,26 +23,33 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 QUANTILES: Final = (0.05, 0.5, 0.95)
-"""Marked on the curves."""
+"""Quantiles that are marked on the curves."""
 
-MOST_TELLING: Final = 4
-"""Drawn keys that get a panel each."""
+MAX_KEYS: Final = 4
+"""Largest number of sampled keys with a panel of their own."""
 
 HATCHES: Final = ("", "///", "...", "\\\\\\", "xxx", "---", "+++")
-"""Of the bars, beside the colours of `CYCLE`, as dashes and markers are of curves and dots."""
+"""Hatches of bars that accompany the colours of `CYCLE`."""
 
 NORMAL_95: Final = 1.959963984540054
 
 
 def distributions_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
-    """Shares of completed flights, distributions of metrics, and the first metric over the draws.
+    """Completed share, distributions of metrics, and the first metric over the sampled keys.
 
-    A lost flight counts as the worst: a curve of errors ends at the share that came through, one
-    of margins (``min_...``) begins at the share that did not.
+    A flight that terminated early counts as the worst value: a curve of errors ends at the
+    completed share, one of margins (``min_...``) begins at the share that terminated early.
+
+    Parameters
+    ----------
+    results
+        The results of a sweep with sampled axes.
+    metrics
+        The metrics.
     """
     key = results.points.sweep.plot.lines or next(iter(_grid_keys(results)), None)
     groups = list(groups_of(results, key, np.ones(len(results), dtype=bool)))
-    keys = _most_telling(results, metrics[0], groups)
+    keys = _most_effective(results, metrics[0], groups)
     figure = new_figure(10.0, 6.2 if keys else 3.2)
     parts: Any = figure.subfigures(2 if keys else 1, 1, squeeze=False)
     above, below = parts[0, 0], parts[-1, 0]
@@ -65,22 +72,22 @@ def distributions_figure(results: SweepResults, metrics: tuple[str, ...]) -> Fig
         _draw_scatter(axes, results, drawn, metrics[0], groups)
     panels[0].set_ylabel(label_of(metrics[0]))
     if not completed_mask(results).all():
-        panels[0].set_title("× lost", pad=10.0 + 6.0 * len(groups))
+        panels[0].set_title("× terminated early", pad=10.0 + 6.0 * len(groups))
     return figure
 
 
 def _grid_keys(results: SweepResults) -> list[str]:
-    """Keys of crossed axes, those of text first."""
+    """Keys of grid axes, those with text values first."""
     keys = [a.targets[0] for a in results.points.sweep.axis if isinstance(a, GridAxis)]
     return sorted(keys, key=lambda key: results.columns[key].dtype == np.float64)
 
 
 def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
-    """Between which shares the true one lies with 95 percent confidence (Wilson, 1927)."""
+    """The 95 percent confidence interval of a probability (Wilson, 1927)."""
     share, square = successes / trials, NORMAL_95**2 / trials
     middle = (share + square / 2.0) / (1.0 + square)
-    reach = sqrt(share * (1.0 - share) * square + square**2 / 4.0) / (1.0 + square)
-    return max(0.0, middle - reach), min(1.0, middle + reach)
+    half = sqrt(share * (1.0 - share) * square + square**2 / 4.0) / (1.0 + square)
+    return max(0.0, middle - half), min(1.0, middle + half)
 
 
 def _draw_shares(axes: Axes, results: SweepResults, groups: list[tuple[str, Column]]) -> None:
@@ -94,13 +101,13 @@ def _draw_shares(axes: Axes, results: SweepResults, groups: list[tuple[str, Colu
             number, share, height=0.34, color=color, alpha=0.85, hatch=hatch, ec="white", lw=0
         )
         axes.plot([low, high], [number, number], color=INK, lw=1.6, solid_capstyle="butt")
-        words = f"{name}: {flown} of {trials}".lstrip(": ")
-        axes.annotate(words, (0.01, number - 0.25), fontsize=8.5, color=color).set_in_layout(False)
+        text = f"{name}: {flown} of {trials}".lstrip(": ")
+        axes.annotate(text, (0.01, number - 0.25), fontsize=8.5, color=color).set_in_layout(False)
     axes.set_yticks([])
     axes.grid(visible=False, axis="y")
     axes.set_xlim(0.0, 1.0)
     axes.set_ylim(len(groups) - 0.65, -0.6)
-    axes.set_xlabel("share that completes")
+    axes.set_xlabel("completed share")
 
 
 def _draw_curve(axes: Axes, results: SweepResults, metric: str, group: Column, look: int) -> None:
@@ -108,13 +115,13 @@ def _draw_curve(axes: Axes, results: SweepResults, metric: str, group: Column, l
     values = results.columns[metric][group & completed_mask(results)]
     values = np.sort(values[~np.isnan(values)])
     total = int(group.sum())
-    lost = total - len(values) if metric.startswith("min_") else 0
-    share = (lost + np.arange(1, len(values) + 1)) / total
+    worst = total - len(values) if metric.startswith("min_") else 0
+    share = (worst + np.arange(1, len(values) + 1)) / total
     axes.step(values, share, where="post", color=color, ls=DASHES[look])
     for quantile in QUANTILES:
         place = int(np.searchsorted(share, quantile - 1e-12))
-        if place == len(values) or (place == 0 and lost):
-            continue  # among the lost
+        if place == len(values) or (place == 0 and worst):
+            continue  # among the flights that terminated early
         value = float(values[place])
         axes.plot(value, share[place], marker, ms=4.5, color=color)
         axes.annotate(
@@ -127,27 +134,27 @@ def _draw_curve(axes: Axes, results: SweepResults, metric: str, group: Column, l
         ).set_in_layout(False)
 
 
-def _most_telling(
+def _most_effective(
     results: SweepResults, metric: str, groups: list[tuple[str, Column]]
 ) -> list[str]:
-    """The drawn keys that go with the metric most closely, by rank, in the order of the file."""
+    """The sampled keys with the highest rank correlation to the metric, in the file's order."""
     keys = sampled_keys(results)
     values = np.where(completed_mask(results), results.columns[metric], np.inf)
     values = np.where(np.isnan(values), np.inf, values)
 
     def strength(key: str) -> float:
         draws = results.columns[key]
-        # Too much and too little may both do harm.
+        # Both too large and too small values may be harmful.
         both = (draws, np.abs(draws - np.median(draws)))
         found = [_rank_correlation(d[group], values[group]) for _, group in groups for d in both]
         return max(map(abs, found))
 
-    chosen = sorted(keys, key=strength, reverse=True)[:MOST_TELLING]
+    chosen = sorted(keys, key=strength, reverse=True)[:MAX_KEYS]
     return [key for key in keys if key in chosen]
 
 
 def _rank_correlation(first: Column, second: Column) -> float:
-    """Spearman's; 0 where either does not vary."""
+    """Spearman's rank correlation; 0 if either is constant."""
     left, right = _ranks(first), _ranks(second)
     if np.ptp(left) == 0.0 or np.ptp(right) == 0.0:
         return 0.0
@@ -155,7 +162,7 @@ def _rank_correlation(first: Column, second: Column) -> float:
 
 
 def _ranks(values: Column) -> Column:
-    """Ranks, those of equal values alike."""
+    """Ranks; equal values share their mean rank."""
     _, places, counts = np.unique(values, return_inverse=True, return_counts=True)
     last = np.cumsum(counts)
     return np.asarray((last - (counts - 1) / 2.0)[places])
@@ -175,15 +182,15 @@ def _draw_scatter(
     )
     many = len(results) > 1000
     for number, (_, group) in enumerate(groups):
-        look, flown, lost = number % len(CYCLE), group & completed, group & ~completed
+        look, flown, ended = number % len(CYCLE), group & completed, group & ~completed
         color, marker = CYCLE[look], MARKERS[look]
-        dots: Any = {"ms": 1.6 if many else 2.5, "alpha": 0.5 if many else 0.7, "mew": 0}
-        axes.plot(draws[flown], values[flown], marker, color=color, rasterized=many, **dots)
-        height = np.full(int(lost.sum()), 1.03 + 0.04 * number)
-        crosses: Any = {"ms": 3.0, "mew": 0.8, "clip_on": False}
+        size, alpha = (1.6, 0.5) if many else (2.5, 0.7)
+        (line,) = axes.plot(draws[flown], values[flown], marker, color=color, ms=size, mew=0)
+        line.set(alpha=alpha, rasterized=many)
+        height = np.full(int(ended.sum()), 1.03 + 0.04 * number)
         above = axes.get_xaxis_transform()
-        (line,) = axes.plot(draws[lost], height, "x", color=color, transform=above, **crosses)
-        line.set_in_layout(False)
+        (line,) = axes.plot(draws[ended], height, "x", color=color, ms=3.0, transform=above)
+        line.set(mew=0.8, clip_on=False, in_layout=False)
     axes.set_xlabel(label_of(key))
     if spans_decades(values[completed]):
         axes.set_yscale("log")

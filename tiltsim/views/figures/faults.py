@@ -1,4 +1,4 @@
-"""What faults ask of the rotors (``tiltsim gait --figure faults``)."""
+"""Rotor speeds that hover needs under faults (``tiltsim gait --figure faults``)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def fault_figure(vehicle: Vehicle) -> Figure:
-    """Top rotor speed that hover needs, over a servo's stuck angle and over the thrust left."""
+    """Maximum rotor speed in hover over a servo's stuck angle and over the remaining thrust."""
     with paper_style():
         figure = new_figure(6.6, 2.7)
         stuck, partial = figure.subplots(1, 2, sharey=True)
@@ -31,11 +31,11 @@ def fault_figure(vehicle: Vehicle) -> Figure:
 def _draw_stuck(axes: Axes, vehicle: Vehicle) -> None:
     angles = np.linspace(-pi / 2, pi / 2, 41)
     axes.plot(angles, [minimum_hover_speed(vehicle, stuck=(1, angle)) for angle in angles.tolist()])
-    whole = vehicle.hover_rotor_speed
-    axes.axhline(whole, color=GREY, linewidth=0.8)
+    intact = vehicle.hover_rotor_speed
+    axes.axhline(intact, color=GREY, linewidth=0.8)
     axes.annotate(
-        f"whole vehicle, {whole:.0f}",
-        (-pi / 2, whole),
+        f"intact vehicle, {intact:.0f}",
+        (-pi / 2, intact),
         xytext=(3, 2),
         textcoords="offset points",
         color=GREY,
@@ -44,7 +44,9 @@ def _draw_stuck(axes: Axes, vehicle: Vehicle) -> None:
     limit = 2.0 * atan(drag_ratio(vehicle))
     axes.axvline(limit, color=AMBER, linestyle="--", linewidth=1.0)
     axes.text(
-        *(limit, 0.9, " level gait\n lost beyond"),
+        limit,
+        0.9,
+        " no level gait\n beyond",
         transform=axes.get_xaxis_transform(),
         color=AMBER,
         fontsize=8,
@@ -52,7 +54,7 @@ def _draw_stuck(axes: Axes, vehicle: Vehicle) -> None:
     )
     angle_axis(axes, "x", pi / 2)
     axes.set_xlabel("angle at which servo 1 is stuck (rad)")
-    axes.set_ylabel("top rotor speed needed (rad/s)")
+    axes.set_ylabel("maximum rotor speed needed (rad/s)")
     axes.set_title("Stuck servo, other tilts free")
 
 
@@ -61,7 +63,8 @@ def _draw_partial(axes: Axes, vehicle: Vehicle) -> None:
     speeds = [minimum_hover_speed(vehicle, factors=(f, 1.0, 1.0, 1.0)) for f in factors.tolist()]
     axes.plot(100.0 * factors, speeds)
     axes.plot([0.0], speeds[:1], "o", markersize=4, color=RED, clip_on=False)
-    axes.text(4.0, speeds[0], f"lost rotor, {speeds[0]:.0f}", color=RED, fontsize=8, va="center")
+    text = f"failed rotor, {speeds[0]:.0f}"
+    axes.text(4.0, speeds[0], text, color=RED, fontsize=8, va="center")
     axes.set_xlim(0.0, 100.0)
-    axes.set_xlabel("thrust left of rotor 1 (%)")
+    axes.set_xlabel("remaining thrust of rotor 1 (%)")
     axes.set_title("Partial thrust, tilts free")

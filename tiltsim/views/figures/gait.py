@@ -1,4 +1,4 @@
-"""Figures of one gait: roll-pitch diagram (ch. 5 to 8), tilt angles and margin over a period."""
+"""Figures of gaits: roll-pitch diagram (ch. 5 to 8), tilt angles and margin over a period."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ if TYPE_CHECKING:
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
 _CURVES = 24
-"""Instants of a period at which the unacceptable-attitude curve is drawn."""
+"""Instants of a period for which the curve of singular attitudes is drawn."""
 
 AREA, CURVE = "area", "curve"
-"""What a roll-pitch diagram may show besides the level attitude."""
+"""Optional contents of a roll-pitch diagram."""
 
 _LAST_SHADE = 0.92
-"""Share of the colour map in use; beyond it, lines fade on white."""
+"""Part of the colour map in use; the rest is too bright on white."""
 
 
 def gait_figure(gait: Gait, vehicle: Vehicle) -> Figure:
-    """Roll-pitch diagram of a gait, with its angles and margin over a period if it moves."""
+    """Roll-pitch diagram of a gait and, if it moves, its angles and margin over a period."""
     with style.paper_style():
         if gait.is_constant:
             figure = style.new_figure(4.2, 4.2)
@@ -59,10 +59,7 @@ def gait_figure(gait: Gait, vehicle: Vehicle) -> Figure:
 
 
 def comparison_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure:
-    """Roll-pitch diagrams of gaits side by side, such as a gait and its biased twin.
-
-    ``gaits`` are pairs of title and gait (ch. 6, Figs. 21-28; ch. 8, Figs. 10-14).
-    """
+    """Roll-pitch diagrams of gaits, given with their titles (ch. 6, Figs. 21-28; ch. 8, 10-14)."""
     with style.paper_style():
         figure = style.new_figure(3.5 * len(gaits) + 0.8, 4.2)
         row = figure.subplots(1, len(gaits), squeeze=False, sharey=True)[0]
@@ -79,7 +76,7 @@ def comparison_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure
 
 
 def margin_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure:
-    """Singularity margin over a period for several gaits, as pairs of label and gait."""
+    """Singularity margin over a period for several gaits, given with their labels."""
     with style.paper_style():
         figure = style.new_figure(5.4, 3.2)
         axes: Any = figure.subplots()
@@ -89,9 +86,9 @@ def margin_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure:
 
 
 def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> set[str]:
-    """Unacceptable-attitude curves at instants of a period; shaded where no instant forbids.
+    """Curves of singular attitudes, and the attitudes reachable from level at all times, shaded.
 
-    Tells which of `AREA` and `CURVE` the legend must explain.
+    Returns those of `AREA` and `CURVE` that the diagram contains.
     """
     from matplotlib import colormaps
 
@@ -101,14 +98,14 @@ def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> set[str]:
     side = np.linspace(-pi / 2, pi / 2, 301)
     roll, pitch = np.meshgrid(side, side)
     level = determinant(angles[0], 0.0, 0.0, vehicle)
-    allowed = np.ones_like(roll, dtype=bool)
+    reachable = np.ones_like(roll, dtype=bool)
     for instant in angles:
-        allowed &= determinant(instant, roll, pitch, vehicle) * level > 0.0
+        reachable &= determinant(instant, roll, pitch, vehicle) * level > 0.0
     curves = [unacceptable_attitudes(instant, vehicle, 721) for instant in angles]
     singular = sum(curve.kind == "everywhere" for curve in curves)
 
     if not singular:
-        axes.contourf(roll, pitch, allowed, levels=[0.5, 1.5], colors=[style.PALE])
+        axes.contourf(roll, pitch, reachable, levels=[0.5, 1.5], colors=[style.PALE])
     colors = colormaps[style.SEQUENTIAL](np.arange(len(curves)) / len(curves) * _LAST_SHADE)
     n = np.nan_to_num(torque_free_direction(angles, vehicle))
     drawn = np.hypot(n[:, 0], n[:, 1]) > MIN_DIRECTION_TILT
@@ -122,22 +119,18 @@ def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> set[str]:
         ratio = f"{conditioning:.0e}".replace("e-0", "e−")
         _note(axes, 0.75, f"nearly singular at every attitude:\nσ₃/σ₁ of τ is {ratio}")
     elif not singular and not drawn.any():
-        _note(axes, 0.35, "no attitude is out of reach")
+        _note(axes, 0.35, "no singular attitudes")
     if singular:
-        share = "at every attitude"
+        text = "singular at every attitude"
         if singular < len(curves):
-            share += f",\nat {singular} of {len(curves)} instants"
+            text += f",\nat {singular} of {len(curves)} instants"
         axes.set_facecolor("#F3F3F3")
-        _note(axes, 0.75 if singular < len(curves) else 0.35, f"singular {share}")
+        _note(axes, 0.75 if singular < len(curves) else 0.35, text)
     axes.plot(0.0, 0.0, "+", color=style.INK, ms=8, mew=1.2)
-    style.angle_axis(axes, "x", pi / 2)
-    style.angle_axis(axes, "y", pi / 2)
-    axes.set_aspect("equal")
-    axes.set_xlabel("roll φ (rad)")
-    axes.set_ylabel("pitch θ (rad)")
-    axes.set_title(f"Unacceptable attitudes, {gait.name}")
+    style.roll_pitch_axes(axes)
+    axes.set_title(f"Singular attitudes, {gait.name}")
     shown = {CURVE} if drawn.any() else set()
-    return shown | ({AREA} if allowed.any() and not singular else set())
+    return shown | ({AREA} if reachable.any() and not singular else set())
 
 
 def _note(axes: Axes, height: float, text: str) -> None:
@@ -162,10 +155,10 @@ def _roll_pitch_legend(figure: Figure, shown: set[str], *, constant: bool = Fals
     from matplotlib.patches import Patch
 
     line = style.RED if constant else style.GREY
-    always = "acceptable" if constant else "acceptable at all times"
+    reachable = "reachable" if constant else "reachable at all times"
     marks = {
-        AREA: Patch(facecolor=style.PALE, edgecolor=style.GREY, linewidth=0.4, label=always),
-        CURVE: Line2D([], [], color=line, lw=1.3, label="unacceptable"),
+        AREA: Patch(facecolor=style.PALE, edgecolor=style.GREY, linewidth=0.4, label=reachable),
+        CURVE: Line2D([], [], color=line, lw=1.3, label="singular"),
     }
     handles = [mark for name, mark in marks.items() if name in shown]
     handles.append(Line2D([], [], color=style.INK, marker="+", ls="", ms=8, mew=1.2, label="level"))

@@ -1,4 +1,4 @@
-"""One flight on a page: time series, path over the ground, and the roll-pitch plane (ch. 4)."""
+"""The figure of a rotorcraft's flight: time series, plan view, roll-pitch plane (ch. 4)."""
 
 from __future__ import annotations
 
@@ -26,29 +26,31 @@ from tiltsim.views.figures.flight_layout import (
     plan_view,
     widen,
 )
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from tiltsim.flight.flight import Flight
 
-FORBIDDEN: Final = "#F6DDD0"
+UNREACHABLE: Final = "#F6DDD0"
 INSTANTS: Final = 120
-"""Instants of the flight for which the plane shows what its gait forbids."""
+"""Number of instants whose unreachable attitudes the roll-pitch plane shows."""
 
-MANY: Final = 20
-"""A panel with more periods of a gait than this would be a solid band."""
+MAX_PERIODS: Final = 20
+"""Periods of a gait above which its tilt angles would be a solid band."""
 
-LAST: Final = 6
-"""So many periods are shown then."""
+SHOWN_PERIODS: Final = 6
+"""Number of periods that are shown instead, the last ones."""
 
 _ROTORS: Final = (1, 2, 3, 4)
 _SUBSCRIPTS: Final = "₁₂₃₄"
 
 
 def rotorcraft_figure(flight: Flight) -> Figure:
-    """What a rotorcraft did and how close it came to a singularity, on one page."""
+    """Time series, plan view, and the attitudes with their distance to singular ones."""
     with style.paper_style():
         figure = style.new_figure(*SIZE)
         add_headings(figure, flight)
@@ -70,34 +72,34 @@ def rotorcraft_figure(flight: Flight) -> Figure:
         return figure
 
 
-def _attitude(axes: Any, flight: Flight) -> None:
-    for angle, look in zip(("roll", "pitch", "yaw"), style.AXIS_LINES):
-        axes.plot(flight["time"], flight[angle], label=angle, **look)
+def _attitude(axes: Axes, flight: Flight) -> None:
+    for angle, line in zip(("roll", "pitch", "yaw"), style.AXIS_LINES):
+        axes.plot(flight["time"], flight[angle], label=angle, **line)
         axes.plot(flight["time"], flight[f"{angle}_ref"], color=style.INK, ls=":", lw=0.8)
     axes.plot([], [], color=style.INK, ls=":", lw=0.8, label="reference")
     label(axes, "Attitude", "rad", columns=4)
 
 
-def _altitude(axes: Any, flight: Flight) -> None:
+def _altitude(axes: Axes, flight: Flight) -> None:
     axes.plot(flight["time"], flight["z"], color=style.BLUE, label="actual")
     axes.plot(flight["time"], flight["z_ref"], color=style.INK, ls=":", lw=1.0, label="reference")
     widen(axes, 0.1)
     label(axes, "Altitude", "m")
 
 
-def _position_error(axes: Any, flight: Flight) -> None:
+def _position_error(axes: Axes, flight: Flight) -> None:
     follows = flight.assembly.follows_position
-    axes.axhline(0.0, color=style.GREY, lw=0.7)
-    for axis, look in zip("xyz", style.AXIS_LINES):
+    style.zero_lines(axes, "x")
+    for axis, line in zip("xyz", style.AXIS_LINES):
         if follows or axis == "z":
             error = flight[f"{axis}_ref"] - flight[axis]
-            axes.plot(flight["time"], error, label=axis, **look)
+            axes.plot(flight["time"], error, label=axis, **line)
     widen(axes, 0.1)
     label(axes, "Position error", "m")
 
 
-def _tilt_angles(axes: Any, flight: Flight) -> None:
-    end, begin = flight["time"][-1], _begin_of_gait(flight)
+def _tilt_angles(axes: Axes, flight: Flight) -> None:
+    end, begin = flight["time"][-1], _start_of_tilt_angles(flight)
     for rotor, line in zip(_ROTORS, style.ROTOR_LINES, strict=True):
         name = f"α{_SUBSCRIPTS[rotor - 1]}"
         axes.plot(flight["time"], flight[f"alpha_{rotor}"], label=name, **line)
@@ -110,16 +112,16 @@ def _tilt_angles(axes: Any, flight: Flight) -> None:
     label(axes, title, "rad", columns=4)
 
 
-def _begin_of_gait(flight: Flight) -> float:
-    """From when on (s) tilt angles are shown: all of them, or the last of very many periods."""
+def _start_of_tilt_angles(flight: Flight) -> float:
+    """The time (s) from which tilt angles are shown."""
     vehicle, end = flight.scenario.vehicle.resolve(), float(flight["time"][-1])
     if not isinstance(vehicle, Vehicle) or SUPERVISION in flight.columns:
         return 0.0
     period = flight.assembly.gait.period
-    return 0.0 if period is None or end <= MANY * period else end - LAST * period
+    return 0.0 if period is None or end <= MAX_PERIODS * period else end - SHOWN_PERIODS * period
 
 
-def _rotor_speeds(axes: Any, flight: Flight) -> None:
+def _rotor_speeds(axes: Axes, flight: Flight) -> None:
     for rotor, spin, line in zip(_ROTORS, SPIN, style.ROTOR_LINES, strict=True):
         speed = spin * flight[f"rotor_speed_{rotor}"]
         axes.plot(flight["time"], speed, label=f"{rotor}", **line)
@@ -131,38 +133,41 @@ def _rotor_speeds(axes: Any, flight: Flight) -> None:
     label(axes, "Rotor speeds", "rad/s", name="along the spin", columns=4)
 
 
-def _margin(axes: Any, flight: Flight) -> None:
+def _margin(axes: Axes, flight: Flight) -> None:
     time, margin = flight["time"], np.abs(flight["singularity_margin"])
     closest = int(np.argmin(margin))
     threshold = margin_threshold(flight.scenario)
-    axes.fill_between(time, 0.0, threshold, color=FORBIDDEN, lw=0.0)
-    words = f"below {threshold:g} rad"
-    axes.text(0.012, 0.03, words, transform=axes.transAxes, fontsize=7.5, color="#7A4A33")
+    axes.fill_between(time, 0.0, threshold, color=UNREACHABLE, lw=0.0)
+    text = f"below {threshold:g} rad"
+    axes.text(0.012, 0.03, text, transform=axes.transAxes, fontsize=7.5, color="#7A4A33")
     if SUPERVISION in flight.columns:
-        acts = flight[SUPERVISION] > SUPERVISION_THRESHOLD
         axes.axhline(threshold, color=style.RED, ls="--", lw=0.9)
         axes.fill_between(
-            *(time, 0.0, 1.0),
-            where=acts,
+            time,
+            0.0,
+            1.0,
+            where=flight[SUPERVISION] > SUPERVISION_THRESHOLD,
             transform=axes.get_xaxis_transform(),
-            **{"color": style.PALE, "lw": 0.0, "zorder": 0.5},
+            color=style.PALE,
+            lw=0.0,
+            zorder=0.5,
         )
-        words = "shaded: supervisor acts"
-        axes.text(0.99, 0.03, words, transform=axes.transAxes, ha="right", fontsize=8)
+        text = "shaded: supervisor active"
+        axes.text(0.99, 0.03, text, transform=axes.transAxes, ha="right", fontsize=8)
     axes.plot(time, margin, color=style.BLUE)
     axes.plot(time[closest], margin[closest], "o", color=style.RED, ms=5, clip_on=False, zorder=5)
     style.angle_axis(axes, "y", pi / 2)
     axes.set_ylim(0.0, pi / 2 * 1.04)
-    label(axes, f"Singularity margin, least {margin[closest]:.2f} rad", "rad")
+    label(axes, f"Singularity margin, minimum {margin[closest]:.2f} rad", "rad")
 
 
-def _roll_pitch_plane(axes: Any, flight: Flight) -> None:
-    """The attitudes flown, those out of reach, and the closest approach to a singular one."""
+def _roll_pitch_plane(axes: Axes, flight: Flight) -> None:
+    """The attitudes flown, unreachable ones, and the closest approach to a singular one."""
     n = torque_free_directions(flight.columns, flight.scenario.rotorcraft.resolve())
     margin = flight["singularity_margin"]
     closest = int(np.argmin(np.abs(margin)))
     side = float(np.sign(margin[0])) or 1.0
-    shaded = _shade_forbidden(axes, n, side)
+    shaded = _shade_unreachable(axes, n, side)
     attitude = np.stack([flight["roll"], flight["pitch"]], axis=1)
     axes.plot(*attitude.T, color=style.BLUE, lw=0.9)
     curve = singular_curves(n[[closest]], 181)[0]
@@ -173,23 +178,20 @@ def _roll_pitch_plane(axes: Any, flight: Flight) -> None:
         axes.plot(*np.stack([here, there]).T, color=style.INK, lw=1.0, ls="--")
     axes.plot(*here, "o", color=style.RED, ms=5, zorder=5)
     axes.text(
-        *(0.97, 0.03),
-        f"closest: {abs(margin[closest]):.2f} rad at {flight['time'][closest]:.2f} s",
+        0.97,
+        0.03,
+        f"minimum margin {abs(margin[closest]):.2f} rad at {flight['time'][closest]:.2f} s",
         transform=axes.transAxes,
         ha="right",
         fontsize=8,
         bbox={"facecolor": "white", "edgecolor": style.GREY, "linewidth": 0.5, "pad": 2.5},
     )
-    style.angle_axis(axes, "x", HALF_WIDTH)
-    style.angle_axis(axes, "y", HALF_WIDTH)
-    axes.set_aspect("equal")
-    axes.set_xlabel("roll φ (rad)")
-    axes.set_ylabel("pitch θ (rad)")
-    axes.set_title(f"Attitudes flown; {'shaded: out' if shaded else 'none is out'} of reach")
+    style.roll_pitch_axes(axes)
+    axes.set_title(f"Attitudes flown; {'shaded: unreachable' if shaded else 'all reachable'}")
 
 
-def _shade_forbidden(axes: Any, n: np.typing.NDArray[np.float64], side: float) -> bool:
-    """Shade what the gait puts out of reach, the darker the longer it does; whether it does."""
+def _shade_unreachable(axes: Axes, n: Floats, side: float) -> bool:
+    """Shade unreachable attitudes, darker where they are so for longer; False if there are none."""
     instants = np.unique(np.linspace(0, len(n) - 1, INSTANTS).round().astype(int))
     edges = np.linspace(-HALF_WIDTH, HALF_WIDTH, 361)
     centres = 0.5 * (edges[1:] + edges[:-1])
@@ -200,6 +202,6 @@ def _shade_forbidden(axes: Any, n: np.typing.NDArray[np.float64], side: float) -
     axes.grid(False)
     from matplotlib.colors import LinearSegmentedColormap
 
-    shades = LinearSegmentedColormap.from_list("forbidden", ["#FFFFFF", FORBIDDEN, "#E9B49A"])
+    shades = LinearSegmentedColormap.from_list("unreachable", ["#FFFFFF", UNREACHABLE, "#E9B49A"])
     axes.pcolormesh(edges, edges, share, cmap=shades, vmin=0.0, vmax=1.0, rasterized=True)
     return bool(share.any())

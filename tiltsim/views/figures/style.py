@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from math import pi
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.errors import InputError
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# After Okabe and Ito; each pair differs in lightness too, so that grey prints stay legible.
+# After Okabe and Ito; each pair also differs in lightness, so that grey prints stay legible.
 BLUE: Final = "#0072B2"
 RED: Final = "#D55E00"
 GREEN: Final = "#009E73"
@@ -27,31 +28,36 @@ GREY: Final = "#8A8A8A"
 PALE: Final = "#D6E6EF"
 CYCLE: Final = (BLUE, RED, GREEN, PURPLE, AMBER, SKY, INK)
 DASHES: Final[tuple[Any, ...]] = (
-    *("-", (0, (6, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2))),
-    *((0, (3, 1)), (0, (10, 3)), (0, (3, 1, 1, 1, 1, 1))),
+    "-",
+    (0, (6, 2)),
+    (0, (1, 1.2)),
+    (0, (6, 2, 1, 2)),
+    (0, (3, 1)),
+    (0, (10, 3)),
+    (0, (3, 1, 1, 1, 1, 1)),
 )
 MARKERS: Final = "os^DvPX"
-"""Dashes and markers that go with the colours of `CYCLE`, for prints without colour."""
+"""Dashes and markers that accompany the colours of `CYCLE`, for prints without colour."""
 SEQUENTIAL: Final = "cividis"
 
-# Equal angles and speeds would hide each other: later lines are thinner and broken.
+# Lines of equal angles and speeds would cover each other: later ones are thinner and dashed.
 ROTOR_LINES: Final[tuple[dict[str, Any], ...]] = (
     {"color": AMBER, "ls": "-", "lw": 3.0},
     {"color": BLUE, "ls": "-", "lw": 1.8},
     {"color": INK, "ls": (0, (4, 2)), "lw": 1.2},
     {"color": SKY, "ls": (0, (1, 1.2)), "lw": 1.6},
 )
-"""How the lines of rotors 1 to 4 are drawn in one panel, in this order."""
+"""Styles of the lines of rotors 1 to 4 in one panel."""
 
 AXIS_LINES: Final[tuple[dict[str, Any], ...]] = (
     {"color": BLUE, "ls": "-", "lw": 1.4},
     {"color": RED, "ls": (0, (5, 1.2)), "lw": 1.4},
     {"color": GREEN, "ls": (0, (5, 1.2, 1, 1.2)), "lw": 1.4},
 )
-"""How the lines of x, y, z, or roll, pitch, yaw, are drawn in one panel: as for rotors."""
+"""Styles of the lines of x, y, z, or roll, pitch, yaw, in one panel."""
 
 FORMATS: Final = (".png", ".svg", ".pdf")
-"""File formats of a figure, by the ending of the file."""
+"""Suffixes of figure files."""
 
 _SETTINGS: Final = {
     "font.family": "sans-serif",
@@ -84,13 +90,13 @@ _SETTINGS: Final = {
 
 
 def line_style(number: int) -> dict[str, Any]:
-    """Colour and dashes of a line among others, by its number."""
+    """Colour and dashes of the line with this number, from 0."""
     return {"color": CYCLE[number % len(CYCLE)], "ls": DASHES[number % len(DASHES)]}
 
 
 @contextmanager
 def paper_style() -> Iterator[None]:
-    """Draw within this context to have the common style, and leave no trace of it."""
+    """Apply the common style within this context."""
     from cycler import cycler
     from matplotlib import rc_context
 
@@ -99,7 +105,7 @@ def paper_style() -> Iterator[None]:
 
 
 def verbatim(text: str) -> str:
-    """A user's text for a figure, in which dollars are dollars and no formula begins."""
+    """A user's text with dollar signs escaped, so that matplotlib finds no formula in it."""
     return text.replace("$", r"\$")
 
 
@@ -112,8 +118,6 @@ def new_figure(width: float, height: float) -> Figure:
 
 def angle_axis(axes: Axes, axis: str, limit: float) -> None:
     """Ticks at multiples of pi/4 up to ``limit`` (rad) on axis "x" or "y"."""
-    from math import pi
-
     labels = {-2: "−π/2", -1: "−π/4", 0: "0", 1: "π/4", 2: "π/2"}
     steps = [step for step in labels if abs(step) * pi / 4 <= limit + 1e-9]
     set_ticks: Any = getattr(axes, f"set_{axis}ticks")
@@ -122,26 +126,40 @@ def angle_axis(axes: Axes, axis: str, limit: float) -> None:
     set_limits(-limit, limit)
 
 
+def roll_pitch_axes(axes: Axes) -> None:
+    """Axes of the roll-pitch plane up to pi/2 either way."""
+    angle_axis(axes, "x", pi / 2)
+    angle_axis(axes, "y", pi / 2)
+    axes.set(xlabel="roll φ (rad)", ylabel="pitch θ (rad)", aspect="equal")
+
+
+def zero_lines(axes: Axes, which: str = "xy") -> None:
+    """Thin lines along the "x" and "y" axes."""
+    if "x" in which:
+        axes.axhline(0.0, color=GREY, lw=0.7)
+    if "y" in which:
+        axes.axvline(0.0, color=GREY, lw=0.7)
+
+
 def time_axis(axes: Axes, end: float) -> None:
-    """Limits from zero to the end of a flight (s), which may have ended where it began."""
+    """Limits from zero to the end of a flight (s), which may be zero."""
     axes.set_xlim(0.0, end if end > 0.0 else 1.0)
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure whole or not at all; the ending of ``path`` chooses the format.
+    """Write a figure atomically, without a date, in the format of the path's suffix.
 
-    Equal figures give equal files: no date is written. Callers have asked
-    `tiltsim.system.files.prepare_file` whether the file can be written.
+    `tiltsim.system.files.prepare_file` checks a path beforehand.
 
     Raises
     ------
     InputError
-        If writing fails.
+        If the file cannot be written.
     """
-    ending = path.suffix.lower()
+    suffix = path.suffix.lower()
     undated = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
     try:
         with paper_style(), replacing(path) as temporary:
-            figure.savefig(temporary, format=ending[1:], metadata=undated.get(ending))
+            figure.savefig(temporary, format=suffix[1:], metadata=undated.get(suffix))
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from error

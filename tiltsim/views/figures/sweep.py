@@ -23,6 +23,7 @@ from tiltsim.views.figures.style import (
     new_figure,
     paper_style,
     verbatim,
+    zero_lines,
 )
 from tiltsim.views.figures.sweep_columns import (
     add_legend,
@@ -41,14 +42,14 @@ MAX_LINES: Final = len(CYCLE)
 
 
 def sweep_figure(results: SweepResults, metrics: tuple[str, ...] = ()) -> Figure:
-    """The figure that suits a sweep, or the one that its ``[plot]`` table asks for.
+    """The figure that the ``[plot]`` table of a sweep requests, or else one that suits its axes.
 
     Parameters
     ----------
     results
         From `tiltsim.sweeps.dataset.load_results`.
     metrics
-        What to draw; default: those of the ``[plot]`` table, else the first few.
+        The metrics; by default those of the ``[plot]`` table, else the first three that vary.
 
     Raises
     ------
@@ -67,12 +68,12 @@ def sweep_figure(results: SweepResults, metrics: tuple[str, ...] = ()) -> Figure
     chosen = _metrics(results, metrics)
     if not chosen and kind not in {"boundary", "plane"}:
         address = results.points.definition.address
-        raise InputError(f"{address}: metrics = []: none is kept, so there is nothing to draw")
+        raise InputError(f"{address}: metrics = []: the sweep has no metric to plot")
     with paper_style():
         figure = draw(results, chosen)
         title = results.points.sweep.title or results.points.definition.address
         missing = len(results.points) - len(results)
-        more = f" ({missing} of {len(results.points)} points still to come)" if missing else ""
+        more = f" ({missing} of {len(results.points)} points missing)" if missing else ""
         lines = fill(verbatim(title) + more, round(11.0 * figure.get_figwidth()))
         figure.suptitle(lines, x=0.01, ha="left", fontsize=10.5)
         return figure
@@ -96,17 +97,18 @@ def _text_axes(results: SweepResults) -> list[str]:
     return [key for key in keys if results.columns[key].dtype != np.float64]
 
 
-def _metrics(results: SweepResults, wanted: tuple[str, ...]) -> tuple[str, ...]:
-    # Results of an earlier tiltsim lack the metrics that came later.
-    kept = tuple(name for name in results.points.metrics if name in results.columns)
-    chosen = wanted or results.points.sweep.plot.metrics
+def _metrics(results: SweepResults, requested: tuple[str, ...]) -> tuple[str, ...]:
+    # Results of an earlier version lack later metrics.
+    available = tuple(name for name in results.points.metrics if name in results.columns)
+    chosen = requested or results.points.sweep.plot.metrics
     for name in chosen:
-        if name not in kept:
+        if name not in available:
             raise InputError(
                 f"{results.points.definition.address}: plot.metrics = {name!r}: not in these "
-                f"results; {choose(name, kept)}"
+                f"results; {choose(name, available)}"
             )
-    return chosen or tuple(name for name in kept if _varies(results.columns[name]))[:3] or kept[:1]
+    varying = tuple(name for name in available if _varies(results.columns[name]))
+    return chosen or varying[:3] or available[:1]
 
 
 def _varies(column: Column) -> bool:
@@ -115,7 +117,7 @@ def _varies(column: Column) -> bool:
 
 
 def _columns_for(results: SweepResults) -> tuple[str, str | None, str | None]:
-    """The columns for x, lines and panels: as the file says, else by the kind of axis."""
+    """The columns for x, lines and panels: those of the file, else by the type of axis."""
     plot = results.points.sweep.plot
     numeric, text = _numeric_axes(results), _text_axes(results)
     longest = max(numeric, key=lambda key: len(np.unique(results.columns[key])), default="index")
@@ -128,14 +130,9 @@ def _columns_for(results: SweepResults) -> tuple[str, str | None, str | None]:
 
 def _panel_grid(rows: int, columns: int, width: float, height: float) -> tuple[Figure, Any]:
     if rows * columns > MAX_PANELS:
-        raise InputError(f"plot: {rows * columns} panels, at most {MAX_PANELS}; choose a metric")
+        raise InputError(f"plot: {rows * columns} panels: at most {MAX_PANELS}; choose a metric")
     figure = new_figure(width * columns, 0.35 + height * rows)
     return figure, figure.subplots(rows, columns, squeeze=False)
-
-
-def _mark(number: int) -> dict[str, str]:
-    """The marker that goes with `line_style`."""
-    return {"marker": MARKERS[number % len(MARKERS)]}
 
 
 # --- lines ---------------------------------------------------------------------------------------
@@ -145,8 +142,8 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
     x, lines, panels = _columns_for(results)
     everything = np.ones(len(results), dtype=bool)
     columns = list(groups_of(results, panels, everything))
-    alone = len(columns) == 1
-    figure, grid = _panel_grid(len(metrics), len(columns), *((5.6, 3.0) if alone else (4.2, 2.7)))
+    width, height = (5.6, 3.0) if len(columns) == 1 else (4.2, 2.7)
+    figure, grid = _panel_grid(len(metrics), len(columns), width, height)
     abscissa, completed = results.values(x), completed_mask(results)
     for row, metric in zip(grid, metrics):
         for axes, (title, mask) in zip(row, columns):
@@ -155,17 +152,13 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
                 color, flown = CYCLE[number % MAX_LINES], group & completed
                 order = np.argsort(abscissa[group], kind="stable")
                 values = np.where(flown, results.columns[metric], np.nan)[group][order]
-                line = abscissa[group][order]
-                axes.plot(line, values, ms=3.5, label=name, **line_style(number), **_mark(number))
-                lost = line[np.isnan(values)]
-                height = 0.03 + 0.04 * (len(groups) - 1 - number)  # in the order of the legend
-                axes.plot(
-                    *(lost, np.full(len(lost), height), "x"),
-                    **{"color": color, "ms": 4, "transform": axes.get_xaxis_transform()},
-                )
-            axes.set_title(title)
-            axes.set_ylabel(label_of(metric))
-            axes.set_xlabel(label_of(x))
+                line, marker = abscissa[group][order], MARKERS[number % len(MARKERS)]
+                axes.plot(line, values, marker=marker, ms=3.5, label=name, **line_style(number))
+                missing = line[np.isnan(values)]
+                heights = np.full(len(missing), 0.03 + 0.04 * (len(groups) - 1 - number))
+                bottom = axes.get_xaxis_transform()
+                axes.plot(missing, heights, "x", color=color, ms=4, transform=bottom)
+            axes.set(title=title, xlabel=label_of(x), ylabel=label_of(metric))
     for axis in results.points.sweep.plot.log:
         for axes in grid.flat:
             getattr(axes, f"set_{axis}scale")("log")
@@ -173,13 +166,13 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
     if not completed.all():
         for axes in grid.flat:
             _make_room_below(axes, 0.03 + 0.04 * len(groups))
-        grid[0][0].plot([], [], "x", color=GREY, ms=4, label="lost, rows in this order")
+        grid[0][0].plot([], [], "x", color=GREY, ms=4, label="terminated early, in this order")
     add_legend(grid[0][0], lines)
     return figure
 
 
 def _share_limits(grid: Any) -> None:
-    """One scale a row, so that panels compare."""
+    """Use one y scale per row."""
     for row in grid:
         low = min(axes.get_ylim()[0] for axes in row)
         high = max(axes.get_ylim()[1] for axes in row)
@@ -188,7 +181,7 @@ def _share_limits(grid: Any) -> None:
 
 
 def _make_room_below(axes: Any, share: float) -> None:
-    """Leave the lowest ``share`` of a panel's height to the marks of lost flights."""
+    """Reserve a share of a panel's height at the bottom for the marks of terminated flights."""
     scale = axes.yaxis.get_transform()
     low, high = scale.transform(np.array(axes.get_ylim()))
     axes.set_ylim(bottom=scale.inverted().transform(low - (high - low) * share / (1.0 - share)))
@@ -204,7 +197,7 @@ def _map_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
     x = plot.x or next((key for key in numeric if key != plot.y), None)
     y = plot.y or next((key for key in numeric if key != x), None)
     if x is None or y is None:
-        raise InputError("plot.kind = 'map': needs two axes of numbers, or x and y")
+        raise InputError("plot.kind = 'map': needs two numeric axes, or x and y")
     panels = plot.panels or next(iter(_text_axes(results)), None)
     columns = list(groups_of(results, panels, np.ones(len(results), dtype=bool)))
     figure, grid = _panel_grid(len(metrics), len(columns), 4.0, 3.1)
@@ -221,18 +214,16 @@ def _map_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
             cells[rows, places] = values[mask]
             axes.set_facecolor(PALE)
             axes.grid(visible=False)
+            known_cells = np.ma.masked_invalid(cells)
             image = axes.pcolormesh(
-                *(xs, ys, np.ma.masked_invalid(cells)),
-                **{"cmap": SEQUENTIAL, "shading": "nearest", "rasterized": True, "norm": norm},
+                xs, ys, known_cells, cmap=SEQUENTIAL, norm=norm, shading="nearest", rasterized=True
             )
-            lost = mask & ~completed
-            axes.plot(abscissa[lost], ordinate[lost], "x", color=RED, ms=4, ls="none")
-            axes.set_title(title)
-            axes.set_xlabel(label_of(x))
-            axes.set_ylabel(label_of(y))
+            ended = mask & ~completed
+            axes.plot(abscissa[ended], ordinate[ended], "x", color=RED, ms=4, ls="none")
+            axes.set(title=title, xlabel=label_of(x), ylabel=label_of(y))
         figure.colorbar(image, ax=list(row), label=label_of(metric))
     if not completed.all():
-        figure.supxlabel("× lost", x=0.99, ha="right", fontsize=8, color=RED)
+        figure.supxlabel("× terminated early", x=0.99, ha="right", fontsize=8, color=RED)
     return figure
 
 
@@ -255,13 +246,10 @@ def _boundary_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure
             line, last, first = (v[group][order] for v in (abscissa, holds, fails))
             axes.plot(line, last, marker="o", ms=3.5, label=name, **line_style(number))
             axes.fill_between(line, last, first, color=color, alpha=0.25, lw=0)
-            whole = np.isnan(first)
-            axes.plot(line[whole], last[whole], "^", ms=6, color=color)
-            nowhere = np.isnan(last)
-            axes.plot(line[nowhere], first[nowhere], "x", ms=6, color=color)
-        axes.set_title(title)
-        axes.set_xlabel(label_of(x))
-        axes.set_ylabel(f"last {bisect.key} that holds")
+            always, never = np.isnan(first), np.isnan(last)
+            axes.plot(line[always], last[always], "^", ms=6, color=color)
+            axes.plot(line[never], first[never], "x", ms=6, color=color)
+        axes.set(title=title, xlabel=label_of(x), ylabel=f"last {bisect.key} that holds")
     _share_limits(grid)
     add_legend(grid[0][0], lines)
     _boundary_key(grid[0][-1], holds, fails)
@@ -269,10 +257,10 @@ def _boundary_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure
 
 
 def _boundary_key(axes: Axes, holds: Column, fails: Column) -> None:
-    words = ["▲ holds to the end"] if np.isnan(fails).any() else []
-    words += ["× fails at the start"] if np.isnan(holds).any() else []
-    place: Any = {"xycoords": "axes fraction", "ha": "right", "va": "bottom", "fontsize": 8}
-    axes.annotate("   ".join(words), (1.0, 1.015), **place)
+    texts = ["▲ holds to the end"] if np.isnan(fails).any() else []
+    texts += ["× fails at the start"] if np.isnan(holds).any() else []
+    text = axes.annotate("   ".join(texts), (1.0, 1.015), xycoords="axes fraction", fontsize=8)
+    text.set(ha="right", va="bottom")
 
 
 def _plane_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure:
@@ -280,38 +268,33 @@ def _plane_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure:
     if bisect is None or plot.x is None or plot.y is None:
         raise InputError("plot.kind = 'plane': needs a [bisect], x and y")
     columns = list(groups_of(results, plot.panels, np.ones(len(results), dtype=bool)))
-    wide = min(2, len(columns))
-    figure, grid = _panel_grid(-(-len(columns) // wide), wide, 4.4, 3.7)
+    per_row = min(2, len(columns))
+    figure, grid = _panel_grid(-(-len(columns) // per_row), per_row, 4.4, 3.7)
     x, y = results.values(plot.x), results.values(plot.y)
     holds, fails = results.columns[bisect.key], results.columns[f"{bisect.key}_beyond"]
     for axes, (title, mask) in zip(grid.flat, columns):
         for number, (name, group) in enumerate(groups_of(results, plot.lines, mask)):
             color = CYCLE[number % MAX_LINES]
             reached = group & ~np.isnan(holds)
-            whole = reached & np.isnan(fails)
+            always = reached & np.isnan(fails)
             # The outline in the order of the directions, closed.
-            turn = np.argsort(np.arctan2(y[reached], x[reached]), kind="stable")
-            outline = np.append(turn, turn[:1])
-            width = max(0.8, 4.0 - 0.8 * number)  # so that lines show under lines
+            order = np.argsort(np.arctan2(y[reached], x[reached]), kind="stable")
+            outline = np.append(order, order[:1])
+            width = max(0.8, 4.0 - 0.8 * number)  # so that lines below others are visible
             label = name if reached.any() else f"{name}: fails at {bisect.start:g}"
-            axes.plot(
-                *(x[reached][outline], y[reached][outline], "-"),
-                **{"lw": width, "color": color, "label": label},
-            )
-            axes.plot(x[reached & ~whole], y[reached & ~whole], "o", ms=width + 3.5, color=color)
-            axes.plot(x[whole], y[whole], "^", ms=width + 4.5, color=color)
-        axes.axhline(0.0, color=GREY, lw=0.6)
-        axes.axvline(0.0, color=GREY, lw=0.6)
+            outline_x, outline_y = x[reached][outline], y[reached][outline]
+            axes.plot(outline_x, outline_y, "-", lw=width, color=color, label=label)
+            axes.plot(x[reached & ~always], y[reached & ~always], "o", ms=width + 3.5, color=color)
+            axes.plot(x[always], y[always], "^", ms=width + 4.5, color=color)
+        zero_lines(axes)
         axes.set_aspect("equal", adjustable="datalim")
-        axes.set_title(title)
-        axes.set_xlabel(label_of(plot.x))
-        axes.set_ylabel(label_of(plot.y))
+        axes.set(title=title, xlabel=label_of(plot.x), ylabel=label_of(plot.y))
         add_legend(axes, plot.lines)
     for axes in grid.flat[len(columns) :]:
         axes.set_axis_off()
     reached = np.concatenate([x[~np.isnan(holds)], y[~np.isnan(holds)], [-1e-3, 1e-3]])
     for axes, (_, mask) in zip(grid.flat, columns):
-        if np.isnan(holds[mask]).all():  # nothing to see: as wide as the others
+        if np.isnan(holds[mask]).all():  # an empty panel: as wide as the others
             axes.plot([reached.min(), reached.max()], [reached.min(), reached.max()], alpha=0.0)
     _boundary_key(grid.flat[0], np.zeros(1), fails)
     return figure

@@ -1,4 +1,4 @@
-"""What figures of sweeps say of their columns: groups, labels, units, losses."""
+"""Columns of sweep results for figures: groups, labels, units, completed flights."""
 
 from __future__ import annotations
 
@@ -35,24 +35,34 @@ _KEY_UNITS: Final = {
 
 
 def sampled_keys(results: SweepResults) -> list[str]:
-    """The first key of every axis that is drawn from a distribution."""
+    """The first key of every axis that is sampled from a distribution."""
     axes = results.points.sweep.axis
     return [a.targets[0] for a in axes if isinstance(a, UniformAxis | NormalAxis)]
 
 
 def spans_decades(values: Column) -> bool:
-    """Whether values are all above zero and range over more than a decade or two."""
+    """Whether all values are positive and the largest is over 50 times the smallest."""
     known = values[~np.isnan(values)]
     return bool(known.size) and 0.0 < 50.0 * float(known.min()) < float(known.max())
 
 
 def completed_mask(results: SweepResults) -> Column:
-    """Which rows are flights that came to their end."""
+    """Whether the flight of each row was completed, shape (rows,)."""
     return np.array(results.columns["end"] == "completed")
 
 
 def groups_of(results: SweepResults, key: str | None, mask: Column) -> Iterator[tuple[str, Column]]:
-    """The values of a column among some rows, as text, each with its rows."""
+    """The distinct values of a column as text, each with the mask of its rows.
+
+    Parameters
+    ----------
+    results
+        The results of a sweep.
+    key
+        The column; None puts all rows into one group without a name.
+    mask
+        The rows to group.
+    """
     if key is None:
         yield "", mask
         return
@@ -63,21 +73,21 @@ def groups_of(results: SweepResults, key: str | None, mask: Column) -> Iterator[
 
 
 def text_of(value: Any) -> str:
-    """A value as figures write it."""
+    """A value as text for figures."""
     if isinstance(value, list):
         return "(" + ", ".join(map(text_of, value)) + ")"
     return f"{value:g}" if isinstance(value, float | int) else verbatim(str(value))
 
 
 def label_of(name: str) -> str:
-    """A column's name with its unit, where it is known."""
+    """A column's name with its unit if known."""
     key = name.partition("[")[0]
     unit = unit_of(name) if name in METRICS else _KEY_UNITS.get(key, "")
     return f"{name} ({unit})" if unit else name
 
 
 def add_legend(axes: Axes, title: str | None) -> None:
-    """A legend where there is anything to tell apart."""
+    """A legend if any line has a label."""
     handles, labels = axes.get_legend_handles_labels()
     if any(labels):
         axes.legend(handles, labels, title=title, title_fontsize=8, alignment="left")

@@ -24,9 +24,9 @@ BELOW: Final = "#F8F8F8"
 
 
 def map_figure(vehicle: Vehicle, paths: list[tuple[str, Path]] | None = None) -> Figure:
-    """Regions S_U and S_D of red, the curve L, P, and paths as pairs of label and path."""
+    """Regions S_U and S_D of red, the curve L, the point P, and paths given with their labels."""
     with style.paper_style():
-        figure = style.new_figure(5.4, 6.1)
+        figure = style.new_figure(5.4, 6.5)
         axes: Any = figure.subplots()
         axes.grid(False)
         limit = pi / 2
@@ -38,10 +38,9 @@ def map_figure(vehicle: Vehicle, paths: list[tuple[str, Path]] | None = None) ->
         )
         inside = np.linspace(-limit, limit, 801)[1:-1]
         axes.plot(inside, curve_l(inside, vehicle), color=style.INK, lw=1.6)
-        axes.plot(
-            *([-1, 1, 1, -1, -1], [-1, -1, 1, 1, -1]), color=style.GREY, lw=0.8, ls=(0, (5, 3))
-        )
-        # The other zeros of R, next to a quarter turn.
+        square_x, square_y = [-1, 1, 1, -1, -1], [-1, -1, 1, 1, -1]
+        axes.plot(square_x, square_y, color=style.GREY, lw=0.8, ls=(0, (5, 3)))
+        # The other zeros of R, close to pi/2.
         angle = delta(vehicle)
         axes.axvline(angle - limit, color=style.INK, lw=0.6, ls=":")
         axes.axhline(limit - angle, color=style.INK, lw=0.6, ls=":")
@@ -58,17 +57,17 @@ def map_figure(vehicle: Vehicle, paths: list[tuple[str, Path]] | None = None) ->
         axes.set_aspect("equal")
         axes.set_xlabel("α₁ (rad)")
         axes.set_ylabel("α₂ (rad)")
-        axes.set_title("Two Color Map: sign of R on red; blue is singular everywhere")
+        axes.set_title("Two Color Map: sign of R on red; blue is singular at every attitude")
         return figure
 
 
 def _draw_path(axes: Axes, label: str, path: Path, vehicle: Vehicle) -> set[str]:
-    """Draw a path; tells which marks the legend must explain."""
+    """Draw a path; returns its colours, and "crossing" if it crosses the curve L."""
     colors = {"red": style.RED, "blue": style.BLUE}
     looks = {"red": "-", "blue": (0, (4, 2))}
     for color, points in _outlines(path):
         axes.plot(*points.T, color=colors[color], ls=looks[color], lw=1.8)
-        # An arrow on the first third shows the direction of travel.
+        # An arrow at the first third shows the direction.
         start = max(1, len(points) // 3)
         axes.annotate(
             "",
@@ -76,15 +75,15 @@ def _draw_path(axes: Axes, label: str, path: Path, vehicle: Vehicle) -> set[str]
             xytext=tuple(points[start - 1]),
             arrowprops={"arrowstyle": "-|>", "color": colors[color], "lw": 1.4},
         )
-    verdict = check_path(path, vehicle)
+    check = check_path(path, vehicle)
     outline = np.concatenate([points[:-1] for _, points in _outlines(path)])
     corner = outline[np.argmax(outline @ [1.0, 1.0])]
-    mark = "" if verdict.accepted else ", refused"
+    mark = "" if check.accepted else ", refused"
     axes.annotate(label + mark, corner, (4, 3), textcoords="offset points", ha="left", fontsize=8.5)
-    for crossing in verdict.crossings:
+    for crossing in check.crossings:
         axes.plot(*crossing, "x", color=style.INK, ms=8, mew=1.8, zorder=6)
     shown = {color for color, _ in _outlines(path)}
-    return shown | ({"crossing"} if verdict.crossings else set())
+    return shown | ({"crossing"} if check.crossings else set())
 
 
 def _legend(figure: Figure, label_of_p: str, shown: set[str]) -> None:
@@ -98,20 +97,17 @@ def _legend(figure: Figure, label_of_p: str, shown: set[str]) -> None:
         Line2D([], [], color=style.INK, lw=1.6, label="L, R = 0: tan α₂ = tan α₁ − 2 tan δ"),
         Line2D([], [], color=style.INK, lw=0.6, ls=":", label="R = 0 as well"),
         Line2D([], [], color=style.AMBER, marker="o", mec=style.INK, ls="", label=label_of_p),
-        Line2D([], [], color=style.GREY, lw=0.8, ls=dashed, label="|α₁|, |α₂| ≤ 1, as ch. 8 asks"),
+        Line2D([], [], color=style.GREY, lw=0.8, ls=dashed, label="|α₁|, |α₂| ≤ 1 (ch. 8)"),
     ]
-    blue = Line2D([], [], color=style.BLUE, lw=1.8, ls=(0, (4, 2)), label="blue path: singular")
-    marks = [
-        (Line2D([], [], color=style.RED, lw=1.8, label="red path"), "red" in shown),
-        (blue, "blue" in shown),
-        (
-            Line2D(
-                [], [], color=style.INK, marker="x", mew=1.8, ls="", label="red meets L: singular"
-            ),
-            "crossing" in shown,
+    cross = "red crosses L: singular"
+    marks = {
+        "red": Line2D([], [], color=style.RED, lw=1.8, label="red path"),
+        "blue": Line2D(
+            [], [], color=style.BLUE, lw=1.8, ls=(0, (4, 2)), label="blue path: singular"
         ),
-    ]
-    handles += [mark for mark, is_shown in marks if is_shown]
+        "crossing": Line2D([], [], color=style.INK, marker="x", mew=1.8, ls="", label=cross),
+    }
+    handles += [mark for name, mark in marks.items() if name in shown]
     figure.legend(handles=handles, loc="outside lower center", ncols=2)
 
 
