@@ -294,7 +294,7 @@ def test_groups_of_a_distribution_are_told_apart_without_colour(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("", '[plot]\nkind = "map"', "needs two axes of numbers, or x and y"),
+        ("", '[plot]\nkind = "map"', "needs two numeric axes, or x and y"),
         ('title = "short flights"', "metrics = []", "the sweep has no metric to plot"),
         (
             "",

@@ -7,6 +7,7 @@ import pytest
 from tests.flights import flight
 from tests.views.recordings import entities
 from tiltsim.cli import main
+from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME
 from tiltsim.views.rerun.blueprint import flight_blueprint
@@ -15,7 +16,8 @@ from tiltsim.views.rerun.recording_file import make_recorders, new_recording
 
 def views_of(*scenarios, names=()):
     """The views of flights of these scenarios, by their titles."""
-    recorders = make_recorders(new_recording(scenarios, names), scenarios, names)
+    assemblies = [assemble(scenario) for scenario in scenarios]
+    recorders = make_recorders(new_recording(scenarios, names), assemblies, names)
     blueprint = flight_blueprint(recorders)
     found, waiting = {}, [blueprint.root_container]
     while waiting:

@@ -9,13 +9,14 @@ import pytest
 import tiltsim
 from tests.flights import SAMPLE_FIELDS, flight
 from tiltsim.flight.end import End
+from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.views.events import EventDetector, rotorcraft_conditions, tilt_car_conditions
 
 
 def flight_events(flight):
     """All events of a rotorcraft's flight, in order of time."""
-    detector = EventDetector(flight.scenario, rotorcraft_conditions)
+    detector = EventDetector(flight.assembly, rotorcraft_conditions)
     return [detector.opening(), *detector.observe(flight), *detector.closing(flight.end)]
 
 
@@ -26,7 +27,7 @@ def texts(events):
 def test_a_flight_without_incidents_has_an_opening_its_margin_and_an_end():
     first, closest, last = flight_events(flight("fixed"))
     assert first.text.startswith(
-        "tests/fixed: gait fixed, modified decoupler, attitude-altitude controller"
+        "tests/fixed: fixed gait, modified decoupler, attitude-altitude controller"
     )
     assert "minimum singularity margin: " in closest.text
     assert (last.text, last.level, last.time) == ("flight completed", "INFO", pytest.approx(1.2))
@@ -34,7 +35,7 @@ def test_a_flight_without_incidents_has_an_opening_its_margin_and_an_end():
 
 def test_the_opening_of_a_quadrotor_names_no_gait():
     scenario = load_scenario("ch01_gust/hover#quadrotor")
-    opening = EventDetector(scenario, rotorcraft_conditions).opening()
+    opening = EventDetector(assemble(scenario), rotorcraft_conditions).opening()
     assert opening.text == "Quadrotor: yaw-position controller, mujoco plant"
 
 
@@ -81,7 +82,7 @@ def test_a_flight_that_terminates_early_ends_with_its_cause():
 
 def test_a_flight_in_pieces_has_the_events_of_a_complete_one():
     this = flight("limited")
-    detector = EventDetector(this.scenario, rotorcraft_conditions)
+    detector = EventDetector(this.assembly, rotorcraft_conditions)
     pieces = [replace(this, samples=this.samples[at : at + 7]) for at in range(0, len(this), 7)]
     found = [detector.opening(), *(e for piece in pieces for e in detector.observe(piece))]
     assert [*found, *detector.closing(this.end)] == flight_events(this)

@@ -12,6 +12,7 @@ import tiltsim
 from tests.flights import BASE, RECIPES, SAMPLE_FIELDS, flight, saved
 from tiltsim.cli import main
 from tiltsim.flight.end import End
+from tiltsim.laws.assembling import assemble
 from tiltsim.views.figures import style
 from tiltsim.views.figures.comparison import comparison_figure
 from tiltsim.views.figures.flight import flight_figure
@@ -65,7 +66,7 @@ def test_lines_of_a_panel_differ_without_color(panel):
 def test_a_gait_of_very_many_periods_is_shown_by_its_last(period, shown):
     this = flight("trot")
     gait = this.scenario.gait.model_copy(update={"period": period})
-    this = replace(this, scenario=this.scenario.model_copy(update={"gait": gait}))
+    this = replace(this, assembly=assemble(this.scenario.model_copy(update={"gait": gait})))
     panels = axes_by_title(flight_figure(this))
     [title] = [title for title in panels if title.startswith("Tilt angles")]
     assert title.endswith(shown)
@@ -238,7 +239,7 @@ def test_flights_of_one_scenario_are_compared_by_their_folders(tmp_path, monkeyp
 def test_the_page_of_a_variant_names_it():
     def subtitle(address):
         scenario = tiltsim.parse_scenario(BASE | RECIPES["trot"], address)
-        page = flight_figure(replace(flight("trot"), scenario=scenario))
+        page = flight_figure(replace(flight("trot"), assembly=assemble(scenario)))
         title, line = (text.get_text() for text in page.texts)
         assert title == "A trot around a circle"
         return line

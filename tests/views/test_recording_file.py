@@ -57,8 +57,8 @@ def test_a_recording_has_all_entities_and_one_timeline(recorded):
     expected = {*SERIES, "/events", "/plane/attitude", "/plane/margin", "/plane/trail"}
     expected |= {"/world/vehicle", "/world/camera", "/world/trail", "/plane/forbidden"}
     expected |= {f"/world/vehicle/pod_{i}/thrust" for i in (1, 2, 3, 4)}
-    expected |= {f"/position_error/{axis}" for axis in error_axes(this.scenario)}
-    expected |= {f"/{level.path}" for level in rotorcraft_levels(this.scenario)}
+    expected |= {f"/position_error/{axis}" for axis in error_axes(this.assembly)}
+    expected |= {f"/{level.path}" for level in rotorcraft_levels(this.assembly)}
     if this.scenario.controller.decoupler != "none":
         expected.add("/world/reference/now")
     assert expected <= entities(path)
@@ -70,7 +70,7 @@ def test_time_series_are_those_of_the_parquet_file(recorded):
         times, values = scalars(path, entity)
         np.testing.assert_allclose(times, this["time"], atol=1e-9)
         np.testing.assert_array_equal(values, this[column])
-    for axis in error_axes(this.scenario):
+    for axis in error_axes(this.assembly):
         _, values = scalars(path, f"/position_error/{axis}")
         np.testing.assert_array_equal(values, this[f"{axis}_ref"] - this[axis])
 
@@ -170,7 +170,7 @@ def test_a_flight_in_pieces_is_recorded_like_a_whole_one(tmp_path):
         path = tmp_path / f"{size}.rrd"
         recording = new_recording([this.scenario])
         recording.save(path)
-        recorder = FlightRecorder(recording, this.scenario)
+        recorder = FlightRecorder(recording, this.assembly)
         recorder.begin()
         recorder.draw_references(this.end.time)
         for at in range(0, len(this), size):

@@ -9,18 +9,17 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from tiltsim.laws.assembling import loop_of
 from tiltsim.laws.layers.supervision import SUPERVISION
 from tiltsim.vehicles.saturation import at_lower_limit, at_upper_limit
 from tiltsim.views.attitude_plane import SUPERVISION_THRESHOLD, margin_threshold
-from tiltsim.views.titles import describe_controller
+from tiltsim.views.titles import describe_controller, describe_gait
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import SPIN
 
 if TYPE_CHECKING:
+    from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.flight.end import End
     from tiltsim.flight.flight import Flight
-    from tiltsim.scenario.scenario import Scenario
 
 Level = Literal["INFO", "WARN", "ERROR"]
 
@@ -51,30 +50,27 @@ class EventDetector:
 
     Parameters
     ----------
-    scenario
-        The scenario of the flight.
+    assembly
+        The assembly of the flight.
     conditions
         Yields the conditions to report for a piece of the flight, in a fixed order.
     """
 
     def __init__(
-        self, scenario: Scenario, conditions: Callable[[Flight], Iterator[Condition]]
+        self, assembly: Assembly, conditions: Callable[[Flight], Iterator[Condition]]
     ) -> None:
-        self._scenario = scenario
+        self._assembly = assembly
         self._conditions = conditions
         self._last_true: dict[str, float] = {}
         self._minimum_margin = (float("inf"), 0.0)  # rad, and its time in s
 
     def opening(self) -> Event:
         """The scenario, controller and plant of the flight."""
-        scenario = self._scenario
-        gait = f"gait {scenario.gait.type}, " if loop_of(scenario).uses_gait else ""
-        text = (
-            f"{scenario.title or scenario.address or 'flight'}: {gait}"
-            f"{', '.join(describe_controller(scenario))}, "
-            f"{scenario.simulation.plant} plant"
-        )
-        return Event(0.0, "INFO", text)
+        scenario = self._assembly.scenario
+        parts = [*describe_gait(self._assembly), *describe_controller(scenario)]
+        parts.append(f"{scenario.simulation.plant} plant")
+        title = scenario.title or scenario.address or "flight"
+        return Event(0.0, "INFO", f"{title}: {', '.join(parts)}")
 
     def observe(self, piece: Flight) -> list[Event]:
         """The events within the next piece of the flight, in order of time."""

@@ -21,7 +21,6 @@ from tiltsim_controllers.references.trajectories import position_reference
 
 if TYPE_CHECKING:
     from tiltsim.closed_loop.assembly import Assembly
-    from tiltsim.scenario.scenario import Scenario
 
 Columns = Mapping[str, Floats]
 
@@ -143,21 +142,11 @@ def reference_positions(columns: Columns) -> Floats:
     return np.stack([columns.get(f"{axis}_ref", zero) for axis in "xyz"], axis=1)
 
 
-def reference_path(scenario: Scenario, end: float, points: int) -> Floats:
-    """The reference position (m) at equidistant times, shape (points, 3).
-
-    Parameters
-    ----------
-    scenario
-        The scenario with the reference.
-    end
-        Last time, s; the first is zero.
-    points
-        Number of times.
-    """
-    reference, table = scenario.reference.parameters, scenario.reference.knots
+def reference_path(assembly: Assembly, end: float, points: int) -> Floats:
+    """The reference position (m) at ``points`` times from zero to ``end`` (s), shape (N, 3)."""
+    reference, knots = assembly.reference, assembly.knots
     times = np.linspace(0.0, end, points).tolist()
-    return np.array([position_reference(time, reference, table)[:3] for time in times])
+    return np.array([position_reference(time, reference, knots)[:3] for time in times])
 
 
 def _stack(columns: Columns, names: tuple[str, ...]) -> Floats:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from tiltsim.laws.assembling import loop_of
-
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.scenario.scenario import Scenario
 
 
@@ -65,9 +64,10 @@ def _endings(names: Sequence[str]) -> Iterator[list[str]]:
         yield ["/".join(part[-count:]) for part in parts]
 
 
-def describe_gait(scenario: Scenario) -> list[str]:
-    """The gait of a scenario for titles; empty for controllers without one."""
-    return [f"{scenario.gait.type} gait"] if loop_of(scenario).uses_gait else []
+def describe_gait(assembly: Assembly) -> list[str]:
+    """The gait of a flight for titles; empty for controllers without one."""
+    gait = assembly.scenario.gait.type.replace("_", " ")
+    return [f"{gait} gait"] if assembly.loop.uses_gait else []
 
 
 def describe_controller(scenario: Scenario) -> list[str]:

@@ -33,8 +33,8 @@ def add_headings(figure: Figure, flight: Flight) -> None:
     title = style.verbatim(scenario.title or scenario.address or "Flight")
     figure.text(0.012, 0.972, title, fontsize=12, fontweight="bold", va="center")
     parts = [style.verbatim(scenario.address.partition("#")[2])]
-    parts += [part.replace("_", " ") for part in describe_gait(scenario)]
-    parts += [*describe_controller(scenario), f"{scenario.simulation.plant} plant"]
+    parts += [*describe_gait(flight.assembly), *describe_controller(scenario)]
+    parts.append(f"{scenario.simulation.plant} plant")
     if end.kind == "completed":
         parts.append(f"completed after {end.time:g} s")
     else:

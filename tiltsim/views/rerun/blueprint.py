@@ -88,7 +88,7 @@ def _from_above(flight: FlightRecorder) -> rrb.EyeControls3D | None:
     """A camera straight above the reference, for vehicles that move in a plane."""
     if not flight.display.overview:
         return None
-    path = reference_path(flight.scenario, flight.scenario.simulation.duration, REFERENCE_POINTS)
+    path = reference_path(flight.assembly, flight.scenario.simulation.duration, REFERENCE_POINTS)
     x, y, _ = (0.5 * (path.min(axis=0) + path.max(axis=0))).tolist()
     height = OVERVIEW_HEIGHT * max(np.ptp(path, axis=0).max(), 1.0)
     return rrb.EyeControls3D(
@@ -124,7 +124,7 @@ def _plots(flights: Sequence[FlightRecorder]) -> tuple[list[rrb.View], list[floa
     Only the first plot of a comparison has a legend: colours are the same in all plots, and long
     names would cover half of each.
     """
-    panels = flights[0].display.panels(flights[0].scenario)
+    panels = flights[0].display.panels(flights[0].assembly)
     if len(flights) == 1:
         whole = [(panel.title, [f"{panel.path}/**"]) for panel in panels]
         return [_plot(*plot) for plot in whole], [panel.height for panel in panels]

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
+    from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.flight.flight import Flight
-    from tiltsim.scenario.scenario import Scenario
     from tiltsim.views.events import Condition
     from tiltsim.views.rerun.palette import Color
     from tiltsim.views.rerun.plane import AttitudePlane
@@ -73,7 +73,7 @@ class VehicleDisplay:
     conditions
         The conditions of a flight that are reported as events.
     panels, series, levels
-        The plots of a scenario's flights from top to bottom, and their lines.
+        The plots of a flight from top to bottom, and their lines.
     plane
         Draws the roll-pitch plane; None for vehicles without one.
     eye, up
@@ -83,9 +83,9 @@ class VehicleDisplay:
     """
 
     conditions: Callable[[Flight], Iterator[Condition]]
-    panels: Callable[[Scenario], tuple[Panel, ...]]
-    series: Callable[[Scenario], list[Series]]
-    levels: Callable[[Scenario], list[Level]]
+    panels: Callable[[Assembly], tuple[Panel, ...]]
+    series: Callable[[Assembly], list[Series]]
+    levels: Callable[[Assembly], list[Level]]
     plane: type[AttitudePlane] | None
     eye: tuple[float, float, float]
     up: tuple[float, float, float]

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import rerun as rr
 
-from tiltsim.laws.assembling import assemble, loop_of
 from tiltsim.views.events import Event, EventDetector
 from tiltsim.views.replay import visible_model
 from tiltsim.views.rerun import palette
@@ -19,9 +18,9 @@ from tiltsim.views.rerun.time_series import TimeSeries
 from tiltsim.views.rerun.timeline import send_rows
 
 if TYPE_CHECKING:
+    from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.flight.end import End
     from tiltsim.flight.flight import Flight
-    from tiltsim.scenario.scenario import Scenario
     from tiltsim.views.rerun.palette import Color
 
 DISPLAYS: Final[dict[str, VehicleDisplay]] = {
@@ -43,8 +42,8 @@ class FlightRecorder:
     ----------
     recording
         The recording to write to.
-    scenario
-        The scenario of the flight.
+    assembly
+        The assembly of the flight.
     name
         The flight's name in a comparison; empty for a single flight.
     color
@@ -56,7 +55,7 @@ class FlightRecorder:
     def __init__(
         self,
         recording: rr.RecordingStream,
-        scenario: Scenario,
+        assembly: Assembly,
         *,
         name: str = "",
         color: Color = palette.SKY,
@@ -66,26 +65,26 @@ class FlightRecorder:
         part = rr.escape_entity_path_part(name) if name else ""
         suffix = f"/{part}" if name else ""
         self.name = name
-        self.scenario = scenario
-        self.assembly = assemble(scenario)
-        self.model = visible_model(self.assembly)
-        self.display = display = DISPLAYS[loop_of(scenario).kind.name]
-        self.scene = Scene(recording, scenario, self.model, f"world{suffix}", color, name)
+        self.scenario = scenario = assembly.scenario
+        self.assembly = assembly
+        self.model = visible_model(assembly)
+        self.display = display = DISPLAYS[assembly.loop.kind.name]
+        self.scene = Scene(recording, assembly, self.model, f"world{suffix}", color, name)
         self.plane = None
         if display.plane is not None:
             self.plane = display.plane(recording, scenario, f"plane{suffix}", color, bool(name))
-        series = self._comparison(color) if name else display.series(scenario)
+        series = self._comparison(color) if name else display.series(assembly)
         self._series = TimeSeries(recording, series, f"{part}/" if name else "")
         self._recording = recording
         self._first = first
-        self._events = EventDetector(scenario, display.conditions)
+        self._events = EventDetector(assembly, display.conditions)
         self._event_path = f"events{suffix}"
 
     def _comparison(self, color: Color) -> list[Series]:
         """The lines of this flight in a comparison."""
         return [
             Series(f"{panel.path}/{compared.name}", self.name, color, compared.values)
-            for panel in self.display.panels(self.scenario)
+            for panel in self.display.panels(self.assembly)
             for compared in panel.compared
         ]
 
@@ -104,7 +103,7 @@ class FlightRecorder:
         """Log the path of the reference and the level lines up to a time (s)."""
         self.scene.draw_reference(end)
         if self._first:
-            self._series.draw_levels(self.display.levels(self.scenario), end)
+            self._series.draw_levels(self.display.levels(self.assembly), end)
 
     def append(self, piece: Flight) -> None:
         """Log the next piece of the flight."""

@@ -14,6 +14,7 @@ import rerun as rr
 
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
+from tiltsim.laws.assembling import assemble
 from tiltsim.views.rerun.blueprint import flight_blueprint
 from tiltsim.views.rerun.flight_recorder import FlightRecorder
 from tiltsim.views.rerun.recording_file import new_recording
@@ -51,10 +52,10 @@ class LiveStream:
 
     def __init__(self, scenario: Scenario, url: str | None = None) -> None:
         require_viewer(url)
-        self._scenario = scenario
+        self._assembly = assemble(scenario)
         # A unique name: a viewer would merge two flights of one scenario into one recording.
         self._recording = new_recording([scenario], salt=uuid4().hex)
-        self._recorder = FlightRecorder(self._recording, scenario)
+        self._recorder = FlightRecorder(self._recording, self._assembly)
         blueprint = flight_blueprint([self._recorder], live=True)
         attach_viewer(self._recording, url, blueprint)
         self._samples: SimpleQueue[Floats] = SimpleQueue()
@@ -91,7 +92,7 @@ class LiveStream:
     def _send_all(self) -> None:
         try:
             self._recorder.begin()
-            self._recorder.draw_references(self._scenario.simulation.duration)
+            self._recorder.draw_references(self._assembly.scenario.simulation.duration)
             while not self._over.wait(SEND_INTERVAL):
                 self._send_queued()
             self._send_queued()
@@ -111,9 +112,7 @@ class LiveStream:
             pass
         if samples:
             now = float(samples[-1][0])
-            piece = Flight(
-                self._recorder.assembly, np.array(samples), End("completed", now), "python", 0.0
-            )
+            piece = Flight(self._assembly, np.array(samples), End("completed", now), "python", 0.0)
             self._recorder.append(piece)
 
 

@@ -105,10 +105,11 @@ def serve() -> None:
     # The pipe breaks if the parent process has ended; its answer is then not needed.
     with suppress(BrokenPipeError), os.fdopen(os.dup(1), "wb") as answer:
         os.dup2(2, 1)  # keep library output out of the answer
+        from tiltsim.laws.assembling import assemble
         from tiltsim.views.rerun.recording_file import RecordingFile
 
         try:
-            file = RecordingFile([pickle.load(sys.stdin.buffer)])
+            file = RecordingFile([assemble(pickle.load(sys.stdin.buffer))])
             flight, path = pickle.load(sys.stdin.buffer)
         except (EOFError, pickle.UnpicklingError):  # the latter for an incomplete message
             os._exit(0)

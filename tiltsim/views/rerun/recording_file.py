@@ -18,6 +18,7 @@ from tiltsim.views.rerun.requirements import require_rerun
 from tiltsim.views.titles import common_title, flight_names
 
 if TYPE_CHECKING:
+    from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.flight.flight import Flight
     from tiltsim.scenario.scenario import Scenario
 
@@ -36,19 +37,19 @@ class RecordingFile:
 
     Parameters
     ----------
-    scenarios
-        The scenarios of the flights.
+    assemblies
+        The assemblies of the flights.
     names
         Names of several flights, by default `flight_names`.
     """
 
-    def __init__(self, scenarios: Sequence[Scenario], names: Sequence[str] = ()) -> None:
-
+    def __init__(self, assemblies: Sequence[Assembly], names: Sequence[str] = ()) -> None:
         require_rerun()
         # Flushed by row and byte counts only: timed flushes would make no two files equal.
         batching = rr.ChunkBatcherConfig(flush_tick=FLUSH_INTERVAL)
+        scenarios = [assembly.scenario for assembly in assemblies]
         self._recording = new_recording(scenarios, names, batching=batching)
-        self._recorders = make_recorders(self._recording, scenarios, names)
+        self._recorders = make_recorders(self._recording, assemblies, names)
         for recorder in self._recorders:
             recorder.begin()
         blueprint = flight_blueprint(self._recorders)
@@ -57,7 +58,7 @@ class RecordingFile:
         self._recording.send_blueprint(blueprint, make_active=False, make_default=True)
 
     def save(self, flights: Sequence[Flight], path: Path) -> None:
-        """Write the flights, one per scenario, atomically; equal flights give equal files.
+        """Write the flights, one per assembly, atomically; equal flights give equal files.
 
         Raises
         ------
@@ -76,7 +77,7 @@ class RecordingFile:
 
 def save_recording(flights: Sequence[Flight], path: Path, names: Sequence[str] = ()) -> None:
     """Write flights into one recording file; see `RecordingFile`."""
-    RecordingFile([flight.scenario for flight in flights], names).save(flights, path)
+    RecordingFile([flight.assembly for flight in flights], names).save(flights, path)
 
 
 def new_recording(
@@ -118,21 +119,21 @@ def new_recording(
 
 
 def make_recorders(
-    recording: rr.RecordingStream, scenarios: Sequence[Scenario], names: Sequence[str] = ()
+    recording: rr.RecordingStream, assemblies: Sequence[Assembly], names: Sequence[str] = ()
 ) -> list[FlightRecorder]:
     """One recorder per flight; several flights have distinct names and colours."""
-    if len(scenarios) == 1:
-        return [FlightRecorder(recording, scenarios[0])]
-    names = names or flight_names(scenarios)
+    if len(assemblies) == 1:
+        return [FlightRecorder(recording, assemblies[0])]
+    names = names or flight_names([assembly.scenario for assembly in assemblies])
     return [
         FlightRecorder(
             recording,
-            scenario,
+            assembly,
             name=name,
             color=palette.FLIGHTS[index % len(palette.FLIGHTS)],
             first=index == 0,
         )
-        for index, (scenario, name) in enumerate(zip(scenarios, names, strict=True))
+        for index, (assembly, name) in enumerate(zip(assemblies, names, strict=True))
     ]
 
 

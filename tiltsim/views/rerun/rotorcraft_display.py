@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltsim.laws.assembling import follows_position, loop_of
 from tiltsim.laws.layers.supervision import SUPERVISION
 from tiltsim.views.attitude_plane import margin_threshold
 from tiltsim.views.events import rotorcraft_conditions
@@ -26,8 +25,8 @@ from tiltsim.views.rerun.plane import AttitudePlane
 from tiltsim_controllers.vehicle.parameters import SPIN
 
 if TYPE_CHECKING:
+    from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.flight.flight import Flight
-    from tiltsim.scenario.scenario import Scenario
     from tiltsim.views.rerun.display import Values
     from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -49,7 +48,7 @@ def _slowest(flight: Flight) -> Floats:
 
 
 def _distance(flight: Flight) -> Floats:
-    return distance(flight, error_axes(flight.scenario))
+    return distance(flight, error_axes(flight.assembly))
 
 
 PANELS: Final = (
@@ -91,14 +90,14 @@ PANELS: Final = (
 """The plots from top to bottom; their legends fit a window of 1600 by 1000 pixels."""
 
 
-def panels(scenario: Scenario) -> tuple[Panel, ...]:
-    """The plots of a scenario's flights; a quadrotor has no tilt angles."""
-    tilts = scenario.vehicle.has_tilting_rotors
+def panels(assembly: Assembly) -> tuple[Panel, ...]:
+    """The plots of a flight; a quadrotor has no tilt angles."""
+    tilts = assembly.scenario.vehicle.has_tilting_rotors
     return tuple(panel for panel in PANELS if tilts or panel.path != "tilt_angles")
 
 
-def rotorcraft_series(scenario: Scenario) -> list[Series]:
-    """The lines of the plots of a scenario's flights."""
+def rotorcraft_series(assembly: Assembly) -> list[Series]:
+    """The lines of the plots."""
     series = []
     for angle, color in _ANGLE_COLORS.items():
         series.append(Series(f"attitude/{angle}", angle, color, column(angle)))
@@ -115,22 +114,22 @@ def rotorcraft_series(scenario: Scenario) -> list[Series]:
         series.append(Series(f"rotor_speeds/{name}", f"rotor {rotor}", color, values, width))
     margin = column("singularity_margin")
     series.append(Series("singularity/margin", "margin", AMBER, margin, 2.5))
-    if SUPERVISION in loop_of(scenario).columns.units:
+    if SUPERVISION in assembly.loop.columns.units:
         path, label = f"singularity/{SUPERVISION}", "supervisor, 0 to 1"
         series.append(Series(path, label, SKY, column(SUPERVISION)))
-    for axis in error_axes(scenario):
+    for axis in error_axes(assembly):
         series.append(Series(f"position_error/{axis}", axis, _AXIS_COLORS[axis], error(axis)))
     return series
 
 
-def rotorcraft_levels(scenario: Scenario) -> list[Level]:
+def rotorcraft_levels(assembly: Assembly) -> list[Level]:
     """Rotor speed limits, singularity, and the threshold of the singularity margin."""
-    threshold = margin_threshold(scenario)
+    threshold = margin_threshold(assembly.scenario)
     levels = [
         Level("singularity/threshold", f"threshold {threshold:g}", RED, threshold),
         Level("singularity/singular", "singular", GREY, 0.0),
     ]
-    vehicle = scenario.rotorcraft
+    vehicle = assembly.scenario.rotorcraft
     for name, label, limit in (
         ("min", "lower limit", vehicle.min_rotor_speed),
         ("max", "upper limit", vehicle.max_rotor_speed),
@@ -140,9 +139,9 @@ def rotorcraft_levels(scenario: Scenario) -> list[Level]:
     return levels
 
 
-def error_axes(scenario: Scenario) -> str:
-    """The axes along which the scenario's controller follows the reference."""
-    return "xyz" if follows_position(scenario) else "z"
+def error_axes(assembly: Assembly) -> str:
+    """The axes along which the controller follows the reference."""
+    return "xyz" if assembly.follows_position else "z"
 
 
 ROTORCRAFT_DISPLAY: Final = VehicleDisplay(

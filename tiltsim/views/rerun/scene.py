@@ -8,7 +8,6 @@ import mujoco
 import numpy as np
 import rerun as rr
 
-from tiltsim.laws.assembling import follows_position
 from tiltsim.views.replay import (
     first_free_body,
     joint_positions,
@@ -27,8 +26,8 @@ from tiltsim.views.rerun.timeline import Ticks, send_rows, trail_segments
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
+    from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.flight.flight import Flight
-    from tiltsim.scenario.scenario import Scenario
     from tiltsim.views.rerun.palette import Color
 
 TRAIL_INTERVAL: Final = 0.1  # s between the corners of a trail
@@ -47,8 +46,8 @@ class Scene:
     ----------
     recording
         The recording to write to.
-    scenario
-        The scenario of the flight.
+    assembly
+        The assembly of the flight.
     model
         The vehicle's model, visual geometry included.
     root
@@ -62,7 +61,7 @@ class Scene:
     def __init__(
         self,
         recording: rr.RecordingStream,
-        scenario: Scenario,
+        assembly: Assembly,
         model: mujoco.MjModel,
         root: str,
         color: Color,
@@ -70,7 +69,7 @@ class Scene:
     ) -> None:
         self._recording = recording
         self._name = name
-        self._scenario = scenario
+        self._assembly = assembly
         self._model = model
         self._color = color
         self.root = root
@@ -80,7 +79,6 @@ class Scene:
         self._thrust = thrust_sites(model)
         self._thrust_scale = thrust_scale(model)
         self._floor_cell: Floats | None = None
-        self._follows = follows_position(scenario)
 
     @property
     def vehicle(self) -> str:
@@ -145,7 +143,7 @@ class Scene:
         send_rows(self._recording, self.camera, time, follow)
         self._append_trail(time, position)
         self._append_floor(time, position)
-        if self._follows:
+        if self._assembly.follows_position:
             reference = reference_positions(columns)
             point = rr.Points3D.columns(positions=reference.astype(np.float32))
             send_rows(self._recording, f"{self.root}/reference/now", time, point)
@@ -171,9 +169,9 @@ class Scene:
 
     def draw_reference(self, end: float) -> None:
         """Log the path of the reference up to a time (s), if the controller follows a position."""
-        if not self._follows:
+        if not self._assembly.follows_position:
             return
-        path = reference_path(self._scenario, end, REFERENCE_POINTS)
+        path = reference_path(self._assembly, end, REFERENCE_POINTS)
         now = rr.Points3D.from_fields(colors=[palette.WHITE], radii=[DOT])
         self._log(f"{self.root}/reference/now", now)
         if np.ptp(path, axis=0).max() > 0.0:

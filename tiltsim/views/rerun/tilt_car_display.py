@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from tiltsim.laws.assembling import loop_of
 from tiltsim.views.events import tilt_car_conditions
 from tiltsim.views.rerun.display import (
     REFERENCE_WIDTH,
@@ -20,8 +19,8 @@ from tiltsim.views.rerun.display import (
 from tiltsim.views.rerun.palette import AMBER, GREEN, GREY, PINK, RED, SKY, dimmed
 
 if TYPE_CHECKING:
+    from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.flight.flight import Flight
-    from tiltsim.scenario.scenario import Scenario
     from tiltsim.views.rerun.display import Values
     from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -60,18 +59,13 @@ PANELS: Final = (
 LYAPUNOV_PANEL: Final = Panel("lyapunov", "Lyapunov candidate (m²/s²)", 4.5)
 
 
-def has_lyapunov_candidate(scenario: Scenario) -> bool:
-    """Whether the flights of a scenario have a Lyapunov candidate."""
-    return "lyapunov" in loop_of(scenario).units
+def panels(assembly: Assembly) -> tuple[Panel, ...]:
+    """The plots of a flight."""
+    return (*PANELS, LYAPUNOV_PANEL) if "lyapunov" in assembly.loop.units else PANELS
 
 
-def panels(scenario: Scenario) -> tuple[Panel, ...]:
-    """The plots of a scenario's flights."""
-    return (*PANELS, LYAPUNOV_PANEL) if has_lyapunov_candidate(scenario) else PANELS
-
-
-def tilt_car_series(scenario: Scenario) -> list[Series]:
-    """The lines of the plots of a scenario's flights."""
+def tilt_car_series(assembly: Assembly) -> list[Series]:
+    """The lines of the plots."""
     bound, reference = dimmed(AMBER), dimmed(PINK)
     upper, lower = column("direction_upper"), column("direction_lower")
     series = [
@@ -87,12 +81,12 @@ def tilt_car_series(scenario: Scenario) -> list[Series]:
         Series("position_error/x", "x", RED, error("x")),
         Series("position_error/y", "y", GREEN, error("y")),
     ]
-    if has_lyapunov_candidate(scenario):
+    if "lyapunov" in assembly.loop.units:
         series.append(Series("lyapunov/candidate", "candidate", PINK, column("lyapunov")))
     return series
 
 
-def tilt_car_levels(_scenario: Scenario) -> list[Level]:
+def tilt_car_levels(_assembly: Assembly) -> list[Level]:
     """The minimum of the squared rotor speeds."""
     return [Level("inputs/minimum", "minimum", GREY, 0.0)]
 

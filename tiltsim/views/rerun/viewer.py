@@ -45,9 +45,8 @@ def view_flights(
     from tiltsim.views.rerun.recording_file import make_recorders, new_recording, write_flights
 
     require_viewer(url)
-    scenarios = [flight.scenario for flight in flights]
-    recording = new_recording(scenarios, names)
-    recorders = make_recorders(recording, scenarios, names)
+    recording = new_recording([flight.scenario for flight in flights], names)
+    recorders = make_recorders(recording, [flight.assembly for flight in flights], names)
     attach_viewer(recording, url, flight_blueprint(recorders))
     for recorder in recorders:
         recorder.begin()

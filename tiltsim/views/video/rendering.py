@@ -108,7 +108,7 @@ class _Stage:
         self._arrow_scale = thrust_scale(model)
         self._reference: Floats | None = None
         if flight.assembly.follows_position:
-            path = reference_path(flight.scenario, float(flight["time"][-1]), REFERENCE_POINTS)
+            path = reference_path(flight.assembly, float(flight["time"][-1]), REFERENCE_POINTS)
             self._reference = path if np.ptp(path, axis=0).max() > 0.0 else path[:1]
         self._targets = reference_positions(flight.columns)
         self._position = positions(flight.columns)
