@@ -70,9 +70,9 @@ def test_what_rounds_to_other_digits_is_not(printed, part):
         ({"in_kind": (1.0, inf)}, 0.9, ClaimVerdict.NOT_REPRODUCED),
         ({"in_kind": (1.0, inf)}, 3.35, ClaimVerdict.REPRODUCED),
         ({"in_kind": (1.0, inf)}, nan, ClaimVerdict.NOT_REPRODUCED),
-        ({"wrong": True, "why": "a slip"}, 0.9, ClaimVerdict.WRONG),
-        ({"wrong": True, "why": "a slip"}, None, ClaimVerdict.WRONG),
-        ({"wrong": True, "why": "a slip"}, 3.35, ClaimVerdict.REPRODUCED),
+        ({"wrong": True, "why": "a misprint"}, 0.9, ClaimVerdict.WRONG),
+        ({"wrong": True, "why": "a misprint"}, None, ClaimVerdict.WRONG),
+        ({"wrong": True, "why": "a misprint"}, 3.35, ClaimVerdict.REPRODUCED),
         ({"why": "a reason"}, 0.9, ClaimVerdict.NOT_REPRODUCED),
     ],
 )
@@ -189,7 +189,7 @@ def test_a_flight_published_as_flown_and_lost_here_is_not_reproduced():
         ({"metric": "diverged", "equals": True, "min": None, "published": 1.0}, "expect.published"),
     ],
 )
-def test_a_claim_without_sense_is_refused_with_its_key(more, words):
+def test_an_invalid_claim_is_rejected_with_its_key(more, words):
     expect = {"metric": "final_roll", "min": 0.1} | more
     expect = {key: value for key, value in expect.items() if value is not None}
     with pytest.raises(InputError, match=words):

@@ -45,7 +45,7 @@ def test_coefficients_multiply_out_to_the_residuals():
 
 
 def test_chapter_3_prints_two_wrong_terms_of_the_determinant():
-    """Eq. (17): 2.880 stands at scss and sscs, and belongs to sccs and sscc."""
+    """Eq. (17): 2.880 is printed at scss and sscs, but belongs to sccs and sscc."""
     computed = determinant_coefficients(AR_DRONE)
     for part, (printed, exact) in enumerate(zip(EQ_17, computed, strict=True)):
         wrong = {n for n in exact if abs(exact[n] - printed.get(n, 0.0)) > 1e-3}
@@ -130,7 +130,7 @@ class RandomMetrics(dict):
         return self.random.random() < self.bad
 
     def __missing__(self, name):
-        # A rotor may rest and nothing saturate; what else is exactly zero says little.
+        # A rotor may rest and nothing saturate; other metrics are never exactly zero.
         can_be_zero = name in {"min_rotor_speed", "saturated_fraction"}
         zero = can_be_zero and self._is_bad()
         value = 0.0 if zero else 10.0 ** self.random.uniform(-3.0, 1.0)

@@ -62,9 +62,9 @@ def test_an_unsupported_plant_has_no_cell(report):
 
 
 def test_a_flight_that_terminates_early_has_no_final_values(report):
-    [lost] = rows_of(report, "The flight terminates early")
-    assert lost.verdict is ClaimVerdict.REPRODUCED
-    assert re.fullmatch(r"terminated at [\d.]+ s", measured_text(lost.claim, lost.cell("mujoco")))
+    [ended] = rows_of(report, "The flight terminates early")
+    assert ended.verdict is ClaimVerdict.REPRODUCED
+    assert re.fullmatch(r"terminated at [\d.]+ s", measured_text(ended.claim, ended.cell("mujoco")))
     [level] = rows_of(report, "It ends level")
     assert level.cell("thesis").measured is None
     assert level.verdict is ClaimVerdict.NOT_REPRODUCED
@@ -141,8 +141,8 @@ def test_a_flights_key_tells_apart_what_its_numbers_depend_on(library):
         flight_key(scenario.model_copy(update={"simulation": simulation})),
     }
     assert len(keys) == 3
-    words = scenario.model_copy(update={"title": "another", "source": "ours", "expect": ()})
-    assert flight_key(words) == flight_key(scenario)
+    retitled = scenario.model_copy(update={"title": "another", "source": "ours", "expect": ()})
+    assert flight_key(retitled) == flight_key(scenario)
 
 
 def test_a_changed_source_means_another_key(library, monkeypatch):
@@ -203,7 +203,7 @@ def full(report):
     return dataclasses.replace(report, findings=FINDINGS, drawings=[Drawing(picture, png(figure))])
 
 
-def test_the_page_needs_nothing_else(full):
+def test_the_page_is_self_contained(full):
     text = page(full)
     parser = Page()
     parser.feed(text)
@@ -217,7 +217,7 @@ def test_the_page_needs_nothing_else(full):
     assert not re.search(r"https?://|@import|url\(", text)
 
 
-def test_the_page_says_what_was_found(full):
+def test_the_page_contains_the_findings(full):
     text = page(full)
     assert "It does <code>not</code> end &lt;early&gt;." in text
     assert "A &lt;line&gt;" in text
@@ -232,8 +232,8 @@ def test_the_page_says_what_was_found(full):
 def test_rows_of_one_flight_are_told_by_their_metrics(report, library):
     [row] = rows_of(report, "The flight terminates early")
     claim = dataclasses.replace(row.claim, statement="Both", case="Blue")
-    wanted = claim.expectation.model_copy(update={"metric": "final_roll"})
-    other = dataclasses.replace(claim, expectation=wanted)
+    expectation = claim.expectation.model_copy(update={"metric": "final_roll"})
+    other = dataclasses.replace(claim, expectation=expectation)
     elsewhere = dataclasses.replace(claim, address=f"{library}/a_file.toml")
     rows = [dataclasses.replace(row, claim=one) for one in (claim, other)]
     assert [Group("Both", rows).case(one) for one in rows] == [
@@ -279,8 +279,8 @@ def test_the_summary_is_stable_and_well_formed(full, library, kept):
 
 def test_the_command_writes_both_and_tells_of_bounds(library, tmp_path, capsys):
     out, summary = tmp_path / "out", tmp_path / "summary.md"
-    words = ["report", f"{library}/bounded.toml", f"{library}/lost.toml", "--jobs", "2"]
-    code = main([*words, "--out", str(out), "--markdown", str(summary)])
+    arguments = ["report", f"{library}/bounded.toml", f"{library}/lost.toml", "--jobs", "2"]
+    code = main([*arguments, "--out", str(out), "--markdown", str(summary)])
     shown = capsys.readouterr().out
     assert code == EXPECTATION_FAILED
     assert "3 claims: 2 reproduced, 1 not reproduced" in shown
@@ -293,13 +293,13 @@ def test_the_command_writes_both_and_tells_of_bounds(library, tmp_path, capsys):
 def test_mistakes_are_one_clear_line(tmp_path, capsys):
     bad = tmp_path / "bad.toml"
     bad.write_text("[simulation]\nduration = -1.0\n", encoding="utf-8")
-    for words in (
+    for arguments in (
         ["report", str(bad), "--out", str(tmp_path / "out")],
         ["report", "no_such", "--out", str(tmp_path / "out")],
         ["report", "--out", str(bad)],
         ["report", "--markdown", str(tmp_path / "no" / "file.md"), "--out", str(tmp_path / "out")],
     ):
-        assert main(words) == INVALID_INPUT
+        assert main(arguments) == INVALID_INPUT
         captured = capsys.readouterr()
         assert captured.err.startswith("tiltsim: ")
         assert captured.err.count("\n") == 1

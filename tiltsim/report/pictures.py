@@ -261,14 +261,14 @@ PICTURES: Final[tuple[Picture, ...]] = (
     AnalysisPicture(
         6,
         "red-and-biased",
-        "Gait 3 (red) and its biased counterpart (ch. 6, Figs. 24, 25): the singular attitudes "
+        "Gait 3 (red) and its biased twin (ch. 6, Figs. 24, 25): the singular attitudes "
         "over a period. On red there are none.",
         draw=partial(_gait_and_biased, "ch06_gait_3"),
     ),
     AnalysisPicture(
         6,
         "blue-and-biased",
-        "Gait 1 (blue) as printed and its biased counterpart (ch. 6, Figs. 20, 21). The curves of "
+        "Gait 1 (blue) as printed and its biased twin (ch. 6, Figs. 20, 21). The curves of "
         "the printed gait result from the rounding of its angles: on the exact blue lines the "
         "matrix is singular at every attitude.",
         draw=partial(_gait_and_biased, "ch06_gait_1"),
@@ -282,7 +282,7 @@ PICTURES: Final[tuple[Picture, ...]] = (
     AnalysisPicture(
         8,
         "circle-and-biased",
-        "Gait 2 of ch. 8, a circle on red, and its biased counterpart.",
+        "Gait 2 of ch. 8, a circle on red, and its biased twin.",
         draw=partial(_gait_and_biased, "ch08_gait_2"),
     ),
     AnalysisPicture(

@@ -288,7 +288,7 @@ CLAIMS = (
     *(
         AnalysisClaim(
             source=f"ch. 6, Sec. 5, Fig. {_FIGURES[key]}",
-            statement="The gait is more robust than its biased counterpart",
+            statement="The gait is more robust than its biased twin",
             case=name,
             wrong=key in _BLUE,
             why=RANK if key in _BLUE else "",

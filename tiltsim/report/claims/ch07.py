@@ -32,7 +32,7 @@ CLAIMS = (
     *(
         AnalysisClaim(
             source=f"ch. 7, Sec. 3.2, Fig. {figure}",
-            statement="The gait is more robust than its biased counterpart",
+            statement="The gait is more robust than its biased twin",
             case=name,
             wrong=key == "ch07_gait_1",
             why=RANK if key == "ch07_gait_1" else "",

@@ -185,7 +185,7 @@ CLAIMS = (
     ),
     AnalysisClaim(
         source="ch. 8, Sec. 4.1, Fig. 10",
-        statement="The gait is more robust than its biased counterpart",
+        statement="The gait is more robust than its biased twin",
         case="Gait 1",
         wrong=True,
         why=_AT_P + RANK,
@@ -193,7 +193,7 @@ CLAIMS = (
     ),
     AnalysisClaim(
         source="ch. 8, Sec. 4.2, Fig. 12",
-        statement="The gait is more robust than its biased counterpart",
+        statement="The gait is more robust than its biased twin",
         case="Gait 2",
         measure=partial(is_more_robust, "ch08_gait_2"),
     ),
@@ -204,7 +204,7 @@ CLAIMS = (
     ),
     AnalysisClaim(
         source="ch. 8, Sec. 4.3, Fig. 14",
-        statement="Gait 3 and its biased counterpart both leave enough attitudes (0.2 rad)",
+        statement="Gait 3 and its biased twin both leave enough attitudes (0.2 rad)",
         wrong=True,
         why=RANK + " R of the biased gait changes sign.",
         measure=_both_are_sufficient,
