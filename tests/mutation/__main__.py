@@ -57,6 +57,7 @@ PYTEST += [
     "--no-header",
     "--tb=no",
 ]
+PYTEST += [f"--ignore={TESTS}/test_scalar_is_pure.py"]  # of how the code is written
 PYTEST += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # hypothesis is loaded already
 SURVIVED = {int(pytest.ExitCode.OK), int(pytest.ExitCode.NO_TESTS_COLLECTED)}
 

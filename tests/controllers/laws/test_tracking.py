@@ -21,14 +21,16 @@ from tests.controllers.laws.test_gait_feedforward import (
     third_derivatives,
 )
 from tests.thesis import force_matrix, torque_matrix
-from tiltsim_controllers.gaits.plans import two_color_circle
+from tiltsim_controllers.gaits.plans import keyframes
 from tiltsim_controllers.laws.decouplers import DECOUPLERS, exact_decoupler
 from tiltsim_controllers.laws.feedback import attitude_jerk
 from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms, tracking_inputs
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
 
 TIME = 0.7
-GAIT = two_color_circle((0.1, -0.2), 0.2, "red", 3.0, VEHICLE)
+GAIT = keyframes(
+    [(0.0, 0.1, 0.3, -0.3, 0.2), (0.6, 0.5, -0.2, 0.2, -0.3), (1.0, 0.1, 0.3, -0.3, 0.2)], 3.0
+)
 PATH = ReferenceParameters(
     REFERENCE_TYPES["lissajous"],
     x=0.2,
@@ -176,7 +178,7 @@ def test_the_attitude_follows_references_that_move_with_path_gait_and_error(law)
         motion = Motion(seed)
         inputs = tracking_inputs(
             *(TIME, motion.state(), tuple(GAIT.rates(TIME).tolist())),
-            *(tuple(motion.integrals.tolist()), law),
+            *(tuple(motion.integrals.tolist()), law, GAIT.knots),
         )
         expected = demanded_third_derivatives(motion, law)
         found = third_derivatives(motion.state(), GAIT.rates(TIME), inputs[:4])
@@ -201,7 +203,9 @@ def test_each_integrator_stops_where_its_own_axis_is_at_its_limit(axis, side):
         state = np.zeros(20)
         state[axis] = -side * share * bound
         state[12:16], state[16:20] = GAIT.angles(TIME), 300.0
-        rates = tracking_inputs(TIME, tuple(state.tolist()), (0.0,) * 4, (0.0,) * 3, law)[4:7]
+        rates = tracking_inputs(
+            TIME, tuple(state.tolist()), (0.0,) * 4, (0.0,) * 3, law, GAIT.knots
+        )[4:7]
         expected = [0.0, 0.0, 0.0]
         expected[axis] = side * share * bound if moves else 0.0
         assert rates == pytest.approx(expected, rel=1e-12)
