@@ -419,7 +419,7 @@ MISTAKES = {
     ),
     "a tilt-car's gait for a tiltrotor": (
         {"gait": {"type": "penguin_small"}},
-        "a gait of the tilt_car's; this vehicle has four tilt angles",
+        "is a gait of the tilt_car; this vehicle has four tilt angles",
     ),
     "a tiltrotor's gait for a tilt-car": (
         {**LAWS["tilt_car_planned_direction"], "gait": {"type": "fixed"}},

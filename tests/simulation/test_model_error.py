@@ -65,7 +65,11 @@ def test_no_error_is_no_difference():
     [
         ({"mass": 0.0}, {}, "model_error.mass = 0.0"),
         ({"gravity": 1.0}, {}, "model_error.gravity = 1.0: unknown key"),
-        ({"inertia": [1.0, 1.0, 3.0]}, {}, "model_error.inertia = [1.0, 1.0, 3.0]: no body"),
+        (
+            {"inertia": [1.0, 1.0, 3.0]},
+            {},
+            "model_error.inertia = [1.0, 1.0, 3.0]: not physically realizable",
+        ),
         (
             {"mass": 1.1},
             {

@@ -1,4 +1,4 @@
-"""The ``[[expect]]`` tables of a scenario: bounds on metrics, and the thesis' claims."""
+"""The ``[[expect]]`` tables of a scenario: bounds on metrics, and the thesis's claims."""
 
 from __future__ import annotations
 
@@ -12,29 +12,33 @@ from tiltsim.scenario.table import NonNegative, Range, Table
 
 
 class Expectation(Table):
-    """A bound on a metric, judged after the flight."""
+    """A bound on a metric, evaluated after the flight."""
 
     # An editor completes the names; the message on an unknown one is ours.
     metric: str = Field(json_schema_extra={"enum": list(METRICS)})
-    claim: str = Field("", description="what the thesis states, in our words, for the report")
+    claim: str = Field("", description="the thesis's statement, paraphrased for the report")
     published: float | bool | None = Field(
         None,
-        description="the thesis' figure, shown beside ours; true or false: does the metric, or the "
-        "statement that it lies within the bounds, hold in the thesis",
+        description="the thesis's value, shown beside the measured one; true or false: whether the "
+        "metric, or the statement that it lies within the bounds, holds in the thesis",
     )
     published_tolerance: NonNegative | None = Field(
-        None, description="how near counts as reproduced; default: half a unit of the last digit"
+        None,
+        description="largest deviation that counts as reproduced; default: half a unit of "
+        "the last digit",
     )
     in_kind: Range | None = Field(
-        None, description="where the claim still holds though the number differs"
+        None, description="range in which the claim holds qualitatively although the number differs"
     )
-    wrong: bool = Field(False, description="the claim is refuted, not merely not seen; needs why")
-    why: str = Field("", description="the reason where the claim does not come out")
+    wrong: bool = Field(
+        False, description="the claim is refuted, not merely not reproduced; needs why"
+    )
+    why: str = Field("", description="the reason why the claim is not reproduced")
     min: float | None = None
     max: float | None = None
     equals: bool | None = Field(None, description="for metrics that are true or false")
     plant: Literal["mujoco", "thesis"] | None = Field(
-        None, description="judge on this plant alone; default: on either"
+        None, description="evaluate on this plant only; default: on both"
     )
 
     @model_validator(mode="after")
@@ -45,10 +49,12 @@ class Expectation(Table):
         bounded = self.min is not None or self.max is not None
         if boolean and (bounded or self.equals is None):
             raise InvalidValueError(
-                "expect.metric", self.metric, "true or false: give equals alone"
+                "expect.metric", self.metric, "is true or false: give equals only"
             )
         if not boolean and (self.equals is not None or not bounded):
-            raise InvalidValueError("expect.metric", self.metric, "a number: give min, max or both")
+            raise InvalidValueError(
+                "expect.metric", self.metric, "is a number: give min, max or both"
+            )
         if self.min is not None and self.max is not None and self.min > self.max:
             raise InvalidValueError("expect.min", self.min, f"must not exceed max = {self.max}")
         self._check_claim(boolean)
@@ -66,7 +72,7 @@ class Expectation(Table):
                     raise InvalidValueError(
                         f"expect.{key}",
                         getattr(self, key),
-                        "needs published: a number, true, false",
+                        "needs published: a number, true or false",
                     )
         if published is None or isinstance(published, bool):
             for key in ("published_tolerance", "in_kind"):

@@ -25,7 +25,7 @@ from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
 class GaitTable(Table, ABC):
-    """What every gait can be told: a common scale, and a bias on the two rear angles."""
+    """The keys of every gait: a common scale, and a bias on the two rear angles."""
 
     scale: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(
         1.0, description="multiplies all angles (ch. 5: 1/n)"
@@ -33,7 +33,7 @@ class GaitTable(Table, ABC):
     bias: Factor = Field(1.0, description="eta, multiplies alpha_3 and alpha_4 (ch. 6)")
 
     def plan(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
-        """The gait, ready to be flown. Raises ValueError where the numbers make none."""
+        """The gait for a vehicle. Raises ValueError if the numbers do not define one."""
         return self.unscaled(vehicle).scaled(1.0 / self.scale).biased(self.bias)
 
     @abstractmethod
@@ -63,7 +63,7 @@ class FixedGait(GaitTable):
 
 
 class TrotGait(GaitTable):
-    """The cat trots of ch. 4, which differ in how they change sides."""
+    """The cat trots of ch. 4, which differ in how they switch sides."""
 
     type: Literal["trot_instant", "trot_continuous"]
     amplitude: Angle = Field(description="rho, rad")
@@ -81,7 +81,7 @@ class TrotGait(GaitTable):
 
 
 class CatGait(GaitTable):
-    """The cat gaits of ch. 5, reconstructed from published footfalls and what ch. 5 reports."""
+    """The cat gaits of ch. 5, reconstructed from published footfalls and the results of ch. 5."""
 
     type: Literal["walk", "run", "transverse_gallop", "rotary_gallop"]
     amplitude: Angle = Field(description="of a leg about its lean, rad")
@@ -99,7 +99,7 @@ class CatGait(GaitTable):
 
 
 class WaypointGait(GaitTable):
-    """A closed gait through given angles, straight in between."""
+    """A closed gait through given angles, linear in between."""
 
     type: Literal["waypoints"]
     angles: Annotated[tuple[Angles4, ...], Field(min_length=2, strict=False)] = Field(
@@ -107,7 +107,9 @@ class WaypointGait(GaitTable):
     )
     period: Period = Field(description="s")
     phases: Annotated[tuple[float, ...], Field(strict=False)] | None = Field(
-        None, description="share of the period of each waypoint, from 0; default: evenly spread"
+        None,
+        description="phase of each waypoint as a fraction of the period, from 0; default: "
+        "evenly spaced",
     )
 
     def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
@@ -121,7 +123,7 @@ class WaypointGait(GaitTable):
 
 
 class TwoColorLeg(Table):
-    """A part of a two-colour path: straight lines in one colour."""
+    """A part of a two-colour path: line segments in one colour."""
 
     color: Literal["red", "blue"]
     vertices: Annotated[tuple[Angles2, ...], Field(min_length=2, strict=False)] = Field(
@@ -132,7 +134,7 @@ class TwoColorLeg(Table):
 class TwoColorGait(GaitTable):
     """A path on the Two Color Map (ch. 6 to 8): a rectangle, a circle, or a path of legs.
 
-    The colour gives alpha_3 and alpha_4, on the exact lines of the vehicle at hand.
+    The colour gives alpha_3 and alpha_4, on the exact lines of the scenario's vehicle.
     """
 
     type: Literal["two_color"]
@@ -141,10 +143,10 @@ class TwoColorGait(GaitTable):
     rectangle: Annotated[tuple[Angles2, Angles2], Field(strict=False)] | None = Field(
         None, description="ranges of alpha_1 and of alpha_2, rad"
     )
-    centre: Angles2 | None = Field(None, description="of a circle, rad; goes with radius")
+    centre: Angles2 | None = Field(None, description="of a circle, rad; needs radius")
     radius: Positive | None = Field(None, description="rad")
     path: Annotated[tuple[TwoColorLeg, ...], Field(strict=False)] = Field(
-        (), description="legs of one colour each, closed; a colour switch belongs at P"
+        (), description="closed path of legs, each in one colour; colours switch at P"
     )
 
     @model_validator(mode="after")
@@ -169,7 +171,7 @@ class TwoColorGait(GaitTable):
     def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         """See `GaitTable.unscaled`."""
         if not isinstance(vehicle, Vehicle):
-            raise ValueError("a gait of four tilt angles; the tilt_car has one")
+            raise ValueError("has four tilt angles; the tilt_car has one")
         return four_angle_gait(self.curve, self.period, vehicle)
 
     @property
@@ -181,18 +183,18 @@ class TwoColorGait(GaitTable):
 
 
 class TiltCarGait(GaitTable):
-    """What the tilt-car's gaits share: they plan the direction of the thrusts."""
+    """Base of the tilt-car's gaits, which plan the direction of the thrusts."""
 
     def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         """See `GaitTable.unscaled`."""
         if not isinstance(vehicle, TiltCar):
-            raise ValueError("a gait of the tilt_car's; this vehicle has four tilt angles")
-        # The bottom disc turns back, so that the tilt must go further than the thrusts.
+            raise ValueError("is a gait of the tilt_car; this vehicle has four tilt angles")
+        # The bottom disc counter-rotates, so that the tilt exceeds the thrusts' rotation.
         return self.tilt(1.0 / turn_per_tilt(vehicle))
 
     @abstractmethod
     def tilt(self, per_direction: float) -> PlannedGait:
-        """The gait of the tilt angle, given how far it turns for a thrust direction of 1 rad."""
+        """The gait of the tilt angle, given the tilt for a thrust direction of 1 rad."""
 
 
 PENGUIN_SWINGS: Final = {"penguin_small": pi / 8, "penguin_large": pi / 3}
@@ -200,7 +202,7 @@ PENGUIN_SWINGS: Final = {"penguin_small": pi / 8, "penguin_large": pi / 3}
 
 
 class PenguinGait(TiltCarGait):
-    """The penguin-inspired swings of ch. 11: to one side for half a period, then to the other."""
+    """The penguin-inspired gaits of ch. 11: half a period on one side, half on the other."""
 
     type: Literal["penguin_small", "penguin_large"]
     amplitude: Angle | None = Field(
@@ -220,7 +222,7 @@ class PenguinGait(TiltCarGait):
 
 
 class RotatingGait(TiltCarGait):
-    """Thrusts that turn at a constant rate (ch. 10, Eq. 18)."""
+    """Thrusts that rotate at a constant rate (ch. 10, Eq. 18)."""
 
     type: Literal["rotating"]
     rate: Annotated[float, Field(ge=-1e3, le=1e3)] = Field(
@@ -242,4 +244,4 @@ Gait = Annotated[
     FixedGait | TrotGait | CatGait | WaypointGait | TwoColorGait | PenguinGait | RotatingGait,
     Field(discriminator="type"),
 ]
-"""The ``[gait]`` table, told apart by its type."""
+"""The ``[gait]`` table, discriminated by its type."""

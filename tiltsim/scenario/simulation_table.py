@@ -1,4 +1,4 @@
-"""The tables [simulation] and [initial]."""
+"""The tables ``[simulation]`` and ``[initial]``."""
 
 from __future__ import annotations
 
@@ -18,26 +18,28 @@ from tiltsim.scenario.table import (
 )
 
 MAX_STEPS: Final = 100_000_000
-"""Physics steps of a flight, more than a day at one millisecond."""
-
+"""Largest number of physics steps of a flight, more than a day at one millisecond."""
 
 MAX_LATENCY_STEPS: Final = 20
-"""Control samples on their way at once; each is eight states of the simulation."""
+"""Largest number of delayed control samples; each takes eight states of the simulation."""
 
 
 class SimulationTable(Table):
-    """How the flight is computed."""
+    """How the flight is integrated."""
 
     duration: Positive = Field(40.0, description="s")
     timestep: Annotated[float, Field(ge=1e-6, le=0.1)] = Field(0.001, description="s, physics")
     control_timestep: NonNegative = Field(
-        0.0, description="s; 0 evaluates the law at every integrator stage, else sample and hold"
+        0.0,
+        description="s; 0 evaluates the law at every integrator stage, other values sample "
+        "and hold",
     )
     control_latency: NonNegative = Field(
-        0.0, description="s from a reading to its command; a multiple of control_timestep"
+        0.0, description="s from a measurement to its command; a multiple of control_timestep"
     )
     record_timestep: Positive | None = Field(
-        None, description="s between recorded samples; default: the multiple of timestep near 0.01"
+        None,
+        description="s between recorded samples; default: the multiple of timestep closest to 0.01",
     )
     engine: Literal["auto", "python", "native"] = "auto"
     plant: Literal["mujoco", "thesis"] = "mujoco"
@@ -51,19 +53,19 @@ class SimulationTable(Table):
 
     @property
     def control_steps(self) -> int:
-        """Physics steps between control samples; 0 where control is continuous."""
+        """Physics steps between control samples; 0 if control is continuous."""
         return round(self.control_timestep / self.timestep)
 
     @property
     def latency_steps(self) -> int:
-        """Control samples between a reading and its command; 0 where there is no latency."""
+        """Control samples between a measurement and its command; 0 without latency."""
         return round(self.control_latency / self.control_timestep) if self.control_latency else 0
 
     @property
     def record_steps(self) -> int:
         """Physics steps between recorded samples."""
-        wanted = 0.01 if self.record_timestep is None else self.record_timestep
-        return max(1, round(wanted / self.timestep))
+        interval = 0.01 if self.record_timestep is None else self.record_timestep
+        return max(1, round(interval / self.timestep))
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -95,7 +97,7 @@ class SimulationTable(Table):
             raise InvalidValueError(
                 "simulation.control_latency",
                 latency,
-                "needs a control_timestep, of which it is a multiple",
+                "must be a multiple of control_timestep, which is 0",
             )
         steps = latency / period
         if abs(steps - round(steps)) > 1e-6 * steps or not 1 <= round(steps) <= MAX_LATENCY_STEPS:
@@ -114,10 +116,10 @@ class InitialTable(Table):
     attitude: Angles3 = Field((0.0, 0.0, 0.0), description="roll, pitch, yaw, rad")
     angular_velocity: Vector3 = Field((0.0, 0.0, 0.0), description="p, q, r, rad/s, body")
     rotor_speed: Positive | Positive4 | Positive2 = Field(
-        300.0, description="absolute value, rad/s; one for all rotors, or one each"
+        300.0, description="absolute value, rad/s; one for all rotors, or one per rotor"
     )
 
     def rotor_speeds(self, rotors: int) -> tuple[float, ...]:
-        """Absolute rotor speeds of so many rotors, one each."""
+        """Absolute rotor speeds (rad/s), one for each of a number of rotors."""
         speed = self.rotor_speed
         return speed if isinstance(speed, tuple) else (speed,) * rotors

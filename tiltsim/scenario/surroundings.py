@@ -1,4 +1,4 @@
-"""What a scenario puts around and into the vehicle: ground, air, disturbances, sensors, faults."""
+"""The tables of a vehicle's surroundings, disturbances, sensors and faults."""
 
 from __future__ import annotations
 
@@ -12,24 +12,25 @@ from tiltsim.scenario.table import Angle, Coordinate, NonNegative, Positive, Tab
 
 
 class GroundTable(Table):
-    """Ground to take off from and land on; without the table nothing touches."""
+    """Ground to take off from and land on; without this table there are no contacts."""
 
     height: float = Field(Ground.height, description="m, world")
     friction: Positive = Field(Ground.friction, description="coefficient of sliding friction")
 
 
 class Disturbance(Table):
-    """What pushes the vehicle without the control law knowing."""
+    """A constant acceleration that the controller does not know of."""
 
     type: Literal["acceleration"]
-    value: Vector3 = Field(description="m/s^2, world; acts on all that has mass, as gravity does")
+    value: Vector3 = Field(description="m/s^2, world; acts on every mass, as gravity does")
 
 
 class SensorTable(Table):
-    """What the law is told of its vehicle's motion; the truth by default.
+    """Measurements of the vehicle's motion that the controller receives; exact by default.
 
-    Every reading has its own zero-mean normal error of the given standard deviation on each axis,
-    drawn from ``simulation.seed``, and stands until the next. Tilts and rotor speeds are known.
+    Each measurement has its own zero-mean normal error of the given standard deviation on each
+    axis, drawn from ``simulation.seed``, and is held until the next. Tilts and rotor speeds are
+    exact.
     """
 
     position_noise: NonNegative = Field(0.0, description="m")
@@ -41,12 +42,12 @@ class SensorTable(Table):
     body_rates_noise: NonNegative = Field(0.0, description="rad/s")
     body_rates_bias: Vector3 = Field((0.0, 0.0, 0.0), description="rad/s, body")
     sample_time: Positive | None = Field(
-        None, description="s between readings; default: control_timestep, 0.01 if continuous"
+        None, description="s between measurements; default: control_timestep, 0.01 if continuous"
     )
 
     @property
     def have_errors(self) -> bool:
-        """Whether any reading differs from the truth."""
+        """Whether any measurement has an error."""
         return self.model_copy(update={"sample_time": None}) != SensorTable()
 
 
@@ -54,7 +55,7 @@ Rotor = Annotated[int, Field(ge=1, le=4)]
 
 
 class RotorLoss(Table):
-    """A rotor that makes neither thrust nor torque any more; its motor turns on."""
+    """A rotor that stops producing thrust and torque while its motor keeps turning."""
 
     type: Literal["rotor_loss"]
     rotor: Rotor
@@ -62,45 +63,47 @@ class RotorLoss(Table):
 
 
 class PartialThrust(Table):
-    """A rotor that makes only part of its thrust and drag torque."""
+    """A rotor that produces only a fraction of its thrust and drag torque."""
 
     type: Literal["partial_thrust"]
     rotor: Rotor
     time: NonNegative = Field(description="s")
-    factor: Annotated[float, Field(ge=0.0, le=2.0)] = Field(description="what is left, 1 for all")
+    factor: Annotated[float, Field(ge=0.0, le=2.0)] = Field(
+        description="remaining fraction, 1 for all"
+    )
 
 
 class StuckServo(Table):
-    """A tilt servo that holds one angle whatever it is told."""
+    """A tilt servo that holds one angle regardless of its command."""
 
     type: Literal["stuck_servo"]
     rotor: Rotor
     time: NonNegative = Field(description="s")
-    angle: Angle | None = Field(None, description="rad; default: what the gait plans at the time")
+    angle: Angle | None = Field(None, description="rad; default: the gait's angle at that time")
 
 
 Fault = Annotated[RotorLoss | PartialThrust | StuckServo, Field(discriminator="type")]
-
+"""A ``[[fault]]`` table, discriminated by its type."""
 
 NonNegative3 = Annotated[tuple[NonNegative, NonNegative, NonNegative], Field(strict=False)]
 
 
 class DragTable(Table):
-    """The force against the motion through the air, along each body axis."""
+    """Drag against the motion through the air, along each body axis."""
 
     linear: NonNegative3 = Field((0.0, 0.0, 0.0), description="N s/m")
     area: NonNegative3 = Field(
-        (0.0, 0.0, 0.0), description="m^2, drag coefficient times the area seen along the axis"
+        (0.0, 0.0, 0.0), description="m^2, drag coefficient times the area projected along the axis"
     )
 
 
 class GustTable(Table):
-    """A discrete gust, one minus cosine (MIL-F-8785C)."""
+    """A discrete gust of the shape 1 - cos (MIL-F-8785C)."""
 
     velocity: Vector3 = Field(description="m/s, world, at its peak")
     start: NonNegative = Field(0.0, description="s")
-    rise: Positive = Field(description="s, up to the peak and down again")
-    duration: NonNegative = Field(0.0, description="s, from start to end; 0: it stays")
+    rise: Positive = Field(description="time to reach the peak, and to decay from it, s")
+    duration: NonNegative = Field(0.0, description="s, from start to end; 0 for a gust that lasts")
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -120,7 +123,7 @@ class TurbulenceTable(Table):
     height: Annotated[float, Field(ge=3.048, le=304.8)] = Field(
         10.0, description="m above the ground, for intensity and scale"
     )
-    sample_time: Positive = Field(0.01, description="s for which a draw of the noise stands")
+    sample_time: Positive = Field(0.01, description="time for which a noise sample is held, s")
 
 
 class GroundEffectTable(Table):
@@ -134,7 +137,7 @@ class AirTable(Table):
     """The air around the vehicle; none by default."""
 
     density: Positive = Field(1.225, description="kg/m^3")
-    wind: Vector3 = Field((0.0, 0.0, 0.0), description="m/s, world: where the air goes")
+    wind: Vector3 = Field((0.0, 0.0, 0.0), description="velocity of the air, m/s, world")
     drag: DragTable = DragTable()
     gust: GustTable | None = None
     turbulence: TurbulenceTable | None = None
@@ -151,6 +154,6 @@ class AirTable(Table):
         ):
             if moves:
                 raise InvalidValueError(
-                    f"air.{key}", getattr(self, key), "acts through drag; give air.drag"
+                    f"air.{key}", getattr(self, key), "acts through drag only; set air.drag"
                 )
         return self

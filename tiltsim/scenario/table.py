@@ -1,4 +1,4 @@
-"""What the tables of a scenario file are made of."""
+"""Base class and number types of the tables of a scenario file."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-# The outer bounds keep arithmetic far from overflow; nothing that flies comes near them.
+# The outer bounds keep arithmetic far from overflow, and far beyond any real vehicle.
 Positive = Annotated[float, Field(gt=0.0, le=1e9)]
-NotTiny = Annotated[float, Field(ge=1e-12, le=1e9)]  # for what others are divided by
+NotTiny = Annotated[float, Field(ge=1e-12, le=1e9)]  # for divisors
 NonNegative = Annotated[float, Field(ge=0.0, le=1e9)]
 Period = Annotated[float, Field(ge=1e-3, le=1e9, description="s")]
 Factor = Annotated[float, Field(ge=-1e3, le=1e3)]
