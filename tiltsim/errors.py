@@ -1,11 +1,11 @@
-"""What can go wrong, in one line each."""
+"""Exceptions with one-line messages."""
 
 from __future__ import annotations
 
 
 class TiltsimError(Exception):
-    """Base of all errors that tiltsim raises on purpose."""
+    """Base of all errors that tiltsim raises deliberately."""
 
 
 class InputError(TiltsimError):
-    """The user gave something that cannot be used; the message is the one line to show."""
+    """Invalid input of the user; the message is one line to show."""

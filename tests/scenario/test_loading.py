@@ -549,7 +549,7 @@ def test_a_type_that_is_set_already_keeps_its_table(write):
 @pytest.mark.parametrize(
     ("key", "value", "shown", "allowed"),
     [
-        ("title.x", 3, "title.x = 3", "title is no table"),
+        ("title.x", 3, "title.x = 3", "title is not a table"),
         (
             "controller.decopler",
             "exact",
@@ -678,7 +678,7 @@ def test_an_unknown_key_is_told_before_the_one_it_leaves_missing(write):
 
 def test_a_single_table_of_a_list_is_told_how_to_write_it(write):
     line = refusal(write('[expect]\nmetric = "duration"\nmin = 1.0\n'))
-    assert "expect: one table where a list of tables stands; write [[expect]]" in line
+    assert "expect: must be a list of tables; write [[expect]]" in line
 
 
 # --- merging -----------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""A resolved scenario as a TOML document."""
+"""A scenario with all defaults filled in, as a TOML document."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ if TYPE_CHECKING:
 
 
 def scenario_toml(scenario: Scenario) -> str:
-    """A scenario with every default written out, as TOML that reads back to the same scenario."""
+    """A scenario with all defaults filled in, as TOML that reads back to the same scenario."""
     document = without_none(scenario.model_dump(mode="json"))
     return tomli_w.dumps(document)
 
 
 def without_none(value: Any) -> Any:
-    """A document without the keys that have no value, which TOML cannot hold."""
+    """A document without the keys whose value is None, which TOML cannot express."""
     if isinstance(value, dict):
         return {key: without_none(item) for key, item in value.items() if item is not None}
     if isinstance(value, list | tuple):

@@ -13,16 +13,16 @@ from tiltsim.resources import shipped_folder
 from tiltsim.scenario.messages import did_you_mean
 
 _SWEEP: Final = re.compile(r"^\s*\[\[?\s*(axis|bisect)\s*\]", re.MULTILINE)
-"""The tables that tell a sweep from a scenario."""
+"""The tables that distinguish a sweep from a scenario."""
 
 
 def find_scenario_file(path: str | Path) -> Path:
-    """The scenario file that a user means: a path as given, or a name from the library.
+    """The scenario file at a path, or of a name in the library.
 
-    Raises `InputError` where neither is a file.
+    Raises `InputError` if neither is a file.
     """
     if not str(path):
-        raise InputError("no scenario named; see tiltsim list")
+        raise InputError("name a scenario; see tiltsim list")
     given = Path(path)
     if given.is_file():
         return given
@@ -40,7 +40,7 @@ def find_scenario_file(path: str | Path) -> Path:
 
 
 def closest_in_library(path: str | Path) -> str:
-    """A question with the file or folder of the library that is called most like a path, if any."""
+    """A suggestion of the file or folder of the library with the most similar name, if any."""
     library = shipped_folder("scenarios")
     places = (place.relative_to(library) for place in library.rglob("*"))
     names = [place.with_suffix("").as_posix() for place in places]
@@ -60,10 +60,10 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def scenario_files(path: Path) -> list[Path]:
-    """All scenario files under a folder, sorted, sweeps left out; a file stands for itself."""
+    """All scenario files under a folder, sorted, without sweeps; a file is returned itself."""
     if not path.is_dir():
         return [path]
-    # What is no ordinary file is none of ours, but a broken link is told of.
+    # Special files are skipped, but broken links are kept, to be reported.
     files = (file for file in path.rglob("*.toml") if file.is_file() or file.is_symlink())
     return sorted(file for file in files if not is_sweep(file))
 
@@ -73,11 +73,11 @@ def is_sweep(file: Path) -> bool:
     try:
         return _SWEEP.search(file.read_text(encoding="utf-8-sig")) is not None
     except (OSError, UnicodeDecodeError):
-        return False  # whoever reads it will say what is wrong
+        return False  # reading it will report the error
 
 
 def library_name(path: Path) -> str:
-    """How a user addresses a file: without folder and suffix when it is in the library."""
+    """A file's address: without folder and suffix if it is in the library."""
     library = shipped_folder("scenarios")
     resolved = path.resolve()
     if resolved.is_relative_to(library.resolve()):
@@ -94,10 +94,10 @@ class Entry(NamedTuple):
 
 
 class Family(NamedTuple):
-    """A file of the library, and what its members add to it."""
+    """A file of the library, and its variants."""
 
     entry: Entry
-    members: tuple[Entry, ...]  # "#name", own title or else what differs, source where it differs
+    members: tuple[Entry, ...]  # "#name", title or changed keys, source if it differs
 
 
 def library_entries() -> Iterator[Entry]:
@@ -133,7 +133,7 @@ def _documents() -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def _differences(document: dict[str, Any], variant: dict[str, Any]) -> str:
-    """The keys that a variant sets otherwise than its family, with their values."""
+    """The keys that a variant changes, with their values."""
     changes: dict[str, Any] = {}
     for table, values in variant.items():
         if isinstance(values, dict):
@@ -143,7 +143,7 @@ def _differences(document: dict[str, Any], variant: dict[str, Any]) -> str:
 
 
 def _shorter(source: str, family: str) -> str:
-    """A member's source without the chapter and section that it shares with its family."""
+    """A member's source without the chapter and section shared with its family."""
     if source == family:
         return ""
     parts, shared = source.split(", "), family.split(", ")

@@ -16,10 +16,10 @@ from tiltsim.scenario.messages import choose, did_you_mean, one_line_message, sh
 from tiltsim.scenario.scenario import Scenario, Variant
 
 KIND_KEYS: Final = {"type": None, "law": DEFAULT_LAW}
-"""Keys that decide which others a table may have, with their defaults."""
+"""Keys that decide which other keys a table may have, with their defaults."""
 
 FILE_KEYS: Final = (("controller", "function", ".py:"), ("vehicle", "mjcf", ""))
-"""Keys that name files: table, key, and what a name of a file has in it."""
+"""Keys that name files: table, key, and a string that marks the value as a file name."""
 
 
 def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Scenario:
@@ -29,10 +29,10 @@ def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) 
     ----------
     path
         A TOML file or the name of a scenario in the library, with ``#variant`` for a member of a
-        family, for example ``ch04_tracking/setpoint#rho_065_modified``.
+        family; for example ``ch04_tracking/setpoint#rho_065_modified``.
     overrides
-        Values by dotted key, for example ``{"controller.decoupler": "exact"}``. A family without
-        ``#variant`` is only flown with overrides: they change its base.
+        Values by dotted key, for example ``{"controller.decoupler": "exact"}``. For a family
+        without ``#variant`` they are required and change its base.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) 
 
 
 def locate_named_files(document: Mapping[str, Any], folder: Path) -> None:
-    """Write out where the files lie that a scenario names: those without a folder in this one."""
+    """Make the file names in a document absolute, relative to a folder."""
     for table, key, mark in FILE_KEYS:
         keys = document.get(table)
         name = keys.get(key) if isinstance(keys, dict) else None
@@ -67,9 +67,21 @@ def locate_named_files(document: Mapping[str, Any], folder: Path) -> None:
 
 
 def apply_overrides(document: dict[str, Any], overrides: Mapping[str, Any], address: str) -> None:
-    """Put values in a document by dotted key, entries of lists as ``gait.angles[0]``.
+    """Set values in a document.
 
-    Raises `InputError` where a key leads nowhere; ``address`` names the document in messages.
+    Parameters
+    ----------
+    document
+        Changed in place.
+    overrides
+        Values by dotted key; entries of lists as ``gait.angles[0]``.
+    address
+        Name of the document in messages.
+
+    Raises
+    ------
+    InputError
+        If a key does not exist.
     """
     for key, value in _kinds_first(overrides):
         _override(address, document, key, value)
@@ -89,7 +101,7 @@ def parse_scenario(document: Mapping[str, Any], address: str = "scenario") -> Sc
 
 
 def variant_names(file: Path, document: Mapping[str, Any]) -> list[str]:
-    """The names of a file's variants, in order. Raises `InputError` where one is bad or double."""
+    """The names of a file's variants, in order. Raises `InputError` if one is bad or repeated."""
     names: list[str] = []
     variants = document.get("variant", [])
     if not isinstance(variants, list):
@@ -116,14 +128,14 @@ def _select_variant(file: Path, document: dict[str, Any], name: str) -> dict[str
     del chosen["name"]
     expectations = [base.pop("expect", []), chosen.pop("expect", [])]
     merged = merge(base, chosen)
-    # Whatever is no list goes on as it is and is refused with its own name.
+    # A value that is not a list is passed on, to be refused under its own key.
     wrong = [value for value in expectations if not isinstance(value, list)]
     merged["expect"] = wrong[0] if wrong else [*expectations[0], *expectations[1]]
     return merged
 
 
 def merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Base with changes on top, table by table; a table of another kind replaces the whole."""
+    """A document with changes, table by table; a table of another kind replaces the old one."""
     merged = dict(base)
     for key, value in changes.items():
         old = merged.get(key)
@@ -152,18 +164,21 @@ def _override(address: str, document: dict[str, Any], key: str, value: object) -
         if not isinstance(target, list) or last >= len(target):
             hint = _other_list(document, path)
             raise InputError(
-                f"{address}: {key} = {show(value)}: there is no such entry; {hint}give the whole "
+                f"{address}: {key} = {show(value)}: no such entry; {hint}give "
+                f"the whole "
                 f"list {key.rpartition('[')[0]}"
             )
     elif not isinstance(target, dict):
-        raise InputError(f"{address}: {key} = {show(value)}: {key.rpartition('.')[0]} is no table")
+        raise InputError(
+            f"{address}: {key} = {show(value)}: {key.rpartition('.')[0]} is not a table"
+        )
     elif last in KIND_KEYS and target.get(last, KIND_KEYS[last]) != value:
         target.clear()
     target[last] = value
 
 
 def _other_list(document: dict[str, Any], path: list[str | int]) -> str:
-    """Whether a list that is not there may be another, misspelt."""
+    """A suggestion for a list that does not exist and may be misspelt."""
     *above, name = path
     table: Any = document
     for step in above:
@@ -173,7 +188,7 @@ def _other_list(document: dict[str, Any], path: list[str | int]) -> str:
 
 
 def _enter(target: object, step: str | int) -> object:
-    """What lies under one step of a key; a table that is not there yet begins empty."""
+    """The value under one step of a key; a missing table is created empty."""
     if isinstance(step, int):
         return target[step] if isinstance(target, list) and step < len(target) else None
     return target.setdefault(step, {}) if isinstance(target, dict) else None
@@ -194,9 +209,9 @@ def split_key(key: str) -> list[str | int]:
 
 
 def parse_override(text: str) -> tuple[str, Any]:
-    """Split ``KEY=VALUE``; the value is read as TOML, or taken as a string where it is none.
+    """Split ``KEY=VALUE``; the value is read as TOML, or as a string if it is not TOML.
 
-    Raises `InputError` where the text has no key or no equals sign.
+    Raises `InputError` if the key or the equals sign is missing.
     """
     key, equals, value = text.partition("=")
     key, value = key.strip(), value.strip()

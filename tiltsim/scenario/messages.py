@@ -1,4 +1,4 @@
-"""Wording of mistakes: every one becomes a line with the key, the value and what is allowed."""
+"""Wording of errors: each is one line with the key, the value and what is allowed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,15 @@ if TYPE_CHECKING:
 
 
 class InvalidValueError(ValueError):
-    """A value that is well formed but not allowed, with the key it stands under."""
+    """A value that is well formed but not allowed.
+
+    Parameters
+    ----------
+    key, value
+        The dotted key and its value.
+    allowed
+        What is wrong with the value, or allowed instead.
+    """
 
     def __init__(self, key: str, value: object, allowed: str) -> None:
         super().__init__(f"{key} = {show(value)}: {allowed}")
@@ -33,19 +41,19 @@ _PLAIN_TYPES: Final = {
 
 
 def show(value: object) -> str:
-    """A value as the user wrote it, cut where it is long."""
+    """A value as the user wrote it, shortened to 80 characters."""
     text = json.dumps(value, default=str)
     return text if len(text) <= 80 else text[:77] + "..."
 
 
 def did_you_mean(name: object, names: Iterable[str]) -> str:
-    """A question with the closest of some names, where one is close."""
+    """A suggestion of the closest of some names; empty if none is close."""
     close = get_close_matches(str(name), list(names), n=1)
     return f"did you mean {close[0]}? " if close else ""
 
 
 def choose(name: object, names: Iterable[str]) -> str:
-    """What is allowed in place of an unknown name, the closest first."""
+    """The allowed names in place of an unknown one, after the closest."""
     names = list(names)
     return f"{did_you_mean(name, names)}choose {', '.join(names)}"
 
@@ -53,9 +61,19 @@ def choose(name: object, names: Iterable[str]) -> str:
 def one_line_message(
     error: ValidationError, document: Mapping[str, Any], schema: type[BaseModel]
 ) -> str:
-    """The first mistake in one line, and how many more there are."""
+    """The first mistake in one line, and the number of others.
+
+    Parameters
+    ----------
+    error
+        What pydantic found.
+    document
+        The document that was validated.
+    schema
+        The table that it was validated against.
+    """
     details = error.errors(include_url=False)
-    # A key misspelt is often a key missing, too: the unknown one tells the user more.
+    # A misspelt key is often a missing key, too: the unknown one is more helpful.
     details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
     line = _short_list(details, document) or _describe(details[0], document, schema)
     # Missing entries of one list, and the options of one union, are one mistake each.
@@ -64,7 +82,7 @@ def one_line_message(
 
 
 def _mistake(detail: Any, document: Mapping[str, Any]) -> str:
-    """What a person would call one mistake: the key, for a list's entries the list's."""
+    """The key that identifies one mistake: a list's for missing entries of it."""
     keep_last = detail["type"] in {"missing", "extra_forbidden"}
     location = detail["loc"]
     if detail["type"] == "missing" and isinstance(location[-1], int):
@@ -73,14 +91,14 @@ def _mistake(detail: Any, document: Mapping[str, Any]) -> str:
 
 
 def _short_list(details: Any, document: Mapping[str, Any]) -> str:
-    """A line for a list with too few entries, which pydantic reports one missing entry each."""
+    """A line for a list with too few entries, each of which pydantic reports as missing."""
     first = details[0]
     if first["type"] != "missing" or not isinstance(first["loc"][-1], int):
         return ""
     place = first["loc"][:-1]
-    wanted = 1 + max(detail["loc"][-1] for detail in details if detail["loc"][:-1] == place)
+    length = 1 + max(detail["loc"][-1] for detail in details if detail["loc"][:-1] == place)
     key, value = _locate(place, document)
-    return f"{key} = {show(value)}: must have {wanted} entries"
+    return f"{key} = {show(value)}: must have {length} entries"
 
 
 def _describe(detail: Any, document: Mapping[str, Any], schema: type[BaseModel]) -> str:
@@ -107,7 +125,7 @@ def _describe(detail: Any, document: Mapping[str, Any], schema: type[BaseModel])
         length = context.get("min_length", context.get("max_length"))
         return f"{key} = {show(value)}: must have {length} entries"
     if kind == "tuple_type" and isinstance(value, dict):
-        return f"{key}: one table where a list of tables stands; write [[{key}]]"
+        return f"{key}: must be a list of tables; write [[{key}]]"
     if kind in {"less_than_equal", "greater_than_equal"} and abs(_bound(context)) == pi:
         return f"{key} = {show(value)}: angles are in rad, from -3.14159 to 3.14159"
     if kind in _PLAIN_TYPES:
@@ -124,7 +142,7 @@ def _locate(
 ) -> tuple[str, Any]:
     """Dotted key and value of an error's location, without the union tags that pydantic adds.
 
-    Tags are told from keys by not being in the document; ``keep_last`` keeps a key that is not.
+    Parts that are not in the document are tags; ``keep_last`` keeps the last part all the same.
     """
     keys: list[str] = []
     value: Any = document
@@ -140,7 +158,7 @@ def _locate(
 
 
 def _tags(schema: Any, location: tuple[Any, ...]) -> tuple[str, list[str]]:
-    """The key that tells the tables of a union under a location apart, and its values."""
+    """The key that discriminates the tables of a union under a location, and its values."""
     for part in location:
         schema = _member(schema, part)
     tables = [option.model_fields for option in _options(schema) if hasattr(option, "model_fields")]
@@ -151,12 +169,12 @@ def _tags(schema: Any, location: tuple[Any, ...]) -> tuple[str, list[str]]:
 
 
 def _tag_key(fields: Mapping[str, Any]) -> str:
-    """The key of a table that tells it apart from others; empty where there is none."""
+    """The key that discriminates a table from others; empty if there is none."""
     return next((key for key in ("type", "law", "model") if key in fields), "")
 
 
 def _known_keys(schema: Any, location: tuple[Any, ...], key: str) -> str:
-    """The keys allowed where an unknown one stood, the closest first if one is close."""
+    """The keys allowed instead of an unknown one, after the closest if one is close."""
     for part in location[:-1]:
         schema = _member(schema, part)
     names = sorted(schema.model_fields) if hasattr(schema, "model_fields") else []
@@ -164,7 +182,7 @@ def _known_keys(schema: Any, location: tuple[Any, ...], key: str) -> str:
 
 
 def _member(schema: Any, part: object) -> Any:
-    """The type found in a type under one part of a location; unions are searched by their tag."""
+    """The type under one part of a location in a type; unions are searched by their tag."""
     if part in getattr(schema, "model_fields", {}):
         return schema.model_fields[part].annotation
     if isinstance(part, int):
@@ -179,5 +197,5 @@ def _member(schema: Any, part: object) -> Any:
 
 
 def _options(schema: Any) -> list[Any]:
-    """The types that a union offers, annotations taken off."""
+    """The members of a union, without annotations."""
     return [option for member in get_args(schema) for option in (member, *_options(member))]

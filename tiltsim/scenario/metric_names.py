@@ -21,7 +21,7 @@ METRICS: Final = {
     "min_rotor_speed": "smallest rotor speed along its spin, negative where one reversed, rad/s",
     "max_rotor_speed": "largest rotor speed along its spin, rad/s",
     "altitude_overshoot": "largest height above the reference, m",
-    "altitude_settling_time": "from when on the altitude error stays within 5 mm, s",
+    "altitude_settling_time": "time after which the altitude error stays within 5 mm, s",
     "max_published_determinant": "largest determinant surface S as published (ch. 2)",
     "min_published_determinant": "smallest determinant surface S as published (ch. 2)",
     "switches": "switches between two laws, from sample to sample",
@@ -31,22 +31,19 @@ METRICS: Final = {
     "max_lyapunov": "largest Lyapunov candidate e_y'^2/2 + K_Y2 e_y^2/2 (ch. 11), m^2/s^2",
     "final_input_split": "omega_1^2 - omega_2^2, mean over the last second, rad^2/s^2 (tilt_car)",
     "max_tilt_rate": "largest absolute tilt rate, rad/s",
-    "min_singularity_margin": "smallest rotation left to a singular attitude, negative beyond, rad",
+    "min_singularity_margin": "smallest rotation to a singular attitude, negative beyond it, rad",
     "min_decoupling_condition": "smallest over largest singular value of [tau/(L Kf); r3 F/Kf]",
-    "saturated_fraction": "share of samples with a rotor at its speed limit",
-    "diverged": "true where the flight was lost: divergence, singular matrix, failed controller",
+    "saturated_fraction": "fraction of samples with a rotor at its speed limit",
+    "diverged": "true if the vehicle was lost: divergence, singular matrix, failed controller",
     "duration": "time flown, s",
     "realtime_factor": "time flown over wall time of the integration",
 }
-"""Every metric by name, with its meaning. Metrics that have none for a flight are left out."""
-
+"""Every metric by name, with its meaning; a flight has those that apply to it."""
 
 WALL_CLOCK_METRICS: Final = frozenset({"realtime_factor"})
-"""Metrics that tell of the computer; equal flights differ in them."""
-
+"""Metrics that depend on the computer; they differ between equal flights."""
 
 BOOLEAN_METRICS: Final = frozenset({"diverged"})
-
 
 _UNITS: Final = frozenset(
     {"m", "rad", "s", "rad/s", "m/s", "m/s^2", "N", "N m", "m^2/s^2", "rad^2/s^2"}
@@ -54,6 +51,6 @@ _UNITS: Final = frozenset(
 
 
 def unit_of(metric: str) -> str:
-    """The unit of a metric, empty where it has none."""
+    """The unit of a metric; empty for dimensionless ones."""
     unit = METRICS[metric].rpartition(", ")[2].partition(" (")[0]
     return unit if unit in _UNITS and metric not in BOOLEAN_METRICS else ""

@@ -357,7 +357,7 @@ def test_a_lost_rotor_makes_neither_thrust_nor_torque():
 MISTAKES = {
     "latency without sampling": (
         {"simulation": {"control_latency": 0.01}},
-        "control_latency.*needs a control_timestep",
+        "control_latency.*must be a multiple of control_timestep",
     ),
     "broken latency": (
         {"simulation": {"control_timestep": 0.004, "control_latency": 0.006}},
