@@ -7,7 +7,8 @@ its gaits were these.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise, product
 from typing import Final
@@ -149,76 +150,32 @@ def _all(reference: str, gaits: tuple[str, ...] = tuple(_GAITS)) -> tuple[str, .
     return tuple(_address(reference, *case) for case in product(gaits, _PERIODS, _DECOUPLERS))
 
 
-def _per_reference() -> tuple[FlightClaim, ...]:
-    claims: list[FlightClaim] = []
-    for reference, section in _REFERENCES.items():
-        source = f"ch. 5, {section}"
-        claims += [
-            FlightClaim(
-                source=source,
-                statement="The modified decoupler decreases the error for all gaits" + _FITTED,
-                case=f"{reference}, {title}, T = {period} s",
-                flights=tuple(_address(reference, gait, period, d) for d in _DECOUPLERS),
-                measure=partial(falls, tracking_error),
-            )
-            for (gait, title), period in product(_GAITS.items(), _PERIODS)
-        ]
-        claims.append(
-            FlightClaim(
-                source=source,
-                statement="The modified decoupler helps most where the error is largest",
-                case=reference,
-                flights=_all(reference),
-                measure=partial(_saves_most_where_the_error_is_largest, reference),
-            )
+def _of_all_gaits(
+    statement: str, measure: Callable[..., bool], section: str = ""
+) -> Iterator[FlightClaim]:
+    """A claim about all flights of a reference, for each reference."""
+    for reference, figure in _REFERENCES.items():
+        yield FlightClaim(
+            source=f"ch. 5, {section or figure}",
+            statement=statement,
+            case=reference,
+            flights=_all(reference),
+            measure=partial(measure, reference),
         )
-        claims += [
-            FlightClaim(
-                source=source,
-                statement="The error tends to grow with the period of the gait" + _FITTED,
-                case=f"{reference}, {title}",
-                flights=_all(reference, (gait,)),
-                measure=partial(_grows, reference, gait),
-            )
-            for gait, title in _GAITS.items()
-        ]
-        claims += [
-            *(
-                FlightClaim(
-                    source=source,
-                    statement="The error depends strongly on the period "
-                    "(it grows by half from T = 1 s to 3 s)",
-                    case=f"{reference}, {_GAITS[gait]}",
-                    published=gait == "run_full",
-                    flights=_all(reference, (gait,)),
-                    measure=partial(_depends_on_period, reference, gait),
-                    why=_WALK_AND_PERIOD if gait == "walk_third" else "",
-                )
-                for gait in ("walk_third", "run_full")
-            ),
-            FlightClaim(
-                source="ch. 5, Sec. 7",
-                statement="The walk has the smallest errors of the four gaits" + _FITTED,
-                case=reference,
-                flights=_all(reference),
-                measure=partial(_walk_is_smallest, reference),
-            ),
-            FlightClaim(
-                source="ch. 5, Sec. 7",
-                statement="The run has the largest errors of the four gaits" + _FITTED,
-                case=reference,
-                flights=_all(reference),
-                measure=partial(_run_is_largest, reference),
-            ),
-            FlightClaim(
-                source="ch. 5, Sec. 7",
-                statement="The two gallops have similar errors (within a tenth)" + _FITTED,
-                case=reference,
-                flights=_all(reference),
-                measure=partial(_gallops_are_alike, reference),
-            ),
-        ]
-    return tuple(claims)
+
+
+def _of_one_gait(
+    statement: str, measure: Callable[..., bool], gaits: tuple[str, ...] = tuple(_GAITS)
+) -> Iterator[FlightClaim]:
+    """A claim about all flights of a gait, for each reference and gait."""
+    for (reference, figure), gait in product(_REFERENCES.items(), gaits):
+        yield FlightClaim(
+            source=f"ch. 5, {figure}",
+            statement=statement,
+            case=f"{reference}, {_GAITS[gait]}",
+            flights=_all(reference, (gait,)),
+            measure=partial(measure, reference, gait),
+        )
 
 
 CLAIMS = (
@@ -278,7 +235,46 @@ CLAIMS = (
         )
         for reference, section in _REFERENCES.items()
     ),
-    *_per_reference(),
+    *(
+        FlightClaim(
+            source=f"ch. 5, {section}",
+            statement="The modified decoupler decreases the error for all gaits" + _FITTED,
+            case=f"{reference}, {title}, T = {period} s",
+            flights=tuple(_address(reference, gait, period, d) for d in _DECOUPLERS),
+            measure=partial(falls, tracking_error),
+        )
+        for (reference, section), (gait, title), period in product(
+            _REFERENCES.items(), _GAITS.items(), _PERIODS
+        )
+    ),
+    *_of_all_gaits(
+        "The modified decoupler helps most where the error is largest",
+        _saves_most_where_the_error_is_largest,
+    ),
+    *_of_one_gait("The error tends to grow with the period of the gait" + _FITTED, _grows),
+    *(
+        replace(
+            claim,
+            published="run" in claim.case,
+            why="" if "run" in claim.case else _WALK_AND_PERIOD,
+        )
+        for claim in _of_one_gait(
+            "The error depends strongly on the period (it grows by half from T = 1 s to 3 s)",
+            _depends_on_period,
+            ("walk_third", "run_full"),
+        )
+    ),
+    *_of_all_gaits(
+        "The walk has the smallest errors of the four gaits" + _FITTED, _walk_is_smallest, "Sec. 7"
+    ),
+    *_of_all_gaits(
+        "The run has the largest errors of the four gaits" + _FITTED, _run_is_largest, "Sec. 7"
+    ),
+    *_of_all_gaits(
+        "The two gallops have similar errors (within a tenth)" + _FITTED,
+        _gallops_are_alike,
+        "Sec. 7",
+    ),
     FlightClaim(
         source="ch. 5, Sec. 7, Figs. 14-15",
         statement="The scale of the walk, 1/3 or 1/6, changes the rotor speeds "
