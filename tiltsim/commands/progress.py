@@ -70,29 +70,27 @@ def counting_bar(total: int, unit: str, *, shown: bool) -> Iterator[Callable[[in
         yield lambda value: None
         return
     layout = "{l_bar}{bar}| {n}/{total}{unit} [{elapsed}<{remaining}, {rate_noinv_fmt}]"
-    bar: tqdm | None = None
+    bars: list[tqdm] = []
     finished = threading.Event()
 
-    def tick(bar: tqdm) -> None:
+    def tick() -> None:
         while not finished.wait(TICK):
-            bar.refresh()
+            bars[0].refresh()
 
-    ticking: threading.Thread | None = None
+    ticking = threading.Thread(target=tick, daemon=True)
 
     def move(value: int) -> None:
-        nonlocal bar, ticking
-        if bar is None:
-            bar = _bar(total, f" {unit}", layout, value)
-            ticking = threading.Thread(target=tick, args=(bar,), daemon=True)
+        if not bars:
+            bars.append(_bar(total, f" {unit}", layout, value))
             ticking.start()
-        bar.update(value - bar.n)
+        bars[0].update(value - bars[0].n)
 
     with announce_compilation(shown=True):
         try:
             yield move
         finally:
             finished.set()
-            if bar is not None and ticking is not None:
+            for bar in bars:
                 ticking.join()
                 bar.close()
 

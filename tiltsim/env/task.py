@@ -40,25 +40,7 @@ class Task:
 
     A subclass may replace any of them.
 
-    Parameters
-    ----------
-    scenario
-        The episode's; its own controller is replaced by the actions.
-    control_timestep
-        Duration (s) of an action, in place of the scenario's ``simulation.control_timestep``.
-    domain
-        A `Domain`, or axes as in a sweep file, that the scenario of each episode is drawn from;
-        empty repeats ``scenario``.
-    reward
-        See `Reward`.
-    max_position_error
-        Distance from the reference (m) beyond which an episode terminates.
-
-    Raises
-    ------
-    InputError
-        If the scenario cannot be flown under commands, an axis is invalid, or
-        ``max_position_error`` is not positive.
+    Its parameters are those of `tiltsim.env.TiltrotorEnv`; ``domain`` may be a `Domain`, too.
     """
 
     def __init__(
@@ -108,14 +90,9 @@ class Task:
         return float(self._reward(observation, action))
 
     def get_termination(self, sample: Floats, observation: Mapping[str, Floats]) -> End | None:
-        """How the episode ended in a state within the simulation's limits; None goes on.
+        """How the episode ends in a state within the simulation's limits, or None.
 
-        Parameters
-        ----------
-        sample
-            The true state: time (s), then position (m, world) first; see `ClosedLoop`.
-        observation
-            The same state, through the scenario's sensors.
+        ``sample`` is the true state: time (s), position (m, world), and the rest of the columns.
         """
         offset = observation["reference_position"] - sample[1:4]
         error = float(offset @ offset) ** 0.5

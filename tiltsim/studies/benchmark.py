@@ -46,18 +46,15 @@ ACCURACY_STEPS: Final = (0.008, 0.004, 0.002, 0.001, 0.0005)
 REFERENCE_STEP: Final = 0.0001
 ACCURACY_DURATION: Final = 8.0
 
+TROT: Final = {"type": "fixed", "angles": [-0.65, -0.65, 0.65, 0.65]}
+
 Rows = list[dict[str, Any]]
 
 
 def flying_plant(integrator: str) -> MujocoPlant:
     """A tiltrotor in steady flight with tilted rotors, so that every part of the loop is active."""
-    scenario = parse_scenario(
-        {
-            "simulation": {"integrator": integrator, "engine": "native"},
-            "gait": {"type": "fixed", "angles": [-0.65, -0.65, 0.65, 0.65]},
-        }
-    )
-    plant = MujocoPlant(assemble(scenario))
+    simulation = {"integrator": integrator, "engine": "native"}
+    plant = MujocoPlant(assemble(parse_scenario({"simulation": simulation, "gait": TROT})))
     plant.advance(10_000)
     return plant
 
@@ -142,31 +139,15 @@ def bench_flights(vehicles: int, duration: float, integrator: str, timestep: flo
     list of dict
         One row without a ratio; ``memory`` is the peak of the process, bytes.
     """
-    scenarios = [_trotting(index, duration, integrator, timestep) for index in range(vehicles)]
+    simulation = {"integrator": integrator, "duration": duration, "timestep": timestep}
+    scenarios = [_trotting(index, simulation) for index in range(vehicles)]
     for _ in fly(scenarios[:1]):
         pass  # native code is compiled or loaded before the clock starts
-    threads = os.cpu_count() or 1
-    start = perf_counter()
-    kinds = [result.end.kind for result in fly(scenarios)]
-    seconds = perf_counter() - start
+    row, seconds, completed = _time_flights("flights", scenarios)
     # Linux counts in KiB, macOS in bytes.
-    largest = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return [
-        {
-            "case": "flights",
-            "engine": "native",
-            "integrator": integrator,
-            "vehicles": vehicles,
-            "threads": threads,
-            "steps_per_second": vehicles * scenarios[0].simulation.steps / seconds,
-            "ratio": None,
-            "realtime_factor": vehicles * duration / seconds,
-            "timestep": timestep,
-            "seconds": seconds,
-            "memory": largest if sys.platform == "darwin" else largest * 1024,
-            "completed": kinds.count("completed"),
-        }
-    ]
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    memory = peak if sys.platform == "darwin" else peak * 1024
+    return [row | {"seconds": seconds, "memory": memory, "completed": completed}]
 
 
 def bench_accuracy(vehicles: int = BATCH_ROWS) -> Rows:
@@ -179,41 +160,38 @@ def bench_accuracy(vehicles: int = BATCH_ROWS) -> Rows:
     rows = []
     for timestep in ACCURACY_STEPS:
         error = float(np.abs(_positions(timestep) - reference).max())
-        scenarios = [_circling(timestep)] * vehicles
-        start = perf_counter()
-        for _ in fly(scenarios):
-            pass
-        seconds = perf_counter() - start
-        steps = vehicles * scenarios[0].simulation.steps
-        rows.append(
-            {
-                "case": "accuracy",
-                "engine": "native",
-                "integrator": "RK4",
-                "vehicles": vehicles,
-                "threads": os.cpu_count() or 1,
-                "steps_per_second": steps / seconds,
-                "ratio": None,
-                "realtime_factor": vehicles * ACCURACY_DURATION / seconds,
-                "timestep": timestep,
-                "position_error": error,
-            }
-        )
+        row, *_ = _time_flights("accuracy", [_circling(timestep)] * vehicles)
+        rows.append(row | {"position_error": error})
     return rows
 
 
-def _trotting(index: int, duration: float, integrator: str, timestep: float) -> Scenario:
+def _time_flights(case: str, scenarios: list[Scenario]) -> tuple[dict[str, Any], float, int]:
+    """Row, seconds and number of completed flights, for equally long flights on all cores."""
+    start = perf_counter()
+    kinds = [result.end.kind for result in fly(scenarios)]
+    seconds = perf_counter() - start
+    simulation, vehicles = scenarios[0].simulation, len(scenarios)
+    row = {
+        "case": case,
+        "engine": "native",
+        "integrator": simulation.integrator,
+        "vehicles": vehicles,
+        "threads": os.cpu_count() or 1,
+        "steps_per_second": vehicles * simulation.steps / seconds,
+        "ratio": None,
+        "realtime_factor": vehicles * simulation.duration / seconds,
+        "timestep": simulation.timestep,
+    }
+    return row, seconds, kinds.count("completed")
+
+
+def _trotting(index: int, simulation: dict[str, Any]) -> Scenario:
     """One vehicle of many, each with a different mass and start."""
     return parse_scenario(
         {
-            "simulation": {
-                "integrator": integrator,
-                "engine": "native",
-                "duration": duration,
-                "timestep": timestep,
-            },
+            "simulation": {"engine": "native", **simulation},
             "vehicle": {"mass": 0.429 * (1.0 + 1e-5 * index)},
-            "gait": {"type": "fixed", "angles": [-0.65, -0.65, 0.65, 0.65]},
+            "gait": TROT,
             "initial": {"position": [1e-3 * index, 0.0, 0.0]},
         }
     )
