@@ -210,7 +210,7 @@ class SweepPoints:
 
     @cached_property
     def _draws(self) -> Floats:
-        """State of the drawn axes, shape (samples, axes)."""
+        """Values of the drawn axes, shape (samples, axes)."""
         assert self.sweep.sample is not None
         return draw_samples(self._drawn, self.sweep.sample)
 

@@ -12,7 +12,7 @@ from tiltsim_controllers.mathematics.scalar import Floats
 
 
 def draw_samples(axes: Sequence[UniformAxis | NormalAxis], sample: SampleTable) -> Floats:
-    """State of drawn axes, shape (samples, axes); the same for the same seed."""
+    """Values of drawn axes, shape (samples, axes); the same for the same seed."""
     unit = _unit_points(sample, len(axes))
     columns = []
     for axis, column in zip(axes, unit.T, strict=True):

@@ -132,7 +132,11 @@ def rotor_accelerations(
     Third-order error dynamics (ch. 4, Eqs. 26-27) give the desired third derivatives of the
     outputs; the decoupling matrix and ``Ma`` (Eq. 18) convert them to inputs (Eq. 19). Body rates
     are used for the rates of roll, pitch and yaw (ch. 3, Eq. 8), second derivatives come from the
-    model. NaN where the decoupling matrix is singular. Arguments as for `attitude_reference`.
+    model. NaN where the decoupling matrix is singular.
+
+    Parameters
+    ----------
+    time, state, parameters, knots : as for `attitude_reference`
     """
     _x, _y, z, _vx, _vy, vz, roll, pitch, yaw, p, q, r, a1, a2, a3, a4, s1, s2, s3, s4 = state
     vehicle = parameters.vehicle

@@ -264,7 +264,9 @@ def tracking_inputs(
     knots: Vector = NO_KNOTS,
     supervisor_motion: Triple = SUPERVISOR_AT_REST,
 ) -> Values:
-    """Rotor accelerations (rad/s^2), integrator rates (m) and attitude reference (rad).
+    """Rotor accelerations (rad/s^2), integrator rates (m) and the attitude reference (rad).
+
+    NaN where the decoupling matrix is singular.
 
     Parameters
     ----------
@@ -274,11 +276,6 @@ def tracking_inputs(
     integrals : `INTEGRAL_FIELDS`
     parameters, knots : of the controller, and of gait and reference
     supervisor_motion : the supervisor's state with its rate and acceleration
-
-    Returns
-    -------
-    tuple
-        Four, three and three (roll, pitch, yaw); NaN where the decoupling matrix is singular.
     """
     _, _, _, _, _, _, roll, pitch, yaw, p, q, r, a1, a2, a3, a4, s1, s2, s3, s4 = state
     vehicle, terms, reference = parameters.vehicle, parameters.terms, parameters.reference

@@ -1,7 +1,7 @@
 """Attitude-altitude feedback linearization of the quadrotor, second order (ch. 2, Appendix B).
 
-Outputs are altitude, roll, pitch and yaw, inputs the total thrust and three torques. The law that
-ch. 2 switches to near the published singular curve: its decoupling matrix is singular only at a
+Outputs are altitude, roll, pitch and yaw, inputs the total thrust and three torques. Ch. 2 switches
+to this controller near the published singular curve: its decoupling matrix is singular only at a
 roll or pitch of 90 degrees.
 """
 
@@ -40,13 +40,18 @@ def attitude_altitude_inputs(
     reference: ReferenceParameters,
     knots: Vector = NO_KNOTS,
 ) -> Quad:
-    """Thrust (N) and the three torques (N m, body axes) of the law (ch. 2, Eq. A7).
+    """Thrust (N) and the three torques (N m, body axes) (ch. 2, Eq. A7).
 
-    ``state`` is that of `tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`, of which the
-    extension is not read; the references are constants. NaN at a roll or pitch of 90 degrees.
+    NaN at a roll or pitch of 90 degrees.
+
+    Parameters
+    ----------
+    time : s
+    state : `tiltsim_controllers.vehicle.states.BODY_FIELDS`; what follows is not read
+    vehicle, gains : the quadrotor and its gains
+    reference, knots : altitude, roll, pitch and yaw, the angles constant
     """
-    z, vz, roll, pitch, yaw = state[2], state[5], state[6], state[7], state[8]
-    p, q, r = state[9], state[10], state[11]
+    _, _, z, _, _, vz, roll, pitch, yaw, p, q, r = state[:12]
     sin_roll, cos_roll = sin(roll), cos(roll)
     sin_pitch, cos_pitch = sin(pitch), cos(pitch)
     if cos_roll == 0.0 or cos_pitch == 0.0:

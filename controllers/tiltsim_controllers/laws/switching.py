@@ -1,12 +1,12 @@
 """Switching between yaw-position and attitude-altitude control of the quadrotor (ch. 2, Sec. 5).
 
-Ch. 2 takes its determinant surface for singular near level attitude and hands the vehicle over to
-the attitude-altitude law there. The choice is a function of the attitude alone, without memory.
+Ch. 2 considers its determinant surface singular near level attitude and switches to the
+attitude-altitude controller there. The choice is a function of the attitude only, without memory.
 
-Only the yaw-position law has states of its own, the thrust ``zeta`` and its rate ``xi``. What they
-do while the other law flies is not printed; `EXTENSIONS` lists what they may do. Bumpless, they
-follow the thrust and thrust rate that the attitude-altitude law makes, so that thrust and thrust
-rate go on without a step when the yaw-position law takes over again.
+Only the yaw-position controller has states of its own, the thrust ``zeta`` and its rate ``xi``. The
+chapter does not state how they evolve while the other controller is active; `EXTENSIONS` lists the
+options. With ``bumpless`` they follow the thrust and thrust rate of the attitude-altitude
+controller, so that both are continuous when the yaw-position controller takes over again.
 """
 
 from __future__ import annotations
@@ -21,16 +21,17 @@ from tiltsim_controllers.laws.quadrotor_attitude_altitude import attitude_altitu
 from tiltsim_controllers.laws.yaw_position import Inputs, euler_rates, yaw_position_inputs
 from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import reference_derivatives
+from tiltsim_controllers.vehicle.states import PITCH, ROLL, THRUST, THRUST_RATE
 
 RUNNING: Final = 0.0
 HELD: Final = 1.0
 BUMPLESS: Final = 2.0
 
 EXTENSIONS: Final = {"running": RUNNING, "held": HELD, "bumpless": BUMPLESS}
-"""What the extension's states do while the attitude-altitude law flies, by name.
+"""Behaviour of the extension's states while the attitude-altitude controller is active, by name.
 
-``running``: they go on under the yaw-position law, unheard. ``held``: they keep their values.
-``bumpless``: they follow the thrust that is flown.
+``running``: they evolve under the inactive yaw-position controller. ``held``: they are constant.
+``bumpless``: they follow the active controller's thrust.
 """
 
 
@@ -49,18 +50,18 @@ PUBLISHED_ZONE: Final = Zone(-1.5707963267948966, 0.2, -0.5, 0.5)
 
 
 class Parameters(NamedTuple):
-    """All that the law needs to know besides time and state."""
+    """Parameters of both controllers and of the switching."""
 
-    yaw_position: yaw_position.Parameters  # vehicle and reference are those of both laws
+    yaw_position: yaw_position.Parameters  # with vehicle and reference of both controllers
     attitude_altitude: attitude_altitude.Gains
     zone: Zone
     extension: float
-    extension_rate: float = 100.0  # 1/s, how fast bumpless states reach the flown thrust
+    extension_rate: float = 100.0  # 1/s, at which bumpless states approach the active thrust
 
 
 @scalar
 def in_attitude_zone(roll: float, pitch: float, zone: Zone) -> bool:
-    """Whether the attitude-altitude law flies at this attitude (ch. 2, Eq. 47)."""
+    """Whether the attitude-altitude controller is active at an attitude (rad; ch. 2, Eq. 47)."""
     return zone.roll_min <= roll <= zone.roll_max and zone.pitch_min <= pitch <= zone.pitch_max
 
 
@@ -72,17 +73,26 @@ def attitude_altitude_thrust_rate(
     parameters: Parameters,
     knots: Vector = NO_KNOTS,
 ) -> float:
-    """Rate (N/s) of the thrust that the attitude-altitude law makes, ``thrust`` in N."""
-    vz, roll, pitch = state[5], state[6], state[7]
+    """Rate (N/s) of the attitude-altitude controller's thrust.
+
+    Parameters
+    ----------
+    time : s
+    state : `tiltsim_controllers.vehicle.states.BODY_FIELDS`; what follows is not read
+    thrust : N
+    parameters, knots : of the controller and of the reference
+    """
+    _, _, _, _, _, vz, roll, pitch, _, p, q, r = state[:12]
     vehicle, gains = parameters.yaw_position.vehicle, parameters.attitude_altitude
-    reference = reference_derivatives(time, parameters.yaw_position.reference, knots)
-    vz_ref, az_ref = reference[5], reference[8]
+    _, _, _, _, _, vz_ref, _, _, az_ref, _, _, _, _, _, _ = reference_derivatives(
+        time, parameters.yaw_position.reference, knots
+    )
     upright = cos(roll) * cos(pitch)
     if upright == 0.0:
         return nan
     az = thrust * upright / vehicle.mass - vehicle.gravity
     lift_rate = gains.altitude_1 * (az_ref - az) + gains.altitude_2 * (vz_ref - vz)
-    roll_rate, pitch_rate, _ = euler_rates(roll, pitch, state[9], state[10], state[11])
+    roll_rate, pitch_rate, _ = euler_rates(roll, pitch, p, q, r)
     return vehicle.mass * lift_rate / upright + thrust * (
         tan(roll) * roll_rate + tan(pitch) * pitch_rate
     )
@@ -92,14 +102,21 @@ def attitude_altitude_thrust_rate(
 def switching_inputs(
     time: float, state: Values, parameters: Parameters, knots: Vector = NO_KNOTS
 ) -> Inputs:
-    """Thrust, torques and the rates of the extension's states (`INPUT_FIELDS`), world z up."""
+    """`INPUT_FIELDS`: thrust, torques and rates of the extension's states, world z up.
+
+    Parameters
+    ----------
+    time : s
+    state : `tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`
+    parameters, knots : of the controllers and of the reference
+    """
     law = parameters.yaw_position
-    if not in_attitude_zone(state[6], state[7], parameters.zone):
+    if not in_attitude_zone(state[ROLL], state[PITCH], parameters.zone):
         return yaw_position_inputs(time, state, law, knots)
     thrust, roll_torque, pitch_torque, yaw_torque = attitude_altitude_inputs(
         time, state, law.vehicle, parameters.attitude_altitude, law.reference, knots
     )
-    zeta, xi = state[12], state[13]
+    zeta, xi = state[THRUST], state[THRUST_RATE]
     zeta_rate, xi_rate = 0.0, 0.0
     if parameters.extension == RUNNING:
         _, _, _, _, zeta_rate, xi_rate = yaw_position_inputs(time, state, law, knots)
