@@ -5,10 +5,38 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, SignCheck
-from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
+from tiltsim.closed_loop.loop import (
+    ClosedLoop,
+    Columns,
+    ControlSetup,
+    Equations,
+    Monitoring,
+    Sampling,
+    SignCheck,
+    SupervisedLaw,
+)
+from tiltsim.equations.tiltrotor import law_state
+from tiltsim.laws.tiltrotor import (
+    determinant_check,
+    gait_equation_rates,
+    gait_servo_commands,
+    initial_equation_state,
+    observe_gait_equations,
+    observe_tiltrotor,
+    reference_columns,
+    refreshed_controls,
+    rotor_speed_checks,
+    rotor_speeds_along_spin,
+    rotor_thrust_controls,
+    scaled_determinant,
+    servo_lead,
+    singularity_columns,
+    tiltrotor_dynamics,
+    tiltrotor_state,
+)
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
+from tiltsim.vehicles.rotorcraft.layout import ALPHA_1, ALPHA_2, ALPHA_3, ALPHA_4
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import (
     DECOUPLINGS,
@@ -27,28 +55,10 @@ from tiltsim_controllers.vehicle.states import TILTROTOR_FIELDS
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
     from tiltsim.scenario.scenario import Scenario
-from tiltsim.closed_loop.loop import Columns, Monitoring, Sampling, SupervisedLaw
-from tiltsim.laws.tiltrotor import (
-    determinant_check,
-    gait_servo_commands,
-    initial_signed_rotor_speeds,
-    observe_tiltrotor,
-    reference_columns,
-    refreshed_controls,
-    rotor_speed_checks,
-    rotor_speeds_along_spin,
-    rotor_thrust_controls,
-    scaled_determinant,
-    servo_lead,
-    singularity_columns,
-    tiltrotor_dynamics,
-    tiltrotor_state,
-)
-from tiltsim.vehicles.rotorcraft.layout import ALPHA_1, ALPHA_2, ALPHA_3, ALPHA_4
 
 
 class LoopParameters(NamedTuple):
-    """The head of `userdata`: what the control step of a flight needs to know."""
+    """The head of `userdata`."""
 
     signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
     servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
@@ -83,7 +93,7 @@ def supervised_controls(
     parameters: LoopParameters,
     knots: Vector,
 ) -> Quad:
-    """Rotor accelerations alone, for `tiltsim.laws.layers.supervision`."""
+    """Rotor accelerations (rad/s^2); see `tiltsim.closed_loop.loop.SupervisedLaw`."""
     return rotor_accelerations(time, state, parameters.law, knots)
 
 
@@ -106,7 +116,7 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
 def reference_values(
     time: float, state: Values, parameters: LoopParameters, knots: Vector
 ) -> Values:
-    """`REFERENCE_COLUMNS` and `TILT_REFERENCE_COLUMNS` at a time and state of the law."""
+    """`REFERENCE_COLUMNS` and `TILT_REFERENCE_COLUMNS`."""
     law = parameters.law
     ratio = drag_ratio(law.vehicle)
     trig = sines_and_cosines(state[ALPHA_1], state[ALPHA_2], state[ALPHA_3], state[ALPHA_4])
@@ -121,7 +131,7 @@ def reference_values(
 def supervised_reference_values(
     time: float, state: Values, motion: Triple, parameters: LoopParameters, knots: Vector
 ) -> Values:
-    """`REFERENCE_COLUMNS`, for `tiltsim.laws.layers.supervision`."""
+    """`REFERENCE_COLUMNS`; see `tiltsim.closed_loop.loop.SupervisedLaw`."""
     return reference_values(time, state, parameters, knots)[:6]
 
 
@@ -136,7 +146,7 @@ def sign_check_values(
 ) -> tuple[float, float, float, float, float]:
     """The determinant of the decoupling matrix, and the rotor speeds where it vanishes with them.
 
-    As published, the factor ``2 |varpi|`` stands in one row alone, and a rotor at rest is harmless.
+    As published, the factor ``2 |varpi|`` is in one row only, and a rotor at rest is harmless.
     """
     law = parameters.law
     matrix = scaled_determinant(values, law.vehicle)
@@ -156,36 +166,10 @@ def _sign_checks(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Sign
 
 @scalar
 def equation_inputs(time: float, state: Vector, parameters: LoopParameters, knots: Vector) -> Quad:
-    """The law's rotor accelerations (rad/s^2) on the thesis's equations."""
+    """Rotor accelerations (rad/s^2) on the thesis's equations."""
     law = parameters.law
     a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, knots)
     return rotor_accelerations(time, law_state(state, (a1, a2, a3, a4)), law, knots)
-
-
-@scalar
-def equation_rates(
-    time: float,
-    state: Vector,
-    inputs: Quad,
-    parameters: LoopParameters,
-    knots: Vector,
-    disturbance: Triple,
-) -> Values:
-    """The thesis's equations with tilt angles that follow the gait exactly."""
-    law = parameters.law
-    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, knots)
-    return equations_of_motion(state, (a1, a2, a3, a4), inputs, law.vehicle, disturbance)
-
-
-@scalar
-def observe_equations(
-    time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
-) -> Values:
-    """What a sample holds, from the state of ch. 3's equations; the tilts are the gait's."""
-    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(
-        time, parameters.law.gait, knots
-    )
-    return (*law_state(state, (a1, a2, a3, a4)), rate_1, rate_2, rate_3, rate_4)
 
 
 def follows_position(scenario: Scenario) -> bool:
@@ -206,11 +190,9 @@ TILTROTOR: Final = ClosedLoop(
     equations=Equations(
         inputs=equation_inputs,
         inputs_size=4,
-        rates=equation_rates,
-        initial=lambda plan, _setup: initial_state(
-            plan.scenario, initial_signed_rotor_speeds(plan.scenario)
-        ),
-        observe=observe_equations,
+        rates=gait_equation_rates,
+        initial=lambda plan, _setup: initial_equation_state(plan),
+        observe=observe_gait_equations,
     ),
     supervised=SupervisedLaw(supervised_controls, supervised_reference_values, TILTROTOR_FIELDS),
     follows_position=follows_position,

@@ -1,8 +1,7 @@
-"""Vehicles that do what they are told from outside: by a user's controller, or an environment.
+"""Vehicles under commands from outside: from a user's controller or an environment.
 
-Their law is to do what `HeldCommand` says; layers around it make of that what they make of any
-law's commands. Both vehicles have the speeds of their rotors as states here, so that they can be
-told speeds, thrusts or accelerations.
+The control law is to hold a `HeldCommand`; layers treat it as any controller's commands. The rotor
+speeds of both vehicles are states here, so that commands may be speeds, thrusts or accelerations.
 """
 
 from __future__ import annotations
@@ -14,9 +13,10 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, Columns, ControlSetup, Dynamics, Sampling, Sizes
 from tiltsim.laws.full_pose import TILT_COMMANDS
-from tiltsim.laws.quadrotor import references, rigid_body_state, upright_margin
+from tiltsim.laws.quadrotor import constant_attitude_references, rigid_body_state, upright_margin
 from tiltsim.laws.tiltrotor import (
     TILT_REFERENCE_COLUMNS,
+    four,
     gait_servo_commands,
     initial_signed_rotor_speeds,
     observe_tiltrotor,
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 class HeldCommand(NamedTuple):
-    """What the vehicle was told last."""
+    """The last command."""
 
     tilt_1: float = 0.0  # rad, for the servos
     tilt_2: float = 0.0
@@ -128,37 +128,28 @@ def with_command(parameters: Any, command: HeldCommand) -> Any:
 @scalar
 def observe_commanded_quadrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """The rigid body, no tilt, the rotor speeds, which are states here, no tilt rates."""
-    return (
-        *rigid_body_state(qpos, qvel, 0.0, 0.0)[:12],
-        *(0.0, 0.0, 0.0, 0.0, act[0], act[1], act[2], act[3], 0.0, 0.0, 0.0, 0.0),
-    )
+    body = rigid_body_state(qpos, qvel, 0.0, 0.0)[:12]
+    return (*body, 0.0, 0.0, 0.0, 0.0, *four(act, 0), 0.0, 0.0, 0.0, 0.0)
 
 
 @scalar
 def observe_commanded_tiltrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-    """As of any tiltrotor, and what its servos are told."""
-    return (*observe_tiltrotor(qpos, qvel, act, ctrl), ctrl[0], ctrl[1], ctrl[2], ctrl[3])
-
-
-def _references(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    reference = setup.parameters.reference
-    return references(
-        samples, reference, setup.knots, (reference.roll, reference.pitch, reference.yaw)
-    )
+    """A sample of any tiltrotor, and the commands of its servos."""
+    return (*observe_tiltrotor(qpos, qvel, act, ctrl), *four(ctrl, 0))
 
 
 def _derive_tiltrotor(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    told = zip(TILT_REFERENCE_COLUMNS, TILT_COMMANDS, strict=True)
+    commands = zip(TILT_REFERENCE_COLUMNS, TILT_COMMANDS, strict=True)
     return {
-        **_references(samples, setup),
-        **{column: samples[name] for column, name in told},
+        **constant_attitude_references(samples, setup.parameters.reference, setup.knots),
+        **{column: samples[name] for column, name in commands},
         **singularity_columns(samples, setup.parameters.vehicle),
     }
 
 
 def _derive_quadrotor(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     return {
-        **_references(samples, setup),
+        **constant_attitude_references(samples, setup.parameters.reference, setup.knots),
         "determinant": np.cos(samples["roll"]),  # of the attitude-altitude law
         "singularity_margin": upright_margin(samples),
     }

@@ -1,4 +1,4 @@
-"""Full-pose control around the tiltrotor: the tilt angles are inputs, too (ch. 3, Sec. 6.3)."""
+"""Full-pose control of the tiltrotor: the tilt angles are inputs, too (ch. 3, Sec. 6.3)."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ from tiltsim.closed_loop.loop import (
     Monitoring,
     Sampling,
 )
-from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
-from tiltsim.laws.quadrotor import references
+from tiltsim.equations.tiltrotor import FURTHER, equations_of_motion, law_state
+from tiltsim.laws.quadrotor import constant_attitude_references
 from tiltsim.laws.tiltrotor import (
-    initial_signed_rotor_speeds,
+    TILT_REFERENCE_COLUMNS,
+    four,
+    initial_equation_state,
     observe_tiltrotor,
     refreshed_controls,
     rotor_speed_checks,
@@ -29,6 +31,7 @@ from tiltsim.laws.tiltrotor import (
 )
 from tiltsim.scenario.tiltrotor_controllers import FullPoseController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT, initial_tilts
+from tiltsim.vehicles.rotorcraft.layout import ROTOR_STATES
 from tiltsim_controllers.laws.full_pose import Parameters, full_pose_inputs, limited_tilt_rate
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values, Vector, scalar
 
@@ -36,7 +39,10 @@ if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
 
 TILT_COMMANDS: Final = tuple(f"tilt_command_{rotor}" for rotor in (1, 2, 3, 4))
-"""The law's own states: the tilt angles that the servos are told, but for their lead."""
+"""The controller's states: the commands of the servos (rad) without their lead."""
+
+TILT_RATES: Final = 4
+"""Index of the first tilt rate among the control law's inputs."""
 
 
 class LoopParameters(NamedTuple):
@@ -53,32 +59,29 @@ def full_pose_controls(
 ) -> Values:
     """All sixteen controls: tilt servos, thrusts, rotor accelerations, tilt rates.
 
-    The law gives tilt rates. Its own four states integrate them to the angles that the servos are
-    told, with the rate fed forward as for a planned gait.
+    The control law gives tilt rates. Four states integrate them to the commands of the servos, with
+    rate feed-forward as for a planned gait.
     """
-    lead = parameters.servo_lead
+    lead, limits = parameters.servo_lead, parameters.law.limits
     state = tiltrotor_state(qpos, qvel, act)
     u1, u2, u3, u4, rate_1, rate_2, rate_3, rate_4 = full_pose_inputs(
         time, state, parameters.law, knots
     )
-    # A pod at the stop of its servo is within the law's limit for good: what it is told is not.
-    limits = parameters.law.limits
-    rate_1 = limited_tilt_rate(rate_1, act[4], limits)
-    rate_2 = limited_tilt_rate(rate_2, act[5], limits)
-    rate_3 = limited_tilt_rate(rate_3, act[6], limits)
-    rate_4 = limited_tilt_rate(rate_4, act[7], limits)
-    return (
-        *(act[4] + lead * rate_1, act[5] + lead * rate_2),
-        *(act[6] + lead * rate_3, act[7] + lead * rate_4),
-        *rotor_thrust_controls(act),
-        *(u1, u2, u3, u4, rate_1, rate_2, rate_3, rate_4),
-    )
+    # The law's limit sees a pod that stops at its servo's stop, but not the command beyond it.
+    a1, a2, a3, a4 = four(act, ROTOR_STATES)
+    rate_1 = limited_tilt_rate(rate_1, a1, limits)
+    rate_2 = limited_tilt_rate(rate_2, a2, limits)
+    rate_3 = limited_tilt_rate(rate_3, a3, limits)
+    rate_4 = limited_tilt_rate(rate_4, a4, limits)
+    servos = (a1 + lead * rate_1, a2 + lead * rate_2, a3 + lead * rate_3, a4 + lead * rate_4)
+    thrusts = rotor_thrust_controls(act)
+    return (*servos, *thrusts, u1, u2, u3, u4, rate_1, rate_2, rate_3, rate_4)
 
 
 @scalar
 def observe_full_pose(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-    """The tiltrotor and the law's own states."""
-    return (*observe_tiltrotor(qpos, qvel, act, ctrl), act[4], act[5], act[6], act[7])
+    """The tiltrotor and the commands of its servos."""
+    return (*observe_tiltrotor(qpos, qvel, act, ctrl), *four(act, ROTOR_STATES))
 
 
 @scalar
@@ -105,11 +108,10 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     law = setup.parameters.law
-    wanted = law.reference
-    attitude = (wanted.roll, wanted.pitch, wanted.yaw)
+    commands = zip(TILT_REFERENCE_COLUMNS, TILT_COMMANDS, strict=True)
     return {
-        **references(samples, wanted, setup.knots, attitude),
-        **{f"alpha_ref_{i}": samples[f"tilt_command_{i}"] for i in (1, 2, 3, 4)},
+        **constant_attitude_references(samples, law.reference, setup.knots),
+        **{column: samples[name] for column, name in commands},
         **singularity_columns(samples, law.vehicle),
     }
 
@@ -118,8 +120,8 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 def equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
-    """The law's rotor accelerations and tilt rates on the thesis's equations."""
-    tilts = state[22], state[23], state[24], state[25]
+    """Rotor accelerations and tilt rates on the thesis's equations."""
+    tilts = four(state, FURTHER)
     return full_pose_inputs(time, law_state(state, tilts), parameters.law, knots)
 
 
@@ -133,25 +135,18 @@ def equation_rates(
     disturbance: Triple,
 ) -> Values:
     """The thesis's equations, the tilt angles being states whose rates are inputs."""
-    tilts = state[22], state[23], state[24], state[25]
-    accelerations = inputs[0], inputs[1], inputs[2], inputs[3]
-    vehicle = parameters.law.vehicle
-    return (
-        *equations_of_motion(state, tilts, accelerations, vehicle, disturbance),
-        *(inputs[4], inputs[5], inputs[6], inputs[7]),
-    )
+    tilts, accelerations, vehicle = four(state, FURTHER), four(inputs, 0), parameters.law.vehicle
+    body = equations_of_motion(state, tilts, accelerations, vehicle, disturbance)
+    return (*body, *four(inputs, TILT_RATES))
 
 
 @scalar
 def observe_equations(
     time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
-    """What a sample holds, from the state of ch. 3's equations and the tilt rates in force."""
-    return (
-        *law_state(state, (state[22], state[23], state[24], state[25])),
-        *(inputs[4], inputs[5], inputs[6], inputs[7]),
-        *(state[22], state[23], state[24], state[25]),
-    )
+    """A sample of the thesis's equations, with the tilt rates in force."""
+    tilts = four(state, FURTHER)
+    return (*law_state(state, tilts), *four(inputs, TILT_RATES), *tilts)
 
 
 FULL_POSE: Final = ClosedLoop(
@@ -168,10 +163,7 @@ FULL_POSE: Final = ClosedLoop(
         inputs=equation_inputs,
         inputs_size=8,
         rates=equation_rates,
-        initial=lambda plan, _setup: (
-            *initial_state(plan.scenario, initial_signed_rotor_speeds(plan.scenario)),
-            *initial_tilts(plan)[0],
-        ),
+        initial=lambda plan, _setup: (*initial_equation_state(plan), *initial_tilts(plan)[0]),
         observe=observe_equations,
     ),
 )

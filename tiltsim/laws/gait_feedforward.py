@@ -1,4 +1,4 @@
-"""The attitude-altitude law that counts its gait's rates in, around the tiltrotor."""
+"""The attitude-altitude controller with tilt-rate feed-forward in a closed loop (ch. 4)."""
 
 from __future__ import annotations
 
@@ -15,12 +15,15 @@ from tiltsim.closed_loop.loop import (
     SignCheck,
     SupervisedLaw,
 )
-from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
+from tiltsim.equations.tiltrotor import FURTHER, law_state
 from tiltsim.laws.attitude_altitude import follows_position
 from tiltsim.laws.tiltrotor import (
     determinant_check,
+    four,
+    gait_equation_rates,
     gait_servo_commands,
-    initial_signed_rotor_speeds,
+    initial_equation_state,
+    observe_gait_equations,
     observe_tiltrotor,
     reference_columns,
     refreshed_controls,
@@ -35,6 +38,7 @@ from tiltsim.laws.tiltrotor import (
 )
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
+from tiltsim.vehicles.rotorcraft.layout import TILT_RATE_1
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.gait_feedforward import INTEGRAL_FIELDS, Parameters, tracking_inputs
@@ -67,9 +71,9 @@ def supervised_controls(
     parameters: LoopParameters,
     knots: Vector,
 ) -> Values:
-    """The law's part of the controls: rotor accelerations, rates of the integrals."""
-    tilt_rates, integrals = (qvel[6], qvel[7], qvel[8], qvel[9]), (act[4], act[5], act[6])
-    return tracking_inputs(*(time, state, tilt_rates, integrals, parameters.law, knots, motion))[:7]
+    """Rotor accelerations and rates of the integrals; see `SupervisedLaw`."""
+    tilt_rates, integrals = four(qvel, TILT_RATE_1), (act[4], act[5], act[6])
+    return tracking_inputs(time, state, tilt_rates, integrals, parameters.law, knots, motion)[:7]
 
 
 @scalar
@@ -98,7 +102,7 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
         max_acceleration=controller.max_acceleration,
         max_angular_acceleration=controller.max_angular_acceleration,
         anticipation=min(controller.anticipation, 0.5 * gait.min_segment_time),
-        # The thesis's own equations leave the gyroscopic torque out.
+        # The thesis's equations omit the gyroscopic torque.
         terms=controller.resolve_feedforward_terms(
             gyroscopic_torque=scenario.simulation.plant != "thesis"
         ),
@@ -115,17 +119,13 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
 def supervised_reference_values(
     time: float, state: Vector, motion: Triple, parameters: LoopParameters, knots: Vector
 ) -> tuple[float, float, float, float, float, float]:
-    """Position (m) and attitude (rad) to track at a time: the state is `REFERENCE_FIELDS`."""
+    """Position (m) and attitude (rad) to track; ``state`` has the `REFERENCE_FIELDS`."""
     law = parameters.law
     x, y, z, _, _, _, _, _, _ = position_reference(time, law.reference, knots)
     _, _, _, _, _, _, _, roll, pitch, yaw = tracking_inputs(
         time,
-        (
-            *(state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7]),
-            *(state[8], state[9], state[10], state[11], state[12], state[13], state[14]),
-            *(state[15], state[16], state[17], state[18], state[19]),
-        ),
-        (state[20], state[21], state[22], state[23]),
+        (*four(state, 0), *four(state, 4), *four(state, 8), *four(state, 12), *four(state, 16)),
+        four(state, 20),
         (state[24], state[25], state[26]),
         law,
         knots,
@@ -138,7 +138,7 @@ def supervised_reference_values(
 def reference_values(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
-    """Columns of references at a time: the state is `REFERENCE_FIELDS`."""
+    """Columns of references; ``state`` has the `REFERENCE_FIELDS`."""
     a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, parameters.law.gait, knots)
     return (
         *supervised_reference_values(time, state, SUPERVISOR_AT_REST, parameters, knots),
@@ -150,7 +150,7 @@ def reference_values(
 
 
 REFERENCE_FIELDS: Final = (*TILTROTOR_FIELDS, *TILT_RATE_COLUMNS, *INTEGRAL_FIELDS)
-"""Of a sample, what references are made from."""
+"""Fields of a sample that the references depend on."""
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -160,7 +160,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 
 @scalar
 def observe_gait_feedforward(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-    """The tiltrotor and the law's own states."""
+    """The tiltrotor and the integrals."""
     return (*observe_tiltrotor(qpos, qvel, act, ctrl), act[4], act[5], act[6])
 
 
@@ -181,14 +181,14 @@ def _sign_checks(sample: Mapping[str, float], setup: ControlSetup) -> tuple[Sign
 def equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
-    """The law's rotor accelerations and the rates of its integrals on the thesis's equations."""
+    """Rotor accelerations and rates of the integrals on the thesis's equations."""
     law = parameters.law
     a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, law.gait, knots)
     u1, u2, u3, u4, x_rate, y_rate, z_rate, _roll, _pitch, _yaw = tracking_inputs(
         time,
         law_state(state, (a1, a2, a3, a4)),
         (rate_1, rate_2, rate_3, rate_4),
-        (state[22], state[23], state[24]),
+        (state[FURTHER], state[FURTHER + 1], state[FURTHER + 2]),
         law,
         knots,
     )
@@ -204,28 +204,18 @@ def equation_rates(
     knots: Vector,
     disturbance: Triple,
 ) -> Values:
-    """The thesis's equations with tilt angles that follow the gait exactly, and the integrals."""
-    law = parameters.law
-    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, knots)
-    accelerations = inputs[0], inputs[1], inputs[2], inputs[3]
-    return (
-        *equations_of_motion(state, (a1, a2, a3, a4), accelerations, law.vehicle, disturbance),
-        *(inputs[4], inputs[5], inputs[6]),
-    )
+    """`gait_equation_rates`, followed by the integrals."""
+    body = gait_equation_rates(time, state, inputs, parameters, knots, disturbance)
+    return (*body, inputs[4], inputs[5], inputs[6])
 
 
 @scalar
 def observe_equations(
     time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
-    """What a sample holds, from the state of ch. 3's equations; the tilts are the gait's."""
-    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(
-        time, parameters.law.gait, knots
-    )
-    return (
-        *law_state(state, (a1, a2, a3, a4)),
-        *(rate_1, rate_2, rate_3, rate_4, state[22], state[23], state[24]),
-    )
+    """`observe_gait_equations`, followed by the integrals."""
+    body = observe_gait_equations(time, state, inputs, parameters, knots)
+    return (*body, state[FURTHER], state[FURTHER + 1], state[FURTHER + 2])
 
 
 GAIT_FEEDFORWARD: Final = ClosedLoop(
@@ -245,12 +235,7 @@ GAIT_FEEDFORWARD: Final = ClosedLoop(
         inputs=equation_inputs,
         inputs_size=7,
         rates=equation_rates,
-        initial=lambda plan, _setup: (
-            *initial_state(plan.scenario, initial_signed_rotor_speeds(plan.scenario)),
-            0.0,
-            0.0,
-            0.0,
-        ),
+        initial=lambda plan, _setup: (*initial_equation_state(plan), 0.0, 0.0, 0.0),
         observe=observe_equations,
     ),
     supervised=SupervisedLaw(supervised_controls, supervised_reference_values, REFERENCE_FIELDS),

@@ -1,7 +1,7 @@
-"""What the loops around the quadrotor share.
+"""What the closed loops with the quadrotor share.
 
-The laws of ch. 2 ask for thrust and torques, which the rotors make at once: their speeds follow
-from the controls and are no states here. The model's four rotor speed states stay at zero.
+The control laws of ch. 2 demand thrust and torques, which the rotors make at once: their speeds
+follow from the controls and are not states. The model's four rotor speed states stay at zero.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
 
 EXTENSION_FIELDS: Final = ("extension_thrust", "extension_thrust_rate")
-"""The law's own states, ``zeta`` and ``xi``, in a sample."""
+"""The controller's states, ``zeta`` and ``xi``, in a sample."""
 
 EXTENSION_COLUMNS: Final = {
     "extension_thrust": "N",
@@ -52,7 +52,7 @@ EXTENSION_COLUMNS: Final = {
 
 @scalar
 def rigid_body_state(qpos: Vector, qvel: Vector, thrust: float, thrust_rate: float) -> Values:
-    """The laws' state (`tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`) from MuJoCo's."""
+    """State of the control laws from MuJoCo's and the thrust (N) with its rate (N/s)."""
     x, y, z, qw, qx, qy, qz = qpos
     vx, vy, vz, p, q, r = qvel
     roll, pitch, yaw = euler_from_quaternion(qw, qx, qy, qz)
@@ -61,19 +61,17 @@ def rigid_body_state(qpos: Vector, qvel: Vector, thrust: float, thrust_rate: flo
 
 @scalar
 def extended_controls(inputs: Values, vehicle: Vehicle) -> Values:
-    """The ten controls for a law's `INPUT_FIELDS`: thrusts, idle rotor states, law states."""
+    """The ten controls for a control law's `INPUT_FIELDS`: thrusts, idle rotors, its states."""
     thrust, roll_torque, pitch_torque, yaw_torque, thrust_derivative, thrust_rate_derivative = (
         inputs
     )
-    return (
-        *thrust_controls(thrust, roll_torque, pitch_torque, yaw_torque, vehicle),
-        *(0.0, 0.0, 0.0, 0.0, thrust_derivative, thrust_rate_derivative),
-    )
+    thrusts = thrust_controls(thrust, roll_torque, pitch_torque, yaw_torque, vehicle)
+    return (*thrusts, 0.0, 0.0, 0.0, 0.0, thrust_derivative, thrust_rate_derivative)
 
 
 @scalar
 def sample_values(body: Vector, thrusts: Vector) -> Values:
-    """What a sample holds, from the rigid body's twelve states and the thrust controls."""
+    """A sample, from the rigid body's twelve states and the thrust controls."""
     return (
         *rigid_body(body),
         0.0,
@@ -99,13 +97,13 @@ def observe_quadrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> 
 
 @scalar
 def observe_extended_quadrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-    """The quadrotor and the law's own states."""
+    """The quadrotor and the controller's states."""
     return (*observe_quadrotor(qpos, qvel, act, ctrl), act[4], act[5])
 
 
 @scalar
 def thrust_tilt_cosine(values: Vector) -> float:
-    """The cosine of the thrust axis' tilt, from what `observe_quadrotor` gives."""
+    """The cosine of the thrust axis's tilt, of a sample's ``values``."""
     return cos(values[ROLL]) * cos(values[PITCH])
 
 
@@ -145,7 +143,7 @@ def observe_extended_equations(
 
 @scalar
 def thrust_axis_value(values: Vector, parameters: object) -> tuple[float]:
-    """What `thrust_axis_check` watches, from what `observe_quadrotor` gives."""
+    """The value of `thrust_axis_check`, from a sample's."""
     return (thrust_tilt_cosine(values),)
 
 
@@ -204,7 +202,17 @@ def references(
     knots: Vector,
     attitude: Sequence[object],
 ) -> dict[str, Floats]:
-    """Reference columns; ``attitude`` are those of roll, pitch and yaw, arrays or constants."""
+    """The columns of references; those of the tilts are zero.
+
+    Parameters
+    ----------
+    samples
+        By field.
+    reference, knots
+        Of the position.
+    attitude
+        Columns of roll, pitch and yaw (rad): arrays or constants.
+    """
     time = samples["time"]
     position = np.array([position_reference(t, reference, knots)[:3] for t in time.tolist()])
     columns = [*position.reshape(len(time), 3).T]
@@ -213,10 +221,18 @@ def references(
     return dict(zip(REFERENCE_COLUMNS, columns, strict=True)) | tilts
 
 
-def upright_margin(samples: Mapping[str, Floats]) -> Floats:
-    """Smallest rotation (rad) to a roll or pitch of 90 degrees, where both laws are singular.
+def constant_attitude_references(
+    samples: Mapping[str, Floats], reference: ReferenceParameters, knots: Vector
+) -> dict[str, Floats]:
+    """`references` with the attitude of the reference."""
+    attitude = (reference.roll, reference.pitch, reference.yaw)
+    return references(samples, reference, knots, attitude)
 
-    Either has the thrust axis level, so it is what the thrust axis lacks to 90 degrees.
+
+def upright_margin(samples: Mapping[str, Floats]) -> Floats:
+    """Smallest rotation (rad) to a roll or pitch of 90 degrees, singular under both control laws.
+
+    The thrust axis is then level, so the margin is its angle above the horizon.
     """
     upright = np.cos(samples["roll"]) * np.cos(samples["pitch"])
     return np.asarray(np.arcsin(np.clip(upright, -1.0, 1.0)))
@@ -225,7 +241,7 @@ def upright_margin(samples: Mapping[str, Floats]) -> Floats:
 def extended_singularity_columns(
     samples: Mapping[str, Floats], vehicle: Vehicle
 ) -> dict[str, Floats]:
-    """Exact and published determinant of the yaw-position law, and the margin to the exact one."""
+    """Exact and published determinant of the yaw-position law, and the margin (rad)."""
     attitude = samples["roll"], samples["pitch"]
     exact = normalized_determinant(*attitude, samples["extension_thrust"], vehicle)
     return {
@@ -237,7 +253,7 @@ def extended_singularity_columns(
 
 
 def thrust_axis_check(sample: Mapping[str, float]) -> SignCheck:
-    """The cosine of the thrust axis' tilt, zero at a roll or pitch of 90 degrees."""
+    """The cosine of the thrust axis's tilt, zero at a roll or pitch of 90 degrees."""
     roll, pitch = sample["roll"], sample["pitch"]
     return SignCheck(
         thrust_tilt_cosine([sample[name] for name in OBSERVED_FIELDS]),

@@ -1,4 +1,4 @@
-"""The attitude-altitude law around the quadrotor (ch. 2, Appendix B)."""
+"""The attitude-altitude controller of the quadrotor (ch. 2, Appendix B)."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from tiltsim.closed_loop.loop import (
 )
 from tiltsim.equations.quadrotor import initial_state, rigid_body
 from tiltsim.laws.quadrotor import (
+    constant_attitude_references,
     equation_rates,
     observe_equations,
     observe_quadrotor,
-    references,
     rigid_body_state,
     thrust_axis_check,
     thrust_axis_value,
@@ -62,10 +62,8 @@ def attitude_altitude_controls(
         parameters.gains,
         parameters.reference,
     )
-    return (
-        *thrust_controls(thrust, roll_torque, pitch_torque, yaw_torque, vehicle),
-        *(0.0, 0.0, 0.0, 0.0),
-    )
+    thrusts = thrust_controls(thrust, roll_torque, pitch_torque, yaw_torque, vehicle)
+    return (*thrusts, 0.0, 0.0, 0.0, 0.0)
 
 
 def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
@@ -77,9 +75,8 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     reference = setup.parameters.reference
-    attitude = (reference.roll, reference.pitch, reference.yaw)
     return {
-        **references(samples, reference, setup.knots, attitude),
+        **constant_attitude_references(samples, reference, setup.knots),
         # cos(roll) cos(pitch) of the altitude times 1 / cos(pitch) of the Euler angles
         "determinant": np.cos(samples["roll"]),
         "singularity_margin": upright_margin(samples),
@@ -90,7 +87,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 def equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
-    """The law on the thesis's equations."""
+    """The control law on the thesis's equations."""
     return attitude_altitude_inputs(
         time,
         (*rigid_body(state), 0.0, 0.0),

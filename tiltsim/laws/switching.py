@@ -1,4 +1,4 @@
-"""Switching between two laws around the quadrotor (ch. 2, Sec. 5)."""
+"""Switching between two controllers of the quadrotor (ch. 2, Sec. 5)."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class LoopParameters(NamedTuple):
 def switching_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
-    """All ten controls: thrusts, idle rotor states, the law's own states."""
+    """All ten controls: thrusts, idle rotor states, the controller's states."""
     law = parameters.law
     state = rigid_body_state(qpos, qvel, act[4], act[5])
     return extended_controls(switching_inputs(time, state, law, knots), law.yaw_position.vehicle)
@@ -75,7 +75,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     reference = law.yaw_position.reference
     attitudes = zip(samples["roll"].tolist(), samples["pitch"].tolist(), strict=True)
     inside = np.array([in_attitude_zone(*attitude, law.zone) for attitude in attitudes], float)
-    # Outside of the zone roll and pitch are no outputs: they are what the position takes.
+    # Outside the zone roll and pitch are not outputs: they follow from the position.
     roll = np.where(inside > 0.0, reference.roll, samples["roll"])
     pitch = np.where(inside > 0.0, reference.pitch, samples["pitch"])
     return {
@@ -89,7 +89,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 def equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
-    """The law on the thesis's equations."""
+    """The control law on the thesis's equations."""
     return switching_inputs(time, (*rigid_body(state), state[12], state[13]), parameters.law, knots)
 
 

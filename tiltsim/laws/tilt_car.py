@@ -1,4 +1,4 @@
-"""What the loops around the tilt-car share."""
+"""What the closed loops with the tilt-car share."""
 
 from __future__ import annotations
 
@@ -35,17 +35,15 @@ REFERENCE_COLUMNS: Final = ("x_ref", "y_ref", "vx_ref", "vy_ref")
 
 @scalar
 def running_speed(speed: float) -> float:
-    """A rotor speed (rad/s) that an integrator's stage may have carried below zero."""
+    """A rotor speed (rad/s), zero where an integrator's stage has passed below."""
     return 0.0 if speed < 0.0 else speed
 
 
 @scalar
 def car_state(qpos: Vector, qvel: Vector, speed_1: float, speed_2: float) -> CarState:
-    """The laws' state (`tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`) from MuJoCo's."""
-    return (
-        *(qpos[0], qpos[1], qvel[0], qvel[1], qpos[2], qpos[3]),
-        *(running_speed(speed_1), running_speed(speed_2)),
-    )
+    """State of the control laws from MuJoCo's and the rotor speeds (rad/s)."""
+    x, y, yaw, alpha = qpos[0], qpos[1], qpos[2], qpos[3]
+    return x, y, qvel[0], qvel[1], yaw, alpha, running_speed(speed_1), running_speed(speed_2)
 
 
 @scalar
@@ -63,15 +61,26 @@ def reference_columns(samples: Mapping[str, Floats], reference: ReferenceParamet
 
 
 def derived_columns(
-    samples: Mapping[str, Floats], reference: Floats, wanted: tuple[Floats, Floats], car: TiltCar
+    samples: Mapping[str, Floats],
+    reference: Floats,
+    acceleration: tuple[Floats, Floats],
+    car: TiltCar,
 ) -> dict[str, Floats]:
     """Reference, directions and the split of the inputs.
 
-    ``reference`` are `reference_columns`, ``wanted`` the acceleration whose direction the thrusts
-    are to bracket.
+    Parameters
+    ----------
+    samples
+        By field.
+    reference
+        `reference_columns`.
+    acceleration
+        Along x and y: the thrusts are to bracket its direction.
+    car
+        The vehicle.
     """
     direction = samples["yaw"] + samples["alpha"]
-    away = np.arctan2(wanted[1], wanted[0]) - direction
+    away = np.arctan2(acceleration[1], acceleration[0]) - direction
     return {
         **dict(zip(REFERENCE_COLUMNS, reference[[0, 1, 3, 4]], strict=True)),
         "direction": direction,
@@ -83,14 +92,14 @@ def derived_columns(
 
 
 def rotors_at_rest(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[SignCheck, ...]:
-    """Both rotors' squares: the inputs' matrix loses its rank where both are at rest."""
+    """The sum of the squared rotor speeds: the decoupling matrix loses rank at zero."""
     squares = sample["rotor_speed_1"] ** 2 + sample["rotor_speed_2"] ** 2
     return (SignCheck(squares, "the decoupling matrix became singular: both rotors came to rest"),)
 
 
 @scalar
 def sum_of_squared_speeds(values: Vector, parameters: object) -> tuple[float]:
-    """What `rotors_at_rest` watches, from what a loop around the car observes."""
+    """The value of `rotors_at_rest`, from a sample's."""
     return (values[SPEED_1] * values[SPEED_1] + values[SPEED_2] * values[SPEED_2],)
 
 
@@ -104,7 +113,7 @@ def initial_motion(scenario: Scenario) -> tuple[float, float, float, float]:
 def car_setup(
     parameters: Callable[..., Any], plan: FlightPlan, signature: float, **own: Any
 ) -> ControlSetup:
-    """What every loop around the car begins with, and its ``own`` fields by name."""
+    """The fields of every such loop's record, and its ``own`` by name."""
     lead = servo_lead(plan.scenario.tilt_car.tilt_servo)
     heading = float(plan.scenario.initial.attitude[2])
     return ControlSetup(parameters(signature, servo_lead=lead, heading=heading, **own))

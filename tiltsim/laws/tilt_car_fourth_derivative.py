@@ -1,4 +1,4 @@
-"""Fourth-derivative feedback linearization around the tilt-car (ch. 10, Sec. 6.1)."""
+"""Fourth-derivative feedback linearization of the tilt-car (ch. 10, Sec. 6.1)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 ACCELERATIONS: Final = ("rotor_acceleration_1", "rotor_acceleration_2")
 SPEEDS: Final = ("law_speed_1", "law_speed_2")
-"""The rotor speeds that the law integrates; those that turn are never below zero."""
+"""The rotor speeds that the controller integrates; the true ones are never below zero."""
 
 
 class LoopParameters(NamedTuple):
@@ -41,7 +41,7 @@ class LoopParameters(NamedTuple):
 
 @scalar
 def law_speed(speed: float, anti_windup: float) -> float:
-    """A rotor speed (rad/s) as the law integrates it: below zero only without anti-windup."""
+    """A rotor speed (rad/s) as the controller has it: below zero only without anti-windup."""
     return 0.0 if anti_windup == 1.0 and speed < 0.0 else speed
 
 
@@ -51,56 +51,48 @@ def fourth_derivative_controls(
 ) -> Values:
     """All nine controls: tilt servo, thrusts, then the rates of rotor speeds and law states.
 
-    The law's own states are the tilt angle that the servo is told, its rate, and the rotor
-    accelerations.
+    The controller's states are the command of the servo, its rate, and the rotor accelerations.
     """
     tilt, tilt_rate, rate_1, rate_2 = act[2], act[3], act[4], act[5]
     speed_1 = law_speed(act[0], parameters.law.anti_windup)
     speed_2 = law_speed(act[1], parameters.law.anti_windup)
-    state = (
-        *(qpos[0], qpos[1], qvel[0], qvel[1], qpos[2], qpos[3]),
-        *(speed_1, speed_2, tilt_rate, rate_1, rate_2),
-    )
+    x, y, yaw, alpha = qpos[0], qpos[1], qpos[2], qpos[3]
+    state = (x, y, qvel[0], qvel[1], yaw, alpha, speed_1, speed_2, tilt_rate, rate_1, rate_2)
     second_1, second_2, second_tilt = fourth_derivative_inputs(time, state, parameters.law)
-    return (
-        tilt + parameters.servo_lead * tilt_rate,
-        *speed_squares(act),
-        *(rate_1, rate_2, tilt_rate, second_tilt, second_1, second_2),
-    )
+    servo, thrusts = tilt + parameters.servo_lead * tilt_rate, speed_squares(act)
+    return (servo, *thrusts, rate_1, rate_2, tilt_rate, second_tilt, second_1, second_2)
 
 
 @scalar
 def refreshed_fourth_derivative_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: LoopParameters
 ) -> Values:
-    """Held second derivatives; what integrates them goes on."""
+    """Held second derivatives, with the present states that integrate them."""
     return (ctrl[0], *speed_squares(act), *(act[4], act[5], act[3], ctrl[6], ctrl[7], ctrl[8]))
 
 
 @scalar
 def fourth_derivative_law_state(state: Vector, parameters: LoopParameters) -> Values:
-    """The law's state from that of the thesis's equations."""
-    return (
-        *(state[0], state[1], state[2], state[3]),
-        *(yaw_of(state[4], parameters.heading, parameters.law.car), state[4]),
-        law_speed(state[5], parameters.law.anti_windup),
-        law_speed(state[6], parameters.law.anti_windup),
-        *(state[7], state[8], state[9]),
-    )
+    """State of the control law from that of the thesis's equations."""
+    x, y, vx, vy, alpha = state[0], state[1], state[2], state[3], state[4]
+    yaw = yaw_of(alpha, parameters.heading, parameters.law.car)
+    speed_1 = law_speed(state[5], parameters.law.anti_windup)
+    speed_2 = law_speed(state[6], parameters.law.anti_windup)
+    return x, y, vx, vy, yaw, alpha, speed_1, speed_2, state[7], state[8], state[9]
 
 
 @scalar
 def fourth_derivative_equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Triple:
-    """The law on the thesis's equations."""
+    """The control law on the thesis's equations."""
     law_state = fourth_derivative_law_state(state, parameters)
     return fourth_derivative_inputs(time, law_state, parameters.law)
 
 
 @scalar
 def integrated_rate(speed: float, rate: float, anti_windup: float) -> float:
-    """The rate (rad/s^2) at which the law's rotor speed changes."""
+    """Rate (rad/s^2) of a rotor speed as the controller has it."""
     return limited_rate(speed, rate) if anti_windup == 1.0 else rate
 
 
@@ -114,17 +106,18 @@ def fourth_derivative_equation_rates(
     disturbance: Triple,
 ) -> Values:
     """The thesis's equations with the inputs integrated twice."""
-    law_state = fourth_derivative_law_state(state, parameters)
+    _, _, _, _, yaw, alpha, _, _, _, _, _ = fourth_derivative_law_state(state, parameters)
+    law, (second_1, second_2, second_tilt) = parameters.law, inputs
     speed_1, speed_2 = running_speed(state[5]), running_speed(state[6])
     square_1, square_2 = speed_1 * speed_1, speed_2 * speed_2
-    direction = law_state[4] + law_state[5]
-    second_1, second_2, second_tilt = inputs
     return (
-        *equations_of_motion(state, direction, square_1, square_2, parameters.law.car, disturbance),
+        *equations_of_motion(state, yaw + alpha, square_1, square_2, law.car, disturbance),
         state[7],
-        integrated_rate(state[5], state[8], parameters.law.anti_windup),
-        integrated_rate(state[6], state[9], parameters.law.anti_windup),
-        *(second_tilt, second_1, second_2),
+        integrated_rate(state[5], state[8], law.anti_windup),
+        integrated_rate(state[6], state[9], law.anti_windup),
+        second_tilt,
+        second_1,
+        second_2,
     )
 
 
@@ -143,26 +136,26 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
 
 @scalar
 def observe_fourth_derivative(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-    """The car and the law's own states."""
+    """The car and the controller's states."""
     x, y, vx, vy, yaw, alpha, speed_1, speed_2 = car_state(qpos, qvel, act[0], act[1])
     return (
-        *(x, y, vx, vy, yaw, qvel[2], alpha, qvel[3], speed_1, speed_2),
-        *(act[2], act[3], act[4], act[5], act[0], act[1]),
-    )
+        x, y, vx, vy, yaw, qvel[2], alpha, qvel[3], speed_1, speed_2,
+        act[2], act[3], act[4], act[5], act[0], act[1],
+    )  # fmt: skip
 
 
 @scalar
 def observe_fourth_derivative_equations(
     time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
-    """The same of the thesis's equations."""
+    """A sample of the thesis's equations."""
     law_state = fourth_derivative_law_state(state, parameters)
     x, y, vx, vy, yaw, alpha, speed_1, speed_2, tilt_rate, rate_1, rate_2 = law_state
     r = yaw_of(tilt_rate, 0.0, parameters.law.car)
     return (
-        *(x, y, vx, vy, yaw, r, alpha, tilt_rate, running_speed(speed_1), running_speed(speed_2)),
-        *(alpha, tilt_rate, rate_1, rate_2, speed_1, speed_2),
-    )
+        x, y, vx, vy, yaw, r, alpha, tilt_rate, running_speed(speed_1), running_speed(speed_2),
+        alpha, tilt_rate, rate_1, rate_2, speed_1, speed_2,
+    )  # fmt: skip
 
 
 FOURTH_DERIVATIVE: Final = integrating_loop(

@@ -1,4 +1,4 @@
-"""The tilt-car with its thrusts' direction planned (ch. 10, Sec. 5; ch. 11)."""
+"""The tilt-car with a planned direction of its thrusts (ch. 10, Sec. 5; ch. 11)."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def planned_direction_controls(
 ) -> Values:
     """All five controls: tilt servo, thrusts, idle rotor states.
 
-    The law reads the direction in which the thrusts do point, which lags behind the gait's jumps.
+    The control law reads the true direction of the thrusts, which lags behind the gait's steps.
     """
     tilt, _, _, _, tilt_rate, _, _, _ = tilt_reference(time, parameters.gait, knots)
     state = car_state(qpos, qvel, 0.0, 0.0)
@@ -72,7 +72,7 @@ def planned_direction_controls(
 def planned_direction_law_state(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> CarState:
-    """The law's state from that of the thesis's equations, the tilt as planned."""
+    """State of the control law from that of the thesis's equations, with the planned tilt."""
     alpha, _, _, _, _, _, _, _ = tilt_reference(time, parameters.gait, knots)
     yaw = yaw_of(alpha, parameters.heading, parameters.law.car)
     return state[0], state[1], state[2], state[3], yaw, alpha, 0.0, 0.0
@@ -82,7 +82,7 @@ def planned_direction_law_state(
 def planned_direction_equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Pair:
-    """The law on the thesis's equations: the squares of the rotor speeds."""
+    """The squares of the rotor speeds on the thesis's equations."""
     law_state = planned_direction_law_state(time, state, parameters, knots)
     return planned_direction_inputs(time, law_state, parameters.law)
 
@@ -114,7 +114,7 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
 
 @scalar
 def speed_of_square(square: float) -> float:
-    """The rotor speed (rad/s) of a control, NaN where the law gave none."""
+    """The rotor speed (rad/s) of a control; NaN of a negative one or of NaN."""
     return sqrt(square) if square >= 0.0 else nan
 
 
@@ -122,29 +122,25 @@ def speed_of_square(square: float) -> float:
 def observe_planned_direction(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """The car, its rotor speeds from the controls in force."""
     x, y, vx, vy, yaw, alpha, _, _ = car_state(qpos, qvel, 0.0, 0.0)
-    return (
-        *(x, y, vx, vy, yaw, qvel[2], alpha, qvel[3]),
-        *(speed_of_square(ctrl[1]), speed_of_square(ctrl[2])),
-    )
+    speed_1, speed_2 = speed_of_square(ctrl[1]), speed_of_square(ctrl[2])
+    return x, y, vx, vy, yaw, qvel[2], alpha, qvel[3], speed_1, speed_2
 
 
 @scalar
 def observe_planned_direction_equations(
     time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
-    """The same of the thesis's equations."""
+    """A sample of the thesis's equations."""
     x, y, vx, vy, yaw, alpha, _, _ = planned_direction_law_state(time, state, parameters, knots)
     tilt_rate = tilt_reference(time, parameters.gait, knots)[4]
     r = yaw_of(tilt_rate, 0.0, parameters.law.car)
-    return (
-        *(x, y, vx, vy, yaw, r, alpha, tilt_rate),
-        *(speed_of_square(inputs[0]), speed_of_square(inputs[1])),
-    )
+    speed_1, speed_2 = speed_of_square(inputs[0]), speed_of_square(inputs[1])
+    return x, y, vx, vy, yaw, r, alpha, tilt_rate, speed_1, speed_2
 
 
 @scalar
 def sign_check_values(values: Vector, parameters: LoopParameters) -> tuple[float]:
-    """The law ends nowhere."""
+    """The controller is singular nowhere."""
     return (1.0,)
 
 
@@ -154,11 +150,11 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
     time = samples["time"].tolist()
     names = ("x", "y", "vx", "vy", "yaw", "alpha", "rotor_speed_1", "rotor_speed_2")
     states = np.stack([samples[name] for name in names], axis=-1).tolist()
-    wanted = [demanded_acceleration(*row, law) for row in zip(time, states, strict=True)]
+    demanded = [demanded_acceleration(*row, law) for row in zip(time, states, strict=True)]
     squares = [demanded_squared_speeds(*row, law) for row in zip(time, states, strict=True)]
     tilts = [tilt_reference(t, parameters.gait, knots)[0] for t in time]
     reference = reference_columns(samples, law.reference)
-    ax, ay = np.array(wanted).reshape(len(time), 2).T
+    ax, ay = np.array(demanded).reshape(len(time), 2).T
     columns = derived_columns(samples, reference, (ax, ay), law.car) | {
         "alpha_ref": np.array(tilts)
     }
@@ -197,8 +193,8 @@ PLANNED_DIRECTION: Final = ClosedLoop(
         observe=observe_planned_direction_equations,
     ),
 )
-"""The tilt-car with its thrusts' direction planned.
+"""The tilt-car with a planned direction of its thrusts.
 
 ``switch_1`` and ``switch_2`` are ``p`` and ``q`` of ch. 11's switch matrix (Eqs. 22-24), 0 where a
-rotor's thrust is saturated at zero; ``wanted_square_i`` what the law would set without the limit.
+rotor's thrust is saturated at zero; ``wanted_square_i`` is the demand without that limit.
 """

@@ -1,4 +1,4 @@
-"""Third-derivative feedback linearization around the tilt-car (ch. 10, Sec. 3.1)."""
+"""Third-derivative feedback linearization of the tilt-car (ch. 10, Sec. 3.1)."""
 
 from __future__ import annotations
 
@@ -38,40 +38,35 @@ def third_derivative_controls(
 ) -> Values:
     """All six controls: tilt servo, thrusts, rotor accelerations, tilt rate.
 
-    The law's own state integrates the tilt rate to the angle that the servo is told.
+    The controller's state integrates the tilt rate to the command of the servo.
     """
     state = car_state(qpos, qvel, act[0], act[1])
     rate_1, rate_2, tilt_rate = third_derivative_inputs(time, state, parameters.law)
-    return (
-        act[2] + parameters.servo_lead * tilt_rate,
-        *speed_squares(act),
-        *(rate_1, rate_2, tilt_rate),
-    )
+    servo = act[2] + parameters.servo_lead * tilt_rate
+    return (servo, *speed_squares(act), rate_1, rate_2, tilt_rate)
 
 
 @scalar
 def refreshed_third_derivative_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: LoopParameters
 ) -> Values:
-    """Held controls with the thrusts that belong to the present rotor speeds."""
+    """Held controls with the thrusts of the present rotor speeds."""
     return (ctrl[0], *speed_squares(act), ctrl[3], ctrl[4], ctrl[5])
 
 
 @scalar
 def third_derivative_law_state(state: Vector, parameters: LoopParameters) -> CarState:
-    """The law's state from that of the thesis's equations."""
-    return (
-        *(state[0], state[1], state[2], state[3]),
-        *(yaw_of(state[4], parameters.heading, parameters.law.car), state[4]),
-        *(running_speed(state[5]), running_speed(state[6])),
-    )
+    """State of the control law from that of the thesis's equations."""
+    x, y, vx, vy, alpha = state[0], state[1], state[2], state[3], state[4]
+    yaw = yaw_of(alpha, parameters.heading, parameters.law.car)
+    return x, y, vx, vy, yaw, alpha, running_speed(state[5]), running_speed(state[6])
 
 
 @scalar
 def third_derivative_equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Triple:
-    """The law on the thesis's equations: rotor accelerations and tilt rate."""
+    """Rotor accelerations and tilt rate on the thesis's equations."""
     law_state = third_derivative_law_state(state, parameters)
     return third_derivative_inputs(time, law_state, parameters.law)
 
@@ -87,14 +82,10 @@ def third_derivative_equation_rates(
 ) -> Values:
     """The thesis's equations with the inputs integrated."""
     _, _, _, _, yaw, alpha, speed_1, speed_2 = third_derivative_law_state(state, parameters)
-    squares = speed_1 * speed_1, speed_2 * speed_2
+    square_1, square_2, car = speed_1 * speed_1, speed_2 * speed_2, parameters.law.car
     rate_1, rate_2, tilt_rate = inputs
-    return (
-        *equations_of_motion(
-            state, yaw + alpha, squares[0], squares[1], parameters.law.car, disturbance
-        ),
-        *(tilt_rate, limited_rate(state[5], rate_1), limited_rate(state[6], rate_2)),
-    )
+    motion = equations_of_motion(state, yaw + alpha, square_1, square_2, car, disturbance)
+    return (*motion, tilt_rate, limited_rate(state[5], rate_1), limited_rate(state[6], rate_2))
 
 
 def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
@@ -111,7 +102,7 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
 
 @scalar
 def observe_third_derivative(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-    """The car and the tilt angle that its servo is told."""
+    """The car and the command of its servo."""
     x, y, vx, vy, yaw, alpha, speed_1, speed_2 = car_state(qpos, qvel, act[0], act[1])
     return x, y, vx, vy, yaw, qvel[2], alpha, qvel[3], speed_1, speed_2, act[2]
 
@@ -120,7 +111,7 @@ def observe_third_derivative(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vect
 def observe_third_derivative_equations(
     time: float, state: Vector, inputs: Triple, parameters: LoopParameters, knots: Vector
 ) -> Values:
-    """The same of the thesis's equations."""
+    """A sample of the thesis's equations."""
     x, y, vx, vy, yaw, alpha, speed_1, speed_2 = third_derivative_law_state(state, parameters)
     tilt_rate = inputs[2]
     r = yaw_of(tilt_rate, 0.0, parameters.law.car)

@@ -1,8 +1,8 @@
-"""The attitude-altitude law around the tiltrotor.
+"""What the closed loops with the tiltrotor share.
 
-The control step goes from MuJoCo's state to MuJoCo's controls, as scalar code. One step serves
-every engine. It is a pure function of time, `qpos`, `qvel`, `act` and the parameters in
-`userdata`, so that a saved state restarts exactly and an integrator may call it at every stage.
+A control step goes from MuJoCo's state to MuJoCo's controls, as scalar code for every engine. It is
+a pure function of time, `qpos`, `qvel`, `act` and the parameters in `userdata`, so that a saved
+state restarts exactly and an integrator may call it at every stage.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import ControlSetup, Dynamics, SignCheck, Sizes
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
+from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.vehicles.rotorcraft.layout import (
     ALPHA_1,
     ALPHA_2,
@@ -27,15 +28,12 @@ from tiltsim.vehicles.rotorcraft.layout import (
     SPEED_3,
     SPEED_4,
     TILT_RATE_1,
-    TILT_RATE_2,
-    TILT_RATE_3,
-    TILT_RATE_4,
 )
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion, world_up_in_body
-from tiltsim_controllers.mathematics.scalar import Floats, Quad, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     sines_and_cosines,
     torque_entries,
@@ -55,7 +53,7 @@ TILT_REFERENCE_COLUMNS: Final = tuple(f"alpha_ref_{rotor}" for rotor in (1, 2, 3
 
 @scalar
 def tiltrotor_state(qpos: Vector, qvel: Vector, act: Vector) -> Values:
-    """The law's state (`tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`) from MuJoCo's.
+    """State of the control laws, `TILTROTOR_FIELDS`, from MuJoCo's.
 
     MuJoCo gives the body's position, its quaternion and the tilt angles in ``qpos``, the velocity
     in world axes, the body rates in body axes and the tilt rates in ``qvel``.
@@ -68,6 +66,12 @@ def tiltrotor_state(qpos: Vector, qvel: Vector, act: Vector) -> Values:
         x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r,
         alpha_1, alpha_2, alpha_3, alpha_4, act[0], act[1], act[2], act[3],
     )  # fmt: skip
+
+
+@scalar
+def four(values: Vector, first: int) -> Quad:
+    """Four consecutive values."""
+    return values[first], values[first + 1], values[first + 2], values[first + 3]
 
 
 @scalar
@@ -84,7 +88,7 @@ def rotor_thrust_controls(act: Vector) -> Quad:
 
 @scalar
 def gait_servo_commands(time: float, lead: float, gait: GaitParameters, knots: Vector) -> Quad:
-    """What the tilt servos are told (rad) to follow the planned gait, their lag allowed for."""
+    """Commands (rad) of the tilt servos, ahead of the planned gait by their lag ``lead`` (s)."""
     a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, gait, knots)
     return a1 + lead * rate_1, a2 + lead * rate_2, a3 + lead * rate_3, a4 + lead * rate_4
 
@@ -98,8 +102,35 @@ def refreshed_controls(
 
 
 def servo_lead(servo: ServoTable) -> float:
-    """By how much (s) a tilt servo lags behind a command that moves evenly."""
+    """Lag (s) of a tilt servo behind a command of constant rate, ``2 zeta / omega_n``."""
     return 2.0 * servo.damping_ratio / servo.natural_frequency
+
+
+@scalar
+def gait_equation_rates(
+    time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector, disturbance: Triple
+) -> Values:
+    """The thesis's equations with tilt angles that follow the gait exactly."""
+    law = parameters.law
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, knots)
+    accelerations = four(inputs, 0)
+    return equations_of_motion(state, (a1, a2, a3, a4), accelerations, law.vehicle, disturbance)
+
+
+@scalar
+def observe_gait_equations(
+    time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
+) -> Values:
+    """A sample of the thesis's equations; the tilts are the gait's."""
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(
+        time, parameters.law.gait, knots
+    )
+    return (*law_state(state, (a1, a2, a3, a4)), rate_1, rate_2, rate_3, rate_4)
+
+
+def initial_equation_state(plan: FlightPlan) -> Values:
+    """State of the thesis's equations at time zero, without states of the controller."""
+    return initial_state(plan.scenario, initial_signed_rotor_speeds(plan.scenario))
 
 
 def initial_signed_rotor_speeds(scenario: Scenario) -> Values:
@@ -128,19 +159,13 @@ def tiltrotor_dynamics(
 
 
 @scalar
-def tilt_rates(qvel: Vector) -> Quad:
-    """Tilt rates (rad/s)."""
-    return qvel[TILT_RATE_1], qvel[TILT_RATE_2], qvel[TILT_RATE_3], qvel[TILT_RATE_4]
-
-
-@scalar
 def observe_tiltrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """Rigid body, tilts, rotor speeds and tilt rates: all of them states of the simulation."""
-    return (*tiltrotor_state(qpos, qvel, act), *tilt_rates(qvel))
+    return (*tiltrotor_state(qpos, qvel, act), *four(qvel, TILT_RATE_1))
 
 
 def singularity_columns(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict[str, Floats]:
-    """Determinant of the attitude-altitude law at the present tilts, and the margin to zero."""
+    """Determinant of the attitude-altitude law, and the margin (rad) to a singular attitude."""
     tilts = np.stack([samples[name] for name in TILT_COLUMNS], axis=-1)
     attitude = samples["roll"], samples["pitch"]
     return {
@@ -155,7 +180,19 @@ def reference_columns(
     samples: Mapping[str, Floats],
     setup: ControlSetup,
 ) -> dict[str, Floats]:
-    """The columns that a function such as `reference_values` tells of samples' ``fields``."""
+    """The columns of references, evaluated over samples.
+
+    Parameters
+    ----------
+    in_force
+        Scalar function ``(time, values, parameters, knots)`` of the columns' values.
+    fields
+        Fields of a sample, its ``values``.
+    samples
+        By field.
+    setup
+        The flight's parameters and knots.
+    """
     states = np.stack([samples[name] for name in fields], axis=-1)
     names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)
     rows = evaluate_over_samples(in_force, len(names), samples["time"], states, setup)
@@ -163,7 +200,7 @@ def reference_columns(
 
 
 def rotor_speed_checks(sample: Mapping[str, float]) -> tuple[SignCheck, ...]:
-    """Rotor speeds along their spin: a matrix with the factor ``2 |varpi|`` is singular at zero."""
+    """Rotor speeds along their spin: the decoupling matrix has the factor ``2 |varpi|``."""
     return tuple(
         SignCheck(
             sign * sample[f"rotor_speed_{rotor}"],
@@ -175,13 +212,13 @@ def rotor_speed_checks(sample: Mapping[str, float]) -> tuple[SignCheck, ...]:
 
 @scalar
 def rotor_speeds_along_spin(values: Vector) -> Quad:
-    """Rotor speeds along their spin, from what `observe_tiltrotor` gives."""
+    """Rotor speeds (rad/s) along their spin, of a sample's ``values``."""
     return -values[SPEED_1], values[SPEED_2], -values[SPEED_3], values[SPEED_4]
 
 
 @scalar
 def scaled_determinant(values: Vector, vehicle: Vehicle) -> float:
-    """The determinant of the decoupling matrix but for the rotor speeds, of a sample's values."""
+    """Determinant of the decoupling matrix without the rotor speeds, of a sample's ``values``."""
     ratio = drag_ratio(vehicle)
     trig = sines_and_cosines(values[ALPHA_1], values[ALPHA_2], values[ALPHA_3], values[ALPHA_4])
     nx, ny, nz = torque_free_force(trig, torque_entries(trig, ratio), ratio)
@@ -190,7 +227,7 @@ def scaled_determinant(values: Vector, vehicle: Vehicle) -> float:
 
 
 def determinant_check(sample: Mapping[str, float], vehicle: Vehicle) -> SignCheck:
-    """The determinant of the attitude-altitude law at the present tilts and attitude."""
+    """`scaled_determinant` of a sample by field."""
     angles = ", ".join(f"{sample[name]:.3g}" for name in TILT_COLUMNS)
     return SignCheck(
         scaled_determinant([sample[name] for name in OBSERVED_FIELDS], vehicle),

@@ -1,4 +1,4 @@
-"""The yaw-position law around the quadrotor (ch. 2)."""
+"""The yaw-position controller of the quadrotor (ch. 2)."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class LoopParameters(NamedTuple):
 def yaw_position_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
-    """All ten controls: thrusts, idle rotor states, the law's own states."""
+    """All ten controls: thrusts, idle rotor states, the controller's states."""
     law = parameters.law
     state = rigid_body_state(qpos, qvel, act[4], act[5])
     return extended_controls(yaw_position_inputs(time, state, law, knots), law.vehicle)
@@ -56,7 +56,7 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     law = setup.parameters.law
-    # Roll and pitch are no outputs: they are what the position takes.
+    # Roll and pitch are not outputs: they follow from the position.
     attitude = (samples["roll"], samples["pitch"], law.reference.yaw)
     columns = references(samples, law.reference, setup.knots, attitude)
     return columns | extended_singularity_columns(samples, law.vehicle)
@@ -64,12 +64,12 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 
 @scalar
 def sign_check_values(values: Vector, parameters: LoopParameters) -> tuple[float, float]:
-    """The cosine of the thrust axis' tilt and the extension's thrust."""
+    """The cosine of the thrust axis's tilt and the extension's thrust."""
     return thrust_tilt_cosine(values), values[24]
 
 
 def extension_thrust_check(sample: Mapping[str, float]) -> SignCheck:
-    """The thrust of the extension: without thrust the decoupling matrix is singular."""
+    """The thrust of the extension (N): at zero the decoupling matrix is singular."""
     thrust = sample["extension_thrust"]
     return SignCheck(thrust, "the decoupling matrix became singular: the thrust came to zero")
 
@@ -78,7 +78,7 @@ def extension_thrust_check(sample: Mapping[str, float]) -> SignCheck:
 def equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
-    """The law on the thesis's equations."""
+    """The control law on the thesis's equations."""
     return yaw_position_inputs(
         time, (*rigid_body(state), state[12], state[13]), parameters.law, knots
     )

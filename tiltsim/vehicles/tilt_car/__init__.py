@@ -30,8 +30,16 @@ if TYPE_CHECKING:
 ROTORS: Final = (1, 2)
 
 OBSERVED_FIELDS: Final = (
-    *("x", "y", "vx", "vy", "yaw", "r"),
-    *("alpha", "alpha_rate", "rotor_speed_1", "rotor_speed_2"),
+    "x",
+    "y",
+    "vx",
+    "vy",
+    "yaw",
+    "r",
+    "alpha",
+    "alpha_rate",
+    "rotor_speed_1",
+    "rotor_speed_2",
 )
 """A sample of any tilt-car after its time: both discs and the rotor speeds."""
 
