@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isnan
+from math import inf, isnan
 
 import numpy as np
 import pytest
@@ -17,6 +17,7 @@ from tiltsim_controllers.laws.attitude_altitude import rotor_accelerations
 from tiltsim_controllers.laws.full_pose import (
     GAIN_SETS,
     PUBLISHED_TILT_WEIGHT,
+    Failure,
     Limits,
     Parameters,
     attitude_error,
@@ -168,6 +169,54 @@ def test_the_outputs_move_as_demanded(weight):
             ]
         )
         np.testing.assert_allclose(third, wanted, rtol=0, atol=1e-4 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("lost", [1, 2, 3, 4])
+def test_a_rotor_known_to_be_lost_is_counted_on_no_more(lost):
+    """From its time on the law is that of a vehicle whose rotor makes no thrust."""
+    random = np.random.default_rng(6)
+    law = parameters()
+    warned = law._replace(failure=Failure(float(lost), 2.0))
+    for _ in range(CASES // 4):
+        state = random_state(random)
+        whole = full_pose_inputs(1.0, state, law)
+        assert full_pose_inputs(1.999, state, warned) == whole
+        inputs = full_pose_inputs(2.0, state, warned)
+        assert inputs == full_pose_inputs(9.0, state, warned)
+        assert inputs[lost - 1] == inputs[lost + 3] == 0.0
+
+        def rates(_, state, inputs=inputs):
+            return tiltrotor_rates((*state[:16], *without(lost, state[16:])), inputs, TILTROTOR)
+
+        now, ahead, behind = (
+            np.array(rates(0.0, rk4_step(rates, 0.0, state, k * 1e-7))) for k in (0, 1, -1)
+        )
+        third = ((ahead - behind) / 2e-7)[[3, 4, 5, 9, 10, 11]]
+        error = attitude_error(rotation_from_euler(*state[6:9]), rotation_from_euler(0, 0, 0))
+        demanded = np.concatenate(
+            [
+                -1562.0 * np.array(state[:3]) - 1875.0 * np.array(state[3:6]) - 750.0 * now[3:6],
+                2577.0 * np.array(error) - 1500.0 * np.array(state[9:12]) - 750.0 * now[9:12],
+            ]
+        )
+        np.testing.assert_allclose(third, demanded, rtol=0, atol=1e-4 * np.abs(demanded).max())
+
+
+def without(lost, speeds):
+    return [0.0 if rotor == lost else speed for rotor, speed in enumerate(speeds, start=1)]
+
+
+def test_no_failure_is_the_default():
+    assert Failure() == Failure(0.0, inf)
+    state = random_state(np.random.default_rng(7))
+    named = parameters()._replace(failure=Failure(0.0, 0.0))
+    assert full_pose_inputs(1.0, state, named) == full_pose_inputs(1.0, state, parameters())
+
+
+def test_the_even_weight_is_that_of_hover():
+    """A tilt rate moves the force by ``w alpha'``, a rotor's acceleration by ``w'``."""
+    weight = TILTROTOR.mass * TILTROTOR.gravity / (4.0 * TILTROTOR.thrust_coefficient)
+    assert WEIGHTS["even"] == pytest.approx(weight, rel=1e-12)
 
 
 def test_the_published_gains_are_stable():

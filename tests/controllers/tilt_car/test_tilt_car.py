@@ -195,6 +195,29 @@ def test_the_third_derivative_law_makes_the_jerk_it_wants(restoring_rate):
     np.testing.assert_allclose(made, wanted, rtol=1e-10)
 
 
+def test_the_fourth_derivative_law_makes_the_snap_it_demands():
+    (w1, d1, _), (w2, d2, _), (alpha, d3, _) = INPUTS
+    yaw = -0.3
+    state = (1.0, -2.0, 3.0, -4.0, yaw, alpha, w1, w2, d3, d1, d2)
+    law = fourth.Parameters(CAR, fourth.GAIN_SETS["ch10"], CIRCLE_10, fourth.EXACT, 0.0)
+    second = fourth.fourth_derivative_inputs(0.7, state, law)
+    motion = [(*values[:2], last) for values, last in zip(INPUTS, second)]
+    frame = rotation(yaw + alpha - turn_per_tilt(CAR) * alpha)
+    ax, jx, made = (
+        frame @ derivative_values(order, [values[: order + 1] for values in motion])
+        for order in (0, 1, 2)
+    )
+    reference = np.reshape(reference_derivatives(0.7, CIRCLE_10), (5, 3))[:, :2]
+    demanded = (
+        reference[4]
+        + 12.0 * (reference[3] - jx)
+        + 54.0 * (reference[2] - ax)
+        + 108.0 * (reference[1] - state[2:4])
+        + 81.0 * (reference[0] - state[0:2])
+    )
+    np.testing.assert_allclose(made, demanded, rtol=1e-10)
+
+
 def test_the_printed_tilt_column_lacks_the_yaws_answer():
     state = (0.1, 0.2, 0.3, 0.4, -0.2, 0.5, 90.0, 70.0, 1.0, 2.0, -3.0)
     gains = fourth.GAIN_SETS["ch10"]
