@@ -91,14 +91,14 @@ def test_a_sweep_shows_how_far_it_is(tmp_path, monkeypatch):
     assert "| 0/12 flights [" in shown.text
 
 
-def test_a_film_counts_its_frames(tmp_path, monkeypatch):
+def test_a_video_counts_its_frames(tmp_path, monkeypatch):
     def frame(_sample):
         time.sleep(0.02)
         return np.zeros((64, 64, 3), dtype=np.uint8)
 
     stage = SimpleNamespace(canvas=nullcontext(), frame=frame)
     monkeypatch.setattr(tiltsim.views.video, "prefer_offscreen_gl", lambda: None)
-    monkeypatch.setattr(tiltsim.views.video.rendering, "_Stage", lambda *_: stage)
+    monkeypatch.setattr(tiltsim.views.video.rendering, "FlightRenderer", lambda *_: stage)
     with terminal_as_stderr(monkeypatch) as shown:
         assert main(["video", str(saved("fixed", tmp_path)), "--size", "64x64", "--fps", "10"]) == 0
     assert "| 0/13 frames [00:00<?, ? frames/s]" in shown.text

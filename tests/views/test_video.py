@@ -1,4 +1,4 @@
-"""Films: frames that show the flight, a file that plays, one line where nothing can draw."""
+"""Videos: frames that show the flight, a file that plays, one line if nothing can render."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from tests.flights import flight, saved
 from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, torque_free_directions
-from tiltsim.views.video import aspects, has_display, inset, offscreen
+from tiltsim.views.video import has_display, inset, offscreen, overlay
 from tiltsim.views.video.inset import PlaneInset, overlay_inset
 from tiltsim.views.video.offscreen import make_contexts
-from tiltsim.views.video.overlay import RotorcraftAspect
-from tiltsim.views.video.rendering import Format, _Stage, frames, write_video
+from tiltsim.views.video.overlay import RotorcraftOverlay
+from tiltsim.views.video.rendering import FlightRenderer, VideoFormat, frames, write_video
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
-SMALL = Format(width=320, height=180, fps=10, speed=2.0)
+SMALL = VideoFormat(width=320, height=180, fps=10, speed=2.0)
 
 
 NOTHING = mujoco.MjModel.from_xml_string("<mujoco/>")
@@ -57,9 +57,9 @@ def color_at(image, roll, pitch):
     return tuple(image[round(row), round(column)].tolist())
 
 
-def test_the_inset_shades_what_is_out_of_reach():
+def test_the_inset_shades_unreachable_attitudes():
     image = plane((-0.65, -0.65, 0.65, 0.65))
-    assert color_at(image, 0.3, -1.45) == inset.FORBIDDEN
+    assert color_at(image, 0.3, -1.45) == inset.UNREACHABLE
     assert color_at(image, 0.3, 0.6) == inset.GROUND
     assert color_at(plane((0.0, 0.0, 0.0, 0.0)), 0.3, -1.45) == inset.GROUND
 
@@ -82,19 +82,19 @@ def test_an_inset_covers_its_corner_alone():
 def test_the_insets_trail_is_short_beside_a_curve_that_moves(name, whole, monkeypatch):
     this, trails = flight(name), []
     monkeypatch.setattr(PlaneInset, "paint", lambda _self, _n, trail, _margin: trails.append(trail))
-    monkeypatch.setattr(aspects, "overlay_inset", lambda *_: None)
+    monkeypatch.setattr(overlay, "overlay_inset", lambda *_: None)
     last = len(this) - 1
-    RotorcraftAspect(this, 180).paint(np.zeros((180, 320, 3), dtype=np.uint8), last)
+    RotorcraftOverlay(this, 180).paint(np.zeros((180, 320, 3), dtype=np.uint8), last)
     began = 0.0 if whole else this["time"][last] - MOVING_TRAIL_TIME
     (first,) = np.flatnonzero(np.isclose(this["time"], began))
     np.testing.assert_array_equal(trails[0][0], [this["roll"][first], this["pitch"][first]])
 
 
-# --- frames and films --------------------------------------------------------------------------
+# --- frames and videos -------------------------------------------------------------------------
 
 
 @needs_gl
-def test_frames_come_at_the_films_rate_and_show_motion():
+def test_frames_come_at_the_videos_rate_and_show_motion():
     this = flight("trot")
     shown = list(frames(this, SMALL))
     times = [time for time, _ in shown]
@@ -109,8 +109,8 @@ def test_frames_come_at_the_films_rate_and_show_motion():
 @pytest.mark.parametrize(
     ("speed", "clock"), [(1.0, "1.2 s"), (10.0, "1.2 s, 10x"), (0.5, "1.2 s, 0.5x")]
 )
-def test_a_film_faster_or_slower_than_the_flight_says_so(speed, clock):
-    stage = _Stage(flight("fixed"), Format(width=320, height=180, speed=speed))
+def test_a_video_faster_or_slower_than_the_flight_says_so(speed, clock):
+    stage = FlightRenderer(flight("fixed"), VideoFormat(width=320, height=180, speed=speed))
     with stage.canvas:
         names, values = stage._table(-1)
     assert names.splitlines()[0] == "time"
@@ -118,7 +118,7 @@ def test_a_film_faster_or_slower_than_the_flight_says_so(speed, clock):
 
 
 @needs_gl
-def test_every_flight_can_be_filmed():
+def test_every_flight_can_be_rendered():
     for name in ("fixed", "limited", "free"):
         _, image = next(frames(flight(name), SMALL))
         assert image.std() > 10.0
@@ -133,7 +133,7 @@ def test_an_arrow_is_drawn_as_long_as_a_line_between_the_same_ends():
     start, end = np.array([0.0, 0.0, -0.3]), np.array([0.0, 0.0, 0.3])
     heights = []
     for shape in (mujoco.mjtGeom.mjGEOM_ARROW, mujoco.mjtGeom.mjGEOM_CAPSULE):
-        stage = _Stage(flight("fixed"), Format(width=400, height=400))
+        stage = FlightRenderer(flight("fixed"), VideoFormat(width=400, height=400))
         with stage.canvas as canvas:
             canvas.compose(stage._data, camera)
             canvas.scene.ngeom = 0
@@ -146,16 +146,16 @@ def test_an_arrow_is_drawn_as_long_as_a_line_between_the_same_ends():
 
 
 @needs_gl
-def test_the_film_plays(tmp_path):
+def test_the_video_plays(tmp_path):
     import av
 
     path = tmp_path / "flight.mp4"
     times = []
     write_video(flight("fixed"), path, SMALL, times.append)
     assert [file.name for file in tmp_path.iterdir()] == ["flight.mp4"]
-    with av.open(str(path)) as film:
-        stream = film.streams.video[0]
-        pictures = [frame.to_ndarray(format="rgb24") for frame in film.decode(stream)]
+    with av.open(str(path)) as video:
+        stream = video.streams.video[0]
+        pictures = [frame.to_ndarray(format="rgb24") for frame in video.decode(stream)]
         assert (stream.width, stream.height, stream.average_rate) == (320, 180, 10)
         assert stream.codec_context.name == "h264"
     assert len(pictures) == len(times) == 7
@@ -163,7 +163,7 @@ def test_the_film_plays(tmp_path):
 
 
 @needs_gl
-def test_the_command_films_without_a_screen(tmp_path):
+def test_the_command_works_without_a_display(tmp_path):
     folder = saved("fixed", tmp_path)
     options = ["--size", "160x120", "--fps", "5", "--speed", "4"]
     environment = {"PATH": "", "PYTHONPATH": ":".join(sys.path)}
@@ -174,15 +174,15 @@ def test_the_command_films_without_a_screen(tmp_path):
         text=True,
     )
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout == f"film written to {folder / 'flight.mp4'}\n"
+    assert done.stdout == f"video written to {folder / 'flight.mp4'}\n"
     assert b"ftyp" in (folder / "flight.mp4").read_bytes()[:12]
 
 
-# --- what can go wrong -------------------------------------------------------------------------
+# --- errors ------------------------------------------------------------------------------------
 
 
 @needs_gl
-def test_a_film_that_is_terminated_leaves_nothing_behind(tmp_path):
+def test_a_terminated_command_leaves_no_file(tmp_path):
     folder = saved("fixed", tmp_path)
     before = sorted(folder.iterdir())
     command = [sys.executable, "-m", "tiltsim", "video", str(folder), "--speed", "0.01"]
@@ -196,7 +196,7 @@ def test_a_film_that_is_terminated_leaves_nothing_behind(tmp_path):
     assert sorted(folder.iterdir()) == before
 
 
-def test_no_way_to_draw_is_one_line_with_the_way_out(monkeypatch):
+def test_a_missing_opengl_is_one_line_with_the_remedy(monkeypatch):
     if sys.platform != "linux":
         pytest.skip("elsewhere the system brings OpenGL")
     monkeypatch.delenv("MUJOCO_GL", raising=False)
@@ -209,11 +209,13 @@ def test_no_way_to_draw_is_one_line_with_the_way_out(monkeypatch):
     assert "MUJOCO_GL=egl" in line
 
 
-def test_a_way_that_only_warns_is_one_line_too(monkeypatch):
+def test_an_implementation_that_only_warns_is_one_line_too(monkeypatch):
     if sys.platform != "linux" or has_display():
         pytest.skip("for Linux without a screen")
     monkeypatch.setenv("MUJOCO_GL", "glfw")
-    with pytest.raises(InputError, match=r"no OpenGL to draw with \(glfw: .*; install a driver"):
+    with pytest.raises(
+        InputError, match=r"no OpenGL implementation works \(glfw: .*; install a driver"
+    ):
         make_contexts(NOTHING, 64, 64)
 
 

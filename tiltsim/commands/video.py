@@ -82,11 +82,11 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.views.video import prefer_offscreen_gl
 
     prefer_offscreen_gl()  # before anything imports MuJoCo
-    from tiltsim.views.video.rendering import Format, moments, write_video
+    from tiltsim.views.video.rendering import VideoFormat, frame_times, write_video
 
     width, height = arguments.size
-    form = Format(width, height, arguments.fps, arguments.speed)
-    count = len(moments(flight, form))
+    video = VideoFormat(width, height, arguments.fps, arguments.speed)
+    count = len(frame_times(flight, video))
     if count > MANY_FRAMES and not arguments.quiet:
         print(
             f"{count} frames of {width}x{height}; without a GPU a frame takes up to half a second "
@@ -96,7 +96,7 @@ def run(arguments: argparse.Namespace) -> int:
     with counting_bar(count, "frames", shown=not arguments.quiet) as move:
         move(0)
         drawn = iter(range(1, count + 1))
-        write_video(flight, out, form, lambda _time: move(next(drawn)))
+        write_video(flight, out, video, lambda _time: move(next(drawn)))
     if not arguments.quiet:
         print(f"video written to {out}")
     return 0

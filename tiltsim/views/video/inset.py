@@ -1,4 +1,4 @@
-"""The roll-pitch plane as a small picture: what is out of reach, and where the attitude is."""
+"""The roll-pitch plane as an inset: the unreachable attitudes and the vehicle's attitude."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tiltsim_controllers.mathematics.scalar import Floats
 Image = npt.NDArray[np.uint8]
 
 GROUND: Final = (250, 250, 250)
-FORBIDDEN: Final = (240, 190, 165)
+UNREACHABLE: Final = (240, 190, 165)
 CURVE: Final = (213, 94, 0)
 GRID: Final = (212, 216, 220)
 FRAME: Final = (70, 78, 86)
@@ -24,14 +24,14 @@ OPACITY: Final = 0.88
 
 
 class PlaneInset:
-    """Paints the plane for one instant after another.
+    """Paints the plane at single instants.
 
     Parameters
     ----------
     size
         Width and height, pixels.
     side
-        Sign of ``n . r3`` within reach: that at the start of the flight.
+        Sign of ``n . r3`` at reachable attitudes: that at the start of the flight.
     """
 
     def __init__(self, size: int, side: float) -> None:
@@ -53,15 +53,14 @@ class PlaneInset:
         n
             The unit vector along the torque-free force, shape (3,).
         trail
-            Attitudes (roll, pitch) so far, rad, shape (N, 2), the present one last.
+            Attitudes (roll, pitch) until now, rad, shape (N, 2).
         margin
             Singularity margin, rad.
         """
         image = self._blank.copy()
-        reach = self._up @ n * self._side
-        out = reach <= 0.0
-        image[out] = np.minimum(image[out], FORBIDDEN)
-        border = out ^ np.roll(out, 1, axis=0) | out ^ np.roll(out, 1, axis=1)
+        beyond = self._up @ n * self._side <= 0.0
+        image[beyond] = np.minimum(image[beyond], UNREACHABLE)
+        border = beyond ^ np.roll(beyond, 1, axis=0) | beyond ^ np.roll(beyond, 1, axis=1)
         border[0], border[:, 0] = False, False
         self._dots(image, np.argwhere(border)[:, ::-1], 1.2, CURVE)
         self._dots(image, self._pixels(trail), 0.8, TRAIL)
@@ -71,28 +70,28 @@ class PlaneInset:
         return image
 
     def _pixels(self, attitude: Floats) -> npt.NDArray[np.intp]:
-        """Columns and rows of attitudes, those beyond the plane at its edge."""
+        """Columns and rows of attitudes; those outside the plane are moved to its edge."""
         shares = 0.5 + 0.5 * np.clip(attitude / HALF_WIDTH, -1.0, 1.0) * (1.0, -1.0)
         return np.asarray((shares * (self.size - 1)).round(), dtype=np.intp)
 
     def _dots(
         self,
         image: Image,
-        places: npt.NDArray[np.intp],
+        centres: npt.NDArray[np.intp],
         radius: float,
         color: tuple[int, int, int],
     ) -> None:
-        reach = int(np.ceil(radius))
-        offsets = np.arange(-reach, reach + 1)
+        extent = int(np.ceil(radius))
+        offsets = np.arange(-extent, extent + 1)
         dx, dy = (part.ravel() for part in np.meshgrid(offsets, offsets))
         disc = np.hypot(dx, dy) <= radius
-        for x, y in zip(dx[disc], dy[disc], strict=True):
-            at = np.clip(places + (x, y), 0, self.size - 1)  # noqa: RUF005
+        for offset in np.stack([dx[disc], dy[disc]], axis=1):
+            at = np.clip(centres + offset, 0, self.size - 1)
             image[at[:, 1], at[:, 0]] = color
 
 
 def overlay_inset(frame: Image, inset: Image, gap: int) -> None:
-    """Lay an inset over the lower right corner of a frame, in place."""
+    """Paint an inset over the lower right corner of a frame, in place, with a gap (pixels)."""
     height, width = inset.shape[:2]
     corner = frame[-gap - height : -gap, -gap - width : -gap]
     corner[:] = (OPACITY * inset + (1.0 - OPACITY) * corner).astype(np.uint8)

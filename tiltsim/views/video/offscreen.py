@@ -1,4 +1,4 @@
-"""Drawing MuJoCo scenes into memory, with whatever OpenGL the machine has."""
+"""Rendering MuJoCo scenes offscreen, with any OpenGL implementation of the machine."""
 
 from __future__ import annotations
 
@@ -19,37 +19,48 @@ from tiltsim.views.video import has_display
 Image = npt.NDArray[np.uint8]
 
 MODULES: Final = {"egl": "mujoco.egl", "osmesa": "mujoco.osmesa", "glfw": "mujoco.glfw"}
-"""Ways to OpenGL, by the names that MUJOCO_GL knows."""
+"""OpenGL modules by the values of MUJOCO_GL."""
 
 FONT_SIZE: Final = mujoco.mjtFontScale.mjFONTSCALE_100
 
 
 def make_contexts(model: mujoco.MjModel, width: int, height: int) -> tuple[Any, mujoco.MjrContext]:
-    """An OpenGL context of at least this size (pixels), made current, and MuJoCo's for a model.
+    """Make an OpenGL context current, and MuJoCo's rendering context for a model.
 
-    MUJOCO_GL chooses the way to it; without it, EGL is tried first where there is no screen.
-    Raises `InputError`, in one line with the way out, where none works.
+    MUJOCO_GL selects the implementation; without it, EGL is tried first if there is no display.
+
+    Parameters
+    ----------
+    model
+        The model to render.
+    width, height
+        Smallest size of the context, pixels.
+
+    Raises
+    ------
+    InputError
+        If no implementation works.
     """
     failures = []
-    for name, make in _ways().items():
-        # GLFW warns where others raise, and only MuJoCo notices that there is no context.
-        with warnings.catch_warnings(record=True) as heard:
+    for name, make in _implementations().items():
+        # GLFW only warns, and only MuJoCo detects that there is no context.
+        with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:
                 context = make(width, height)
                 context.make_current()
                 return context, mujoco.MjrContext(model, FONT_SIZE.value)
-            except Exception as error:  # every library fails in its own way
-                said = str(heard[0].message if heard else error)
-                reason = said.strip().partition("\n")[0] or type(error).__name__
+            except Exception as error:  # every library has errors of its own
+                message = str(caught[0].message if caught else error)
+                reason = message.strip().partition("\n")[0] or type(error).__name__
                 failures.append(f"{name}: {reason}")
     raise InputError(
-        f"no OpenGL to draw with ({'; '.join(failures)}); install a driver, on Debian "
+        f"no OpenGL implementation works ({'; '.join(failures)}); install a driver, on Debian "
         "apt-get install libegl1 libgl1-mesa-dri, and set MUJOCO_GL=egl"
     )
 
 
-def _ways() -> dict[str, Callable[[int, int], Any]]:
+def _implementations() -> dict[str, Callable[[int, int], Any]]:
     if sys.platform != "linux":
         return {sys.platform: mujoco.GLContext}
     chosen = os.environ.get("MUJOCO_GL", "").strip().lower()
@@ -57,34 +68,34 @@ def _ways() -> dict[str, Callable[[int, int], Any]]:
         names = [chosen]
     else:
         names = ["glfw", "egl", "osmesa"] if has_display() else ["egl", "osmesa"]
-    # Imported on the way, for a library that is missing is a failure like any other.
+    # Imported when called, so that a missing library is a failure like any other.
     return {
         name: lambda *size, m=MODULES[name]: import_module(m).GLContext(*size) for name in names
     }
 
 
 class Caption(NamedTuple):
-    """A line whose lower right corner stands off the frame's (pixels)."""
+    """A line of text, and the distances of its lower right corner from the frame's (pixels)."""
 
     text: str
-    inwards: int
-    up: int
+    right: int
+    bottom: int
 
 
 class Canvas:
-    """Draws one model, frame by frame; use it as a context manager.
+    """Renders frames of one model; use it as a context manager.
 
     Parameters
     ----------
     model
-        What to draw.
+        The model.
     width, height
         Size of the frames, pixels.
 
     Raises
     ------
     InputError
-        If there is no OpenGL to draw with.
+        If no OpenGL implementation works.
     """
 
     def __init__(self, model: mujoco.MjModel, width: int, height: int) -> None:
@@ -96,39 +107,47 @@ class Canvas:
         self._frame = mujoco.MjrRect(0, 0, width, height)
         self._options = mujoco.MjvOption()
         self.scene = mujoco.MjvScene(model, maxgeom=5000)
-        # Where the processor draws, shadows and reflections would take half of the time.
+        # With software rendering, shadows and reflections would take half of the time.
         for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
             self.scene.flags[flag] = 0
 
     def __enter__(self) -> Self:
-        """Nothing to do: the context was made with the canvas."""
+        """Return the canvas, whose constructor made the context."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Give the OpenGL context back."""
+        """Free the OpenGL context."""
         self._context.free()
         self._gl.free()
 
     def compose(self, data: mujoco.MjData, camera: mujoco.MjvCamera) -> None:
-        """Fill the scene with the model; more may be added to it before `draw`."""
-        everything = mujoco.mjtCatBit.mjCAT_ALL
-        mujoco.mjv_updateScene(
-            *(self._model, data, self._options, None, camera, everything, self.scene)
-        )
+        """Fill the scene with the model; more geoms can be added before `draw`."""
+        model, options, category = self._model, self._options, mujoco.mjtCatBit.mjCAT_ALL
+        mujoco.mjv_updateScene(model, data, options, None, camera, category, self.scene)
 
     def draw(self, names: str, values: str, caption: Caption) -> Image:
-        """The scene as an image, shape (height, width, 3), with words on it.
+        """Render the scene with text.
 
-        ``names`` and ``values`` are the columns of a table at the upper left, one line a row.
+        Parameters
+        ----------
+        names, values
+            The columns of a table at the upper left, one line per row.
+        caption
+            A line at the lower right.
+
+        Returns
+        -------
+        Image
+            Shape (height, width, 3).
         """
         mujoco.mjr_render(self._frame, self.scene, self._context)
         frame = self._frame
         self._write(mujoco.mjtGridPos.mjGRID_TOPLEFT, frame, names, values)
-        corner = mujoco.MjrRect(0, caption.up, frame.width - caption.inwards, frame.height)
+        corner = mujoco.MjrRect(0, caption.bottom, frame.width - caption.right, frame.height)
         if caption.text:
             self._write(mujoco.mjtGridPos.mjGRID_BOTTOMRIGHT, corner, caption.text, "")
-        image = np.empty((self._frame.height, self._frame.width, 3), dtype=np.uint8)
-        mujoco.mjr_readPixels(image, None, self._frame, self._context)
+        image = np.empty((frame.height, frame.width, 3), dtype=np.uint8)
+        mujoco.mjr_readPixels(image, None, frame, self._context)
         return np.flipud(image)
 
     def _write(self, place: mujoco.mjtGridPos, area: mujoco.MjrRect, *columns: str) -> None:

@@ -1,4 +1,4 @@
-"""A film of a flight: the vehicle with its thrust and trail, followed by the camera."""
+"""A video of a flight: the vehicle with its thrusts and trail, followed by the camera."""
 
 from __future__ import annotations
 
@@ -24,82 +24,95 @@ from tiltsim.views.replay import (
     visible_model,
 )
 from tiltsim.views.video.offscreen import Canvas, Image
-from tiltsim.views.video.overlay import aspect_of
+from tiltsim.views.video.overlay import OVERLAYS
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
 
-TRAIL_TIME: Final = 20.0  # s of the flight that the trail shows
-TRAIL_INTERVAL: Final = 0.1  # s between its corners
+TRAIL_TIME: Final = 20.0  # s, length of the trail
+TRAIL_INTERVAL: Final = 0.1  # s between its points
 TRAIL_COLOR: Final = (0.0, 0.45, 0.85)
 REFERENCE_COLOR: Final = (0.15, 0.16, 0.18)
 THRUST_COLOR: Final = (0.95, 0.80, 0.10)
 REFERENCE_POINTS: Final = 200
 
-QUALITY: Final = "21"  # H.264's constant rate factor: 18 is lossless to the eye, 28 coarse
+QUALITY: Final = "21"  # H.264's constant rate factor: 18 is visually lossless, 28 coarse
 
 
 @dataclass(frozen=True)
-class Format:
-    """Size of the frames (pixels), frames per second, and seconds of flight per second of film."""
+class VideoFormat:
+    """Size and rate of a video."""
 
-    width: int = 960
+    width: int = 960  # pixels
     height: int = 540
-    fps: int = 30
-    speed: float = 1.0
+    fps: int = 30  # frames per second
+    speed: float = 1.0  # seconds of flight per second of video
 
 
 def write_video(
     flight: Flight,
     path: Path,
-    form: Format = Format(),
-    advance_to: Callable[[float], None] | None = None,
+    video: VideoFormat = VideoFormat(),
+    progress: Callable[[float], None] | None = None,
 ) -> None:
-    """Write a flight as an MP4 film; the file appears whole or not at all.
+    """Write a flight as an MP4 video, atomically.
 
-    ``advance_to`` is called with the time (s) of every frame. Raises `InputError` where there is
-    no OpenGL to draw with or the file cannot be written.
+    Parameters
+    ----------
+    flight
+        The flight.
+    path
+        The file.
+    video
+        Size and rate.
+    progress
+        Called with the time (s) of every frame.
+
+    Raises
+    ------
+    InputError
+        If no OpenGL implementation works or the file cannot be written.
     """
     import av
 
     try:
-        with replacing(path) as temporary, av.open(str(temporary), "w", format="mp4") as film:
-            stream = film.add_stream("libx264", rate=form.fps)
-            stream.width, stream.height = form.width, form.height
-            stream.pix_fmt = "yuv420p"  # what every player shows
+        with replacing(path) as temporary, av.open(str(temporary), "w", format="mp4") as file:
+            stream = file.add_stream("libx264", rate=video.fps)
+            stream.width, stream.height = video.width, video.height
+            stream.pix_fmt = "yuv420p"  # the format that every player supports
             stream.options = {"crf": QUALITY, "preset": "medium"}
-            for time, image in frames(flight, form):
+            for time, image in frames(flight, video):
                 frame = av.VideoFrame.from_ndarray(image, format="rgb24")
-                film.mux(stream.encode(frame))
-                if advance_to is not None:
-                    advance_to(time)
-            film.mux(stream.encode(None))
+                file.mux(stream.encode(frame))
+                if progress is not None:
+                    progress(time)
+            file.mux(stream.encode(None))
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
-def moments(flight: Flight, form: Format) -> Floats:
-    """The times of the flight (s) that the frames of the film are to show."""
-    return np.arange(0.0, float(flight["time"][-1]) + 1e-9, form.speed / form.fps)
+def frame_times(flight: Flight, video: VideoFormat) -> Floats:
+    """The times (s) of the frames of a flight's video."""
+    return np.arange(0.0, float(flight["time"][-1]) + 1e-9, video.speed / video.fps)
 
 
-def frames(flight: Flight, form: Format) -> Iterator[tuple[float, Image]]:
-    """The frames of the film and their times (s), one after the other."""
+def frames(flight: Flight, video: VideoFormat) -> Iterator[tuple[float, Image]]:
+    """The frames of a flight's video with the times (s) of their samples."""
     time = flight["time"]
-    scene = _Stage(flight, form)
-    with scene.canvas:
-        for moment in moments(flight, form):
-            sample = min(int(np.searchsorted(time, moment - 1e-9)), len(time) - 1)
-            yield float(time[sample]), scene.frame(sample)
+    renderer = FlightRenderer(flight, video)
+    with renderer.canvas:
+        for frame_time in frame_times(flight, video):
+            sample = min(int(np.searchsorted(time, frame_time - 1e-9)), len(time) - 1)
+            yield float(time[sample]), renderer.frame(sample)
 
 
-class _Stage:
-    """Everything that is drawn of one flight."""
+class FlightRenderer:
+    """Renders the samples of one flight."""
 
-    def __init__(self, flight: Flight, form: Format) -> None:
+    def __init__(self, flight: Flight, video: VideoFormat) -> None:
         self._flight = flight
-        self._pace = "" if form.speed == 1.0 else f", {form.speed:g}x"
+        self._speed = "" if video.speed == 1.0 else f", {video.speed:g}x"
         self._model = model = visible_model(flight.assembly)
         self._data = mujoco.MjData(model)
         self._qpos = joint_positions(model, flight.columns)
@@ -112,14 +125,14 @@ class _Stage:
             self._reference = path if np.ptp(path, axis=0).max() > 0.0 else path[:1]
         self._targets = reference_positions(flight.columns)
         self._position = positions(flight.columns)
-        self._aspect = aspect_of(flight, form.height)
+        self._overlay = OVERLAYS[flight.assembly.loop.kind.name](flight, video.height)
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_TRACKING
         self._camera.trackbodyid = self._body
-        eye = self._aspect.eye
-        self._camera.distance = eye.distance * self._radius
-        self._camera.azimuth, self._camera.elevation = eye.azimuth, eye.elevation
-        self.canvas = Canvas(model, form.width, form.height)
+        pose = self._overlay.camera
+        self._camera.distance = pose.distance * self._radius
+        self._camera.azimuth, self._camera.elevation = pose.azimuth, pose.elevation
+        self.canvas = Canvas(model, video.width, video.height)
 
     def frame(self, sample: int) -> Image:
         """The frame of a sample."""
@@ -133,14 +146,14 @@ class _Stage:
         self._add_reference(sample)
         self._add_trail(sample)
         names, values = self._table(sample)
-        image = np.ascontiguousarray(self.canvas.draw(names, values, self._aspect.caption))
-        self._aspect.paint(image, sample)
+        image = np.ascontiguousarray(self.canvas.draw(names, values, self._overlay.caption))
+        self._overlay.paint(image, sample)
         return image
 
     def _table(self, sample: int) -> tuple[str, str]:
         rows = {
-            "time": f"{self._flight['time'][sample]:.1f} s{self._pace}",
-            **self._aspect.rows(sample),
+            "time": f"{self._flight['time'][sample]:.1f} s{self._speed}",
+            **self._overlay.rows(sample),
         }
         if self._reference is not None:
             error = self._targets[sample] - self._position[sample]
@@ -162,24 +175,22 @@ class _Stage:
         line, color = mujoco.mjtGeom.mjGEOM_CAPSULE, (*REFERENCE_COLOR, 0.6)
         for start, end in zip(self._reference[:-1], self._reference[1:], strict=True):
             self._connect(line, 0.012 * self._radius, start, end, color)
-        place = self._targets[sample]
+        target = self._targets[sample]
         scene = self.canvas.scene
         if scene.ngeom < scene.maxgeom:
-            size = np.full(3, 0.07 * self._radius)
+            geom, size = scene.geoms[scene.ngeom], np.full(3, 0.07 * self._radius)
             rgba = np.array((*REFERENCE_COLOR, 0.9), dtype=np.float32)
-            ball = mujoco.mjtGeom.mjGEOM_SPHERE
-            mujoco.mjv_initGeom(
-                scene.geoms[scene.ngeom], ball, size, place, np.eye(3).ravel(), rgba
-            )
+            sphere, axes = mujoco.mjtGeom.mjGEOM_SPHERE, np.eye(3).ravel()
+            mujoco.mjv_initGeom(geom, sphere, size, target, axes, rgba)
             scene.ngeom += 1
 
     def _add_trail(self, sample: int) -> None:
-        time, places = self._flight["time"], self._position
+        time = self._flight["time"]
         now = time[sample]
-        moments = np.arange(max(0.0, now - TRAIL_TIME), now, TRAIL_INTERVAL)
-        # Corners at fixed times, lest the trail crawl from frame to frame.
-        corners = np.searchsorted(time, np.ceil(moments / TRAIL_INTERVAL) * TRAIL_INTERVAL)
-        points = places[np.append(corners[corners < sample], sample)]
+        steps = np.arange(max(0.0, now - TRAIL_TIME), now, TRAIL_INTERVAL) / TRAIL_INTERVAL
+        # Points at fixed times, so that the trail does not shimmer.
+        samples = np.searchsorted(time, np.ceil(steps) * TRAIL_INTERVAL)
+        points = self._position[np.append(samples[samples < sample], sample)]
         shades = np.linspace(0.15, 0.95, len(points))
         line = mujoco.mjtGeom.mjGEOM_CAPSULE
         for start, end, shade in zip(points[:-1], points[1:], shades, strict=False):
@@ -201,6 +212,6 @@ class _Stage:
         mujoco.mjv_initGeom(geom, shape, np.zeros(3), np.zeros(3), np.zeros(9), colors)
         mujoco.mjv_connector(geom, shape, width, start, end)
         if shape == mujoco.mjtGeom.mjGEOM_ARROW:
-            geom.size[2] *= 2.0  # MuJoCo draws arrows at half the length it sets
+            geom.size[2] *= 2.0  # MuJoCo draws arrows at half the length that it sets
             geom.emission = 0.4
         scene.ngeom += 1
