@@ -160,6 +160,14 @@ def test_reading_a_scenario_does_not_load_the_simulator():
     assert not modules_loaded_by(code) & (HEAVY - {"pydantic"})
 
 
+def test_a_flight_of_the_python_engine_does_not_load_the_compiler():
+    tables = {"simulation": {"duration": 0.01, "engine": "python"}}
+    code = f"import tiltsim; tiltsim.simulate(tiltsim.parse_scenario({tables})).metrics()"
+    loaded = modules_loaded_by(code)
+    assert "mujoco" in loaded
+    assert not loaded & (HEAVY - {"mujoco", "dm_control", "pydantic"})
+
+
 def test_every_public_name_of_the_package_resolves():
     for name in tiltsim.__all__:
         assert getattr(tiltsim, name).__name__ == name

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.scenario.flight_plan import FlightPlan
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,9 +1,8 @@
-"""Engines: how the control step runs inside MuJoCo.
+"""Engines, which run the control step inside MuJoCo.
 
-The same scalar source runs either as Python floats (nothing to compile, best for one short flight)
+The same scalar source runs either on Python floats (nothing to compile, best for one short flight)
 or as a native callback (`tiltsim.engines.native_engine`). MuJoCo's control callback is global to
-the process, so an engine is installed for the length of a ``with`` block and checks that a model is
-ours before it touches it.
+the process, so an engine checks that a model is ours before it writes to it.
 """
 
 from __future__ import annotations
@@ -22,20 +21,20 @@ Callback = Callable[[mujoco.MjModel, mujoco.MjData], None]
 
 
 class Engine(Protocol):
-    """Evaluates the control step of one model whenever MuJoCo asks for controls."""
+    """Evaluates the control step of one model whenever MuJoCo needs its controls."""
 
     name: EngineName
 
     def callback(self) -> Any:
-        """What MuJoCo calls: the whole step, or between the samples of a held law the rest of it.
+        """The control callback: a Python function, or a C function as `ctypes` shows it.
 
-        Under a held law the controls stay as sampled but for what follows the state by itself, as
-        thrust follows the rotor speed.
+        It evaluates the whole step or, between the samples of a held controller, only those
+        controls that follow the state, as thrusts follow the rotor speeds.
         """
 
 
 def check_model(loop: ClosedLoop, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Raise ValueError unless model and data are those of a flight of this loop."""
+    """Raise ValueError unless model and data belong to a flight of this loop."""
     sizes = Sizes(model.nq, model.nv, model.na, model.nu)
     head = HEADER_SIZE + loop.record_size
     signed = model.nuserdata >= head and data.userdata[HEADER_SIZE] == loop.signature

@@ -1,4 +1,4 @@
-"""Where compiled control steps are kept between runs."""
+"""The folder of compiled code, and which control steps it holds."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def core_sources() -> list[Path]:
 
 @cache
 def native_code_folder() -> Path:
-    """The folder for code compiled from exactly these sources with exactly these versions."""
+    """The folder of code compiled from exactly these sources with exactly these versions."""
     versions = [version(name) for name in ("numba", "llvmlite", "numpy", "mujoco")]
     digest = hashlib.sha256(repr([*versions, platform.platform()]).encode())
     for source in core_sources():
@@ -39,29 +39,29 @@ def native_code_is_cached(name: str) -> bool:
 
 
 before_compiling: Final[list[Callable[[str], None]]] = []
-"""Called with a name before its code is compiled, which takes seconds, for a screen to say so."""
+"""Called with a name before its code is compiled, so that a display can announce the delay."""
 
 
 def announce_native_code(name: str) -> None:
-    """Say that native code of this name will be loaded or, where there is none yet, compiled."""
+    """Announce that native code of this name will be compiled, unless it is cached."""
     if before_compiling and not native_code_is_cached(name):
-        for tell in before_compiling:
-            tell(name)
+        for announce in before_compiling:
+            announce(name)
 
 
 def mark_native_code_compiled(name: str) -> None:
-    """Remember that native code of this name is on disk now, if it can be kept."""
+    """Mark native code of this name as cached, if the folder is writable."""
     if native_code_is_cacheable():
         _mark(name).touch()
 
 
 def _mark(name: str) -> Path:
-    """An empty file: numba's own files do not tell which law they hold."""
+    """An empty file: the names of numba's own files do not identify a loop."""
     return native_code_folder() / f"{name}.compiled"
 
 
 def native_code_is_cacheable() -> bool:
-    """Whether compiled code can be written for the next run."""
+    """Whether the folder of compiled code is writable."""
     folder = native_code_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -13,8 +13,8 @@ import mujoco
 def control_callback(callback: Any) -> Iterator[None]:
     """Install MuJoCo's control callback for the length of a ``with`` block.
 
-    Under a native one MuJoCo's timers stand still: nothing reads them, and to read the clock takes
-    a tenth of a step.
+    A native callback also stops MuJoCo's timers: nothing uses them, and reading the clock takes a
+    tenth of a step.
     """
     native = hasattr(callback, "argtypes")  # a C function, as ctypes shows them
     previous, clock = mujoco.get_mjcb_control(), mujoco.get_mjcb_time()

@@ -1,11 +1,11 @@
-"""Where MuJoCo keeps a flight's state: the places of mjData's public fields in memory.
+"""The memory offsets of mjData's public fields, which hold a flight's state.
 
 A C program reads ``d->qpos``; native code of ours has only the address ``d``. MuJoCo's functions
-for reading and writing the state (``mj_getState``) copy all of it twice at every call of the
-callback, which costs as much as a control law. So the fields are read where they lie. Their places
-change with MuJoCo's version and are written down nowhere but in its C headers; here the running
-library is asked: in a small model of our own, the places are those where the bindings' own
-addresses and values are found.
+for reading and writing the state (``mj_getState``) would copy all of it twice per call of the
+callback, which takes as long as a controller. So native code reads the fields in place. Their
+offsets depend on MuJoCo's version and are documented only in its C headers; here they are measured
+in the running library, as those at which a small model has the addresses and values that the
+Python bindings report.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ _ARRAYS: Final = ("qpos", "qvel", "act", "ctrl", "userdata")
 
 _MODEL_BYTES: Final = 2048
 _DATA_BYTES: Final = 1 << 20
-"""How far the sizes in mjModel and the time in mjData are looked for; they come before arrays."""
+"""Search ranges of the sizes in mjModel and the time in mjData, which precede the arrays."""
 
 _ARRAY_BYTES: Final = 512
-"""How far behind the time the arrays are looked for: they come first of some hundred."""
+"""Search range of the arrays behind the time; they are the first of some hundred."""
 
 
 class Layout(NamedTuple):
-    """Offsets, bytes."""
+    """Offsets in bytes."""
 
     model_userdata_size: int  # in mjModel, a 32-bit integer at least
     time: int  # in mjData, a float
@@ -50,12 +50,12 @@ class Layout(NamedTuple):
 
 @cache
 def mjdata_layout() -> Layout:
-    """Find the fields.
+    """Measure the offsets.
 
     Raises
     ------
     RuntimeError
-        If this MuJoCo keeps them somewhere else altogether.
+        If a field is not found in the search range.
     """
     model = mujoco.MjModel.from_xml_string(_PROBE)
     data = mujoco.MjData(model)
@@ -65,18 +65,18 @@ def mjdata_layout() -> Layout:
     words = np.ctypeslib.as_array(
         (ctypes.c_uint64 * (_ARRAY_BYTES // 8)).from_address(data._address + time)
     )
-    places = {}
+    offsets = {}
     for name in _ARRAYS:
         found = np.flatnonzero(words == getattr(data, name).ctypes.data)
         if found.size == 0:
             raise _not_found(f"mjData.{name}")
-        # An empty array that lies before this one begins where this one does.
-        places[name] = time + 8 * int(found[-1])
-    return Layout(size, time, **places)
+        # An empty array in front of this one has the same address.
+        offsets[name] = time + 8 * int(found[-1])
+    return Layout(size, time, **offsets)
 
 
 def _first(address: int, reach: int, kind: Any, value: float) -> int:
-    """Offset of the first place that holds a value, read no further than there."""
+    """The first offset at which memory holds a value; memory behind it is not read."""
     width = ctypes.sizeof(kind)
     for offset in range(0, reach, width):
         if kind.from_address(address + offset).value == value:

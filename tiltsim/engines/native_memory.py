@@ -1,4 +1,4 @@
-"""Read and write memory by address in compiled code."""
+"""Memory access by address in compiled code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Evaluate the control step in Python."""
+"""The Python engine: the scalar control step on Python floats."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from tiltsim_controllers.mathematics.records import slotted, unflatten
 
 
 class PythonEngine:
-    """Runs the scalar source as Python floats."""
+    """Runs the scalar source on Python floats."""
 
     name: EngineName = "python"
 
     def __init__(self, loop: ClosedLoop, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         check_model(loop, model, data)
         controls, hold = loop.sampling.controls, loop.sampling.hold
-        # Parameters never change during a flight: read once what native code reads at every call.
+        # Parameters do not change during a flight: read once here, at every call in native code.
         values = data.userdata[HEADER_SIZE:].tolist()
         parameters = slotted(unflatten(loop.parameters, values))
         knots = tuple(values[loop.record_size :])
-        # Views of MuJoCo's own memory; looking them up anew would cost a tenth of the callback.
+        # Views of MuJoCo's memory; a look-up at every call would take a tenth of the callback.
         vectors = data.qpos, data.qvel, data.act, data.ctrl
         qpos, qvel, act, ctrl = (memoryview(vector) for vector in vectors)
         header = data.userdata[:HEADER_SIZE]
@@ -33,7 +33,7 @@ class PythonEngine:
 
         def sample(_model: mujoco.MjModel, called: mujoco.MjData) -> None:
             if called is not data:
-                return  # some other model of this process is being stepped
+                return  # another model of this process
             try:
                 positions, velocities = qpos.tolist(), qvel.tolist()
                 values = controls(data.time, positions, velocities, act.tolist(), parameters, knots)

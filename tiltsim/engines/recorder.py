@@ -1,4 +1,4 @@
-"""Memory into which compiled code records samples."""
+"""Recording of samples by compiled code."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from tiltsim_controllers.references.trajectories import ReferenceParameters
 
 
 class RecorderHead(NamedTuple):
-    """What the memory of a recorder begins with; `SIDES` floats and the samples follow."""
+    """The head of a recorder's memory; `SIDES` floats and the samples follow."""
 
-    left: float  # evaluations to go before the next sample
+    left: float  # evaluations before the next sample
     interval: float  # evaluations between samples
     last_interval: float  # evaluations between the last two samples
     samples: float  # taken so far
-    capacity: float  # samples that there is room for
-    terminated: float  # 1 from the first sample on that ends the flight
-    follows_position: float  # whether the horizontal position counts
+    capacity: float  # maximum number of samples
+    terminated: float  # 1 once a sample has ended the flight
+    follows_position: float  # whether the horizontal position has a limit
     reference: ReferenceParameters
 
 
@@ -41,7 +41,7 @@ _RECORDER_SIZE: Final = record_size(RecorderHead)
 
 @register_jitable(**INNER)
 def sample_is_due(recorder):  # type: ignore[no-untyped-def]
-    """Count an evaluation."""
+    """Whether to record a sample at this evaluation, which is counted."""
     head = carray(bytes_at(recorder), (1,), _RECORDER)
     left = head[0].left
     head[0].left = left - 1.0

@@ -6,16 +6,14 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from math import nan
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
+from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.system.interrupts import reraise_swallowed_interrupts
 from tiltsim_controllers.mathematics.records import record_dtype, record_size
 from tiltsim_controllers.mathematics.scalar import Floats, Values
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.loop import ControlSetup
 
 MIN_ROWS_TO_COMPILE: Final = 20_000
 """Rows that one process evaluates in Python before it loads or compiles native code for them."""

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isnan
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from tiltsim.scenario.expectation import Expectation
-    from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.expectation import Expectation
+from tiltsim.scenario.scenario import Scenario
 
 
 @dataclass(frozen=True)

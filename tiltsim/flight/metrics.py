@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import isfinite
-from typing import TYPE_CHECKING
 
+from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.flight.end import End
 from tiltsim_controllers.mathematics.scalar import Floats
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from tiltsim.closed_loop.assembly import Assembly
-    from tiltsim.flight.end import End
 
 
 def compute_metrics(

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from tiltsim.errors import TiltsimError
 from tiltsim_controllers.mathematics.scalar import Floats, Quad
 from tiltsim_controllers.vehicle.parameters import Vehicle
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
 
 ROTOR_COMMANDS: Final = ("thrusts", "rotor_speeds", "rotor_accelerations")
 """Commands for the rotors; a `Command` gives one of them."""

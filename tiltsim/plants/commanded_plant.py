@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import nan, sqrt
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import mujoco
 import numpy as np
 
+from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.engines.base import EngineName
 from tiltsim.engines.callback import control_callback
 from tiltsim.laws.commanded import COMMANDED_LOOPS, HeldCommand, commanded_parameters, with_command
 from tiltsim.laws.layers.actuation import measured_qpos, measured_qvel, sensor_parameters
@@ -30,18 +32,14 @@ from tiltsim_controllers.mathematics.scalar import Floats, Quad, clipped
 from tiltsim_controllers.references.trajectories import reference_derivatives
 from tiltsim_controllers.vehicle.parameters import SPIN
 
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.assembly import Assembly
-    from tiltsim.engines.base import EngineName
-
 _NONE: Final = (0.0, 0.0, 0.0, 0.0)
 
 
 class CommandedPlant:
     """A vehicle that follows commands, each after the scenario's latency.
 
-    MuJoCo steps alone as long as there is no layer and the rotors keep their speeds; else the
-    control callback holds the commands.
+    MuJoCo steps without a callback as long as there is no layer and the rotors keep their speeds;
+    else the control callback holds the commands.
     """
 
     engine: EngineName = "python"

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from tiltsim.closed_loop.loop import ClosedLoop
+from tiltsim.engines.base import EngineName
 from tiltsim.engines.cache import native_code_is_cached
 from tiltsim.laws.assembling import loop_of
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.loop import ClosedLoop
-    from tiltsim.engines.base import EngineName
-    from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.scenario import Scenario
 
 MIN_STEPS_TO_LOAD: Final = 15_000
 """Flights of at least this many steps repay loading the native engine, once it is compiled."""

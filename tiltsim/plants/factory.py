@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.engines.base import EngineName
+from tiltsim.plants.command import Controller
 from tiltsim.plants.mujoco_plant import MujocoPlant
+from tiltsim.plants.plant import Plant
 from tiltsim.plants.thesis_plant import ThesisPlant
 from tiltsim.plants.user_controlled_plant import UserControlledPlant
 from tiltsim.system.interrupts import reraise_swallowed_interrupts
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.assembly import Assembly
-    from tiltsim.engines.base import EngineName
-    from tiltsim.plants.command import Controller
-    from tiltsim.plants.plant import Plant
 
 
 def make_plant(

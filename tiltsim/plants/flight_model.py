@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import mujoco
 
+from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.userdata import HEADER_SIZE
 from tiltsim.errors import InputError
+from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Triple
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.assembly import Assembly
-    from tiltsim.scenario.scenario import Scenario
 
 _TABLES_WITHOUT_EFFECT: Final = frozenset(
     (

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any, Final
 import mujoco
 import numpy as np
 
+from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.userdata import EVALUATIONS, HEADER_SIZE, RECORDER, Header
+from tiltsim.engines.base import EngineName
 from tiltsim.engines.callback import control_callback
 from tiltsim.engines.factory import make_engine
 from tiltsim.plants.engine_choice import choose_engine
@@ -19,8 +21,6 @@ from tiltsim.plants.plant import natively_checked_values, record_step_by_step
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
-    from tiltsim.closed_loop.assembly import Assembly
-    from tiltsim.engines.base import EngineName
     from tiltsim.engines.recorder import Recorder
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import nan
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.engines.base import EngineName
 from tiltsim.engines.cache import mark_native_code_compiled
 from tiltsim.equations.ode3 import Integration, Stepper, make_stepper
 from tiltsim.plants.engine_choice import choose_engine
@@ -15,10 +17,6 @@ from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.plants.plant import natively_checked_values, record_step_by_step
 from tiltsim_controllers.mathematics.records import slotted
 from tiltsim_controllers.mathematics.scalar import Floats
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.assembly import Assembly
-    from tiltsim.engines.base import EngineName
 
 
 class ThesisPlant:

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.plants.command import CheckedCommand, Controller
 from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.plants.user_controller import load_controller
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.assembly import Assembly
-    from tiltsim.plants.command import CheckedCommand, Controller
 
 
 class UserControlledPlant(CommandedPlant):

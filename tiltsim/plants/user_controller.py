@@ -12,7 +12,7 @@ import sys
 import traceback
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tiltsim.errors import InputError
 from tiltsim.plants.command import (
@@ -24,9 +24,7 @@ from tiltsim.plants.command import (
     short_repr,
 )
 from tiltsim.scenario.controller import PythonController
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.scenario import Scenario
 
 
 class UserController:

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.flight.end import End
@@ -15,12 +15,10 @@ from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.engine_choice import native_pays_off
 from tiltsim.plants.factory import make_plant
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.simulation.native_batch import NativeBatch
 from tiltsim.simulation.simulate import simulate_assembly
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
 
 WINDOW: Final = 512
 """How many scenarios are grouped together into those that share a batch."""

@@ -11,11 +11,12 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
+from typing import Any, Final, Generic, TypeVar
 
 import mujoco
 import numpy as np
 
+from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.userdata import RECORDER
 from tiltsim.engines.callback import control_callback
 from tiltsim.flight.end import End
@@ -24,10 +25,7 @@ from tiltsim.plants.flight_model import flight_model, model_cache_key
 from tiltsim.plants.mujoco_plant import MujocoPlant, quiet_warnings
 from tiltsim.simulation.monitor import TerminationMonitor
 from tiltsim.simulation.simulate import fly_chunk
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.assembly import Assembly
-    from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.mathematics.scalar import Floats
 
 ROWS_PER_THREAD: Final = 24
 """Rows of a batch: so many that no thread waits long for the last one of a call."""

@@ -13,10 +13,19 @@ from tiltsim.system.interrupts import reraise_swallowed_interrupts
 
 
 def shared_engine(scenarios: Sequence[Scenario], steps: int | None = None) -> EngineName | None:
-    """The native engine where the flights together repay compiling it, None elsewhere.
+    """Choose one engine for flights in several processes, and compile it for all of them.
 
-    What the scenarios need is compiled here once, for all processes to load. Where they are but
-    examples of the flights to come, ``steps`` is the physics steps of all flights.
+    Parameters
+    ----------
+    scenarios
+        The flights, or examples of them.
+    steps
+        Physics steps of all flights; default: of ``scenarios``.
+
+    Returns
+    -------
+    EngineName or None
+        "native" if the flights together repay compilation, else None, the choice of each scenario.
     """
     if steps is None:
         steps = sum(scenario.simulation.steps for scenario in scenarios)
@@ -28,7 +37,7 @@ def shared_engine(scenarios: Sequence[Scenario], steps: int | None = None) -> En
         if kind not in ready and not scenario.controller.is_external:
             with reraise_swallowed_interrupts():
                 plant = make_plant(assemble(scenario), engine="native")
-                plant.record(1, 1)  # on the thesis plant compiled apart from `advance`
+                plant.record(1, 1)  # on the thesis plant compiled separately from `advance`
                 plant.advance(1)
             ready.add(kind)
     return "native"

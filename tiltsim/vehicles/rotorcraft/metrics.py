@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Mapping
+from typing import Final
 
 import numpy as np
 
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.saturation import at_lower_limit, at_upper_limit
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from tiltsim.scenario.scenario import Scenario
 
 SETTLED_ALTITUDE: Final = 0.005  # m
 SETTLED: Final = 20.0  # s, from when on the supremum of the position error is taken

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.rotorcraft.metrics import SETTLED
 from tiltsim.vehicles.saturation import at_lower_limit
 from tiltsim_controllers.mathematics.scalar import Floats
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from tiltsim.scenario.scenario import Scenario
 
 
 def tilt_car_metrics(
