@@ -14,8 +14,6 @@ from tiltsim.closed_loop.limits import (
     WITHIN_LIMITS,
     altitude_error,
     horizontal_error,
-    rotorcraft_limit_exceeded,
-    tilt_car_limit_exceeded,
 )
 from tiltsim.vehicles import rotorcraft, tilt_car
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
@@ -38,8 +36,8 @@ BOUNDS = {
     },
 }
 VEHICLES = {
-    "rotorcraft": (rotorcraft.OBSERVED_FIELDS, rotorcraft_limit_exceeded),
-    "tilt_car": (tilt_car.OBSERVED_FIELDS, tilt_car_limit_exceeded),
+    "rotorcraft": (rotorcraft.OBSERVED_FIELDS, rotorcraft.rotorcraft_limit_exceeded),
+    "tilt_car": (tilt_car.OBSERVED_FIELDS, tilt_car.tilt_car_limit_exceeded),
 }
 
 
