@@ -23,14 +23,6 @@ def _tilt(metrics: Metrics) -> float:
     return hypot(*(float(metrics[f"final_{angle}"]) for angle in ("roll", "pitch", "yaw")))
 
 
-def _perfect_is_smallest(flights: Mapping[str, Metrics]) -> bool:
-    return min(flights, key=lambda address: _tilt(flights[address])) == _PERFECT
-
-
-def _quadrotor_tilts_more(flights: Mapping[str, Metrics]) -> bool:
-    return _tilt(flights[_QUADROTOR]) > _tilt(flights[_PERFECT])
-
-
 def _some_gait_tilts_more_than_the_quadrotor() -> bool:
     """Statics of the mirrored perfect gait, whose force at level attitude adds to the gust."""
     from tiltsim_controllers.analysis.balance import even_load_gait
@@ -58,13 +50,15 @@ CLAIMS = (
         source="ch. 1, Sec. 2, Figs. 2-4",
         statement="In a constant gust the perfect gait needs the smallest attitude of the three",
         flights=_FLIGHTS,
-        measure=_perfect_is_smallest,
+        measure=lambda flights: (
+            min(flights, key=lambda address: _tilt(flights[address])) == _PERFECT
+        ),
     ),
     FlightClaim(
         source="ch. 1, Sec. 2, Fig. 4",
         statement="A quadrotor leans more than the tiltrotor with the perfect gait",
         flights=(_PERFECT, _QUADROTOR),
-        measure=_quadrotor_tilts_more,
+        measure=lambda flights: _tilt(flights[_QUADROTOR]) > _tilt(flights[_PERFECT]),
     ),
     AnalysisClaim(
         source="ch. 1, Sec. 2, Fig. 3",

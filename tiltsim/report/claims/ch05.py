@@ -58,10 +58,6 @@ EQ_15_R_PHI: Final = terms(
 """The printed terms with sin(roll), with their misprints."""
 
 
-def _eq_15_holds() -> bool:
-    return worst_coefficient(EQ_17._replace(R_phi=EQ_15_R_PHI), _VEHICLE) < PRINTED
-
-
 def _margin(gait: str, scale: int) -> float:
     swing = SWINGS[gait]
     return smallest_margin(
@@ -190,7 +186,7 @@ CLAIMS = (
         wrong=True,
         why="-2.880 s1 c2 s3 s4 sin φ cos θ should be s1 c2 c3 s4, and the last term, "
         "1.000 s1 s2 s3 c4 sin φ cos θ, should be s1 s2 c3 s4.",
-        measure=_eq_15_holds,
+        measure=lambda: worst_coefficient(EQ_17._replace(R_phi=EQ_15_R_PHI), _VEHICLE) < PRINTED,
     ),
     *(
         AnalysisClaim(

@@ -103,10 +103,6 @@ def _triangle_is_the_published() -> bool:
     return _positive_points() == published
 
 
-def _one_positive_root_each() -> bool:
-    return sum(root.R > _ZERO for root in _inside()) == len(_positive_points())
-
-
 def _signs(key: str) -> float:
     """1, -1, or 0 where R is zero or changes sign over the gait on the exact lines."""
     published = PUBLISHED_GAITS[key]
@@ -218,7 +214,7 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 6, Sec. 3, Figs. 11-14",
         statement="At most one root with R > 0",
-        measure=_one_positive_root_each,
+        measure=lambda: sum(root.R > _ZERO for root in _inside()) == len(_positive_points()),
     ),
     AnalysisClaim(
         source="ch. 6, Sec. 3",

@@ -78,10 +78,6 @@ def _is_rectangle(number: int) -> bool:
     return len(corners) == 4 and all(len(span) == 2 for span in spans)
 
 
-def _gaits_2_and_3_are_similar() -> bool:
-    return bool(np.allclose(_acceleration(2), _acceleration(3), rtol=1e-6))
-
-
 def _thrusts() -> tuple[float, ...]:
     speeds = np.array(_LIMITS)
     return tuple((4.0 * _VEHICLE.thrust_coefficient * speeds**2).tolist())
@@ -92,10 +88,6 @@ def _faster_is_worse(flights: Mapping[str, Metrics]) -> bool:
         np.inf if metrics["diverged"] else tracking_error(metrics) for metrics in flights.values()
     ]
     return all(slower < faster for slower, faster in pairwise(errors))
-
-
-def _first_four_repeat(flights: Mapping[str, Metrics]) -> bool:
-    return not any(metrics["diverged"] for metrics in flights.values())
 
 
 def _spread(address: str, flights: Mapping[str, Metrics]) -> float:
@@ -196,7 +188,7 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 9, Sec. 3.3",
         statement="Gaits 2 and 3 reach similar accelerations",
-        measure=_gaits_2_and_3_are_similar,
+        measure=lambda: bool(np.allclose(_acceleration(2), _acceleration(3), rtol=1e-6)),
     ),
     AnalysisClaim(
         source="ch. 9, Sec. 4.1",
@@ -209,7 +201,7 @@ CLAIMS = (
         source="ch. 9, Sec. 4.2, Fig. 10",
         statement="All four references end in periodic trajectories: none of the flights diverges",
         flights=tuple(map(_circle, ("01", "05", "10", "15"))),
-        measure=_first_four_repeat,
+        measure=lambda flights: not any(metrics["diverged"] for metrics in flights.values()),
     ),
     FlightClaim(
         source="ch. 9, Sec. 5",

@@ -80,10 +80,6 @@ def _fails_after_a_rotor_stops(flights: Mapping[str, Metrics]) -> bool:
     return metrics["min_rotor_speed"] == 0.0 and error > 0.2
 
 
-def _saturates(flights: Mapping[str, Metrics]) -> bool:
-    return float(flights[_PLANNED]["saturated_fraction"]) > 0.0
-
-
 CLAIMS = (
     AnalysisClaim(
         source="ch. 10, Sec. 2, Eq. (2)",
@@ -172,7 +168,7 @@ CLAIMS = (
         source="ch. 10, Sec. 5, Fig. 23",
         statement="With the tilt planned the inputs saturate for a while",
         flights=(_PLANNED,),
-        measure=_saturates,
+        measure=lambda flights: float(flights[_PLANNED]["saturated_fraction"]) > 0.0,
     ),
     AnalysisClaim(
         source="ch. 10, Sec. 5, Eq. (18)",

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cache
 from math import exp, pi
 from typing import Final
 
 import numpy as np
 
-from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
+from tiltsim.report.claim import AnalysisClaim, FlightClaim
 from tiltsim_controllers.tilt_car.penguin_cycle import (
     LyapunovBound,
     State,
@@ -113,22 +113,6 @@ def _bound() -> LyapunovBound:
     return lyapunov_bound(_SWING, points=33)
 
 
-def _cycle_attracts() -> bool:
-    return bool(np.abs(multipliers(_SWING, limit_cycle(_SWING))).max() < 1.0)
-
-
-def _errors_stay_below(flights: Mapping[str, Metrics]) -> bool:
-    return all(float(flights[_SMALL][f"max_abs_error_{axis}"]) < 0.1 for axis in "xy")
-
-
-def _saturates_intermittently(flights: Mapping[str, Metrics]) -> bool:
-    return 0.0 < float(flights[_LARGE]["saturated_fraction"]) < 1.0
-
-
-def _is_bounded(flights: Mapping[str, Metrics]) -> bool:
-    return float(flights[_LARGE]["max_lyapunov"]) <= _bound().published
-
-
 CLAIMS = (
     AnalysisClaim(
         source="ch. 11, Sec. 3, Figs. 5-8",
@@ -147,7 +131,9 @@ CLAIMS = (
         source="ch. 11, Sec. 4.4",
         statement="With the small swing the errors stay below 0.1 m",
         flights=(_SMALL,),
-        measure=_errors_stay_below,
+        measure=lambda flights: all(
+            float(flights[_SMALL][f"max_abs_error_{axis}"]) < 0.1 for axis in "xy"
+        ),
     ),
     FlightClaim(
         source="ch. 11, Sec. 4.4, Fig. 10",
@@ -218,18 +204,18 @@ CLAIMS = (
     AnalysisClaim(
         source="ch. 11, Secs. 6-7, Prop. 2, Figs. 24, 31",
         statement="The error along y stays bounded: the oscillation is stable",
-        measure=_cycle_attracts,
+        measure=lambda: bool(np.abs(multipliers(_SWING, limit_cycle(_SWING))).max() < 1.0),
     ),
     FlightClaim(
         source="ch. 11, Sec. 7, Figs. 25-26",
         statement="With the large swing inputs saturate from time to time, not always",
         flights=(_LARGE,),
-        measure=_saturates_intermittently,
+        measure=lambda flights: 0.0 < float(flights[_LARGE]["saturated_fraction"]) < 1.0,
     ),
     FlightClaim(
         source="ch. 11, Sec. 8, Prop. 7, Eq. (77)",
         statement="The candidate stays below L_critical + 3/4 (here 2.56 m²/s²)",
         flights=(_LARGE,),
-        measure=_is_bounded,
+        measure=lambda flights: float(flights[_LARGE]["max_lyapunov"]) <= _bound().published,
     ),
 )
