@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from math import pi
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -27,6 +27,8 @@ from tiltsim_controllers.vehicle.parameters import Vehicle
 class GaitTable(Table, ABC):
     """The keys of every gait: a common scale, and a bias on the two rear angles."""
 
+    size_key: ClassVar[str]
+
     scale: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(
         1.0, description="multiplies all angles (ch. 5: 1/n)"
     )
@@ -34,72 +36,62 @@ class GaitTable(Table, ABC):
 
     def plan(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         """The gait for a vehicle. Raises ValueError if the numbers do not define one."""
-        return self.unscaled(vehicle).scaled(1.0 / self.scale).biased(self.bias)
+        return self._unscaled(vehicle).scaled(1.0 / self.scale).biased(self.bias)
 
     @abstractmethod
-    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+    def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         """The gait before scale and bias."""
 
     @property
-    @abstractmethod
     def size(self) -> tuple[str, object]:
         """The key that sets how far the gait tilts, and its value."""
+        return self.size_key, dict(self)[self.size_key]
 
 
 class FixedGait(GaitTable):
     """Constant tilt angles."""
 
+    size_key = "angles"
+
     type: Literal["fixed"] = "fixed"
     angles: Angles4 = Field((0.0, 0.0, 0.0, 0.0), description="alpha_1..4, rad")
 
-    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
-        """See `GaitTable.unscaled`."""
+    def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         return plans.fixed(self.angles)
-
-    @property
-    def size(self) -> tuple[str, object]:
-        """See `GaitTable.size`."""
-        return "angles", self.angles
 
 
 class TrotGait(GaitTable):
     """The cat trots of ch. 4, which differ in how they switch sides."""
 
+    size_key = "amplitude"
+
     type: Literal["trot_instant", "trot_continuous"]
     amplitude: Angle = Field(description="rho, rad")
     period: Period = Field(description="T, s")
 
-    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
-        """See `GaitTable.unscaled`."""
+    def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         trot = plans.instant_trot if self.type == "trot_instant" else plans.continuous_trot
         return trot(self.amplitude, self.period)
-
-    @property
-    def size(self) -> tuple[str, object]:
-        """See `GaitTable.size`."""
-        return "amplitude", self.amplitude
 
 
 class CatGait(GaitTable):
     """The cat gaits of ch. 5, reconstructed from published footfalls and the results of ch. 5."""
+
+    size_key = "amplitude"
 
     type: Literal["walk", "run", "transverse_gallop", "rotary_gallop"]
     amplitude: Angle = Field(description="of a leg about its lean, rad")
     lean: Angle = Field(0.0, description="mean angle of the legs, forward, rad")
     period: Period = Field(description="T, s")
 
-    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
-        """See `GaitTable.unscaled`."""
+    def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         return plans.cat(self.type, self.amplitude, self.period, self.lean)
-
-    @property
-    def size(self) -> tuple[str, object]:
-        """See `GaitTable.size`."""
-        return "amplitude", self.amplitude
 
 
 class WaypointGait(GaitTable):
     """A closed gait through given angles, linear in between."""
+
+    size_key = "angles"
 
     type: Literal["waypoints"]
     angles: Annotated[tuple[Angles4, ...], Field(min_length=2, strict=False)] = Field(
@@ -112,14 +104,8 @@ class WaypointGait(GaitTable):
         "evenly spaced",
     )
 
-    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
-        """See `GaitTable.unscaled`."""
+    def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         return plans.waypoints(self.angles, self.period, self.phases)
-
-    @property
-    def size(self) -> tuple[str, object]:
-        """See `GaitTable.size`."""
-        return "angles", self.angles
 
 
 class TwoColorLeg(Table):
@@ -168,8 +154,7 @@ class TwoColorGait(GaitTable):
             return Circle(self.color, self.centre, self.radius)
         return Polyline(tuple(Leg(leg.color, leg.vertices) for leg in self.path))
 
-    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
-        """See `GaitTable.unscaled`."""
+    def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         if not isinstance(vehicle, Vehicle):
             raise ValueError("has four tilt angles; the tilt_car has one")
         return four_angle_gait(self.curve, self.period, vehicle)
@@ -185,15 +170,14 @@ class TwoColorGait(GaitTable):
 class TiltCarGait(GaitTable):
     """Base of the tilt-car's gaits, which plan the direction of the thrusts."""
 
-    def unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
-        """See `GaitTable.unscaled`."""
+    def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         if not isinstance(vehicle, TiltCar):
             raise ValueError("is a gait of the tilt_car; this vehicle has four tilt angles")
         # The bottom disc counter-rotates, so that the tilt exceeds the thrusts' rotation.
-        return self.tilt(1.0 / turn_per_tilt(vehicle))
+        return self._tilt(1.0 / turn_per_tilt(vehicle))
 
     @abstractmethod
-    def tilt(self, per_direction: float) -> PlannedGait:
+    def _tilt(self, per_direction: float) -> PlannedGait:
         """The gait of the tilt angle, given the tilt for a thrust direction of 1 rad."""
 
 
@@ -204,25 +188,23 @@ PENGUIN_SWINGS: Final = {"penguin_small": pi / 8, "penguin_large": pi / 3}
 class PenguinGait(TiltCarGait):
     """The penguin-inspired gaits of ch. 11: half a period on one side, half on the other."""
 
+    size_key = "amplitude"
+
     type: Literal["penguin_small", "penguin_large"]
     amplitude: Angle | None = Field(
         None, description="of the thrusts' direction, rad; default: pi/8 (small), pi/3 (large)"
     )
     period: Period = Field(2.0, description="T, s")
 
-    def tilt(self, per_direction: float) -> PlannedGait:
-        """See `TiltCarGait.tilt`."""
+    def _tilt(self, per_direction: float) -> PlannedGait:
         swing = PENGUIN_SWINGS[self.type] if self.amplitude is None else self.amplitude
         return plans.penguin(self.type, swing * per_direction, self.period)
-
-    @property
-    def size(self) -> tuple[str, object]:
-        """See `GaitTable.size`."""
-        return "amplitude", self.amplitude
 
 
 class RotatingGait(TiltCarGait):
     """Thrusts that rotate at a constant rate (ch. 10, Eq. 18)."""
+
+    size_key = "rate"
 
     type: Literal["rotating"]
     rate: Annotated[float, Field(ge=-1e3, le=1e3)] = Field(
@@ -230,14 +212,8 @@ class RotatingGait(TiltCarGait):
     )
     start: Angle = Field(0.0, description="direction at time zero, rad")
 
-    def tilt(self, per_direction: float) -> PlannedGait:
-        """See `TiltCarGait.tilt`."""
+    def _tilt(self, per_direction: float) -> PlannedGait:
         return plans.rotating(self.start * per_direction, self.rate * per_direction)
-
-    @property
-    def size(self) -> tuple[str, object]:
-        """See `GaitTable.size`."""
-        return "rate", self.rate
 
 
 Gait = Annotated[

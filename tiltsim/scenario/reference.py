@@ -13,7 +13,7 @@ from tiltsim.scenario.controller_table import ReferenceKind
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import Angle, Angles3, Positive, Table, Vector3
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
-from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.mathematics.scalar import Triple, Values
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
 from tiltsim_controllers.references.waypoints import minimum_snap_knots
 
@@ -59,6 +59,7 @@ class _PositionReference(_Reference):
     acceleration_feedforward: bool = Field(
         False, description="ch. 4 omits it; laws of higher order always include it"
     )
+    type: str
 
     @property
     def adds_acceleration(self) -> bool:
@@ -70,16 +71,21 @@ class _PositionReference(_Reference):
         """See `_Reference.kind`."""
         return "position" if self.roll == self.pitch == 0.0 else "pose"
 
-    def _parameters(self, kind: str, position: Vector3, **own: float) -> ReferenceParameters:
+    @property
+    def parameters(self) -> ReferenceParameters:
+        """See `_Reference.parameters`."""
         return ReferenceParameters(
-            REFERENCE_TYPES[kind],
-            *position,
+            REFERENCE_TYPES[self.type],
             roll=self.roll,
             pitch=self.pitch,
             yaw=self.yaw,
             acceleration_feedforward=float(self.acceleration_feedforward),
-            **own,
+            **self._motion(),
         )
+
+    @abstractmethod
+    def _motion(self) -> dict[str, float]:
+        """The parameters of the motion."""
 
 
 class SetpointReference(_PositionReference):
@@ -88,10 +94,8 @@ class SetpointReference(_PositionReference):
     type: Literal["setpoint"] = "setpoint"
     position: Vector3 = Field((0.0, 0.0, 0.0), description="m")
 
-    @property
-    def parameters(self) -> ReferenceParameters:
-        """The record that the law reads."""
-        return self._parameters(self.type, self.position)
+    def _motion(self) -> dict[str, float]:
+        return _axes("", self.position)
 
 
 class LineReference(_PositionReference):
@@ -102,15 +106,9 @@ class LineReference(_PositionReference):
     velocity: Vector3 = Field(description="m/s, at time zero")
     acceleration: Vector3 = Field((0.0, 0.0, 0.0), description="m/s^2")
 
-    @property
-    def parameters(self) -> ReferenceParameters:
-        """The record that the law reads."""
-        return self._parameters(
-            self.type,
-            self.position,
-            **_by_axis("velocity", self.velocity),
-            **_by_axis("acceleration", self.acceleration),
-        )
+    def _motion(self) -> dict[str, float]:
+        moving = _axes("velocity_", self.velocity) | _axes("acceleration_", self.acceleration)
+        return _axes("", self.position) | moving
 
 
 class CircleReference(_PositionReference):
@@ -121,11 +119,9 @@ class CircleReference(_PositionReference):
     radius: float = Field(description="m; negative to start on the other side")
     angular_frequency: float = Field(description="rad/s")
 
-    @property
-    def parameters(self) -> ReferenceParameters:
-        """The record that the law reads."""
-        own = {"radius": self.radius, "angular_frequency": self.angular_frequency}
-        return self._parameters(self.type, self.position, **own)
+    def _motion(self) -> dict[str, float]:
+        turning = {"radius": self.radius, "angular_frequency": self.angular_frequency}
+        return _axes("", self.position) | turning
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -143,16 +139,9 @@ class LissajousReference(_PositionReference):
     angular_frequency: Vector3 = Field(description="rad/s")
     phase: Angles3 = Field((0.0, 0.0, 0.0), description="rad")
 
-    @property
-    def parameters(self) -> ReferenceParameters:
-        """The record that the law reads."""
-        return self._parameters(
-            self.type,
-            self.position,
-            **_by_axis("amplitude", self.amplitude),
-            **_by_axis("frequency", self.angular_frequency),
-            **_by_axis("phase", self.phase),
-        )
+    def _motion(self) -> dict[str, float]:
+        sine = _axes("amplitude_", self.amplitude) | _axes("phase_", self.phase)
+        return _axes("", self.position) | sine | _axes("frequency_", self.angular_frequency)
 
 
 class FigureEightReference(_PositionReference):
@@ -164,16 +153,10 @@ class FigureEightReference(_PositionReference):
     width: Positive = Field(description="m, along y")
     angular_frequency: Positive = Field(description="rad/s, once around")
 
-    @property
-    def parameters(self) -> ReferenceParameters:
-        """The record that the law reads."""
+    def _motion(self) -> dict[str, float]:
         once = self.angular_frequency
-        return self._parameters(
-            self.type,
-            self.position,
-            **_by_axis("amplitude", (0.5 * self.length, 0.5 * self.width, 0.0)),
-            **_by_axis("frequency", (once, 2.0 * once, 0.0)),
-        )
+        sine = _axes("amplitude_", (0.5 * self.length, 0.5 * self.width, 0.0))
+        return _axes("", self.position) | sine | _axes("frequency_", (once, 2.0 * once, 0.0))
 
 
 class WaypointReference(_PositionReference):
@@ -187,10 +170,8 @@ class WaypointReference(_PositionReference):
         description="s, one per point, from 0; after the last the reference rests"
     )
 
-    @property
-    def parameters(self) -> ReferenceParameters:
-        """The record that the law reads."""
-        return self._parameters(self.type, (0.0, 0.0, 0.0), segments=float(len(self.times)))
+    def _motion(self) -> dict[str, float]:
+        return {"segments": float(len(self.times))}
 
     @property
     def knots(self) -> Values:
@@ -209,8 +190,8 @@ class WaypointReference(_PositionReference):
 _minimum_snap_knots = lru_cache(maxsize=64)(minimum_snap_knots)
 
 
-def _by_axis(name: str, values: tuple[float, float, float]) -> dict[str, float]:
-    return {f"{name}_{axis}": value for axis, value in zip("xyz", values, strict=True)}
+def _axes(prefix: str, values: Triple) -> dict[str, float]:
+    return {f"{prefix}{axis}": value for axis, value in zip("xyz", values, strict=True)}
 
 
 class AttitudeAltitudeReference(_Reference):
