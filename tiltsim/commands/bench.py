@@ -13,35 +13,21 @@ from tiltsim.errors import InputError
 
 def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
-    parser = subparsers.add_parser(
-        "bench",
-        help="measure the speed of the closed loop relative to bare MuJoCo",
-        description=(
-            "Measure the speed of the closed loop, for one vehicle and for batches, as a fraction "
-            "of bare mj_step on the same model in flight; medians of interleaved runs."
-        ),
-    )
+    description = """Measure the speed of the closed loop, for one vehicle and for batches, as a
+    fraction of bare mj_step on the same model in flight; medians of interleaved runs."""
+    summary = "measure the speed of the closed loop relative to bare MuJoCo"
+    parser = subparsers.add_parser("bench", help=summary, description=description)
     add_json(parser)
-    instead = parser.add_mutually_exclusive_group()
-    instead.add_argument(
-        "--vehicles",
-        type=int,
-        metavar="N",
-        help="instead simulate N whole flights with metrics; print time and memory",
-    )
-    instead.add_argument(
-        "--accuracy",
-        action="store_true",
-        help="instead print RK4's position error and speed for several time steps",
-    )
-    parser.add_argument("--duration", type=float, default=10.0, help="with --vehicles, s")
-    parser.add_argument("--timestep", type=float, default=0.001, help="with --vehicles, s")
-    parser.add_argument(
-        "--integrator",
-        choices=("RK4", "implicitfast", "implicit", "Euler"),
-        default="implicitfast",
-        help="with --vehicles",
-    )
+    instead = parser.add_mutually_exclusive_group().add_argument
+    vehicles = "instead simulate N whole flights with metrics; print time and memory"
+    instead("--vehicles", type=int, metavar="N", help=vehicles)
+    accuracy = "instead print RK4's position error and speed for several time steps"
+    instead("--accuracy", action="store_true", help=accuracy)
+    add = parser.add_argument
+    add("--duration", type=float, default=10.0, help="with --vehicles, s")
+    add("--timestep", type=float, default=0.001, help="with --vehicles, s")
+    integrators = ("RK4", "implicitfast", "implicit", "Euler")
+    add("--integrator", choices=integrators, default="implicitfast", help="with --vehicles")
     parser.set_defaults(run=run)
 
 

@@ -19,25 +19,21 @@ if TYPE_CHECKING:
 
 def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
+    description = """Fly all scenarios under files and folders, and check their expectations. Sweep
+    files in folders are skipped. The JUnit file is written even when interrupted; scenarios not yet
+    flown are errors in it."""
     parser = subparsers.add_parser(
         "check",
         help="fly all scenarios under some paths and check their expectations",
-        description=(
-            "Fly all scenarios under files and folders, and check their expectations. Sweep files "
-            "in folders are skipped. The JUnit file is written even when interrupted; scenarios "
-            "not yet flown are errors in it."
-        ),
-        epilog=(
-            "exit codes: 0 all passed, 1 an expectation failed, 2 invalid or crashed, 3 a vehicle "
-            "was lost; if several apply, the most severe is returned (2 > 3 > 1)"
-        ),
+        description=description,
+        epilog="exit codes: 0 all passed, 1 an expectation failed, 2 invalid or crashed, 3 vehicle "
+        "lost; if several apply, the most severe is returned (2 > 3 > 1)",
     )
-    parser.add_argument(
-        "paths", nargs="*", metavar="PATH", help="files, folders or library names; default: all"
-    )
+    add = parser.add_argument
+    add("paths", nargs="*", metavar="PATH", help="files, folders or library names; default: all")
     add_jobs(parser)
     add_overrides(parser, "every scenario", "simulation.plant=thesis")
-    parser.add_argument("--junit", type=Path, metavar="FILE", help="write JUnit XML")
+    add("--junit", type=Path, metavar="FILE", help="write JUnit XML")
     parser.set_defaults(run=run)
 
 
@@ -100,8 +96,7 @@ def _print_result(result: CheckResult, width: int) -> None:
         outcome = "no expectations" if _is_unchecked(result) else ""
     mark = "ok" if result.status == "passed" else result.status.upper()
     print(
-        f"{mark:<8}{result.address:<{width}}  {outcome:<15}  {result.wall_time:6.1f} s",
-        flush=True,
+        f"{mark:<8}{result.address:<{width}}  {outcome:<15}  {result.wall_time:6.1f} s", flush=True
     )
     if result.message:
         print(f"        {result.message}")

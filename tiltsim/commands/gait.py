@@ -21,64 +21,34 @@ OPPOSITE_SPEED_RATIO: Final = 0.7
 
 def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
-    parser = subparsers.add_parser(
-        "gait",
-        help="analyze the singularities of a gait",
-        description=(
-            "Print rank and singular values of the torque matrix, the residuals R, R_phi and "
-            "R_theta, the singularity margin and the singular attitudes of a gait; for a moving "
-            "gait over one period."
-        ),
-    )
+    description = """Print rank and singular values of the torque matrix, the residuals R, R_phi and
+    R_theta, the singularity margin and the singular attitudes of a gait; for a moving gait over one
+    period."""
+    summary = "analyze the singularities of a gait"
+    parser = subparsers.add_parser("gait", help=summary, description=description)
     allow_negative_lists(parser)
-    parser.add_argument(
-        "scenario", nargs="?", metavar="SCENARIO", help="take gait and vehicle from a scenario"
-    )
-    parser.add_argument(
-        "--angles", metavar="A1,A2,A3,A4", help="tilt angles in rad, instead of a scenario"
-    )
-    parser.add_argument(
-        "--published", metavar="NAME", help="a gait of the thesis, such as ch06_gait_3"
-    )
-    parser.add_argument(
-        "--balance",
-        metavar="AX,AY,AZ",
-        help="find the gait with the smallest tilt angles that hovers level under this "
-        "acceleration, m/s^2, world",
-    )
-    parser.add_argument(
-        "--list",
-        action="store_true",
-        help="list the gaits of the thesis and whether its robustness claims hold for them",
-    )
+    add = parser.add_argument
+    add("scenario", nargs="?", metavar="SCENARIO", help="take gait and vehicle from a scenario")
+    add("--angles", metavar="A1,A2,A3,A4", help="tilt angles in rad, instead of a scenario")
+    add("--published", metavar="NAME", help="a gait of the thesis, such as ch06_gait_3")
+    balance = "the gait of least tilt that hovers level under an acceleration, m/s^2, world"
+    add("--balance", metavar="AX,AY,AZ", help=balance)
+    add("--list", action="store_true", help="list the thesis's gaits and their robustness claims")
     add_vehicle(parser)
-    parser.add_argument("--roll", metavar="RAD", help="attitude to analyze (default: level)")
-    parser.add_argument("--pitch", metavar="RAD")
-    parser.add_argument(
-        "--faults", action="store_true", help="also print which rotor losses allow hovering"
-    )
+    add("--roll", metavar="RAD", help="attitude to analyze (default: level)")
+    add("--pitch", metavar="RAD")
+    add("--faults", action="store_true", help="also print which rotor losses allow hovering")
     add_json(parser)
     add_plot(parser, "a figure")
-    parser.add_argument(
-        "--figure",
-        choices=FIGURES,
-        help=(
-            "roll_pitch (default); comparison, two roll-pitch diagrams, with and without bias; "
-            "margin over a period; attainable torques, thrusts and accelerations (ch. 9); "
-            "determinant surfaces and zero curves (ch. 3), without a gait; faults: rotor speeds "
-            "that hover needs after a rotor loss, for any gait"
-        ),
-    )
-    parser.add_argument(
-        "--case",
-        choices=CASES,
-        help="for --figure determinant: relation of alpha_1 and alpha_3 (default: equal)",
-    )
-    parser.add_argument(
-        "--speed-limits",
-        metavar="MIN,MAX",
-        help="for --figure attainable: rotor speeds in rad/s (default: those of ch. 9)",
-    )
+    figure = """roll_pitch (default); comparison, two roll-pitch diagrams, with and without bias;
+    margin over a period; attainable torques, thrusts and accelerations (ch. 9); determinant
+    surfaces and zero curves (ch. 3), without a gait; faults: rotor speeds that hover needs after a
+    rotor loss, for any gait"""
+    add("--figure", choices=FIGURES, help=figure)
+    case = "for --figure determinant: relation of alpha_1 and alpha_3 (default: equal)"
+    add("--case", choices=CASES, help=case)
+    limits = "for --figure attainable: rotor speeds in rad/s (default: those of ch. 9)"
+    add("--speed-limits", metavar="MIN,MAX", help=limits)
     parser.set_defaults(run=run)
 
 

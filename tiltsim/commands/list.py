@@ -12,12 +12,10 @@ from tiltsim.scenario.library import Entry, library_entries, library_families, l
 
 def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
-    parser = subparsers.add_parser(
-        "list",
-        help="list the scenario library",
-        description="List the scenario library with titles and sources in the thesis. A line that "
-        "begins with # is a variant of the file above it: tiltsim run 'FILE#VARIANT'.",
-    )
+    description = """List the scenario library with titles and sources in the thesis. A line that
+    begins with # is a variant of the file above it: tiltsim run 'FILE#VARIANT'."""
+    summary = "list the scenario library"
+    parser = subparsers.add_parser("list", help=summary, description=description)
     parser.add_argument("--sweeps", action="store_true", help="list only the sweeps")
     add_json(parser)
     parser.set_defaults(run=run)

@@ -17,31 +17,21 @@ if TYPE_CHECKING:
 
 def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
+    description = """Print the Two Color Map of a vehicle: delta, P, the exact red and blue lines,
+    the curve L and the grid search of ch. 6. With --leg or --circle, also check a path."""
     parser = subparsers.add_parser(
         "map",
         help="draw the Two Color Map and check a path on it",
-        description=(
-            "Print the Two Color Map of a vehicle: delta, P, the exact red and blue lines, the "
-            "curve L and the grid search of ch. 6. With --leg or --circle, also check a path."
-        ),
+        description=description,
         epilog="exit codes: 0 done, 1 both theorems reject the path, or it is singular although "
         "they accept it, as every blue path is, 2 invalid input",
     )
     allow_negative_lists(parser)
     add_vehicle(parser)
-    parser.add_argument(
-        "--leg",
-        action="append",
-        nargs="+",
-        metavar="WORD",
-        help="COLOR A1,A2 A1,A2 ...: part of a closed path, vertices in rad or P; repeatable",
-    )
-    parser.add_argument(
-        "--circle",
-        nargs=3,
-        metavar=("COLOR", "A1,A2", "RADIUS"),
-        help="a circular path: centre and radius in rad",
-    )
+    leg = "COLOR A1,A2 A1,A2 ...: part of a closed path, vertices in rad or P; repeatable"
+    parser.add_argument("--leg", action="append", nargs="+", metavar="WORD", help=leg)
+    circle = "a circular path: centre and radius in rad"
+    parser.add_argument("--circle", nargs=3, metavar=("COLOR", "A1,A2", "RADIUS"), help=circle)
     add_json(parser)
     add_plot(parser, "the map")
     parser.set_defaults(run=run)

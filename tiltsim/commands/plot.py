@@ -14,39 +14,19 @@ if TYPE_CHECKING:
 
 def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
-    parser = subparsers.add_parser(
-        "plot",
-        help="draw a flight, several, or a sweep as a figure",
-        description=(
-            "Draw a flight on one page: attitude, altitude, position error, tilt angles, rotor "
-            "speeds, singularity margin, path over the ground, roll-pitch plane. Several flights: "
-            "margin, determinant and position error of each over time. A sweep: lines, maps, "
-            "distributions or boundaries, according to its axes or its [plot] table."
-        ),
-    )
-    parser.add_argument(
-        "flights",
-        type=Path,
-        nargs="+",
-        metavar="FLIGHT",
-        help="a folder of results, a flight.parquet, or the folder of a sweep; several flights are "
-        "compared",
-    )
-    parser.add_argument(
-        "--metric",
-        action="append",
-        default=[],
-        metavar="NAME",
-        dest="metrics",
-        help="metric of a sweep to draw; repeatable",
-    )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE",
-        help="PNG, SVG or PDF by its suffix (default: flight.png, flights.png or sweep.png beside "
-        "the first of the data)",
-    )
+    description = """Draw a flight on one page: attitude, altitude, position error, tilt angles,
+    rotor speeds, singularity margin, path over the ground, roll-pitch plane. Several flights: margin,
+    determinant and position error of each over time. A sweep: lines, maps, distributions or
+    boundaries, according to its axes or its [plot] table."""
+    summary = "draw a flight, several, or a sweep as a figure"
+    parser = subparsers.add_parser("plot", help=summary, description=description)
+    add = parser.add_argument
+    flights = "folder of results, flight.parquet or folder of a sweep; several flights are compared"
+    add("flights", type=Path, nargs="+", metavar="FLIGHT", help=flights)
+    metrics = "metric of a sweep to draw; repeatable"
+    add("--metric", action="append", default=[], metavar="NAME", dest="metrics", help=metrics)
+    out = "PNG, SVG or PDF (default: flight.png, flights.png or sweep.png beside the first flight)"
+    add("--out", type=Path, metavar="FILE", help=out)
     parser.set_defaults(run=run)
 
 

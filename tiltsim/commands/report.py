@@ -11,30 +11,21 @@ from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
 
 def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
+    description = """Fly scenarios on both plants, check every published claim, and write one
+    self-contained HTML page. Flights are cached: a second report takes seconds, and an interrupted
+    one continues."""
     parser = subparsers.add_parser(
         "report",
         help="compare the whole library with the published claims on one HTML page",
-        description=(
-            "Fly scenarios on both plants, check every published claim, and write one "
-            "self-contained HTML page. Flights are cached: a second report takes seconds, and an "
-            "interrupted one continues."
-        ),
+        description=description,
         epilog="exit codes: 0 done, 1 an expectation of a scenario failed, 2 invalid input",
     )
-    parser.add_argument(
-        "paths",
-        nargs="*",
-        metavar="PATH",
-        help="files, folders or library names; default: the library and all claims",
-    )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        default=Path("report"),
-        metavar="DIR",
-        help="folder for report.html and the cached flights (default: report)",
-    )
-    parser.add_argument("--markdown", type=Path, metavar="FILE", help="also write a summary")
+    add = parser.add_argument
+    paths = "files, folders or library names; default: the library and all claims"
+    add("paths", nargs="*", metavar="PATH", help=paths)
+    out = "folder for report.html and the cached flights (default: report)"
+    add("--out", type=Path, default=Path("report"), metavar="DIR", help=out)
+    add("--markdown", type=Path, metavar="FILE", help="also write a summary")
     add_jobs(parser)
     parser.set_defaults(run=run)
 

@@ -25,34 +25,21 @@ if TYPE_CHECKING:
 
 def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
-    parser = subparsers.add_parser(
-        "run",
-        help="fly one scenario",
-        description="Fly one scenario, write its files and check its expectations.",
-    )
-    parser.add_argument(
-        "scenario",
-        metavar="SCENARIO",
-        help="a TOML file or a name from the library, with #VARIANT for a member of a family "
-        "(with --set, a family without #VARIANT flies its base)",
-    )
-    parser.add_argument(
-        "--controller",
-        metavar="FILE.py:NAME",
-        help="fly your own controller, a function or class in a Python file; short for --set "
-        "controller.law=python --set controller.function=FILE.py:NAME",
-    )
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="write metrics.json, flight.parquet, scenario.toml"
-    )
-    parser.add_argument(
-        "--rerun", type=Path, metavar="FILE.rrd", help="save a recording for the Rerun viewer"
-    )
-    live = parser.add_mutually_exclusive_group()
-    live.add_argument("--live", action="store_true", help="watch the flight in the Rerun viewer")
-    live.add_argument(
-        "--connect", metavar="URL", help="stream to a Rerun viewer that is already open"
-    )
+    description = "Fly one scenario, write its files and check its expectations."
+    parser = subparsers.add_parser("run", help="fly one scenario", description=description)
+    add = parser.add_argument
+    scenario = """a TOML file or a name from the library, with #VARIANT for a member of a family
+    (with --set, a family without #VARIANT flies its base)"""
+    add("scenario", metavar="SCENARIO", help=scenario)
+    controller = """fly your own controller, a function or class in a Python file; short for --set
+    controller.law=python --set controller.function=FILE.py:NAME"""
+    add("--controller", metavar="FILE.py:NAME", help=controller)
+    out = "write metrics.json, flight.parquet, scenario.toml"
+    add("--out", type=Path, metavar="DIR", help=out)
+    add("--rerun", type=Path, metavar="FILE.rrd", help="save a recording for the Rerun viewer")
+    live = parser.add_mutually_exclusive_group().add_argument
+    live("--live", action="store_true", help="watch the flight in the Rerun viewer")
+    live("--connect", metavar="URL", help="stream to a Rerun viewer that is already open")
     add_overrides(parser, "the scenario", "controller.decoupler=exact")
     add_quiet(parser)
     parser.set_defaults(run=run)

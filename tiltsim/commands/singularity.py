@@ -16,14 +16,10 @@ if TYPE_CHECKING:
 
 def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
-    parser = subparsers.add_parser(
-        "singularity",
-        help="compare the quadrotor's published and exact determinants",
-        description=(
-            "Compare ch. 2's determinant surface S(theta, phi) of yaw-position control and its "
-            "singular curve with the exact determinant, which is not zero in hover up to 90 deg."
-        ),
-    )
+    description = """Compare ch. 2's determinant surface S(theta, phi) of yaw-position control and
+    its singular curve with the exact determinant, which is not zero in hover up to 90 degrees."""
+    summary = "compare the quadrotor's published and exact determinants"
+    parser = subparsers.add_parser("singularity", help=summary, description=description)
     allow_negative_lists(parser)
     parser.add_argument("vehicle_model", metavar="quadrotor", choices=("quadrotor",))
     parser.add_argument("--vehicle", metavar="PRESET", help="default: ar_drone_2_unrounded")
@@ -39,10 +35,7 @@ def add_parser(subparsers: Subparsers) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Compute, draw, print."""
     vehicle = parse_vehicle(arguments.vehicle or "ar_drone_2_unrounded")
-    attitude = (
-        parse_angle("--roll", arguments.roll),
-        parse_angle("--pitch", arguments.pitch),
-    )
+    attitude = (parse_angle("--roll", arguments.roll), parse_angle("--pitch", arguments.pitch))
     prepare_figure("--plot", arguments.plot)
     report = _report(vehicle, *attitude)
     if arguments.plot is not None:
@@ -99,10 +92,7 @@ def _summary(report: dict[str, Any]) -> str:
             f"roll {min(curve['roll']):.4g} to {max(curve['roll']):.4g}, "
             f"pitch {min(curve['pitch']):.4g} to {max(curve['pitch']):.4g} rad",
         ),
-        (
-            "exact on that curve",
-            f"{on_curve['min']:.6g} to {on_curve['max']:.6g}, never singular",
-        ),
+        ("exact on that curve", f"{on_curve['min']:.6g} to {on_curve['max']:.6g}, never singular"),
         (
             "published zone",
             f"roll {zone['roll_min']:.4g} to {zone['roll_max']:.4g}, "

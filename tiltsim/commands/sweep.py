@@ -18,26 +18,16 @@ if TYPE_CHECKING:
 
 def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
-    parser = subparsers.add_parser(
-        "sweep",
-        help="fly a scenario along axes: grids, random sets, stability boundaries",
-        description=(
-            "Fly a scenario along axes into one Parquet dataset. If it is interrupted or killed, "
-            "running the same command again continues."
-        ),
-    )
-    parser.add_argument(
-        "sweep", metavar="SWEEP", help="a TOML file or a name from the library (tiltsim list)"
-    )
+    description = """Fly a scenario along axes into one Parquet dataset. If it is interrupted or
+    killed, running the same command again continues."""
+    summary = "fly a scenario along axes: grids, random sets, stability boundaries"
+    parser = subparsers.add_parser("sweep", help=summary, description=description)
+    add = parser.add_argument
+    add("sweep", metavar="SWEEP", help="a TOML file or a name from the library (tiltsim list)")
     add_jobs(parser)
-    parser.add_argument(
-        "--cluster",
-        metavar="ADDRESS",
-        help="fly on the workers of this Dask scheduler, such as tcp://192.168.0.1:8786",
-    )
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="the results (default: sweeps/NAME)"
-    )
+    cluster = "fly on the workers of this Dask scheduler, such as tcp://192.168.0.1:8786"
+    add("--cluster", metavar="ADDRESS", help=cluster)
+    add("--out", type=Path, metavar="DIR", help="the results (default: sweeps/NAME)")
     add_overrides(parser, "the base scenario", "simulation.plant=thesis")
     add_quiet(parser)
     parser.set_defaults(run=run)
@@ -68,11 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         with counting_bar(len(points), units[1], shown=shown) as move:
             dataset = run_sweep(
-                definition,
-                out,
-                jobs=arguments.jobs,
-                cluster=arguments.cluster,
-                report=report,
+                definition, out, jobs=arguments.jobs, cluster=arguments.cluster, report=report
             )
     except KeyboardInterrupt:
         print(

@@ -16,29 +16,17 @@ MANY_FRAMES: Final = 100
 
 def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
+    description = """Render a flight with MuJoCo, the camera following the vehicle; works without a
+    screen. The inset shows the roll-pitch plane."""
     parser = subparsers.add_parser(
-        "video",
-        help="render a video of a flight",
-        description=(
-            "Render a flight with MuJoCo, the camera following the vehicle; works without a "
-            "screen. The inset shows the roll-pitch plane."
-        ),
+        "video", help="render a video of a flight", description=description
     )
-    parser.add_argument(
-        "flight", type=Path, metavar="FLIGHT", help="a folder of results, or a flight.parquet"
-    )
-    parser.add_argument(
-        "--out", type=Path, metavar="FILE.mp4", help="default: flight.mp4 beside the flight"
-    )
-    parser.add_argument(
-        "--size", type=_size, default=(960, 540), metavar="WxH", help="pixels (default 960x540)"
-    )
-    parser.add_argument(
-        "--fps", type=_frame_rate, default=30, metavar="N", help="frames per second (default 30)"
-    )
-    parser.add_argument(
-        "--speed", type=_speed, default=1.0, metavar="X", help="times real time (default 1)"
-    )
+    add = parser.add_argument
+    add("flight", type=Path, metavar="FLIGHT", help="a folder of results, or a flight.parquet")
+    add("--out", type=Path, metavar="FILE.mp4", help="default: flight.mp4 beside the flight")
+    add("--size", type=_size, default=(960, 540), metavar="WxH", help="pixels (default 960x540)")
+    add("--fps", type=_frame_rate, default=30, metavar="N", help="frames per second (default 30)")
+    add("--speed", type=_speed, default=1.0, metavar="X", help="times real time (default 1)")
     add_quiet(parser)
     parser.set_defaults(run=run)
 

@@ -10,29 +10,16 @@ from tiltsim.commands.options import Subparsers
 
 def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
-    parser = subparsers.add_parser(
-        "view",
-        help="show flights in the Rerun viewer",
-        description=(
-            "Show a flight in the Rerun viewer, or several in one recording for comparison. "
-            "Recordings (.rrd) are opened unchanged."
-        ),
-    )
-    parser.add_argument(
-        "paths",
-        nargs="+",
-        type=Path,
-        metavar="PATH",
-        help="folders of results, flight.parquet files, or .rrd recordings",
-    )
-    target = parser.add_mutually_exclusive_group()
-    target.add_argument(
-        "--rerun",
-        type=Path,
-        metavar="FILE.rrd",
-        help="save a recording instead of opening the viewer",
-    )
-    target.add_argument("--connect", metavar="URL", help="show it in a viewer that is already open")
+    description = """Show a flight in the Rerun viewer, or several in one recording for comparison.
+    Recordings (.rrd) are opened unchanged."""
+    summary = "show flights in the Rerun viewer"
+    parser = subparsers.add_parser("view", help=summary, description=description)
+    paths = "folders of results, flight.parquet files, or .rrd recordings"
+    parser.add_argument("paths", nargs="+", type=Path, metavar="PATH", help=paths)
+    add = parser.add_mutually_exclusive_group().add_argument
+    recording = "save a recording instead of opening the viewer"
+    add("--rerun", type=Path, metavar="FILE.rrd", help=recording)
+    add("--connect", metavar="URL", help="show it in a viewer that is already open")
     parser.set_defaults(run=run)
 
 

@@ -110,10 +110,7 @@ def bench_batch(integrator: str, threads: int, rounds: int = BATCH_ROUNDS) -> Ro
 
         return run
 
-    variants = {
-        ("batch", "bare"): stepping(None),
-        ("batch", "native"): stepping(plant.callback),
-    }
+    variants = {("batch", "bare"): stepping(None), ("batch", "native"): stepping(plant.callback)}
     seconds = _time_in_rounds(variants, rounds)
     return _rows(
         seconds, ("batch", "bare"), integrator, plant.model, vehicles=BATCH_ROWS, threads=threads
