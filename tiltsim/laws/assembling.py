@@ -1,4 +1,4 @@
-"""The closed loops that can be flown: one module a law, found by the name of the law."""
+"""Which closed loop a scenario has, and its `Assembly`."""
 
 from __future__ import annotations
 
@@ -40,15 +40,14 @@ LOOPS: Final[dict[str, ClosedLoop]] = {
 
 
 def loop_of(scenario: Scenario) -> ClosedLoop:
-    """The loop that a scenario flies: its law, within layers for what is not ideal."""
-    own, latency = scenario.controller.is_external, scenario.simulation.latency_steps
-    loop = COMMANDED_LOOPS[scenario.vehicle.model] if own else LOOPS[scenario.controller.loop_name]
-    supervisor = scenario.controller.supervision
+    """The closed loop of a scenario: its controller inside layers for all that is not ideal."""
+    controller, external = scenario.controller, scenario.controller.is_external
+    loop = COMMANDED_LOOPS[scenario.vehicle.model] if external else LOOPS[controller.loop_name]
+    supervisor = controller.supervision
     if supervisor is not None:
         loop = with_supervisor(loop, supervisor.strategy)
     if scenario.needs_actuation_layer:
-        # Commands from outside are under way in their plant, `tiltsim.plants.commanded_plant`.
-        loop = with_actuation(loop, 0 if own else latency)
+        loop = with_actuation(loop, scenario.simulation.latency_steps, external)
     if scenario.has_air:
         loop = with_air(loop)
     by_controls = (
@@ -58,7 +57,7 @@ def loop_of(scenario: Scenario) -> ClosedLoop:
 
 
 def follows_position(scenario: Scenario) -> bool:
-    """Whether the law of a scenario follows the reference's horizontal position."""
+    """Whether the controller of a scenario follows the reference's horizontal position."""
     return loop_of(scenario).follows_position(scenario)
 
 

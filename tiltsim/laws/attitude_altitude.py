@@ -36,7 +36,6 @@ from tiltsim.laws.tiltrotor import (
 )
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
-from tiltsim.vehicles.rotorcraft.layout import ALPHA_1, ALPHA_2, ALPHA_3, ALPHA_4
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import (
     DECOUPLINGS,
@@ -50,7 +49,7 @@ from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values,
 from tiltsim_controllers.references.trajectories import position_reference
 from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines, torque_entries
 from tiltsim_controllers.vehicle.parameters import drag_ratio
-from tiltsim_controllers.vehicle.states import TILTROTOR_FIELDS
+from tiltsim_controllers.vehicle.states import ALPHA_1, ALPHA_2, ALPHA_3, ALPHA_4, TILTROTOR_FIELDS
 
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan

@@ -26,7 +26,7 @@ from tiltsim.closed_loop.loop import (
 from tiltsim.equations.quadrotor import equations_of_motion, initial_state, rigid_body
 from tiltsim.laws.tiltrotor import REFERENCE_COLUMNS, TILT_REFERENCE_COLUMNS
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
-from tiltsim.vehicles.rotorcraft.layout import OBSERVED_FIELDS, PITCH, ROLL
+from tiltsim.vehicles.rotorcraft.layout import OBSERVED_FIELDS
 from tiltsim_controllers.analysis.quadrotor_singularity import (
     normalized_determinant,
     published_determinant,
@@ -36,6 +36,7 @@ from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vecto
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.quadrotor_mixer import speed_along_spin, thrust_controls
+from tiltsim_controllers.vehicle.states import PITCH, ROLL
 
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan

@@ -15,20 +15,7 @@ import numpy as np
 from tiltsim.closed_loop.loop import ControlSetup, Dynamics, SignCheck, Sizes
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
-from tiltsim.vehicles.rotorcraft.layout import (
-    ALPHA_1,
-    ALPHA_2,
-    ALPHA_3,
-    ALPHA_4,
-    OBSERVED_FIELDS,
-    PITCH,
-    ROLL,
-    SPEED_1,
-    SPEED_2,
-    SPEED_3,
-    SPEED_4,
-    TILT_RATE_1,
-)
+from tiltsim.vehicles.rotorcraft.layout import OBSERVED_FIELDS, TILT_RATE_1
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.gaits.tilts import tilt_reference
@@ -40,6 +27,18 @@ from tiltsim_controllers.vehicle.decoupling_matrix import (
     torque_free_force,
 )
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle, drag_ratio
+from tiltsim_controllers.vehicle.states import (
+    ALPHA_1,
+    ALPHA_2,
+    ALPHA_3,
+    ALPHA_4,
+    PITCH,
+    ROLL,
+    SPEED_1,
+    SPEED_2,
+    SPEED_3,
+    SPEED_4,
+)
 
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan

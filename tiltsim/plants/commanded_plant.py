@@ -1,9 +1,8 @@
 """The MuJoCo plant under commands: from a user's own controller, or step by step from outside.
 
-Commands and observations pass the same layers as those of the shipped controllers. Only the latency
-differs: a rotor may be commanded a speed that it takes at once, and a chain of activations
-(`tiltsim.laws.layers.actuation`) cannot pass on a jump. So delayed commands are a state of this
-plant.
+Commands and observations pass the same layers as those of the shipped controllers. Only the delay
+line of `tiltsim.laws.layers.delay_line` is moved by this plant, as rotors may be commanded speeds
+that they take at once.
 """
 
 from __future__ import annotations
@@ -19,12 +18,13 @@ from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.callback import control_callback
 from tiltsim.laws.commanded import COMMANDED_LOOPS, HeldCommand, commanded_parameters, with_command
-from tiltsim.laws.layers.actuation import measured_qpos, measured_qvel, sensor_parameters
+from tiltsim.laws.layers.delay_line import EXTERNAL_COMMANDS
+from tiltsim.laws.layers.sensing import measured_qpos, measured_qvel, sensor_parameters
 from tiltsim.laws.tiltrotor import gait_servo_commands
 from tiltsim.plants.command import CheckedCommand, ControllerError, Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant, quiet_warnings
 from tiltsim.plants.plant import record_step_by_step
-from tiltsim.vehicles.rotorcraft import initial_tilts
+from tiltsim.vehicles.rotorcraft.layout import ROTOR_STATES
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.mathematics.records import slotted
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
@@ -61,10 +61,10 @@ class CommandedPlant:
         # that the layer keeps after the four rotor speeds.
         first = 0 if vehicle.rotor_time_constant is None else 4
         self._speeds = slice(first, first + 4)
-        # Before the first command arrives the servos hold the pods where they are.
-        tilts = initial_tilts(assembly)[0] if self.tilting else _NONE
-        waiting = CheckedCommand("rotor_accelerations", _NONE, tilts)
-        self._delayed = [waiting] * assembly.scenario.simulation.latency_steps  # oldest first
+        # The delay line in ``act``, the newest command first; without latency it is empty.
+        steps, first = assembly.scenario.simulation.latency_steps, 2 * ROTOR_STATES
+        line = self.data.act[first : first + EXTERNAL_COMMANDS * steps]
+        self._line = line.reshape(steps, EXTERNAL_COMMANDS)
         self._hold_command(self._commanded.command)
 
     @property
@@ -74,39 +74,34 @@ class CommandedPlant:
 
     @property
     def state(self) -> Floats:
-        """See `Plant.state`: MuJoCo's, and the delayed commands."""
-        delayed = [number for command in self._delayed for number in _as_numbers(command)]
-        return np.array([*self._plant.state, *delayed])
+        """See `Plant.state`: MuJoCo's."""
+        return self._plant.state
 
     @state.setter
     def state(self, value: Floats) -> None:
-        length = len(value) - _NUMBERS * len(self._delayed)
-        self._plant.state = value[:length]
-        self._delayed = list(map(_from_numbers, value[length:].reshape(-1, _NUMBERS).tolist()))
+        self._plant.state = value
 
     def apply(self, command: CheckedCommand) -> None:
         """Send a command, once per control sample, and hold the one that arrives until the next.
 
         Rotors take a commanded speed at once, unless they lag: the observed state has it.
         """
-        self._delayed.append(self._completed(command))
-        arrived = self._delayed.pop(0)
-        assert arrived.tilt_angles is not None
-        rates = _NONE
-        if arrived.kind == "rotor_speeds":
-            self.data.act[self._speeds] = _flip_by_spin(arrived.rotors)
-        else:
-            rates = _flip_by_spin(arrived.rotors)
-        self._hold_command(HeldCommand(*arrived.tilt_angles, *rates))
+        line = np.vstack([self._external_command(command), self._line])
+        self._line[:] = line[:-1]
+        *arrived, are_speeds = line[-1].tolist()
+        if are_speeds:
+            self.data.act[self._speeds] = arrived[4:]
+            arrived[4:] = _NONE
+        self._hold_command(HeldCommand(*arrived))
 
-    def _completed(self, command: CheckedCommand) -> CheckedCommand:
-        """The command of speeds or accelerations, with tilt angles, that a command amounts to."""
+    def _external_command(self, command: CheckedCommand) -> Floats:
+        """The `EXTERNAL_COMMANDS` that a command amounts to."""
         tilts = command.tilt_angles
         if tilts is None:
             tilts = self._gait_servo_commands() if self.tilting else _NONE
-        if command.kind == "rotor_accelerations":
-            return CheckedCommand(command.kind, command.rotors, tilts)
-        return CheckedCommand("rotor_speeds", self._limited_speeds(command), tilts)
+        are_speeds = command.kind != "rotor_accelerations"
+        rotors = self._limited_speeds(command) if are_speeds else command.rotors
+        return np.array([*tilts, *_flip_by_spin(rotors), are_speeds])
 
     def _hold_command(self, command: HeldCommand) -> None:
         data, knots = self.data, self._setup.knots
@@ -226,18 +221,3 @@ def _flip_by_spin(values: Sequence[float]) -> Quad:
     """Speeds along the spin from signed ones, and back."""
     first, second, third, fourth = values
     return SPIN[0] * first, SPIN[1] * second, SPIN[2] * third, SPIN[3] * fourth
-
-
-_NUMBERS: Final = 9
-"""How many numbers of a state are one delayed command."""
-
-
-def _as_numbers(command: CheckedCommand) -> tuple[float, ...]:
-    assert command.tilt_angles is not None
-    return (float(command.kind == "rotor_speeds"), *command.rotors, *command.tilt_angles)
-
-
-def _from_numbers(numbers: Sequence[float]) -> CheckedCommand:
-    are_speeds, r1, r2, r3, r4, a1, a2, a3, a4 = numbers
-    kind = "rotor_speeds" if are_speeds else "rotor_accelerations"
-    return CheckedCommand(kind, (r1, r2, r3, r4), (a1, a2, a3, a4))

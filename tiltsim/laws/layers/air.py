@@ -1,8 +1,8 @@
-"""The air around any vehicle: a layer that adds its forces to what a law makes the vehicle do.
+"""The air around any rotorcraft: a layer that adds its forces.
 
-MuJoCo's own fluid forces know boxes and ellipsoids in a constant wind. These act through six
+MuJoCo's fluid forces are those of boxes and ellipsoids in a constant wind. These act through six
 actuators on the body instead, force and torque in body axes, which only models with air have. The
-filters of turbulence are activations, so a flight restarts anywhere, gusts and all.
+filters of the turbulence are activations, so a flight restarts anywhere.
 """
 
 from __future__ import annotations
@@ -16,8 +16,17 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
+from tiltsim.laws.tiltrotor import four
 from tiltsim.models.parts import ExtraActuators
-from tiltsim.vehicles.rotorcraft.layout import QUADROTOR_THRUSTS, TILTROTOR_THRUSTS
+from tiltsim.vehicles.rotorcraft.layout import (
+    QUADROTOR_THRUSTS,
+    QW,
+    QX,
+    QY,
+    QZ,
+    TILT_1,
+    TILTROTOR_THRUSTS,
+)
 from tiltsim_controllers.mathematics.rotation import rotation_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Values, Vector, scalar
 from tiltsim_controllers.vehicle.air import (
@@ -40,7 +49,6 @@ from tiltsim_controllers.vehicle.parameters import Vehicle
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
 
-WRENCH: Final = 6
 AIR_COLUMNS: Final = ("air_vx", "air_vy", "air_vz")
 DRYDEN_FIELDS: Final = tuple(f"dryden_{index}" for index in range(1, DRYDEN_STATES + 1))
 
@@ -55,7 +63,7 @@ class Surroundings(NamedTuple):
 @scalar
 def pod_tilts(qpos: Vector) -> Quad:
     """Tilt angles of the tiltrotor."""
-    return qpos[7], qpos[8], qpos[9], qpos[10]
+    return four(qpos, TILT_1)
 
 
 @scalar
@@ -74,14 +82,26 @@ def air_wrench(
     thrusts: Quad,
     surroundings: Surroundings,
 ) -> Values:
-    """Force (N) and torque (N m) of the air, body axes: drag, and what the ground adds to thrust.
+    """Force (N) and torque (N m) of the air, body axes: drag and ground effect.
 
-    ``thrusts`` are the controls of the thrust actuators, (rad/s)^2; ``states`` those of the
-    turbulence.
+    Parameters
+    ----------
+    time
+        s.
+    qpos, qvel
+        MuJoCo's.
+    states
+        Of the turbulence's filters.
+    tilts
+        rad.
+    thrusts
+        Controls of the thrust actuators, (rad/s)^2.
+    surroundings
+        The parameters of the layer.
     """
     air, vehicle = surroundings.air, surroundings.vehicle
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_from_quaternion(
-        qpos[3], qpos[4], qpos[5], qpos[6]
+        qpos[QW], qpos[QX], qpos[QY], qpos[QZ]
     )
     ax, ay, az = air_velocity(time, states, air)
     vx, vy, vz = qvel[0] - ax, qvel[1] - ay, qvel[2] - az
@@ -115,7 +135,7 @@ def air_wrench(
 
 @cache
 def with_air(loop: ClosedLoop) -> ClosedLoop:
-    """A loop in air that moves, drags and feels the ground."""
+    """A loop in air with wind, turbulence, gusts, drag and ground effect."""
     inner_controls, inner_hold = loop.sampling.controls, loop.sampling.hold
     first, inner_ctrl = loop.dynamics.sizes.act, loop.dynamics.sizes.ctrl
     tilting = loop.dynamics.model == "tiltrotor"

@@ -1,35 +1,34 @@
-"""Any loop around a rotorcraft, whatever its layers, on the thesis's equations.
+"""Any closed loop of a rotorcraft, whatever its layers, on the thesis's equations.
 
-The loop stays what it is in MuJoCo, a function from time, `qpos`, `qvel` and `act` to controls, and
-so does the order in which it reads its sensors, draws its noise and hands on its commands. Only
-what the controls act upon is another: `tiltsim.equations.actuator_level`.
+The controls are the same function of time, `qpos`, `qvel` and `act` as in MuJoCo, with the same
+sensors, noise and latency. Only the plant on which they act differs:
+`tiltsim.equations.actuator_level`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations
 from tiltsim.equations.actuator_level import ACTUATOR_PLANTS, Mechanics, Wrench, mechanics
-from tiltsim.laws.layers.layer import Layer, wrap_loop
+from tiltsim.laws.layers.layer import WRENCH_SIZE, Layer, wrap_loop
 from tiltsim.models.parts import ExtraActuators
+from tiltsim.vehicles.rotorcraft.layout import ROTOR_STATES
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
-
-ROTOR_STATES: Final = 4
 
 
 @cache
 def _read_actuators(
     actuators: tuple[ExtraActuators, ...], first: int
 ) -> tuple[Callable[..., Values], Callable[..., Wrench]]:
-    """Scalar code that reads what actuators do, from the controls of which theirs begin at one.
+    """Scalar code that reads what actuators do, whose controls begin at an index.
 
-    Returns ``rates(ctrl)``, those of the activations in their order, and ``wrench(ctrl)``.
+    Returns ``rates(ctrl)`` of the activations, in their order, and ``wrench(ctrl)``.
     """
     if not actuators:
 
@@ -46,7 +45,7 @@ def _read_actuators(
     this = actuators[0]
     memories = first + this.states
     force = memories + this.memories
-    end = force + 6 * this.wrench
+    end = force + WRENCH_SIZE * this.wrench
     further_rates, further_wrench = _read_actuators(actuators[1:], end)
 
     @scalar
@@ -60,8 +59,12 @@ def _read_actuators(
     def wrench(ctrl: Vector) -> Wrench:
         fx, fy, fz, tx, ty, tz = further_wrench(ctrl)
         return (
-            *(fx + ctrl[force], fy + ctrl[force + 1], fz + ctrl[force + 2]),
-            *(tx + ctrl[force + 3], ty + ctrl[force + 4], tz + ctrl[force + 5]),
+            fx + ctrl[force],
+            fy + ctrl[force + 1],
+            fz + ctrl[force + 2],
+            tx + ctrl[force + 3],
+            ty + ctrl[force + 4],
+            tz + ctrl[force + 5],
         )
 
     return rates, wrench
@@ -101,7 +104,7 @@ def on_equations(loop: ClosedLoop) -> ClosedLoop:
         knots: Vector,
         disturbance: Triple,
     ) -> Values:
-        # A stage may have carried a rotor past its limit by what one step adds.
+        # A stage may pass a rotor's limit by up to one step.
         state = project_motion(state, parameters.layer)
         ctrl = controls_in_force(time, state, inputs, parameters)
         return (

@@ -19,7 +19,7 @@ from tiltsim.laws.tiltrotor import (
 )
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
-from tiltsim.vehicles.rotorcraft.layout import PITCH, QW, QX, QY, QZ, ROLL
+from tiltsim.vehicles.rotorcraft.layout import QW, QX, QY, QZ
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.gaits.tilts import planned_jets, tilt_reference
 from tiltsim_controllers.laws.supervisor import (
@@ -33,6 +33,7 @@ from tiltsim_controllers.laws.supervisor import (
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.vehicle.parameters import drag_ratio
+from tiltsim_controllers.vehicle.states import PITCH, ROLL
 
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
