@@ -110,13 +110,13 @@ def test_a_file_placed_askew_is_measured_in_the_bodys_own_axes(write):
 )
 def test_the_compiled_model_has_the_mass_and_inertia_asked_for(write, own):
     this = scenario(write(), vehicle=own)
-    wanted = this.rotorcraft.resolve()
+    expected = this.rotorcraft.resolve()
     model = build_model(assemble(this))
     mass, inertia = total_inertia(model)
-    assert mass == pytest.approx(wanted.mass, rel=1e-9)
-    np.testing.assert_allclose(inertia, np.diag(wanted[1:4]), atol=1e-9)
-    assert model.opt.gravity[2] == -wanted.gravity
-    assert model.actuator("thrust_2").gear[2] == wanted.thrust_coefficient
+    assert mass == pytest.approx(expected.mass, rel=1e-9)
+    np.testing.assert_allclose(inertia, np.diag(expected[1:4]), atol=1e-9)
+    assert model.opt.gravity[2] == -expected.gravity
+    assert model.actuator("thrust_2").gear[2] == expected.thrust_coefficient
     pods = [model.body_mass[model.body(f"pod_{i}").id] for i in (1, 2, 3, 4)]
     assert pods == pytest.approx([0.03] * 4)  # never touched
 

@@ -408,9 +408,11 @@ def test_a_variant_changes_what_it_names_and_keeps_the_rest(write):
 
 def test_a_variant_adds_its_expectations_to_those_of_the_base(write):
     path = write(FAMILY)
-    metrics = [wanted.metric for wanted in load_scenario(f"{path}#long").expect]
+    metrics = [expectation.metric for expectation in load_scenario(f"{path}#long").expect]
     assert metrics == ["final_roll", "final_pitch"]
-    assert [wanted.metric for wanted in load_scenario(f"{path}#plain").expect] == ["final_roll"]
+    assert [expectation.metric for expectation in load_scenario(f"{path}#plain").expect] == [
+        "final_roll"
+    ]
 
 
 def test_a_table_of_another_type_replaces_the_whole(write):

@@ -41,8 +41,8 @@ def test_engines_fly_the_same_waypoints(case, plant):
     python, native = (fly(case, plant=plant, engine=engine) for engine in ("python", "native"))
     np.testing.assert_array_equal(python.samples, native.samples)
     at_second = np.argmin(np.abs(python["time"] - 0.3))
-    for axis, wanted in zip("xyz", WAYPOINTS["positions"][1]):
-        assert python[f"{axis}_ref"][at_second] == pytest.approx(wanted, abs=1e-9)
+    for axis, expected in zip("xyz", WAYPOINTS["positions"][1]):
+        assert python[f"{axis}_ref"][at_second] == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -224,7 +224,8 @@ def _check_reference(scenario: ScenarioTables) -> None:
             "reference.type", reference.type, "the tilt_car's laws cannot track it"
         )
     if reference.adds_acceleration and not controller.omits_reference_acceleration:
-        option = " with gait_rate_feedforward" if controller.feeds_tilt_rates_forward else ""
+        own = isinstance(controller, AttitudeAltitudeController)
+        option = " with gait_rate_feedforward" if own else ""
         raise InvalidValueError(
             "reference.acceleration_feedforward",
             True,

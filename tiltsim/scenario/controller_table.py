@@ -47,19 +47,9 @@ class ControllerTable(Table, ABC):
         return None
 
     @property
-    def feeds_tilt_rates_forward(self) -> bool:
-        """Whether the control law takes the gait's tilt rates into account."""
-        return False
-
-    @property
     def omits_reference_acceleration(self) -> bool:
         """Whether the law leaves the reference's acceleration out unless the reference says so."""
         return False
-
-    @property
-    def lateral_decoupler(self) -> str:
-        """How a controller that leans to move sideways computes the lean; ``none`` for others."""
-        return "none"
 
     @property
     def prioritizes_attitude(self) -> bool:

@@ -67,19 +67,11 @@ class Expectation(Table):
                 "expect.published", published, f"{self.metric} is true or false"
             )
         if published is None:
-            for key in ("claim", "why", "wrong"):
-                if getattr(self, key):
-                    raise InvalidValueError(
-                        f"expect.{key}",
-                        getattr(self, key),
-                        "needs published: a number, true or false",
-                    )
+            needs = "needs published: a number, true or false"
+            self._require_defaults("expect", ("claim", "why", "wrong"), needs)
         if published is None or isinstance(published, bool):
-            for key in ("published_tolerance", "in_kind"):
-                if getattr(self, key) is not None:
-                    raise InvalidValueError(
-                        f"expect.{key}", getattr(self, key), "needs a published number"
-                    )
+            numeric = ("published_tolerance", "in_kind")
+            self._require_defaults("expect", numeric, "needs a published number")
         if self.wrong and not self.why:
             raise InvalidValueError("expect.wrong", True, "needs why")
         if self.in_kind is not None and not self.in_kind[0] <= self.in_kind[1]:

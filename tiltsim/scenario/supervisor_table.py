@@ -44,19 +44,13 @@ class SupervisorTable(Table):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        needs = {
-            "horizon": ("hold", "return_to_red"),
-            "max_tilt_rate": ("return_to_red",),
-            "clearance": ("return_to_red",),
-        }
-        for key, strategies in needs.items():
-            value = getattr(self, key)
-            if self.strategy not in strategies and value != type(self).model_fields[key].default:
-                raise InvalidValueError(
-                    f"controller.supervisor.{key}",
-                    value,
-                    f"needs controller.supervisor.strategy = {' or '.join(strategies)}",
-                )
+        for keys, strategies in (
+            (("horizon",), ("hold", "return_to_red")),
+            (("max_tilt_rate", "clearance"), ("return_to_red",)),
+        ):
+            if self.strategy not in strategies:
+                needs = f"needs controller.supervisor.strategy = {' or '.join(strategies)}"
+                self._require_defaults("controller.supervisor", keys, needs)
         return self
 
     def resolve(self, vehicle: Vehicle) -> Supervisor:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import pi
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
+
+from tiltsim.scenario.messages import InvalidValueError
 
 # The outer bounds keep arithmetic far from overflow, and far beyond any real vehicle.
 Positive = Annotated[float, Field(gt=0.0, le=1e9)]
@@ -31,3 +34,10 @@ class Table(BaseModel):
     """A table of the scenario file: unknown keys, NaN and loose types are errors."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    def _require_defaults(self, name: str, keys: Iterable[str], reason: str) -> None:
+        """Refuse keys that are set although they have no effect, for a reason."""
+        for key in keys:
+            value = getattr(self, key)
+            if value != type(self).model_fields[key].default:
+                raise InvalidValueError(f"{name}.{key}", value, reason)

@@ -154,18 +154,11 @@ class AttitudeAltitudeController(ControllerTable):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if not self.gait_rate_feedforward:
-            for key in _NEED_GAIT_RATES:
-                value = getattr(self, key)
-                if value != type(self).model_fields[key].default:
-                    raise InvalidValueError(
-                        f"controller.{key}", value, "needs controller.gait_rate_feedforward = true"
-                    )
+            needs = "needs controller.gait_rate_feedforward = true"
+            self._require_defaults("controller", _RATE_KEYS, needs)
             if any(self.resolve_integral_gains()):
-                raise InvalidValueError(
-                    "controller.gains",
-                    self.model_dump()["gains"],
-                    "integral action needs controller.gait_rate_feedforward = true",
-                )
+                gains = self.model_dump()["gains"]
+                raise InvalidValueError("controller.gains", gains, f"integral action {needs}")
             return self
         for key, choices in (("decoupling", ("exact",)), ("decoupler", ("exact", "none"))):
             if getattr(self, key) not in choices:
@@ -221,19 +214,9 @@ class AttitudeAltitudeController(ControllerTable):
         return self.supervisor
 
     @property
-    def feeds_tilt_rates_forward(self) -> bool:
-        """See `ControllerTable.feeds_tilt_rates_forward`."""
-        return self.gait_rate_feedforward
-
-    @property
     def omits_reference_acceleration(self) -> bool:
         """See `ControllerTable.omits_reference_acceleration`."""
         return not self.gait_rate_feedforward
-
-    @property
-    def lateral_decoupler(self) -> str:
-        """See `ControllerTable.lateral_decoupler`."""
-        return self.decoupler
 
     @property
     def prioritizes_attitude(self) -> bool:
@@ -246,12 +229,7 @@ class AttitudeAltitudeController(ControllerTable):
         return self.allocation_horizon
 
 
-_NEED_GAIT_RATES: Final = (
-    "leave_out",
-    "anticipation",
-    "max_acceleration",
-    "max_angular_acceleration",
-)
+_RATE_KEYS: Final = ("leave_out", "anticipation", "max_acceleration", "max_angular_acceleration")
 """Keys of `AttitudeAltitudeController` that only gait_rate_feedforward reads."""
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -74,7 +76,9 @@ def describe_controller(scenario: Scenario) -> list[str]:
     """The controller of a scenario for titles, most specific part first."""
     controller = scenario.controller
     parts = [f"{controller.law.replace('_', '-')} controller"]
-    if controller.feeds_tilt_rates_forward:
+    if not isinstance(controller, AttitudeAltitudeController):
+        return parts
+    if controller.gait_rate_feedforward:
         parts.append("tilt-rate feed-forward")
-    decoupler = controller.lateral_decoupler
-    return parts if decoupler == "none" else [f"{decoupler} decoupler", *parts]
+    leans = controller.decoupler != "none"
+    return [f"{controller.decoupler} decoupler", *parts] if leans else parts
