@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import tiltsim
+from tests.statics import setpoint_error
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.attitude_altitude import TILTROTOR
 from tiltsim.plants.factory import make_plant
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.vehicles.rotorcraft import COLUMN_UNITS
-from tiltsim_controllers.analysis.statics import setpoint_error
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.gains import GAIN_SETS
 from tiltsim_controllers.vehicle.parameters import PRESETS

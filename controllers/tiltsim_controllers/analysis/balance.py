@@ -27,9 +27,8 @@ from scipy.optimize import minimize
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     torque_entries,
     torque_free_force,
-    torque_free_inputs,
 )
-from tiltsim_controllers.vehicle.parameters import SPIN, drag_ratio
+from tiltsim_controllers.vehicle.parameters import drag_ratio
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -97,20 +96,6 @@ def even_load_gait(acceleration: Triple, vehicle: Vehicle) -> Quad:
         low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
     a, b = -0.5 * asin(_clipped(y * high)), 0.5 * asin(_clipped(x * high))
     return a, b, -a, -b
-
-
-def rotor_loads(tilts: Quad, vehicle: Vehicle) -> Quad:
-    """Share of each rotor in ``sum |w_i|`` when torque-free, times four: 1 where evenly loaded.
-
-    Negative where a rotor would have to turn backwards. NaN where the torque matrix has lost rank.
-
-    Parameters
-    ----------
-    tilts : the four tilt angles in rad
-    vehicle : of which the drag ratio matters
-    """
-    first, second, third, fourth = _loads(np.array(tilts, dtype=float), drag_ratio(vehicle))
-    return float(first), float(second), float(third), float(fourth)
 
 
 def balanced_gait(
@@ -242,13 +227,6 @@ def _imbalance(tilts: Any, x: float, y: float, ratio: float) -> Any:
     trig = _trig(tilts)
     nx, ny, nz = torque_free_force(trig, torque_entries(trig, ratio), ratio)
     return np.array([nx - x * nz, ny - y * nz])
-
-
-def _loads(tilts: Any, ratio: float) -> Any:
-    inputs = np.array(torque_free_inputs(torque_entries(_trig(tilts), ratio))) * SPIN
-    total = inputs.sum()
-    # Where tau loses rank both pairs stop, and there is no load to share.
-    return 4.0 * inputs / total if total != 0.0 else np.full(4, np.nan)
 
 
 def _trig(tilts: Any) -> Any:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
 
 if TYPE_CHECKING:
@@ -105,34 +103,6 @@ def error_loops(gains: Gains, vehicle: Vehicle, decoupling: float) -> list[Error
     stable = is_hurwitz(position)
     condition = "" if stable else f"position gains {list(position[1:])} must both be positive"
     return [*third_order, ErrorLoop("position", position, stable, condition)]
-
-
-def longest_lag(gains: Sequence[float]) -> float:
-    """The time constant (s) of a lag in the input at which a third-order loop turns unstable.
-
-    ``s^3 (T s + 1) + K1 s^2 + K2 s + K3`` is Hurwitz, by Routh, while
-    ``T < (K1 K2 - K3) / K2^2``. ``gains`` are K1, K2 and K3.
-    """
-    k1, k2, k3 = gains
-    return (k1 * k2 - k3) / (k2 * k2)
-
-
-def delay_margin(gains: Sequence[float]) -> float:
-    """The delay (s) of the input at which a third-order loop turns unstable, 0 if it is already.
-
-    Where the open loop ``(K1 s^2 + K2 s + K3) / s^3`` has gain one, at up to three frequencies, a
-    delay uses up the phase margin; the least delay counts. A command held for a period delays by
-    half of it.
-    """
-    k1, k2, k3 = gains
-    if not is_hurwitz((1.0, k1, k2, k3)):
-        return 0.0
-    squares = np.roots([1.0, -k1 * k1, 2.0 * k1 * k3 - k2 * k2, -k3 * k3])
-    real = squares[np.abs(squares.imag) < 1e-9 * np.abs(squares)].real
-    crossings = np.sqrt(real[real > 0.0])
-    s = 1j * crossings
-    phases = np.angle((k1 * s * s + k2 * s + k3) / s**3)
-    return float((((np.pi + phases) % (2.0 * np.pi)) / crossings).min())
 
 
 def feedforward_loops(gains: Gains, integral: IntegralGains) -> list[ErrorLoop]:

@@ -6,33 +6,16 @@ from math import copysign, hypot, sqrt
 from typing import TYPE_CHECKING
 
 from tiltsim_controllers.analysis.singularity import torque_free_direction
-from tiltsim_controllers.laws.attitude_altitude import Gains
-from tiltsim_controllers.laws.decouplers import (
-    CONVENTIONAL,
-    EXACT,
-    conventional_decoupler,
-    exact_decoupler,
-    modified_decoupler,
-)
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     body_force,
     sines_and_cosines,
     torque_entries,
-    torque_free_force,
     torque_free_inputs,
 )
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle, drag_ratio
 
 if TYPE_CHECKING:
     from tiltsim_controllers.mathematics.scalar import Quad
-
-
-def hover_attitude(tilts: Quad, vehicle: Vehicle) -> tuple[float, float]:
-    """Roll and pitch (rad) at which the torque-free force of fixed tilt angles is vertical."""
-    trig = sines_and_cosines(*tilts)
-    ratio = drag_ratio(vehicle)
-    n = torque_free_force(trig, torque_entries(trig, ratio), ratio)
-    return exact_decoupler(0.0, 0.0, 0.0, 0.0, vehicle.gravity, n)
 
 
 def hover_rotor_speeds(tilts: Quad, vehicle: Vehicle) -> Quad | None:
@@ -56,27 +39,3 @@ def hover_rotor_speeds(tilts: Quad, vehicle: Vehicle) -> Quad | None:
 def _speed(square: float) -> float:
     """The rotor speed whose square, with its sign, is given."""
     return copysign(sqrt(abs(square)), square)
-
-
-def setpoint_error(
-    tilts: Quad, vehicle: Vehicle, gains: Gains, decoupler: float
-) -> tuple[float, float]:
-    """Steady position error (m), reference minus actual, of a setpoint flown with fixed tilts.
-
-    At rest the vehicle hovers at `hover_attitude`. A decoupler that takes another attitude for
-    level demands acceleration there, and the position loop, ``a = K_2 e``, answers with an error.
-    This inverts the decoupler at yaw 0, whose roll steers y and whose pitch steers x.
-    """
-    if decoupler == EXACT:
-        return 0.0, 0.0
-    roll, pitch = hover_attitude(tilts, vehicle)
-    gravity = vehicle.gravity
-    if decoupler == CONVENTIONAL:
-        roll_bias, pitch_bias = conventional_decoupler(0.0, 0.0, 0.0, gravity)
-    else:
-        trig = sines_and_cosines(*tilts)
-        ratio = drag_ratio(vehicle)
-        n = torque_free_force(trig, torque_entries(trig, ratio), ratio)
-        roll_bias, pitch_bias = modified_decoupler(0.0, 0.0, 0.0, gravity, n)
-    stiffness = gains.position_2
-    return gravity * (pitch - pitch_bias) / stiffness, -gravity * (roll - roll_bias) / stiffness

@@ -41,18 +41,6 @@ class AttitudeCurve:
     pitch: Array
 
 
-def unacceptable_pitch(angles: ArrayLike, vehicle: Vehicle, roll: ArrayLike) -> Array:
-    """The singular pitch (rad) at each roll: ``atan(-(R cos + R_phi sin) / R_theta)``.
-
-    NaN where ``R_theta`` is exactly zero: the curve is then a vertical line or absent.
-    """
-    R, R_phi, R_theta = (float(value) for value in residuals(angles, vehicle))
-    roll = np.asarray(roll, dtype=float)
-    if R_theta == 0.0:
-        return np.full_like(roll, np.nan)
-    return np.asarray(np.arctan(-(R * np.cos(roll) + R_phi * np.sin(roll)) / R_theta))
-
-
 def unacceptable_attitudes(
     angles: ArrayLike, vehicle: Vehicle, samples: int = 181
 ) -> AttitudeCurve:

@@ -19,7 +19,7 @@ theta``, and slows down on the way there, for ``W`` grows without bound.
 
 from __future__ import annotations
 
-from math import copysign, cos, log, pi, sin, tan
+from math import cos, log, pi, sin, tan
 from typing import NamedTuple
 
 import numpy as np
@@ -28,8 +28,6 @@ import numpy.typing as npt
 from tiltsim_controllers.tilt_car.third_derivative import input_columns, null_space_input
 from tiltsim_controllers.tilt_car.vehicle import (
     TiltCar,
-    body_acceleration,
-    squared_speeds,
     turn_per_tilt,
 )
 
@@ -71,27 +69,7 @@ def holonomy(lean: float, path: Orbit, car: TiltCar) -> float:
     return lean_after(time, lean, path, car) - lean
 
 
-def drift_time(start: float, end: float, path: Orbit, car: TiltCar) -> float:
-    """The time (s) that the lean takes from one value to another, in closed form.
-
-    Negative where the drift leads the other way. Both must lie within plus and minus the half
-    angle.
-
-    Raises
-    ------
-    ValueError
-        If a lean is not within.
-    """
-    for lean in (start, end):
-        if not abs(lean) < car.half_angle:
-            raise ValueError(
-                f"lean = {lean!r}: must lie within the half angle, {car.half_angle:.6g} rad"
-            )
-    angle = _turned_by(end, path, car) - _turned_by(start, path, car)
-    return angle / path.angular_frequency
-
-
-def _turned_by(lean: float, path: Orbit, car: TiltCar) -> float:
+def turned_angle(lean: float, path: Orbit, car: TiltCar) -> float:
     """The integral of ``1 + kappa^2 W`` from no lean: how far the acceleration turns meanwhile."""
     theta = car.half_angle
 
@@ -104,36 +82,17 @@ def _turned_by(lean: float, path: Orbit, car: TiltCar) -> float:
 
 def lean_after(time: float, start: float, path: Orbit, car: TiltCar) -> float:
     """The lean (rad) that a lean at the start has become after a time (s), on a settled orbit."""
-    wanted = _turned_by(start, path, car) + path.angular_frequency * time
+    wanted = turned_angle(start, path, car) + path.angular_frequency * time
     low, high = -car.half_angle, car.half_angle
     for _ in range(200):  # bisection; the integral grows from minus to plus infinity
         middle = 0.5 * (low + high)
         if middle in (low, high):
             break
-        if _turned_by(middle, path, car) < wanted:
+        if turned_angle(middle, path, car) < wanted:
             low = middle
         else:
             high = middle
     return 0.5 * (low + high)
-
-
-def lean_of_split(split: float, acceleration: float, car: TiltCar) -> float:
-    """The lean (rad) at which the squares of the rotor speeds differ by ``split`` (rad^2/s^2)."""
-    _, across = body_acceleration(split, 0.0, car)
-    return float(np.arcsin(across / acceleration))
-
-
-def split_of_lean(lean: float, acceleration: float, car: TiltCar) -> float:
-    """``omega_1^2 - omega_2^2`` (rad^2/s^2) at a lean (rad) and acceleration (m/s^2)."""
-    square_1, square_2 = squared_speeds(acceleration * cos(lean), acceleration * sin(lean), car)
-    return square_1 - square_2
-
-
-def lean_of(square_1: Array, square_2: Array, car: TiltCar) -> Array:
-    """The lean (rad) at squares of rotor speeds (rad^2/s^2), arrays of any shape."""
-    along = cos(car.half_angle) * (np.asarray(square_1) + square_2)
-    across = sin(car.half_angle) * (np.asarray(square_1) - square_2)
-    return np.asarray(np.arctan2(across, along))
 
 
 def twist(speed_1: float, speed_2: float, car: TiltCar) -> float:
@@ -156,27 +115,3 @@ def twist(speed_1: float, speed_2: float, car: TiltCar) -> float:
     )
     curl = np.array([by_2[2], -by_1[2], by_1[1] - by_2[0]])
     return float(direction(speed_1, speed_2) @ curl)
-
-
-def restored_lean(path: Orbit, car: TiltCar, rate: float) -> float:
-    """The lean (rad) at which a restoring rate (1/s) and the drift hold each other.
-
-    There is one for every rate above 0, for the drift dies away towards the half angle.
-
-    Raises
-    ------
-    ValueError
-        If the rate is not above 0.
-    """
-    if not rate > 0.0:
-        raise ValueError(f"rate = {rate!r}: must be above 0")
-    low, high = 0.0, car.half_angle
-    for _ in range(200):  # bisection; both signs of the drift are alike
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        if abs(drift_rate(middle, path, car)) > rate * middle:
-            low = middle
-        else:
-            high = middle
-    return copysign(low, path.angular_frequency)

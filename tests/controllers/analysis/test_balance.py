@@ -10,13 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from tiltsim_controllers.analysis.balance import balanced_gait, even_load_gait, rotor_loads
+from tiltsim_controllers.analysis.balance import balanced_gait, even_load_gait
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     sines_and_cosines,
     torque_entries,
     torque_free_force,
+    torque_free_inputs,
 )
-from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
+from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
 
 AR_DRONE = PRESETS["ar_drone_2"]
 VEHICLES = {name: PRESETS[name] for name in ("ar_drone_2", "luukkonen")}
@@ -24,6 +25,17 @@ quick = settings(deadline=None, max_examples=40)
 accelerations = st.tuples(st.floats(-2, 2), st.floats(-2, 2), st.floats(-5, 3))
 
 every_vehicle = pytest.mark.parametrize("vehicle", VEHICLES.values(), ids=VEHICLES)
+
+
+def rotor_loads(tilts, vehicle):
+    """Fraction of each rotor in ``sum |w_i|`` when torque-free, times four: 1 where evenly loaded.
+
+    Negative where a rotor would have to turn backwards. NaN where tau is rank-deficient.
+    """
+    entries = torque_entries(sines_and_cosines(*tilts), drag_ratio(vehicle))
+    inputs = np.array(torque_free_inputs(entries)) * SPIN
+    total = inputs.sum()
+    return 4.0 * inputs / total if total != 0.0 else np.full(4, np.nan)
 
 
 def force(tilts, vehicle):

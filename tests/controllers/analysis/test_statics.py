@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.statics import hover_attitude
 from tests.thesis import force_matrix, torque_matrix
-from tiltsim_controllers.analysis.statics import hover_attitude, hover_rotor_speeds
+from tiltsim_controllers.analysis.statics import hover_rotor_speeds
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
 
 VEHICLE = PRESETS["ar_drone_2"]

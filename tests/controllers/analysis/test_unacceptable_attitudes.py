@@ -11,7 +11,6 @@ from tiltsim_controllers.analysis.singularity import determinant, residuals, tor
 from tiltsim_controllers.analysis.unacceptable_attitudes import (
     acceptable_share,
     unacceptable_attitudes,
-    unacceptable_pitch,
 )
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
@@ -20,6 +19,18 @@ OFFSET = 2.0 * float(np.arctan(drag_ratio(AR_DRONE)))
 
 tilt = st.floats(-1.5, 1.5)
 gaits = st.tuples(tilt, tilt, tilt, tilt)
+
+
+def unacceptable_pitch(angles, vehicle, roll):
+    """The singular pitch (rad) at each roll: ``atan(-(R cos + R_phi sin) / R_theta)``.
+
+    NaN where ``R_theta`` is exactly zero: the curve is then a vertical line or absent.
+    """
+    R, R_phi, R_theta = (float(value) for value in residuals(angles, vehicle))
+    roll = np.asarray(roll, dtype=float)
+    if R_theta == 0.0:
+        return np.full_like(roll, np.nan)
+    return np.asarray(np.arctan(-(R * np.cos(roll) + R_phi * np.sin(roll)) / R_theta))
 
 
 @given(angles=gaits)

@@ -10,18 +10,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
+from tests.controllers.tilt_car.lean import (
+    drift_time,
+    lean_of,
+    lean_of_split,
+    restored_lean,
+    split_of_lean,
+)
 from tiltsim_controllers.tilt_car.state_drift import (
     Orbit,
     drift_rate,
-    drift_time,
     holonomy,
     lean_after,
-    lean_of,
-    lean_of_split,
     lean_stiffness,
     orbit,
-    restored_lean,
-    split_of_lean,
     twist,
 )
 from tiltsim_controllers.tilt_car.third_derivative import (

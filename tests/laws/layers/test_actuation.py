@@ -10,7 +10,7 @@ from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.flight_plan import plan_flight
-from tiltsim_controllers.analysis.stability import delay_margin, is_hurwitz, longest_lag
+from tiltsim_controllers.analysis.stability import is_hurwitz
 from tiltsim_controllers.laws.gains import GAIN_SETS
 
 ATTITUDE = (40.0, 600.0, 4000.0)  # of the gain set "exact"
@@ -39,6 +39,34 @@ EVERYTHING = {
     ],
 }
 continuous_and_late = pytest.mark.parametrize("timing", [{}, LATE], ids=["continuous", "late"])
+
+
+def longest_lag(gains):
+    """The time constant (s) of a lag in the input at which a third-order loop turns unstable.
+
+    ``s^3 (T s + 1) + K1 s^2 + K2 s + K3`` is Hurwitz, by Routh, while
+    ``T < (K1 K2 - K3) / K2^2``. ``gains`` are K1, K2 and K3.
+    """
+    k1, k2, k3 = gains
+    return (k1 * k2 - k3) / (k2 * k2)
+
+
+def delay_margin(gains):
+    """The delay (s) of the input at which a third-order loop turns unstable, 0 if it is already.
+
+    Where the open loop ``(K1 s^2 + K2 s + K3) / s^3`` has gain one, at up to three frequencies, a
+    delay uses up the phase margin; the least delay counts. A command held for a period delays by
+    half of it.
+    """
+    k1, k2, k3 = gains
+    if not is_hurwitz((1.0, k1, k2, k3)):
+        return 0.0
+    squares = np.roots([1.0, -k1 * k1, 2.0 * k1 * k3 - k2 * k2, -k3 * k3])
+    real = squares[np.abs(squares.imag) < 1e-9 * np.abs(squares)].real
+    crossings = np.sqrt(real[real > 0.0])
+    s = 1j * crossings
+    phases = np.angle((k1 * s * s + k2 * s + k3) / s**3)
+    return float((((np.pi + phases) % (2.0 * np.pi)) / crossings).min())
 
 
 def merged(base, changes):

@@ -1,0 +1,73 @@
+"""The tilt-car's lean: its drift time, its split of the rotor speeds, and where it is restored."""
+
+from __future__ import annotations
+
+from math import copysign, cos, sin
+
+import numpy as np
+
+from tiltsim_controllers.tilt_car.state_drift import turned_angle, drift_rate
+from tiltsim_controllers.tilt_car.vehicle import body_acceleration, squared_speeds
+
+
+def drift_time(start, end, path, car):
+    """The time (s) that the lean takes from one value to another, in closed form.
+
+    Negative where the drift leads the other way. Both must lie within plus and minus the half
+    angle.
+
+    Raises
+    ------
+    ValueError
+        If a lean is not within.
+    """
+    for lean in (start, end):
+        if not abs(lean) < car.half_angle:
+            raise ValueError(
+                f"lean = {lean!r}: must lie within the half angle, {car.half_angle:.6g} rad"
+            )
+    angle = turned_angle(end, path, car) - turned_angle(start, path, car)
+    return angle / path.angular_frequency
+
+
+def lean_of_split(split, acceleration, car):
+    """The lean (rad) at which the squares of the rotor speeds differ by ``split`` (rad^2/s^2)."""
+    _, across = body_acceleration(split, 0.0, car)
+    return float(np.arcsin(across / acceleration))
+
+
+def split_of_lean(lean, acceleration, car):
+    """``omega_1^2 - omega_2^2`` (rad^2/s^2) at a lean (rad) and acceleration (m/s^2)."""
+    square_1, square_2 = squared_speeds(acceleration * cos(lean), acceleration * sin(lean), car)
+    return square_1 - square_2
+
+
+def lean_of(square_1, square_2, car):
+    """The lean (rad) at squares of rotor speeds (rad^2/s^2), arrays of any shape."""
+    along = cos(car.half_angle) * (np.asarray(square_1) + square_2)
+    across = sin(car.half_angle) * (np.asarray(square_1) - square_2)
+    return np.asarray(np.arctan2(across, along))
+
+
+def restored_lean(path, car, rate):
+    """The lean (rad) at which a restoring rate (1/s) and the drift hold each other.
+
+    There is one for every rate above 0, for the drift dies away towards the half angle.
+
+    Raises
+    ------
+    ValueError
+        If the rate is not above 0.
+    """
+    if not rate > 0.0:
+        raise ValueError(f"rate = {rate!r}: must be above 0")
+    low, high = 0.0, car.half_angle
+    for _ in range(200):  # bisection; both signs of the drift are alike
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            break
+        if abs(drift_rate(middle, path, car)) > rate * middle:
+            low = middle
+        else:
+            high = middle
+    return copysign(low, path.angular_frequency)
