@@ -6,6 +6,7 @@ import ast
 import re
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -31,15 +32,14 @@ ORDER = {
 }
 """Folders and root modules of each package; imports go to the same or to an earlier one."""
 
+FLYING_PREFIXES = tuple(f"tiltsim.{folder}." for folder in FLYING)
 HEAVY = {"av", "mujoco", "numba", "matplotlib", "rerun", "pyarrow", "dm_control", "pydantic"}
 
-in_every_module = pytest.mark.parametrize("module", TREES)
 
-
-def imports(module):
+def imports(module, tree):
     """Every module that a module imports anywhere in its text, `TYPE_CHECKING` blocks included."""
     package = module if FILES[module].name == "__init__.py" else module.rpartition(".")[0]
-    for node in ast.walk(TREES[module]):
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -47,9 +47,12 @@ def imports(module):
             if node.level:
                 parents = package.split(".")[: len(package.split(".")) - node.level + 1]
                 base = ".".join([*parents, *filter(None, [node.module])])
-            yield base
-            # ``from tiltsim import model`` imports the module tiltsim.models.rotorcraft
-            yield from (name for a in node.names if (name := f"{base}.{a.name}") in TREES)
+            # ``from tiltsim.plants import plant`` imports the module tiltsim.plants.plant
+            names = (f"{base}.{alias.name}" for alias in node.names)
+            yield from (name if name in TREES else base for name in names)
+
+
+IMPORTS = {module: {*imports(module, tree)} for module, tree in TREES.items()}
 
 
 def place(module):
@@ -58,30 +61,15 @@ def place(module):
     return list(ORDER).index(package), ORDER[package].index(rest[0] if rest else "__init__")
 
 
-def upward_imports(module):
+def upward(module, imported):
     """Imports of a module that go to a later folder."""
-    return [name for name in imports(module) if name in TREES and place(name) > place(module)]
+    ours = sorted(name for name in imported if name in TREES)
+    return [f"{module} imports {name}" for name in ours if place(name) > place(module)]
 
 
-def circles():
-    """Groups of modules that import each other, directly or through others."""
-    leads_to = {module: reachable(module) for module in TREES}
-    groups = (
-        frozenset(other for other in leads_to[module] if module in leads_to[other])
-        for module in TREES
-    )
-    return sorted(sorted(group) for group in set(groups) if len(group) > 1)
-
-
-def reachable(module):
-    """All modules of ours that a module leads to, itself included."""
-    seen, waiting = set(), [module]
-    while waiting:
-        this = waiting.pop()
-        if this in TREES and this not in seen:
-            seen.add(this)
-            waiting.extend(imports(this))
-    return seen
+def roots(module):
+    """Names of the packages that a module imports from."""
+    return {name.partition(".")[0] for name in IMPORTS[module]}
 
 
 def modules_loaded_by(code):
@@ -112,37 +100,36 @@ def test_every_folder_and_module_has_its_place_in_the_order():
         assert found == set(ORDER[package])
 
 
-@in_every_module
-def test_imports_go_to_the_same_or_an_earlier_folder(module):
-    if module != "tiltsim":  # it imports its public names on first use
-        assert upward_imports(module) == []
+def test_imports_go_to_the_same_or_an_earlier_folder():
+    # The package itself imports its public names on first use.
+    modules = [module for module in TREES if module != "tiltsim"]
+    assert [line for module in modules for line in upward(module, IMPORTS[module])] == []
 
 
-def test_an_upward_import_is_noticed(monkeypatch):
-    upward = ast.parse("def f():\n    from tiltsim.plants import plant\n")
-    monkeypatch.setitem(TREES, "tiltsim.scenario.loading", upward)
-    assert upward_imports("tiltsim.scenario.loading") == ["tiltsim.plants", "tiltsim.plants.plant"]
+def test_an_upward_import_is_noticed():
+    module, text = "tiltsim.scenario.loading", "def f():\n    from tiltsim.plants import plant\n"
+    assert upward(module, {*imports(module, ast.parse(text))}) == [
+        "tiltsim.scenario.loading imports tiltsim.plants.plant"
+    ]
 
 
 def test_no_modules_import_each_other():
-    assert circles() == []
+    ours = {module: IMPORTS[module] & (TREES.keys() - {module}) for module in TREES}
+    TopologicalSorter(ours).prepare()  # raises CycleError, which names the circle
 
 
 def test_few_modules_lie_directly_in_the_package():
     assert len(list(ROOT.glob("*.py"))) <= 8
 
 
-@pytest.mark.parametrize("module", [name for name in TREES if name.startswith("tiltsim_con")])
-def test_controllers_know_neither_mujoco_nor_the_testbed(module):
-    roots = {name.partition(".")[0] for name in imports(module)}
-    assert not roots & {"mujoco", "dm_control", "tiltsim", "numba"}
+def test_controllers_know_neither_mujoco_nor_the_testbed():
+    modules = [module for module in TREES if module.startswith("tiltsim_controllers")]
+    assert not set().union(*map(roots, modules)) & {"mujoco", "dm_control", "tiltsim", "numba"}
 
 
-@in_every_module
-def test_flying_needs_no_library_for_screens(module):
-    if module.startswith("tiltsim.") and module.split(".")[1] in FLYING:
-        roots = {name.partition(".")[0] for name in imports(module)}
-        assert not roots & {"argparse", "av", "matplotlib", "rerun", "tqdm"}
+def test_flying_needs_no_library_for_screens():
+    flying = [module for module in TREES if module.startswith(FLYING_PREFIXES)]
+    assert not set().union(*map(roots, flying)) & {"argparse", "av", "matplotlib", "rerun", "tqdm"}
 
 
 @pytest.mark.parametrize(
@@ -179,10 +166,14 @@ def test_an_unknown_name_of_the_package_is_an_attribute_error():
         _ = tiltsim.no_such_name
 
 
-@in_every_module
-def test_every_public_definition_has_a_docstring(module):
-    assert ast.get_docstring(TREES[module]), "the module has none"
-    bare = [name for name, node in public_definitions(TREES[module]) if not ast.get_docstring(node)]
+def test_every_public_definition_has_a_docstring():
+    assert [module for module, tree in TREES.items() if not ast.get_docstring(tree)] == []
+    bare = [
+        f"{module}.{name}"
+        for module, tree in TREES.items()
+        for name, node in public_definitions(tree)
+        if not ast.get_docstring(node)
+    ]
     assert bare == []
 
 
