@@ -19,9 +19,10 @@ def parse_mjcf(path: Path) -> Any:
 
 
 def remove_visuals(root: Any, *, contacts: bool) -> None:
-    """Remove geoms (with ``contacts`` only those that never touch), cameras, lights and sensors.
+    """Remove all that is only drawn or measured: geoms, cameras, lights, sensors and their sites.
 
-    The shipped vehicles have neither springs nor dampers, so that MuJoCo need not look for them.
+    ``contacts`` keeps the geoms that take part in contacts. The shipped vehicles have neither springs
+    nor dampers, so that MuJoCo need not look for them.
     """
     root.option.flag.spring = root.option.flag.damper = "disable"
     for geom in root.find_all("geom"):
@@ -43,7 +44,17 @@ def set_servo_gains(position: Any, inertia: float, servo: TiltServo) -> None:
 
 
 def set_stop(joint: Any, position: Any, max_angle: float, timestep: float) -> None:
-    """Limit a hinge and its servo's command to plus and minus an angle (rad)."""
+    """Limit a hinge and its servo's command to plus and minus an angle.
+
+    Parameters
+    ----------
+    joint, position
+        Elements of the hinge and of its position actuator, or their defaults.
+    max_angle
+        rad.
+    timestep
+        Physics time step, s, which limits the stiffness of the stop.
+    """
     joint.range = position.ctrlrange = (-max_angle, max_angle)
     # As stiff as MuJoCo allows: its usual stop is softer than the servo and would do nothing.
     joint.solreflimit = (2.0 * timestep, 1.0)

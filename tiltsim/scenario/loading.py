@@ -88,9 +88,19 @@ def apply_overrides(document: dict[str, Any], overrides: Mapping[str, Any], addr
 
 
 def parse_scenario(document: Mapping[str, Any], address: str = "scenario") -> Scenario:
-    """Validate a document of plain dicts and lists; ``address`` names it in messages.
+    """Validate a scenario's document.
 
-    Raises `InputError` as `load_scenario` does.
+    Parameters
+    ----------
+    document
+        Plain dicts and lists, as read from TOML.
+    address
+        Name of the document in messages.
+
+    Raises
+    ------
+    InputError
+        As `load_scenario` does.
     """
     try:
         scenario = Scenario.model_validate(document)

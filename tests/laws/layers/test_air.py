@@ -149,10 +149,10 @@ def test_near_the_ground_the_lower_side_is_lifted_more():
 
 
 MISTAKES = {
-    "wind without drag": ({"wind": [3.0, 0.0, 0.0]}, r"air.wind.*give air.drag"),
+    "wind without drag": ({"wind": [3.0, 0.0, 0.0]}, r"air.wind.*set air.drag"),
     "gust without drag": (
         {"gust": {"velocity": [1.0, 0.0, 0.0], "rise": 1.0}},
-        r"air.gust.*give air.drag",
+        r"air.gust.*set air.drag",
     ),
     "short gust": (
         {"drag": DRAG, "gust": {"velocity": [1, 0, 0], "rise": 1.0, "duration": 1.5}},
