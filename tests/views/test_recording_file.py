@@ -267,7 +267,7 @@ def test_a_full_disk_is_said_in_one_line(full_disk, tmp_path, capfd):
     [
         (["view", "nothing"], "no such file"),
         (["view", "nothing.rrd"], "no such file"),
-        (["view", "a.rrd", "b"], "a recording is opened as it is"),
+        (["view", "a.rrd", "b"], "a recording can only be opened"),
         (["run", "ch04_tracking/setpoint#rho_0_modified", "--rerun", "no/x.rrd"], "does not exist"),
         (["run", "ch04_tracking/setpoint#rho_0_modified", "--connect", "x"], "not a viewer's"),
     ],

@@ -88,22 +88,10 @@ def singular_curves(n: Floats, points: int = 61) -> Floats:
 
 
 def unreachable_pitch(n: Floats, side: float, roll: Floats) -> Floats:
-    """The interval of unreachable pitch (rad) at each roll, shape (N, len(roll), 2).
+    """The lower and upper end of unreachable pitch (rad) at each roll, shape (N, len(roll), 2).
 
-    Parameters
-    ----------
-    n
-        Unit vectors along the torque-free force, shape (N, 3).
-    side
-        Sign of the singularity margin at the start of the flight; attitudes where ``n . r3`` has
-        the other sign lie beyond the curve.
-    roll
-        Roll angles, rad.
-
-    Returns
-    -------
-    Floats
-        Lower and upper end; both are equal where every pitch is reachable.
+    Attitudes where ``n . r3`` has another sign than ``side``, the singularity margin's at the start
+    of the flight, lie beyond the curve. Both ends are equal where every pitch is reachable.
     """
     normal = n[:, :, np.newaxis] * side
     lift = normal[:, 1] * np.sin(roll) + normal[:, 2] * np.cos(roll)

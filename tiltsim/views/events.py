@@ -48,12 +48,7 @@ class Event:
 class EventDetector:
     """Finds the events of one flight, which may be given in pieces.
 
-    Parameters
-    ----------
-    assembly
-        The assembly of the flight.
-    conditions
-        Yields the conditions to report for a piece of the flight, in a fixed order.
+    ``conditions`` yields the conditions to report for a piece of the flight, in a fixed order.
     """
 
     def __init__(

@@ -19,13 +19,7 @@ def flight_names(scenarios: Sequence[Scenario], paths: Sequence[Path] = ()) -> l
 
     The first of these that is distinct: the variant or file of the address, longer parts of the
     address, the folder from which the flight was loaded, longer parts of its path, a number.
-
-    Parameters
-    ----------
-    scenarios
-        One scenario per flight.
-    paths
-        The folder or file from which each flight was loaded; empty for flights in memory.
+    ``paths`` are the folders or files of the flights; empty for flights in memory.
     """
     addresses = [scenario.address for scenario in scenarios]
     short = [_short(address) for address in addresses]

@@ -29,14 +29,8 @@ def attainable_figure(
 ) -> Figure:
     """Roll torque, pitch torque and thrust at zero yaw torque; accelerations at hover thrust.
 
-    Parameters
-    ----------
-    gait
-        A constant gait.
-    vehicle
-        The vehicle.
-    speed_limits
-        Minimum and maximum rotor speed, rad/s; by default those of ch. 9.
+    For a constant gait. ``speed_limits`` are the minimum and maximum rotor speed, rad/s; by default
+    those of ch. 9.
     """
     limits = speed_limits or published_speed_limits(vehicle)
     angles = gait.angles(0.0)

@@ -27,12 +27,7 @@ MAX_FLIGHTS: Final = len(style.CYCLE)
 def comparison_figure(flights: Sequence[Flight], names: Sequence[str] = ()) -> Figure:
     """Margin, determinant, supervisor and position error of rotorcraft flights over time.
 
-    Parameters
-    ----------
-    flights
-        The flights, of rotorcraft.
-    names
-        Their names, by default `flight_names`.
+    ``names`` are those of the flights, by default `flight_names`.
 
     Raises
     ------

@@ -39,13 +39,6 @@ def distributions_figure(results: SweepResults, metrics: tuple[str, ...]) -> Fig
 
     A flight that terminated early counts as the worst value: a curve of errors ends at the
     completed share, one of margins (``min_...``) begins at the share that terminated early.
-
-    Parameters
-    ----------
-    results
-        The results of a sweep with sampled axes.
-    metrics
-        The metrics.
     """
     key = results.points.sweep.plot.lines or next(iter(_grid_keys(results)), None)
     groups = list(groups_of(results, key, np.ones(len(results), dtype=bool)))

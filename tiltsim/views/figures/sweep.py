@@ -44,12 +44,7 @@ MAX_LINES: Final = len(CYCLE)
 def sweep_figure(results: SweepResults, metrics: tuple[str, ...] = ()) -> Figure:
     """The figure that the ``[plot]`` table of a sweep requests, or else one that suits its axes.
 
-    Parameters
-    ----------
-    results
-        From `tiltsim.sweeps.dataset.load_results`.
-    metrics
-        The metrics; by default those of the ``[plot]`` table, else the first three that vary.
+    ``metrics`` default to those of the ``[plot]`` table, else to the first three that vary.
 
     Raises
     ------

@@ -52,16 +52,9 @@ def completed_mask(results: SweepResults) -> Column:
 
 
 def groups_of(results: SweepResults, key: str | None, mask: Column) -> Iterator[tuple[str, Column]]:
-    """The distinct values of a column as text, each with the mask of its rows.
+    """The distinct values of a column as text, each with its rows among those of a mask.
 
-    Parameters
-    ----------
-    results
-        The results of a sweep.
-    key
-        The column; None puts all rows into one group without a name.
-    mask
-        The rows to group.
+    Without a column (None) all rows are one group without a name.
     """
     if key is None:
         yield "", mask

@@ -97,7 +97,6 @@ def _from_above(flight: FlightRecorder) -> rrb.EyeControls3D | None:
 
 
 def _plane_view(flights: Sequence[FlightRecorder]) -> rrb.View:
-
     return rrb.Spatial2DView(
         origin="plane",
         name="Attitude (shaded: unreachable attitudes)",
@@ -107,7 +106,6 @@ def _plane_view(flights: Sequence[FlightRecorder]) -> rrb.View:
 
 
 def _events_view() -> rrb.View:
-
     return rrb.TextLogView(
         origin="events",
         name="Events",
@@ -140,7 +138,6 @@ def _plots(flights: Sequence[FlightRecorder]) -> tuple[list[rrb.View], list[floa
 
 
 def _plot(title: str, contents: list[str], *, legend: bool = True) -> rrb.View:
-
     return rrb.TimeSeriesView(
         origin="/",
         contents=contents,
@@ -151,7 +148,6 @@ def _plot(title: str, contents: list[str], *, legend: bool = True) -> rrb.View:
 
 
 def _grid(height: float) -> rrb.LineGrid3D:
-
     plane = rr.encodings.Plane3D(normal=(0.0, 0.0, 1.0), distance=height)
     return rrb.LineGrid3D(visible=True, spacing=1.0, plane=plane)
 

@@ -61,7 +61,6 @@ class FlightRecorder:
         color: Color = palette.SKY,
         first: bool = True,
     ) -> None:
-
         part = rr.escape_entity_path_part(name) if name else ""
         suffix = f"/{part}" if name else ""
         self.name = name
@@ -118,7 +117,6 @@ class FlightRecorder:
         self._log_events(self._events.closing(end))
 
     def _log_events(self, events: list[Event]) -> None:
-
         prefix = f"{self.name}: " if self.name else ""
         rows = rr.TextLog.columns(
             text=[prefix + event.text for event in events],

@@ -6,7 +6,7 @@ entities below the body's. Infinite planes are not drawn: the view has a grid.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Sequence
 from typing import Any, Final
 
 import mujoco
@@ -74,10 +74,58 @@ def ground_height(model: mujoco.MjModel) -> float:
     return max(heights, default=0.0)
 
 
-def geom_archetypes(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
+def geom_archetypes(model: mujoco.MjModel, geom: int) -> Sequence[Any]:
     """Rerun's archetypes for a geom in its body's frame; empty for shapes that Rerun lacks."""
-    shape = _SHAPES.get(model.geom_type[geom])
-    return () if shape is None else shape(model, geom)
+    shape, size = mujoco.mjtGeom(model.geom_type[geom]), model.geom_size[geom]
+    centers = [model.geom_pos[geom]]
+    common: dict[str, Any] = {
+        "quaternions": [xyzw(model.geom_quat[geom])],
+        "colors": [geom_color(model, geom)],
+        "fill_mode": rr.components.FillMode.Solid,
+    }
+    match shape:
+        case mujoco.mjtGeom.mjGEOM_BOX:
+            return (rr.Boxes3D(centers=centers, half_sizes=[size], **common),)
+        case mujoco.mjtGeom.mjGEOM_SPHERE:
+            half_sizes = [np.full(3, size[0])]
+            return (rr.Ellipsoids3D(centers=centers, half_sizes=half_sizes, **common),)
+        case mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+            return (rr.Ellipsoids3D(centers=centers, half_sizes=[size], **common),)
+        case mujoco.mjtGeom.mjGEOM_CYLINDER:
+            lengths, radii = [2.0 * size[1]], [size[0]]
+            return (rr.Cylinders3D(lengths=lengths, radii=radii, centers=centers, **common),)
+        case mujoco.mjtGeom.mjGEOM_CAPSULE:
+            # Rerun's capsule starts at its origin, MuJoCo's is centred there.
+            lengths, radii, start = [2.0 * size[1]], [size[0]], [_on_axis(model, geom, -size[1])]
+            return (rr.Capsules3D(lengths=lengths, radii=radii, translations=start, **common),)
+        case mujoco.mjtGeom.mjGEOM_PLANE:
+            half = 1e-3  # m, half the thickness of a box whose upper face is the plane
+            centers, half_sizes = [_on_axis(model, geom, -half)], [np.array([*size[:2], half])]
+            return (rr.Boxes3D(centers=centers, half_sizes=half_sizes, **common),)
+        case mujoco.mjtGeom.mjGEOM_MESH:
+            pose = rr.InstancePoses3D(translations=centers, quaternions=common["quaternions"])
+            return _mesh(model, geom), pose
+    return ()
+
+
+def _on_axis(model: mujoco.MjModel, geom: int, z: float) -> Floats:
+    """A point on the z axis of the geom's frame (m) in its body's frame."""
+    return np.asarray(model.geom_pos[geom] + rotate(model.geom_quat[geom], np.array([0.0, 0.0, z])))
+
+
+def _mesh(model: mujoco.MjModel, geom: int) -> rr.Mesh3D:
+    mesh = model.geom_dataid[geom]
+    first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
+    vertex, normal = model.mesh_vertadr[mesh], model.mesh_normaladr[mesh]
+    # MuJoCo indexes vertices and normals separately, Rerun together: each corner is a vertex.
+    corners = model.mesh_vert[vertex + model.mesh_face[first : first + count].ravel()]
+    normals = model.mesh_normal[normal + model.mesh_facenormal[first : first + count].ravel()]
+    return rr.Mesh3D(
+        vertex_positions=corners,
+        vertex_normals=normals,
+        triangle_indices=np.arange(len(corners), dtype=np.uint32).reshape(-1, 3),
+        albedo_factor=geom_color(model, geom),
+    )
 
 
 def geom_color(model: mujoco.MjModel, geom: int) -> npt.NDArray[np.uint8]:
@@ -89,106 +137,4 @@ def geom_color(model: mujoco.MjModel, geom: int) -> npt.NDArray[np.uint8]:
 
 
 def _part(name: str) -> str:
-
     return str(rr.escape_entity_path_part(name))
-
-
-def _in_body(model: mujoco.MjModel, geom: int, point: tuple[float, float, float]) -> Floats:
-    """A point of the geom's frame (m) in its body's frame."""
-    return np.asarray(model.geom_pos[geom] + rotate(model.geom_quat[geom], np.array(point)))
-
-
-def _common(model: mujoco.MjModel, geom: int) -> dict[str, Any]:
-
-    return {
-        "quaternions": [xyzw(model.geom_quat[geom])],
-        "colors": [geom_color(model, geom)],
-        "fill_mode": rr.components.FillMode.Solid,
-    }
-
-
-def _box(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
-
-    centers, sizes = [model.geom_pos[geom]], [model.geom_size[geom]]
-    return (rr.Boxes3D(centers=centers, half_sizes=sizes, **_common(model, geom)),)
-
-
-def _ellipsoid(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
-
-    size = model.geom_size[geom]
-    is_sphere = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_SPHERE
-    sizes = [np.full(3, size[0]) if is_sphere else size]
-    centers = [model.geom_pos[geom]]
-    return (rr.Ellipsoids3D(centers=centers, half_sizes=sizes, **_common(model, geom)),)
-
-
-def _cylinder(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
-
-    radius, half_length, _ = model.geom_size[geom]
-    return (
-        rr.Cylinders3D(
-            lengths=[2.0 * half_length],
-            radii=[radius],
-            centers=[model.geom_pos[geom]],
-            **_common(model, geom),
-        ),
-    )
-
-
-def _capsule(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
-
-    radius, half_length, _ = model.geom_size[geom]
-    return (
-        rr.Capsules3D(
-            lengths=[2.0 * half_length],
-            radii=[radius],
-            # Rerun's capsule starts at its origin, MuJoCo's is centred there.
-            translations=[_in_body(model, geom, (0.0, 0.0, -half_length))],
-            **_common(model, geom),
-        ),
-    )
-
-
-def _plane(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
-
-    half_x, half_y, _ = model.geom_size[geom]
-    thickness = 1e-3  # m, half of a thin box whose upper face is the plane
-    return (
-        rr.Boxes3D(
-            centers=[_in_body(model, geom, (0.0, 0.0, -thickness))],
-            half_sizes=[(half_x, half_y, thickness)],
-            **_common(model, geom),
-        ),
-    )
-
-
-def _mesh(model: mujoco.MjModel, geom: int) -> Iterable[Any]:
-
-    mesh = model.geom_dataid[geom]
-    first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
-    vertex, normal = model.mesh_vertadr[mesh], model.mesh_normaladr[mesh]
-    # MuJoCo indexes vertices and normals separately, Rerun together: each corner is a vertex.
-    corners = model.mesh_vert[vertex + model.mesh_face[first : first + count].ravel()]
-    normals = model.mesh_normal[normal + model.mesh_facenormal[first : first + count].ravel()]
-    return (
-        rr.Mesh3D(
-            vertex_positions=corners,
-            vertex_normals=normals,
-            triangle_indices=np.arange(len(corners), dtype=np.uint32).reshape(-1, 3),
-            albedo_factor=geom_color(model, geom),
-        ),
-        rr.InstancePoses3D(
-            translations=[model.geom_pos[geom]], quaternions=[xyzw(model.geom_quat[geom])]
-        ),
-    )
-
-
-_SHAPES: Final[dict[int, Callable[[mujoco.MjModel, int], Iterable[Any]]]] = {
-    int(mujoco.mjtGeom.mjGEOM_BOX): _box,
-    int(mujoco.mjtGeom.mjGEOM_SPHERE): _ellipsoid,
-    int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): _ellipsoid,
-    int(mujoco.mjtGeom.mjGEOM_CYLINDER): _cylinder,
-    int(mujoco.mjtGeom.mjGEOM_CAPSULE): _capsule,
-    int(mujoco.mjtGeom.mjGEOM_PLANE): _plane,
-    int(mujoco.mjtGeom.mjGEOM_MESH): _mesh,
-}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
-from types import TracebackType
 from typing import TYPE_CHECKING, Final, Self
 from uuid import uuid4
 
@@ -35,14 +34,8 @@ class LiveStream:
     """Sends samples to a viewer from a separate thread as they are recorded.
 
     The simulation only puts its samples into an unbounded queue, so that a slow or closed viewer
-    never delays it. Use it as a context manager and as `simulate`'s observer.
-
-    Parameters
-    ----------
-    scenario
-        The scenario of the flight.
-    url
-        The viewer's address; None opens a viewer.
+    never delays it. Use it as a context manager and as `simulate`'s observer. ``url`` is the
+    viewer's address; None opens a viewer.
 
     Raises
     ------
@@ -77,12 +70,7 @@ class LiveStream:
         """Set how the flight ended; sent after its last sample."""
         self._end = end
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """Send the remaining samples and stop, within `SHUTDOWN_TIMEOUT` seconds at most."""
         self._over.set()
         self._thread.join(SHUTDOWN_TIMEOUT)

@@ -21,7 +21,7 @@ from tiltsim.views.attitude_plane import (
     unreachable_pitch,
 )
 from tiltsim.views.rerun import palette
-from tiltsim.views.rerun.timeline import Ticks, send_rows, trail_segments
+from tiltsim.views.rerun.timeline import Ticks, Trail, send_rows
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
@@ -75,10 +75,9 @@ class AttitudePlane:
         self._color = color
         self._labelled = not compared
         self._curve_ticks = Ticks(CURVE_INTERVAL)
-        self._trail_ticks = Ticks(ATTITUDE_TRAIL_INTERVAL)
+        self._trail = Trail(ATTITUDE_TRAIL_INTERVAL)
         self._drawn: Floats | None = None  # the unit vector along n of the current curve
         self._side = 0.0
-        self._trail_end: Floats | None = None
 
     def begin(self, *, first: bool) -> None:
         """Log styles; the ``first`` flight also draws the axes and the unreachable region."""
@@ -119,20 +118,12 @@ class AttitudePlane:
         colors = np.where(near[:, np.newaxis], palette.RED, palette.GREY).astype(np.uint8)
         lines = rr.LineStrips2D.columns(strips=on_screen(clip_to_plane(to_nearest)), colors=colors)
         self._send("margin", time, lines)
-        self._append_trail(time, attitude)
+        ends, segments = self._trail.extend(time, attitude)
+        if len(ends):
+            self._send("trail", ends, rr.LineStrips2D.columns(strips=on_screen(segments)))
 
     def _send(self, name: str, times: Floats, *columns: Any) -> None:
         send_rows(self._recording, f"{self.root}/{name}", times, *columns)
-
-    def _append_trail(self, time: Floats, attitude: Floats) -> None:
-
-        picked = self._trail_ticks.pick(time)
-        if len(picked) == 0:
-            return
-        ends = attitude[picked]
-        segments = trail_segments(ends, self._trail_end)
-        self._send("trail", time[picked], rr.LineStrips2D.columns(strips=on_screen(segments)))
-        self._trail_end = ends[-1]
 
     def _append_curves(self, time: Floats, n: Floats) -> None:
         """Draw the curve and the region beyond it at the times at which the gait has moved."""

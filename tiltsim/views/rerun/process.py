@@ -31,11 +31,6 @@ class RecordingProcess:
     Use it as a context manager: call `start` after the flight and `finish` after all other work.
     The process receives no keyboard interrupt and ends with its parent.
 
-    Parameters
-    ----------
-    scenario
-        The scenario of the flight.
-
     Raises
     ------
     InputError

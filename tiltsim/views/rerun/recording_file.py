@@ -32,15 +32,8 @@ FLUSH_INTERVAL: Final = 3600.0
 class RecordingFile:
     """A recording of complete flights.
 
-    The constructor prepares everything that does not need the flights, the import of Rerun
-    included, so that it can run during the simulation.
-
-    Parameters
-    ----------
-    assemblies
-        The assemblies of the flights.
-    names
-        Names of several flights, by default `flight_names`.
+    The constructor prepares everything that does not need the flights, so that it can run during
+    the simulation. ``names`` are those of several flights, by default `flight_names`.
     """
 
     def __init__(self, assemblies: Sequence[Assembly], names: Sequence[str] = ()) -> None:

@@ -22,7 +22,7 @@ from tiltsim.views.replay import (
 )
 from tiltsim.views.rerun import palette
 from tiltsim.views.rerun.geometry import body_paths, ground_height, log_geometry, xyzw
-from tiltsim.views.rerun.timeline import Ticks, send_rows, trail_segments
+from tiltsim.views.rerun.timeline import Trail, send_rows
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
@@ -73,27 +73,14 @@ class Scene:
         self._model = model
         self._color = color
         self.root = root
+        self.camera = f"{root}/camera"  # moves with the vehicle but does not rotate
+        self._floor = f"{root}/floor"  # moves with the vehicle in whole cells
         self._paths = body_paths(model, root)
-        self._ticks = Ticks(TRAIL_INTERVAL)
-        self._trail_end: Floats | None = None
+        self.vehicle = self._paths[first_free_body(model)]
+        self._trail = Trail(TRAIL_INTERVAL)
         self._thrust = thrust_sites(model)
         self._thrust_scale = thrust_scale(model)
         self._floor_cell: Floats | None = None
-
-    @property
-    def vehicle(self) -> str:
-        """The entity of the vehicle's body."""
-        return self._paths[first_free_body(self._model)]
-
-    @property
-    def camera(self) -> str:
-        """The entity that moves with the vehicle but does not rotate, for the camera."""
-        return f"{self.root}/camera"
-
-    @property
-    def floor(self) -> str:
-        """The entity of the ground's grid, which moves with the vehicle in whole cells."""
-        return f"{self.root}/floor"
 
     def begin(self) -> list[str]:
         """Log the static data; returns the names of geoms that Rerun cannot draw."""
@@ -141,7 +128,10 @@ class Scene:
         position = world.position[:, first_free_body(model)]
         follow = rr.Transform3D.columns(translation=position.astype(np.float32))
         send_rows(self._recording, self.camera, time, follow)
-        self._append_trail(time, position)
+        ends, segments = self._trail.extend(time, position)
+        if len(ends):
+            strips = rr.LineStrips3D.columns(strips=segments.astype(np.float32))
+            send_rows(self._recording, f"{self.root}/trail", ends, strips)
         self._append_floor(time, position)
         if self._assembly.follows_position:
             reference = reference_positions(columns)
@@ -158,7 +148,6 @@ class Scene:
         return f"{self._paths[body]}/{'thrust' if alone else self._thrust[site]}"
 
     def _begin_thrust(self) -> None:
-
         for site in self._thrust:
             arrow = rr.Arrows3D.from_fields(
                 origins=[self._model.site_pos[site]],
@@ -185,7 +174,7 @@ class Scene:
         offsets = np.linspace(-half, half, 2 * FLOOR_CELLS + 1)
         lines = [[(c, -half, height), (c, half, height)] for c in offsets]
         lines += [[(-half, c, height), (half, c, height)] for c in offsets]
-        self._log(self.floor, rr.LineStrips3D(lines, colors=[palette.FAINT], radii=[-0.5]))
+        self._log(self._floor, rr.LineStrips3D(lines, colors=[palette.FAINT], radii=[-0.5]))
 
     def _append_floor(self, time: Floats, position: Floats) -> None:
         """Move the grid by whole cells, so that it appears fixed and infinite."""
@@ -193,19 +182,8 @@ class Scene:
         before = cells[:1] + 1.0 if self._floor_cell is None else self._floor_cell[np.newaxis]
         moved = np.any(cells != np.concatenate([before, cells[:-1]]), axis=1)
         move = rr.Transform3D.columns(translation=cells[moved].astype(np.float32))
-        send_rows(self._recording, self.floor, time[moved], move)
+        send_rows(self._recording, self._floor, time[moved], move)
         self._floor_cell = cells[-1]
-
-    def _append_trail(self, time: Floats, position: Floats) -> None:
-        """Log the next segments of the trail, each at the time of its end."""
-        picked = self._ticks.pick(time)
-        if len(picked) == 0:
-            return
-        ends = position[picked]
-        segments = trail_segments(ends, self._trail_end)
-        strips = rr.LineStrips3D.columns(strips=segments.astype(np.float32))
-        send_rows(self._recording, f"{self.root}/trail", time[picked], strips)
-        self._trail_end = ends[-1]
 
 
 def _axis_in_body(model: mujoco.MjModel, site: int) -> Floats:

@@ -16,17 +16,7 @@ if TYPE_CHECKING:
 
 
 class TimeSeries:
-    """Logs the lines of one flight's plots.
-
-    Parameters
-    ----------
-    recording
-        The recording to write to.
-    series
-        The lines.
-    prefix
-        Precedes their entities.
-    """
+    """Logs the lines of one flight's plots, with a prefix before their entities."""
 
     def __init__(
         self, recording: rr.RecordingStream, series: Sequence[Series], prefix: str
@@ -54,6 +44,5 @@ class TimeSeries:
             send_rows(self._recording, self._prefix + series.path, piece["time"], row)
 
     def _log_style(self, line: Series | Level) -> None:
-
         style = rr.SeriesLines(names=[line.label], colors=[line.color], widths=[line.width])
         self._recording.log(self._prefix + line.path, style, static=True)

@@ -35,25 +35,11 @@ def send_rows(recording: rr.RecordingStream, path: str, times: Floats, *columns:
     recording.send_columns(path, [index], [part for column in columns for part in column])
 
 
-def trail_segments(points: Floats, last: Floats | None) -> Floats:
-    """Line segments to each of N points from the one before it, shape (N, 2, dimensions).
-
-    The first segment starts at the ``last`` point of the previous piece; without one it is empty.
-    """
-    first = points[:1] if last is None else last[np.newaxis]
-    return np.stack([np.concatenate([first, points[:-1]]), points], axis=1)
-
-
 class Ticks:
     """Picks the samples at which an entity below the full rate is logged: one per interval.
 
-    The pick depends on the times of the samples only, so that a flight given in pieces is logged
-    like a complete one.
-
-    Parameters
-    ----------
-    interval
-        Time between picked samples, s.
+    The pick depends on the interval (s) and the times of the samples only, so that a flight given
+    in pieces is logged like a complete one.
     """
 
     def __init__(self, interval: float) -> None:
@@ -66,3 +52,21 @@ class Ticks:
         before = np.concatenate([[self._tick], ticks[:-1]])
         self._tick = int(ticks[-1])
         return np.flatnonzero(ticks > before)
+
+
+class Trail:
+    """Line segments between points of a flight that lie an interval (s) apart."""
+
+    def __init__(self, interval: float) -> None:
+        self._ticks = Ticks(interval)
+        self._last: Floats | None = None
+
+    def extend(self, times: Floats, points: Floats) -> tuple[Floats, Floats]:
+        """End times (s) and points of the next segments, shapes (N,) and (N, 2, dimensions)."""
+        picked = self._ticks.pick(times)
+        ends = points[picked]
+        first = ends[:1] if self._last is None else self._last[np.newaxis]
+        segments = np.stack([np.concatenate([first, ends])[:-1], ends], axis=1)
+        if len(ends):
+            self._last = ends[-1]
+        return times[picked], segments

@@ -25,16 +25,9 @@ RECORDING_START: Final = b"RRF"
 def view_flights(
     flights: Sequence[Flight], url: str | None = None, names: Sequence[str] = ()
 ) -> None:
-    """Show flights in a viewer.
+    """Show a flight, or several for a comparison, in the viewer at a URL; None opens a viewer.
 
-    Parameters
-    ----------
-    flights
-        One flight, or several for a comparison.
-    url
-        The address of a running viewer; None opens one.
-    names
-        Names of several flights, by default `flight_names`.
+    ``names`` are those of several flights, by default `flight_names`.
 
     Raises
     ------

@@ -24,14 +24,9 @@ OPACITY: Final = 0.88
 
 
 class PlaneInset:
-    """Paints the plane at single instants.
+    """Paints the plane at single instants, ``size`` pixels wide and high.
 
-    Parameters
-    ----------
-    size
-        Width and height, pixels.
-    side
-        Sign of ``n . r3`` at reachable attitudes: that at the start of the flight.
+    ``side`` is the sign of ``n . r3`` at reachable attitudes: that at the start of the flight.
     """
 
     def __init__(self, size: int, side: float) -> None:
@@ -48,14 +43,8 @@ class PlaneInset:
     def paint(self, n: Floats, trail: Floats, margin: float) -> Image:
         """The plane at an instant, shape (size, size, 3).
 
-        Parameters
-        ----------
-        n
-            The unit vector along the torque-free force, shape (3,).
-        trail
-            Attitudes (roll, pitch) until now, rad, shape (N, 2).
-        margin
-            Singularity margin, rad.
+        ``n`` is the unit vector along the torque-free force, shape (3,); ``trail`` are the
+        attitudes (roll, pitch) until now, rad, shape (N, 2); ``margin`` is the margin, rad.
         """
         image = self._blank.copy()
         beyond = self._up @ n * self._side <= 0.0

@@ -28,13 +28,7 @@ def make_contexts(model: mujoco.MjModel, width: int, height: int) -> tuple[Any, 
     """Make an OpenGL context current, and MuJoCo's rendering context for a model.
 
     MUJOCO_GL selects the implementation; without it, EGL is tried first if there is no display.
-
-    Parameters
-    ----------
-    model
-        The model to render.
-    width, height
-        Smallest size of the context, pixels.
+    The context has at least the given size (pixels).
 
     Raises
     ------
@@ -83,14 +77,7 @@ class Caption(NamedTuple):
 
 
 class Canvas:
-    """Renders frames of one model; use it as a context manager.
-
-    Parameters
-    ----------
-    model
-        The model.
-    width, height
-        Size of the frames, pixels.
+    """Renders frames of one model, of a size in pixels; use it as a context manager.
 
     Raises
     ------
@@ -126,19 +113,9 @@ class Canvas:
         mujoco.mjv_updateScene(model, data, options, None, camera, category, self.scene)
 
     def draw(self, names: str, values: str, caption: Caption) -> Image:
-        """Render the scene with text.
+        """Render the scene, shape (height, width, 3), with a table at the upper left.
 
-        Parameters
-        ----------
-        names, values
-            The columns of a table at the upper left, one line per row.
-        caption
-            A line at the lower right.
-
-        Returns
-        -------
-        Image
-            Shape (height, width, 3).
+        ``names`` and ``values`` are the columns of the table, one line per row.
         """
         mujoco.mjr_render(self._frame, self.scene, self._context)
         frame = self._frame
