@@ -1,4 +1,4 @@
-"""Progress on a terminal, one that tells no size among others, as those of services do."""
+"""Progress on a terminal, also on one that reports no size, as those of CI services do."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def terminal_as_stderr(monkeypatch):
     found, shown = bytearray(), Shown()
 
     def read():
-        with suppress(OSError):  # how Linux tells that the other side is closed
+        with suppress(OSError):  # how Linux reports that the other side is closed
             while part := os.read(keyboard, 4096):
                 found.extend(part)
 
@@ -71,7 +71,7 @@ def test_the_clock_moves_while_nothing_is_finished(monkeypatch):
     assert shown.text.count("| 0/5 flights") > 5
 
 
-def test_time_is_shown_on_a_terminal_of_no_size(monkeypatch):
+def test_time_is_shown_on_a_terminal_of_unknown_size(monkeypatch):
     with terminal_as_stderr(monkeypatch) as shown, progress_bar(2.0, "s", shown=True) as move:
         move(0.0)
     assert "| 0.0/2 s [00:00<?]" in shown.text

@@ -19,7 +19,7 @@ def report(capsys, *words):
     return json.loads(capsys.readouterr().out)
 
 
-def test_level_attitude_is_singular_as_published_and_is_not(capsys):
+def test_level_attitude_is_singular_only_as_published(capsys):
     level = report(capsys, "singularity", "quadrotor")
     assert level["published_determinant"] == 0.0
     assert level["normalized_determinant"] == pytest.approx(1.0)
@@ -45,7 +45,7 @@ def test_another_attitude_and_vehicle(capsys):
     assert first["exact_determinant"] != other["exact_determinant"]
 
 
-def test_the_summary_is_for_people(capsys):
+def test_the_summary_is_readable(capsys):
     assert main(["singularity", "quadrotor"]) == 0
     assert "never singular" in capsys.readouterr().out
 
@@ -93,7 +93,7 @@ def test_the_balanced_gait_points_its_force_into_the_gust(capsys):
         ("0,0,10", "must be smaller"),
     ],
 )
-def test_what_cannot_be_balanced_is_one_line(capsys, value, message):
+def test_an_acceleration_that_cannot_be_balanced_is_one_line(capsys, value, message):
     assert main(["gait", "--balance", value]) == 2
     error = capsys.readouterr().err
     assert message in error

@@ -55,7 +55,7 @@ def tiltsim(*arguments):
     )
 
 
-def test_a_process_of_its_own_spends_no_time_on_garbage(monkeypatch):
+def test_only_a_separate_process_reduces_garbage_collection(monkeypatch):
     done = []
     monkeypatch.setattr(gc, "set_threshold", lambda *_: done.append("seldom"))
     monkeypatch.setattr(atexit, "register", done.append)
@@ -110,7 +110,7 @@ def test_resolved_scenario_flies_the_same_flight_again(tmp_path):
 
 
 @pytest.mark.parametrize(("bound", "code", "word"), [(1.0, 0, "ok"), (-1.0, 1, "FAILED")])
-def test_run_exit_code_tells_whether_expectations_hold(expecting, capsys, bound, code, word):
+def test_run_exit_code_reports_whether_expectations_hold(expecting, capsys, bound, code, word):
     assert main(["run", str(expecting(bound))]) == code
     assert word in capsys.readouterr().out
 
@@ -120,14 +120,14 @@ def test_run_quiet_prints_nothing(capsys):
     assert capsys.readouterr() == ("", "")
 
 
-def test_run_quiet_tells_what_failed(expecting, capsys):
+def test_run_quiet_prints_failed_expectations(expecting, capsys):
     assert main(["run", str(expecting(-1.0)), "--quiet"]) == 1
     output, error = capsys.readouterr()
     assert output == ""
     assert error == "tiltsim: FAILED max_abs_roll: measured 0, expected <= -1\n"
 
 
-def test_a_sweep_is_no_scenario(tmp_path, capsys):
+def test_a_sweep_is_not_a_scenario(tmp_path, capsys):
     path = tmp_path / "sw.toml"
     path.write_text('scenario = "x"\n[[axis]]\ntype = "list"\nkey = "gait.period"\nvalues = [1]\n')
     words = f"{path}: this is a sweep: tiltsim sweep {path}\n"
@@ -237,7 +237,7 @@ def test_check_reports_every_outcome_and_writes_junit(tmp_path, capsys):
     assert main(["check", str(tmp_path / "lost.toml"), "--jobs", "1"]) == 3
 
 
-def test_check_tells_flights_that_nothing_judges(tmp_path, capsys):
+def test_check_marks_flights_without_expectations(tmp_path, capsys):
     (tmp_path / "a.toml").write_text("[simulation]\nduration = 0.01\n")
     (tmp_path / "b.toml").write_text(EXPECTING.format(bound=1.0))
     (tmp_path / "c.toml").write_text("titel = 'x'\n")
@@ -256,7 +256,7 @@ def test_check_tells_flights_that_nothing_judges(tmp_path, capsys):
     assert output.endswith("1 scenario: 1 invalid\n")
 
 
-def test_check_judges_what_speaks_of_the_plant_it_flies(tmp_path, capsys):
+def test_check_evaluates_the_expectations_for_its_plant(tmp_path, capsys):
     path = tmp_path / "plants.toml"
     path.write_text(
         "[simulation]\nduration = 0.1\n"
@@ -368,7 +368,7 @@ def test_list_shows_every_scenario_with_title_and_source(capsys):
     assert main(["list", "--json"]) == 0
     entries = json.loads(capsys.readouterr().out)
     assert all(entry["title"] and entry["source"] for entry in entries)
-    # A member without a title is told by what it changes; a title is not repeated.
+    # A member without a title shows what it changes; a title is not repeated.
     trots = [line for line in lines if line.lstrip().startswith("#continuous_t3_modified ")]
     assert all("type = trot_continuous" in line and "period = 3.0" in line for line in trots)
     assert len(trots) == 2
@@ -376,7 +376,7 @@ def test_list_shows_every_scenario_with_title_and_source(capsys):
     assert all(part in shown for e in entries for part in split_address(e["scenario"]))
 
 
-def test_long_lines_are_wrapped_on_a_terminal_alone(capsys, monkeypatch):
+def test_long_lines_are_wrapped_only_on_a_terminal(capsys, monkeypatch):
     assert main(["list"]) == 0
     piped = capsys.readouterr().out
     monkeypatch.setenv("COLUMNS", "80")
@@ -388,7 +388,7 @@ def test_long_lines_are_wrapped_on_a_terminal_alone(capsys, monkeypatch):
     assert shown.split() == piped.split()
 
 
-def test_a_terminal_is_told_what_is_being_compiled(capsys, monkeypatch):
+def test_compilation_is_announced_on_a_terminal(capsys, monkeypatch):
     name = TILTROTOR.native_name("thesis")
     with announce_compilation(shown=True):
         assert before_compiling == []  # standard error is no terminal here
@@ -396,8 +396,8 @@ def test_a_terminal_is_told_what_is_being_compiled(capsys, monkeypatch):
     with announce_compilation(shown=False):
         assert before_compiling == []
     with announce_compilation(shown=True):
-        (tell,) = before_compiling
-        tell(name)
+        (announce,) = before_compiling
+        announce(name)
     assert before_compiling == []
     assert (
         "tiltsim: compiling attitude_altitude for the thesis plant, once" in capsys.readouterr().err
@@ -447,7 +447,7 @@ def test_bench_prints_ratios_for_every_engine_and_integrator():
     assert all(row["ratio"] == 1.0 for row in rows if row["engine"] == "bare")
 
 
-def test_bench_of_many_flights_tells_time_and_memory():
+def test_bench_of_many_flights_prints_time_and_memory():
     done = tiltsim("bench", "--vehicles", "3", "--duration", "0.05", "--json")
     assert done.returncode == 0, done.stderr
     (row,) = json.loads(done.stdout)

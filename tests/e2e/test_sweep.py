@@ -52,7 +52,7 @@ def grid(tmp_path):
     return file
 
 
-def test_sweep_writes_one_dataset_and_sums_up(grid, tmp_path, capsys):
+def test_sweep_writes_one_dataset_and_prints_a_summary(grid, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["sweep", str(grid), "--out", str(out), "--jobs", "1"]) == 0
     printed = capsys.readouterr()
@@ -65,7 +65,7 @@ def test_sweep_writes_one_dataset_and_sums_up(grid, tmp_path, capsys):
     assert capsys.readouterr() == ("", "")
 
 
-def test_a_continued_sweep_says_what_is_kept(grid, tmp_path, capsys):
+def test_a_continued_sweep_prints_how_much_is_finished(grid, tmp_path, capsys):
     command = ["sweep", str(grid), "--out", str(tmp_path / "out"), "--jobs", "1"]
     assert main([*command, "--quiet"]) == 0
     assert main(command) == 0
@@ -76,7 +76,7 @@ def test_a_continued_sweep_says_what_is_kept(grid, tmp_path, capsys):
     assert capsys.readouterr().err == "A grid: 22 of 24 flights finished, 2 to fly\n"
 
 
-def test_the_dataset_goes_to_a_folder_of_its_own_by_default(grid, tmp_path, monkeypatch):
+def test_the_dataset_has_its_own_folder_by_default(grid, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["sweep", "grid.toml", "--jobs", "1", "--quiet"]) == 0
     assert (tmp_path / "sweeps" / "grid" / "sweep.parquet").is_file()
@@ -128,7 +128,7 @@ def test_every_shipped_sweep_is_valid(address):
     assert definition.sweep["source"]
 
 
-def test_list_shows_sweeps_in_a_section_of_their_own(capsys):
+def test_list_shows_sweeps_in_their_own_section(capsys):
     assert main(["list"]) == 0
     scenarios, _, sweeps = capsys.readouterr().out.partition("\nsweeps, for tiltsim sweep:\n")
     for address in SHIPPED:
@@ -138,7 +138,7 @@ def test_list_shows_sweeps_in_a_section_of_their_own(capsys):
     assert [entry["sweep"] for entry in json.loads(capsys.readouterr().out)] == SHIPPED
 
 
-def test_check_leaves_sweeps_out():
+def test_check_skips_sweeps():
     files = scenario_files(shipped_folder("scenarios"))
     assert files
     assert not [file for file in files if file.parent.name == "sweeps"]
@@ -169,14 +169,14 @@ def test_plot_draws_a_map_of_two_axes(grid, tmp_path, capsys):
     cells = left.collections[0].get_array()
     assert cells.shape == (3, 4)
     rows = pq.read_table(out / "sweep.parquet").to_pylist()
-    wanted = [r["max_abs_roll"] for r in rows if r["controller.decoupler"] == "conventional"]
-    assert sorted(cells.ravel().tolist()) == sorted(wanted)
+    expected = [r["max_abs_roll"] for r in rows if r["controller.decoupler"] == "conventional"]
+    assert sorted(cells.ravel().tolist()) == sorted(expected)
     capsys.readouterr()
     assert main(["plot", str(out), "--metric", "roll"]) == 2
     assert "choose" in capsys.readouterr().err
 
 
-def test_plot_draws_lines_and_says_what_was_lost(grid, tmp_path):
+def test_plot_draws_lines_and_counts_lost_flights(grid, tmp_path):
     text = GRID.replace("stop = 0.4", "stop = 3.1").replace("count = 3", "count = 2")
     grid.write_text(
         text + '[plot]\nkind = "lines"\nx = "initial.attitude[0]"\nlog = ["y"]\n', encoding="utf-8"
@@ -279,7 +279,7 @@ count = 2
 """
 
 
-def test_groups_of_a_distribution_are_told_apart_without_colour(tmp_path):
+def test_groups_of_a_distribution_differ_without_colour(tmp_path):
     out = swept(short_sweep(tmp_path / "sweep.toml", count=8), tmp_path / "out")
     figure = sweep_figure(load_results(out), ("max_abs_roll",))
     shares, curves = figure.subfigs[0].axes
@@ -313,7 +313,7 @@ def test_figures_that_cannot_be_drawn_are_refused_in_one_line(tmp_path, capsys, 
     assert words in error
 
 
-def test_a_users_words_are_no_formulas(tmp_path):
+def test_user_text_is_not_a_formula(tmp_path):
     file = short_sweep(tmp_path / "sweep.toml", count=1)
     text = file.read_text(encoding="utf-8").partition("[[axis]]")[0].replace("flights", "$x_$ ü")
     cases = '[[axis]]\ntype = "cases"\nkey = "price"\n'
@@ -349,10 +349,10 @@ def test_axes_of_layers_fly_as_their_rows_say(tmp_path, engine):
     assert len(set(found)) == 12
 
 
-def test_a_controller_of_ones_own_is_one_case_among_laws(tmp_path):
+def test_a_user_controller_can_be_a_case_beside_built_in_controllers(tmp_path):
     (tmp_path / "mine.py").write_text(
         "import numpy as np\nimport tiltsim\n\n\n"
-        "def law(seen):\n    return tiltsim.Command(thrusts=np.full(4, 1.2))\n",
+        "def law(observation):\n    return tiltsim.Command(thrusts=np.full(4, 1.2))\n",
         encoding="utf-8",
     )
     (tmp_path / "sweep.toml").write_text(

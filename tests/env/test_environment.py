@@ -11,11 +11,13 @@ import dm_env
 import numpy as np
 import pytest
 from absl.testing import absltest
-from dm_env import test_utils
+from dm_env import specs, test_utils
 
 import tiltsim
-from tiltsim.env.environment import TiltrotorEnv
+from tiltsim.env.environment import Environment, TiltrotorEnv
+from tiltsim.env.task import Task
 from tiltsim.errors import InputError
+from tiltsim.flight.end import End
 from tiltsim.flight.reading import load_flight
 from tiltsim.plants.command import Command, ControllerError
 from tiltsim_controllers.vehicle.parameters import PRESETS
@@ -114,7 +116,7 @@ def test_an_episode_does_not_depend_on_those_before(layers):
     assert_same(rollout(used, 10, seed=5), rollout(fresh, 10, seed=5))
 
 
-def test_reseeding_starts_the_draws_anew():
+def test_reseeding_restarts_the_draws():
     env = TiltrotorEnv(scenario(), domain=AXES[1:2], seed=1)
     places = []
     for _ in range(2):
@@ -161,7 +163,7 @@ def test_a_seed_axis_draws_other_noise_every_episode():
     assert len(set(map(float, seen))) == 3
 
 
-def test_an_episode_is_lost_where_the_vehicle_is_not_where_it_is_said_to_be():
+def test_termination_uses_the_true_position_not_the_measured_one():
     env = TiltrotorEnv(scenario(sensors={"position_bias": [9.0, 9.0, 0.0]}), max_position_error=1.0)
     env.reset()
     assert not env.step(HOVER).last()
@@ -182,7 +184,7 @@ def test_episodes_are_flights_with_files_and_metrics(tmp_path):
     assert (back.end.kind, back.metrics()["duration"]) == ("completed", pytest.approx(0.2))
 
 
-def test_a_lost_flight_ends_with_no_discount_and_no_reward():
+def test_a_lost_vehicle_terminates_with_zero_discount_and_reward():
     env = TiltrotorEnv(scenario({"duration": 5.0}), max_position_error=0.5)
     step = env.reset()
     while not step.last():
@@ -244,14 +246,14 @@ def test_actions_have_the_vehicles_bounds_and_are_clipped_there(vehicle, low, hi
         (np.array([0.0] * 7 + [np.nan]), r"action\[7\] = nan: must be finite"),
     ],
 )
-def test_actions_that_cannot_be_told_are_refused(action, words):
+def test_invalid_actions_are_refused(action, words):
     env = TiltrotorEnv(scenario())
     env.reset()
     with pytest.raises(ValueError, match=words):
         env.step(action)
 
 
-def test_the_reward_is_the_users():
+def test_the_user_defines_the_reward():
     seen = []
 
     def reward(observation, action):
@@ -264,6 +266,33 @@ def test_the_reward_is_the_users():
     assert step.reward == pytest.approx(-WEIGHT)
     np.testing.assert_array_equal(seen[0][1], HOVER)
     np.testing.assert_array_equal(seen[0][0], step.observation["position"])
+
+
+def test_a_task_may_replace_any_hook():
+    class Climb(Task):
+        """Climb; reward, observation and termination are its own."""
+
+        def observation_spec(self):
+            return {"altitude": specs.Array((1,), np.float64, "altitude")}
+
+        def get_observation(self, plant):
+            return {"altitude": np.array(plant.observe()[2:3])}
+
+        def get_reward(self, observation, action):
+            return float(observation["altitude"][0])
+
+        def get_termination(self, sample, observation):
+            return End("diverged", float(sample[0]), "too high") if sample[3] > 0.1 else None
+
+    env = Environment(Climb(scenario({"duration": 5.0})))
+    env.observation_spec()["altitude"].validate(env.reset().observation["altitude"])
+    step = env.step(1.5 * HOVER)
+    assert step.reward == step.observation["altitude"][0] > 0.0
+    while not step.last():
+        step = env.step(1.5 * HOVER)
+    # Half a g of net thrust: 0.1 m after sqrt(2 s / a) = 0.2 s.
+    assert (env.end.cause, step.discount) == ("too high", 0.0)
+    assert env.end.time == pytest.approx((0.2 / (0.5 * VEHICLE.gravity)) ** 0.5, abs=0.021)
 
 
 def test_changing_what_was_returned_changes_nothing_else():
@@ -281,8 +310,8 @@ def test_changing_what_was_returned_changes_nothing_else():
 def test_a_controller_written_for_simulate_flies_here():
     env = TiltrotorEnv(scenario())
     env.reset()
-    seen = env.observe()
-    assert seen.vehicle == VEHICLE
+    observation = env.observe()
+    assert observation.vehicle == VEHICLE
     speeds = Command(rotor_speeds=[300.0, 310.0, 320.0, 330.0], tilt_angles=[0.1, 0.2, 0.3, 0.4])
     action = env.action(speeds)
     np.testing.assert_allclose(action[:4], 8.048e-6 * np.array([300, 310, 320, 330.0]) ** 2)
@@ -343,7 +372,7 @@ def test_axes_of_a_group_are_drawn_together():
     assert any(x != z for x, _, z in drawn)
 
 
-def test_a_bound_that_is_none_is_refused():
+def test_an_invalid_position_bound_is_refused():
     for bound in (0.0, float("nan")):
         with pytest.raises(InputError, match="max_position_error"):
             TiltrotorEnv(max_position_error=bound)
@@ -372,13 +401,13 @@ def test_the_drawn_mass_is_the_one_that_flies():
         ({"key": "vehicle.mas", "type": "uniform", "low": 0.4, "high": 0.5}, "did you mean mass"),
     ],
 )
-def test_bad_axes_are_told_when_the_environment_is_made(axis, words):
+def test_bad_axes_are_reported_when_the_environment_is_made(axis, words):
     with pytest.raises(InputError, match=words) as caught:
         TiltrotorEnv(scenario(), domain=[axis])
     assert "\n" not in str(caught.value)
 
 
-def test_a_draw_that_cannot_fly_is_told_with_its_key():
+def test_a_draw_that_cannot_be_flown_is_reported_with_its_key():
     axis = {"key": "vehicle.mass", "type": "uniform", "low": -1.0, "high": 1.0}
     env = TiltrotorEnv(scenario(), domain=[axis])
 
@@ -436,7 +465,7 @@ def test_gymnasiums_own_checker_passes_without_a_warning(arguments):
     check_env(gymnasium.make(ID, **arguments).unwrapped)
 
 
-def test_gymnasium_tells_a_loss_from_the_end_of_time():
+def test_gymnasium_distinguishes_termination_from_truncation():
     pytest.importorskip("gymnasium")
     from tiltsim.env.gymnasium import GymnasiumEnv
 

@@ -80,7 +80,7 @@ def test_report_of_an_untilted_vehicle_has_the_published_normalisation(capsys) -
     assert report["R"] == pytest.approx(4.0)
 
 
-def test_report_of_a_blue_gait_says_that_rank_is_lost(capsys) -> None:
+def test_report_of_a_blue_gait_warns_of_its_rank(capsys) -> None:
     words = ["gait", "--angles", "0.5,-0.5,-0.165813558,0.165813558"]
     report = run_json(capsys, *words)
     assert report["rank"] == 2
@@ -220,13 +220,13 @@ with_docs = pytest.mark.skipif(
 
 
 @with_docs
-def test_the_page_on_gaits_shows_the_table_of_today(capsys) -> None:
+def test_the_page_on_gaits_shows_the_current_table(capsys) -> None:
     run("gait", "--list")
     assert capsys.readouterr().out in GAIT_PAGE.read_text(encoding="utf-8")
 
 
 @with_docs
-def test_the_documented_gait_of_ones_own_flies_and_is_judged_as_shown(tmp_path, capsys) -> None:
+def test_the_documented_own_gait_flies_and_is_analyzed_as_shown(tmp_path, capsys) -> None:
     page = GAIT_PAGE.read_text(encoding="utf-8")
     section = page.partition("## Your own gait")[2].partition("\n## ")[0]
     file = tmp_path / "my_gait.toml"
@@ -247,7 +247,7 @@ def test_the_documented_gait_of_ones_own_flies_and_is_judged_as_shown(tmp_path, 
         ("0,0,0,0", ""),
     ],
 )
-def test_rotors_that_would_turn_backwards_to_hover_are_named(capsys, angles, backward) -> None:
+def test_rotors_that_would_spin_backwards_to_hover_are_named(capsys, angles, backward) -> None:
     words = ["gait", f"--angles={angles}"]
     report = run_json(capsys, *words)
     squares = np.array(SPIN) * np.sign(report["hover_rotor_speeds"])
@@ -290,7 +290,7 @@ def test_a_rotor_at_rest_does_not_count_as_turning_backwards() -> None:
         assert report["warnings"] == []
 
 
-def test_a_moving_gait_tells_its_start_from_its_worst(capsys) -> None:
+def test_a_moving_gait_shows_values_at_its_start_and_the_worst_case(capsys) -> None:
     run("gait", "ch05_gaits/line#walk_full")
     text = capsys.readouterr().out
     assert "\nsingularity margin  0.839116 rad at the gait's start\n" in text
@@ -490,7 +490,7 @@ def test_map_of_any_vehicle() -> None:
     assert report["delta"] == pytest.approx(np.arctan(2 * 0.168663), abs=1e-4)
 
 
-def test_a_refused_path_is_refused_with_the_place(capsys) -> None:
+def test_a_rejected_path_names_the_place(capsys) -> None:
     assert run("map", "--leg", "red", "0.3,-0.8", "0.8,-0.3", "0.1,0.6", "0.3,-0.8") == 1
     output = capsys.readouterr().out
     assert "rejected: red crosses the curve L (R = 0) at (0.452123, 0.147270)" in output
@@ -508,7 +508,7 @@ def test_accepted_paths(capsys) -> None:
     assert report["path"]["sound"] is True
 
 
-def test_blue_is_accepted_as_published_but_not_sound(capsys) -> None:
+def test_blue_is_accepted_as_published_but_singular(capsys) -> None:
     assert run("map", "--circle", "blue", "0.3,-0.5", "0.2", "--json") == 1
     verdict = json.loads(capsys.readouterr().out)["path"]
     assert verdict["accepted"] is True
@@ -581,14 +581,14 @@ def test_every_kind_of_figure_is_written_by_the_command(tmp_path, capsys, name) 
     assert capsys.readouterr().out
 
 
-def test_nothing_attainable_is_said_in_words(tmp_path, capsys) -> None:
+def test_an_empty_attainable_set_is_a_warning(tmp_path, capsys) -> None:
     figure = ["--figure", "attainable", "--plot", str(tmp_path / "attainable.png")]
     words = "nothing is attainable: no rotor speeds from 305.27 to 394.10 rad/s hover"
-    for gait, told in (("ch09_gait_1", True), ("ch09_gait_2", False)):
+    for gait, expected in (("ch09_gait_1", True), ("ch09_gait_2", False)):
         run("gait", "--published", gait, *figure)
-        assert (f"warning: {words}" in capsys.readouterr().out) is told
+        assert (f"warning: {words}" in capsys.readouterr().out) is expected
         warnings = run_json(capsys, "gait", "--published", gait, *figure)["warnings"]
-        assert any(warning.startswith(words) for warning in warnings) is told
+        assert any(warning.startswith(words) for warning in warnings) is expected
     run("gait", "--published", "ch09_gait_1")
     assert words not in capsys.readouterr().out
 
@@ -604,7 +604,7 @@ ALL_MARKS = ["reachable at all times", "singular", "level"]
         (plans.fixed([0.0] * 4), ["reachable", "level"], False),
     ],
 )
-def test_the_legend_explains_what_there_is(gait, marks, bar) -> None:
+def test_the_legend_explains_only_what_is_drawn(gait, marks, bar) -> None:
     figure = gait_figure(gait, AR_DRONE)
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()] == marks

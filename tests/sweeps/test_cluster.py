@@ -81,7 +81,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_local_dataset(tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_a_cluster_that_is_not_there_is_one_line(tmp_path, capsys, monkeypatch):
+def test_an_unreachable_cluster_is_one_line(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("tiltsim.sweeps.cluster.CONNECT_TIMEOUT", 1.0)
     file = short_sweep(tmp_path / "sweep.toml")
     address = f"tcp://127.0.0.1:{free_port()}"
@@ -96,7 +96,7 @@ def test_a_cluster_that_is_not_there_is_one_line(tmp_path, capsys, monkeypatch):
 
 
 @pytest.mark.parametrize("address", ["nowhere", "tcp://nowhere", "http://nowhere:8786", ":1"])
-def test_what_is_no_address_is_refused_at_once(tmp_path, capsys, address):
+def test_an_invalid_address_is_refused_immediately(tmp_path, capsys, address):
     file = short_sweep(tmp_path / "sweep.toml")
     options = ["--cluster", address, "--out", str(tmp_path / "out"), "--quiet"]
     assert main(["sweep", str(file), *options]) == 2

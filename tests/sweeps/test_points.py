@@ -70,7 +70,7 @@ def test_axes_are_crossed_the_last_one_fastest(points_of):
     assert sorted(i for n in range(sweep.chunks) for i in sweep.chunk(n)) == list(range(25))
 
 
-def test_a_table_is_no_value_of_an_axis(points_of):
+def test_a_table_is_not_a_value_of_an_axis(points_of):
     axis = """
 [[axis]]
 type = "list"
@@ -157,7 +157,7 @@ count = 3
     assert scenario.initial.position == (0.0, 0.0, 0.1)
 
 
-def test_what_is_set_survives_a_change_of_kind(points_of):
+def test_values_of_set_survive_a_change_of_type(points_of):
     text = '[set]\ngait.amplitude = 0.3\ngait.period = 2.0\n[[axis]]\ntype = "list"\n'
     text += 'key = "gait.type"\nvalues = ["trot_instant", "walk"]'
     sweep = points_of(text)
@@ -208,7 +208,7 @@ def test_seeds_alone_are_a_random_set(points_of):
 
 
 def test_files_of_an_inline_scenario_lie_beside_the_sweep(points_of, tmp_path, monkeypatch):
-    (tmp_path / "mine.py").write_text("def law(seen): ...\n", encoding="utf-8")
+    (tmp_path / "mine.py").write_text("def law(observation): ...\n", encoding="utf-8")
     monkeypatch.chdir("/")
     own = 'controller = { law = "python", function = "mine.py:law" }\n'
     inline = f"[scenario.simulation]\nduration = 0.01\n{SEED}[sample]\ncount = 1\n"

@@ -167,7 +167,7 @@ def test_a_bad_flight_becomes_a_row(tmp_path, monkeypatch):
         assert (row["max_abs_roll"] is None) == bad
 
 
-def test_points_that_make_no_scenario_become_rows(tmp_path):
+def test_points_without_a_valid_scenario_become_rows(tmp_path):
     file = short_sweep(tmp_path / "sweep.toml", count=32)
     text = file.read_text().replace("0.1", "0.2").replace("mean = 0.0", "mean = 2.9")
     file.write_text(text.replace("seed = 3", "seed = 5"))
@@ -178,7 +178,7 @@ def test_points_that_make_no_scenario_become_rows(tmp_path):
     assert "invalid" in ends
 
 
-def test_flights_are_kept_where_asked(tmp_path):
+def test_flights_are_kept_if_requested(tmp_path):
     file = short_sweep(tmp_path / "sweep.toml", count=2)
     file.write_text("keep_flights = true\n" + file.read_text())
     run_sweep(load_sweep(file), tmp_path / "out")
@@ -288,7 +288,7 @@ def test_a_terminated_sweep_cleans_up_and_continues(tmp_path):
     assert [row["index"] for row in rows(folder)] == list(range(120))
 
 
-def test_a_damaged_folder_is_told_of_or_mended(tmp_path):
+def test_a_damaged_folder_is_reported_or_repaired(tmp_path):
     definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
     dataset = run_sweep(definition, tmp_path / "out")
     whole = dataset.read_bytes()
@@ -311,7 +311,7 @@ def test_parts_with_other_columns_are_refused(tmp_path, monkeypatch):
     assert sweep_figure(load_results(tmp_path / "out"))  # but they can be drawn
 
 
-def test_a_definition_that_is_none_is_refused(tmp_path):
+def test_an_unreadable_definition_is_refused(tmp_path):
     definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
     run_sweep(definition, tmp_path / "out")
     file = tmp_path / "out" / "sweep.json"

@@ -57,6 +57,6 @@ def test_a_coarse_tolerance_needs_no_bisection(tolerance):
     assert len(tried) == 4
 
 
-def test_a_tolerance_finer_than_floats_ends_all_the_same():
+def test_a_tolerance_finer_than_floats_terminates():
     found, _ = search(lambda x: x < 0.32, 0.0, 1.0, 0.1, 1e-30)
     assert np.nextafter(found.holds, 1.0) == found.fails == 0.32

@@ -28,8 +28,8 @@ import time
 from pathlib import Path
 from tiltsim import Command
 
-def law(seen):
-    if seen.time > 0.1:
+def law(observation):
+    if observation.time > 0.1:
         Path(__file__).with_suffix(".flying").touch()
         time.sleep(0.05)
     return Command(thrusts=[1.05105] * 4)
@@ -45,23 +45,23 @@ def call_from_c(function):
     CALLED_BACK(function)()
 
 
-def test_an_interrupt_that_c_dropped_is_raised_after_the_block():
+def test_an_interrupt_swallowed_by_c_is_raised_after_the_block():
     def raises():
         raise KeyboardInterrupt
 
-    seen = []
+    reached = []
 
     def work():
         with reraise_swallowed_interrupts():
             call_from_c(raises)
-            seen.append("goes on")
+            reached.append("goes on")
 
     with pytest.raises(KeyboardInterrupt):
         work()
-    assert seen == ["goes on"]
+    assert reached == ["goes on"]
 
 
-def test_other_exceptions_that_c_dropped_are_reported_as_ever(monkeypatch):
+def test_other_exceptions_swallowed_by_c_are_reported_as_usual(monkeypatch):
     def raises():
         raise LookupError
 
@@ -99,7 +99,7 @@ def test_a_second_interrupt_does_not_wait():
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_other_threads_run_as_ever():
+def test_other_threads_are_unaffected():
     ran = []
 
     def work():
@@ -150,7 +150,7 @@ def test_a_termination_interrupts_and_a_second_one_would_kill(keyboard):
 
 
 @pytest.mark.parametrize("keyboard", [signal.default_int_handler, signal.SIG_IGN])
-def test_a_termination_waits_for_what_must_not_be_lost(keyboard):
+def test_a_termination_waits_for_a_deferred_block(keyboard):
     done = []
 
     def work():

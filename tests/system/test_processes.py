@@ -27,7 +27,7 @@ def much_of(item):
     return bytes(MEGABYTES)
 
 
-def test_each_item_is_answered_whatever_becomes_of_the_others():
+def test_each_item_is_answered_regardless_of_the_others():
     items = ["a", "dies", "b", "raises", "c", "d"]
     found = dict(in_processes(work_on, items, 2))
     assert sorted(found) == sorted(items)
@@ -44,14 +44,14 @@ def interrupts_blocked(_item):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-def test_processes_meet_no_interrupt_while_they_begin():
+def test_processes_receive_no_interrupt_while_they_start():
     """They would print a traceback: the keyboard's go to all processes of a terminal's job."""
     found = dict(in_processes(interrupts_blocked, "ab", 2))
     assert [found[item].result() for item in "ab"] == [True, True]
     assert not interrupts_blocked(None)
 
 
-def test_leaving_ends_processes_that_are_answering():
+def test_leaving_the_loop_ends_processes_that_are_answering():
     """More than a pipe holds: the other process is halfway through its answer."""
     for _item, future in in_processes(much_of, range(6), 2):
         assert len(future.result()) == MEGABYTES

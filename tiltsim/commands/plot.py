@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
     description = """Draw a flight on one page: attitude, altitude, position error, tilt angles,
-    rotor speeds, singularity margin, path over the ground, roll-pitch plane. Several flights: margin,
-    determinant and position error of each over time. A sweep: lines, maps, distributions or
+    rotor speeds, singularity margin, path over the ground, roll-pitch plane. Several flights:
+    margin, determinant and position error of each over time. A sweep: lines, maps, distributions or
     boundaries, according to its axes or its [plot] table."""
     summary = "draw a flight, several, or a sweep as a figure"
     parser = subparsers.add_parser("plot", help=summary, description=description)

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from dm_env import specs
 
-from tiltsim.env.arrays import action_spec, clip_action, has_tilts, observation_spec
+from tiltsim.env.arrays import clip_action, has_tilts
 from tiltsim.env.domain import Domain
 from tiltsim.env.task import Reward, Task, hover_reward
 from tiltsim.errors import InputError
@@ -54,8 +54,8 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
     def __init__(self, task: Task, *, seed: int | None = None) -> None:
         self.task = task
         self._scenario = task.scenario
-        self._action_spec = action_spec(task.scenario)
-        self._observation_spec = observation_spec(task.scenario)
+        self._action_spec = task.action_spec()
+        self._observation_spec = task.observation_spec()
         self._plant: CommandedPlant | None = None
         self._initial_state: Floats | None = None
         self._end: End | None = None

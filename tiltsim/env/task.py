@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
+from dm_env import specs
 
-from tiltsim.env.arrays import has_tilts, observation_arrays
+from tiltsim.env.arrays import action_spec, has_tilts, observation_arrays, observation_spec
 from tiltsim.env.domain import Domain
 from tiltsim.errors import InputError
 from tiltsim.flight.end import End
@@ -21,7 +22,7 @@ Reward = Callable[[Mapping[str, Floats], Floats], float]
 """``(observation, action) -> reward``, called after every step."""
 
 ENVIRONMENT: Final = "tiltsim.env.TiltrotorEnv"
-"""What the scenarios of episodes name as their controller."""
+"""The controller named in the scenarios of episodes."""
 
 
 def hover_reward(observation: Mapping[str, Floats], action: Floats) -> float:
@@ -69,6 +70,14 @@ class Task:
 
     def _commanded(self, scenario: Scenario) -> Scenario:
         return with_external_commands(scenario, ENVIRONMENT, self._simulation)
+
+    def action_spec(self) -> specs.BoundedArray:
+        """Shape and bounds of an action, N and rad."""
+        return action_spec(self.scenario)
+
+    def observation_spec(self) -> dict[str, specs.BoundedArray]:
+        """Shape and bounds of every array of an observation, by name."""
+        return observation_spec(self.scenario)
 
     def initialize_episode(self, generator: np.random.Generator) -> Scenario:
         """The scenario of the next episode. Raises `InputError` where the draw cannot be flown."""
