@@ -35,22 +35,22 @@ def expects(**bounds):
         ({"min": 0.0}, -1e-300, False),
     ],
 )
-def test_bounds_belong_to_what_they_bound(bounds, measured, holds):
+def test_bounds_are_inclusive(bounds, measured, holds):
     assert Verdict(expects(**bounds), measured).holds is holds
 
 
 @pytest.mark.parametrize("bounds", [{"min": 0.0}, {"max": 0.0}, {"equals": False}])
 @pytest.mark.parametrize("measured", [nan, None], ids=["NaN", "no such metric"])
-def test_what_was_not_measured_holds_never(bounds, measured):
+def test_an_unmeasured_metric_never_holds(bounds, measured):
     assert not Verdict(expects(**bounds), measured).holds
 
 
-@pytest.mark.parametrize("wanted", [True, False])
-def test_equals_asks_for_a_truth_value(wanted):
-    expectation = Expectation(metric="diverged", equals=wanted)
-    assert Verdict(expectation, wanted).holds
-    assert not Verdict(expectation, not wanted).holds
-    assert not Verdict(expectation, float(wanted)).holds
+@pytest.mark.parametrize("expected", [True, False])
+def test_equals_expects_a_truth_value(expected):
+    expectation = Expectation(metric="diverged", equals=expected)
+    assert Verdict(expectation, expected).holds
+    assert not Verdict(expectation, not expected).holds
+    assert not Verdict(expectation, float(expected)).holds
 
 
 def test_the_published_figure_is_shown_but_not_judged():
@@ -96,8 +96,8 @@ def test_a_metric_that_the_flight_does_not_have_fails_its_expectation():
     assert not verdict.holds
 
 
-@pytest.mark.parametrize(("plant", "judged"), [("mujoco", [0.1, 0.2]), ("thesis", [0.1, 0.3])])
-def test_an_expectation_may_speak_of_one_plant_alone(plant, judged):
+@pytest.mark.parametrize(("plant", "bounds"), [("mujoco", [0.1, 0.2]), ("thesis", [0.1, 0.3])])
+def test_an_expectation_may_apply_to_one_plant_only(plant, bounds):
     scenario = Scenario(
         simulation={"plant": plant},
         expect=[
@@ -107,7 +107,7 @@ def test_an_expectation_may_speak_of_one_plant_alone(plant, judged):
         ],
     )
     verdicts = check_expectations(scenario, {"final_roll": 0.0})
-    assert [verdict.expectation.max for verdict in verdicts] == judged
+    assert [verdict.expectation.max for verdict in verdicts] == bounds
 
 
 @pytest.mark.parametrize(
@@ -121,6 +121,6 @@ def test_an_expectation_may_speak_of_one_plant_alone(plant, judged):
         ({"max": 2.0}, 1.5, "<= 2"),
     ],
 )
-def test_the_table_shows_what_the_thesis_says_of_a_metric(bounds, measured, shown):
+def test_the_table_shows_the_published_value(bounds, measured, shown):
     header, line = expectation_lines([Verdict(expects(**bounds), measured)])
     assert line[header.index("published") :].strip().startswith(shown)

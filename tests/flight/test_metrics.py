@@ -178,7 +178,7 @@ def test_tilt_rate_is_the_fastest_of_the_four_either_way(rotor):
 @pytest.mark.parametrize(
     ("roll", "pitch"), [(0.0, 0.0), (0.3, 0.0), (0.0, -0.4), (0.5, 0.7), (2.0, 0.1), (pi, 0.0)]
 )
-def test_margin_of_the_untilted_vehicle_is_what_its_lean_leaves_of_a_right_angle(roll, pitch):
+def test_margin_of_the_untilted_vehicle_is_a_right_angle_minus_its_lean(roll, pitch):
     roll = np.where(TIMES == 2.0, roll, 0.0)
     pitch = np.where(TIMES == 2.0, pitch, 0.0)
     lowest = asin(min(cos(a) * cos(b) for a, b in zip(roll, pitch)))
@@ -211,7 +211,7 @@ BLUE = [
 
 
 @pytest.mark.parametrize("alpha", BLUE)
-def test_margin_is_zero_where_the_torque_matrix_has_lost_rank(alpha):
+def test_margin_is_zero_where_the_torque_matrix_is_rank_deficient(alpha):
     """Blue gaits (ch. 6): opposite columns of tau cancel, so every attitude is singular."""
     metrics = fly({"gait": {"type": "fixed", "angles": alpha}}, **tilted(alpha)).metrics()
     assert metrics["min_singularity_margin"] == 0.0
@@ -270,7 +270,7 @@ def test_rotors_without_limits_saturate_never():
     ("kind", "diverged"),
     [("completed", False), ("interrupted", False), ("diverged", True), ("singular", True)],
 )
-def test_diverged_means_lost(kind, diverged):
+def test_diverged_means_an_early_end(kind, diverged):
     assert fly(end=End(kind, 30.0, "why")).metrics()["diverged"] is diverged
 
 
@@ -292,7 +292,7 @@ def test_columns_come_in_the_order_of_the_file_and_of_one_length():
     assert {column.shape for column in flight.columns.values()} == {(len(TIMES),)}
 
 
-def test_reference_columns_hold_what_the_law_aimed_at():
+def test_reference_columns_hold_the_references_of_the_controller():
     scenario = {
         "reference": {"type": "setpoint", "position": [1.0, 2.0, 3.0], "yaw": 0.0},
         "controller": {"decoupler": "conventional"},

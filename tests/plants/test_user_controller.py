@@ -31,28 +31,29 @@ HOVER = """
 import numpy as np
 import tiltsim
 
-def law(seen):
-    vehicle, error = seen.vehicle, seen.reference.position - seen.position
-    wanted = 1.0 * error + 1.6 * (seen.reference.velocity - seen.velocity)
-    lean = np.array([-wanted[1], wanted[0], 0.0]) / vehicle.gravity
-    moment = np.array(vehicle[1:4]) * (64 * (lean - seen.attitude) - 16 * seen.body_rates)
-    lift = vehicle.mass * (vehicle.gravity + wanted[2])
+def law(observation):
+    vehicle, error = observation.vehicle, observation.reference.position - observation.position
+    acceleration = 1.0 * error + 1.6 * (observation.reference.velocity - observation.velocity)
+    lean = np.array([-acceleration[1], acceleration[0], 0.0]) / vehicle.gravity
+    error = 64 * (lean - observation.attitude) - 16 * observation.body_rates
+    moment = np.array(vehicle[1:4]) * error
+    lift = vehicle.mass * (vehicle.gravity + acceleration[2])
     roll, pitch, yaw = moment
     drag = vehicle.drag_coefficient / vehicle.thrust_coefficient
     thrusts = lift / 4 + np.array([-pitch, roll, pitch, -roll]) / (2 * vehicle.arm_length)
     return tiltsim.Command(thrusts=thrusts + yaw / (4 * drag) * np.array([1, -1, 1, -1]))
 
 class Slow:
-    "Counts what it was asked, and fails when asked twice about one moment."
+    "Counts its calls, and fails if it is called twice for one time."
     def __init__(self):
         self.times = []
     def reset(self, scenario):
         self.times.clear()
         self.step = scenario.simulation.control_timestep
-    def __call__(self, seen):
-        assert not self.times or seen.time > self.times[-1]
-        self.times.append(seen.time)
-        return law(seen)
+    def __call__(self, observation):
+        assert not self.times or observation.time > self.times[-1]
+        self.times.append(observation.time)
+        return law(observation)
 
 not_callable = 3.0
 """
@@ -181,19 +182,19 @@ def test_a_shipped_law_flown_as_a_users_own_flies_the_same_flight(layers):
     while not isinstance(parameters, Parameters):
         parameters = getattr(parameters, "inner", None) or parameters.law
 
-    def own(seen):
+    def own(observation):
         state = tiltrotor_state(
-            [*seen.position, *seen.quaternion, *seen.tilt_angles],
-            [*seen.velocity, *seen.body_rates, *seen.tilt_rates],
-            np.array(SPIN) * seen.rotor_speeds,
+            [*observation.position, *observation.quaternion, *observation.tilt_angles],
+            [*observation.velocity, *observation.body_rates, *observation.tilt_rates],
+            np.array(SPIN) * observation.rotor_speeds,
         )
-        rates = rotor_accelerations(seen.time, tuple(map(float, state)), parameters)
+        rates = rotor_accelerations(observation.time, tuple(map(float, state)), parameters)
         return Command(rotor_accelerations=np.array(SPIN) * rates)
 
     ours, theirs = tiltsim.simulate(shipped), tiltsim.simulate(shipped, controller=own)
     assert theirs.scenario.controller.law == "python"
     rounding = 1e-9 if shipped.simulation.latency_steps else 0.0
-    # The own law's samples have what the servos were told besides.
+    # The samples under the own controller also have the commands of the servos.
     common = loop_of(shipped).sample_fields
     places = [loop_of(theirs.scenario).sample_fields.index(field) for field in common]
     np.testing.assert_allclose(
@@ -206,24 +207,28 @@ def test_a_shipped_law_flown_as_a_users_own_flies_the_same_flight(layers):
 
 @pytest.mark.parametrize("command", ["thrusts", "rotor_speeds"])
 def test_lagging_rotors_approach_a_commanded_speed(command):
-    start, told, lag, late = 300.0, 350.0, 0.05, 0.02
+    start, commanded, lag, late = 300.0, 350.0, 0.05, 0.02
     value = (
-        told if command == "rotor_speeds" else PRESETS["ar_drone_2"].thrust_coefficient * told**2
+        commanded
+        if command == "rotor_speeds"
+        else PRESETS["ar_drone_2"].thrust_coefficient * commanded**2
     )
     flight = tiltsim.simulate(
         scenario({"duration": 0.2, "control_latency": late}, vehicle={"rotor_time_constant": lag}),
         controller=lambda _: Command(**{command: [value] * 4}),
     )
     time = flight["time"]
-    approach = told + (start - told) * np.exp(-(time - late) / lag)
+    approach = commanded + (start - commanded) * np.exp(-(time - late) / lag)
     for rotor, spin in enumerate(SPIN, start=1):
         expected = spin * np.where(time <= late, start, approach)
         np.testing.assert_allclose(flight[f"rotor_speed_{rotor}"], expected, rtol=1e-7)
 
 
 def test_late_speeds_are_taken_at_once_when_they_arrive():
-    def law(seen):
-        return Command(rotor_speeds=[300.0 + 1e3 * seen.time] * 4, tilt_angles=[seen.time] * 4)
+    def law(observation):
+        return Command(
+            rotor_speeds=[300.0 + 1e3 * observation.time] * 4, tilt_angles=[observation.time] * 4
+        )
 
     flight = tiltsim.simulate(
         scenario({"duration": 0.1, "control_latency": 0.03, "record_timestep": 0.005}),
@@ -236,22 +241,23 @@ def test_late_speeds_are_taken_at_once_when_they_arrive():
     np.testing.assert_allclose(flight["alpha_ref_3"], arrived, atol=1e-9)
 
 
-def test_sensors_tell_the_controller_and_not_the_log():
-    seen = []
+def test_sensors_affect_the_observation_and_not_the_log():
+    observations = []
 
     def look(observation):
-        seen.append(observation)
+        observations.append(observation)
         return STILL
 
     errors = merged(NOISE, {"sensors": {"position_noise": 0.0}})
     flight = tiltsim.simulate(scenario({"record_timestep": 0.01}, **errors), controller=look)
     x, roll, p = (
-        [getattr(s, name)[0] for s in seen] for name in ("position", "attitude", "body_rates")
+        [getattr(s, name)[0] for s in observations]
+        for name in ("position", "attitude", "body_rates")
     )
     np.testing.assert_allclose(x - flight["x"][:-1], 0.1, atol=1e-12)
     assert 0.002 < np.std(roll - flight["roll"][:-1]) < 0.01
     assert 0.004 < np.std(p - flight["p"][:-1]) < 0.02
-    np.testing.assert_array_equal(seen[3].tilt_angles, 0.0)
+    np.testing.assert_array_equal(observations[3].tilt_angles, 0.0)
 
 
 def test_both_vehicles_fly_in_the_wind(law):
@@ -267,11 +273,11 @@ def test_both_vehicles_fly_in_the_wind(law):
         np.testing.assert_allclose(both[0][column], both[1][column], atol=1e-9)
 
 
-def test_what_is_seen_is_the_state_the_reference_and_the_gait():
-    seen = []
+def test_the_observation_is_the_state_the_reference_and_the_gait():
+    observations = []
 
     def look(observation):
-        seen.append(observation)
+        observations.append(observation)
         return STILL
 
     flown = tiltsim.simulate(
@@ -289,7 +295,7 @@ def test_what_is_seen_is_the_state_the_reference_and_the_gait():
         ),
         controller=look,
     )
-    first, second = seen
+    first, second = observations
     assert (first.time, second.time) == (0.0, pytest.approx(0.005))
     np.testing.assert_array_equal(first.position, [1.0, 2.0, 3.0])
     np.testing.assert_array_equal(first.velocity, [0.1, 0.2, 0.3])
@@ -304,10 +310,10 @@ def test_what_is_seen_is_the_state_the_reference_and_the_gait():
     np.testing.assert_array_equal(second.position, [sample[axis] for axis in "xyz"])
     np.testing.assert_array_equal(second.body_rates, [sample[axis] for axis in "pqr"])
     np.testing.assert_array_equal(second.tilt_angles, [sample[f"alpha_{i}"] for i in (1, 2, 3, 4)])
-    wanted = reference_derivatives(second.time, flown.scenario.reference.parameters)
-    np.testing.assert_array_equal(second.reference.position, wanted[:3])
-    np.testing.assert_array_equal(second.reference.velocity, wanted[3:6])
-    np.testing.assert_array_equal(second.reference.acceleration, wanted[6:9])
+    expected = reference_derivatives(second.time, flown.scenario.reference.parameters)
+    np.testing.assert_array_equal(second.reference.position, expected[:3])
+    np.testing.assert_array_equal(second.reference.velocity, expected[3:6])
+    np.testing.assert_array_equal(second.reference.acceleration, expected[6:9])
     np.testing.assert_array_equal(second.reference.attitude, [0.0, 0.0, 0.2])
     gait = flown.scenario.gait.plan(flown.scenario.vehicle.resolve())
     planned = tilt_reference(second.time, gait.parameters, gait.knots)
@@ -319,9 +325,9 @@ def test_what_is_seen_is_the_state_the_reference_and_the_gait():
 
 
 def test_changing_an_observation_changes_nothing_else():
-    def meddle(seen):
-        seen.position[:] = 1e6
-        seen.quaternion[:] = 0.0
+    def meddle(observation):
+        observation.position[:] = 1e6
+        observation.quaternion[:] = 0.0
         return STILL
 
     calm = tiltsim.simulate(scenario(), controller=lambda _: STILL)
@@ -339,7 +345,7 @@ def test_changing_an_observation_changes_nothing_else():
     ],
 )
 @each_model
-def test_rotors_do_as_they_are_told(command, expected, model):
+def test_rotors_follow_their_commands(command, expected, model):
     flight = tiltsim.simulate(
         scenario({"duration": 0.1}, vehicle={"model": model}), controller=lambda _: command
     )
@@ -350,7 +356,7 @@ def test_rotors_do_as_they_are_told(command, expected, model):
 
 
 @each_model
-def test_commanded_thrust_is_what_lifts_the_vehicle(model):
+def test_commanded_thrust_lifts_the_vehicle(model):
     vehicle = PRESETS["ar_drone_2"]
     thrust = 1.2 * vehicle.mass * vehicle.gravity / 4.0
     flight = tiltsim.simulate(
@@ -373,7 +379,7 @@ def test_tilt_angles_reach_the_servos_and_the_log():
 
 @each_model
 def test_rotor_limits_hold(model):
-    def law(seen):
+    def law(observation):
         return Command(rotor_speeds=[1e3, 1e3, 0.0, -50.0])
 
     limits = {"model": model, "min_rotor_speed": 100.0, "max_rotor_speed": 500.0}
@@ -384,7 +390,7 @@ def test_rotor_limits_hold(model):
 
 @each_model
 def test_rotors_whose_least_speed_is_0_stop_and_do_not_reverse(model):
-    def law(seen):
+    def law(observation):
         return Command(rotor_accelerations=[-4e4, 0.0, -4e4, 0.0])
 
     for limits, stopped in (({"min_rotor_speed": 0.0}, True), ({}, False)):
@@ -398,8 +404,8 @@ def test_rotors_whose_least_speed_is_0_stop_and_do_not_reverse(model):
 def test_asked_at_every_control_sample(control_timestep, calls):
     times = []
 
-    def law(seen):
-        times.append(seen.time)
+    def law(observation):
+        times.append(observation.time)
         return STILL
 
     tiltsim.simulate(
@@ -423,7 +429,7 @@ def test_a_class_is_made_anew_and_an_object_is_reset(hover_file):
         def reset(self, scenario):
             self.sum = 0.1 * scenario.simulation.control_timestep
 
-        def __call__(self, seen):
+        def __call__(self, observation):
             self.sum += 0.01
             return Command(thrusts=[1.0 + self.sum] * 4)
 
@@ -436,12 +442,12 @@ def test_a_class_is_made_anew_and_an_object_is_reset(hover_file):
 
 
 @pytest.mark.parametrize("latency", [0.0, 0.006])
-def test_a_moment_is_lived_through_once_even_where_the_flight_is_lost(latency):
+def test_the_controller_is_called_once_per_time_even_if_the_flight_ends_early(latency):
     times = []
 
-    def law(seen):
-        assert not times or seen.time > times[-1], "asked twice"
-        times.append(seen.time)
+    def law(observation):
+        assert not times or observation.time > times[-1], "called twice"
+        times.append(observation.time)
         return Command(rotor_accelerations=[1e6] * 4)  # 1e5 rad/s after 0.1 s
 
     flight = tiltsim.simulate(
@@ -464,31 +470,31 @@ def test_a_saved_state_restarts_under_held_accelerations(layers):
     plant = CommandedPlant(assemble(scenario(**tables)))
 
     def tell(speed):
-        told = Command(rotor_speeds=[speed] * 4, tilt_angles=[0.1, 0.0, 0.0, speed / 1e4])
-        plant.apply(check_command(told, tilting=True))
+        sent = Command(rotor_speeds=[speed] * 4, tilt_angles=[0.1, 0.0, 0.0, speed / 1e4])
+        plant.apply(check_command(sent, tilting=True))
         plant.advance(2)
         plant.apply(check_command(Command(rotor_accelerations=[5.0, -5.0, 3.0, 1.0]), tilting=True))
         plant.advance(1)
 
     for speed in (300.0, 310.0, 320.0):
         tell(speed)
-    state, seen = plant.state, plant.observe()
+    state, sample = plant.state, plant.observe()
     ends = []
     for _ in range(2):
         plant.state = state
-        assert plant.observe() == seen
+        assert plant.observe() == sample
         for speed in (330.0, 340.0, 350.0):
             tell(speed)
         ends.append(plant.observe())
     assert ends[0] == ends[1]
-    assert ends[0] != seen
+    assert ends[0] != sample
 
 
 # --- mistakes ------------------------------------------------------------------------------------
 
 
-def raises(seen):
-    return 1.0 / (0.0 if seen.time > 0.0349 else 1.0) and STILL
+def raises(observation):
+    return 1.0 / (0.0 if observation.time > 0.0349 else 1.0) and STILL
 
 
 class MuteError(Exception):
@@ -498,20 +504,20 @@ class MuteError(Exception):
     __repr__ = __str__
 
 
-def raises_unspeakably(seen):
-    if seen.time > 0.0349:
+def raises_unspeakably(observation):
+    if observation.time > 0.0349:
         raise MuteError
     return STILL
 
 
-def leaves(seen):
-    if seen.time > 0.0349:
+def leaves(observation):
+    if observation.time > 0.0349:
         sys.exit(5)
     return STILL
 
 
 def returning(value):
-    return lambda seen: value if seen.time > 0.0349 else STILL
+    return lambda observation: value if observation.time > 0.0349 else STILL
 
 
 @pytest.mark.parametrize(
@@ -554,7 +560,7 @@ def test_a_failing_controller_ends_the_flight_with_one_line_and_a_log(law, words
 
 
 def test_failing_at_a_recorded_sample_does_not_record_it_twice():
-    def law(seen):
+    def law(observation):
         raise RuntimeError
 
     flight = tiltsim.simulate(scenario(), controller=law)
@@ -563,12 +569,12 @@ def test_failing_at_a_recorded_sample_does_not_record_it_twice():
     assert flight.metrics()["duration"] == 0.0
 
 
-def test_a_failing_reset_is_told_like_a_failing_law():
+def test_a_failing_reset_is_reported_like_a_failing_controller():
     class Law:
         def reset(self, scenario):
             raise KeyError("gain")
 
-        def __call__(self, seen):
+        def __call__(self, observation):
             return STILL
 
     assert "raised KeyError: 'gain'" in tiltsim.simulate(scenario(), controller=Law()).end.cause
@@ -583,8 +589,8 @@ def test_the_quadrotor_has_no_tilt_servos():
 
 
 def test_an_interrupt_within_the_controller_interrupts_the_flight():
-    def law(seen):
-        if seen.time > 0.1:
+    def law(observation):
+        if observation.time > 0.1:
             raise KeyboardInterrupt
         return STILL
 
@@ -659,7 +665,8 @@ def test_a_class_in_a_file_beside_the_scenario(hover_file, monkeypatch, tmp_path
 def test_a_failing_controller_exits_3_and_leaves_its_log(tmp_path, capsys):
     law = tmp_path / "bad.py"
     law.write_text(
-        "import tiltsim\n\n\ndef law(seen):\n    thrusts = [1.0] * (4 if seen.time < 0.1 else 3)\n"
+        "import tiltsim\n\n\ndef law(observation):\n"
+        "    thrusts = [1.0] * (4 if observation.time < 0.1 else 3)\n"
         "    return tiltsim.Command(thrusts=thrusts)\n",
         encoding="utf-8",
     )

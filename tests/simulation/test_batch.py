@@ -75,10 +75,10 @@ def three_ways(scenarios):
     """Assert that every scenario flies the same in Python, natively and in a batch of all."""
     rows = list(fly(scenarios, keep_samples=True, threads=2))
     assert [row.scenario for row in rows] == scenarios
-    for wanted, row in zip(scenarios, rows, strict=True):
+    for flown, row in zip(scenarios, rows, strict=True):
         for engine in ("python", "native"):
-            simulation = wanted.simulation.model_copy(update={"engine": engine})
-            alone = tiltsim.simulate(wanted.model_copy(update={"simulation": simulation}))
+            simulation = flown.simulation.model_copy(update={"engine": engine})
+            alone = tiltsim.simulate(flown.model_copy(update={"simulation": simulation}))
             assert alone.engine == engine
             np.testing.assert_array_equal(row.flight.samples, alone.samples)
             assert row.end == alone.end
@@ -184,7 +184,7 @@ def test_user_files_with_other_bodies_fly_in_batches_of_their_own(tmp_path):
 
 
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
-def test_lost_flights_end_on_the_same_step_with_the_same_cause(plant):
+def test_flights_end_early_on_the_same_step_with_the_same_cause(plant):
     rows = three_ways(
         [
             scenario(tables, duration=3.0, record_timestep=record, plant=plant)
@@ -199,8 +199,8 @@ def test_lost_flights_end_on_the_same_step_with_the_same_cause(plant):
     assert ends[0] == ends[1] == ends[2], "recording must not matter"
 
 
-def test_a_lost_row_is_flown_no_further_and_its_place_is_taken():
-    """Hundreds of flights that would last an hour, were they not lost in the first second."""
+def test_a_row_that_ends_early_makes_room_for_the_next():
+    """Hundreds of flights that would last an hour, if they did not diverge in the first second."""
     many = [scenario(UPSIDE_DOWN, duration=3600.0, record_timestep=1.0)] * 60
     results = list(fly(many, threads=2))
     assert len(results) == 60
@@ -209,7 +209,7 @@ def test_a_lost_row_is_flown_no_further_and_its_place_is_taken():
     assert all(result.flight is None for result in results)
 
 
-def test_the_end_of_a_lost_row_is_looked_for_from_the_last_calls_on(monkeypatch):
+def test_an_early_end_is_located_from_the_last_calls_on(monkeypatch):
     """Calls of 64 steps: at most two of them and one recording interval are flown again."""
     flown = []
     advance = MujocoPlant.advance
@@ -218,13 +218,13 @@ def test_the_end_of_a_lost_row_is_looked_for_from_the_last_calls_on(monkeypatch)
         flown.append(steps)
         return advance(plant, steps, *rest)
 
-    lost = scenario(LATE_LOSS, duration=3600.0, record_timestep=0.05)
+    flown = scenario(LATE_LOSS, duration=3600.0, record_timestep=0.05)
     monkeypatch.setattr(tiltsim.simulation.native_batch, "CALL_TIME", 0.0)
     monkeypatch.setattr(MujocoPlant, "advance", counted)
-    (row,) = fly([lost], keep_samples=True)
+    (row,) = fly([flown], keep_samples=True)
     assert 2.0 < row.end.time < 2.1
     assert 0 < sum(flown) <= 2 * 64 + 50
-    alone = tiltsim.simulate(lost)
+    alone = tiltsim.simulate(flown)
     assert row.end == alone.end
     np.testing.assert_array_equal(row.flight.samples, alone.samples)
 
@@ -337,12 +337,12 @@ def test_every_row_flies_a_model_of_its_own():
     ],
     ids=str,
 )
-def test_what_decides_the_model_tells_models_apart(change):
+def test_the_model_cache_key_tells_models_apart(change):
     """Rows share a model exactly where MuJoCo would compile the same one."""
     change = {"disturbance": change} if change is GUST else change
     tables = {**LAYERED, "simulation": {"timestep": 0.002, "duration": 0.3}}
     plain, changed = map(tiltsim.parse_scenario, (tables, merge(tables, change)))
-    models = [saved_model(flight_model(assemble(wanted), 40)) for wanted in (plain, changed)]
+    models = [saved_model(flight_model(assemble(flown), 40)) for flown in (plain, changed)]
     same_key = model_cache_key(plain) == model_cache_key(changed)
     assert same_key == (models[0] == models[1])
 
@@ -364,18 +364,18 @@ def test_own_controllers_are_flown_one_by_one_among_others(tmp_path):
         encoding="utf-8",
     )
     own = {"controller": {"law": "python", "function": f"{file}:law"}}
-    wanted = [
+    scenarios = [
         scenario(
             {**own, "model_error": {"mass": mass}}, engine="auto", timestep=0.002, duration=0.1
         )
         for mass in (0.9, 1.0, 1.1)
     ]
-    # A sweep tells all scenarios alike to fly natively, those that cannot included.
-    told = wanted[2].simulation.model_copy(update={"engine": "native"})
-    wanted[2] = wanted[2].model_copy(update={"simulation": told})
-    wanted.insert(1, scenario({}, duration=0.1))
-    results = list(fly(wanted, keep_samples=True))
-    assert [result.scenario for result in results] == wanted
+    # A sweep requests the native engine for all scenarios, even for those that cannot use it.
+    simulation = scenarios[2].simulation.model_copy(update={"engine": "native"})
+    scenarios[2] = scenarios[2].model_copy(update={"simulation": simulation})
+    scenarios.insert(1, scenario({}, duration=0.1))
+    results = list(fly(scenarios, keep_samples=True))
+    assert [result.scenario for result in results] == scenarios
     assert [result.flight.engine for result in results] == ["python", "native", "python", "python"]
     light, _, right, heavy = (float(result.flight["z"][-1]) for result in results)
     # The law lifts the nominal weight: z = (1 / factor - 1) g t^2 / 2.
@@ -388,27 +388,27 @@ def test_own_controllers_are_flown_one_by_one_among_others(tmp_path):
 
 
 def test_more_flights_than_rows_come_in_their_order():
-    wanted = [
+    scenarios = [
         scenario({"initial": {"position": [0.001 * i, 0.0, 0.0]}}, duration=0.02 + 0.01 * (i % 7))
         for i in range(150)
     ]
-    results = list(fly(wanted, threads=2, keep_samples=True))
-    assert [result.scenario for result in results] == wanted
+    results = list(fly(scenarios, threads=2, keep_samples=True))
+    assert [result.scenario for result in results] == scenarios
     for i, result in enumerate(results):
         assert result.flight["x"][0] == 0.001 * i
         assert result.end.time == pytest.approx(0.02 + 0.01 * (i % 7))
 
 
 def test_all_kinds_of_flights_together():
-    wanted = [
+    scenarios = [
         scenario({}, engine="python", duration=0.05),
         scenario({}, plant="thesis", duration=0.05),
         scenario({}, duration=0.05),
         scenario(LAWS["yaw_position"], duration=0.05),
         scenario({}, engine="auto", duration=0.05),
     ]
-    results = list(fly(wanted * 2, keep_samples=True))
-    assert [result.scenario for result in results] == wanted * 2
+    results = list(fly(scenarios * 2, keep_samples=True))
+    assert [result.scenario for result in results] == scenarios * 2
     assert results[0].flight.engine == "python"
     assert results[2].flight.engine == "native"
     assert mujoco.get_mjcb_control() is None
@@ -416,13 +416,13 @@ def test_all_kinds_of_flights_together():
 
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
 def test_many_short_flights_are_worth_the_native_engine(plant, monkeypatch):
-    wanted = [scenario({}, engine="auto", plant=plant, duration=0.05)] * 6
+    scenarios = [scenario({}, engine="auto", plant=plant, duration=0.05)] * 6
     monkeypatch.setattr(tiltsim.plants.engine_choice, "MIN_STEPS_TO_LOAD", 300)
     monkeypatch.setattr(tiltsim.plants.engine_choice, "MIN_STEPS_TO_COMPILE", 300)
-    results = list(fly(wanted, keep_samples=True))
+    results = list(fly(scenarios, keep_samples=True))
     assert {result.flight.engine for result in results} == {"native"}
-    assert [result.scenario for result in results] == wanted
-    assert next(fly(wanted[:1], keep_samples=True)).flight.engine == "python"
+    assert [result.scenario for result in results] == scenarios
+    assert next(fly(scenarios[:1], keep_samples=True)).flight.engine == "python"
 
 
 def test_no_flights_give_no_results():
@@ -433,10 +433,10 @@ def test_no_flights_give_no_results():
 
 
 @pytest.mark.parametrize("law", LOOPS)
-def test_native_watching_sees_what_python_watches(law):
+def test_native_sign_checks_are_those_of_python(law):
     """Every watched number is there, and what else is there never ends a flight."""
-    wanted = scenario(ALL_LAWS[law], engine="python")
-    plant, loop, setup = make_plant(assemble(wanted)), LOOPS[law], assemble(wanted).setup
+    flown = scenario(ALL_LAWS[law], engine="python")
+    plant, loop, setup = make_plant(assemble(flown)), LOOPS[law], assemble(flown).setup
     for _ in range(5):
         plant.advance(20)
         values = plant.observe()
@@ -469,14 +469,14 @@ def test_references_of_the_law_with_gait_rates_are_the_same_floats_natively(monk
 
 
 def test_columns_beside_a_state_out_of_all_bounds_raise_nothing():
-    """A flight may be lost between two samples by a hundred orders of magnitude."""
+    """A flight may be diverged between two samples by a hundred orders of magnitude."""
     flight = tiltsim.simulate(scenario(LAWS["gait_feedforward"], engine="python", duration=0.05))
     samples = flight.samples.copy()
     samples[-1, 3:] = 1e200  # squares overflow
-    lost = replace(flight, samples=samples, end=End("diverged", 0.05, "test"))
-    columns = lost.columns
+    diverged = replace(flight, samples=samples, end=End("diverged", 0.05, "test"))
+    columns = diverged.columns
     assert np.isfinite([columns[name][:-1] for name in ("roll_ref", "alpha_ref_1")]).all()
-    assert lost.metrics()["diverged"] is True
+    assert diverged.metrics()["diverged"] is True
 
 
 def test_a_row_without_a_result_is_no_number():
@@ -488,34 +488,34 @@ def test_a_row_without_a_result_is_no_number():
     np.testing.assert_array_equal(rows, [[np.nan, np.nan], [4.0, 0.5]])
 
 
-def test_what_is_about_to_be_compiled_is_told_and_what_is_cached_is_not(monkeypatch, tmp_path):
+def test_compilation_is_announced_unless_the_code_is_cached(monkeypatch, tmp_path):
     import tiltsim.engines.cache as cache
 
     monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
-    told = []
-    monkeypatch.setattr(cache, "before_compiling", [told.append])
+    announced = []
+    monkeypatch.setattr(cache, "before_compiling", [announced.append])
     cache.announce_native_code("mujoco.some.law")
-    assert told == ["mujoco.some.law"]
+    assert announced == ["mujoco.some.law"]
     cache.mark_native_code_compiled("mujoco.some.law")
     cache.announce_native_code("mujoco.some.law")
-    assert told == ["mujoco.some.law"]
+    assert announced == ["mujoco.some.law"]
 
 
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
-def test_each_plant_tells_what_it_compiles(monkeypatch, tmp_path, plant):
+def test_each_plant_announces_its_compilation(monkeypatch, tmp_path, plant):
     import tiltsim.engines.cache as cache
 
-    class ToldError(Exception):
+    class AnnouncedError(Exception):
         pass
 
     def stop(name):
-        raise ToldError(name)
+        raise AnnouncedError(name)
 
     monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
     monkeypatch.setattr(cache, "before_compiling", [stop])
     loop = LOOPS["attitude_altitude"]
     compiling = compile_control if plant == "mujoco" else compile_stepper
-    with pytest.raises(ToldError, match=re.escape(loop.native_name(plant))):
+    with pytest.raises(AnnouncedError, match=re.escape(loop.native_name(plant))):
         compiling.__wrapped__(loop)
 
 
@@ -546,13 +546,13 @@ def test_whether_native_code_is_cached_is_known_by_law_and_plant(monkeypatch, tm
     from tiltsim.plants.engine_choice import choose_engine
 
     monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
-    wanted = scenario({}, engine="auto", duration=20.0)  # 20,000 steps: worth loading only
-    assert choose_engine(wanted, loop_of(wanted)) == "python"
+    flown = scenario({}, engine="auto", duration=20.0)  # 20,000 steps: worth loading only
+    assert choose_engine(flown, loop_of(flown)) == "python"
     cache.mark_native_code_compiled(LOOPS["full_pose"].native_name("mujoco"))
     cache.mark_native_code_compiled(LOOPS["attitude_altitude"].native_name("thesis"))
-    assert choose_engine(wanted, loop_of(wanted)) == "python"
+    assert choose_engine(flown, loop_of(flown)) == "python"
     cache.mark_native_code_compiled(LOOPS["attitude_altitude"].native_name("mujoco"))
-    assert choose_engine(wanted, loop_of(wanted)) == "native"
+    assert choose_engine(flown, loop_of(flown)) == "native"
 
 
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])

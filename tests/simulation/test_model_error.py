@@ -34,8 +34,8 @@ def test_the_plant_has_the_error_and_the_law_has_not():
     model = build_model(assemble(scenario))
     assert model.body("vehicle").subtreemass[0] == pytest.approx(1.07 * NOMINAL.mass, rel=1e-9)
     inertia = model.body("vehicle").inertia
-    wanted = np.array([1.1, 0.9, 0.95]) * NOMINAL[1:4]
-    assert inertia == pytest.approx(wanted, rel=1e-4)  # the pods are small, and not nothing
+    expected = np.array([1.1, 0.9, 0.95]) * NOMINAL[1:4]
+    assert inertia == pytest.approx(expected, rel=1e-4)  # the pods are small, and not nothing
     gear = model.actuator("thrust_1").gear
     assert gear[2] == pytest.approx(0.93 * NOMINAL.thrust_coefficient)
     assert gear[5] == pytest.approx(1.05 * NOMINAL.drag_coefficient)
@@ -49,8 +49,8 @@ def test_the_flight_begins_with_the_true_acceleration():
     flight = tiltsim.simulate(parse(ERROR))
     speed = 300.0
     thrust = 4.0 * 0.93 * NOMINAL.thrust_coefficient * speed**2
-    wanted = thrust / (1.07 * NOMINAL.mass) - NOMINAL.gravity
-    assert flight["vz"][-1] / flight["time"][-1] == pytest.approx(wanted, rel=0.02)
+    expected = thrust / (1.07 * NOMINAL.mass) - NOMINAL.gravity
+    assert flight["vz"][-1] / flight["time"][-1] == pytest.approx(expected, rel=0.02)
     assert flight["thrust_2"][0] == pytest.approx(thrust / 4.0, rel=1e-12)
 
 

@@ -14,7 +14,7 @@ from tiltsim.simulation.monitor import TerminationMonitor
 
 
 @pytest.fixture
-def judged():
+def end_of_sample():
     """The end that a first sample with some fields changed calls for."""
     assembly = assemble(tiltsim.parse_scenario({"simulation": {"engine": "python"}}))
     plant, fields = make_plant(assembly), assembly.loop.sample_fields
@@ -41,17 +41,17 @@ def judged():
         ({"rotor_speed_4": 3e5}, "rotor 4 at 3e+05 rad/s"),
     ],
 )
-def test_a_limit_is_named_with_its_value(judged, changed, cause):
-    end = judged(**changed)
+def test_a_limit_is_named_with_its_value(end_of_sample, changed, cause):
+    end = end_of_sample(**changed)
     assert (end.kind, end.cause, end.time) == ("diverged", cause, 0.0)
 
 
 @pytest.mark.parametrize("value", [nan, inf, -inf])
-def test_a_number_that_is_not_finite_is_named(judged, value):
-    end = judged(vy=value, roll=nan)
+def test_a_number_that_is_not_finite_is_named(end_of_sample, value):
+    end = end_of_sample(vy=value, roll=nan)
     assert end.kind == "diverged"
     assert end.cause.startswith("vy is no longer")
 
 
-def test_a_sound_sample_ends_nothing(judged):
-    assert judged() is None
+def test_a_sound_sample_ends_nothing(end_of_sample):
+    assert end_of_sample() is None

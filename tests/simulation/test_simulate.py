@@ -176,8 +176,8 @@ def test_sample_and_hold_is_coarser_than_continuous_control_but_converges_to_it(
 @pytest.mark.parametrize("plant", PLANTS)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_two_runs_are_bit_identical(plant, engine):
-    wanted = scenario(gait=GAITS["trot_continuous"], simulation={"plant": plant, "engine": engine})
-    first, second = tiltsim.simulate(wanted), tiltsim.simulate(wanted)
+    flown = scenario(gait=GAITS["trot_continuous"], simulation={"plant": plant, "engine": engine})
+    first, second = tiltsim.simulate(flown), tiltsim.simulate(flown)
     np.testing.assert_array_equal(first.samples, second.samples)
     assert first.to_arrow().equals(second.to_arrow())
 
@@ -186,17 +186,17 @@ def test_two_runs_are_bit_identical(plant, engine):
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("control_timestep", [0.0, 0.004])
 def test_saved_state_restarts_bit_identically(plant, engine, control_timestep):
-    wanted = scenario(
+    flown = scenario(
         gait=GAITS["trot_instant"],
         controller=EXACT,
         simulation={"plant": plant, "engine": engine, "control_timestep": control_timestep},
     )
-    straight = make_plant(assemble(wanted))
+    straight = make_plant(assemble(flown))
     straight.advance(150)
     saved = straight.state
     straight.advance(150)
 
-    restarted = make_plant(assemble(wanted))
+    restarted = make_plant(assemble(flown))
     restarted.advance(33)  # somewhere else, so that the state has to do all the work
     restarted.state = saved
     restarted.advance(150)
@@ -232,12 +232,12 @@ def test_plants_differ_by_the_gyroscopic_torque_once_the_body_rolls_and_yaws():
     np.testing.assert_allclose(measured, expected, rtol=0.1)
 
 
-# --- lost flights ------------------------------------------------------------------------------
+# --- flights that end early --------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("plant", PLANTS)
 @pytest.mark.parametrize("engine", ENGINES)
-def test_upside_down_start_is_lost_with_cause_time_and_complete_log(plant, engine):
+def test_upside_down_start_diverges_with_cause_time_and_complete_log(plant, engine):
     flight = tiltsim.simulate(
         scenario(
             initial={"attitude": [np.pi, 0.0, 0.0], "rotor_speed": 300.0},
@@ -301,7 +301,7 @@ def test_exact_decoupling_ends_when_a_rotor_stops():
     assert "rotor 3 came to a stop" in flight.end.cause
 
 
-def test_interrupt_keeps_what_was_flown():
+def test_interrupt_keeps_the_samples_so_far():
     def stop_at_half_a_second(sample):
         if sample[0] >= 0.2:
             raise KeyboardInterrupt
@@ -428,7 +428,7 @@ def test_samples_cannot_be_changed_behind_the_columns():
         flight.samples[0, 0] = 1.0
 
 
-def test_a_flight_is_told_of_in_one_line_and_knows_its_columns():
+def test_a_flight_has_a_one_line_repr_and_lists_its_columns():
     flown = tiltsim.simulate(
         tiltsim.parse_scenario({"simulation": {"duration": 0.1, "engine": "python"}})
     )

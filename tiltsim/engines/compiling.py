@@ -137,6 +137,6 @@ _registering: Final = Lock()
 
 
 @scalar
-def no_sign_checks(values: Any, parameters: Any) -> tuple[float]:
+def no_sign_check_values(values: Any, parameters: Any) -> tuple[float]:
     """For loops that leave the sign checks to Python."""
     return (1.0,)

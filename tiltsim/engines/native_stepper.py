@@ -10,7 +10,12 @@ from numba.extending import register_jitable
 
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.engines.cache import announce_native_code
-from tiltsim.engines.compiling import INNER, compiled, no_sign_checks, register_scalar_functions
+from tiltsim.engines.compiling import (
+    INNER,
+    compiled,
+    no_sign_check_values,
+    register_scalar_functions,
+)
 from tiltsim.engines.recorder import record_sample, recording_is_over
 from tiltsim.equations.ode3 import make_stepper
 from tiltsim_controllers.mathematics.records import record_dtype
@@ -37,7 +42,7 @@ def compile_stepper(loop: ClosedLoop) -> tuple[Any, Any]:
     register_scalar_functions()
     assert loop.equations is not None
     inputs, observe = loop.equations.inputs, loop.equations.observe
-    watch = loop.monitoring.sign_check_values or no_sign_checks
+    watch = loop.monitoring.sign_check_values or no_sign_check_values
     limit_exceeded = loop.kind.limit_exceeded
     stepper = register_jitable(**INNER)(make_stepper(loop.equations))
 

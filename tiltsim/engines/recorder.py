@@ -50,7 +50,19 @@ def sample_is_due(recorder):  # type: ignore[no-untyped-def]
 
 @register_jitable(**INNER)
 def record_sample(recorder, time, values, checked, limit_exceeded, knots):  # type: ignore[no-untyped-def]
-    """Record a sample; end the recording where the `TerminationMonitor` would end the flight."""
+    """Record a sample; end the recording where the `TerminationMonitor` would end the flight.
+
+    Parameters
+    ----------
+    recorder
+        Address of a `Recorder`'s memory.
+    time, values
+        The time (s) and the fields after it.
+    checked
+        The numbers that must keep their signs.
+    limit_exceeded, knots
+        See `tiltsim.closed_loop.vehicle_kind.VehicleKind`; knots of gait and reference.
+    """
     head = carray(bytes_at(recorder), (1,), _RECORDER)
     samples = int(head[0].samples)
     capacity = int(head[0].capacity)

@@ -8,7 +8,7 @@ memory holds as many flights as there are rows, however many are flown.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from time import perf_counter
 from typing import Any, Final, Generic, TypeVar
@@ -55,12 +55,6 @@ class _Row:
         self.recorder = plant.recorder(len(self.intervals), self.interval, last)
         self.saved = [(0, plant.state)]  # steps and state at the start of the last two calls
         self.wall_time = 0.0
-
-    @property
-    def steps(self) -> int:
-        """Physics steps up to the last sample."""
-        taken = len(self.recorder.samples)
-        return sum(self.intervals) if self.recorder.full else taken * self.interval
 
     def save(self, state: Floats) -> None:
         """Save the state at the start of a call."""
@@ -124,79 +118,84 @@ class NativeBatch(Generic[Result]):
         simulations = [assembly.scenario.simulation for assembly in assemblies]
         largest = max(s.steps // s.record_steps for s in simulations) + 2
         fitting = MEMORY // (8 * len(assemblies[0].loop.sample_fields) * largest)
-        self._size = max(1, min(len(assemblies), ROWS_PER_THREAD * threads, fitting))
+        size = max(1, min(len(assemblies), ROWS_PER_THREAD * threads, fitting))
+        self._rows: list[_Row | None] = [None] * size
+        self._batch: Any = None
+        self._unfinished: deque[tuple[int, Future[Result]]] = deque()
 
     def results(self) -> Iterator[tuple[int, Result]]:
         """Pairs of a flight's place and its result, in the order in which they become available."""
-        from mujoco.batch import Batch
-
-        unfinished: deque[tuple[int, Future[Result]]] = deque()
-        rows: list[_Row | None] = [None] * self._size
-        batch: Any = None
         steps = 256
         while True:
-            for place in range(self._size):
-                while rows[place] is None and self._waiting:
-                    new = self._take_next()
-                    if new.end is not None:
-                        unfinished.append((new.index, self._hand_over(new)))
-                        continue
-                    if batch is None:
-                        batch = Batch(new.plant.model, self._size, self._threads)
-                    rows[place] = new
-                    batch.state[place] = new.saved[-1][1]
-                    batch.state[place, new.plant.header_offset + RECORDER] = new.recorder.address
-            flying = {place: row for place, row in enumerate(rows) if row is not None}
+            self._fill_free_rows()
+            flying = {place: row for place, row in enumerate(self._rows) if row is not None}
             if flying:
-                steps = self._fly(batch, flying, steps)
-                for place, row in flying.items():
-                    if row.recorder.full or row.recorder.terminated or batch.warning[place].any():
-                        batch.warning[place] = 0
-                        rows[place] = None
-                        if row.recorder.terminated or not row.recorder.full:
-                            # Its end is located with MuJoCo's callback, which is global.
-                            flight = row.finish()
-                            future = self._pool.submit(self._result, flight)
-                        else:
-                            future = self._hand_over(row)
-                        unfinished.append((row.index, future))
-            while unfinished and (unfinished[0][1].done() or not flying):
-                index, future = unfinished.popleft()
-                yield index, future.result()
-            if len(unfinished) > 2 * self._size:  # the pool cannot keep up: wait
-                index, future = unfinished.popleft()
-                yield index, future.result()
+                steps = self._step(flying, steps)
+                self._free_finished_rows(flying)
+            while self._unfinished and (self._unfinished[0][1].done() or not flying):
+                yield self._wait_for_next()
+            if len(self._unfinished) > 2 * len(self._rows):  # the pool cannot keep up
+                yield self._wait_for_next()
             if not flying and not self._waiting:
                 return
+
+    def _wait_for_next(self) -> tuple[int, Result]:
+        index, future = self._unfinished.popleft()
+        return index, future.result()
+
+    def _fill_free_rows(self) -> None:
+        from mujoco.batch import Batch
+
+        for place in range(len(self._rows)):
+            while self._rows[place] is None and self._waiting:
+                row = self._take_next()
+                if row.end is not None:
+                    self._finish_in_pool(row)
+                    continue
+                if self._batch is None:
+                    self._batch = Batch(row.plant.model, len(self._rows), self._threads)
+                self._rows[place] = row
+                self._batch.state[place] = row.saved[-1][1]
+                self._batch.state[place, row.plant.header_offset + RECORDER] = row.recorder.address
+
+    def _free_finished_rows(self, flying: Mapping[int, _Row]) -> None:
+        for place, row in flying.items():
+            recorder = row.recorder
+            if recorder.full or recorder.terminated or self._batch.warning[place].any():
+                self._batch.warning[place] = 0
+                self._rows[place] = None
+                if recorder.terminated or not recorder.full:
+                    # Its end is located here, with MuJoCo's callback, which is global.
+                    flight = row.finish()
+                    self._unfinished.append((row.index, self._pool.submit(self._result, flight)))
+                else:
+                    self._finish_in_pool(row)
+
+    def _finish_in_pool(self, row: _Row) -> None:
+        future = self._pool.submit(lambda: self._result(row.finish()))
+        self._unfinished.append((row.index, future))
 
     def _take_next(self) -> _Row:
         index, assembly = self._waiting.popleft()
         key = model_cache_key(assembly.scenario)
         model = self._models.get(key)
         if model is None:
-            if len(self._models) > 2 * self._size:
+            if len(self._models) > 2 * len(self._rows):
                 self._models.clear()
             model = self._models[key] = flight_model(assembly, self._knots)
         return _Row(index, assembly, MujocoPlant(assembly, model, "native"))
 
-    def _hand_over(self, row: _Row) -> Future[Result]:
-        return self._pool.submit(lambda: self._result(row.finish()))
-
-    def _fly(self, batch: Any, flying: dict[int, _Row], steps: int) -> int:
-        """Fly every row for some steps; returns how many to take next."""
+    def _step(self, flying: Mapping[int, _Row], steps: int) -> int:
+        """Step every row; returns how many steps to take next."""
+        batch, any_row = self._batch, next(iter(flying.values()))
         places = np.array(list(flying), dtype=np.int32)
-        any_model = next(iter(flying.values())).plant.model
-        by_place = [
-            row.plant.model if row else any_model for row in map(flying.get, range(self._size))
-        ]
-        batch.set_models(by_place)
+        batch.set_models([(row or any_row).plant.model for row in self._rows])
         steps = max(steps, *(row.interval for row in flying.values()), 1)
         for place, row in flying.items():
             row.save(batch.state[place])
         before = batch.bind("time")[places].copy()
-        callback = next(iter(flying.values())).plant.callback
         start = perf_counter()
-        with control_callback(callback), quiet_warnings():
+        with control_callback(any_row.plant.callback), quiet_warnings():
             batch.rollout(steps, record=(), ids=places)
         seconds = perf_counter() - start
         flown = batch.bind("time")[places] - before
