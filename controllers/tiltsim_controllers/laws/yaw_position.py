@@ -104,7 +104,7 @@ def acceleration_and_jerk(z_down: Values, vehicle: Vehicle) -> Values:
 
     ``z_down`` is the state `EXTENDED_QUADROTOR_FIELDS` with z down, here and in what follows.
     """
-    roll, pitch, yaw, p, q, _, thrust, thrust_rate = z_down[ROLL : THRUST_RATE + 1]
+    roll, pitch, yaw, p, q, _, thrust, thrust_rate = z_down[ROLL:]
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_from_euler(roll, pitch, yaw)
     mass = vehicle.mass
     return (
@@ -123,7 +123,7 @@ def drift(z_down: Values, vehicle: Vehicle) -> Quad:
 
     Returns the fourth derivative of the position (m/s^4) and the second of yaw (rad/s^2).
     """
-    roll, pitch, yaw, p, q, r, thrust, thrust_rate = z_down[ROLL : THRUST_RATE + 1]
+    roll, pitch, yaw, p, q, r, thrust, thrust_rate = z_down[ROLL:]
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_from_euler(roll, pitch, yaw)
     roll_rate, pitch_rate, yaw_rate = euler_rates(roll, pitch, p, q, r)
     p_drift, q_drift, r_drift = gyroscopic_acceleration(p, q, r, vehicle)
