@@ -16,10 +16,10 @@ from tests.flights import flight as screen_flight
 from tiltsim.cli import main
 from tiltsim.models.tilt_car import TiltCarSpec, compile_tilt_car
 from tiltsim.resources import shipped_folder
-from tiltsim.views.figures.flight import flight_figure
 from tiltsim.views.replay import thrust_sites, visible_model
 from tiltsim.views.rerun.geometry import ground_height
 from tiltsim.views.rerun.recording_file import save_recording
+from tiltsim.views.vehicle_views import flight_figure
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.tilt_car.penguin_cycle import Swing, limit_cycle, lyapunov, lyapunov_bound
 from tiltsim_controllers.tilt_car.planned_direction import GAIN_SETS

@@ -15,7 +15,7 @@ from tiltsim.flight.end import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.views.figures import style
 from tiltsim.views.figures.comparison import comparison_figure
-from tiltsim.views.figures.flight import flight_figure
+from tiltsim.views.vehicle_views import flight_figure
 
 SIGNATURES = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
 PANELS = {"Attitude", "Altitude", "Position error", "Tilt angles", "Rotor speeds", "Plan view"}

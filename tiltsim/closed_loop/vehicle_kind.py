@@ -1,4 +1,7 @@
-"""Kinds of vehicles: what all loops around one kind have in common."""
+"""Kinds of vehicles.
+
+A kind is a folder of `tiltsim.vehicles` and an entry of `tiltsim.views.vehicle_views.VIEWS`.
+"""
 
 from __future__ import annotations
 
@@ -18,16 +21,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class VehicleKind:
-    """What can be told of every vehicle of a kind, and how MuJoCo builds it.
+    """What all vehicles of a kind have in common, and how MuJoCo builds them.
 
     Attributes
     ----------
-    name
-        Metrics and screens find theirs by it.
     observed_fields
-        What every sample of such a vehicle holds after the time.
+        Fields of a sample after the time.
     columns
-        Columns of every flight of such a vehicle and their units, in the order of the file.
+        Columns of every flight and their units, in the order of the file.
     thrusts
         ``(columns so far, scenario) -> columns``: the rotors' thrusts, N.
     compile
@@ -40,11 +41,10 @@ class VehicleKind:
         limit of `tiltsim.closed_loop.limits` that a sample exceeds; ``values`` begin with the
         observed fields.
     metrics
-        ``(columns, scenario, follows_position) -> metrics`` of a flight, but for those that do not
-        depend on the kind.
+        ``(columns, scenario, follows_position) -> metrics`` of a flight, without those of all
+        kinds.
     """
 
-    name: str
     observed_fields: tuple[str, ...]
     columns: Mapping[str, str]
     thrusts: Callable[[Mapping[str, Floats], Scenario], dict[str, Floats]]

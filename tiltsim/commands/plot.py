@@ -69,7 +69,7 @@ def _flights_figure(paths: list[Path], out: Path) -> Figure:
 
         names = flight_names([flight.scenario for flight in flights], paths)
         return comparison_figure(flights, names)
-    from tiltsim.views.figures.flight import flight_figure
+    from tiltsim.views.vehicle_views import flight_figure
 
     return flight_figure(flights[0])
 

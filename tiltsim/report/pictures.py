@@ -61,7 +61,7 @@ class AnalysisPicture(Picture):
 
 @dataclass(frozen=True, kw_only=True)
 class FlightPicture(Picture):
-    """The page of one flight (`tiltsim.views.figures.flight`)."""
+    """The page of one flight (`tiltsim.views.vehicle_views`)."""
 
     address: str
     plant: Plant = "mujoco"
@@ -76,7 +76,7 @@ class FlightPicture(Picture):
     def figure(self, metrics: object) -> Figure:
         """Fly again, and draw."""
         from tiltsim.simulation.simulate import simulate
-        from tiltsim.views.figures.flight import flight_figure
+        from tiltsim.views.vehicle_views import flight_figure
 
         return flight_figure(simulate(variant_for(self.address, self.plant)))
 

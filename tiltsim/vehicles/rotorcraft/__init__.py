@@ -161,7 +161,6 @@ def _initial_motion(plan: FlightPlan) -> tuple[Vector, Vector]:
 
 
 ROTORCRAFT: Final = VehicleKind(
-    name="rotorcraft",
     observed_fields=OBSERVED_FIELDS,
     columns=COLUMN_UNITS,
     thrusts=rotor_thrusts,

@@ -136,7 +136,6 @@ def _initial_motion(plan: FlightPlan) -> tuple[Vector, Vector]:
 
 
 TILT_CAR: Final = VehicleKind(
-    name="tilt_car",
     observed_fields=OBSERVED_FIELDS,
     columns=COLUMN_UNITS,
     thrusts=_thrusts,

@@ -10,24 +10,17 @@ import rerun as rr
 from tiltsim.views.events import Event, EventDetector
 from tiltsim.views.replay import visible_model
 from tiltsim.views.rerun import palette
-from tiltsim.views.rerun.display import Series, VehicleDisplay
-from tiltsim.views.rerun.rotorcraft_display import ROTORCRAFT_DISPLAY
+from tiltsim.views.rerun.display import Series
 from tiltsim.views.rerun.scene import Scene
-from tiltsim.views.rerun.tilt_car_display import TILT_CAR_DISPLAY
 from tiltsim.views.rerun.time_series import TimeSeries
 from tiltsim.views.rerun.timeline import send_rows
+from tiltsim.views.vehicle_views import views_of
 
 if TYPE_CHECKING:
     from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.flight.end import End
     from tiltsim.flight.flight import Flight
     from tiltsim.views.rerun.palette import Color
-
-DISPLAYS: Final[dict[str, VehicleDisplay]] = {
-    "rotorcraft": ROTORCRAFT_DISPLAY,
-    "tilt_car": TILT_CAR_DISPLAY,
-}
-"""Displays by the name of the kind of vehicle."""
 
 _LEVEL_COLORS: Final = {"INFO": palette.GREY, "WARN": palette.AMBER, "ERROR": palette.RED}
 
@@ -67,7 +60,7 @@ class FlightRecorder:
         self.scenario = scenario = assembly.scenario
         self.assembly = assembly
         self.model = visible_model(assembly)
-        self.display = display = DISPLAYS[assembly.loop.kind.name]
+        self.display = display = views_of(assembly).display()
         self.scene = Scene(recording, assembly, self.model, f"world{suffix}", color, name)
         self.plane = None
         if display.plane is not None:

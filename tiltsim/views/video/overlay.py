@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 import numpy as np
@@ -103,10 +102,3 @@ class TiltCarOverlay:
 
     def paint(self, image: Image, sample: int) -> None:
         """See `Overlay.paint`; a tilt-car has no inset."""
-
-
-OVERLAYS: Final[dict[str, Callable[[Flight, int], Overlay]]] = {
-    "rotorcraft": RotorcraftOverlay,
-    "tilt_car": TiltCarOverlay,
-}
-"""Overlays of a flight, for frames of a height (pixels), by the name of the kind of vehicle."""

@@ -23,8 +23,8 @@ from tiltsim.views.replay import (
     vehicle_radius,
     visible_model,
 )
+from tiltsim.views.vehicle_views import views_of
 from tiltsim.views.video.offscreen import Canvas, Image
-from tiltsim.views.video.overlay import OVERLAYS
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ class FlightRenderer:
             self._reference = path if np.ptp(path, axis=0).max() > 0.0 else path[:1]
         self._targets = reference_positions(flight.columns)
         self._position = positions(flight.columns)
-        self._overlay = OVERLAYS[flight.assembly.loop.kind.name](flight, video.height)
+        self._overlay = views_of(flight.assembly).overlay(flight, video.height)
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_TRACKING
         self._camera.trackbodyid = self._body

@@ -1,0 +1,90 @@
+"""How flights of each kind of vehicle are shown: one entry of `VIEWS` per kind."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, Protocol
+
+from tiltsim.vehicles.rotorcraft import ROTORCRAFT
+from tiltsim.vehicles.tilt_car import TILT_CAR
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tiltsim.closed_loop.assembly import Assembly
+    from tiltsim.closed_loop.vehicle_kind import VehicleKind
+    from tiltsim.flight.flight import Flight
+    from tiltsim.views.rerun.display import VehicleDisplay
+    from tiltsim.views.video.overlay import Overlay
+
+
+class VehicleViews(Protocol):
+    """The views of one kind of vehicle; methods import the libraries that they need."""
+
+    def figure(self, flight: Flight) -> Figure:
+        """One flight on a page."""
+
+    def overlay(self, flight: Flight, height: int) -> Overlay:
+        """Camera and captions of a video of a flight, with frames of a height (pixels)."""
+
+    def display(self) -> VehicleDisplay:
+        """Panels and camera in Rerun."""
+
+
+class RotorcraftViews:
+    """Views of tiltrotor and quadrotor."""
+
+    def figure(self, flight: Flight) -> Figure:
+        """See `VehicleViews.figure`."""
+        from tiltsim.views.figures.rotorcraft import rotorcraft_figure
+
+        return rotorcraft_figure(flight)
+
+    def overlay(self, flight: Flight, height: int) -> Overlay:
+        """See `VehicleViews.overlay`."""
+        from tiltsim.views.video.overlay import RotorcraftOverlay
+
+        return RotorcraftOverlay(flight, height)
+
+    def display(self) -> VehicleDisplay:
+        """See `VehicleViews.display`."""
+        from tiltsim.views.rerun.rotorcraft_display import ROTORCRAFT_DISPLAY
+
+        return ROTORCRAFT_DISPLAY
+
+
+class TiltCarViews:
+    """Views of the tilt-car."""
+
+    def figure(self, flight: Flight) -> Figure:
+        """See `VehicleViews.figure`."""
+        from tiltsim.views.figures.tilt_car import tilt_car_figure
+
+        return tilt_car_figure(flight)
+
+    def overlay(self, flight: Flight, height: int) -> Overlay:
+        """See `VehicleViews.overlay`."""
+        from tiltsim.views.video.overlay import TiltCarOverlay
+
+        return TiltCarOverlay(flight, height)
+
+    def display(self) -> VehicleDisplay:
+        """See `VehicleViews.display`."""
+        from tiltsim.views.rerun.tilt_car_display import TILT_CAR_DISPLAY
+
+        return TILT_CAR_DISPLAY
+
+
+VIEWS: Final[dict[VehicleKind, VehicleViews]] = {
+    ROTORCRAFT: RotorcraftViews(),
+    TILT_CAR: TiltCarViews(),
+}
+
+
+def views_of(assembly: Assembly) -> VehicleViews:
+    """The views of an assembly's kind of vehicle."""
+    return VIEWS[assembly.loop.kind]
+
+
+def flight_figure(flight: Flight) -> Figure:
+    """The page of a flight, with the panels of its kind of vehicle."""
+    return views_of(flight.assembly).figure(flight)
