@@ -320,4 +320,4 @@ def test_run_check_and_plot_from_the_command_line(tmp_path, capsys):
     assert (out / "flight.png").stat().st_size > 20_000
     assert main(["check", name, "--set", "simulation.plant=thesis"]) == 0
     assert main(["gait", name]) == 2
-    assert "has no gait of four tilt angles" in capsys.readouterr().err
+    assert "does not have a gait of four tilt angles" in capsys.readouterr().err
