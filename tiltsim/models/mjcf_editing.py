@@ -21,8 +21,8 @@ def parse_mjcf(path: Path) -> Any:
 def remove_visuals(root: Any, *, contacts: bool) -> None:
     """Remove all that is only drawn or measured: geoms, cameras, lights, sensors and their sites.
 
-    ``contacts`` keeps the geoms that take part in contacts. The shipped vehicles have neither springs
-    nor dampers, so that MuJoCo need not look for them.
+    ``contacts`` keeps the geoms that take part in contacts. The shipped vehicles have neither
+    springs nor dampers, so that MuJoCo need not look for them.
     """
     root.option.flag.spring = root.option.flag.damper = "disable"
     for geom in root.find_all("geom"):
