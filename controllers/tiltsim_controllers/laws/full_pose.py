@@ -348,8 +348,9 @@ def full_pose_inputs(
     rows = pose_rows(trig, torque, (w1 / weight, w2 / weight, w3 / weight, w4 / weight))
     if health != (1.0, 1.0, 1.0, 1.0):
         a1, a2, a3, a4, a5, a6 = rows
-        force_rows = _masked(a1, health), _masked(a2, health), _masked(a3, health)
-        rows = (*force_rows, _masked(a4, health), _masked(a5, health), _masked(a6, health))
+        a1, a2, a3 = _masked(a1, health), _masked(a2, health), _masked(a3, health)
+        a4, a5, a6 = _masked(a4, health), _masked(a5, health), _masked(a6, health)
+        rows = a1, a2, a3, a4, a5, a6
     u1, u2, u3, u4, turn_1, turn_2, turn_3, turn_4 = minimum_norm_inputs(rows, desired)
 
     # w' = 2 |varpi| varpi'.
