@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from tiltsim.commands.options import Subparsers, add_jobs, add_overrides
 from tiltsim.commands.progress import announce_compilation
-from tiltsim.commands.text import counted
+from tiltsim.commands.text import counted, tally
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INVALID_INPUT, VEHICLE_LOST
 from tiltsim.system.interrupts import defer_interrupts
 
@@ -71,10 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
     labels = Counter(
         "without expectations" if _is_unchecked(result) else result.status for result in results
     )
-    print(
-        f"\n{counted(len(results), 'scenario', 'scenarios')}: "
-        + ", ".join(f"{n} {label}" for label, n in labels.items())
-    )
+    print(f"\n{counted(len(results), 'scenario', 'scenarios')}: {tally(labels)}")
     counts = Counter(result.status for result in results)
     if counts["invalid"] or counts["crashed"]:
         return INVALID_INPUT

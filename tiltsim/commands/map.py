@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.angles import allow_negative_lists, parse_angles, parse_vehicle, vehicle_text
 from tiltsim.commands.options import Subparsers, add_json, add_plot, add_vehicle, prepare_figure
-from tiltsim.commands.text import aligned, json_text, print_figure_path
+from tiltsim.commands.text import aligned, json_text, print_figure_path, tally
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
 
 if TYPE_CHECKING:
@@ -102,7 +102,6 @@ def _color(option: str, name: str) -> str:
 def _summary(report: dict[str, Any]) -> str:
     blue = report["blue"]
     counts = report["roots"]["count"]
-    classes = ", ".join(f"{count} {name}" for name, count in report["roots"]["classes"].items())
     rows = [
         ("vehicle", vehicle_text(report["vehicle"])),
         ("delta = atan(K_m / (L K_f))", f"{report['delta']:.9g} rad"),
@@ -118,7 +117,7 @@ def _summary(report: dict[str, Any]) -> str:
             "roots on the 17 x 17 grid",
             f"{counts[8][8]} inside, {counts[0][8]} on sides, {counts[0][0]} in corners",
         ),
-        ("their classes", classes),
+        ("their classes", tally(report["roots"]["classes"])),
     ]
     lines = aligned(rows)
     lines += [f"warning: {text}" for text in report["warnings"]]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 Subparsers: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
-"""Where `tiltsim.cli.build_parser` lets commands declare themselves."""
+"""The subcommands of the parser that `tiltsim.cli.build_parser` makes."""
 
 
 def positive_integer(text: str) -> int:
@@ -29,15 +29,15 @@ def add_jobs(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_overrides(parser: argparse.ArgumentParser, what: str, example: str) -> None:
-    """Declare ``--set``, which overrides keys of ``what``, with an example in its help."""
+def add_overrides(parser: argparse.ArgumentParser, target: str, example: str) -> None:
+    """Declare ``--set``, which overrides keys of ``target``, with an example in its help."""
     parser.add_argument(
         "--set",
         action="append",
         default=[],
         metavar="KEY=VALUE",
         dest="overrides",
-        help=f"override a key of {what}, such as {example}; repeatable",
+        help=f"override a key of {target}, such as {example}; repeatable",
     )
 
 

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from tiltsim.commands.options import Subparsers, add_jobs
+from tiltsim.commands.text import tally
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
 
 
@@ -53,14 +54,8 @@ def run(arguments: argparse.Namespace) -> int:
     target.write_text(page(report), encoding="utf-8")
     if arguments.markdown is not None:
         arguments.markdown.write_text(markdown(report), encoding="utf-8")
-    counts = count(report.rows)
-    print(
-        f"{len(report.rows)} claims: "
-        + ", ".join(
-            f"{n} {outcome.value}"
-            for outcome, n in sorted(counts.items(), key=lambda item: item[0].rank)
-        )
-    )
+    counts = sorted(count(report.rows).items(), key=lambda item: item[0].rank)
+    print(f"{len(report.rows)} claims: {tally({kind.value: number for kind, number in counts})}")
     for failure in report.failures:
         print(f"FAILED  {failure_text(failure)}")
     print(f"report written to {target}")

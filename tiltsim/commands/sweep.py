@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from tiltsim.commands.options import Subparsers, add_jobs, add_overrides, add_quiet
 from tiltsim.commands.progress import counting_bar
-from tiltsim.commands.text import counted
+from tiltsim.commands.text import counted, tally
 from tiltsim.exit_codes import INTERRUPTED
 
 if TYPE_CHECKING:
@@ -88,5 +88,5 @@ def _summary(dataset: Path, units: tuple[str, str]) -> str:
     import pyarrow.parquet as pq
 
     ends = Counter(pq.read_table(dataset, columns=["end"])["end"].to_pylist())
-    counts = ", ".join(f"{count} {end}" for end, count in ends.most_common())
-    return f"{counted(sum(ends.values()), *units)}: {counts}\nwritten to {dataset}"
+    total = counted(sum(ends.values()), *units)
+    return f"{total}: {tally(dict(ends.most_common()))}\nwritten to {dataset}"

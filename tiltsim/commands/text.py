@@ -6,7 +6,7 @@ import argparse
 import json
 import shutil
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from textwrap import fill
 from typing import Any
 
@@ -25,6 +25,11 @@ def numbers(values: Iterable[float]) -> str:
 def counted(count: int, one: str, many: str) -> str:
     """A count with its noun: ``1 flight``, ``2 flights``."""
     return f"{count} {one if count == 1 else many}"
+
+
+def tally(counts: Mapping[str, int]) -> str:
+    """Counts by name: ``3 passed, 1 failed``."""
+    return ", ".join(f"{count} {name}" for name, count in counts.items())
 
 
 def print_figure_path(arguments: argparse.Namespace) -> None:

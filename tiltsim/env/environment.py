@@ -45,7 +45,7 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
     Parameters
     ----------
     task
-        What an episode flies, observes, rewards and ends at.
+        Its scenario, observation, reward and termination make an episode.
     seed
         Of the scenarios drawn; default: the ``simulation.seed`` of the task's scenario. The same
         seed and the same actions give the same episodes, bit for bit.

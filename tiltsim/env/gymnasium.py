@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from tiltsim.env.environment import TiltrotorEnv
+from tiltsim.env.environment import Environment, TiltrotorEnv
 from tiltsim_controllers.mathematics.scalar import Floats
 
 try:
@@ -25,25 +25,25 @@ ID: Final = "tiltsim/Tiltrotor-v0"
 
 
 class GymnasiumEnv(gymnasium.Env):  # type: ignore[misc]
-    """A `TiltrotorEnv` under Gymnasium's interface.
+    """An `Environment` under Gymnasium's interface.
 
-    Actions are scaled to -1 .. 1, each entry between the bounds of `TiltrotorEnv.action_spec`, so
+    Actions are scaled to -1 .. 1, each entry between the bounds of `Environment.action_spec`, so
     that zeros are the middle: for the default scenario, hover. Observations are the same flat dict;
-    ``gymnasium.wrappers.FlattenObservation`` makes one vector of it. A lost flight terminates the
-    episode, the end of the scenario truncates it.
+    ``gymnasium.wrappers.FlattenObservation`` makes one vector of it. An episode terminates when the
+    vehicle is lost, and is truncated at the end of the scenario.
 
     Parameters
     ----------
     env
-        The environment to adapt; default: one made from the other arguments.
+        The environment to adapt; default: a `TiltrotorEnv` with the other arguments.
     **arguments
         Those of `TiltrotorEnv`.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
 
-    def __init__(self, env: TiltrotorEnv | None = None, **arguments: Any) -> None:
-        self.env = TiltrotorEnv(**arguments) if env is None else env
+    def __init__(self, env: Environment | None = None, **arguments: Any) -> None:
+        self.env: Environment = TiltrotorEnv(**arguments) if env is None else env
         self.render_mode = None
         self._flying = False
         spec = self.env.action_spec()
@@ -57,7 +57,7 @@ class GymnasiumEnv(gymnasium.Env):  # type: ignore[misc]
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Floats], dict[str, Any]]:
-        """Begin an episode; a seed starts the draws anew. There are no options."""
+        """Begin an episode; a seed restarts the random draws. There are no options."""
         super().reset(seed=seed)
         self.env.reseed(self.np_random)
         observation = dict(self.env.reset().observation)
@@ -65,18 +65,16 @@ class GymnasiumEnv(gymnasium.Env):  # type: ignore[misc]
         return observation, {}
 
     def step(self, action: Floats) -> tuple[dict[str, Floats], float, bool, bool, dict[str, Any]]:
-        """Hold an action for one control step; ``info["cause"]`` tells why a flight was lost."""
+        """Hold an action for one control step; ``info["cause"]`` is that of a termination."""
         if not self._flying:
-            raise RuntimeError("no episode goes on: call reset()")
+            raise RuntimeError("the episode has ended: call reset()")
         array = np.asarray(action, dtype=np.float64)
         if array.shape != self._middle.shape:
             raise ValueError(f"action of shape {array.shape}; expected {self._middle.shape}")
         step = self.env.step(self._middle + self._half * array)
         self._flying = not step.last()
         lost = bool(step.last() and step.discount == 0.0)
-        info: dict[str, Any] = (
-            {"cause": self.env.end.cause} if lost and self.env.end is not None else {}
-        )
+        info = {"cause": self.env.end.cause} if lost and self.env.end is not None else {}
         return dict(step.observation), float(step.reward), lost, step.last() and not lost, info
 
 

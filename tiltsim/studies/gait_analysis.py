@@ -41,18 +41,14 @@ if TYPE_CHECKING:
 
     from tiltsim_controllers.analysis.two_color_planner import Path
     from tiltsim_controllers.gaits.plans import Gait
-    from tiltsim_controllers.mathematics.scalar import Quad
+    from tiltsim_controllers.mathematics.scalar import Floats, Quad
     from tiltsim_controllers.vehicle.parameters import Vehicle
-
-    Array = NDArray[np.float64]
-
 
 NEARLY_SINGULAR: Final = 1e-3
 """Ratio of singular values of tau below which a gait has full rank only because of rounding.
 
 Blue gaits with angles rounded as in the thesis stay below 3e-4, nonsingular gaits above 1e-2.
 """
-
 
 REST_TOLERANCE: Final = 1e-6
 """Fraction of the fastest rotor's speed below which a rotor counts as at rest."""
@@ -314,7 +310,7 @@ def vehicle_name(vehicle: Vehicle) -> str | dict[str, float]:
     return dict(vehicle._asdict())
 
 
-def _instant(angles: Array, vehicle: Vehicle, roll: float, pitch: float) -> dict[str, Any]:
+def _instant(angles: Floats, vehicle: Vehicle, roll: float, pitch: float) -> dict[str, Any]:
     """The singularity analysis of tilt angles of shape (4,) or (N, 4)."""
     R, R_phi, R_theta = residuals(angles, vehicle)
     return {
@@ -329,14 +325,14 @@ def _instant(angles: Array, vehicle: Vehicle, roll: float, pitch: float) -> dict
     }
 
 
-def _vectors(directions: Array) -> Any:
+def _vectors(directions: Floats) -> Any:
     """Vectors as lists, null for NaN."""
     if directions.ndim > 1:
         return [_vectors(direction) for direction in directions]
     return None if np.isnan(directions).any() else directions.tolist()
 
 
-def _when(chosen: NDArray[np.bool_], times: Array, gait: Gait) -> str:
+def _when(chosen: NDArray[np.bool_], times: Floats, gait: Gait) -> str:
     if gait.is_constant or chosen.all():
         return ""
     return f" at t = {times[chosen][0]:.3f} s"

@@ -24,27 +24,13 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class FinishedChunk:
-    """The rows of a chunk, ready to be written.
-
-    Attributes
-    ----------
-    number
-        Of the chunk.
-    rows
-        Number of rows.
-    table
-        The rows as a Parquet file.
-    flights
-        Files ``flight.parquet`` by point, if the sweep keeps flights.
-    versions
-        Of the packages that made the rows.
-    """
+    """The rows of a chunk, ready to be written."""
 
     number: int
     rows: int
-    table: bytes
-    flights: dict[int, bytes]
-    versions: dict[str, str]
+    table: bytes  # the rows as a Parquet file
+    flights: dict[int, bytes]  # flight.parquet by point, if the sweep keeps flights
+    versions: dict[str, str]  # of the packages that made the rows
 
 
 @dataclass(frozen=True)

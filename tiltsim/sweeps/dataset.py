@@ -25,13 +25,8 @@ Column = npt.NDArray[Any]
 class SweepResults:
     """The rows of a sweep by column, and the points of the sweep.
 
-    Attributes
-    ----------
-    points
-        The sweep's.
-    columns
-        Each of shape (rows,), in the order of the points: floats (NaN where there is no value),
-        objects for text and lists. Entries of lists have columns of their own, ``key[0]``.
+    Columns have shape (rows,), in the order of the points: floats (NaN for missing values), objects
+    for text and lists. Entries of lists have their own columns, ``key[0]``.
     """
 
     points: SweepPoints

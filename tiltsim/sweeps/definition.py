@@ -23,24 +23,12 @@ COSMETIC: Final = ("title", "source", "without", "plot")
 
 @dataclass(frozen=True)
 class SweepDefinition:
-    """All that decides the rows of a sweep, in plain dicts and lists.
+    """All that decides the rows of a sweep, in plain dicts and lists."""
 
-    Attributes
-    ----------
-    address
-        The sweep's name on the command line.
-    sweep
-        The validated file.
-    base
-        The base scenario with every default written out.
-    versions
-        Installed versions of `VERSIONS`.
-    """
-
-    address: str
-    sweep: dict[str, Any]
-    base: dict[str, Any]
-    versions: dict[str, str]
+    address: str  # the sweep's name on the command line
+    sweep: dict[str, Any]  # the validated file
+    base: dict[str, Any]  # the base scenario with every default written out
+    versions: dict[str, str]  # installed versions of `VERSIONS`
 
     def to_json(self) -> str:
         """The definition as text, for a file."""

@@ -74,7 +74,7 @@ def _fly(
     examples = check_points(points)
     count = sum(len(points.chunk(number)) for number in numbers)
     steps = count * max(example.simulation.steps for example in examples)
-    # A cluster's workers compile for themselves, so nothing is compiled here.
+    # A cluster's workers compile their own native code; nothing is compiled here.
     engine = shared_engine([] if cluster is not None else examples, steps)
     work = ChunkWork(points.definition.to_json(), engine)
     if cluster is not None:
