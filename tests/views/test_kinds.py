@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from tiltsim.views.figures.flight import FIGURES
 
 from tiltsim.laws.assembling import LOOPS
-from tiltsim.views.figures.flight import FIGURES
 from tiltsim.views.rerun.flight_recorder import DISPLAYS
 from tiltsim.views.video.overlay import OVERLAYS
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.scenario.flight_plan import FlightPlan
+from tiltsim_controllers.mathematics.scalar import Values, Vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,3 +29,7 @@ class Assembly(FlightPlan):
     loop: ClosedLoop
     setup: ControlSetup
     follows_position: bool
+
+    def sign_check_values(self, values: Vector) -> Values:
+        """The numbers of `Monitoring.sign_check_values`, from the ``values`` of a sample."""
+        return self.loop.monitoring.sign_check_values(values, self.setup.parameters)

@@ -45,13 +45,6 @@ class ControlSetup(NamedTuple):
         return np.array([*flatten(self.parameters), *self.knots])
 
 
-class SignCheck(NamedTuple):
-    """A number that has to keep its sign; where it reaches zero the flight ends for this cause."""
-
-    value: float
-    cause: str
-
-
 @dataclass(frozen=True, eq=False)
 class Dynamics:
     """The model in MuJoCo and its state.
@@ -128,29 +121,27 @@ class Columns:
     observe_reads_controls: bool = False
 
 
-def no_sign_checks(_sample: Mapping[str, float], _setup: ControlSetup) -> tuple[SignCheck, ...]:
+@scalar
+def nothing_singular(values: Vector, parameters: Any) -> tuple[float]:
     """For controllers that are singular nowhere."""
-    return ()
+    return (1.0,)
 
 
 @dataclass(frozen=True, eq=False)
 class Monitoring:
-    """Where the controller becomes singular.
+    """Where the controller becomes singular: numbers that have to keep their sign.
 
     Attributes
     ----------
-    sign_checks
-        ``(sample by field, setup) -> SignCheck, ...``.
     sign_check_values
-        Scalar function ``(values, parameters) -> numbers``: at least the values of
-        ``sign_checks``, from ``values`` as `Columns.observe` returns them. None leaves the check
-        to Python.
+        Scalar function ``(values, parameters) -> numbers``, from ``values`` as `Columns.observe`
+        returns them.
+    causes
+        ``(sample by field) -> texts``: why the flight ends where each of them reaches zero.
     """
 
-    sign_checks: Callable[[Mapping[str, float], ControlSetup], tuple[SignCheck, ...]] = (
-        no_sign_checks
-    )
-    sign_check_values: Callable[..., Values] | None = None
+    sign_check_values: Callable[..., Values] = nothing_singular
+    causes: Callable[[Mapping[str, float]], tuple[str, ...]] = lambda _sample: ("",)
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ from numba.core.typing.templates import infer, infer_global, make_overload_templ
 
 from tiltsim.engines.cache import native_code_folder, native_code_is_cacheable
 from tiltsim.system.locks import locked
-from tiltsim_controllers.mathematics.scalar import scalar, scalar_functions
+from tiltsim_controllers.mathematics.scalar import scalar_functions
 
 ERROR_MODEL: Final = {"error_model": "numpy"}
 """Division by zero gives infinity or NaN, as in C; MuJoCo then reports a bad control."""
@@ -134,9 +134,3 @@ def register_scalar_functions() -> None:
 
 _registered: Final[list[Callable[..., Any]]] = []
 _registering: Final = Lock()
-
-
-@scalar
-def no_sign_check_values(values: Any, parameters: Any) -> tuple[float]:
-    """For loops that leave the sign checks to Python."""
-    return (1.0,)

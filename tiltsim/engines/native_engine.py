@@ -22,7 +22,6 @@ from tiltsim.engines.base import EngineName, check_model
 from tiltsim.engines.cache import announce_native_code, mark_native_code_compiled
 from tiltsim.engines.compiling import (
     compiled_callback,
-    no_sign_check_values,
     register_scalar_functions,
 )
 from tiltsim.engines.mjdata_layout import mjdata_layout
@@ -49,7 +48,7 @@ def compile_control(loop: ClosedLoop) -> Any:
     """
     announce_native_code(loop.native_name("mujoco"))
     controls, hold, signature = loop.sampling.controls, loop.sampling.hold, loop.signature
-    observe, watch = loop.columns.observe, loop.monitoring.sign_check_values or no_sign_check_values
+    observe, watch = loop.columns.observe, loop.monitoring.sign_check_values
     register_scalar_functions()
     limit_exceeded = loop.kind.limit_exceeded
     nq, nv, na, nu = loop.dynamics.sizes

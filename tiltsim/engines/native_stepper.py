@@ -13,7 +13,6 @@ from tiltsim.engines.cache import announce_native_code
 from tiltsim.engines.compiling import (
     INNER,
     compiled,
-    no_sign_check_values,
     register_scalar_functions,
 )
 from tiltsim.engines.recorder import record_sample, recording_is_over
@@ -42,7 +41,7 @@ def compile_stepper(loop: ClosedLoop) -> tuple[Any, Any]:
     register_scalar_functions()
     assert loop.equations is not None
     inputs, observe = loop.equations.inputs, loop.equations.observe
-    watch = loop.monitoring.sign_check_values or no_sign_check_values
+    watch = loop.monitoring.sign_check_values
     limit_exceeded = loop.kind.limit_exceeded
     stepper = register_jitable(**INNER)(make_stepper(loop.equations))
 

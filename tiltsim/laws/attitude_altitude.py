@@ -12,12 +12,12 @@ from tiltsim.closed_loop.loop import (
     Equations,
     Monitoring,
     Sampling,
-    SignCheck,
     SupervisedLaw,
 )
 from tiltsim.equations.tiltrotor import law_state
 from tiltsim.laws.tiltrotor import (
-    determinant_check,
+    determinant_and_speed_causes,
+    determinant_and_speeds,
     gait_equation_rates,
     gait_servo_commands,
     initial_equation_state,
@@ -25,10 +25,7 @@ from tiltsim.laws.tiltrotor import (
     observe_tiltrotor,
     reference_columns,
     refreshed_controls,
-    rotor_speed_checks,
-    rotor_speeds_along_spin,
     rotor_thrust_controls,
-    scaled_determinant,
     servo_lead,
     singularity_columns,
     tiltrotor_dynamics,
@@ -140,27 +137,15 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 
 
 @scalar
-def sign_check_values(
-    values: Vector, parameters: LoopParameters
-) -> tuple[float, float, float, float, float]:
+def sign_check_values(values: Vector, parameters: LoopParameters) -> Values:
     """The determinant of the decoupling matrix, and the rotor speeds where it vanishes with them.
 
     As published, the factor ``2 |varpi|`` is in one row only, and a rotor at rest is harmless.
     """
-    law = parameters.law
-    matrix = scaled_determinant(values, law.vehicle)
-    if law.decoupling == EXACT_DECOUPLING:
-        spin_1, spin_2, spin_3, spin_4 = rotor_speeds_along_spin(values)
-        return matrix, spin_1, spin_2, spin_3, spin_4
-    return matrix, 1.0, 1.0, 1.0, 1.0
-
-
-def _sign_checks(sample: Mapping[str, float], setup: ControlSetup) -> tuple[SignCheck, ...]:
-    law = setup.parameters.law
-    matrix = determinant_check(sample, law.vehicle)
-    return (
-        (matrix, *rotor_speed_checks(sample)) if law.decoupling == EXACT_DECOUPLING else (matrix,)
-    )
+    determinant, spin_1, spin_2, spin_3, spin_4 = determinant_and_speeds(values, parameters)
+    if parameters.law.decoupling == EXACT_DECOUPLING:
+        return determinant, spin_1, spin_2, spin_3, spin_4
+    return determinant, 1.0, 1.0, 1.0, 1.0
 
 
 @scalar
@@ -185,7 +170,7 @@ TILTROTOR: Final = ClosedLoop(
     dynamics=tiltrotor_dynamics(),
     sampling=Sampling(tiltrotor_controls, refreshed_controls),
     columns=Columns(observe_tiltrotor, _derive),
-    monitoring=Monitoring(_sign_checks, sign_check_values),
+    monitoring=Monitoring(sign_check_values, determinant_and_speed_causes),
     equations=Equations(
         inputs=equation_inputs,
         inputs_size=4,

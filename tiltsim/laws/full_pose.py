@@ -16,12 +16,12 @@ from tiltsim.closed_loop.loop import (
 from tiltsim.equations.tiltrotor import FURTHER, equations_of_motion, law_state
 from tiltsim.laws.quadrotor import constant_attitude_references
 from tiltsim.laws.tiltrotor import (
+    ROTOR_STOPS,
     TILT_REFERENCE_COLUMNS,
     four,
     initial_equation_state,
     observe_tiltrotor,
     refreshed_controls,
-    rotor_speed_checks,
     rotor_speeds_along_spin,
     rotor_thrust_controls,
     servo_lead,
@@ -158,7 +158,7 @@ FULL_POSE: Final = ClosedLoop(
     columns=Columns(
         observe_full_pose, _derive, fields=TILT_COMMANDS, units=dict.fromkeys(TILT_COMMANDS, "rad")
     ),
-    monitoring=Monitoring(lambda sample, _setup: rotor_speed_checks(sample), sign_check_values),
+    monitoring=Monitoring(sign_check_values, lambda _sample: ROTOR_STOPS),
     equations=Equations(
         inputs=equation_inputs,
         inputs_size=8,

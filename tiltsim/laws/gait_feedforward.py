@@ -12,13 +12,13 @@ from tiltsim.closed_loop.loop import (
     Equations,
     Monitoring,
     Sampling,
-    SignCheck,
     SupervisedLaw,
 )
 from tiltsim.equations.tiltrotor import FURTHER, law_state
 from tiltsim.laws.attitude_altitude import follows_position
 from tiltsim.laws.tiltrotor import (
-    determinant_check,
+    determinant_and_speed_causes,
+    determinant_and_speeds,
     four,
     gait_equation_rates,
     gait_servo_commands,
@@ -27,10 +27,7 @@ from tiltsim.laws.tiltrotor import (
     observe_tiltrotor,
     reference_columns,
     refreshed_controls,
-    rotor_speed_checks,
-    rotor_speeds_along_spin,
     rotor_thrust_controls,
-    scaled_determinant,
     servo_lead,
     singularity_columns,
     tiltrotor_dynamics,
@@ -165,19 +162,6 @@ def observe_gait_feedforward(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vect
 
 
 @scalar
-def sign_check_values(
-    values: Vector, parameters: LoopParameters
-) -> tuple[float, float, float, float, float]:
-    """The determinant of the decoupling matrix, and the rotor speeds with which it vanishes."""
-    spin_1, spin_2, spin_3, spin_4 = rotor_speeds_along_spin(values)
-    return scaled_determinant(values, parameters.law.vehicle), spin_1, spin_2, spin_3, spin_4
-
-
-def _sign_checks(sample: Mapping[str, float], setup: ControlSetup) -> tuple[SignCheck, ...]:
-    return (determinant_check(sample, setup.parameters.law.vehicle), *rotor_speed_checks(sample))
-
-
-@scalar
 def equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
@@ -230,7 +214,7 @@ GAIT_FEEDFORWARD: Final = ClosedLoop(
         fields=INTEGRAL_FIELDS,
         units=dict.fromkeys(INTEGRAL_FIELDS, "m s"),
     ),
-    monitoring=Monitoring(_sign_checks, sign_check_values),
+    monitoring=Monitoring(determinant_and_speeds, determinant_and_speed_causes),
     equations=Equations(
         inputs=equation_inputs,
         inputs_size=7,

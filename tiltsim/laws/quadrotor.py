@@ -20,13 +20,11 @@ from tiltsim.closed_loop.loop import (
     Equations,
     Monitoring,
     Sampling,
-    SignCheck,
     Sizes,
 )
 from tiltsim.equations.quadrotor import equations_of_motion, initial_state, rigid_body
 from tiltsim.laws.tiltrotor import REFERENCE_COLUMNS, TILT_REFERENCE_COLUMNS
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
-from tiltsim.vehicles.rotorcraft.layout import OBSERVED_FIELDS
 from tiltsim_controllers.analysis.quadrotor_singularity import (
     normalized_determinant,
     published_determinant,
@@ -144,7 +142,7 @@ def observe_extended_equations(
 
 @scalar
 def thrust_axis_value(values: Vector, parameters: object) -> tuple[float]:
-    """The value of `thrust_axis_check`, from a sample's."""
+    """The cosine of the thrust axis's tilt."""
     return (thrust_tilt_cosine(values),)
 
 
@@ -253,11 +251,10 @@ def extended_singularity_columns(
     }
 
 
-def thrust_axis_check(sample: Mapping[str, float]) -> SignCheck:
-    """The cosine of the thrust axis's tilt, zero at a roll or pitch of 90 degrees."""
+def thrust_axis_cause(sample: Mapping[str, float]) -> tuple[str]:
+    """Cause for `thrust_axis_value`: a roll or pitch of 90 degrees."""
     roll, pitch = sample["roll"], sample["pitch"]
-    return SignCheck(
-        thrust_tilt_cosine([sample[name] for name in OBSERVED_FIELDS]),
+    return (
         "the decoupling matrix became singular: the thrust axis came level, "
         f"at roll = {roll:.3g} rad, pitch = {pitch:.3g} rad",
     )

@@ -24,7 +24,7 @@ from tiltsim.laws.quadrotor import (
     observe_equations,
     observe_quadrotor,
     rigid_body_state,
-    thrust_axis_check,
+    thrust_axis_cause,
     thrust_axis_value,
     upright_margin,
 )
@@ -108,7 +108,7 @@ QUADROTOR_ATTITUDE_ALTITUDE: Final = ClosedLoop(
     ),
     sampling=Sampling(attitude_altitude_controls),
     columns=Columns(observe_quadrotor, _derive, observe_reads_controls=True),
-    monitoring=Monitoring(lambda sample, _setup: (thrust_axis_check(sample),), thrust_axis_value),
+    monitoring=Monitoring(thrust_axis_value, thrust_axis_cause),
     equations=Equations(
         inputs=equation_inputs,
         inputs_size=4,

@@ -20,7 +20,7 @@ from tiltsim.laws.quadrotor import (
     observe_extended_quadrotor,
     references,
     rigid_body_state,
-    thrust_axis_check,
+    thrust_axis_cause,
     thrust_axis_value,
 )
 from tiltsim.scenario.quadrotor_controllers import SwitchingController
@@ -107,7 +107,7 @@ SWITCHING: Final = replace(
             observe_reads_controls=True,
         ),
         # The thrust of the extension may be anything while the other controller is active.
-        Monitoring(lambda sample, _setup: (thrust_axis_check(sample),), thrust_axis_value),
+        Monitoring(thrust_axis_value, thrust_axis_cause),
     ),
     # In the zone, where the vehicle is meant to end up, the position is free.
     follows_position=lambda _scenario: False,

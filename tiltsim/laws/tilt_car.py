@@ -15,7 +15,6 @@ from tiltsim.closed_loop.loop import (
     Equations,
     Monitoring,
     Sampling,
-    SignCheck,
     Sizes,
 )
 from tiltsim.laws.tiltrotor import servo_lead
@@ -91,15 +90,12 @@ def derived_columns(
     }
 
 
-def rotors_at_rest(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[SignCheck, ...]:
-    """The sum of the squared rotor speeds: the decoupling matrix loses rank at zero."""
-    squares = sample["rotor_speed_1"] ** 2 + sample["rotor_speed_2"] ** 2
-    return (SignCheck(squares, "the decoupling matrix became singular: both rotors came to rest"),)
+ROTORS_AT_REST: Final = "the decoupling matrix became singular: both rotors came to rest"
 
 
 @scalar
 def sum_of_squared_speeds(values: Vector, parameters: object) -> tuple[float]:
-    """The value of `rotors_at_rest`, from a sample's."""
+    """Zero where the decoupling matrix loses rank."""
     return (values[SPEED_1] * values[SPEED_1] + values[SPEED_2] * values[SPEED_2],)
 
 
@@ -159,7 +155,7 @@ def integrating_loop(
         ),
         sampling=sampling,
         columns=columns,
-        monitoring=Monitoring(rotors_at_rest, sum_of_squared_speeds),
+        monitoring=Monitoring(sum_of_squared_speeds, lambda _sample: (ROTORS_AT_REST,)),
         equations=Equations(
             inputs=inputs,
             inputs_size=3,

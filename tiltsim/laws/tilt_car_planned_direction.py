@@ -14,7 +14,6 @@ from tiltsim.closed_loop.loop import (
     ControlSetup,
     Dynamics,
     Equations,
-    Monitoring,
     Sampling,
     Sizes,
 )
@@ -138,12 +137,6 @@ def observe_planned_direction_equations(
     return x, y, vx, vy, yaw, r, alpha, tilt_rate, speed_1, speed_2
 
 
-@scalar
-def sign_check_values(values: Vector, parameters: LoopParameters) -> tuple[float]:
-    """The controller is singular nowhere."""
-    return (1.0,)
-
-
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     parameters, knots = setup
     law = parameters.law
@@ -184,7 +177,6 @@ PLANNED_DIRECTION: Final = ClosedLoop(
         },
         observe_reads_controls=True,
     ),
-    monitoring=Monitoring(sign_check_values=sign_check_values),
     equations=Equations(
         inputs=planned_direction_equation_inputs,
         inputs_size=2,

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ControlSetup, Dynamics, SignCheck, Sizes
+from tiltsim.closed_loop.loop import ControlSetup, Dynamics, Sizes
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
-from tiltsim.vehicles.rotorcraft.layout import OBSERVED_FIELDS, TILT_RATE_1
+from tiltsim.vehicles.rotorcraft.layout import ROTORS, TILT_RATE_1
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.gaits.tilts import tilt_reference
@@ -198,15 +198,10 @@ def reference_columns(
     return dict(zip(names, rows.T, strict=True))
 
 
-def rotor_speed_checks(sample: Mapping[str, float]) -> tuple[SignCheck, ...]:
-    """Rotor speeds along their spin: the decoupling matrix has the factor ``2 |varpi|``."""
-    return tuple(
-        SignCheck(
-            sign * sample[f"rotor_speed_{rotor}"],
-            f"the decoupling matrix became singular: rotor {rotor} came to a stop",
-        )
-        for rotor, sign in enumerate(SPIN, start=1)
-    )
+ROTOR_STOPS: Final = tuple(
+    f"the decoupling matrix became singular: rotor {rotor} came to a stop" for rotor in ROTORS
+)
+"""Causes for `rotor_speeds_along_spin`: the decoupling matrix has the factor ``2 |varpi|``."""
 
 
 @scalar
@@ -225,11 +220,18 @@ def scaled_determinant(values: Vector, vehicle: Vehicle) -> float:
     return nx * ux + ny * uy + nz * uz
 
 
-def determinant_check(sample: Mapping[str, float], vehicle: Vehicle) -> SignCheck:
-    """`scaled_determinant` of a sample by field."""
+@scalar
+def determinant_and_speeds(values: Vector, parameters: Any) -> Values:
+    """`scaled_determinant` and `rotor_speeds_along_spin`."""
+    determinant = scaled_determinant(values, parameters.law.vehicle)
+    return (determinant, *rotor_speeds_along_spin(values))
+
+
+def determinant_and_speed_causes(sample: Mapping[str, float]) -> tuple[str, ...]:
+    """Causes for `determinant_and_speeds`."""
     angles = ", ".join(f"{sample[name]:.3g}" for name in TILT_COLUMNS)
-    return SignCheck(
-        scaled_determinant([sample[name] for name in OBSERVED_FIELDS], vehicle),
+    determinant = (
         f"the decoupling matrix became singular at roll = {sample['roll']:.3g} rad, "
-        f"pitch = {sample['pitch']:.3g} rad, tilt angles ({angles}) rad",
+        f"pitch = {sample['pitch']:.3g} rad, tilt angles ({angles}) rad"
     )
+    return (determinant, *ROTOR_STOPS)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tiltsim.closed_loop.loop import Columns, ControlSetup, Monitoring, SignCheck
+from tiltsim.closed_loop.loop import Columns, ControlSetup, Monitoring
 from tiltsim.equations.quadrotor import rigid_body
 from tiltsim.laws.quadrotor import (
     EXTENSION_COLUMNS,
@@ -16,7 +16,7 @@ from tiltsim.laws.quadrotor import (
     observe_extended_quadrotor,
     references,
     rigid_body_state,
-    thrust_axis_check,
+    thrust_axis_cause,
     thrust_tilt_cosine,
 )
 from tiltsim.scenario.quadrotor_controllers import YawPositionController
@@ -68,12 +68,6 @@ def sign_check_values(values: Vector, parameters: LoopParameters) -> tuple[float
     return thrust_tilt_cosine(values), values[24]
 
 
-def extension_thrust_check(sample: Mapping[str, float]) -> SignCheck:
-    """The thrust of the extension (N): at zero the decoupling matrix is singular."""
-    thrust = sample["extension_thrust"]
-    return SignCheck(thrust, "the decoupling matrix became singular: the thrust came to zero")
-
-
 @scalar
 def equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
@@ -97,8 +91,11 @@ YAW_POSITION: Final = extended_loop(
         observe_reads_controls=True,
     ),
     Monitoring(
-        lambda sample, _setup: (thrust_axis_check(sample), extension_thrust_check(sample)),
         sign_check_values,
+        lambda sample: (
+            *thrust_axis_cause(sample),
+            "the decoupling matrix became singular: the thrust came to zero",
+        ),
     ),
 )
 """The yaw-position controller of the quadrotor."""

@@ -17,7 +17,7 @@ from tiltsim.engines.callback import control_callback
 from tiltsim.engines.factory import make_engine
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.flight_model import evaluations_per_step, flight_model
-from tiltsim.plants.plant import natively_checked_values, record_step_by_step
+from tiltsim.plants.plant import record_step_by_step
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ class MujocoPlant:
             samples,
             steps * evaluations,
             last_steps * evaluations,
-            natively_checked_values(self._assembly, self.observe()),
+            self._assembly.sign_check_values(self.observe()),
         )
 
     def _record_natively(self, samples: int, steps: int) -> Floats | None:

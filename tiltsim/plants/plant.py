@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 
-from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.engines.base import EngineName
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -62,9 +60,3 @@ def record_step_by_step(plant: Plant, samples: int, steps: int) -> Floats | None
         plant.advance(steps)
         rows.append((plant.time, *plant.observe()))
     return None if plant.fault() else np.array(rows)
-
-
-def natively_checked_values(assembly: Assembly, values: Sequence[float]) -> tuple[float, ...]:
-    """The numbers whose signs native code checks; none where the loop leaves that to Python."""
-    watch = assembly.loop.monitoring.sign_check_values
-    return () if watch is None else watch(values, assembly.setup.parameters)

@@ -14,7 +14,7 @@ from tiltsim.engines.cache import mark_native_code_compiled
 from tiltsim.equations.ode3 import Integration, Stepper, make_stepper
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.flight_model import disturbance_acceleration
-from tiltsim.plants.plant import natively_checked_values, record_step_by_step
+from tiltsim.plants.plant import record_step_by_step
 from tiltsim_controllers.mathematics.records import slotted
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -97,7 +97,7 @@ class ThesisPlant:
     def _record_natively(self, samples: int, steps: int) -> Floats | None:
         from tiltsim.engines.recorder import Recorder
 
-        checked = natively_checked_values(self._assembly, self.observe())
+        checked = self._assembly.sign_check_values(self.observe())
         recorder = Recorder(self._assembly, samples, steps, steps, checked)
         state, self._held = self._record(
             int(recorder.address),

@@ -128,8 +128,7 @@ def _way_to_fly(assembly: Assembly, native: bool) -> object:
     scenario, loop = assembly.scenario, assembly.loop
     simulation = scenario.simulation
     natively = simulation.engine == "native" or (simulation.engine == "auto" and native)
-    checked = loop.monitoring.sign_check_values is not None
-    if not natively or not checked or scenario.controller.is_external:
+    if not natively or scenario.controller.is_external:
         return "alone"
     if simulation.plant == "thesis":
         return "thesis"

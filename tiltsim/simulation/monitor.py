@@ -56,7 +56,7 @@ class TerminationMonitor:
 
         Native code has checked all but the last; see `tiltsim.engines.recorder.Recorder`.
         """
-        if plant.engine == "native" and self._loop.monitoring.sign_check_values is not None:
+        if plant.engine == "native":
             samples = samples[-1:]
         return all(self.check(plant, sample) is None for sample in samples)
 
@@ -81,10 +81,12 @@ class TerminationMonitor:
         return End("diverged", time, cause)
 
     def _check_signs(self, time: float, state: dict[str, float]) -> End | None:
-        checks = self._loop.monitoring.sign_checks(state, self._setup)
-        for index, (value, cause) in enumerate(checks):
+        monitoring = self._loop.monitoring
+        values = list(state.values())[1:]
+        checked = monitoring.sign_check_values(values, self._setup.parameters)
+        for index, value in enumerate(checked):
             # A number that changes its sign between two samples was zero in between.
             side = 0.0 if abs(value) < SINGULAR else copysign(1.0, value)
             if side == 0.0 or side != self._sides.setdefault(index, side):
-                return End("singular", time, cause)
+                return End("singular", time, monitoring.causes(state)[index])
         return None

@@ -6,7 +6,7 @@ from math import copysign, cos, sin
 
 import numpy as np
 
-from tiltsim_controllers.tilt_car.state_drift import turned_angle, drift_rate
+from tiltsim_controllers.tilt_car.state_drift import drift_rate, turned_angle
 from tiltsim_controllers.tilt_car.vehicle import body_acceleration, squared_speeds
 
 

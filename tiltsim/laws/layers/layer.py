@@ -11,14 +11,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
-from tiltsim.closed_loop.loop import (
-    ClosedLoop,
-    ControlSetup,
-    Equations,
-    Monitoring,
-    Sampling,
-    SignCheck,
-)
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Sampling
 from tiltsim.models.parts import ExtraActuators
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
@@ -125,9 +118,6 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
     def derive(samples: Samples, setup: ControlSetup) -> dict[str, Floats]:
         return layer.derive(lambda: inner.columns.derive(samples, within(setup)), samples, setup)
 
-    def sign_checks(sample: Mapping[str, float], setup: ControlSetup) -> tuple[SignCheck, ...]:
-        return inner.monitoring.sign_checks(sample, within(setup))
-
     columns = replace(
         inner.columns,
         observe=observe,
@@ -147,15 +137,13 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
         ),
         sampling=Sampling(controls, layer.hold or hold),
         columns=columns,
-        monitoring=Monitoring(sign_checks, sign_check_values),
+        monitoring=replace(inner.monitoring, sign_check_values=sign_check_values),
         equations=layer.equations,
         supervised=None,
     )
 
 
-def _functions_within(
-    inner: ClosedLoop, fields: int
-) -> tuple[Callable[..., Values], Callable[..., Values], Callable[..., Values], Any]:
+def _functions_within(inner: ClosedLoop, fields: int) -> tuple[Callable[..., Values], ...]:
     """Controls, hold, observe and sign check values of a loop, for a layer around it.
 
     They read the parameters ``inner`` and the first entries of ``act`` and ``ctrl``, hold what the
@@ -163,7 +151,7 @@ def _functions_within(
     """
     inner_controls, inner_hold = inner.sampling.controls, inner.sampling.hold
     inner_observe = inner.columns.observe
-    inner_check: Any = inner.monitoring.sign_check_values
+    inner_check = inner.monitoring.sign_check_values
     act_size, ctrl_size = inner.dynamics.sizes.act, inner.dynamics.sizes.ctrl
     activations = _entries(act_size, fields)
 
@@ -186,10 +174,9 @@ def _functions_within(
 
     @scalar
     def sign_check_values(values: Vector, parameters: Any) -> Values:
-        checked: Values = inner_check(values, parameters.inner)
-        return checked
+        return inner_check(values, parameters.inner)
 
-    return controls, hold, observe, None if inner_check is None else sign_check_values
+    return controls, hold, observe, sign_check_values
 
 
 @cache
