@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from math import inf, nan
 
-import numpy as np
 import pytest
 
 import tiltsim
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.factory import make_plant
+from tiltsim.plants.plant import take_sample
 from tiltsim.simulation.monitor import TerminationMonitor
 
 
@@ -18,7 +18,7 @@ def end_of_sample():
     """The end that a first sample with some fields changed calls for."""
     assembly = assemble(tiltsim.parse_scenario({"simulation": {"engine": "python"}}))
     plant, fields = make_plant(assembly), assembly.loop.sample_fields
-    first = np.array([plant.time, *plant.observe()])
+    first = take_sample(plant)
 
     def end(**changed):
         sample = first.copy()

@@ -25,6 +25,7 @@ from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.command import Command, Observation, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
+from tiltsim.plants.plant import take_sample
 from tiltsim.scenario.loading import load_scenario, parse_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.monitor import TerminationMonitor
@@ -81,7 +82,7 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
         self._steps_left = scenario.simulation.steps
         self._monitor = TerminationMonitor(self._assembly)
         self._end = None
-        self._samples = [_sample(self._plant)]
+        self._samples = [take_sample(self._plant)]
         self._wall_time = 0.0
         self._observation = self.task.get_observation(self._plant)
         return dm_env.restart(dict(self._observation))
@@ -100,7 +101,7 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
         self._plant.advance(steps)
         self._wall_time += perf_counter() - start
         self._steps_left -= steps
-        sample = _sample(self._plant)
+        sample = take_sample(self._plant)
         if np.isfinite(sample).all():
             self._samples.append(sample)
             self._observation = self.task.get_observation(self._plant)
@@ -234,7 +235,3 @@ class TiltrotorEnv(Environment):
         """
         domain = Domain.from_sweep(path)
         return cls(domain.base, domain=domain, **arguments)
-
-
-def _sample(plant: CommandedPlant) -> Floats:
-    return np.array([plant.time, *plant.observe()])

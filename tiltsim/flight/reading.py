@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
+import numpy as np
+
+from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
+from tiltsim.flight.end import End, EndKind
+from tiltsim.flight.flight import Flight
+from tiltsim.laws.assembling import assemble
+from tiltsim.scenario.document import without_none
+from tiltsim.scenario.loading import parse_scenario
+from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     import pyarrow
-
-    from tiltsim.flight.end import End
-    from tiltsim.flight.flight import Flight
-from tiltsim.scenario.document import without_none
 
 
 def load_flight(path: str | Path) -> Flight:
@@ -29,13 +35,8 @@ def load_flight(path: str | Path) -> Flight:
     InputError
         If there is no such file, or it is not a complete flight of tiltsim.
     """
-    import numpy as np
     import pyarrow as pa
     import pyarrow.parquet as pq
-
-    from tiltsim.flight.flight import Flight
-    from tiltsim.laws.assembling import assemble
-    from tiltsim.scenario.loading import parse_scenario
 
     file = _flight_file(Path(path))
     try:
@@ -50,32 +51,33 @@ def load_flight(path: str | Path) -> Flight:
     except (KeyError, ValueError, TypeError) as error:
         raise InputError(f"{file}: not a flight of tiltsim: {_first_line(error)}") from error
     try:
-        scenario = parse_scenario(without_none(document), origin.get("address", ""))
+        assembly = assemble(parse_scenario(without_none(document), origin.get("address", "")))
     except InputError as error:
         raise InputError(f"{file}: its scenario is invalid: {error}") from error
-    assembly = assemble(scenario)
-    fields = assembly.loop.sample_fields
+    samples = _samples(file, table, assembly.loop.sample_fields)
+    return Flight(assembly, samples, end, engine, wall_time)
+
+
+def _samples(file: Path, table: pyarrow.Table, fields: Sequence[str]) -> Floats:
     missing = [name for name in fields if name not in table.column_names]
     if missing:
         raise InputError(f"{file}: not a flight of tiltsim: no column {', '.join(missing)}")
     if len(table) == 0:
         raise InputError(f"{file}: the flight has no samples")
     try:
-        samples = np.column_stack(
-            [np.asarray(table[name].to_numpy(), dtype=np.float64) for name in fields]
-        )
+        columns = [np.asarray(table[name].to_numpy(), dtype=np.float64) for name in fields]
     except (ValueError, TypeError) as error:
         raise InputError(f"{file}: not a flight of tiltsim: {_first_line(error)}") from error
-    for name, values in zip(fields, samples.T, strict=True):
+    for name, values in zip(fields, columns, strict=True):
         if not np.isfinite(values).all():
             raise InputError(f"{file}: damaged: {name} contains non-finite values")
-    if (np.diff(samples[:, 0]) <= 0.0).any():
+    if (np.diff(columns[0]) <= 0.0).any():
         raise InputError(f"{file}: damaged: timestamps are not strictly increasing")
-    return Flight(assembly, samples, end, engine, wall_time)
+    return np.column_stack(columns)
 
 
 def _flight_file(path: Path) -> Path:
-    """The Parquet file that a path given by the user means."""
+    """The Parquet file of a path, which may be its folder."""
     file = path / "flight.parquet" if path.is_dir() else path
     if file.is_file():
         return file
@@ -94,9 +96,6 @@ def _origin(file: Path, table: pyarrow.Table) -> dict[str, str]:
 
 def _engine_and_end(origin: dict[str, str]) -> tuple[Any, End]:
     """Engine and end from the metadata. Raises `ValueError` where they are unknown."""
-    from tiltsim.engines.base import EngineName
-    from tiltsim.flight.end import End, EndKind
-
     if origin["engine"] not in get_args(EngineName):
         raise ValueError(f"engine {origin['engine']!r} is unknown")
     kind: Any = origin["end"]

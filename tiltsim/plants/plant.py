@@ -53,10 +53,15 @@ class Plant(Protocol):
         """The fault that the physics engine has reported so far, in a few words; else empty."""
 
 
+def take_sample(plant: Plant) -> Floats:
+    """The present sample, shape (fields,); see `ClosedLoop.sample_fields`."""
+    return np.array([plant.time, *plant.observe()])
+
+
 def record_step_by_step(plant: Plant, samples: int, steps: int) -> Floats | None:
     """`Plant.record` by alternating `Plant.advance` and `Plant.observe`."""
     rows = []
     for _ in range(samples):
         plant.advance(steps)
-        rows.append((plant.time, *plant.observe()))
+        rows.append(take_sample(plant))
     return None if plant.fault() else np.array(rows)

@@ -23,6 +23,7 @@ from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.plants.flight_model import flight_model, model_cache_key
 from tiltsim.plants.mujoco_plant import MujocoPlant, quiet_warnings
+from tiltsim.plants.plant import take_sample
 from tiltsim.simulation.monitor import TerminationMonitor
 from tiltsim.simulation.simulate import fly_chunk
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -45,7 +46,7 @@ class _Row:
     def __init__(self, index: int, assembly: Assembly, plant: MujocoPlant) -> None:
         self.index, self.assembly, self.plant = index, assembly, plant
         self.monitor = TerminationMonitor(assembly)
-        self.first = np.array([plant.time, *plant.observe()])
+        self.first = take_sample(plant)
         self.end = self.monitor.check(plant, self.first)
         simulation = assembly.scenario.simulation
         self.interval = simulation.record_steps

@@ -15,7 +15,7 @@ from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.command import Controller, ControllerError
 from tiltsim.plants.factory import make_plant
-from tiltsim.plants.plant import Plant
+from tiltsim.plants.plant import Plant, take_sample
 from tiltsim.plants.user_controller import with_controller
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.monitor import TerminationMonitor
@@ -101,7 +101,7 @@ def simulate_assembly(
 
     start = perf_counter()
     try:
-        record(_sample(plant))
+        record(take_sample(plant))
         end = monitor.check(plant, samples[0])
         steps_left, chunk = simulation.steps, FIRST_CHUNK if plant.engine == "native" else 1
         while steps_left > 0 and end is None:
@@ -121,7 +121,7 @@ def simulate_assembly(
             raise
         end = End("interrupted", float(samples[-1][0]), "interrupted from outside")
     except ControllerError as error:
-        sample = _sample(plant)
+        sample = take_sample(plant)
         end = monitor.check(plant, sample) or End("failed", plant.time, str(error))
         if sample[0] > samples[-1][0] and np.isfinite(sample).all():
             record(sample)
@@ -129,10 +129,6 @@ def simulate_assembly(
     if end is None:
         end = End("completed", plant.time)
     return Flight(assembly, np.array(samples), end, plant.engine, wall_time)
-
-
-def _sample(plant: Plant) -> Floats:
-    return np.array([plant.time, *plant.observe()])
 
 
 def fly_chunk(
@@ -167,7 +163,7 @@ def fly_chunk(
     for _ in range(samples):
         before = plant.state
         plant.advance(steps)
-        sample = _sample(plant)
+        sample = take_sample(plant)
         end = monitor.check(plant, sample)
         if end is not None:
             plant.state = before
@@ -185,7 +181,7 @@ def _first_bad_step(
     """Repeat a recording interval step by step to find the step on which the flight ended."""
     for _ in range(steps):
         plant.advance(1)
-        this = _sample(plant)
+        this = take_sample(plant)
         exact = monitor.check(plant, this)
         if exact is not None:
             return this, exact
