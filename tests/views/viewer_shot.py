@@ -57,23 +57,27 @@ def shoot(recording: Path, seconds: float | None = None, size: str = "1600x1000"
 
 @contextmanager
 def viewer(size: str, port: int | None = None) -> Iterator[Any]:
-    """A viewer without a window, as a client to drive it with; ended with the block."""
-    from rerun.experimental import ViewerClient
-
+    """A viewer without a window, as a client that controls it; ended with the block."""
     port = port or free_port()
     with viewer_process(port, size) as process:
+        yield client_of(process, port)
 
-        def connect() -> Any:
-            if process.poll() is not None:
-                raise RuntimeError(process.stderr.read().decode()[-2000:])
-            try:
-                client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
-                client.get_state()
-            except Exception:  # whatever the client raises until the viewer listens
-                return None
-            return client
 
-        yield wait_for(connect, "the viewer to start")
+def client_of(process: subprocess.Popen[bytes], port: int) -> Any:
+    """A client of a viewer's process, once it listens."""
+    from rerun.experimental import ViewerClient
+
+    def connect() -> Any:
+        if process.poll() is not None:
+            raise RuntimeError(process.stderr.read().decode()[-2000:])
+        try:
+            client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+            client.get_state()
+        except Exception:  # any error until the viewer listens
+            return None
+        return client
+
+    return wait_for(connect, "the viewer to start")
 
 
 @contextmanager

@@ -9,21 +9,16 @@ from typing import TYPE_CHECKING, Final, Self
 from uuid import uuid4
 
 import numpy as np
-import rerun as rr
 
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
-from tiltsim.views.rerun.blueprint import flight_blueprint
-from tiltsim.views.rerun.flight_recorder import FlightRecorder
-from tiltsim.views.rerun.recording_file import new_recording
 from tiltsim.views.rerun.requirements import require_viewer
 from tiltsim.views.rerun.viewer import attach_viewer
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
-    from tiltsim_controllers.mathematics.scalar import Floats
 
 SEND_INTERVAL: Final = 0.25  # s of wall time between pieces; each costs about 0.04 s
 SHUTDOWN_TIMEOUT: Final = 5.0
@@ -45,6 +40,11 @@ class LiveStream:
 
     def __init__(self, scenario: Scenario, url: str | None = None) -> None:
         require_viewer(url)
+        # After the check, as Rerun takes a second to load.
+        from tiltsim.views.rerun.blueprint import flight_blueprint
+        from tiltsim.views.rerun.flight_recorder import FlightRecorder
+        from tiltsim.views.rerun.recording_file import new_recording
+
         self._assembly = assemble(scenario)
         # A unique name: a viewer would merge two flights of one scenario into one recording.
         self._recording = new_recording([scenario], salt=uuid4().hex)
@@ -106,5 +106,7 @@ class LiveStream:
 
 def _abandon_connection() -> None:
     """Let the program exit before the viewer has received everything: Rerun would wait forever."""
+    import rerun as rr
+
     rr.unregister_shutdown()
     sys.stderr.write("tiltsim: the viewer does not respond; the live view is incomplete\n")
