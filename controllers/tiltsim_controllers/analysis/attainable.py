@@ -1,14 +1,14 @@
 """Attainable torques, thrusts and accelerations under rotor-speed limits (ch. 9, Sec. 3).
 
 With the tilt angles fixed, forces and torques are linear in ``w_i = varpi_i |varpi_i|``, and speed
-limits put ``w`` into a box. A condition such as ``tau_N = 0`` cuts the box by a hyperplane. What
-remains is a polytope whose vertices lie on faces of the box, so they are found exactly, by solving
-one small system per face; nothing is sampled and no optimizer is involved. A linear image of them
+limits confine ``w`` to a box. A condition such as ``tau_N = 0`` intersects the box with a
+hyperplane, which leaves a polytope whose vertices lie on faces of the box. They are found exactly,
+by solving one small system per face, without sampling or optimization. A linear image of them
 (torques, thrust, acceleration) spans the attainable set.
 
-Two published findings do not come out: the body accelerations of +-2 m/s^2 (Figs. 8, 9; see
+Two published findings are not reproduced: the body accelerations of +-2 m/s^2 (Figs. 8, 9; see
 `attainable_accelerations`), and blue gaits (5 to 8) as a usable design: that their torques are
-"linearly coupled" is the rank loss of `tiltsim_controllers.analysis.two_color_map`.
+"linearly coupled" is the rank deficiency of `tiltsim_controllers.analysis.two_color_map`.
 """
 
 from __future__ import annotations
@@ -25,9 +25,8 @@ from tiltsim_controllers.vehicle.parameters import SPIN
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from tiltsim_controllers.mathematics.scalar import Floats
     from tiltsim_controllers.vehicle.parameters import Vehicle
-
-    Array = NDArray[np.float64]
 
 MIN_TOTAL_THRUST: Final = 3.0
 """N, of four untilted rotors at the lower speed limit (ch. 9, Sec. 3.1)."""
@@ -42,12 +41,12 @@ _INSIDE: Final = 1e-9
 
 
 def rotor_speed_for_thrust(total_thrust: float, vehicle: Vehicle) -> float:
-    """Rotor speed (rad/s) at which four untilted rotors make ``total_thrust`` (N) together."""
+    """Rotor speed (rad/s) at which four untilted rotors produce ``total_thrust`` (N)."""
     return float(np.sqrt(total_thrust / (4.0 * vehicle.thrust_coefficient)))
 
 
 def published_speed_limits(vehicle: Vehicle) -> tuple[float, float]:
-    """Least and greatest rotor speed of ch. 9: 305.27 and 394.10 rad/s for its vehicle."""
+    """Minimum and maximum rotor speed of ch. 9: 305.27 and 394.10 rad/s for its vehicle."""
     return (
         rotor_speed_for_thrust(MIN_TOTAL_THRUST, vehicle),
         rotor_speed_for_thrust(MAX_TOTAL_THRUST, vehicle),
@@ -58,9 +57,9 @@ def published_speed_limits(vehicle: Vehicle) -> tuple[float, float]:
 class AttainableSet:
     """A convex set: the hull of its vertices."""
 
-    labels: tuple[str, ...]  # what the coordinates are, with units
-    vertices: Array  # (N, len(labels)); hull vertices where the set has an interior
-    inputs: Array  # (N, 4): the w (rad^2/s^2) that reach the vertices
+    labels: tuple[str, ...]  # names of the coordinates, with units
+    vertices: Floats  # (N, len(labels)); hull vertices where the set has an interior
+    inputs: Floats  # (N, 4): the w (rad^2/s^2) that reach the vertices
     dimension: int  # affine dimension; -1 for the empty set
 
     @property
@@ -69,56 +68,65 @@ class AttainableSet:
         return self.dimension < 0
 
     @property
-    def lower(self) -> Array:
-        """Least value of each coordinate; NaN if empty."""
+    def lower(self) -> Floats:
+        """Minimum of each coordinate; NaN if empty."""
         return np.min(self.vertices, axis=0) if not self.is_empty else self._nan
 
     @property
-    def upper(self) -> Array:
-        """Greatest value of each coordinate; NaN if empty."""
+    def upper(self) -> Floats:
+        """Maximum of each coordinate; NaN if empty."""
         return np.max(self.vertices, axis=0) if not self.is_empty else self._nan
 
     @property
-    def _nan(self) -> Array:
+    def _nan(self) -> Floats:
         return np.full(len(self.labels), np.nan)
 
 
-def input_box(speed_limits: tuple[float, float]) -> tuple[Array, Array]:
+def input_box(speed_limits: tuple[float, float]) -> tuple[Floats, Floats]:
     """Bounds of ``w`` (rad^2/s^2), each of shape (4,), under limits of |varpi| (rad/s; Eq. 11).
 
     Raises
     ------
     ValueError
-        If the limits are not ``0 <= least < greatest``.
+        If the limits are not ``0 <= minimum < maximum``.
     """
-    least, greatest = speed_limits
-    if not 0.0 <= least < greatest < np.inf:
-        raise ValueError(f"rotor speed limits {least}, {greatest}: need 0 <= least < greatest")
-    ends = np.outer([least**2, greatest**2], SPIN)
+    low, high = speed_limits
+    if not 0.0 <= low < high < np.inf:
+        raise ValueError(f"rotor speed limits {low}, {high}: must satisfy 0 <= minimum < maximum")
+    ends = np.outer([low**2, high**2], SPIN)
     return ends.min(axis=0), ends.max(axis=0)
 
 
-def box_slice_vertices(lower: Array, upper: Array, conditions: Array, values: Array) -> Array:
+def box_slice_vertices(lower: Floats, upper: Floats, conditions: Floats, values: Floats) -> Floats:
     """Vertices of ``{w : lower <= w <= upper, conditions w = values}``, shape (N, 4).
 
     A vertex of the slice lies on a face of the box with as many free coordinates as there are
-    conditions, the others at a bound. ``conditions`` has the shape (k, 4) with k from 0 to 4.
+    conditions, the others at a bound.
+
+    Parameters
+    ----------
+    lower, upper : shape (4,)
+    conditions, values : shapes (k, 4) and (k,), k from 0 to 4
     """
     count = len(conditions)
     size = lower.size
     scale = np.abs(np.concatenate([lower, upper])).max()
-    found: list[Array] = []
+    found: list[Floats] = []
     for free in combinations(range(size), count):
-        held = [index for index in range(size) if index not in free]
+        bounded = [index for index in range(size) if index not in free]
         matrix = conditions[:, list(free)]
         norms = np.linalg.norm(conditions, axis=1)
         if count and abs(np.linalg.det(matrix)) < 1e-12 * norms.prod():
-            continue  # parallel to the face: its vertices are those of lower faces
-        for ends in product((0, 1), repeat=len(held)):
+            continue  # parallel to the face, whose vertices are those of its faces
+        for ends in product((0, 1), repeat=len(bounded)):
             w = np.empty(size)
-            w[held] = [(lower, upper)[end][index] for end, index in zip(ends, held, strict=True)]
+            w[bounded] = [
+                (lower, upper)[end][index] for end, index in zip(ends, bounded, strict=True)
+            ]
             if count:
-                w[list(free)] = np.linalg.solve(matrix, values - conditions[:, held] @ w[held])
+                w[list(free)] = np.linalg.solve(
+                    matrix, values - conditions[:, bounded] @ w[bounded]
+                )
             slack = _INSIDE * scale
             if (w >= lower - slack).all() and (w <= upper + slack).all():
                 found.append(np.clip(w, lower, upper))
@@ -135,10 +143,15 @@ def attainable_torque_thrust(
     yaw_torque: float | None = 0.0,
     vertical_thrust: float | None = None,
 ) -> AttainableSet:
-    """Attainable ``(tau_L, tau_M, F_Z)`` (N m, N m, N) of fixed tilt angles (ch. 9, Figs. 2-7).
+    """Attainable ``(tau_L, tau_M, F_Z)`` (N m, N m, N; body axes; ch. 9, Figs. 2-7).
 
-    ``yaw_torque`` (N m, Eq. 20) and ``vertical_thrust`` (N; the slices of the figures) are
-    conditions; None leaves them free. All in body axes.
+    Parameters
+    ----------
+    angles : tilt angles, shape (4,), rad
+    vehicle : the tiltrotor
+    speed_limits : minimum and maximum rotor speed, rad/s
+    yaw_torque : condition (Eq. 20), N m; None for none
+    vertical_thrust : condition (slices of the figures), N; None for none
     """
     torque, force = _wrench(angles, vehicle)
     image = np.stack([torque[0], torque[1], force[2]])
@@ -155,9 +168,13 @@ def attainable_accelerations(
     yaw_torque: float | None = 0.0,
     vertical_thrust: float | None = HOVER_THRUST,
 ) -> AttainableSet:
-    """Attainable ``(F_X, F_Y) / m`` (m/s^2, body axes) of fixed tilt angles (ch. 9, Figs. 8, 9).
+    """Attainable ``(F_X, F_Y) / m`` (m/s^2, body axes; ch. 9, Figs. 8, 9).
 
     With the stated limits gaits 2 and 3 reach about 0.12 m/s^2, not the published 2 m/s^2.
+
+    Parameters
+    ----------
+    angles, vehicle, speed_limits, yaw_torque, vertical_thrust : as for `attainable_torque_thrust`
     """
     torque, force = _wrench(angles, vehicle)
     labels = ("a_X (m/s^2)", "a_Y (m/s^2)")
@@ -165,7 +182,7 @@ def attainable_accelerations(
     return _attainable(force[:2] / vehicle.mass, labels, conditions, speed_limits)
 
 
-def _wrench(angles: ArrayLike, vehicle: Vehicle) -> tuple[Array, Array]:
+def _wrench(angles: ArrayLike, vehicle: Vehicle) -> tuple[Floats, Floats]:
     """Torque and force per ``w``, each of shape (3, 4), SI."""
     per_force = vehicle.thrust_coefficient
     torque = torque_matrix(angles, vehicle) * (vehicle.arm_length * per_force)
@@ -173,9 +190,9 @@ def _wrench(angles: ArrayLike, vehicle: Vehicle) -> tuple[Array, Array]:
 
 
 def _attainable(
-    image: Array,
+    image: Floats,
     labels: tuple[str, ...],
-    conditions: list[tuple[Array, float | None]],
+    conditions: list[tuple[Floats, float | None]],
     speed_limits: tuple[float, float],
 ) -> AttainableSet:
     lower, upper = input_box(speed_limits)
@@ -188,7 +205,7 @@ def _attainable(
     return AttainableSet(labels, points[keep], inputs[keep], dimension)
 
 
-def _hull(points: Array) -> tuple[NDArray[np.int_], int]:
+def _hull(points: Floats) -> tuple[NDArray[np.int_], int]:
     """Indices of the hull's vertices and the affine dimension of a set of points (N, d)."""
     from scipy.spatial import ConvexHull
 

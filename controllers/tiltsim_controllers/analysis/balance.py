@@ -9,11 +9,11 @@ At level attitude the torque-free force ``n(alpha)`` must point along ``(-ax, -a
     D13)``,
 
 with ``A = sin(2 delta - E13) / sin(2 delta)`` and ``B = sin(2 delta + E24) / sin(2 delta)``. Pods
-that tilt opposite ways in pairs, E13 = E24 = 0, load the rotors evenly: `even_load_gait`, in closed
-form. A gait may tilt less by shifting load to the pair that makes the side force, in the end until
-the other pair stands still (A or B zero); and where both are zero, at the point P of the two color
-map, it balances everything and nothing. The decoupling matrix is singular in both cases, so
-`balanced_gait` takes the least tilt among gaits that keep A and B away from zero.
+with opposite tilts in pairs, E13 = E24 = 0, load the rotors evenly: `even_load_gait`, in closed
+form. A gait may tilt less by shifting load to the pair that produces the side force, in the limit
+until the other pair stops (A or B zero); where both are zero, at the point P of the Two Color Map,
+``n`` vanishes. The decoupling matrix is singular in both cases, so `balanced_gait` minimizes the
+tilt with A and B bounded away from zero.
 """
 
 from __future__ import annotations
@@ -33,12 +33,8 @@ from tiltsim_controllers.vehicle.parameters import drag_ratio
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
-    from tiltsim_controllers.mathematics.scalar import Quad, Triple
+    from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple
     from tiltsim_controllers.vehicle.parameters import Vehicle
-
-    Vector = NDArray[np.float64]
 
 MAX_TILT: Final = radians(60.0)
 MIN_LEVER: Final = 0.5
@@ -47,9 +43,12 @@ _TOLERANCE: Final = 1e-9
 
 
 def side_slopes(acceleration: Triple, gravity: float) -> tuple[float, float]:
-    """Side force over lift, along x and y, that holds against an acceleration (m/s^2).
+    """Ratio of side force to lift, along x and y, that balances an acceleration (m/s^2).
 
-    Raises ValueError where the vehicle would have to push downwards.
+    Raises
+    ------
+    ValueError
+        If the acceleration is not finite or the vehicle would have to push downwards.
     """
     ax, ay, az = acceleration
     lift = gravity - az
@@ -64,10 +63,10 @@ def side_slopes(acceleration: Triple, gravity: float) -> tuple[float, float]:
 
 
 def even_load_gait(acceleration: Triple, vehicle: Vehicle) -> Quad:
-    """The gait ``(a, b, -a, -b)`` that balances an acceleration, in closed form but for one root.
+    """The gait ``(a, b, -a, -b)`` that balances an acceleration, up to one scalar root.
 
     ``sin 2b = X N`` and ``-sin 2a = Y N`` with ``N = 2 + cos 2a + cos 2b`` and the `side_slopes` X
-    and Y; it does not depend on the drag ratio. All four rotors make nearly the same thrust.
+    and Y; it does not depend on the drag ratio. All four rotors have nearly the same thrust.
 
     Parameters
     ----------
@@ -91,7 +90,7 @@ def even_load_gait(acceleration: Triple, vehicle: Vehicle) -> Quad:
             f"acceleration {_shown(acceleration)}: out of reach of evenly loaded rotors with tilt"
             " angles up to 45 degrees"
         )
-    # `excess` falls all the way: bisection to the last bit.
+    # `excess` is decreasing: bisection to the last bit.
     while low < (middle := 0.5 * (low + high)) < high:
         low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
     a, b = -0.5 * asin(_clipped(y * high)), 0.5 * asin(_clipped(x * high))
@@ -105,9 +104,7 @@ def balanced_gait(
     max_tilt: float = MAX_TILT,
     min_lever: float = MIN_LEVER,
 ) -> Quad:
-    """The least tilted gait that hovers level under a constant acceleration.
-
-    Least is the sum of the squared tilt angles.
+    """The gait with the smallest sum of squared tilts that hovers level under an acceleration.
 
     Parameters
     ----------
@@ -117,7 +114,7 @@ def balanced_gait(
     vehicle : the tiltrotor
     max_tilt : largest tilt angle of a pod, rad
     min_lever : float
-        Smallest A and B, the yaw levers of the two pairs of rotors, 1 being those without tilt.
+        Lower bound of A and B, the yaw levers of the two pairs of rotors relative to no tilt.
 
     Returns
     -------
@@ -147,17 +144,17 @@ def balanced_gait(
             f" {hypot(x, y):.3g} times the lift; no gait makes it with tilt angles up to"
             f" {max_tilt:.3g} rad and yaw levers of {min_lever:g} or more"
         )
-    a1, a2, a3, a4 = _least_tilt(tilts, x, y, ratio, max_sum, max_tilt).tolist()
+    a1, a2, a3, a4 = _minimum_tilt(tilts, x, y, ratio, max_sum, max_tilt).tolist()
     return a1, a2, a3, a4
 
 
 def _best_on_grid(
     x: float, y: float, ratio: float, max_sum: float, max_tilt: float
-) -> Vector | None:
-    """The least tilted balanced gait on a grid of E13 and E24; None where there is none.
+) -> Floats | None:
+    """The balanced gait of minimum tilt on a grid of E13 and E24; None where there is none.
 
     For each grid point one monotonic equation in ``n_z`` gives D13 and D24 up to 90 degrees. The
-    grid finds the right valley; `_least_tilt` then its floor.
+    grid finds the basin of the global minimum, `_minimum_tilt` the minimum.
     """
     delta = atan(ratio)
     sums = np.linspace(max_sum - 1.5, max_sum, _GRID)
@@ -181,10 +178,10 @@ def _best_on_grid(
     return None if size[best] == inf else np.asarray(tilts[:, best[0], best[1]])
 
 
-def _least_tilt(
-    start: Vector, x: float, y: float, ratio: float, max_sum: float, max_tilt: float
-) -> Vector:
-    """Minimise the squared tilt angles subject to balance and limits, from a start near by."""
+def _minimum_tilt(
+    start: Floats, x: float, y: float, ratio: float, max_sum: float, max_tilt: float
+) -> Floats:
+    """Minimize the squared tilt angles subject to balance and limits, from a nearby start."""
 
     def balance(tilts: Any) -> Any:
         return _imbalance(tilts, x, y, ratio)
@@ -202,23 +199,23 @@ def _least_tilt(
         ],
         options={"ftol": 1e-15, "maxiter": 200},
     )
-    # With so fine a tolerance the optimiser often reports failure for want of further progress, so
-    # its answer is judged by itself; the start is balanced and within the limits.
+    # With so fine a tolerance the optimizer often reports failure for lack of further progress, so
+    # its solution is checked here instead; the start is balanced and within the limits.
     tilts = _onto_balance(np.asarray(found.x, dtype=float), x, y, ratio)
-    kept = (
+    valid = (
         np.abs(balance(tilts)).max() < _TOLERANCE
         and (sums @ tilts + max_sum).min() > -_TOLERANCE
         and np.abs(tilts).max() < max_tilt + _TOLERANCE
     )
-    return tilts if kept and tilts @ tilts <= start @ start else start
+    return tilts if valid and tilts @ tilts <= start @ start else start
 
 
-def _onto_balance(tilts: Vector, x: float, y: float, ratio: float) -> Vector:
-    """Remove the optimiser's last residue by two Newton steps of least length."""
+def _onto_balance(tilts: Floats, x: float, y: float, ratio: float) -> Floats:
+    """Remove the optimizer's residual by two minimum-norm Newton steps."""
     for _ in range(2):
-        residue = _imbalance(tilts, x, y, ratio)
+        residual = _imbalance(tilts, x, y, ratio)
         slopes = _jacobian(lambda point: _imbalance(point, x, y, ratio), tilts)
-        tilts = tilts - np.linalg.pinv(slopes) @ residue
+        tilts = tilts - np.linalg.pinv(slopes) @ residual
     return tilts
 
 
@@ -234,7 +231,7 @@ def _trig(tilts: Any) -> Any:
     return tuple(np.stack([np.sin(tilts), np.cos(tilts)], axis=1).ravel())
 
 
-def _jacobian(function: Callable[[Any], Any], point: Vector) -> Vector:
+def _jacobian(function: Callable[[Any], Any], point: Floats) -> Floats:
     """Derivatives by complex steps, exact to rounding."""
     columns = [function(point + 1e-30j * axis).imag / 1e-30 for axis in np.eye(4)]
     return np.asarray(np.stack(columns, axis=1), dtype=float)

@@ -1,23 +1,24 @@
-"""Hover after the loss of a rotor, with part of its thrust, or with a stuck tilt servo.
+"""Hover after the failure of a rotor, with partial thrust, or with a stuck tilt servo.
 
-The thesis asks for this and leaves it open. Static hover is zero torque and a force as large as the
+The thesis leaves this question open. Static hover means zero torque and a force as large as the
 weight; the vehicle may lean so that it points up. In units of ``L K_f`` and with ``r = K_m / (L
-K_f) = tan(delta)`` the torque matrix (ch. 3, Eq. 5) reads, but for the factor ``1 / cos(delta)``,
+K_f) = tan(delta)`` the torque matrix (ch. 3, Eq. 5) is, up to the factor ``1 / cos(delta)``,
 
     rotors 2, 4:  roll ``cos(a2 + delta)``, ``-cos(a4 + delta)``;  yaw ``-sin(ai + delta)``
     rotors 1, 3:  pitch ``cos(a1 - delta)``, ``-cos(a3 - delta)``;  yaw ``sin(ai - delta)``
 
-Nobody but rotor 3 makes pitch torque once rotor 1 is lost. What holds, then, for the loss of rotor
-1 (for the others turn the vehicle, and mirror it for rotors 2 and 4):
+Without rotor 1 only rotor 3 produces pitch torque. For the loss of rotor 1 (for the others rotate
+the vehicle, and mirror it for rotors 2 and 4):
 
-- Rotors 2 and 4 alone hover, at ``a2 = a4 = -delta``, where the drag torque of each is made up for
-  by its tilt; each must carry ``m g / (2 cos(delta))``. No torque about pitch is left then.
-- With rotor 3 turning at ``a3 = delta - pi/2``, where its pitch torque vanishes, a family of hovers
-  opens. Tilting rotor 3 from there makes pitch torque of either sign, and three speeds and three
-  tilts move all six of force and torque: the vehicle stays fully controllable, leaning a little.
-- With fixed tilts, two or three rotors hover only where ``a2 + a4 = -2 delta``. That is what the
-  blue planes of the Two Color Map ask of this pair: the loss that the healthy vehicle must avoid is
-  what hovering on the pair needs. Pitch remains without control.
+- Rotors 2 and 4 alone hover at ``a2 = a4 = -delta``, where the tilt of each compensates its drag
+  torque; each must carry ``m g / (2 cos(delta))``. Pitch is then uncontrolled.
+- With rotor 3 turning at ``a3 = delta - pi/2``, where its pitch torque vanishes, there is a family
+  of hovers. Tilting rotor 3 from there produces pitch torque of either sign, and three speeds and
+  three tilts control all six components of force and torque: the vehicle, leaning slightly, stays
+  fully controllable.
+- With fixed tilts, two or three rotors hover only where ``a2 + a4 = -2 delta``, the condition of
+  the blue planes of the Two Color Map on this pair: the rank deficiency that the intact vehicle
+  must avoid is necessary to hover on the pair. Pitch is uncontrolled.
 """
 
 from __future__ import annotations
@@ -34,17 +35,13 @@ from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines, tor
 from tiltsim_controllers.vehicle.parameters import SPIN, drag_ratio
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from tiltsim_controllers.mathematics.scalar import Quad
+    from tiltsim_controllers.mathematics.scalar import Floats, Quad
     from tiltsim_controllers.vehicle.parameters import Vehicle
-
-    Array = NDArray[np.float64]
 
 ROTORS: Final = (1, 2, 3, 4)
 
 BALANCED: Final = 1e-9
-"""Torque, in units of ``L m g``, that counts as none."""
+"""Torque, in units of ``L m g``, that counts as zero."""
 
 
 @dataclass(frozen=True)
@@ -55,19 +52,25 @@ class Hover:
     rotor_speeds: Quad  # rad/s, absolute
     roll: float  # rad
     pitch: float  # rad
-    authority: float  # least over greatest singular value of `pose_matrix`; 0: not controllable
+    authority: float  # smallest over largest singular value of `pose_matrix`; 0: uncontrollable
 
     @property
     def max_rotor_speed(self) -> float:
-        """The speed (rad/s) that the rotors must be able to reach."""
+        """The largest rotor speed (rad/s)."""
         return max(self.rotor_speeds)
 
 
-def pose_matrix(tilts: Quad, rotor_speeds: Quad, vehicle: Vehicle, lost: int | None) -> Array:
-    """How speeds and tilts of the sound rotors move force and torque, shape (6, 8 or 6).
+def pose_matrix(tilts: Quad, rotor_speeds: Quad, vehicle: Vehicle, lost: int | None) -> Floats:
+    """Force and torque per speed and tilt of the working rotors, shape (6, 8 or 6).
 
     Forces are in units of the weight, torques in units of the weight times the arm's length, inputs
     are relative changes of thrust and tilts in rad.
+
+    Parameters
+    ----------
+    tilts, rotor_speeds : rad, rad/s
+    vehicle : the tiltrotor
+    lost : failed rotor, 1 to 4, or None
     """
     w = [spin * speed * speed for spin, speed in zip(SPIN, rotor_speeds, strict=True)]
     trig = sines_and_cosines(*tilts)
@@ -89,15 +92,15 @@ def _hover(tilts: Quad, rotor_speeds: Quad, vehicle: Vehicle, lost: int | None) 
 
 
 def three_rotor_hover(lost: int, vehicle: Vehicle, *, opposite_speed: float) -> Hover:
-    """The hover without a rotor in which both rotors beside it share the weight evenly.
+    """The hover without a rotor in which its two neighbours share the weight evenly.
 
     Parameters
     ----------
     lost : the lost rotor, 1 to 4
     vehicle : the tiltrotor
     opposite_speed : float
-        Speed of the rotor opposite the lost one, rad/s; the more, the more authority over the
-        torque that only it can make. At 0 the other two hover alone.
+        Speed of the rotor opposite the lost one, rad/s; it determines the authority over the torque
+        that only this rotor produces. At 0 the other two hover alone.
 
     Raises
     ------
@@ -114,7 +117,7 @@ def three_rotor_hover(lost: int, vehicle: Vehicle, *, opposite_speed: float) -> 
             f"opposite_speed = {opposite_speed!r}: must lie between 0 and "
             f"{sqrt(weight / cos(delta)):.4g} rad/s, where this rotor alone outweighs the vehicle"
         )
-    # Across the lean the opposite rotor pushes; along it all three lift; yaw: sin(beta) w = half.
+    # The opposite rotor pushes across the lean, all three lift along it; yaw: sin(beta) w = half.
     lift = sqrt(weight * weight - (across * cos(delta)) ** 2)
     upright = (lift - 2.0 * across * sin(delta)) / (2.0 * cos(delta))
     beside = hypot(upright, 0.5 * across)
@@ -131,10 +134,10 @@ def three_rotor_hover(lost: int, vehicle: Vehicle, *, opposite_speed: float) -> 
 
 
 def fixed_tilt_imbalance(tilts: Quad, lost: int, vehicle: Vehicle) -> float:
-    """By how much (rad) fixed tilts miss the hover without a rotor: ``a_i + a_k -+ 2 delta``.
+    """Deviation (rad) of fixed tilts from hover without a rotor: ``a_i + a_k -+ 2 delta``.
 
-    ``i`` and ``k`` are the rotors beside the lost one. Zero where they hover on their own; the
-    opposite rotor then stands still.
+    ``i`` and ``k`` are the neighbours of the rotor ``lost``. Zero where they hover alone, with the
+    opposite rotor at rest.
     """
     delta = atan(drag_ratio(vehicle))
     beside = tilts[lost % 4] + tilts[(lost + 2) % 4]
@@ -144,19 +147,26 @@ def fixed_tilt_imbalance(tilts: Quad, lost: int, vehicle: Vehicle) -> float:
 def fixed_tilt_hover(
     tilts: Quad, vehicle: Vehicle, *, lost: int | None = None, factors: Quad = (1.0, 1.0, 1.0, 1.0)
 ) -> Hover | None:
-    """The hover with given tilts and thrust factors, or without a rotor; None if there is none.
+    """The hover with fixed tilts and a fault; None if there is none.
 
-    Rotors do not turn backwards. Without a loss it is the torque-free input of
+    Rotors do not turn backwards. Without a fault it is the torque-free input of
     `tiltsim_controllers.vehicle.decoupling_matrix`, unless a rotor would have to reverse.
+
+    Parameters
+    ----------
+    tilts : rad
+    vehicle : the tiltrotor
+    lost : failed rotor, 1 to 4, or None
+    factors : remaining fraction of each rotor's thrust
     """
     sound = [index for index in range(4) if lost is None or index != lost - 1]
     sound = [index for index in sound if factors[index] > 0.0]
     torque = torque_matrix(np.array(tilts), vehicle)[:, sound] * np.array(SPIN)[sound]
     _, values, rows = np.linalg.svd(torque, full_matrices=True)
     for index, row in enumerate(rows):
-        lost_rank = index >= len(values) or values[index] < BALANCED * values[0]
+        is_kernel = index >= len(values) or values[index] < BALANCED * values[0]
         thrusts = row * np.sign(row.sum())
-        if not lost_rank or thrusts.min() < -1e-9 * thrusts.max():
+        if not is_kernel or thrusts.min() < -1e-9 * thrusts.max():
             continue
         w = np.zeros(4)
         w[sound] = np.maximum(thrusts, 0.0)
@@ -165,8 +175,8 @@ def fixed_tilt_hover(
             continue
         w *= vehicle.mass * vehicle.gravity / (vehicle.thrust_coefficient * force)
         made = _hover(tilts, _quad(np.sqrt(w)), vehicle, lost)
-        told = np.sqrt(w / np.where(np.array(factors) > 0.0, factors, 1.0))
-        return Hover(tilts, _quad(told), made.roll, made.pitch, made.authority)
+        commanded = np.sqrt(w / np.where(np.array(factors) > 0.0, factors, 1.0))
+        return Hover(tilts, _quad(commanded), made.roll, made.pitch, made.authority)
     return None
 
 
@@ -176,33 +186,32 @@ def minimum_hover_speed(
     factors: Quad = (1.0, 1.0, 1.0, 1.0),
     stuck: tuple[int, float] | None = None,
 ) -> float:
-    """The least top speed (rad/s) with which tilts free to choose hover after a fault.
+    """The minimum over all tilts of the largest rotor speed (rad/s) in hover after a fault.
 
     Parameters
     ----------
     vehicle : the tiltrotor
-    factors : what is left of each rotor's thrust and drag torque; 0 for a lost one
+    factors : remaining fraction of each rotor's thrust and drag torque; 0 for a failed one
     stuck : tuple, optional
         A rotor, 1 to 4, and the angle (rad) its servo holds.
 
     Returns
     -------
     float
-        Of the largest rotor speed; a limit below it means that no hover is possible. The vehicle
-        may lean as it likes, even upside down.
+        With a lower speed limit no hover is possible, at any attitude.
     """
     from scipy.optimize import minimize
 
     weight = vehicle.mass * vehicle.gravity / vehicle.thrust_coefficient
     scale = np.array(factors) * SPIN
 
-    def tilts_of(x: Array) -> Array:
+    def tilts_of(x: Floats) -> Floats:
         tilts = x[:4].copy()
         if stuck is not None:
             tilts[stuck[0] - 1] = stuck[1]
         return tilts
 
-    def balance(x: Array) -> Array:
+    def balance(x: Floats) -> Floats:
         tilts, w = tilts_of(x), x[4:8] * scale
         force = force_matrix(tilts) @ w
         return np.array([*(torque_matrix(tilts, vehicle) @ w), force @ force - 1.0])
@@ -210,15 +219,15 @@ def minimum_hover_speed(
     delta = atan(drag_ratio(vehicle))
     best = np.inf
     starts = [
-        [0.0, 0.0, 0.0, 0.0, 0.25, 0.25, 0.25, 0.25],  # all four, and each pair on its own
+        [0.0, 0.0, 0.0, 0.0, 0.25, 0.25, 0.25, 0.25],  # all four, and each pair alone
         [0.0, -delta, 0.0, -delta, 0.0, 0.5, 0.0, 0.5],
         [delta, 0.0, delta, 0.0, 0.5, 0.0, 0.5, 0.0],
     ]
     weak = stuck[0] if stuck is not None else 1 + int(np.argmin(factors))
-    for speed in (0.5, 0.8):  # without the one that is broken
+    for speed in (0.5, 0.8):  # without the faulty one
         three = three_rotor_hover(weak, vehicle, opposite_speed=speed * vehicle.hover_rotor_speed)
         starts.append([*three.tilts, *(np.array(three.rotor_speeds) ** 2 / weight)])
-    if stuck is not None:  # with the opposite pod turned alike, or in the mirror
+    if stuck is not None:  # with the opposite pod tilted alike, or mirrored
         for angle in (stuck[1], -stuck[1]):
             alike = [0.0, 0.0, 0.0, 0.0, 0.25, 0.25, 0.25, 0.25]
             alike[(stuck[0] + 1) % 4] = angle

@@ -1,8 +1,8 @@
 """The gaits of the thesis by chapter, and where its robustness claims hold.
 
-Ch. 3, 6 and 9 print the tilt angles of their gaits; these are taken digit by digit. The paths of
-ch. 7 and 8 were drawn in figures that are lost: the paths here have the described shape and colour,
-their size is ours, and `PublishedGait.printed` is False.
+Ch. 3, 6 and 9 print the tilt angles of their gaits; these are used digit for digit. The paths of
+ch. 7 and 8 are in figures that are missing: the paths here have the described shape and colour, but
+sizes of our choice, and `PublishedGait.printed` is False.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ if TYPE_CHECKING:
 
 _AR_DRONE: Final = PRESETS["ar_drone_2"]
 _P: Final = point_p(_AR_DRONE)
-SINGULAR: Final = 1e-6
-"""A margin (rad) below this is none: the gait is singular where it is smallest."""
+SINGULAR_MARGIN: Final = 1e-6
+"""A gait with a smaller margin (rad) counts as singular."""
 
 _PERIOD: Final = 1.0
 """Ch. 6 sets the period to 1 s; the margin over a period does not depend on it."""
 
 
 class DeterminantCase(NamedTuple):
-    """A restriction of ch. 3, Sec. 5.1, and the pairs it is looked at with."""
+    """A restriction of ch. 3, Sec. 5.1, and the pairs of angles evaluated."""
 
     restriction: str
     pairs: tuple[tuple[float, float], ...]  # (alpha_1, alpha_3), rad
@@ -72,12 +72,12 @@ class PublishedGait:
     gait: Gait
     color: str | None  # red, blue, "red and blue", or None off the map
     printed: bool  # whether the thesis prints the angles
-    bias: float | None = None  # [eta] of the biased twin it is compared with
+    bias: float | None = None  # [eta] of the biased gait it is compared with
     exact: Gait | None = None  # the same on the exact lines, where the printed angles are rounded
 
     @property
     def biased(self) -> Gait | None:
-        """The biased twin (ch. 6, Eqs. 12-15; ch. 8, Eqs. 13-16)."""
+        """The biased gait (ch. 6, Eqs. 12-15; ch. 8, Eqs. 13-16)."""
         return None if self.bias is None else self.gait.biased(self.bias)
 
 
@@ -121,7 +121,7 @@ def _path(key: str, color: str, path: Path) -> PublishedGait:
 _TRIANGLE: Final = (_P, (0.7, -0.25), (0.25, -0.7), _P)
 
 PATHS: Final[dict[str, Path]] = {
-    # ch. 8, Fig. 7 (lost): which rule each example follows or breaks is in its caption.
+    # ch. 8, Fig. 7 (missing): its caption has the rule that each example follows or violates.
     "E1": polygon(((-0.8, 0.2), (-0.4, 0.8), (-0.75, 0.75)), "red"),
     "E2": polygon(((-0.6, -0.6), (0.7, -0.4), (0.2, 0.8)), "blue"),
     "E3": polygon(((0.3, -0.8), (0.8, -0.3), (0.7, -0.7)), "red"),
@@ -180,11 +180,11 @@ PUBLISHED_GAITS: Final = {
                 (-3 * pi / 8, pi / 8, -1.178, 0.393),
             ],
         ),
-        # ch. 7, Fig. 4 (lost): rectangles, gait 1 blue, gaits 2 and 3 red
+        # ch. 7, Fig. 4 (missing): rectangles, gait 1 blue, gaits 2 and 3 red
         _path("ch07_gait_1", "blue", rectangle((0.2, 0.8), (-0.8, -0.2), "blue")),
         _path("ch07_gait_2", "red", rectangle((-0.8, -0.2), (0.2, 0.8), "red")),
         _path("ch07_gait_3", "red", rectangle((0.2, 0.8), (-0.8, -0.2), "red")),
-        # ch. 8, Fig. 8 (lost): a triangle through P that changes its colour there; two circles
+        # ch. 8, Fig. 8 (missing): a triangle through P that changes its colour there; two circles
         _path(
             "ch08_gait_1",
             "red and blue",
@@ -208,25 +208,25 @@ PUBLISHED_GAITS: Final = {
 
 @dataclass(frozen=True)
 class Robustness:
-    """How robust a published gait is, over one period at level attitude."""
+    """Robustness of a published gait over one period at level attitude."""
 
     key: str
     color: str | None
     printed: bool
     margin: float  # rad, of the angles as printed
     margin_exact: float  # rad, on the exact lines of the map
-    margin_biased: float | None  # rad, of the biased twin
-    conditioning: float  # least smallest over largest singular value of tau, exact lines
-    claim_holds: bool | None  # "more robust than its biased twin"; None where not compared
+    margin_biased: float | None  # rad, of the biased gait
+    conditioning: float  # minimum of smallest over largest singular value of tau, exact lines
+    claim_holds: bool | None  # "more robust than its biased gait"; None where not compared
 
 
 def smallest_margin(gait: Gait, vehicle: Vehicle, samples: int = 401) -> float:
-    """Least level-attitude margin (rad) over a period, negative after a change of sign of R."""
+    """Minimum margin (rad) at level attitude over a period, negative after R changes sign."""
     return float(margin_over_gait(gait.angles(gait.sample_times(samples)), vehicle).min())
 
 
 def robustness(published: PublishedGait) -> Robustness:
-    """Compare a published gait with its exact lines and its biased twin."""
+    """Compare a published gait with its exact lines and its biased gait."""
     exact = published.exact or published.gait
     angles = exact.angles(exact.sample_times(401))
     values = singular_values(angles, _AR_DRONE)
@@ -243,7 +243,7 @@ def robustness(published: PublishedGait) -> Robustness:
         conditioning=float((values[:, 2] / values[:, 0]).min()),
         claim_holds=None
         if margin_biased is None
-        else margin_exact > SINGULAR and margin_exact > margin_biased,
+        else margin_exact > SINGULAR_MARGIN and margin_exact > margin_biased,
     )
 
 

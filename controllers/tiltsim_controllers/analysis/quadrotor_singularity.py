@@ -1,19 +1,19 @@
 """Where the quadrotor's yaw-position decoupling matrix is singular: claimed and exact (ch. 2).
 
 Ch. 2 derives a "determinant surface" ``S(theta, phi)`` that vanishes on a closed curve through
-level attitude. It rests on one entry: the first of the third row of Eq. (43) is printed as 0, but
-the printed factors make it ``cos(theta)^2 (sin(phi) - cos(phi))``, and with it the product has the
-determinant -1 at every attitude. The determinant of ``Delta`` itself is
+level attitude. It results from one wrong entry: the first of the third row of Eq. (43) is printed
+as 0, but the printed factors make it ``cos(theta)^2 (sin(phi) - cos(phi))``, and with it the
+product has the determinant -1 at every attitude. The determinant of ``Delta`` itself is
 
     ``det Delta = -d^3 zeta^2 cos(phi) / (I_x I_y I_z m^3 cos(theta))``,
 
 which is never zero for ``zeta != 0`` and roll and pitch inside of 90 degrees. Eqs. (31) and (36)
-have a slip too (``s_theta s_phi`` for ``s_theta c_phi``), which adds multiples of the matrix' last
-row to its first two and so does not touch the determinant. Both forms are kept here, the published
-one for what was published, the exact one for what is so.
+have an error, too (``s_theta s_phi`` for ``s_theta c_phi``), which adds multiples of the matrix's
+last row to its first two and so does not change the determinant. Both the published and the exact
+form are available.
 
-Attitudes are roll ``phi`` and pitch ``theta`` in rad. Each expression is even in pitch, so that it
-is the same in ch. 2's axes (z down) and in ours.
+Attitudes are roll ``phi`` and pitch ``theta`` in rad. Each expression is even in pitch, so it is
+the same in the axes of ch. 2 (z down) and in ours.
 """
 
 from __future__ import annotations
@@ -23,12 +23,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
+    from tiltsim_controllers.mathematics.scalar import Floats
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
-def published_determinant(roll: ArrayLike, pitch: ArrayLike) -> NDArray[np.float64]:
+def published_determinant(roll: ArrayLike, pitch: ArrayLike) -> Floats:
     """The surface ``S(theta, phi)`` as published (ch. 2, Eqs. 44-46), dimensionless.
 
     Parameters
@@ -41,19 +42,19 @@ def published_determinant(roll: ArrayLike, pitch: ArrayLike) -> NDArray[np.float
     return np.asarray(surface)
 
 
-def published_singular_curve(points: int = 181) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def published_singular_curve(points: int = 181) -> tuple[Floats, Floats]:
     """The closed curve ``S = 0`` of ch. 2, Fig. 3: roll and pitch in rad.
 
-    ``cos(theta)^2 = 1 / (cos(phi) (cos(phi) - sin(phi)))`` has a solution for ``-pi/4 <= phi <= 0``
-    alone. The curve runs through level attitude to ``(-pi/4, 0)`` and back on the other side.
+    ``cos(theta)^2 = 1 / (cos(phi) (cos(phi) - sin(phi)))`` has a solution only for
+    ``-pi/4 <= phi <= 0``. The curve passes through level attitude and ``(-pi/4, 0)``.
 
     Parameters
     ----------
     points : int
         Number of points on each half; pitch is positive on the first half, negative on the second.
     """
-    # Evenly spaced in the angle about the curve's middle: pitch grows like the root of the distance
-    # from either end.
+    # Evenly spaced in the angle about the curve's centre: pitch grows like the square root of the
+    # distance from either end.
     roll = -np.pi / 8.0 * (1.0 - np.cos(np.linspace(0.0, np.pi, points)))
     cosine = 1.0 / np.sqrt(np.cos(roll) * (np.cos(roll) - np.sin(roll)))
     pitch = np.arccos(np.minimum(cosine, 1.0))
@@ -62,8 +63,8 @@ def published_singular_curve(points: int = 181) -> tuple[NDArray[np.float64], ND
 
 def exact_determinant(
     roll: ArrayLike, pitch: ArrayLike, thrust: ArrayLike, vehicle: Vehicle
-) -> NDArray[np.float64]:
-    """The determinant of ``Delta``, Eq. (42) without its slips, in SI units.
+) -> Floats:
+    """The determinant of ``Delta``, Eq. (42) without its errors, in SI units.
 
     Parameters
     ----------
@@ -81,7 +82,7 @@ def exact_determinant(
 
 def normalized_determinant(
     roll: ArrayLike, pitch: ArrayLike, thrust: ArrayLike, vehicle: Vehicle
-) -> NDArray[np.float64]:
+) -> Floats:
     """`exact_determinant` over its value in level hover: 1 there, 0 where singular.
 
     Parameters

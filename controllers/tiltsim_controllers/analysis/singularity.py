@@ -1,6 +1,6 @@
 """Where the decoupling matrix is singular: rank, residuals and margin for arrays of gaits.
 
-Array-shaped companions of `tiltsim_controllers.vehicle.decoupling_matrix`, for any vehicle. Tilt
+Floats-shaped companions of `tiltsim_controllers.vehicle.decoupling_matrix`, for any vehicle. Tilt
 angles have the shape ``(..., 4)``; roll and pitch broadcast against the leading shape; angles are
 in rad.
 
@@ -8,9 +8,9 @@ Ch. 3 and 6 write the condition for an invertible matrix as ``R cos(roll) cos(pi
 sin(roll) cos(pitch) + R_theta sin(pitch) != 0``, which is ``n . r3 != 0`` with the torque-free
 force ``n = (-R_theta, R_phi, R)`` and world up seen from the body ``r3``. The coefficients printed
 in ch. 3, Eqs. (17) and (19), and ch. 12, Eqs. (4)-(8), are those of `residuals` at the respective
-drag ratio, with these slips of the pen: the term ``-2.880 s1 s2 c3 s4 sin(roll) cos(pitch)`` of
-ch. 3, Eq. (17), stands for ``s1 s2 c3 c4``, and the last term of ch. 5, Eq. (15), for ``s1 s2 c3
-s4``. Ch. 12 scales everything by the one constant 1.025.
+drag ratio, with these misprints: the term ``-2.880 s1 s2 c3 s4 sin(roll) cos(pitch)`` of ch. 3,
+Eq. (17), should read ``s1 s2 c3 c4``, and the last term of ch. 5, Eq. (15), ``s1 s2 c3 s4``. Ch. 12
+scales everything by the constant 1.025.
 """
 
 from __future__ import annotations
@@ -30,42 +30,42 @@ from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    Array = NDArray[np.float64]
+    from tiltsim_controllers.mathematics.scalar import Floats
 
 RANK_TOLERANCE: Final = 1e-8
-"""A singular value below this share of the largest counts as zero.
+"""A singular value below this fraction of the largest counts as zero.
 
-Rank is lost to rounding at 1e-16, but gaits are typed in decimals: with tilt angles good to 1e-8
-rad the smallest singular value of a rank-deficient ``tau`` comes out near that share.
+Rounding is 1e-16, but gaits are given in decimals: with tilt angles accurate to 1e-8 rad the
+smallest singular value of a rank-deficient ``tau`` is near that fraction.
 """
 
 
 class Residuals(NamedTuple):
-    """Coefficients of the determinant (ch. 6, Eqs. 4-6), in ch. 3's normalisation."""
+    """Coefficients of the determinant (ch. 6, Eqs. 4-6), normalized as in ch. 3."""
 
-    R: Array  # of cos(roll) cos(pitch); 4 for an untilted vehicle
-    R_phi: Array  # of sin(roll) cos(pitch)
-    R_theta: Array  # of sin(pitch)
+    R: Floats  # of cos(roll) cos(pitch); 4 for an untilted vehicle
+    R_phi: Floats  # of sin(roll) cos(pitch)
+    R_theta: Floats  # of sin(pitch)
 
 
 def tilt_trigonometry(angles: ArrayLike) -> Any:
     """``(sin alpha_1, cos alpha_1, ..., cos alpha_4)`` of tilt angles of shape (..., 4).
 
-    Eight arrays of shape (...), typed loosely: they stand where scalar code declares floats.
+    Eight arrays of shape (...), typed as Any because scalar code declares floats.
     """
     angles = np.asarray(angles, dtype=float)
     sines, cosines = np.sin(angles), np.cos(angles)
     return tuple(part[..., rotor] for rotor in range(4) for part in (sines, cosines))
 
 
-def world_up(roll: ArrayLike, pitch: ArrayLike) -> Array:
-    """World up seen from the body, ``r3``, shape (..., 3) (ch. 3, third row of Eq. 2)."""
+def world_up(roll: ArrayLike, pitch: ArrayLike) -> Floats:
+    """World up in body axes, ``r3``, shape (..., 3) (ch. 3, third row of Eq. 2)."""
     roll, pitch = np.broadcast_arrays(np.asarray(roll, float), np.asarray(pitch, float))
     cosine = np.cos(pitch)
     return np.stack([-np.sin(pitch), np.sin(roll) * cosine, np.cos(roll) * cosine], axis=-1)
 
 
-def torque_matrix(angles: ArrayLike, vehicle: Vehicle) -> Array:
+def torque_matrix(angles: ArrayLike, vehicle: Vehicle) -> Floats:
     """``tau(alpha) / (L K_f)``, shape (..., 3, 4), dimensionless (ch. 3, Eq. 5)."""
     trig = tilt_trigonometry(angles)
     x2, x4, y1, y3, z1, z2, z3, z4 = torque_entries(trig, drag_ratio(vehicle))
@@ -74,7 +74,7 @@ def torque_matrix(angles: ArrayLike, vehicle: Vehicle) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def force_matrix(angles: ArrayLike) -> Array:
+def force_matrix(angles: ArrayLike) -> Floats:
     """``F(alpha) / K_f``, shape (..., 3, 4), dimensionless (ch. 3, Eq. 3)."""
     trig = tilt_trigonometry(angles)
     rows = [vertical_force_entries(trig, *axis) for axis in np.eye(3)]
@@ -83,8 +83,15 @@ def force_matrix(angles: ArrayLike) -> Array:
 
 def decoupling_matrix(
     angles: ArrayLike, roll: ArrayLike, pitch: ArrayLike, vehicle: Vehicle
-) -> Array:
-    """``[tau(alpha); r3^T F(alpha)]`` in SI units, shape (..., 4, 4) (ch. 3, Eqs. 16, 18)."""
+) -> Floats:
+    """``[tau(alpha); r3^T F(alpha)]`` in SI units, shape (..., 4, 4) (ch. 3, Eqs. 16, 18).
+
+    Parameters
+    ----------
+    angles : tilt angles, shape (..., 4), rad
+    roll, pitch : rad
+    vehicle : the tiltrotor
+    """
     torque = torque_matrix(angles, vehicle) * vehicle.arm_length * vehicle.thrust_coefficient
     force = force_matrix(angles) * vehicle.thrust_coefficient
     lift = np.einsum("...i,...ij->...j", world_up(roll, pitch), force)
@@ -93,7 +100,7 @@ def decoupling_matrix(
     return np.concatenate([torque, lift], axis=-2)
 
 
-def singular_values(angles: ArrayLike, vehicle: Vehicle) -> Array:
+def singular_values(angles: ArrayLike, vehicle: Vehicle) -> Floats:
     """Singular values of ``tau / (L K_f)``, largest first, shape (..., 3)."""
     return np.asarray(np.linalg.svd(torque_matrix(angles, vehicle), compute_uv=False), float)
 
@@ -111,10 +118,14 @@ def residuals(angles: ArrayLike, vehicle: Vehicle) -> Residuals:
     return Residuals(R=nz, R_phi=ny, R_theta=-nx)
 
 
-def determinant(angles: ArrayLike, roll: ArrayLike, pitch: ArrayLike, vehicle: Vehicle) -> Array:
-    """The determinant ``n . r3`` in ch. 3's normalisation, shape (...) (ch. 3, Eq. 17).
+def determinant(angles: ArrayLike, roll: ArrayLike, pitch: ArrayLike, vehicle: Vehicle) -> Floats:
+    """The determinant ``n . r3``, normalized as in ch. 3, shape (...) (ch. 3, Eq. 17).
 
-    Times `determinant_unit` it is that of `decoupling_matrix`.
+    That of `decoupling_matrix`, whose arguments it takes, is `determinant_unit` times this.
+
+    Parameters
+    ----------
+    angles, roll, pitch, vehicle : as for `decoupling_matrix`
     """
     R, R_phi, R_theta = residuals(angles, vehicle)
     up = world_up(roll, pitch)
@@ -126,11 +137,11 @@ def determinant_unit(vehicle: Vehicle) -> float:
     return 2.0 * vehicle.arm_length**2 * vehicle.thrust_coefficient**3 * vehicle.drag_coefficient
 
 
-def torque_free_direction(angles: ArrayLike, vehicle: Vehicle) -> Array:
+def torque_free_direction(angles: ArrayLike, vehicle: Vehicle) -> Floats:
     """Unit vector along the force at zero torque, body axes, z >= 0; shape (..., 3).
 
-    NaN where there is no such direction: ``tau`` has lost rank, or the torque-free rotor inputs
-    make no force (`torque_free_force`).
+    NaN where there is no such direction: ``tau`` is rank-deficient, or the torque-free rotor inputs
+    produce no force (`torque_free_force`).
     """
     trig = tilt_trigonometry(angles)
     ratio = drag_ratio(vehicle)
@@ -145,12 +156,12 @@ def torque_free_direction(angles: ArrayLike, vehicle: Vehicle) -> Array:
     return np.where((full_rank & pushes)[..., np.newaxis], direction, np.nan)
 
 
-def _has_full_rank(angles: Array, torque: Any, inputs: Array, vehicle: Vehicle) -> Any:
-    """``rank(angles, vehicle) == 3``, by singular values only where a bound does not tell.
+def _has_full_rank(angles: Floats, torque: Any, inputs: Floats, vehicle: Vehicle) -> Any:
+    """``rank(angles, vehicle) == 3``, by singular values only where a bound does not decide.
 
-    The torque-free inputs are the 3 x 3 minors of ``tau``, so that their norm is the product of its
-    three singular values and, divided by the third power of its Frobenius norm, no more than the
-    smallest over the largest.
+    The torque-free inputs are the 3 x 3 minors of ``tau``, so their norm is the product of its
+    three singular values and, divided by the cube of its Frobenius norm, at most the smallest over
+    the largest.
     """
     frobenius = np.linalg.norm(np.stack(torque, axis=-1), axis=-1)
     full = np.asarray(inputs > 2.0 * RANK_TOLERANCE * frobenius**3)
@@ -161,13 +172,17 @@ def _has_full_rank(angles: Array, torque: Any, inputs: Array, vehicle: Vehicle) 
 
 def singularity_margin(
     angles: ArrayLike, vehicle: Vehicle, roll: ArrayLike = 0.0, pitch: ArrayLike = 0.0
-) -> Array:
+) -> Floats:
     """Smallest rotation (rad) from the attitude to a singular one, shape (...).
 
     The singular attitudes are those with world up perpendicular to ``n``, so the margin is
     ``asin(n . r3 / |n|)``: pi/2 at most, zero where the matrix is singular at every attitude. It is
     positive on the side of the level attitude and negative beyond the unacceptable-attitude curve.
     At level attitude it is the gait's robustness in the sense of ch. 5 and 6.
+
+    Parameters
+    ----------
+    angles, vehicle, roll, pitch : as for `decoupling_matrix`
     """
     direction = torque_free_direction(angles, vehicle)
     sine = np.einsum("...i,...i->...", direction, world_up(roll, pitch))
@@ -177,12 +192,17 @@ def singularity_margin(
 
 def margin_over_gait(
     angles: ArrayLike, vehicle: Vehicle, roll: ArrayLike = 0.0, pitch: ArrayLike = 0.0
-) -> Array:
-    """Margin (rad) along a gait that must not cross a singularity.
+) -> Floats:
+    """Margin (rad) along a gait that must not cross a singularity, shape (N,).
 
-    ``angles`` has the shape (N, 4), in order of time. As `singularity_margin`, but with the sign of
-    ``R`` relative to where the gait starts: a gait whose determinant changes sign passes through a
-    singularity even if no sample shows a zero, and is negative from there on.
+    As `singularity_margin`, but with the sign of ``R`` relative to the start of the gait: a gait
+    whose determinant changes sign passes a singularity even if no sample is zero, and its margin is
+    negative from there on.
+
+    Parameters
+    ----------
+    angles : shape (N, 4), in order of time, rad
+    vehicle, roll, pitch : as for `decoupling_matrix`
     """
     sign = np.sign(residuals(angles, vehicle).R)
     started = np.flatnonzero(sign)

@@ -1,4 +1,4 @@
-"""Routh-Hurwitz stability of the closed loops (ch. 4, Propositions 4 and 5)."""
+"""Routh-Hurwitz stability of the linear error dynamics (ch. 4, Propositions 4 and 5)."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 
 class ErrorLoop(NamedTuple):
-    """One linear closed loop: its name and its monic characteristic polynomial."""
+    """The linear error dynamics of one output."""
 
     name: str
-    polynomial: tuple[float, ...]  # highest power first, leading 1
+    polynomial: tuple[float, ...]  # characteristic, monic, highest power first
     stable: bool
     condition: str  # the first Routh condition that fails, with its numbers; empty when stable
 
@@ -26,8 +26,8 @@ class ErrorLoop(NamedTuple):
 def routh_first_column(polynomial: Sequence[float]) -> list[float]:
     """First column of the Routh array of a polynomial, highest power first.
 
-    The roots all have negative real parts if and only if every entry is positive. The array is
-    cut short at the first entry that is not positive, which decides the question.
+    All roots have negative real parts if and only if every entry is positive. The column ends at
+    the first entry that is not positive.
     """
     upper = [float(value) for value in polynomial[0::2]]
     lower = [float(value) for value in polynomial[1::2]]
@@ -54,7 +54,7 @@ def is_hurwitz(polynomial: Sequence[float]) -> bool:
 
 
 def third_order_loop(name: str, gains: tuple[float, float, float], loop_gain: float) -> ErrorLoop:
-    """The loop ``y''' + N K1 y'' + N K2 y' + N K3 y = 0`` and its verdict (Eqs. 35-38)."""
+    """The loop ``y''' + N K1 y'' + N K2 y' + N K3 y = 0`` (Eqs. 35-38), ``N`` the loop gain."""
     scaled = tuple(loop_gain * gain for gain in gains)
     k1, k2, k3 = scaled
     polynomial = (1.0, *scaled)
@@ -79,18 +79,18 @@ def linear_loop(name: str, gains: Sequence[float]) -> ErrorLoop:
                 name, polynomial, False, f"{name} k{index} = {gain:g} must be positive"
             )
     column = routh_first_column(polynomial)
-    return ErrorLoop(
-        *(name, polynomial, False),
+    condition = (
         f"{name} {list(gains)}: entry {len(column)} of the Routh array's first column is "
-        f"{column[-1]:g}, must be positive",
+        f"{column[-1]:g}, must be positive"
     )
+    return ErrorLoop(name, polynomial, False, condition)
 
 
 def error_loops(gains: Gains, vehicle: Vehicle, decoupling: float) -> list[ErrorLoop]:
-    """The closed loops of the attitude-altitude law under the given form of decoupling matrix.
+    """The loops of the attitude-altitude controller with a form of the decoupling matrix.
 
-    The published matrix lacks the factor ``2 |varpi|`` in its attitude rows, so the attitude loops
-    run with that factor, taken at hover, as an additional loop gain.
+    The published matrix lacks the factor ``2 |varpi|`` in its attitude rows, so that factor, taken
+    at hover, is an additional gain of the attitude loops.
     """
     factor = 2.0 * vehicle.hover_rotor_speed if decoupling == PUBLISHED_DECOUPLING else 1.0
     third_order = [
@@ -106,7 +106,7 @@ def error_loops(gains: Gains, vehicle: Vehicle, decoupling: float) -> list[Error
 
 
 def feedforward_loops(gains: Gains, integral: IntegralGains) -> list[ErrorLoop]:
-    """The closed loops of the law that knows its gait's rates, with its integrals."""
+    """The loops of the controller with gait feed-forward, with its integrals."""
     altitude = (gains.altitude_1, gains.altitude_2, gains.altitude_3)
     position = (gains.position_1, gains.position_2)
     with_altitude = (*altitude, integral.altitude) if integral.altitude else altitude

@@ -1,4 +1,4 @@
-"""Where a flight comes to rest: steady states from statics alone (ch. 4, Remark 6)."""
+"""Rotor speeds in hover with fixed tilts, from statics alone (ch. 4, Remark 6)."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 
 
 def hover_rotor_speeds(tilts: Quad, vehicle: Vehicle) -> Quad | None:
-    """Rotor speeds (rad/s) along the spins with which fixed tilt angles carry the weight.
+    """Rotor speeds (rad/s) along the spins with which fixed ``tilts`` (rad) support the weight.
 
-    They make no torque and a force as large as the weight, up at level attitude or as near to it as
-    the tilts allow. Negative where a rotor would have to turn backwards, which the singularity
-    margin says nothing of. None where there is no such force, or it has no part upwards.
+    Their torque is zero and their force as large as the weight, upward at level attitude or as
+    nearly as the tilts allow. Negative where a rotor would have to turn backwards, which the
+    singularity margin does not show. None where there is no such force or it has no upward part.
     """
     if not torque_free_direction(tilts, vehicle)[2] > 0.0:
         return None
@@ -37,5 +37,5 @@ def hover_rotor_speeds(tilts: Quad, vehicle: Vehicle) -> Quad | None:
 
 
 def _speed(square: float) -> float:
-    """The rotor speed whose square, with its sign, is given."""
+    """The rotor speed with a given signed square."""
     return copysign(sqrt(abs(square)), square)

@@ -1,14 +1,14 @@
 """The Two Color Map in closed form, for any vehicle (ch. 6 to 8, 12).
 
-A gait is robust, says ch. 6, where ``R_phi = R_theta = 0`` and ``R != 0``: small roll and pitch
-then leave the determinant alone. The thesis solves the first two equations numerically, vehicle by
-vehicle. Written with the columns of ``tau``, they factor. Let ``r = K_m / (L K_f)``, ``delta =
+According to ch. 6 a gait is robust where ``R_phi = R_theta = 0`` and ``R != 0``: small roll and
+pitch then do not change the determinant. The thesis solves the first two equations numerically for
+each vehicle. Written with the columns of ``tau``, they factor. Let ``r = K_m / (L K_f)``, ``delta =
 atan(r)`` and ``k = (r + 1/r) / 2``; then
 
     ``R_theta = k sin(alpha_1 + alpha_3 - 2 delta) sin(alpha_2 - alpha_4)``,
     ``R_phi = k sin(alpha_2 + alpha_4 + 2 delta) sin(alpha_3 - alpha_1)``,
 
-so the roots are two families of lines and nothing else (but where both meet):
+so the only roots are two families of lines (where they intersect, one angle is free):
 
 * red: ``alpha_3 = alpha_1``, ``alpha_4 = alpha_2``;
 * blue: ``alpha_3 = 2 delta - alpha_1``, ``alpha_4 = -2 delta - alpha_2``;
@@ -21,7 +21,7 @@ each angle up to a multiple of pi. They meet at ``P = (delta, -delta)``.
     cos^2 alpha_1 cos^2 alpha_2``.
 
 The first bracket is the curve L of ch. 8: ``tan alpha_2 = tan alpha_1 - 2 r``. P lies exactly on
-it; ch. 8 and 12 place it "a little below" because of rounding. The other two vanish only at
+it; ch. 8 and 12 place it slightly below because of rounding. The other two vanish only at
 ``alpha_1 = delta - pi/2`` and ``alpha_2 = pi/2 - delta``.
 
 **Blue is singular everywhere.** Up to the factor ``hypot(L K_f, K_m)`` the columns of ``tau`` are
@@ -32,9 +32,9 @@ it; ch. 8 and 12 place it "a little below" because of rounding. The other two va
     ``(-cos(alpha_4 + delta), 0, -sin(alpha_4 + delta))``.
 
 On blue ``alpha_3 - delta = -(alpha_1 - delta)`` and ``alpha_4 + delta = -(alpha_2 + delta)``, so
-the third column is minus the first and the fourth minus the second: ``tau`` has rank 2 at most,
-whatever the attitude. ``R``, ``R_phi`` and ``R_theta`` vanish together. The blue results of the
-thesis live on the rounding of its coefficients; a blue gait has no margin at all.
+the third column is minus the first and the fourth minus the second: ``tau`` has rank 2 at most, at
+every attitude. ``R``, ``R_phi`` and ``R_theta`` vanish together. The thesis's results for blue are
+due to the rounding of its coefficients; the margin of a blue gait is zero.
 """
 
 from __future__ import annotations
@@ -52,9 +52,8 @@ from tiltsim_controllers.vehicle.parameters import drag_ratio
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from tiltsim_controllers.mathematics.scalar import Floats
     from tiltsim_controllers.vehicle.parameters import Vehicle
-
-    Array = NDArray[np.float64]
 
 Region = Literal["S_U", "S_D", "L"]
 
@@ -65,18 +64,18 @@ _END_TOLERANCE: Final = 1e-9
 
 
 def delta(vehicle: Vehicle) -> float:
-    """``atan(K_m / (L K_f))`` (rad): the tilt that turns a rotor's drag into its thrust arm."""
+    """``atan(K_m / (L K_f))``, rad."""
     return atan(drag_ratio(vehicle))
 
 
 def point_p(vehicle: Vehicle) -> tuple[float, float]:
-    """P, the only point of the alpha_1-alpha_2 plane that both colours share (ch. 8, Sec. 3.4)."""
+    """P, the only point (rad) of the alpha_1-alpha_2 plane on both colours (ch. 8, Sec. 3.4)."""
     angle = delta(vehicle)
     return angle, -angle
 
 
-def red_residual(alpha_1: ArrayLike, alpha_2: ArrayLike, vehicle: Vehicle) -> Array:
-    """``R`` on red (ch. 8, Eq. 7) in factored form; angles in rad, broadcast together."""
+def red_residual(alpha_1: ArrayLike, alpha_2: ArrayLike, vehicle: Vehicle) -> Floats:
+    """``R`` on red (ch. 8, Eq. 7) in factored form; angles in rad broadcast."""
     ratio, angle = drag_ratio(vehicle), delta(vehicle)
     alpha_1, alpha_2 = np.asarray(alpha_1, float), np.asarray(alpha_2, float)
     beside_l = 2.0 * ratio * np.cos(alpha_1) * np.cos(alpha_2) - np.sin(alpha_1 - alpha_2)
@@ -84,13 +83,13 @@ def red_residual(alpha_1: ArrayLike, alpha_2: ArrayLike, vehicle: Vehicle) -> Ar
     return np.asarray(2.0 / ratio * beside_l * sides)
 
 
-def curve_l(alpha_1: ArrayLike, vehicle: Vehicle) -> Array:
+def curve_l(alpha_1: ArrayLike, vehicle: Vehicle) -> Floats:
     """The curve L (ch. 8, Eq. 6): ``alpha_2 = atan(tan alpha_1 - 2 r)``, rad, |alpha_1| < pi/2."""
     return np.asarray(np.arctan(np.tan(np.asarray(alpha_1, float)) - 2.0 * drag_ratio(vehicle)))
 
 
 def region(alpha_1: float, alpha_2: float, vehicle: Vehicle) -> Region:
-    """Where red ``(alpha_1, alpha_2)`` lies: S_U (R > 0), S_D (R < 0) or on L (ch. 8, Eqs. 6-9)."""
+    """The region of red angles (rad): S_U (R > 0), S_D (R < 0) or L (ch. 8, Eqs. 6-9)."""
     value = float(red_residual(alpha_1, alpha_2, vehicle))
     if abs(value) < 1e-12 / drag_ratio(vehicle):
         return "L"
@@ -115,10 +114,16 @@ def find_roots(
 ) -> list[Root]:
     """All ``(alpha_3, alpha_4)`` in [-pi/2, pi/2] with ``R_phi = R_theta = 0`` (ch. 6, Eqs. 7-8).
 
-    A search that knows nothing of the closed form above, as a check on it: both residuals are
-    bilinear in ``(cos, sin)`` of ``alpha_3`` and of ``alpha_4``, so eliminating ``alpha_4`` leaves
-    one quadratic, and no root can be missed. Planes less than ``same_plane`` (rad) apart count as
-    meeting; ch. 6's "?" need half a grid step, pi/32, as no grid point lies exactly on a crossing.
+    A search independent of the closed form above, to check it: both residuals are bilinear in
+    ``(cos, sin)`` of ``alpha_3`` and of ``alpha_4``, so eliminating ``alpha_4`` leaves one
+    quadratic, and no root is missed.
+
+    Parameters
+    ----------
+    alpha_1, alpha_2 : rad
+    vehicle : the tiltrotor
+    same_plane : distance below which planes intersect, rad; for "?" of ch. 6 half a grid step,
+        pi/32, as no grid point lies exactly on an intersection
 
     Raises
     ------
@@ -155,7 +160,7 @@ def find_roots(
     return sorted(roots, key=lambda root: (root.alpha_3, root.alpha_4))
 
 
-def grid_axis(size: int = GRID_SIZE) -> Array:
+def grid_axis(size: int = GRID_SIZE) -> Floats:
     """Grid of ch. 6 along one axis: ``size`` points from -pi/2 to pi/2 (rad)."""
     return np.linspace(-pi / 2, pi / 2, size)
 
@@ -163,7 +168,7 @@ def grid_axis(size: int = GRID_SIZE) -> Array:
 def grid_roots(vehicle: Vehicle, size: int = GRID_SIZE) -> list[list[list[Root]]]:
     """The roots at every grid point ``[i][j]`` of ``(alpha_1, alpha_2)`` (ch. 6, Fig. 4).
 
-    Planes count as meeting ("?") within half a grid step.
+    Planes closer than half a grid step count as intersecting ("?").
     """
     axis = grid_axis(size).tolist()
     half_step = 0.5 * pi / (size - 1)
@@ -187,7 +192,11 @@ def _classify(
     offset = 2.0 * delta(vehicle)
     R = float(residuals((alpha_1, alpha_2, alpha_3, alpha_4), vehicle).R)
     return Root(
-        *(alpha_1, alpha_2, alpha_3, alpha_4, R),
+        alpha_1,
+        alpha_2,
+        alpha_3,
+        alpha_4,
+        R,
         plane_3=_plane(alpha_3, alpha_1, offset - alpha_1, same),
         plane_4=_plane(alpha_4, alpha_2, -offset - alpha_2, same),
     )
@@ -200,19 +209,19 @@ def _plane(angle: float, growing: float, falling: float, same: float) -> Literal
 
 
 def _distance(angle: float, other: float) -> float:
-    """Distance (rad) of two directions that are the same after half a turn."""
+    """Distance (rad) of two directions modulo half a revolution."""
     return abs((angle - other + pi / 2) % pi - pi / 2)
 
 
 def _representatives(angle: float) -> list[float]:
-    """The values of ``angle`` modulo pi within [-pi/2, pi/2]: both ends, if it is one of them."""
+    """The values of ``angle`` modulo pi in [-pi/2, pi/2]: both ends if it is one of them."""
     wrapped = (angle + pi / 2) % pi - pi / 2
     if pi / 2 - abs(wrapped) < _END_TOLERANCE:
         return [-pi / 2, pi / 2]
     return [wrapped]
 
 
-def _cross(first: Array, second: Array) -> float:
+def _cross(first: Floats, second: Floats) -> float:
     return float(first[0] * second[1] - first[1] * second[0])
 
 

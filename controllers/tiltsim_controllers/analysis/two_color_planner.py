@@ -1,16 +1,15 @@
 """Gaits planned on the Two Color Map: check a path, then give its four angles (ch. 6 and 8).
 
 A path is a closed curve in the alpha_1-alpha_2 plane with a colour on every part. Two published
-theorems judge it:
+theorems give conditions:
 
 * the Two Color Map Theorem (ch. 6, Theorem 1): ``alpha_1`` and ``alpha_2`` move one at a time and
   the colour stays;
 * the generalized theorem (ch. 8, Sec. 3): any continuous path within ``|alpha| <= 1``; red stays on
-  its side of the curve L; the colour changes at P alone.
+  its side of the curve L; the colour changes only at P.
 
-Both accept blue anywhere. A path that they accept can still be singular, and then `PathReport` says
-so: blue has rank 2 at every attitude (`tiltsim_controllers.analysis.two_color_map`), and P lies on
-L.
+Both accept blue anywhere. An accepted path can still be singular, a warning of `PathReport`: blue
+has rank 2 at every attitude (`tiltsim_controllers.analysis.two_color_map`), and P lies on L.
 """
 
 from __future__ import annotations
@@ -29,12 +28,10 @@ from tiltsim_controllers.gaits.two_color import colored_angles
 from tiltsim_controllers.vehicle.parameters import drag_ratio
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from tiltsim_controllers.gaits.plans import Gait
+    from tiltsim_controllers.mathematics.scalar import Floats
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
-Array: TypeAlias = "NDArray[np.float64]"
 Point: TypeAlias = tuple[float, float]
 Theorem = Literal["two_color", "generalized"]
 
@@ -59,7 +56,7 @@ class Leg(NamedTuple):
 
 @dataclass(frozen=True)
 class Polyline:
-    """A closed path of legs; each starts where the one before ended."""
+    """A closed path of legs; each starts at the end of the previous one."""
 
     legs: tuple[Leg, ...]
 
@@ -78,12 +75,12 @@ Path: TypeAlias = Polyline | Circle
 
 @dataclass(frozen=True)
 class PathReport:
-    """The verdict on a path."""
+    """The result of checking a path."""
 
     theorem: Theorem | None  # the narrower published theorem that accepts it; None: refused
-    reasons: tuple[str, ...]  # why it is refused
-    crossings: tuple[Point, ...]  # where red leaves its side of L (rad)
-    warnings: tuple[str, ...]  # what the theorems overlook
+    reasons: tuple[str, ...]  # for refusing it
+    crossings: tuple[Point, ...]  # where red crosses L (rad)
+    warnings: tuple[str, ...]  # singularities that the theorems do not consider
 
     @property
     def accepted(self) -> bool:
@@ -92,7 +89,7 @@ class PathReport:
 
     @property
     def sound(self) -> bool:
-        """Whether a published theorem accepts the path, and it is nowhere singular."""
+        """Whether a published theorem accepts the path and it is nowhere singular."""
         return self.accepted and not self.warnings
 
 
@@ -108,12 +105,12 @@ def rectangle(alpha_1: Point, alpha_2: Point, color: str) -> Polyline:
 
 
 def polygon(vertices: tuple[Point, ...], color: str) -> Polyline:
-    """A free path through the vertices (rad) and back to the first, in one colour."""
+    """A closed path through the vertices (rad) in one colour."""
     return Polyline((Leg(color, (*vertices, vertices[0])),))
 
 
 def check_path(path: Path, vehicle: Vehicle) -> PathReport:
-    """Judge a path by both published theorems, and say what they overlook.
+    """Check a path by both published theorems, and for singularities they do not consider.
 
     Raises
     ------
@@ -125,11 +122,11 @@ def check_path(path: Path, vehicle: Vehicle) -> PathReport:
     p = point_p(vehicle)
     reasons: list[str] = []
     for end, start, before, after in joints:
-        if not _same(end, start):
-            reasons.append(f"broken at {_show(end)}: the next part starts at {_show(start)}")
-        elif before != after and not _same(start, p):
+        if not _coincide(end, start):
+            reasons.append(f"broken at {_text(end)}: the next part starts at {_text(start)}")
+        elif before != after and not _coincide(start, p):
             reasons.append(
-                f"color changes at {_show(start)}: the colors meet at P = {_show(p)} alone"
+                f"color changes at {_text(start)}: the colors meet at P = {_text(p)} alone"
             )
     crossings = _distinct(
         [
@@ -140,7 +137,7 @@ def check_path(path: Path, vehicle: Vehicle) -> PathReport:
         ]
     )
     if crossings:
-        places = ", ".join(map(_show, crossings))
+        places = ", ".join(map(_text, crossings))
         reasons.append(f"red crosses the curve L (R = 0) at {places}")
 
     points = np.concatenate([point(np.linspace(0.0, 1.0, _SAMPLES)) for _, point in pieces])
@@ -170,7 +167,14 @@ def plan(
 ) -> Gait:
     """The four-angle gait of a path that a published theorem accepts.
 
-    The path is run at constant speed in the alpha_1-alpha_2 plane, once a period (s).
+    The path is followed at constant speed in the alpha_1-alpha_2 plane.
+
+    Parameters
+    ----------
+    path : in the alpha_1-alpha_2 plane
+    period : s
+    vehicle : its drag ratio sets the offset of the blue lines
+    name, source : name and origin of the gait
 
     Raises
     ------
@@ -188,7 +192,12 @@ def plan(
 def four_angle_gait(
     path: Path, period: float, vehicle: Vehicle, *, name: str = "two_color", source: str = ""
 ) -> Gait:
-    """The four-angle gait of a path, judged or not; see `plan`."""
+    """The four-angle gait of a path, without checking it.
+
+    Parameters
+    ----------
+    path, period, vehicle, name, source : as for `plan`
+    """
     if isinstance(path, Circle):
         return plans.two_color_circle(
             path.centre, path.radius, path.color, period, vehicle, name=name, source=source
@@ -211,7 +220,7 @@ def four_angle_gait(
             if index:
                 covered += next(steps)
             elif rows:
-                continue  # the leg before ended here, with the same four angles
+                continue  # the end of the previous leg, with the same four angles
             back = colored_angles(first, second, code, ratio)
             rows.append((covered / total, first, second, *back))
     rows[-1] = (1.0, *rows[-1][1:])
@@ -220,11 +229,11 @@ def four_angle_gait(
 
 class _Piece(NamedTuple):
     color: str
-    point: Callable[[Array], Array]  # shares of the piece (N,) to points (N, 2), rad
+    point: Callable[[Floats], Floats]  # shares of the piece (N,) to points (N, 2), rad
 
 
 def _pieces(path: Path) -> list[_Piece]:
-    """The path as smooth pieces; refuses what is no path at all."""
+    """The path as smooth pieces; raises ValueError for an invalid path."""
     if isinstance(path, Circle):
         plans.color_code(path.color)
         if not (all(map(isfinite, (*path.centre, path.radius))) and path.radius > 0.0):
@@ -233,7 +242,7 @@ def _pieces(path: Path) -> list[_Piece]:
                 "finite"
             )
 
-        def around(share: Array) -> Array:
+        def around(share: Floats) -> Floats:
             turn = 2.0 * pi * share[:, np.newaxis]
             offset = np.concatenate([np.cos(turn), np.sin(turn)], axis=1)
             return np.asarray(path.centre + path.radius * offset)
@@ -247,7 +256,7 @@ def _pieces(path: Path) -> list[_Piece]:
             raise ValueError(f"{leg.color} leg {list(leg.vertices)}: needs two finite points")
         for start, end in pairwise(leg.vertices):
 
-            def along(share: Array, start: Point = start, end: Point = end) -> Array:
+            def along(share: Floats, start: Point = start, end: Point = end) -> Floats:
                 share = share[:, np.newaxis]
                 return np.asarray((1.0 - share) * np.array(start) + share * np.array(end))
 
@@ -276,7 +285,7 @@ def _moves_one_at_a_time(path: Path) -> bool:
     )
 
 
-def _crossings(point: Callable[[Array], Array], p: Point, vehicle: Vehicle) -> list[Point]:
+def _crossings(point: Callable[[Floats], Floats], p: Point, vehicle: Vehicle) -> list[Point]:
     """Where ``R`` on red changes sign or touches zero along a piece, P excepted."""
     from scipy.optimize import brentq, minimize_scalar
 
@@ -287,7 +296,7 @@ def _crossings(point: Callable[[Array], Array], p: Point, vehicle: Vehicle) -> l
     shares = np.linspace(0.0, 1.0, _SAMPLES)
     points = point(shares)
     values = red_residual(points[:, 0], points[:, 1], vehicle)
-    # Close to zero without a change of sign: the path may dip across between two samples.
+    # Close to zero without a change of sign: the path may cross twice between two samples.
     side = np.sign(values[np.abs(values).argmax()])
     depth = side * values
     dips = np.flatnonzero((depth[1:-1] <= depth[:-2]) & (depth[1:-1] <= depth[2:])) + 1
@@ -308,24 +317,24 @@ def _crossings(point: Callable[[Array], Array], p: Point, vehicle: Vehicle) -> l
     places: list[Point] = []
     for share in sorted(found):
         first, second = map(float, point(np.array([share]))[0])
-        # ch. 8 takes P for a point below L and lets red pass there.
-        if not _same((first, second), p):
+        # ch. 8 considers P a point below L and allows red there.
+        if not _coincide((first, second), p):
             places.append((first, second))
     return places
 
 
 def _distinct(places: list[Point]) -> tuple[Point, ...]:
-    """Without repeats: a crossing at a vertex belongs to both of its lines."""
-    kept: list[Point] = []
+    """Without duplicates: a crossing at a vertex belongs to both of its lines."""
+    distinct: list[Point] = []
     for place in places:
-        if not any(hypot(place[0] - k[0], place[1] - k[1]) < 1e-6 for k in kept):
-            kept.append(place)
-    return tuple(kept)
+        if not any(hypot(place[0] - k[0], place[1] - k[1]) < 1e-6 for k in distinct):
+            distinct.append(place)
+    return tuple(distinct)
 
 
-def _same(first: Point, second: Point) -> bool:
+def _coincide(first: Point, second: Point) -> bool:
     return hypot(first[0] - second[0], first[1] - second[1]) < _SAME_POINT
 
 
-def _show(point: Point) -> str:
+def _text(point: Point) -> str:
     return f"({point[0]:.6f}, {point[1]:.6f})"

@@ -1,7 +1,7 @@
 """Unacceptable attitudes of a gait: the singular curve in the roll-pitch diagram (ch. 5 to 8).
 
 The thesis traces the curve by root finding. The singular attitudes are those at which world up,
-seen from the body, is perpendicular to the torque-free force ``n``: a great circle, known in closed
+in body axes, is perpendicular to the torque-free force ``n``: a great circle, known in closed
 form. Angles are in rad; ``angles`` are the four tilt angles of one gait at one instant.
 """
 
@@ -17,11 +17,10 @@ import numpy as np
 from tiltsim_controllers.analysis.singularity import residuals, torque_free_direction
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
+    from tiltsim_controllers.mathematics.scalar import Floats
     from tiltsim_controllers.vehicle.parameters import Vehicle
-
-    Array = NDArray[np.float64]
 
 CurveKind = Literal["graph", "vertical", "none", "everywhere"]
 
@@ -30,23 +29,24 @@ CurveKind = Literal["graph", "vertical", "none", "everywhere"]
 class AttitudeCurve:
     """The singular attitudes of one gait with ``|roll| < pi/2``.
 
-    ``kind`` tells their shape: ``graph`` (one pitch for each roll), ``vertical`` (one roll, any
+    ``kind`` is their shape: ``graph`` (one pitch for each roll), ``vertical`` (one roll, any
     pitch; ``R_theta = 0``), ``none`` (only at ``|roll| = pi/2``; ``R_phi = R_theta = 0``) or
     ``everywhere`` (``n = 0``). ``roll`` and ``pitch`` are samples, shape (N,), empty for the last
     two kinds.
     """
 
     kind: CurveKind
-    roll: Array
-    pitch: Array
+    roll: Floats
+    pitch: Floats
 
 
 def unacceptable_attitudes(
     angles: ArrayLike, vehicle: Vehicle, samples: int = 181
 ) -> AttitudeCurve:
-    """The unacceptable-attitude curve of a gait, sampled evenly along the great circle.
+    """The unacceptable-attitude curve of a gait, in ``samples`` points.
 
-    Evenly in the angle turned, not in roll: a steep or vertical curve is followed like any other.
+    Sampled evenly along the great circle, not in roll, so that steep and vertical curves are
+    resolved, too.
     """
     empty = np.empty(0)
     direction = torque_free_direction(angles, vehicle)
@@ -59,17 +59,17 @@ def unacceptable_attitudes(
     # Two unit vectors that span the plane across n: one level, one pointing up.
     level = np.array([-ny, nx, 0.0]) / lean
     upward = np.array([-nx * nz, -ny * nz, lean * lean]) / lean
-    turned = np.linspace(0.0, pi, samples + 2)[1:-1, np.newaxis]
-    ux, uy, uz = (np.cos(turned) * level + np.sin(turned) * upward).T
+    turn = np.linspace(0.0, pi, samples + 2)[1:-1, np.newaxis]
+    ux, uy, uz = (np.cos(turn) * level + np.sin(turn) * upward).T
     kind: CurveKind = "vertical" if nx == 0.0 else "graph"
     return AttitudeCurve(kind, np.arctan2(uy, uz), np.arctan2(-ux, np.hypot(uy, uz)))
 
 
 def acceptable_share(angles: ArrayLike, vehicle: Vehicle, half_width: float = pi / 2) -> float:
-    """Share of the square ``|roll|, |pitch| < half_width`` that a flight from level can reach.
+    """Fraction of the square ``|roll|, |pitch| < half_width`` (rad) reachable from level attitude.
 
-    That is the part where the determinant keeps the sign it has at level attitude; it is connected,
-    as the curve cuts every line of constant roll at most once. Zero if level attitude is singular.
+    That is the part where the determinant has the same sign as at level attitude; it is connected,
+    as the curve crosses each line of constant roll at most once. Zero if level is singular.
 
     Raises
     ------
@@ -93,9 +93,9 @@ def acceptable_share(angles: ArrayLike, vehicle: Vehicle, half_width: float = pi
         steepness = lift / abs(R_theta) if R_theta else (inf if lift > 0.0 else -inf)
         return half_width + min(half_width, max(-half_width, atan(steepness)))
 
-    from scipy.integrate import quad  # a third of a second to import, for this function alone
+    from scipy.integrate import quad  # takes a third of a second to import
 
-    # The integrand bends where the curve leaves the square or crosses level pitch.
+    # The integrand has corners where the curve leaves the square or crosses level pitch.
     bends = {-half_width, half_width}
     for level in (0.0, abs(R_theta) * np.tan(half_width), -abs(R_theta) * np.tan(half_width)):
         if abs(level) <= amplitude:

@@ -3,9 +3,9 @@
 With the tilt angles as inputs the tiltrotor has more inputs than degrees of freedom. Position and
 attitude are tracked by third-order error dynamics; of all inputs with the desired third derivatives
 the controller takes the one of minimum norm. The inputs are the rates of
-``w_i = varpi_i |varpi_i|`` and of the tilt angles, and the norm depends on the weight of a tilt rate
-relative to a rate of ``w``. The published controller takes (rad/s)^2/s and rad/s as they are. One
-rad/s then moves the force as much as 1e5 (rad/s)^2/s, so that tilting does nearly all the work,
+``w_i = varpi_i |varpi_i|`` and of the tilt angles, and the norm depends on the weight of a tilt
+rate relative to a rate of ``w``. The published controller takes (rad/s)^2/s and rad/s as they are.
+One rad/s then moves the force as much as 1e5 (rad/s)^2/s, so that tilting does nearly all the work,
 even for the vertical force: a pod at a small angle hardly changes it, and its rate grows like
 1/sin(alpha) down to angles of 1e-5 rad, faster than any step can follow.
 `force_balanced_tilt_weight` weights both by the force they move.

@@ -1,37 +1,34 @@
 """Fourth-derivative feedback linearization of the tilt-car (ch. 10, Sec. 6.1).
 
 The inputs are the second derivatives of both rotor speeds and of the tilt angle; their first
-derivatives are states of the law. As printed, the tilt's column of the decoupling matrix (Eq. 27)
-lacks the factor ``1 - I_T / I_B``, for the yaw answers the tilt's acceleration, too: `PUBLISHED`
-leaves it out, `EXACT` puts it in.
+derivatives are states of the controller. As printed, the tilt's column of the decoupling matrix
+(Eq. 27) lacks the factor ``1 - I_T / I_B`` due to the counter-rotation: `PUBLISHED` omits it,
+`EXACT` includes it.
 
-The rotor speeds that the law integrates may drift below zero, where no thrust follows them. As the
-chapter's run, the law then goes on with speeds that no rotor has (windup), and fails; with
-``anti_windup`` they stop at zero, and the other rotor and the tilt go on alone.
+The rotor speeds that the controller integrates may drift below zero, where no thrust follows them.
+As in the chapter, the controller then continues with speeds that no rotor has (windup), and fails;
+with ``anti_windup`` they stop at zero, and the other rotor and the tilt continue alone.
 """
 
 from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from tiltsim_controllers.mathematics.scalar import Pair, Quad, Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Pair, Quad, Triple, Values, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
 from tiltsim_controllers.tilt_car.third_derivative import input_columns, minimum_norm
 from tiltsim_controllers.tilt_car.vehicle import (
     STATE_FIELDS,
     TiltCar,
     body_acceleration,
+    rotate,
     turn_per_tilt,
-    turned,
 )
 
-State = tuple[float, ...]
-
-EXTENDED_STATE_FIELDS: Final = (
-    *STATE_FIELDS,
-    *("alpha_rate", "rotor_acceleration_1", "rotor_acceleration_2"),  # 8-10: rad/s, rad/s^2
-)
-"""The state of the car and the law's own first derivatives."""
+SPEED_1: Final = STATE_FIELDS.index("rotor_speed_1")
+DERIVATIVE_FIELDS: Final = ("alpha_rate", "rotor_acceleration_1", "rotor_acceleration_2")
+EXTENDED_STATE_FIELDS: Final = (*STATE_FIELDS, *DERIVATIVE_FIELDS)
+"""The state of the car and the controller's own first derivatives, rad/s and rad/s^2."""
 
 PUBLISHED: Final = 0.0
 EXACT: Final = 1.0
@@ -49,13 +46,13 @@ class Gains(NamedTuple):
 
 
 class Parameters(NamedTuple):
-    """All that the law needs to know besides time and state."""
+    """Parameters of the controller."""
 
     car: TiltCar
     gains: Gains
     reference: ReferenceParameters
     decoupling: float
-    anti_windup: float  # 1 or 0: whether the law's rotor speeds stop at zero
+    anti_windup: float  # 1 or 0: whether the controller's rotor speeds stop at zero
 
 
 GAIN_SETS: Final = {
@@ -66,64 +63,66 @@ GAIN_SETS: Final = {
 
 
 @scalar
-def body_derivatives(state: State, car: TiltCar) -> tuple[float, ...]:
-    """Acceleration, jerk and drift ``M_P``, two floats each, seen from the thrusts' middle.
+def body_derivatives(state: Values, car: TiltCar) -> Values:
+    """Acceleration, jerk and drift ``M_P``, two floats each, in the frame of the thrusts' bisector.
 
     Eq. (21) without its terms in the second derivatives of the inputs, written with the turn rate
-    of the middle, ``(1 - I_T / I_B) alpha'``, for the products of ``J_psi`` and ``J_alpha``.
+    of the bisector, ``(1 - I_T / I_B) alpha'``, for the products of ``J_psi`` and ``J_alpha``.
     """
-    speed_1, speed_2, tilt_rate, rate_1, rate_2 = state[6:11]
+    speed_1, speed_2, tilt_rate, rate_1, rate_2 = state[SPEED_1 : SPEED_1 + 5]
     turn = turn_per_tilt(car) * tilt_rate
     along, across = body_acceleration(speed_1 * speed_1, speed_2 * speed_2, car)
     along_1, across_1 = body_acceleration(2.0 * speed_1 * rate_1, 2.0 * speed_2 * rate_2, car)
     along_2, across_2 = body_acceleration(2.0 * rate_1 * rate_1, 2.0 * rate_2 * rate_2, car)
     return (
-        *(along, across),
-        *(along_1 - turn * across, across_1 + turn * along),
+        along,
+        across,
+        along_1 - turn * across,
+        across_1 + turn * along,
         along_2 - turn * turn * along - 2.0 * turn * across_1,
         across_2 - turn * turn * across + 2.0 * turn * along_1,
     )
 
 
 @scalar
-def wanted_snap(time: float, state: State, derivatives: Quad, parameters: Parameters) -> Pair:
-    """The fourth derivative of the position (m/s^4, world) to ask for.
+def demanded_snap(time: float, state: Values, derivatives: Quad, parameters: Parameters) -> Pair:
+    """The desired fourth derivative of the position (m/s^4, world).
 
-    ``derivatives`` are the present acceleration and jerk, world axes.
+    Parameters
+    ----------
+    time : s
+    state : `EXTENDED_STATE_FIELDS`
+    derivatives : present acceleration and jerk, two floats each, world
+    parameters : of the controller
     """
     gains = parameters.gains
     k1, k2, k3, k4 = gains.jerk, gains.acceleration, gains.velocity, gains.position
     ax, ay, jx, jy = derivatives
-    reference = reference_derivatives(time, parameters.reference)
+    x, y, vx, vy = state[:4]
+    motion = reference_derivatives(time, parameters.reference)
+    x0, y0, _, x1, y1, _, x2, y2, _, x3, y3, _, x4, y4, _ = motion
     return (
-        reference[12]
-        + k1 * (reference[9] - jx)
-        + k2 * (reference[6] - ax)
-        + k3 * (reference[3] - state[2])
-        + k4 * (reference[0] - state[0]),
-        reference[13]
-        + k1 * (reference[10] - jy)
-        + k2 * (reference[7] - ay)
-        + k3 * (reference[4] - state[3])
-        + k4 * (reference[1] - state[1]),
+        x4 + k1 * (x3 - jx) + k2 * (x2 - ax) + k3 * (x1 - vx) + k4 * (x0 - x),
+        y4 + k1 * (y3 - jy) + k2 * (y2 - ay) + k3 * (y1 - vy) + k4 * (y0 - y),
     )
 
 
 @scalar
-def fourth_derivative_inputs(time: float, state: State, parameters: Parameters) -> Triple:
+def fourth_derivative_inputs(time: float, state: Values, parameters: Parameters) -> Triple:
     """Second derivatives of the rotor speeds (rad/s^3) and of the tilt angle (rad/s^2); Eq. (29).
 
-    ``state`` holds `EXTENDED_STATE_FIELDS`.
+    ``state`` is `EXTENDED_STATE_FIELDS`.
     """
     car = parameters.car
-    direction = state[4] + state[5]
+    yaw, alpha, speed_1, speed_2 = state[4:8]
+    direction = yaw + alpha
     along, across, jerk_along, jerk_across, drift_along, drift_across = body_derivatives(state, car)
-    ax, ay = turned(along, across, direction)
-    jx, jy = turned(jerk_along, jerk_across, direction)
-    snap_x, snap_y = wanted_snap(time, state, (ax, ay, jx, jy), parameters)
-    snap_along, snap_across = turned(snap_x, snap_y, -direction)
-    x1, y1, x2, y2, x3, y3 = input_columns(state[6], state[7], car)
+    ax, ay = rotate(along, across, direction)
+    jx, jy = rotate(jerk_along, jerk_across, direction)
+    snap_x, snap_y = demanded_snap(time, state, (ax, ay, jx, jy), parameters)
+    snap_along, snap_across = rotate(snap_x, snap_y, -direction)
+    x1, y1, x2, y2, x3, y3 = input_columns(speed_1, speed_2, car)
     if parameters.decoupling == PUBLISHED:
         x3, y3 = -across, along
-    wanted = (snap_along - drift_along, snap_across - drift_across)
-    return minimum_norm((x1, y1, x2, y2, x3, y3), wanted)
+    desired = (snap_along - drift_along, snap_across - drift_across)
+    return minimum_norm((x1, y1, x2, y2, x3, y3), desired)

@@ -1,15 +1,15 @@
-"""The limit cycle of ch. 11's large penguin swing, half a period at a time.
+"""The limit cycle of the large penguin swing of ch. 11, half a period at a time.
 
 With ``e_x = 0`` the error along y obeys ``e'' = -K_Y1 e' - K_Y2 e`` while both rotors push, and
-``e'' = -+ tan(Lambda - theta)`` while one has stopped (ch. 11, Eqs. 30-32). The latter, and with it
-Lemma 3, needs ``Lambda + theta = pi / 2``: the rotor that would have to pull then has no part in x,
-and leaving it out leaves ``e_x`` at zero. Over half a period the state ``(e_y, e_y')`` goes through
-a map; the swing to the other side is its mirror image. A fixed point of the map followed by the
-mirror, ``-P(s) = s``, is a limit cycle, stable if the eigenvalues of the map's Jacobian there lie
-within the unit circle.
+``e'' = -+ tan(Lambda - theta)`` while one is stopped (ch. 11, Eqs. 30-32). The latter, and with it
+Lemma 3, requires ``Lambda + theta = pi / 2``: the rotor that would have to pull then has no
+component along x, so that ``e_x`` stays zero without it. Over half a period a map takes the state
+``(e_y, e_y')`` to the next; the swing to the other side is its mirror image. A fixed point of the
+map followed by the mirror, ``-P(s) = s``, is a limit cycle, stable if the eigenvalues of the map's
+Jacobian there lie within the unit circle.
 
-`half_period` takes the state at the start of a half period with the thrusts' middle at ``+Lambda``.
-Everything is in the frame of that half: for the other one change both signs.
+`half_period` takes the state at the start of a half period with the thrusts' bisector at
+``+Lambda``. Everything is in the frame of that half; for the other one both signs change.
 """
 
 from __future__ import annotations
@@ -19,19 +19,17 @@ from dataclasses import dataclass
 from math import cos, exp, isclose, pi, sin, sqrt, tan
 
 import numpy as np
-import numpy.typing as npt
 
+from tiltsim_controllers.mathematics.scalar import Floats, Pair
 from tiltsim_controllers.tilt_car.planned_direction import Gains
 
-Array = npt.NDArray[np.float64]
-State = tuple[float, float]
-
-STEPS = 64  # to look for the switch in a half period, which is slow against them
+STEPS = 64
+"""Intervals of a half period in which the switch is bracketed."""
 
 
 @dataclass(frozen=True)
 class Swing:
-    """A penguin swing under ch. 11's law.
+    """A penguin swing under the controller of ch. 11.
 
     Attributes
     ----------
@@ -48,25 +46,25 @@ class Swing:
 
     @property
     def direction(self) -> float:
-        """``Lambda``, rad: the one at which one thrust has no part in x."""
+        """``Lambda`` (rad), at which one thrust has no component along x."""
         return 0.5 * pi - self.half_angle
 
     @property
     def push(self) -> float:
-        """``e_y''`` (m/s^2) with rotor 2 alone: its thrust, just enough for x, also pushes y."""
+        """``e_y''`` (m/s^2) with rotor 2 alone, whose thrust for x also pushes along y."""
         return -self._side
 
     @property
     def _side(self) -> float:
-        """The least acceleration along y that the thrusts make at the wanted one along x."""
+        """The minimum acceleration along y at the desired one along x."""
         return self.reference_acceleration * tan(self.direction - self.half_angle)
 
-    def both_push(self, state: State) -> bool:
-        """Whether both rotors push: the wanted acceleration lies between the thrusts (Prop. 4)."""
+    def both_push(self, state: Pair) -> bool:
+        """Whether both rotors push: the desired acceleration lies between the thrusts (Prop. 4)."""
         error, rate = state
         return self.gains.y_velocity * rate + self.gains.y_position * error > self._side
 
-    def free(self, time: float, state: State) -> State:
+    def after_both_push(self, time: float, state: Pair) -> Pair:
         """The state after a time (s) of both rotors pushing (ch. 11, Eq. 42)."""
         error, rate = state
         k1, k2 = self.gains.y_velocity, self.gains.y_position
@@ -86,7 +84,7 @@ class Swing:
             decay * (even * rate - odd * (0.5 * k1 * rate + k2 * error)),
         )
 
-    def pushed(self, time: float, state: State) -> State:
+    def after_one_push(self, time: float, state: Pair) -> Pair:
         """The state after a time (s) of one rotor pushing (ch. 11, Eq. 53)."""
         error, rate = state
         return error + rate * time + 0.5 * self.push * time * time, rate + self.push * time
@@ -94,61 +92,61 @@ class Swing:
 
 @dataclass(frozen=True)
 class Half:
-    """What happened in half a period: the state at its end, and for how long both rotors pushed."""
+    """The result of half a period: the state at its end, and how long both rotors pushed (s)."""
 
-    end: State
+    end: Pair
     free_time: float
 
 
-def half_period(swing: Swing, start: State) -> Half:
+def half_period(swing: Swing, start: Pair) -> Half:
     """Follow a state (e_y in m, e_y' in m/s) through half a period, in closed form.
 
-    While both rotors push the state comes down to the line of Eq. (40); from there on one rotor
-    pushes to the end (Remark 4).
+    While both rotors push the state approaches the line of Eq. (40); from there one rotor pushes
+    until the end (Remark 4).
     """
     if not swing.both_push(start):
-        return Half(swing.pushed(swing.half_period, start), 0.0)
+        return Half(swing.after_one_push(swing.half_period, start), 0.0)
     times = np.linspace(0.0, swing.half_period, STEPS + 1).tolist()
     for low, high in itertools.pairwise(times):
-        if not swing.both_push(swing.free(high, start)):
+        if not swing.both_push(swing.after_both_push(high, start)):
             switch = _bisect(swing, start, low, high)
-            between = swing.free(switch, start)
-            return Half(swing.pushed(swing.half_period - switch, between), switch)
-    return Half(swing.free(swing.half_period, start), swing.half_period)
+            between = swing.after_both_push(switch, start)
+            return Half(swing.after_one_push(swing.half_period - switch, between), switch)
+    return Half(swing.after_both_push(swing.half_period, start), swing.half_period)
 
 
-def _bisect(swing: Swing, start: State, low: float, high: float) -> float:
+def _bisect(swing: Swing, start: Pair, low: float, high: float) -> float:
     for _ in range(100):
         middle = 0.5 * (low + high)
         if middle in (low, high):
             break
-        if swing.both_push(swing.free(middle, start)):
+        if swing.both_push(swing.after_both_push(middle, start)):
             low = middle
         else:
             high = middle
     return high
 
 
-def mirrored_map(swing: Swing, state: State) -> State:
+def mirrored_map(swing: Swing, state: Pair) -> Pair:
     """The half-period Poincaré map followed by the mirror, ``s -> -P(s)``."""
     error, rate = half_period(swing, state).end
     return -error, -rate
 
 
-def jacobian(swing: Swing, state: State) -> Array:
+def jacobian(swing: Swing, state: Pair) -> Floats:
     """The mirrored map's Jacobian at a state, shape (2, 2), by central differences."""
     columns = []
     for index in (0, 1):
         ends = []
         for side in (1e-6, -1e-6):
-            moved = [*state]
-            moved[index] += side
-            ends.append(np.array(mirrored_map(swing, (moved[0], moved[1]))))
+            shifted = [*state]
+            shifted[index] += side
+            ends.append(np.array(mirrored_map(swing, (shifted[0], shifted[1]))))
         columns.append((ends[0] - ends[1]) / 2e-6)
     return np.stack(columns, axis=1)
 
 
-def limit_cycle(swing: Swing, guess: State = (0.2, 0.7)) -> State:
+def limit_cycle(swing: Swing, guess: Pair = (0.2, 0.7)) -> Pair:
     """The fixed point of the mirrored map, by Newton's method.
 
     Raises
@@ -159,30 +157,30 @@ def limit_cycle(swing: Swing, guess: State = (0.2, 0.7)) -> State:
     state = np.array(guess)
     for _ in range(50):
         at = (float(state[0]), float(state[1]))
-        miss = np.array(mirrored_map(swing, at)) - state
-        if float(np.abs(miss).max()) < 1e-13:
+        residual = np.array(mirrored_map(swing, at)) - state
+        if float(np.abs(residual).max()) < 1e-13:
             return at
-        state = state - np.linalg.solve(jacobian(swing, at) - np.eye(2), miss)
+        state = state - np.linalg.solve(jacobian(swing, at) - np.eye(2), residual)
     raise ValueError(f"no limit cycle near (e_y, e_y') = {guess}")
 
 
-def multipliers(swing: Swing, state: State) -> Array:
+def multipliers(swing: Swing, state: Pair) -> Floats:
     """Eigenvalues of the mirrored map at its fixed point, largest first, shape (2,).
 
-    The errors of a disturbed cycle shrink by their magnitudes every half period.
+    The errors of a disturbed cycle decay by these factors every half period.
     """
     values = np.linalg.eigvals(jacobian(swing, state))
     return np.asarray(values[np.argsort(-np.abs(values))])
 
 
-def lyapunov(swing: Swing, state: State) -> float:
-    """Ch. 11's candidate at a state, m^2/s^2 (Eq. 49)."""
+def lyapunov(swing: Swing, state: Pair) -> float:
+    """The Lyapunov candidate of ch. 11 at a state, m^2/s^2 (Eq. 49)."""
     error, rate = state
     return 0.5 * rate * rate + 0.5 * swing.gains.y_position * error * error
 
 
-def lyapunov_growth(swing: Swing, state: State) -> float:
-    """By how much the candidate grows over the half period from a state (Eq. 70)."""
+def lyapunov_growth(swing: Swing, state: Pair) -> float:
+    """The growth of the candidate over the half period from a state (Eq. 70)."""
     return lyapunov(swing, half_period(swing, state).end) - lyapunov(swing, state)
 
 
@@ -200,7 +198,7 @@ class LyapunovBound:
 
     critical: float
     largest_gain: float
-    at: State
+    at: Pair
 
     @property
     def published(self) -> float:
@@ -209,10 +207,10 @@ class LyapunovBound:
 
 
 def lyapunov_bound(swing: Swing, points: int = 161) -> LyapunovBound:
-    """``L_critical`` and the largest growth over the zone of Eq. (39).
+    """``L_critical`` and the largest growth over the zone of Eq. (39), on ``points`` rays.
 
-    On every ray from the origin into the zone's quadrant the growth falls with the distance from
-    where it is positive; its zero is bisected, and the rays are searched for the largest candidate.
+    On every ray from the origin into the zone's quadrant the growth decreases with the distance.
+    Its zero is found by bisection; ``L_critical`` is the largest candidate there of all rays.
     """
     angles = np.linspace(0.0, 0.5 * np.pi, points)
     critical, at, largest = 0.0, (0.0, 0.0), 0.0
@@ -238,8 +236,8 @@ def lyapunov_bound(swing: Swing, points: int = 161) -> LyapunovBound:
     return LyapunovBound(critical, largest, at)
 
 
-def _edge(swing: Swing, unit: State) -> float:
-    """How far along a ray the zone of Eq. (39) begins."""
+def _edge(swing: Swing, unit: Pair) -> float:
+    """The distance along a ray at which the zone of Eq. (39) begins."""
     gains = swing.gains
     slope = gains.y_velocity * unit[1] + gains.y_position * unit[0]
     return -swing.push / slope * (1.0 + 1e-12)

@@ -1,19 +1,17 @@
 """Control of the tilt-car with the direction of its thrusts planned (ch. 10, Sec. 5; ch. 11).
 
-The gait moves the tilt, the law sets the squares of both rotor speeds: as many inputs as outputs,
-nothing left to drift. A thrust cannot pull, so squares below zero become zero (ch. 11, Eq. 13),
-which ch. 11 writes with the switch matrix ``S_pq``.
+The gait moves the tilt, the controller sets the squares of both rotor speeds: as many inputs as
+outputs, so that no state drifts. A thrust cannot pull, so negative squares become zero (ch. 11,
+Eq. 13), which ch. 11 writes with the switch matrix ``S_pq``.
 """
 
 from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from tiltsim_controllers.mathematics.scalar import Pair, scalar
+from tiltsim_controllers.mathematics.scalar import Pair, Values, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
-from tiltsim_controllers.tilt_car.vehicle import TiltCar, squared_speeds, turned
-
-State = tuple[float, ...]
+from tiltsim_controllers.tilt_car.vehicle import TiltCar, rotate, squared_speeds
 
 
 class Gains(NamedTuple):
@@ -26,7 +24,7 @@ class Gains(NamedTuple):
 
 
 class Parameters(NamedTuple):
-    """All that the law needs to know besides time and state."""
+    """Parameters of the controller."""
 
     car: TiltCar
     gains: Gains
@@ -43,30 +41,28 @@ GAIN_SETS: Final = {
 
 
 @scalar
-def demanded_acceleration(time: float, state: State, parameters: Parameters) -> Pair:
-    """The acceleration (m/s^2, world) to ask for; ch. 10, Eq. (20) and ch. 11, Eqs. (9), (10)."""
+def demanded_acceleration(time: float, state: Values, parameters: Parameters) -> Pair:
+    """The desired acceleration (m/s^2, world); ch. 10, Eq. (20) and ch. 11, Eqs. (9), (10)."""
     gains = parameters.gains
-    reference = reference_derivatives(time, parameters.reference)
+    x, y, vx, vy = state[:4]
+    x0, y0, _, x1, y1, _, x2, y2, _ = reference_derivatives(time, parameters.reference)[:9]
     return (
-        reference[6]
-        + gains.x_velocity * (reference[3] - state[2])
-        + gains.x_position * (reference[0] - state[0]),
-        reference[7]
-        + gains.y_velocity * (reference[4] - state[3])
-        + gains.y_position * (reference[1] - state[1]),
+        x2 + gains.x_velocity * (x1 - vx) + gains.x_position * (x0 - x),
+        y2 + gains.y_velocity * (y1 - vy) + gains.y_position * (y0 - y),
     )
 
 
 @scalar
-def demanded_squared_speeds(time: float, state: State, parameters: Parameters) -> Pair:
-    """The squares of the rotor speeds (rad^2/s^2) to ask for, of any sign; ch. 11, Eq. (12)."""
+def demanded_squared_speeds(time: float, state: Values, parameters: Parameters) -> Pair:
+    """The desired squares of the rotor speeds (rad^2/s^2), of any sign; ch. 11, Eq. (12)."""
     x, y = demanded_acceleration(time, state, parameters)
-    along, across = turned(x, y, -(state[4] + state[5]))
+    yaw, alpha = state[4:6]
+    along, across = rotate(x, y, -(yaw + alpha))
     return squared_speeds(along, across, parameters.car)
 
 
 @scalar
-def planned_direction_inputs(time: float, state: State, parameters: Parameters) -> Pair:
+def planned_direction_inputs(time: float, state: Values, parameters: Parameters) -> Pair:
     """The squares of the rotor speeds (rad^2/s^2), never below zero; ch. 11, Eqs. (12), (13)."""
     square_1, square_2 = demanded_squared_speeds(time, state, parameters)
     # Written so that NaN stays NaN.

@@ -1,20 +1,20 @@
-"""Why the states of the over-actuated tilt-car drift, and how fast (ch. 10, Secs. 4.2 and 6.2).
+"""Cause and rate of the state drift of the over-actuated tilt-car (ch. 10, Secs. 4.2 and 6.2).
 
-The car's acceleration is a function of three numbers, both rotor speeds and the tilt, and two of
-them would do: each acceleration can be had along a curve of inputs. Along the curve runs the *lean*
-``beta``, the angle from the middle of the thrusts to the acceleration. The minimum-norm law moves
-the inputs at right angles to these curves. The planes at right angles to them do not fit together
-into surfaces (`twist` is not zero: Frobenius), so inputs that go round with an acceleration do not
-come back to where they were: the lean advances by a holonomy. Nothing in the law sees it.
+The car's acceleration is a function of three numbers, both rotor speeds and the tilt, where two
+would suffice: each acceleration is produced along a curve of inputs, parametrized by the *lean*
+``beta``, the angle from the thrusts' bisector to the acceleration. The minimum-norm controller
+moves the inputs perpendicular to these curves. The planes perpendicular to them are not tangent to
+any surfaces (`twist` is not zero: Frobenius), so inputs that follow a closed path of accelerations
+do not return to their start: the lean advances by a holonomy, unobserved by the controller.
 
-On a circle the acceleration keeps its size ``A`` and turns at ``Omega``, and the minimum of
+On a circle the acceleration keeps its magnitude ``A`` and turns at ``Omega``, and the minimum of
 ``W beta'^2 + alpha'^2`` under ``beta' + kappa alpha' = Omega`` gives the drift in closed form::
 
     beta' = Omega / (1 + kappa^2 W(beta))
 
 with ``kappa = 1 - I_T / I_B`` and ``W`` the squared speed of the rotor speeds per lean
-(`lean_stiffness`). It has the sign of ``Omega``, never ends before a rotor stands still at ``beta =
-theta``, and slows down on the way there, for ``W`` grows without bound.
+(`lean_stiffness`). It has the sign of ``Omega``, continues until a rotor stops at ``beta = theta``,
+and slows down on the way there, as ``W`` grows without bound.
 """
 
 from __future__ import annotations
@@ -23,15 +23,13 @@ from math import cos, log, pi, sin, tan
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.tilt_car.third_derivative import input_columns, null_space_input
 from tiltsim_controllers.tilt_car.vehicle import (
     TiltCar,
     turn_per_tilt,
 )
-
-Array = npt.NDArray[np.float64]
 
 
 class Orbit(NamedTuple):
@@ -42,12 +40,15 @@ class Orbit(NamedTuple):
 
 
 def orbit(radius: float, angular_frequency: float) -> Orbit:
-    """The orbit of a radius (m, its sign does not matter) at an angular frequency (rad/s)."""
+    """The orbit of a radius (m, of either sign) at an angular frequency (rad/s)."""
     return Orbit(abs(radius) * angular_frequency**2, angular_frequency)
 
 
 def lean_stiffness(lean: float, acceleration: float, car: TiltCar) -> float:
-    """``W(beta)``: the squares of both rotor speeds' change per radian of lean, (rad/s)^2/rad^2."""
+    """``W(beta)`` ((rad/s)^2/rad^2): squared change of the rotor speeds per lean.
+
+    ``lean`` in rad, ``acceleration`` in m/s^2.
+    """
     theta = car.half_angle
     scale = _scale(acceleration, car)
     return scale * sum(cos(angle) ** 2 / sin(angle) for angle in (theta + lean, theta - lean))
@@ -58,19 +59,19 @@ def _scale(acceleration: float, car: TiltCar) -> float:
 
 
 def drift_rate(lean: float, path: Orbit, car: TiltCar) -> float:
-    """The rate (rad/s) at which the lean advances under the minimum-norm law."""
+    """The rate (rad/s) at which the lean (rad) advances under the minimum-norm controller."""
     stiffness = lean_stiffness(lean, path.acceleration, car)
     return path.angular_frequency / (1.0 + turn_per_tilt(car) ** 2 * stiffness)
 
 
 def holonomy(lean: float, path: Orbit, car: TiltCar) -> float:
-    """By how much (rad) the lean has advanced after one lap that began with this lean."""
+    """The advance (rad) of the lean over one lap that begins with this lean (rad)."""
     time = 2.0 * pi / abs(path.angular_frequency)
     return lean_after(time, lean, path, car) - lean
 
 
 def turned_angle(lean: float, path: Orbit, car: TiltCar) -> float:
-    """The integral of ``1 + kappa^2 W`` from no lean: how far the acceleration turns meanwhile."""
+    """The integral of ``1 + kappa^2 W`` from zero to a lean (rad): rotation of the acceleration."""
     theta = car.half_angle
 
     def integral(angle: float) -> float:  # of cos^2 / sin
@@ -81,14 +82,21 @@ def turned_angle(lean: float, path: Orbit, car: TiltCar) -> float:
 
 
 def lean_after(time: float, start: float, path: Orbit, car: TiltCar) -> float:
-    """The lean (rad) that a lean at the start has become after a time (s), on a settled orbit."""
-    wanted = turned_angle(start, path, car) + path.angular_frequency * time
+    """The lean (rad) after a time on an orbit, in steady state.
+
+    Parameters
+    ----------
+    time : s
+    start : initial lean, rad
+    path, car : the orbit and the tilt-car
+    """
+    target = turned_angle(start, path, car) + path.angular_frequency * time
     low, high = -car.half_angle, car.half_angle
     for _ in range(200):  # bisection; the integral grows from minus to plus infinity
         middle = 0.5 * (low + high)
         if middle in (low, high):
             break
-        if turned_angle(middle, path, car) < wanted:
+        if turned_angle(middle, path, car) < target:
             low = middle
         else:
             high = middle
@@ -96,14 +104,14 @@ def lean_after(time: float, start: float, path: Orbit, car: TiltCar) -> float:
 
 
 def twist(speed_1: float, speed_2: float, car: TiltCar) -> float:
-    """``n . curl n`` of the unit silent input ``n(omega_1, omega_2, alpha)``, per unit of input.
+    """``n . curl n`` of the unit null-space input ``n(omega_1, omega_2, alpha)``, per input.
 
-    Zero, and only zero, would let the minimum-norm planes fit into surfaces (Frobenius), on which
-    every lap closes. By central differences; ``n`` does not depend on the tilt.
+    Only if it were zero would the minimum-norm planes be tangent to surfaces (Frobenius), on which
+    every lap closes. By central differences at rotor speeds (rad/s); ``n`` is independent of tilt.
     """
     steps = 1e-5 * speed_1, 1e-5 * speed_2
 
-    def direction(w1: float, w2: float) -> Array:
+    def direction(w1: float, w2: float) -> Floats:
         n = np.array(null_space_input(input_columns(w1, w2, car)))
         return np.asarray(n / np.linalg.norm(n))
 

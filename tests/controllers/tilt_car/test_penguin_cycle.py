@@ -74,11 +74,11 @@ def test_free_motion_is_right_for_any_damping(gains):
     swing = Swing(pi / 6, 1.0, Gains(12.0, 6.0, *gains))
     step = 1e-5
     state = (0.3, -0.2)
-    here, ahead, behind = (swing.free(0.4 + side, state) for side in (0.0, step, -step))
+    here, ahead, behind = (swing.after_both_push(0.4 + side, state) for side in (0.0, step, -step))
     assert (ahead[0] - behind[0]) / (2 * step) == pytest.approx(here[1], rel=1e-6)
     curvature = (ahead[1] - behind[1]) / (2 * step)
     assert curvature == pytest.approx(-gains[0] * here[1] - gains[1] * here[0], rel=1e-6)
-    assert swing.free(0.0, state) == pytest.approx(state)
+    assert swing.after_both_push(0.0, state) == pytest.approx(state)
 
 
 def test_the_limit_cycle_is_where_it_was_seen():

@@ -36,9 +36,9 @@ from tiltsim_controllers.tilt_car.vehicle import (
     THESIS_CAR,
     TiltCar,
     body_acceleration,
+    rotate,
     squared_speeds,
     turn_per_tilt,
-    turned,
 )
 
 CAR = TiltCar(1.3, 0.0012, 0.0007, 0.45, 0.0008)
@@ -52,7 +52,7 @@ def follow(jerk, inputs, time, steps, car, rate=0.0):
     def slope(at, values):
         w1, w2, alpha = values
         columns = input_columns(w1, w2, car)
-        wanted = turned(*jerk(at), -turn_per_tilt(car) * alpha)
+        wanted = rotate(*jerk(at), -turn_per_tilt(car) * alpha)
         change = np.array(minimum_norm(columns, wanted))
         if rate:
             along, across = body_acceleration(w1 * w1, w2 * w2, car)
@@ -136,7 +136,7 @@ def test_a_lap_advances_the_lean_by_the_holonomy(omega, lean):
     assert np.sign(advanced) == np.sign(omega)
     # The acceleration is back, the inputs are not.
     along, across = body_acceleration(end[0] ** 2, end[1] ** 2, THESIS_CAR)
-    made = turned(along, across, turn_per_tilt(THESIS_CAR) * end[2])
+    made = rotate(along, across, turn_per_tilt(THESIS_CAR) * end[2])
     np.testing.assert_allclose(made, (10.0, 0.0), atol=1e-6)
 
 

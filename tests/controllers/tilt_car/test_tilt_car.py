@@ -25,9 +25,9 @@ from tiltsim_controllers.tilt_car.vehicle import (
     acceleration,
     body_acceleration,
     counter_yaw_per_tilt,
+    rotate,
     squared_speeds,
     turn_per_tilt,
-    turned,
 )
 
 CAR = TiltCar(1.3, 0.0012, 0.0007, 0.45, 0.0008)
@@ -109,7 +109,7 @@ def test_the_columns_are_the_third_derivative_of_the_position():
     (w1, d1, _), (w2, d2, _), (alpha, d3, _) = INPUTS
     x1, y1, x2, y2, x3, y3 = third.input_columns(w1, w2, CAR)
     body = x1 * d1 + x2 * d2 + x3 * d3, y1 * d1 + y2 * d2 + y3 * d3
-    np.testing.assert_allclose(turned(*body, turn_per_tilt(CAR) * alpha), wanted, rtol=1e-12)
+    np.testing.assert_allclose(rotate(*body, turn_per_tilt(CAR) * alpha), wanted, rtol=1e-12)
 
 
 def test_the_columns_are_eqs_10_and_11():
@@ -133,7 +133,7 @@ def test_drift_and_columns_make_the_fourth_derivative():
         drift_along + x1 * s1 + x2 * s2 + x3 * s3,
         drift_across + y1 * s1 + y2 * s2 + y3 * s3,
     )
-    np.testing.assert_allclose(turned(*body, yaw + alpha), wanted, rtol=1e-12)
+    np.testing.assert_allclose(rotate(*body, yaw + alpha), wanted, rtol=1e-12)
 
 
 @given(speeds, speeds, rates, rates)

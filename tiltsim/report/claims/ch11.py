@@ -10,9 +10,9 @@ from typing import Final
 import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim, FlightClaim
+from tiltsim_controllers.mathematics.scalar import Pair
 from tiltsim_controllers.tilt_car.penguin_cycle import (
     LyapunovBound,
-    State,
     Swing,
     half_period,
     limit_cycle,
@@ -40,41 +40,43 @@ def _can_push_straight_ahead(swing: float) -> bool:
 
 
 @cache
-def _zone() -> tuple[State, ...]:
+def _zone() -> tuple[Pair, ...]:
     """States of Eq. (39): beyond the switching line, both components positive."""
     grid = np.linspace(0.0, 3.0, 31).tolist()
     return tuple((e, rate) for e in grid for rate in grid if _SWING.both_push((e, rate)))
 
 
-def _for_all(holds: Callable[[State], bool]) -> bool:
+def _for_all(holds: Callable[[Pair], bool]) -> bool:
     return all(holds(state) for state in _zone())
 
 
-def _comes_back_mirrored(state: State) -> bool:
+def _comes_back_mirrored(state: Pair) -> bool:
     """Lemma 7: half a period leads into the zone of Eq. (45)."""
     error, rate = half_period(_SWING, state).end
     return error <= 0.0 and rate <= 0.0 and _SWING.both_push((-error, -rate))
 
 
-def _switches_within(state: State) -> bool:
+def _switches_within(state: Pair) -> bool:
     """Lemma 5: 0 < t_1 < 1 s."""
     return 0.0 < half_period(_SWING, state).free_time < 1.0
 
 
-def _largest_at_the_ends(state: State) -> bool:
+def _largest_at_the_ends(state: Pair) -> bool:
     """Proposition 6, along the motion in steps of 10 ms."""
     half = half_period(_SWING, state)
-    between = _SWING.free(half.free_time, state)
+    between = _SWING.after_both_push(half.free_time, state)
     times = np.linspace(0.0, _SWING.half_period, 101)
     path = [
-        _SWING.free(t, state) if t <= half.free_time else _SWING.pushed(t - half.free_time, between)
+        _SWING.after_both_push(t, state)
+        if t <= half.free_time
+        else _SWING.after_one_push(t - half.free_time, between)
         for t in times.tolist()
     ]
     ends = max(lyapunov(_SWING, state), lyapunov(_SWING, half.end))
     return max(lyapunov(_SWING, at) for at in path) <= ends + 1e-12
 
 
-def _eq_42_holds(state: State) -> bool:
+def _eq_42_holds(state: Pair) -> bool:
     """The printed solution with both rotors pushing, after 0.3 s."""
     error, rate = state
     slow, fast = exp(-0.9), exp(-1.8)
@@ -82,13 +84,13 @@ def _eq_42_holds(state: State) -> bool:
         (2.0 * error + rate / 3.0) * slow + (-error - rate / 3.0) * fast,
         (-6.0 * error - rate) * slow + (6.0 * error + 2.0 * rate) * fast,
     )
-    solved = _SWING.free(0.3, state)
+    solved = _SWING.after_both_push(0.3, state)
     return all(abs(a - b) < 1e-9 for a, b in zip(printed, solved, strict=True))
 
 
 def _first_half_period() -> bool:
     """Remark 8: from rest a single rotor pushes for half a period, mirrored, into the zone."""
-    error, rate = _SWING.pushed(_SWING.half_period, (0.0, 0.0))
+    error, rate = _SWING.after_one_push(_SWING.half_period, (0.0, 0.0))
     return _SWING.both_push((-error, -rate))
 
 
