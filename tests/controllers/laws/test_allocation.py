@@ -131,3 +131,42 @@ def test_a_climb_beyond_the_limit_costs_no_attitude():
     matrix = decoupling((0.0,) * 4, speeds_now, 0.0, 0.0)
     np.testing.assert_allclose((matrix @ found)[:3], (matrix @ wanted)[:3], rtol=1e-9, atol=1e-6)
     assert (matrix @ found)[3] < (matrix @ wanted)[3]
+
+
+def test_attitude_comes_before_yaw_and_yaw_before_climb():
+    """Three linear programs in a row, with the decoupling matrix inverted by NumPy."""
+    random = np.random.default_rng(8)
+    limited = 0
+    for _ in range(25):
+        angles, (roll, pitch) = random.uniform(-0.4, 0.4, 4), random.uniform(-0.4, 0.4, 2)
+        magnitudes = random.uniform(*LIMITS, 4)
+        signed = np.multiply(SPIN, magnitudes)
+        requested = random.uniform(-1e4, 1e4, 4)
+        matrix = decoupling(angles, signed, roll, pitch)
+        tilting, turning, climbing = (
+            np.linalg.solve(matrix, part * (matrix @ requested))
+            for part in ([1, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1])
+        )
+        ends = np.multiply(SPIN, (np.array(LIMITS)[:, None] - magnitudes) / HORIZON)
+        low, high = np.minimum(0.0, ends.min(axis=0)), np.maximum(0.0, ends.max(axis=0))
+        if (low <= requested).all() and (requested <= high).all():
+            continue  # nothing to allocate
+        free, share = (None, None), (0.0, 1.0)
+        first = -program([-1.0, 0.0], [tilting, climbing], low, high, [share, free]).fun
+        left = low - first * tilting, high - first * tilting
+        second = -program([-1.0, 0.0], [turning, climbing], *left, [share, free]).fun
+        found = allocate_accelerations(
+            *(tuple(requested.tolist()), tuple(angles.tolist()), tuple(signed.tolist())),
+            *(roll, pitch, VEHICLE, LIMITS, HORIZON),
+        )
+        third = nearest_to_one(climbing, left[0] - second * turning, left[1] - second * turning)
+        expected = first * tilting + second * turning + third * climbing
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * np.abs(requested).max())
+        limited += second < 1.0
+    assert limited > 5
+
+
+def nearest_to_one(direction, low, high):
+    """The factor of a direction that is nearest to 1 within a box."""
+    ends = np.sort([low / direction, high / direction], axis=0)
+    return min(max(1.0, ends[0].max()), ends[1].min())
