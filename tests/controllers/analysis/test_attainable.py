@@ -140,3 +140,22 @@ def test_linear_coupling_of_blue_gaits_is_their_loss_of_rank() -> None:
 def test_bad_limits_are_refused(limits) -> None:
     with pytest.raises(ValueError, match="rotor speed limits"):
         attainable_torque_thrust([0.0] * 4, AR_DRONE, limits)
+
+
+def test_a_set_of_one_point_and_an_empty_one():
+    thrust = 4.0 * AR_DRONE.thrust_coefficient * LIMITS[1] ** 2
+    full = attainable_torque_thrust((0.0,) * 4, AR_DRONE, LIMITS, vertical_thrust=thrust)
+    assert (full.dimension, full.is_empty, len(full.vertices)) == (0, False, 1)
+    np.testing.assert_allclose(full.lower, [0.0, 0.0, thrust], atol=1e-12)
+    np.testing.assert_array_equal(full.lower, full.upper)
+    np.testing.assert_allclose(np.abs(full.inputs), [[LIMITS[1] ** 2] * 4], rtol=1e-12)
+    heavy = attainable_torque_thrust((0.0,) * 4, AR_DRONE, LIMITS, vertical_thrust=9.0)
+    assert (heavy.dimension, heavy.is_empty, len(heavy.vertices)) == (-1, True, 0)
+    assert np.isnan(heavy.lower).all()
+    assert np.isnan(heavy.upper).all()
+
+
+def test_the_published_limits_are_those_of_3_and_5_newtons():
+    least, greatest = published_speed_limits(AR_DRONE)
+    assert 4.0 * AR_DRONE.thrust_coefficient * least**2 == pytest.approx(3.0)
+    assert 4.0 * AR_DRONE.thrust_coefficient * greatest**2 == pytest.approx(5.0)

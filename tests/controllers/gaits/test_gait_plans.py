@@ -289,3 +289,42 @@ def test_a_rotating_gait_turns_for_ever() -> None:
     assert gait.amplitude == inf
     assert gait.max_rate == 2.0
     assert gait.is_continuous
+
+
+# --- the named gaits ---------------------------------------------------------------------------
+
+STRIDES = {  # touchdown of the right and left fore, left and right hind foot; stance; swing in rad
+    "walk": ((0.75, 0.25, 0.0, 0.5), 0.95, 1.055, 1.25),
+    "run": ((0.875, 0.375, 0.0, 0.5), 0.45, 0.5, 0.5),
+    "transverse_gallop": ((0.6, 0.5, 0.0, 0.1), 0.3, 1.3, 0.4),
+    "rotary_gallop": ((0.5, 0.6, 0.0, 0.1), 0.3, 1.3, 0.4),
+}
+
+
+@pytest.mark.parametrize("name", STRIDES)
+def test_every_leg_swings_from_its_touchdown_to_its_lift_off(name):
+    """The numbers with which the statements of ch. 5 hold, read off the tilts as flown."""
+    touchdowns, stance, lean, amplitude = STRIDES[name]
+    assert SWINGS[name] == (lean, amplitude)
+    period = 1.6
+    gait = plans.cat(name, amplitude, period, lean)
+    for pod, (forward, touchdown) in enumerate(zip((-1, 1, 1, -1), touchdowns)):
+        middle, lift_off = (touchdown + 0.5 * stance) % 1.0, (touchdown + stance) % 1.0
+        phases = np.array([touchdown, middle, lift_off])
+        expected = forward * (lean + amplitude * np.array([1.0, 0.0, -1.0]))
+        found = gait.angles(phases * period)[:, pod]
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+
+
+def test_the_shortest_line_of_every_kind_of_gait():
+    assert plans.instant_trot(0.4, 2.0).min_segment_time == 0.0
+    assert plans.continuous_trot(0.4, 2.0).min_segment_time == 1.0
+    assert plans.fixed([0.1] * 4).min_segment_time == inf
+    three = plans.keyframes([(0, 0, 0, 0, 0), (0.3, 1, 0, 0, 0), (1, 0, 0, 0, 0)], 2.0)
+    assert three.min_segment_time == pytest.approx(0.6)
+
+
+def test_a_scale_or_bias_of_one_is_the_gait_itself():
+    gait = plans.continuous_trot(0.4, 2.0)
+    assert gait.scaled(1.0) is gait
+    assert gait.biased(1.0) is gait

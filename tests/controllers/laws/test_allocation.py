@@ -170,3 +170,22 @@ def nearest_to_one(direction, low, high):
     """The factor of a direction that is nearest to 1 within a box."""
     ends = np.sort([low / direction, high / direction], axis=0)
     return min(max(1.0, ends[0].max()), ends[1].min())
+
+
+def test_a_singular_matrix_gives_back_what_was_requested():
+    """A rotor that stands still has no acceleration that moves its thrust."""
+    requested = (9000.0, -9000.0, 9000.0, -9000.0)
+    for stopped in range(4):
+        speeds_now = [-300.0, 300.0, -300.0, 300.0]
+        speeds_now[stopped] = 0.0
+        found = allocate_accelerations(
+            requested, (0.0,) * 4, tuple(speeds_now), 0.0, 0.0, VEHICLE, LIMITS, HORIZON
+        )
+        assert found == requested
+
+
+def test_a_rotor_without_part_in_the_climb_does_not_bound_it():
+    found = allocate_by_priority(
+        (0.0,) * 4, (0.0,) * 4, (1.0, 0.0, 2.0, 0.0), 3.0, (-1.0,) * 4, (1.0,) * 4
+    )
+    assert found == (0.5, 0.0, 1.0, 0.0)

@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.controllers.flights import fly, rk4_step, tiltrotor_rates
+from tests.controllers.laws.test_tracking import PATH, TIME, reference
 from tests.controllers.scalar_sources import as_native
 from tiltsim_controllers.analysis.stability import is_hurwitz
 from tiltsim_controllers.gaits.parameters import GAIT_TYPES, GaitParameters
@@ -99,6 +100,14 @@ def test_the_solve_is_nan_where_rows_depend_on_each_other():
     assert all(isnan(value) for value in found)
 
 
+@pytest.mark.parametrize("row", range(6))
+def test_a_row_of_zeros_has_no_solution(row):
+    rows = np.random.default_rng(2).normal(size=(6, 8))
+    rows[row] = 0.0
+    found = minimum_norm_inputs(tuple(map(tuple, rows.tolist())), (1.0,) * 6)
+    assert all(isnan(value) for value in found)
+
+
 def test_rows_are_derivatives_of_force_and_torque():
     random = np.random.default_rng(3)
     ratio = drag_ratio(TILTROTOR)
@@ -143,11 +152,11 @@ def test_the_attitude_error_is_the_sine_of_the_angle_along_its_axis():
 @pytest.mark.parametrize("weight", WEIGHTS)
 def test_the_outputs_move_as_demanded(weight):
     random = np.random.default_rng(5)
-    reference = HERE._replace(x=0.2, y=-0.1, z=0.3, roll=0.1, pitch=-0.2, yaw=0.3)
-    law = parameters(weight, reference=reference)
+    law = parameters(weight, reference=PATH._replace(roll=0.1, pitch=-0.2, yaw=0.3))
+    path = [reference(TIME, order) for order in range(4)]
     for _ in range(CASES):
         state = random_state(random)
-        inputs = full_pose_inputs(0.0, state, law)
+        inputs = full_pose_inputs(TIME, state, law)
 
         def rates(_, state, inputs=inputs):
             return tiltrotor_rates(state, inputs, TILTROTOR)
@@ -162,9 +171,10 @@ def test_the_outputs_move_as_demanded(weight):
         )
         wanted = np.concatenate(
             [
-                1562.0 * (np.array([0.2, -0.1, 0.3]) - state[:3])
-                - 1875.0 * np.array(state[3:6])
-                - 750.0 * now[3:6],
+                path[3]
+                + 750.0 * (path[2] - now[3:6])
+                + 1875.0 * (path[1] - state[3:6])
+                + 1562.0 * (path[0] - state[:3]),
                 2577.0 * np.array(error) - 1500.0 * np.array(state[9:12]) - 750.0 * now[9:12],
             ]
         )

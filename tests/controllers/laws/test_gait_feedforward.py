@@ -19,7 +19,11 @@ from tiltsim_controllers.gaits.tilts import tilt_acceleration, tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import Gains
 from tiltsim_controllers.laws.decouplers import DECOUPLERS, exact_decoupler
 from tiltsim_controllers.laws.feedback import attitude_jerk, integrator_rate, limited_acceleration
-from tiltsim_controllers.laws.force_motion import exact_decoupler_jet, torque_free_force_jet
+from tiltsim_controllers.laws.force_motion import (
+    exact_decoupler_jet,
+    jerk_along,
+    torque_free_force_jet,
+)
 from tiltsim_controllers.laws.gains import (
     IntegralGains,
     Poles,
@@ -445,3 +449,30 @@ def test_a_reference_that_is_no_number_asks_for_no_number(place):
     wanted = [0.1, 0.2, 0.3]
     wanted[place] = float("nan")
     assert isnan(attitude_jerk(tuple(wanted), (0.0, 0.0, 0.0), (40.0, 600.0, 4000.0), 50.0))
+
+
+def test_in_free_fall_the_decoupler_has_no_answer():
+    zero = (0.0, 0.0, 0.0)
+    force = ((0.1, 0.0, 0.0), (0.2, 0.0, 0.0), (3.0, 0.0, 0.0))
+    for jet in exact_decoupler_jet(zero, zero, zero, (0.3, 0.0, 0.0), force):
+        assert all(map(isnan, jet))
+
+
+@pytest.mark.parametrize("counted", [0.0, 0.5, 1.0])
+def test_the_jerk_is_that_of_a_force_that_turns_with_the_body_and_with_its_direction(counted):
+    random = np.random.default_rng(12)
+    for _ in range(CASES):
+        jets, paths = zip(*(path(random, 0.5, 2.0) for _ in range(3)))
+        jets = (*jets[:2], (jets[2][0] + 2.0, *jets[2][1:]))
+        omega = random.uniform(-2.0, 2.0, 3)
+        size = random.uniform(5.0, 15.0)
+
+        def force(t, counted=counted, paths=paths, omega=omega, size=size):
+            n = np.add([p(counted * t) for p in paths], [0.0, 0.0, 2.0])
+            return Rotation.from_rotvec(t * omega).apply(size * n / np.linalg.norm(n))
+
+        now, rate, _ = differences(force)
+        for side in (1.0, -1.0):  # a direction that points down is that of a force against it
+            turned = [tuple(side * value for value in jet) for jet in jets]
+            found = jerk_along(tuple(turned), tuple(now.tolist()), tuple(omega.tolist()), counted)
+            np.testing.assert_allclose(found, rate, rtol=0, atol=1e-8)

@@ -170,3 +170,21 @@ def test_the_clock_slows_down_within_the_band():
             break
     assert state < 0.0
     assert asked_rates == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("strategy", WITH_STATES)
+def test_only_the_scaling_strategy_scales(strategy):
+    planned = (1.2, -0.9, 0.7, 1.1, 0.0, 0.0, 0.0, 0.0)
+    scaling = Supervisor(0.3, 1.0, STRATEGIES["scale"])
+    passed = supervised_gait_scale(planned, 0.2, -0.1, scaling, VEHICLE)
+    assert passed == allowed_scale(planned[:4], 0.2, -0.1, scaling, RATIO)
+    assert 0.0 < passed < 1.0
+    other = scaling._replace(strategy=STRATEGIES[strategy])
+    assert supervised_gait_scale(planned, 0.2, -0.1, other, VEHICLE) == 1.0
+
+
+@pytest.mark.parametrize("threshold", ["min_margin", "min_determinant"])
+def test_one_threshold_is_enough_to_scale(threshold):
+    planned = (1.2, -0.9, 0.7, 1.1, 0.0, 0.0, 0.0, 0.0)
+    single = Supervisor(**{threshold: 1.0})
+    assert supervised_gait_scale(planned, 0.2, -0.1, single, VEHICLE) < 1.0

@@ -11,6 +11,7 @@ from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.laws.attitude_altitude import Gains, Parameters
 from tiltsim_controllers.mathematics.records import (
     flatten,
+    make_record_type,
     record_dtype,
     record_size,
     slotted,
@@ -101,3 +102,13 @@ def test_slotted_reads_like_the_record():
     assert (view.again.a, view.again.b) == (5.0, 6.0)
     with pytest.raises(AttributeError):
         view.misspelt = 1.0
+
+
+def test_a_record_type_made_at_run_time_reads_like_a_declared_one():
+    made = make_record_type("Made", first=float, middle=Middle, last=float)
+    record = made(1.0, Middle(Inner(2.0, 3.0), 4.0), 5.0)
+    assert made._fields == ("first", "middle", "last")
+    assert list(flatten(record)) == [1.0, 2.0, 3.0, 4.0, 5.0]
+    assert unflatten(made, [1.0, 2.0, 3.0, 4.0, 5.0]) == record
+    assert record_size(made) == 5
+    assert record_dtype(made).names == made._fields

@@ -14,6 +14,8 @@ from tiltsim_controllers.mathematics.rotation import (
     quaternion_from_euler,
     quaternion_from_rotation,
     rotation_from_euler,
+    rotation_from_quaternion,
+    to_world,
     world_up_in_body,
     wrap_angle,
 )
@@ -148,3 +150,12 @@ def test_the_shortest_turn_leads_to_the_same_direction(angle):
     assert abs(turn) <= pi + 1e-12
     assert (cos(turn), sin(turn)) == pytest.approx((cos(angle), sin(angle)), abs=1e-12)
     assert abs(angle) > pi or turn == angle
+
+
+@quick
+@given(quaternions, st.tuples(*[st.floats(-5.0, 5.0)] * 3))
+def test_the_matrix_of_a_quaternion_turns_vectors_as_it_does(quaternion, vector):
+    rotation = rotation_from_quaternion(*quaternion.tolist())
+    expected = matrix_of_quaternion(quaternion)
+    np.testing.assert_allclose(np.reshape(rotation, (3, 3)), expected, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(to_world(rotation, vector), expected @ vector, rtol=0, atol=1e-14)

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 from tiltsim_controllers.tilt_car.penguin_cycle import (
     Swing,
@@ -141,3 +142,12 @@ def test_beyond_l_critical_nothing_gains(scale):
         size = sqrt(bound.critical * scale)
         state = (size / 3.0 * np.cos(angle), size * sqrt(2.0) * np.sin(angle))  # Eq. (75)
         assert lyapunov_growth(CH11, state) < 0.0
+
+
+def test_in_a_short_half_both_rotors_push_all_the_time():
+    short = Swing(pi / 6, 0.05, GAIN_SETS["ch11"])
+    start = (0.3, 0.9)
+    half = half_period(short, start)
+    assert half.free_time == 0.05
+    matrix = np.array([[0.0, 1.0], [-short.gains.y_position, -short.gains.y_velocity]])
+    np.testing.assert_allclose(half.end, expm(0.05 * matrix) @ start, rtol=1e-13)

@@ -195,6 +195,11 @@ def test_the_third_derivative_law_makes_the_jerk_it_wants(restoring_rate):
     np.testing.assert_allclose(made, wanted, rtol=1e-10)
 
 
+def test_nothing_restores_the_lean_where_a_rotor_rests():
+    columns = third.input_columns(80.0, 0.0, CAR)
+    assert third.restoring_inputs(0.3, 2.0, columns, CAR) == (0.0, 0.0, 0.0)
+
+
 def test_the_fourth_derivative_law_makes_the_snap_it_demands():
     (w1, d1, _), (w2, d2, _), (alpha, d3, _) = INPUTS
     yaw = -0.3
@@ -263,6 +268,14 @@ def test_the_planned_law_is_eqs_12_and_13(direction, x, y, vy):
     np.testing.assert_allclose(squares, printed, rtol=1e-9, atol=1e-6)
     inputs = planned.planned_direction_inputs(time, state, LAW)
     assert inputs == tuple(max(square, 0.0) for square in squares)
+
+
+def test_the_thrusts_direction_is_yaw_and_tilt_together():
+    direct, shared = (
+        (0.1, 0.2, 0.3, 0.4, *angles, 80.0, 70.0) for angles in ((0.5, 0), (0.8, -0.3))
+    )
+    expected = planned.demanded_squared_speeds(1.7, direct, LAW)
+    assert planned.demanded_squared_speeds(1.7, shared, LAW) == pytest.approx(expected, rel=1e-12)
 
 
 @given(st.floats(-0.5, 0.5), st.floats(-1.5, 1.5), st.sampled_from([-pi / 3, pi / 3]))

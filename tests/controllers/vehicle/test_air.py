@@ -77,6 +77,13 @@ def test_a_gust_falls_as_it_rose(since):
     assert gust_profile(1.0 + since, gust) == pytest.approx(gust_profile(7.0 - since, gust))
 
 
+def test_a_gust_with_an_end_is_over_then():
+    gust = Gust(start=1.0, rise=2.0, duration=6.0)
+    times = [0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 7.5, 50.0]
+    expected = [0.0, 0.0, 0.5, 1.0, 1.0, 1.0, 0.5, 0.0, 0.0, 0.0]
+    assert [gust_profile(t, gust) for t in times] == pytest.approx(expected, abs=1e-12)
+
+
 # --- turbulence --------------------------------------------------------------------------------
 
 TURBULENCE = low_altitude_turbulence(6.0, 12.0, speed=6.0, seed=4.0)

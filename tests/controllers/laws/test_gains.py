@@ -1,0 +1,56 @@
+"""The named gain sets, by the poles of their loops and as printed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tiltsim_controllers.laws.gains import GAIN_SETS, Poles, gains_from_rows
+
+AXES = ("roll", "pitch", "yaw", "altitude")
+
+
+def poles(name, axis):
+    gains = GAIN_SETS[name]
+    return np.roots([1.0, *(getattr(gains, f"{axis}_{order}") for order in (1, 2, 3))])
+
+
+def assert_poles(name, axis, expected):
+    """Equal as sets, to the accuracy of a triple root."""
+    polynomial = np.poly(expected).real
+    found = np.poly(poles(name, axis)).real
+    np.testing.assert_allclose(found, polynomial, rtol=1e-9)
+
+
+def test_the_exact_set_has_the_poles_that_it_says():
+    for axis in ("roll", "pitch", "yaw"):
+        assert_poles("exact", axis, [-20.0, -10.0 + 10.0j, -10.0 - 10.0j])
+    climb = poles("exact", "altitude")
+    assert (np.abs(climb) > 1.0).all()
+    assert (-climb.real > 0.75 * np.abs(climb)).all()  # the damping of each
+
+
+def test_the_feedforward_set_has_the_poles_that_it_says():
+    for axis, bandwidth in (("roll", 25.0), ("pitch", 25.0), ("yaw", 10.0), ("altitude", 10.0)):
+        assert_poles("feedforward", axis, [-bandwidth] * 3)
+    gains = GAIN_SETS["feedforward"]
+    position = np.poly([-1.5, -1.5])
+    np.testing.assert_allclose([1.0, gains.position_1, gains.position_2], position, rtol=1e-12)
+
+
+def test_the_published_sets_are_as_printed():
+    """Ch. 3, Sec. 3.2, and ch. 4, Eqs. (26)-(28), whose third column is the yaw's."""
+    ch03, ch04 = GAIN_SETS["ch03"], GAIN_SETS["ch04"]
+    assert ch03 == (*[1] * 9, 10, 5, 10, 1, 1)
+    assert ch04 == (1, 10, 50, 1, 10, 50, 1, 1, 1, 10, 5, 10, 1, 1)
+
+
+def test_rows_are_diagonals_of_roll_pitch_and_yaw():
+    gains = gains_from_rows([[1, 2, 3], [4, 5, 6], [7, 8, 9]], [10, 11, 12], [13, 14])
+    assert gains == (1, 4, 7, 2, 5, 8, 3, 6, 9, 10, 11, 12, 13, 14)
+    assert (gains.pitch_2, gains.yaw_3, gains.altitude_1, gains.position_2) == (5, 9, 10, 14)
+
+
+@pytest.mark.parametrize("field", ["damping", "integral"])
+def test_poles_are_critically_damped_without_integral_by_default(field):
+    assert getattr(Poles(3.0), field) == {"damping": 1.0, "integral": 0.0}[field]
