@@ -15,24 +15,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from tiltsim.equations.quadrotor import equations_of_motion, initial_state
 from tiltsim.equations.quadrotor import rigid_body as quadrotor_body
-from tiltsim.equations.tiltrotor import (
-    R11,
-    R12,
-    R13,
-    R21,
-    R22,
-    R23,
-    R31,
-    R32,
-    R33,
-    VX,
-    VY,
-    VZ,
-    P,
-    Q,
-    R,
-    rigid_body,
-)
+from tiltsim.equations.tiltrotor import rigid_body, rotation_of, velocity_of
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim_controllers.mathematics.rotation import (
     quaternion_from_euler,
@@ -104,16 +87,6 @@ TILT_1, TILT_2, TILT_3, TILT_4, RATE_1, RATE_2, RATE_3, RATE_4, SPEED_1 = range(
 
 
 @scalar
-def rotation_of(state: Vector) -> Values:
-    """The nine entries, rows first, of the body-to-world rotation."""
-    return (
-        state[R11], state[R12], state[R13],
-        state[R21], state[R22], state[R23],
-        state[R31], state[R32], state[R33],
-    )  # fmt: skip
-
-
-@scalar
 def tiltrotor_qpos(state: Vector) -> Values:
     """Position, quaternion and tilts."""
     qw, qx, qy, qz = quaternion_from_rotation(rotation_of(state))
@@ -126,10 +99,8 @@ def tiltrotor_qpos(state: Vector) -> Values:
 @scalar
 def tiltrotor_qvel(state: Vector) -> Values:
     """Velocity, body rates and tilt rates."""
-    return (
-        state[VX], state[VY], state[VZ], state[P], state[Q], state[R],
-        state[RATE_1], state[RATE_2], state[RATE_3], state[RATE_4],
-    )  # fmt: skip
+    rates = state[RATE_1], state[RATE_2], state[RATE_3], state[RATE_4]
+    return (*velocity_of(state), *rates)
 
 
 @scalar

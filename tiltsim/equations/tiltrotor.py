@@ -29,6 +29,22 @@ FURTHER: Final = 22  # the states of the controller
 
 
 @scalar
+def rotation_of(state: Vector) -> Values:
+    """The nine entries, rows first, of the body-to-world rotation."""
+    return (
+        state[R11], state[R12], state[R13],
+        state[R21], state[R22], state[R23],
+        state[R31], state[R32], state[R33],
+    )  # fmt: skip
+
+
+@scalar
+def velocity_of(state: Vector) -> Values:
+    """Velocity (m/s, world axes) and body rates (rad/s)."""
+    return state[VX], state[VY], state[VZ], state[P], state[Q], state[R]
+
+
+@scalar
 def law_state(state: Vector, tilts: Quad) -> Values:
     """State of the control laws, `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`."""
     sin_pitch = min(1.0, max(-1.0, -state[R31]))  # rounding may carry the sine past one
@@ -67,10 +83,8 @@ def rigid_body(
     extra_angular_acceleration
         By all but the rotors, rad/s^2, body axes.
     """
-    r11, r12, r13, r21, r22, r23 = (
-        state[R11], state[R12], state[R13], state[R21], state[R22], state[R23],
-    )  # fmt: skip
-    r31, r32, r33, p, q, r = state[R31], state[R32], state[R33], state[P], state[Q], state[R]
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_of(state)
+    vx, vy, vz, p, q, r = velocity_of(state)
     w1, w2, w3, w4 = squares
     trig = sines_and_cosines(tilts[0], tilts[1], tilts[2], tilts[3])
 
@@ -91,7 +105,7 @@ def rigid_body(
 
     extra_p, extra_q, extra_r = extra_angular_acceleration
     return (
-        state[VX], state[VY], state[VZ], ax, ay, az,
+        vx, vy, vz, ax, ay, az,
         r12 * r - r13 * q, r13 * p - r11 * r, r11 * q - r12 * p,  # Eq. (7): R' = R omega^
         r22 * r - r23 * q, r23 * p - r21 * r, r21 * q - r22 * p,
         r32 * r - r33 * q, r33 * p - r31 * r, r31 * q - r32 * p,

@@ -18,6 +18,7 @@ from tiltsim.equations.tiltrotor import law_state
 from tiltsim.laws.tiltrotor import (
     determinant_and_speed_causes,
     determinant_and_speeds,
+    four,
     gait_equation_rates,
     gait_servo_commands,
     initial_equation_state,
@@ -46,7 +47,7 @@ from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values,
 from tiltsim_controllers.references.trajectories import position_reference
 from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines, torque_entries
 from tiltsim_controllers.vehicle.parameters import drag_ratio
-from tiltsim_controllers.vehicle.states import ALPHA_1, ALPHA_2, ALPHA_3, ALPHA_4, TILTROTOR_FIELDS
+from tiltsim_controllers.vehicle.states import ALPHA_1, TILTROTOR_FIELDS
 
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
@@ -115,7 +116,8 @@ def reference_values(
     """`REFERENCE_COLUMNS` and `TILT_REFERENCE_COLUMNS`."""
     law = parameters.law
     ratio = drag_ratio(law.vehicle)
-    trig = sines_and_cosines(state[ALPHA_1], state[ALPHA_2], state[ALPHA_3], state[ALPHA_4])
+    a1, a2, a3, a4 = four(state, ALPHA_1)
+    trig = sines_and_cosines(a1, a2, a3, a4)
     torque = torque_entries(trig, ratio)
     x, y, z, _, _, _, _, _, _ = position_reference(time, law.reference, knots)
     roll, pitch, yaw, _, _, _ = attitude_reference(time, state, trig, torque, law, knots)

@@ -34,11 +34,12 @@ from tiltsim.vehicles.rotorcraft import ROTORCRAFT, initial_tilts
 from tiltsim.vehicles.rotorcraft.layout import ROTOR_STATES
 from tiltsim_controllers.laws.full_pose import Parameters, full_pose_inputs, limited_tilt_rate
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values, Vector, scalar
+from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
 
-TILT_COMMANDS: Final = tuple(f"tilt_command_{rotor}" for rotor in (1, 2, 3, 4))
+TILT_COMMANDS: Final = tuple(f"tilt_command_{rotor}" for rotor in ROTORS)
 """The controller's states: the commands of the servos (rad) without their lead."""
 
 TILT_RATES: Final = 4

@@ -42,12 +42,12 @@ from tiltsim_controllers.laws.gait_feedforward import INTEGRAL_FIELDS, Parameter
 from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import position_reference
-from tiltsim_controllers.vehicle.states import TILTROTOR_FIELDS
+from tiltsim_controllers.vehicle.states import ROTORS, TILTROTOR_FIELDS
 
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
 
-TILT_RATE_COLUMNS: Final = tuple(f"alpha_rate_{rotor}" for rotor in (1, 2, 3, 4))
+TILT_RATE_COLUMNS: Final = tuple(f"alpha_rate_{rotor}" for rotor in ROTORS)
 
 
 class LoopParameters(NamedTuple):

@@ -15,7 +15,7 @@ import numpy as np
 from tiltsim.closed_loop.loop import ControlSetup, Dynamics, Sizes
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
-from tiltsim.vehicles.rotorcraft.layout import ROTORS, TILT_RATE_1
+from tiltsim.vehicles.rotorcraft.layout import TILT_RATE_1
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.gaits.tilts import tilt_reference
@@ -27,18 +27,7 @@ from tiltsim_controllers.vehicle.decoupling_matrix import (
     torque_free_force,
 )
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle, drag_ratio
-from tiltsim_controllers.vehicle.states import (
-    ALPHA_1,
-    ALPHA_2,
-    ALPHA_3,
-    ALPHA_4,
-    PITCH,
-    ROLL,
-    SPEED_1,
-    SPEED_2,
-    SPEED_3,
-    SPEED_4,
-)
+from tiltsim_controllers.vehicle.states import ALPHA_1, PITCH, ROLL, ROTORS, SPEED_1, TILT_FIELDS
 
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
@@ -46,8 +35,7 @@ if TYPE_CHECKING:
     from tiltsim.scenario.vehicle import ServoTable
 
 REFERENCE_COLUMNS: Final = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
-TILT_COLUMNS: Final = ("alpha_1", "alpha_2", "alpha_3", "alpha_4")
-TILT_REFERENCE_COLUMNS: Final = tuple(f"alpha_ref_{rotor}" for rotor in (1, 2, 3, 4))
+TILT_REFERENCE_COLUMNS: Final = tuple(f"alpha_ref_{rotor}" for rotor in ROTORS)
 
 
 @scalar
@@ -165,7 +153,7 @@ def observe_tiltrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> 
 
 def singularity_columns(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict[str, Floats]:
     """Determinant of the attitude-altitude law, and the margin (rad) to a singular attitude."""
-    tilts = np.stack([samples[name] for name in TILT_COLUMNS], axis=-1)
+    tilts = np.stack([samples[name] for name in TILT_FIELDS], axis=-1)
     attitude = samples["roll"], samples["pitch"]
     return {
         "singularity_margin": margin_over_gait(tilts, vehicle, *attitude),
@@ -207,14 +195,16 @@ ROTOR_STOPS: Final = tuple(
 @scalar
 def rotor_speeds_along_spin(values: Vector) -> Quad:
     """Rotor speeds (rad/s) along their spin, of a sample's ``values``."""
-    return -values[SPEED_1], values[SPEED_2], -values[SPEED_3], values[SPEED_4]
+    s1, s2, s3, s4 = four(values, SPEED_1)
+    return -s1, s2, -s3, s4
 
 
 @scalar
 def scaled_determinant(values: Vector, vehicle: Vehicle) -> float:
     """Determinant of the decoupling matrix without the rotor speeds, of a sample's ``values``."""
     ratio = drag_ratio(vehicle)
-    trig = sines_and_cosines(values[ALPHA_1], values[ALPHA_2], values[ALPHA_3], values[ALPHA_4])
+    a1, a2, a3, a4 = four(values, ALPHA_1)
+    trig = sines_and_cosines(a1, a2, a3, a4)
     nx, ny, nz = torque_free_force(trig, torque_entries(trig, ratio), ratio)
     ux, uy, uz = world_up_in_body(values[ROLL], values[PITCH])
     return nx * ux + ny * uy + nz * uz
@@ -229,7 +219,7 @@ def determinant_and_speeds(values: Vector, parameters: Any) -> Values:
 
 def determinant_and_speed_causes(sample: Mapping[str, float]) -> tuple[str, ...]:
     """Causes for `determinant_and_speeds`."""
-    angles = ", ".join(f"{sample[name]:.3g}" for name in TILT_COLUMNS)
+    angles = ", ".join(f"{sample[name]:.3g}" for name in TILT_FIELDS)
     determinant = (
         f"the decoupling matrix became singular at roll = {sample['roll']:.3g} rad, "
         f"pitch = {sample['pitch']:.3g} rad, tilt angles ({angles}) rad"

@@ -6,9 +6,6 @@ from dataclasses import dataclass, field
 from math import inf, isfinite
 from typing import Final, NamedTuple
 
-ROTORS: Final = (1, 2, 3, 4)
-"""The rotors of a tiltrotor or quadrotor."""
-
 INTEGRATORS: Final = ("Euler", "RK4", "implicit", "implicitfast")
 
 

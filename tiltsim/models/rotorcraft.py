@@ -22,7 +22,6 @@ from tiltsim.models.mjcf_editing import (
     set_stop,
 )
 from tiltsim.models.parts import (
-    ROTORS,
     ExtraActuators,
     Ground,
     ModelSpec,
@@ -35,6 +34,7 @@ from tiltsim.models.parts import (
 from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.resources import shipped_folder
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
+from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
     import mujoco

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from tiltsim.models.mjcf_editing import set_servo_gains, set_stop
-from tiltsim.models.parts import ROTORS, TiltServo
+from tiltsim.models.parts import TiltServo
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
+from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
     import mujoco

@@ -12,7 +12,6 @@ import numpy as np
 
 from tiltsim_controllers.analysis import two_color_map
 from tiltsim_controllers.analysis.fault_tolerance import (
-    ROTORS,
     fixed_tilt_hover,
     fixed_tilt_imbalance,
     minimum_hover_speed,
@@ -35,6 +34,7 @@ from tiltsim_controllers.analysis.unacceptable_attitudes import (
     unacceptable_attitudes,
 )
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
+from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -20,6 +20,7 @@ import numpy as np
 
 from tiltsim_controllers.analysis.singularity import torque_free_direction, world_up
 from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.vehicle.states import TILT_FIELDS
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
@@ -65,7 +66,7 @@ def torque_free_directions(columns: Mapping[str, Floats], vehicle: Vehicle) -> F
 
     Its z component is not negative; it is zero where every attitude is singular.
     """
-    angles = np.stack([columns[f"alpha_{rotor}"] for rotor in (1, 2, 3, 4)], axis=-1)
+    angles = np.stack([columns[name] for name in TILT_FIELDS], axis=-1)
     return np.nan_to_num(torque_free_direction(angles, vehicle))
 
 

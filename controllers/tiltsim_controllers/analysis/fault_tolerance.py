@@ -33,12 +33,12 @@ from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix
 from tiltsim_controllers.laws.full_pose import pose_rows
 from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines, torque_entries
 from tiltsim_controllers.vehicle.parameters import SPIN, drag_ratio
+from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
     from tiltsim_controllers.mathematics.scalar import Floats, Quad
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
-ROTORS: Final = (1, 2, 3, 4)
 
 BALANCED: Final = 1e-9
 """Torque, in units of ``L m g``, that counts as zero."""

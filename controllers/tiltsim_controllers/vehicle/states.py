@@ -8,6 +8,9 @@ X, Y, Z, VX, VY, VZ, ROLL, PITCH, YAW, P, Q, R = range(12)
 ALPHA_1, ALPHA_2, ALPHA_3, ALPHA_4, SPEED_1, SPEED_2, SPEED_3, SPEED_4 = range(12, 20)
 THRUST, THRUST_RATE = range(12, 14)
 
+ROTORS: Final = (1, 2, 3, 4)
+"""Numbers of the rotors of tiltrotor and quadrotor."""
+
 BODY_FIELDS: Final = ("x", "y", "z", "vx", "vy", "vz", "roll", "pitch", "yaw", "p", "q", "r")
 """A rigid body: position (m) and velocity (m/s), world axes; rad; body rates, rad/s."""
 

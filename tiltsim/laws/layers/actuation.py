@@ -57,11 +57,12 @@ from tiltsim_controllers.vehicle.actuators import (
 )
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.sensors import Sensors
+from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
     from tiltsim.scenario.flight_plan import FlightPlan
 
-THRUST_FACTORS: Final = tuple(f"thrust_factor_{rotor}" for rotor in (1, 2, 3, 4))
+THRUST_FACTORS: Final = tuple(f"thrust_factor_{rotor}" for rotor in ROTORS)
 
 
 class Allocation(NamedTuple):

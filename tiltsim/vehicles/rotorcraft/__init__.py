@@ -21,14 +21,14 @@ from tiltsim.closed_loop.limits import (
     horizontal_error,
 )
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
-from tiltsim.vehicles.rotorcraft.layout import OBSERVED_FIELDS, ROTORS
+from tiltsim.vehicles.rotorcraft.layout import OBSERVED_FIELDS
 from tiltsim.vehicles.rotorcraft.metrics import rotorcraft_metrics
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Vector, clipped, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.parameters import SPIN
-from tiltsim_controllers.vehicle.states import SPEED_1, P
+from tiltsim_controllers.vehicle.states import ROTORS, SPEED_1, P
 
 if TYPE_CHECKING:
     import mujoco

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from tiltsim_controllers.vehicle.states import TILTROTOR_FIELDS
-
-ROTORS: Final = (1, 2, 3, 4)
+from tiltsim_controllers.vehicle.states import ROTORS, TILTROTOR_FIELDS
 
 OBSERVED_FIELDS: Final = (*TILTROTOR_FIELDS, *(f"alpha_rate_{rotor}" for rotor in ROTORS))
 """A sample of any rotorcraft after its time: rigid body, tilts, rotor speeds, tilt rates.

@@ -12,6 +12,7 @@ from tiltsim.vehicles.saturation import at_lower_limit, at_upper_limit
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
+from tiltsim_controllers.vehicle.states import ROTORS, TILT_FIELDS
 
 SETTLED_ALTITUDE: Final = 0.005  # m
 SETTLED: Final = 20.0  # s, from when on the supremum of the position error is taken
@@ -26,7 +27,7 @@ def rotorcraft_metrics(
     limits = scenario.rotorcraft
     saturated = at_upper_limit(spins, limits.max_rotor_speed)
     saturated |= at_lower_limit(spins, limits.min_rotor_speed)
-    rates = [np.abs(columns[f"alpha_rate_{i}"]).max() for i in (1, 2, 3, 4)]
+    rates = [np.abs(columns[f"alpha_rate_{i}"]).max() for i in ROTORS]
     vehicle = limits.resolve()
     return {
         **_position_metrics(columns, scenario, follows_position),
@@ -107,7 +108,7 @@ def _singular_zone_metrics(columns: Mapping[str, Floats]) -> dict[str, float | b
 
 
 def _min_decoupling_condition(columns: Mapping[str, Floats], vehicle: Vehicle) -> float:
-    tilts = np.stack([columns[f"alpha_{rotor}"] for rotor in (1, 2, 3, 4)], axis=-1)
+    tilts = np.stack([columns[name] for name in TILT_FIELDS], axis=-1)
     up = world_up(columns["roll"], columns["pitch"])
     lift = np.einsum("ni,nij->nj", up, force_matrix(tilts))[:, np.newaxis]
     torque = torque_matrix(tilts, vehicle)

@@ -28,6 +28,7 @@ from tiltsim.views.figures.flight_layout import (
 )
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
+from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,7 +46,6 @@ MAX_PERIODS: Final = 20
 SHOWN_PERIODS: Final = 6
 """Number of periods that are shown instead, the last ones."""
 
-_ROTORS: Final = (1, 2, 3, 4)
 _SUBSCRIPTS: Final = "₁₂₃₄"
 
 
@@ -100,7 +100,7 @@ def _position_error(axes: Axes, flight: Flight) -> None:
 
 def _tilt_angles(axes: Axes, flight: Flight) -> None:
     end, begin = flight["time"][-1], _start_of_tilt_angles(flight)
-    for rotor, line in zip(_ROTORS, style.ROTOR_LINES, strict=True):
+    for rotor, line in zip(ROTORS, style.ROTOR_LINES, strict=True):
         name = f"α{_SUBSCRIPTS[rotor - 1]}"
         axes.plot(flight["time"], flight[f"alpha_{rotor}"], label=name, **line)
     widen(axes, 0.1)
@@ -122,7 +122,7 @@ def _start_of_tilt_angles(flight: Flight) -> float:
 
 
 def _rotor_speeds(axes: Axes, flight: Flight) -> None:
-    for rotor, spin, line in zip(_ROTORS, SPIN, style.ROTOR_LINES, strict=True):
+    for rotor, spin, line in zip(ROTORS, SPIN, style.ROTOR_LINES, strict=True):
         speed = spin * flight[f"rotor_speed_{rotor}"]
         axes.plot(flight["time"], speed, label=f"{rotor}", **line)
     vehicle = flight.scenario.rotorcraft

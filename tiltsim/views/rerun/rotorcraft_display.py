@@ -23,6 +23,7 @@ from tiltsim.views.rerun.display import (
 from tiltsim.views.rerun.palette import AMBER, GREEN, GREY, PINK, RED, SKY, dimmed
 from tiltsim.views.rerun.plane import AttitudePlane
 from tiltsim_controllers.vehicle.parameters import SPIN
+from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
     from tiltsim.closed_loop.assembly import Assembly
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from tiltsim.views.rerun.display import Values
     from tiltsim_controllers.mathematics.scalar import Floats
 
-_ROTORS: Final = (1, 2, 3, 4)
 _ROTOR_COLORS: Final = (AMBER, SKY, PINK, GREEN)
 # Lines of equal angles and speeds would cover each other: later ones are thinner.
 _ROTOR_WIDTHS: Final = (4.0, 3.0, 2.0, 1.2)
@@ -44,7 +44,7 @@ def _spin_speed(rotor: int) -> Values:
 
 
 def _slowest(flight: Flight) -> Floats:
-    return np.asarray(np.min([_spin_speed(rotor)(flight) for rotor in _ROTORS], axis=0))
+    return np.asarray(np.min([_spin_speed(rotor)(flight) for rotor in ROTORS], axis=0))
 
 
 def _distance(flight: Flight) -> Floats:
@@ -104,7 +104,7 @@ def rotorcraft_series(assembly: Assembly) -> list[Series]:
         name, values = f"{angle}_ref", column(f"{angle}_ref")
         dark = dimmed(color)
         series.append(Series(f"attitude/{name}", f"{angle} ref", dark, values, REFERENCE_WIDTH))
-    for rotor, color, width in zip(_ROTORS, _ROTOR_COLORS, _ROTOR_WIDTHS, strict=True):
+    for rotor, color, width in zip(ROTORS, _ROTOR_COLORS, _ROTOR_WIDTHS, strict=True):
         name, values = f"alpha_{rotor}", column(f"alpha_{rotor}")
         series.append(Series(f"tilt_angles/{name}", f"α{rotor}", color, values, width))
         name, values = f"alpha_ref_{rotor}", column(f"alpha_ref_{rotor}")
