@@ -13,7 +13,7 @@ from tiltsim_controllers.mathematics.scalar import Floats
 def compute_metrics(
     columns: Mapping[str, Floats], assembly: Assembly, end: End, wall_time: float
 ) -> dict[str, float | bool]:
-    """All metrics of a flight, over its recorded samples.
+    """All metrics that a flight has of `tiltsim.scenario.metric_names.METRICS`.
 
     Parameters
     ----------
@@ -26,10 +26,6 @@ def compute_metrics(
     wall_time
         Duration of the integration, s.
 
-    Returns
-    -------
-    dict
-        The metrics that the flight has, of `tiltsim.scenario.metric_names.METRICS`.
     """
     duration = float(columns["time"][-1])
     metrics = assembly.loop.kind.metrics(columns, assembly.scenario, assembly.follows_position) | {

@@ -93,20 +93,13 @@ class CheckedCommand:
 
 
 def check_command(command: object, *, tilting: bool) -> CheckedCommand:
-    """Check what a controller returned.
-
-    Parameters
-    ----------
-    command
-        Expected to be a `Command`.
-    tilting
-        Whether the vehicle has tilt servos.
+    """Check what a controller returned, for a vehicle with or without tilt servos.
 
     Raises
     ------
     ControllerError
         If it is not a `Command`, does not give exactly one of `ROTOR_COMMANDS`, has an entry of the
-        wrong shape or a non-finite one, or gives tilt angles to a vehicle without tilt servos.
+        wrong shape or a non-finite one, or gives tilt angles to a vehicle that is not ``tilting``.
     """
     if not isinstance(command, Command):
         raise ControllerError(f"returned {short_repr(command)}; expected a tiltsim.Command")

@@ -28,11 +28,6 @@ def make_plant(
     engine
         In place of the scenario's.
 
-    Returns
-    -------
-    Plant
-        `MujocoPlant`, `ThesisPlant` or `UserControlledPlant`.
-
     Raises
     ------
     InputError

@@ -29,21 +29,7 @@ _TABLES_WITHOUT_EFFECT: Final = frozenset(
 
 
 def flight_model(assembly: Assembly, knots: int | None = None) -> mujoco.MjModel:
-    """The model of a flight.
-
-    Parameters
-    ----------
-    assembly
-        The flight.
-    knots
-        Room for the knots in ``userdata``, for a model that several flights share; default: those
-        of this flight.
-
-    Raises
-    ------
-    InputError
-        If MuJoCo cannot compile it.
-    """
+    """The model that a flight integrates; see `build_model`."""
     model = build_model(assembly, knots=knots)
     # A diverged state must stay visible; by default MuJoCo would silently start over.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
@@ -71,21 +57,16 @@ def disturbance_acceleration(scenario: Scenario) -> Triple:
 def build_model(
     assembly: Assembly, *, knots: int | None = None, visuals: bool = False
 ) -> mujoco.MjModel:
-    """Compile the vehicle of a flight.
+    """Compile the vehicle of a flight. Raises `InputError` if MuJoCo cannot.
 
     Parameters
     ----------
     assembly
         The flight.
     knots
-        See `flight_model`.
+        Room for knots in ``userdata``, where several flights share the model; default: its own.
     visuals
         Whether the model has the parts that are only drawn.
-
-    Raises
-    ------
-    InputError
-        If MuJoCo cannot compile it.
     """
     loop, scenario = assembly.loop, assembly.scenario
     size = HEADER_SIZE + loop.record_size + (len(assembly.setup.knots) if knots is None else knots)

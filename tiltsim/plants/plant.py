@@ -30,20 +30,10 @@ class Plant(Protocol):
         """Take physics steps."""
 
     def record(self, samples: int, steps: int) -> Floats | None:
-        """Take a sample after every few physics steps.
+        """Take ``samples`` samples, each after so many physics steps: shape (samples, fields).
 
-        Parameters
-        ----------
-        samples
-            Number of samples.
-        steps
-            Physics steps before each of them.
-
-        Returns
-        -------
-        Floats or None
-            The samples, shape (samples, fields). None where a sample or the physics engine shows
-            that the flight ended on the way; the state of the plant is then undefined.
+        None where a sample or the physics engine shows that the flight ended on the way; the state
+        of the plant is then undefined.
         """
 
     def observe(self) -> tuple[float, ...]:

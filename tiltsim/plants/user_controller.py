@@ -77,10 +77,7 @@ def _place(error: BaseException) -> str:
 def with_controller(scenario: Scenario, controller: object) -> Scenario:
     """The scenario with a controller given in Python in place of its own.
 
-    Raises
-    ------
-    InputError
-        If the controller is not callable, or the scenario does not support a user's controller.
+    Raises `InputError` if it is not callable, or the scenario does not support one.
     """
     if not callable(controller):
         raise InputError(f"controller = {short_repr(controller)}: must be callable")
@@ -92,19 +89,8 @@ def with_external_commands(
 ) -> Scenario:
     """The scenario with commands from outside in place of its controller.
 
-    Parameters
-    ----------
-    scenario
-        The scenario.
-    name
-        The source of the commands, for ``controller.function``.
-    simulation
-        Keys to replace in ``[simulation]``.
-
-    Raises
-    ------
-    InputError
-        If the scenario does not support them.
+    ``name`` is their source, for ``controller.function``; ``simulation`` has keys to replace in
+    that table. Raises `InputError` if the scenario does not support them.
     """
     from tiltsim.scenario.document import without_none
     from tiltsim.scenario.loading import parse_scenario
@@ -128,18 +114,8 @@ def load_controller(
 ) -> UserController:
     """The controller of a scenario under the law ``python``.
 
-    Parameters
-    ----------
-    scenario
-        The scenario.
-    controller
-        The controller, or a class that makes one without arguments; default: the one that the
-        scenario names.
-
-    Raises
-    ------
-    InputError
-        If it cannot be loaded or made.
+    ``controller`` is one, or a class that makes one without arguments; default: what the scenario
+    names. Raises `InputError` if it cannot be loaded or made.
     """
     table = scenario.controller
     assert isinstance(table, PythonController)

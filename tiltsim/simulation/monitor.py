@@ -30,15 +30,7 @@ class TerminationMonitor:
         self._sides: dict[int, float] = {}
 
     def check(self, plant: Plant, sample: Floats) -> End | None:
-        """The termination that a sample implies, or None.
-
-        Parameters
-        ----------
-        plant
-            The plant that the sample was taken from, in the same state.
-        sample
-            The sample, shape (fields,); see `ClosedLoop.sample_fields`.
-        """
+        """The termination that a sample, shape (fields,), of the plant's present state implies."""
         state = dict(zip(self._loop.sample_fields, sample.tolist(), strict=True))
         time = state["time"]
         finite = all(map(isfinite, state.values()))
