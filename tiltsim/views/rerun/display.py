@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tiltsim.views.rerun.plane import AttitudePlane
     from tiltsim_controllers.mathematics.scalar import Floats
 
-    Values = Callable[[Flight], Floats]
+    Values = str | Callable[[Flight], Floats]  # the name of a column, or computed
 
 MEASURED_WIDTH: Final = 1.8
 REFERENCE_WIDTH: Final = 1.0
@@ -92,12 +92,7 @@ class VehicleDisplay:
     overview: bool
 
 
-def column(name: str) -> Values:
-    """The values of a column."""
-    return lambda flight: flight[name]
-
-
-def error(axis: str) -> Values:
+def error(axis: str) -> Callable[[Flight], Floats]:
     """The position error along an axis: reference minus actual, m."""
     return lambda flight: flight[f"{axis}_ref"] - flight[axis]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -16,7 +17,6 @@ from tiltsim.views.rerun.display import (
     Panel,
     Series,
     VehicleDisplay,
-    column,
     distance,
     error,
 )
@@ -28,7 +28,7 @@ from tiltsim_controllers.vehicle.states import ROTORS
 if TYPE_CHECKING:
     from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.flight.flight import Flight
-    from tiltsim.views.rerun.display import Values
+    from tiltsim.views.rerun.palette import Color
     from tiltsim_controllers.mathematics.scalar import Floats
 
 _ROTOR_COLORS: Final = (AMBER, SKY, PINK, GREEN)
@@ -38,7 +38,7 @@ _ANGLE_COLORS: Final = {"roll": RED, "pitch": GREEN, "yaw": SKY}
 _AXIS_COLORS: Final = {"x": RED, "y": GREEN, "z": SKY}
 
 
-def _spin_speed(rotor: int) -> Values:
+def _spin_speed(rotor: int) -> Callable[[Flight], Floats]:
     """The speed of a rotor along its spin, rad/s."""
     return lambda flight: SPIN[rotor - 1] * flight[f"rotor_speed_{rotor}"]
 
@@ -56,10 +56,7 @@ PANELS: Final = (
         "attitude",
         "Attitude (rad)",
         7.5,
-        (
-            Compared("roll", "Roll (rad)", column("roll")),
-            Compared("pitch", "Pitch (rad)", column("pitch")),
-        ),
+        (Compared("roll", "Roll (rad)", "roll"), Compared("pitch", "Pitch (rad)", "pitch")),
     ),
     Panel("tilt_angles", "Tilt angles (rad)", 6.5),
     Panel(
@@ -73,11 +70,7 @@ PANELS: Final = (
         "singularity",
         "Singularity margin (rad)",
         6.0,
-        (
-            Compared(
-                "margin", "Singularity margin and threshold (rad)", column("singularity_margin")
-            ),
-        ),
+        (Compared("margin", "Singularity margin and threshold (rad)", "singularity_margin"),),
         ("threshold", "singular"),
     ),
     Panel(
@@ -100,26 +93,25 @@ def rotorcraft_series(assembly: Assembly) -> list[Series]:
     """The lines of the plots."""
     series = []
     for angle, color in _ANGLE_COLORS.items():
-        series.append(Series(f"attitude/{angle}", angle, color, column(angle)))
-        name, values = f"{angle}_ref", column(f"{angle}_ref")
-        dark = dimmed(color)
-        series.append(Series(f"attitude/{name}", f"{angle} ref", dark, values, REFERENCE_WIDTH))
+        series.append(Series(f"attitude/{angle}", angle, color, angle))
+        series.append(_reference(f"attitude/{angle}_ref", f"{angle} ref", color))
     for rotor, color, width in zip(ROTORS, _ROTOR_COLORS, _ROTOR_WIDTHS, strict=True):
-        name, values = f"alpha_{rotor}", column(f"alpha_{rotor}")
-        series.append(Series(f"tilt_angles/{name}", f"α{rotor}", color, values, width))
-        name, values = f"alpha_ref_{rotor}", column(f"alpha_ref_{rotor}")
-        dark = dimmed(color)
-        series.append(Series(f"tilt_angles/{name}", f"α{rotor} ref", dark, values, REFERENCE_WIDTH))
-        name, values = f"rotor_{rotor}", _spin_speed(rotor)
-        series.append(Series(f"rotor_speeds/{name}", f"rotor {rotor}", color, values, width))
-    margin = column("singularity_margin")
-    series.append(Series("singularity/margin", "margin", AMBER, margin, 2.5))
+        tilt, speed = f"alpha_{rotor}", _spin_speed(rotor)
+        series.append(Series(f"tilt_angles/{tilt}", f"α{rotor}", color, tilt, width))
+        series.append(_reference(f"tilt_angles/alpha_ref_{rotor}", f"α{rotor} ref", color))
+        series.append(Series(f"rotor_speeds/rotor_{rotor}", f"rotor {rotor}", color, speed, width))
+    series.append(Series("singularity/margin", "margin", AMBER, "singularity_margin", 2.5))
     if SUPERVISION in assembly.loop.columns.units:
         path, label = f"singularity/{SUPERVISION}", "supervisor, 0 to 1"
-        series.append(Series(path, label, SKY, column(SUPERVISION)))
+        series.append(Series(path, label, SKY, SUPERVISION))
     for axis in error_axes(assembly):
         series.append(Series(f"position_error/{axis}", axis, _AXIS_COLORS[axis], error(axis)))
     return series
+
+
+def _reference(path: str, label: str, color: Color) -> Series:
+    """The column of the entity's name, as the reference of a line of this colour."""
+    return Series(path, label, dimmed(color), path.rpartition("/")[2], REFERENCE_WIDTH)
 
 
 def rotorcraft_levels(assembly: Assembly) -> list[Level]:

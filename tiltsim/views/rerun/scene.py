@@ -8,18 +8,7 @@ import mujoco
 import numpy as np
 import rerun as rr
 
-from tiltsim.views.replay import (
-    first_free_body,
-    joint_positions,
-    poses_in_parents,
-    reference_path,
-    reference_positions,
-    rotate,
-    thrust_scale,
-    thrust_sites,
-    vehicle_radius,
-    world_poses,
-)
+from tiltsim.views import replay
 from tiltsim.views.rerun import palette
 from tiltsim.views.rerun.geometry import body_paths, ground_height, log_geometry, xyzw
 from tiltsim.views.rerun.timeline import Trail, send_rows
@@ -76,10 +65,10 @@ class Scene:
         self.camera = f"{root}/camera"  # moves with the vehicle but does not rotate
         self._floor = f"{root}/floor"  # moves with the vehicle in whole cells
         self._paths = body_paths(model, root)
-        self.vehicle = self._paths[first_free_body(model)]
+        self.vehicle = self._paths[replay.first_free_body(model)]
         self._trail = Trail(TRAIL_INTERVAL)
-        self._thrust = thrust_sites(model)
-        self._thrust_scale = thrust_scale(model)
+        self._thrust = replay.thrust_sites(model)
+        self._thrust_scale = replay.thrust_scale(model)
         self._floor_cell: Floats | None = None
 
     def begin(self) -> list[str]:
@@ -111,8 +100,8 @@ class Scene:
     def append(self, piece: Flight) -> None:
         """Log the next piece of the flight."""
         model, columns, time = self._model, piece.columns, piece["time"]
-        world = world_poses(model, joint_positions(model, columns))
-        local = poses_in_parents(model, world)
+        world = replay.world_poses(model, replay.joint_positions(model, columns))
+        local = replay.poses_in_parents(model, world)
         for body in range(1, model.nbody):
             if model.body_dofnum[body]:
                 pose = rr.Transform3D.columns(
@@ -125,7 +114,7 @@ class Scene:
             vectors = np.outer(columns[column] * self._thrust_scale, axis).astype(np.float32)
             arrow = rr.Arrows3D.columns(vectors=vectors)
             send_rows(self._recording, self._thrust_path(site), time, arrow)
-        position = world.position[:, first_free_body(model)]
+        position = world.position[:, replay.first_free_body(model)]
         follow = rr.Transform3D.columns(translation=position.astype(np.float32))
         send_rows(self._recording, self.camera, time, follow)
         ends, segments = self._trail.extend(time, position)
@@ -134,7 +123,7 @@ class Scene:
             send_rows(self._recording, f"{self.root}/trail", ends, strips)
         self._append_floor(time, position)
         if self._assembly.follows_position:
-            reference = reference_positions(columns)
+            reference = replay.reference_positions(columns)
             point = rr.Points3D.columns(positions=reference.astype(np.float32))
             send_rows(self._recording, f"{self.root}/reference/now", time, point)
 
@@ -152,7 +141,7 @@ class Scene:
             arrow = rr.Arrows3D.from_fields(
                 origins=[self._model.site_pos[site]],
                 colors=[palette.YELLOW],
-                radii=[0.02 * vehicle_radius(self._model)],
+                radii=[0.02 * replay.vehicle_radius(self._model)],
             )
             self._log(self._thrust_path(site), arrow)
 
@@ -160,7 +149,7 @@ class Scene:
         """Log the path of the reference up to a time (s), if the controller follows a position."""
         if not self._assembly.follows_position:
             return
-        path = reference_path(self._assembly, end, REFERENCE_POINTS)
+        path = replay.reference_path(self._assembly, end, REFERENCE_POINTS)
         now = rr.Points3D.from_fields(colors=[palette.WHITE], radii=[DOT])
         self._log(f"{self.root}/reference/now", now)
         if np.ptp(path, axis=0).max() > 0.0:
@@ -187,4 +176,4 @@ class Scene:
 
 
 def _axis_in_body(model: mujoco.MjModel, site: int) -> Floats:
-    return rotate(model.site_quat[site], np.array([0.0, 0.0, 1.0]))
+    return replay.rotate(model.site_quat[site], np.array([0.0, 0.0, 1.0]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.views.events import tilt_car_conditions
@@ -12,7 +13,6 @@ from tiltsim.views.rerun.display import (
     Panel,
     Series,
     VehicleDisplay,
-    column,
     distance,
     error,
 )
@@ -21,11 +21,10 @@ from tiltsim.views.rerun.palette import AMBER, GREEN, GREY, PINK, RED, SKY, dimm
 if TYPE_CHECKING:
     from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.flight.flight import Flight
-    from tiltsim.views.rerun.display import Values
     from tiltsim_controllers.mathematics.scalar import Floats
 
 
-def _squared_speed(rotor: int) -> Values:
+def _squared_speed(rotor: int) -> Callable[[Flight], Floats]:
     return lambda flight: flight[f"rotor_speed_{rotor}"] ** 2
 
 
@@ -38,13 +37,13 @@ PANELS: Final = (
         "direction",
         "Direction of the thrusts and of the desired acceleration (rad)",
         7.0,
-        (Compared("middle", "Direction of the thrusts (rad)", column("direction")),),
+        (Compared("middle", "Direction of the thrusts (rad)", "direction"),),
     ),
     Panel(
         "inputs",
         "Rotor speeds squared (rad²/s²)",
         6.0,
-        (Compared("split", "ω₁² - ω₂² (rad²/s²)", column("input_split")),),
+        (Compared("split", "ω₁² - ω₂² (rad²/s²)", "input_split"),),
     ),
     Panel("discs", "Tilt and yaw (rad)", 5.0),
     Panel(
@@ -67,22 +66,21 @@ def panels(assembly: Assembly) -> tuple[Panel, ...]:
 def tilt_car_series(assembly: Assembly) -> list[Series]:
     """The lines of the plots."""
     bound, reference = dimmed(AMBER), dimmed(PINK)
-    upper, lower = column("direction_upper"), column("direction_lower")
     series = [
-        Series("direction/middle", "middle of the thrusts", AMBER, column("direction"), 2.5),
-        Series("direction/upper", "upper bound", bound, upper, REFERENCE_WIDTH),
-        Series("direction/lower", "lower bound", bound, lower, REFERENCE_WIDTH),
-        Series("direction/desired", "desired acceleration", SKY, column("direction_ref")),
+        Series("direction/middle", "middle of the thrusts", AMBER, "direction", 2.5),
+        Series("direction/upper", "upper bound", bound, "direction_upper", REFERENCE_WIDTH),
+        Series("direction/lower", "lower bound", bound, "direction_lower", REFERENCE_WIDTH),
+        Series("direction/desired", "desired acceleration", SKY, "direction_ref"),
         Series("inputs/square_1", "rotor 1", AMBER, _squared_speed(1)),
         Series("inputs/square_2", "rotor 2", SKY, _squared_speed(2)),
-        Series("discs/alpha", "tilt", PINK, column("alpha")),
-        Series("discs/alpha_ref", "tilt ref", reference, column("alpha_ref"), REFERENCE_WIDTH),
-        Series("discs/yaw", "yaw", GREEN, column("yaw")),
+        Series("discs/alpha", "tilt", PINK, "alpha"),
+        Series("discs/alpha_ref", "tilt ref", reference, "alpha_ref", REFERENCE_WIDTH),
+        Series("discs/yaw", "yaw", GREEN, "yaw"),
         Series("position_error/x", "x", RED, error("x")),
         Series("position_error/y", "y", GREEN, error("y")),
     ]
     if "lyapunov" in assembly.loop.units:
-        series.append(Series("lyapunov/candidate", "candidate", PINK, column("lyapunov")))
+        series.append(Series("lyapunov/candidate", "candidate", PINK, "lyapunov"))
     return series
 
 

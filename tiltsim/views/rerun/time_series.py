@@ -40,7 +40,10 @@ class TimeSeries:
     def append(self, piece: Flight) -> None:
         """Log the next piece of the flight."""
         for series in self._series:
-            row = rr.Scalars.columns(scalars=series.values(piece))
+            source = series.values
+            row = rr.Scalars.columns(
+                scalars=piece[source] if isinstance(source, str) else source(piece)
+            )
             send_rows(self._recording, self._prefix + series.path, piece["time"], row)
 
     def _log_style(self, line: Series | Level) -> None:

@@ -12,17 +12,7 @@ import numpy as np
 
 from tiltsim.errors import InputError
 from tiltsim.system.files import replacing
-from tiltsim.views.replay import (
-    first_free_body,
-    joint_positions,
-    positions,
-    reference_path,
-    reference_positions,
-    thrust_scale,
-    thrust_sites,
-    vehicle_radius,
-    visible_model,
-)
+from tiltsim.views import replay
 from tiltsim.views.vehicle_views import views_of
 from tiltsim.views.video.offscreen import Canvas, Image
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -113,18 +103,20 @@ class FlightRenderer:
     def __init__(self, flight: Flight, video: VideoFormat) -> None:
         self._flight = flight
         self._speed = "" if video.speed == 1.0 else f", {video.speed:g}x"
-        self._model = model = visible_model(flight.assembly)
+        self._model = model = replay.visible_model(flight.assembly)
         self._data = mujoco.MjData(model)
-        self._qpos = joint_positions(model, flight.columns)
-        self._body = first_free_body(model)
-        self._radius = vehicle_radius(model)
-        self._arrow_scale = thrust_scale(model)
+        self._qpos = replay.joint_positions(model, flight.columns)
+        self._body = replay.first_free_body(model)
+        self._radius = replay.vehicle_radius(model)
+        self._arrow_scale = replay.thrust_scale(model)
         self._reference: Floats | None = None
         if flight.assembly.follows_position:
-            path = reference_path(flight.assembly, float(flight["time"][-1]), REFERENCE_POINTS)
+            path = replay.reference_path(
+                flight.assembly, float(flight["time"][-1]), REFERENCE_POINTS
+            )
             self._reference = path if np.ptp(path, axis=0).max() > 0.0 else path[:1]
-        self._targets = reference_positions(flight.columns)
-        self._position = positions(flight.columns)
+        self._targets = replay.reference_positions(flight.columns)
+        self._position = replay.positions(flight.columns)
         self._overlay = views_of(flight.assembly).overlay(flight, video.height)
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_TRACKING
@@ -162,7 +154,7 @@ class FlightRenderer:
 
     def _add_thrusts(self, sample: int) -> None:
         data = self._data
-        for site, column in thrust_sites(self._model).items():
+        for site, column in replay.thrust_sites(self._model).items():
             axis = data.site_xmat[site].reshape(3, 3)[:, 2]
             start = data.site_xpos[site]
             end = start + axis * self._arrow_scale * self._flight[column][sample]
