@@ -59,15 +59,16 @@ def test_a_count_is_shown_from_the_start_with_rate_and_time_left(monkeypatch):
         for count in (2, 3):
             time.sleep(0.11)
             move(count)
-    assert "| 1/5 flights [00:00<?, ? flights/s]" in shown.text
-    assert re.search(r"\| 3/5 flights \[\d\d:\d\d<\d\d:\d\d, +\d\.\d\d flights/s\]", shown.text)
+    assert re.search(r"\| 1/5 flights \[\d\d:\d\d<\?, \? flights/s\]", shown.text)
+    rate = r" +\d\.\d\d( flights/s|s/ flights)"  # the latter on a machine that is very busy
+    assert re.search(rf"\| 3/5 flights \[\d\d:\d\d<\d\d:\d\d,{rate}\]", shown.text)
 
 
 def test_the_clock_moves_while_nothing_is_finished(monkeypatch):
     monkeypatch.setattr(progress, "TICK", 0.02)
     with terminal_as_stderr(monkeypatch) as shown, counting_bar(5, "flights", shown=True) as move:
         move(0)
-        time.sleep(0.3)
+        time.sleep(1.0)
     assert shown.text.count("| 0/5 flights") > 5
 
 

@@ -88,7 +88,7 @@ def test_an_unreachable_cluster_is_one_line(tmp_path, capsys, monkeypatch):
     start = time.monotonic()
     options = ["--cluster", address, "--out", str(tmp_path / "out"), "--quiet"]
     assert main(["sweep", str(file), *options]) == 2
-    assert time.monotonic() - start < 20.0
+    assert time.monotonic() - start < 60.0
     error = capsys.readouterr().err
     assert error.count("\n") == 1
     assert "cannot reach a scheduler" in error

@@ -177,11 +177,10 @@ def test_a_terminated_run_keeps_its_flight_and_leaves_no_part_file(tmp_path):
     options = ["--controller", f"{law}:law", "--out", str(out), "--rerun", str(out / "flight.rrd")]
     out.mkdir()
     with subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True) as process:
-        deadline = time.monotonic() + 30.0
-        while not law.with_suffix(".flying").exists() and time.monotonic() < deadline:
+        while not law.with_suffix(".flying").exists() and process.poll() is None:
             time.sleep(0.02)
         process.terminate()
-        _, error = process.communicate(timeout=30.0)
+        _, error = process.communicate(timeout=300.0)
     assert (process.returncode, error.splitlines()[-1][:29]) == (
         143,
         "tiltsim: interrupted at t = 0",

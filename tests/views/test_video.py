@@ -187,11 +187,10 @@ def test_a_terminated_command_leaves_no_file(tmp_path):
     before = sorted(folder.iterdir())
     command = [sys.executable, "-m", "tiltsim", "video", str(folder), "--speed", "0.01"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
-        deadline = time.monotonic() + 30.0
-        while sorted(folder.iterdir()) == before and time.monotonic() < deadline:
+        while sorted(folder.iterdir()) == before and process.poll() is None:
             time.sleep(0.02)
         process.terminate()
-        _, error = process.communicate(timeout=30.0)
+        _, error = process.communicate(timeout=300.0)
     assert (process.returncode, error.splitlines()[-1]) == (143, "tiltsim: interrupted")
     assert sorted(folder.iterdir()) == before
 
