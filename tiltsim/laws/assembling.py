@@ -56,11 +56,6 @@ def loop_of(scenario: Scenario) -> ClosedLoop:
     return on_equations(loop) if by_controls else loop
 
 
-def follows_position(scenario: Scenario) -> bool:
-    """Whether the controller of a scenario follows the reference's horizontal position."""
-    return loop_of(scenario).follows_position(scenario)
-
-
 def assemble(scenario: Scenario) -> Assembly:
     """Plan the flight of a scenario and set up its closed loop."""
     plan, loop = plan_flight(scenario), loop_of(scenario)
