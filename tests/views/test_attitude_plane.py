@@ -56,7 +56,7 @@ def test_the_determinant_vanishes_on_the_curve(angles):
             assert abs(float(normals(angles)[0] @ up)) < 1e-9
 
 
-def test_many_instants_are_drawn_as_each_alone():
+def test_curves_of_many_instants_equal_those_of_single_instants():
     angles = [TROT, (0.3, -0.2, 0.1, 0.4)]
     for curve, alone in zip(singular_curves(normals(*angles), 183), angles, strict=True):
         expected = unacceptable_attitudes(alone, VEHICLE, 181)
@@ -72,12 +72,12 @@ def test_a_vertical_line_is_followed():
 
 
 @pytest.mark.parametrize("n", [(0.0, 0.0, 1.0), (0.0, 0.0, 0.0)])
-def test_there_is_no_curve_where_none_or_all_attitudes_are_singular(n):
+def test_there_is_no_curve_if_no_or_every_attitude_is_singular(n):
     assert np.isnan(singular_curves(np.array([n]))).all()
 
 
 @given(tilts, st.sampled_from([1.0, -1.0]))
-def test_out_of_reach_is_where_the_determinant_has_the_other_sign(angles, side):
+def test_attitudes_are_unreachable_where_the_determinant_has_the_other_sign(angles, side):
     n = normals(angles)
     roll = np.linspace(-1.5, 1.5, 13)
     intervals = unreachable_pitch(n, side, roll)[0]
@@ -89,7 +89,7 @@ def test_out_of_reach_is_where_the_determinant_has_the_other_sign(angles, side):
         np.testing.assert_array_equal(inside[clear], sign[clear] < 0.0)
 
 
-def test_all_is_out_of_reach_where_tau_has_lost_rank_and_nothing_where_n_is_vertical():
+def test_all_attitudes_are_unreachable_if_tau_is_singular_and_none_if_n_is_vertical():
     roll = np.linspace(-1.0, 1.0, 5)
     everything = unreachable_pitch(np.zeros((1, 3)), 1.0, roll)[0]
     np.testing.assert_array_equal(everything, np.tile([-HALF_WIDTH, HALF_WIDTH], (5, 1)))

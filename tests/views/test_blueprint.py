@@ -44,7 +44,7 @@ def test_compared_flights_have_one_legend():
 
 
 @pytest.mark.parametrize(("name", "whole"), [("fixed", True), ("trot", False)])
-def test_the_attitudes_trail_is_short_beside_a_curve_that_moves(name, whole):
+def test_the_attitudes_trail_is_short_if_the_curve_moves(name, whole):
     view = views_of(flight(name).scenario)["Attitude (shaded: unreachable attitudes)"]
     (shown,) = view.visualizer_overrides["plane/trail"].ranges.as_arrow_array().to_pylist()
     assert shown["range"]["start"] == (None if whole else -1e9 * MOVING_TRAIL_TIME)

@@ -63,7 +63,7 @@ def test_lines_of_a_panel_differ_without_color(panel):
 
 
 @pytest.mark.parametrize(("period", "shown"), [(0.5, "Tilt angles"), (0.05, "last 0.3 s")])
-def test_a_gait_of_very_many_periods_is_shown_by_its_last(period, shown):
+def test_of_many_periods_only_the_last_are_shown(period, shown):
     this = flight("trot")
     gait = this.scenario.gait.model_copy(update={"period": period})
     this = replace(this, assembly=assemble(this.scenario.model_copy(update={"gait": gait})))
@@ -158,7 +158,7 @@ def test_all_attitudes_of_a_red_gait_are_reachable():
     red = BASE | {"gait": {"type": "fixed", "angles": [-0.3, 0.3, -0.3, 0.3]}}
     panels = axes_by_title(flight_figure(tiltsim.simulate(tiltsim.parse_scenario(red))))
     plane = panels["Attitudes flown; all reachable"]
-    assert [len(line.get_xdata()) > 1 for line in plane.lines].count(True) == 1  # what was flown
+    assert [len(line.get_xdata()) > 1 for line in plane.lines].count(True) == 1, "the attitudes"
 
 
 # --- supervised flights, and several on one page -------------------------------------------------

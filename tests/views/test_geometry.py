@@ -52,7 +52,7 @@ def test_every_shape_of_any_model_is_drawn_or_named(tmp_path):
 
 
 @pytest.mark.parametrize("vehicle", MODELS)
-def test_every_vehicle_is_drawn_whole(vehicle, tmp_path):
+def test_every_visible_geom_of_a_vehicle_is_drawn(vehicle, tmp_path):
     import rerun as rr
 
     model = compile_model(RotorcraftSpec(vehicle, PRESETS["ar_drone_2"]))

@@ -13,8 +13,8 @@ from tiltsim.simulation.simulate import simulate
 from tiltsim.views.rerun.live import LiveStream
 
 
-class Wall:
-    """A recorder that takes nothing for a while, or at all."""
+class BlockedRecorder:
+    """A recorder that blocks until it is released, or raises an error."""
 
     def __init__(self, error=None):
         self.released = threading.Event()
@@ -39,7 +39,7 @@ class Wall:
 
 @pytest.fixture
 def listener():
-    """The address of something that listens but never answers."""
+    """The address of a server that never responds."""
     import socket
 
     with socket.create_server(("127.0.0.1", 0)) as server:
@@ -56,21 +56,21 @@ def stream_to(recorder, url, monkeypatch, farewell=30.0):
     return stream
 
 
-def test_a_viewer_that_takes_nothing_does_not_hold_the_flight_up(listener, monkeypatch, capsys):
-    wall = Wall()
+def test_an_unresponsive_viewer_does_not_delay_the_flight(listener, monkeypatch, capsys):
+    blocked = BlockedRecorder()
     began = time.monotonic()
-    with stream_to(wall, listener, monkeypatch, farewell=0.3) as stream:
+    with stream_to(blocked, listener, monkeypatch, farewell=0.3) as stream:
         this = simulate(flight("fixed").scenario, stream)
         stream.finish(this.end)
-    assert time.monotonic() - began < 30.0, "the wall stands for a minute"
+    assert time.monotonic() - began < 30.0, "the blocked stands for a minute"
     assert "the viewer does not respond" in capsys.readouterr().err
     assert this.end.kind == "completed"
     np.testing.assert_array_equal(this.samples, flight("fixed").samples)
-    wall.released.set()
+    blocked.released.set()
 
 
-def test_a_stream_that_breaks_is_one_line_and_no_loss(listener, monkeypatch, capsys):
-    with stream_to(Wall(OSError("gone")), listener, monkeypatch) as stream:
+def test_a_broken_stream_prints_one_line(listener, monkeypatch, capsys):
+    with stream_to(BlockedRecorder(OSError("gone")), listener, monkeypatch) as stream:
         this = simulate(flight("fixed").scenario, stream)
         stream.finish(this.end)
     assert this.end.kind == "completed"

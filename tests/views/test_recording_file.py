@@ -136,14 +136,14 @@ def test_events_begin_and_end_with_the_flight(recorded):
     assert bool(saturated) == (this.scenario.vehicle.max_rotor_speed is not None)
 
 
-def test_the_viewers_own_tool_verifies_the_recording(recorded):
+def test_the_rerun_tool_verifies_the_recording(recorded):
     done = rerun_rrd("verify", recorded[0])
     assert done.returncode == 0, done.stderr
 
 
 def test_a_recording_is_small(recorded):
     path, this = recorded
-    # Below 5 MB for 40 s at 100 Hz: what does not move, and so much a row.
+    # Below 5 MB for 40 s at 100 Hz: the static data, and this much per row.
     assert path.stat().st_size < 0.8e6 + 1000 * len(this)
 
 
@@ -163,7 +163,7 @@ def test_another_flight_does_not_compare_equal(tmp_path):
     assert rerun_rrd("compare", "--unordered", *paths).returncode != 0
 
 
-def test_a_flight_in_pieces_is_recorded_like_a_whole_one(tmp_path):
+def test_a_flight_in_pieces_is_recorded_like_a_complete_one(tmp_path):
     this = flight("trot")
     paths = []
     for size in (len(this), 13):
@@ -193,7 +193,7 @@ def test_a_flight_in_pieces_is_recorded_like_a_whole_one(tmp_path):
         assert found[1] == expected[1]
 
 
-def test_several_flights_share_a_recording_under_names_of_their_own(tmp_path):
+def test_several_flights_share_a_recording_under_distinct_names(tmp_path):
     path = tmp_path / "comparison.rrd"
     save_recording([flight("fixed"), flight("trot")], path)
     assert rerun_rrd("verify", path).returncode == 0
@@ -205,8 +205,8 @@ def test_several_flights_share_a_recording_under_names_of_their_own(tmp_path):
         assert all(text.startswith(f"{name}: ") for (text,) in texts)
 
 
-def test_compared_flights_have_their_margins_in_the_plot_alone(tmp_path):
-    """Labels of several would hide each other in the plane."""
+def test_compared_flights_have_no_labels_in_the_plane(tmp_path):
+    """Labels of several flights would cover each other."""
     alone, compared = tmp_path / "alone.rrd", tmp_path / "compared.rrd"
     save_recording([flight("fixed")], alone)
     save_recording([flight("fixed"), flight("trot")], compared)
@@ -216,7 +216,7 @@ def test_compared_flights_have_their_margins_in_the_plot_alone(tmp_path):
     assert labels == []
 
 
-def test_vehicle_and_reference_are_seen_from_however_far(recorded):
+def test_vehicle_and_reference_are_visible_from_any_distance(recorded):
     from rerun.chunk import RrdReader
 
     path, this = recorded
@@ -244,7 +244,7 @@ def test_run_and_view_write_equal_recordings(tmp_path, capsys):
 
 @pytest.fixture
 def full_disk(monkeypatch):
-    """The next recording goes to where there is no room."""
+    """Redirect the next recording to a full device."""
     if not Path("/dev/full").exists():
         pytest.skip("this system has no /dev/full")
 
@@ -255,7 +255,7 @@ def full_disk(monkeypatch):
     monkeypatch.setattr("tiltsim.views.rerun.recording_file.replacing", to_nowhere)
 
 
-def test_a_full_disk_is_said_in_one_line(full_disk, tmp_path, capfd):
+def test_a_full_disk_is_an_error_of_one_line(full_disk, tmp_path, capfd):
     path = tmp_path / "flight.rrd"
     with pytest.raises(InputError, match=r"flight\.rrd: cannot be written: No space left"):
         save_recording([flight("fixed")], path)
@@ -279,7 +279,7 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, words, capsys):
 
 
 @pytest.mark.parametrize(("content", "words"), [(b"", "not a Rerun"), (b"PAR1", "not a Rerun")])
-def test_what_is_no_recording_is_said_in_one_line(content, words, tmp_path, monkeypatch, capsys):
+def test_a_file_without_a_recording_is_refused(content, words, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: pytest.fail("opens the viewer"))
     monkeypatch.setenv("DISPLAY", ":0")
     path = tmp_path / "flight.RRD"
@@ -289,7 +289,7 @@ def test_what_is_no_recording_is_said_in_one_line(content, words, tmp_path, monk
     assert words in line
 
 
-def test_no_screen_is_said_in_one_line(monkeypatch):
+def test_a_missing_screen_is_an_error_of_one_line(monkeypatch):
     monkeypatch.setattr(sys, "platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
@@ -298,7 +298,7 @@ def test_no_screen_is_said_in_one_line(monkeypatch):
 
 
 @pytest.mark.parametrize("how", ["run", "view", "live"])
-def test_rerun_switched_off_is_said_in_one_line(how, tmp_path, monkeypatch, capfd):
+def test_disabled_rerun_is_an_error_of_one_line(how, tmp_path, monkeypatch, capfd):
     monkeypatch.setenv("RERUN", "Off")
     folder, target = saved("fixed", tmp_path), str(tmp_path / "flight.rrd")
     arguments = {
@@ -311,6 +311,6 @@ def test_rerun_switched_off_is_said_in_one_line(how, tmp_path, monkeypatch, capf
     assert line == "tiltsim: RERUN=Off in the environment disables Rerun; unset it"
 
 
-def test_a_port_where_nobody_listens_is_said_in_one_line():
+def test_a_port_without_a_viewer_is_an_error_of_one_line():
     with pytest.raises(InputError, match="no viewer listens there"):
         require_viewer(f"rerun+http://127.0.0.1:{free_port()}/proxy")

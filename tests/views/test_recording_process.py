@@ -18,7 +18,7 @@ from tiltsim.views.rerun.process import RecordingProcess
 from tiltsim.views.rerun.recording_file import save_recording
 
 
-def test_the_recordings_process_tells_what_went_wrong(tmp_path):
+def test_the_process_reports_an_error(tmp_path):
     path = tmp_path / "no folder" / "flight.rrd"
     with RecordingProcess(flight("fixed").scenario) as process:
         process.start(flight("fixed"), path)
@@ -26,7 +26,7 @@ def test_the_recordings_process_tells_what_went_wrong(tmp_path):
             process.finish()
 
 
-def test_a_recording_whose_process_is_killed_is_written_all_the_same(tmp_path):
+def test_a_recording_is_written_although_its_process_was_killed(tmp_path):
     this, paths = flight("trot"), [tmp_path / "a.rrd", tmp_path / "b.rrd"]
     with RecordingProcess(this.scenario) as process:
         process._process.kill()
@@ -38,14 +38,14 @@ def test_a_recording_whose_process_is_killed_is_written_all_the_same(tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-def test_the_recordings_process_ends_with_a_flight_that_comes_to_nothing():
+def test_the_process_ends_with_an_interrupted_flight():
     with pytest.raises(KeyboardInterrupt), RecordingProcess(flight("trot").scenario) as process:
         raise KeyboardInterrupt
     assert process._process.returncode is not None
 
 
-def test_the_recordings_process_says_nothing_where_its_answer_is_not_awaited(tmp_path, capfd):
-    """As where another file of the flight cannot be written."""
+def test_the_process_prints_nothing_if_its_answer_is_not_read(tmp_path, capfd):
+    """As if another file of the flight could not be written."""
     path = tmp_path / "flight.rrd"
     with RecordingProcess(flight("fixed").scenario) as process:
         process.start(flight("fixed"), path)
@@ -54,7 +54,7 @@ def test_the_recordings_process_says_nothing_where_its_answer_is_not_awaited(tmp
     assert capfd.readouterr().err == ""
 
 
-def test_the_recordings_process_says_nothing_of_half_a_flight(capfd):
+def test_the_process_prints_nothing_about_an_incomplete_message(capfd):
     with RecordingProcess(flight("fixed").scenario) as process:
         process._work = flight("fixed"), Path("nowhere")
         process._process.stdin.write(pickle.dumps(process._work)[:1000])
@@ -62,8 +62,8 @@ def test_the_recordings_process_says_nothing_of_half_a_flight(capfd):
     assert capfd.readouterr().err == ""
 
 
-def test_the_recordings_process_ends_with_the_one_that_it_serves(tmp_path):
-    """Also when that is killed, with no time to clean up."""
+def test_the_process_ends_with_its_parent(tmp_path):
+    """Even if that is killed and cannot clean up."""
     program = (
         "import os, signal; from tests.flights import flight; "
         "from tiltsim.views.rerun.process import RecordingProcess; "
@@ -76,7 +76,7 @@ def test_the_recordings_process_ends_with_the_one_that_it_serves(tmp_path):
     assert (done.returncode, done.stderr) == (-signal.SIGKILL, "")
 
 
-def test_a_flight_is_recorded_without_loading_rerun_beside_it(tmp_path):
+def test_recording_a_flight_does_not_import_rerun(tmp_path):
     path = tmp_path / "flight.rrd"
     options = ["--set", "simulation.duration=0.1", "--set", "expect=[]", "--quiet"]
     arguments = ["run", "ch04_tracking/setpoint#rho_065_modified", *options, "--rerun", str(path)]

@@ -54,7 +54,7 @@ def test_up_of_the_last_pose_is_that_of_the_attitude():
     assert up[2] == pytest.approx(expected)
 
 
-def test_any_model_moves_by_the_columns_that_bear_its_joints_names():
+def test_any_model_moves_by_the_columns_named_like_its_joints():
     model = mujoco.MjModel.from_xml_string(FOREIGN)
     columns = {"time": np.arange(3.0), "x": np.array([0.0, 1.0, 2.0])}
     poses = world_poses(model, joint_positions(model, columns))

@@ -37,7 +37,7 @@ SAME = ("g2.toml", "g2.toml")
         (("", ""), (), ["flight_1", "flight_2"]),
     ],
 )
-def test_flights_are_named_by_what_tells_them_apart(addresses, paths, names):
+def test_flights_have_distinct_names(addresses, paths, names):
     assert flight_names(scenarios(*addresses), [Path(path) for path in paths]) == names
 
 

@@ -71,7 +71,7 @@ def test_the_inset_has_the_attitude_with_pitch_upwards():
     assert inset.ATTITUDE in {tuple(pixel) for pixel in beyond[50, -5:-1].tolist()}
 
 
-def test_an_inset_covers_its_corner_alone():
+def test_an_inset_covers_only_its_corner():
     frame = np.zeros((100, 100, 3), dtype=np.uint8)
     overlay_inset(frame, np.full((30, 30, 3), 200, dtype=np.uint8), 5)
     assert frame[70, 70].min() > 150
@@ -79,7 +79,7 @@ def test_an_inset_covers_its_corner_alone():
 
 
 @pytest.mark.parametrize(("name", "whole"), [("fixed", True), ("trot", False)])
-def test_the_insets_trail_is_short_beside_a_curve_that_moves(name, whole, monkeypatch):
+def test_the_insets_trail_is_short_if_the_curve_moves(name, whole, monkeypatch):
     this, trails = flight(name), []
     monkeypatch.setattr(PlaneInset, "paint", lambda _self, _n, trail, _margin: trails.append(trail))
     monkeypatch.setattr(overlay, "overlay_inset", lambda *_: None)
@@ -126,7 +126,7 @@ def test_every_flight_can_be_rendered():
 
 @needs_gl
 def test_an_arrow_is_drawn_as_long_as_a_line_between_the_same_ends():
-    """MuJoCo draws arrows at half the length it sets; notice when that changes."""
+    """MuJoCo draws arrows at half the length that it sets; this fails when that changes."""
     words = ("", "", offscreen.Caption("", 0, 0))
     camera = mujoco.MjvCamera()
     camera.distance, camera.elevation = 2.0, 0.0
@@ -219,7 +219,7 @@ def test_an_implementation_that_only_warns_is_one_line_too(monkeypatch):
 
 
 @pytest.mark.parametrize("way", ["nonsense", "osmesa"])
-def test_what_mujoco_cannot_be_loaded_with_is_one_line(way, tmp_path):
+def test_an_invalid_mujoco_gl_is_an_error_of_one_line(way, tmp_path):
     if way == "osmesa" and (sys.platform != "linux" or find_library("OSMesa")):
         pytest.skip("OSMesa is installed")
     command = [sys.executable, "-m", "tiltsim", "run", "ch01_gust/hover#quadrotor", "--quiet"]

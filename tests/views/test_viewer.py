@@ -29,7 +29,7 @@ needs_driver = pytest.mark.skipif(bool(missing_driver()), reason=missing_driver(
 @pytest.mark.viewer
 @needs_driver
 @pytest.mark.parametrize("names", [["fixed"], ["trot"], ["free"], ["tilt_car"], ["fixed", "trot"]])
-def test_the_viewer_shows_recordings_without_complaints(names, tmp_path):
+def test_the_viewer_reports_no_errors(names, tmp_path):
     path = tmp_path / "flight.rrd"
     save_recording([flight(name) for name in names], path)
     shot = shoot(path, 1.0)
@@ -53,7 +53,7 @@ def test_the_viewer_receives_a_live_flight():
 @pytest.mark.viewer
 @needs_driver
 @pytest.mark.parametrize("stop", ["kill", "freeze"])
-def test_closing_the_viewer_leaves_the_flight_whole(stop, tmp_path):
+def test_closing_the_viewer_does_not_affect_the_flight(stop, tmp_path):
     port = free_port()
     url = f"rerun+http://127.0.0.1:{port}/proxy"
     name = "ch04_tracking/setpoint#rho_065_modified"

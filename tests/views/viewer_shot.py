@@ -22,13 +22,13 @@ from typing import Any
 TIMELINE = "sim_time"
 DRIVERS = "/usr/share/vulkan/icd.d"
 START_UP = 30.0  # s to wait for the viewer, the data, a still picture
-GREETING = 4.5  # s for which the viewer shows a message of its own over the views
+GREETING = 4.5  # s during which the viewer shows a message over the views
 STEP = 0.2  # s between looks
 
 
 @dataclass(frozen=True)
 class Shot:
-    """A picture (PNG), the titles of the views in it, and what they complain of."""
+    """A picture (PNG), the titles of the views in it, and their reported errors."""
 
     png: bytes
     views: list[str]
@@ -103,13 +103,13 @@ def viewer_process(port: int, size: str = "800x600") -> Iterator[subprocess.Pope
     try:
         yield process
     finally:
-        process.kill()  # it may be frozen and deaf to gentler words
+        process.kill()  # a frozen process ignores other signals
         process.wait(10)
         process.stderr.close()
 
 
 def free_port() -> int:
-    """A port that nobody listens on."""
+    """A free port."""
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         port: int = listener.getsockname()[1]
@@ -135,7 +135,7 @@ def still_picture(client: Any) -> bytes:
 
 
 def wait_for(condition: Callable[[], Any], what: str) -> Any:
-    """The first true value of a condition. Raises `TimeoutError` where none comes."""
+    """The first true value of a condition. Raises `TimeoutError` after `START_UP`."""
     deadline = time.monotonic() + START_UP
     while time.monotonic() < deadline:
         value = condition()
