@@ -62,7 +62,7 @@ def test_an_unresponsive_viewer_does_not_delay_the_flight(listener, monkeypatch,
     with stream_to(blocked, listener, monkeypatch, farewell=0.3) as stream:
         this = simulate(flight("fixed").scenario, stream)
         stream.finish(this.end)
-    assert time.monotonic() - began < 30.0, "the blocked stands for a minute"
+    assert time.monotonic() - began < 30.0, "the recorder blocks for a minute"
     assert "the viewer does not respond" in capsys.readouterr().err
     assert this.end.kind == "completed"
     np.testing.assert_array_equal(this.samples, flight("fixed").samples)
@@ -80,7 +80,7 @@ def test_a_broken_stream_prints_one_line(listener, monkeypatch, capsys):
 def test_all_samples_reach_the_recorder_in_order(listener, monkeypatch):
     pieces = []
 
-    class Taker(Wall):
+    class Taker(BlockedRecorder):
         def append(self, piece):
             pieces.append(piece.samples)
 
