@@ -24,16 +24,12 @@ def allow_negative_lists(parser: argparse.ArgumentParser) -> None:
 
 def parse_angle(option: str, text: str) -> float:
     """One angle in rad. Raises `InputError` unless it is finite and at most half a turn."""
-    try:
-        value = float(text)
-    except ValueError:
-        raise InputError(f"{option} {text}: must be a number, in rad") from None
-    return _checked(option, text, value)
+    return parse_angles(option, text, 1)[0]
 
 
 def parse_angles(option: str, text: str, count: int = 4) -> tuple[float, ...]:
     """Angles in rad, separated by commas. Raises `InputError` like `parse_angle`."""
-    parts = text.split(",")
+    parts = text.split(",") if count > 1 else [text]
     if len(parts) != count:
         raise InputError(
             f"{option} {text}: needs {count} angles separated by commas, has {len(parts)}"

@@ -5,7 +5,13 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from tiltsim.commands.angles import allow_negative_lists, parse_angles, parse_vehicle, vehicle_text
+from tiltsim.commands.angles import (
+    allow_negative_lists,
+    parse_angle,
+    parse_angles,
+    parse_vehicle,
+    vehicle_text,
+)
 from tiltsim.commands.options import Subparsers, add_json, add_plot, add_vehicle, prepare_figure
 from tiltsim.commands.text import aligned, json_text, print_figure_path, tally
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
@@ -68,7 +74,7 @@ def _path(arguments: argparse.Namespace, vehicle: Vehicle) -> Polyline | Circle 
         raise InputError("map: give either --leg or --circle")
     if arguments.circle:
         color, centre, radius = arguments.circle
-        (size,) = parse_angles("--circle radius", radius, 1)
+        size = parse_angle("--circle radius", radius)
         first, second = parse_angles("--circle centre", centre, 2)
         return Circle(_color("--circle", color), (first, second), size)
     if not arguments.leg:

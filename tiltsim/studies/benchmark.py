@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import resource
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from statistics import median
 from time import perf_counter
 from typing import Any, Final
@@ -49,6 +49,8 @@ ACCURACY_DURATION: Final = 8.0
 TROT: Final = {"type": "fixed", "angles": [-0.65, -0.65, 0.65, 0.65]}
 
 Rows = list[dict[str, Any]]
+Variants = dict[tuple[str, str], Callable[[], float]]
+"""Seconds per step of one timing, by case and engine."""
 
 
 def flying_plant(integrator: str) -> MujocoPlant:
@@ -85,13 +87,13 @@ def bench_single(integrator: str, rounds: int = ROUNDS) -> Rows:
         seconds = _seconds(lambda: plant.record(STEPS // RECORD_STEPS, RECORD_STEPS))
         return seconds / STEPS
 
-    variants: dict[tuple[str, str], Callable[[], float]] = {
+    variants: Variants = {
         ("single", name): stepping(callback, PYTHON_STEPS if name == "python" else STEPS)
         for name, callback in callbacks.items()
     }
     variants["recorded", "native"] = recording
-    seconds = _time_in_rounds(variants, rounds)
-    return _rows(seconds, ("single", "bare"), integrator, model, vehicles=1, threads=1)
+    shared = {"integrator": integrator, "vehicles": 1, "threads": 1}
+    return _compare(variants, rounds, float(model.opt.timestep), shared)
 
 
 def bench_batch(integrator: str, threads: int, rounds: int = BATCH_ROUNDS) -> Rows:
@@ -111,10 +113,8 @@ def bench_batch(integrator: str, threads: int, rounds: int = BATCH_ROUNDS) -> Ro
         return run
 
     variants = {("batch", "bare"): stepping(None), ("batch", "native"): stepping(plant.callback)}
-    seconds = _time_in_rounds(variants, rounds)
-    return _rows(
-        seconds, ("batch", "bare"), integrator, plant.model, vehicles=BATCH_ROWS, threads=threads
-    )
+    shared = {"integrator": integrator, "vehicles": BATCH_ROWS, "threads": threads}
+    return _compare(variants, rounds, float(plant.model.opt.timestep), shared)
 
 
 def bench_flights(vehicles: int, duration: float, integrator: str, timestep: float) -> Rows:
@@ -224,38 +224,23 @@ def _seconds(action: Callable[[], object]) -> float:
     return perf_counter() - start
 
 
-def _time_in_rounds(
-    variants: Mapping[tuple[str, str], Callable[[], float]], rounds: int
-) -> dict[tuple[str, str], list[float]]:
-    """Seconds per step of each variant in each round."""
+def _compare(variants: Variants, rounds: int, timestep: float, shared: dict[str, Any]) -> Rows:
+    """Rows of variants timed in rounds, the first one bare; ``shared`` has their common columns."""
     seconds: dict[tuple[str, str], list[float]] = {name: [] for name in variants}
     for round_ in range(rounds + 1):
         for name, run in variants.items():
             per_step = run()
             if round_ > 0:  # the first round warms the caches
                 seconds[name].append(per_step)
-    return seconds
-
-
-def _rows(
-    seconds: Mapping[tuple[str, str], list[float]],
-    bare: tuple[str, str],
-    integrator: str,
-    model: mujoco.MjModel,
-    *,
-    vehicles: int,
-    threads: int,
-) -> Rows:
+    bare = next(iter(seconds.values()))
     return [
         {
             "case": case,
             "engine": engine,
-            "integrator": integrator,
-            "vehicles": vehicles,
-            "threads": threads,
+            **shared,
             "steps_per_second": 1.0 / median(values),
-            "ratio": median(b / v for b, v in zip(seconds[bare], values, strict=True)),
-            "realtime_factor": float(model.opt.timestep) / median(values),
+            "ratio": median(b / v for b, v in zip(bare, values, strict=True)),
+            "realtime_factor": timestep / median(values),
         }
         for (case, engine), values in seconds.items()
     ]

@@ -14,7 +14,9 @@ from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
 from tiltsim.scenario.table import Positive, Table
 
 Keys = Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
+Names = Annotated[tuple[str, ...], Field(strict=False)]
 Count = Annotated[int, Field(ge=1, le=10_000_000)]
+Group = Annotated[str | None, Field(description="axes of one group advance together, not crossed")]
 
 
 class AxisTable(Table):
@@ -63,7 +65,7 @@ class ListAxis(AxisTable):
 
     type: Literal["list"]
     values: Annotated[tuple[Any, ...], Field(strict=False, min_length=1)]
-    group: str | None = Field(None, description="axes of one group advance together, not crossed")
+    group: Group = None
 
     @model_validator(mode="after")
     def _check_rows(self) -> Self:
@@ -94,7 +96,7 @@ class LinspaceAxis(AxisTable):
     start: float
     stop: float
     count: Annotated[int, Field(ge=2, le=10_000_000)]
-    group: str | None = Field(None, description="axes of one group advance together, not crossed")
+    group: Group = None
 
     @property
     def length(self) -> int:
@@ -151,7 +153,7 @@ class CasesAxis(AxisTable):
     cases: Annotated[dict[str, dict[str, Any]], Field(min_length=1)] = Field(
         description="tables of the scenario by the name of the case"
     )
-    group: str | None = Field(None, description="axes of one group advance together, not crossed")
+    group: Group = None
 
     @model_validator(mode="after")
     def _check_name(self) -> Self:
@@ -222,7 +224,7 @@ class PlotTable(Table):
     kind: Literal["lines", "map", "quantiles", "boundary", "plane"] | None = None
     x: str | None = Field(None, description="a column, or an expression over columns")
     y: str | None = Field(None, description="likewise; for map and plane")
-    metrics: Annotated[tuple[str, ...], Field(strict=False)] = ()
+    metrics: Names = ()
     lines: str | None = Field(None, description="a column; one line per value")
     panels: str | None = Field(None, description="a column; one panel per value")
     log: Annotated[tuple[Literal["x", "y"], ...], Field(strict=False)] = Field(
@@ -256,9 +258,7 @@ class Sweep(Table):
         {}, description="keys that follow from the axes: expressions, or lists of expressions"
     )
     bisect: BisectTable | None = None
-    metrics: Annotated[tuple[str, ...], Field(strict=False)] | None = Field(
-        None, description="metrics in the dataset; default: all"
-    )
+    metrics: Names | None = Field(None, description="metrics in the dataset; default: all")
     keep_flights: bool = Field(False, description="also keep every flight.parquet")
     chunk_size: Count | None = Field(
         None, description="number of points that are flown and saved together"
