@@ -23,7 +23,7 @@ from tiltsim.simulation.simulate import simulate
 from tiltsim.sweeps import chunks, running
 from tiltsim.sweeps.chunks import ChunkWork
 from tiltsim.sweeps.dataset import load_results
-from tiltsim.sweeps.folder import open_sweep_folder, write_durably
+from tiltsim.sweeps.folder import open_sweep_folder
 from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.running import run_sweep
@@ -137,17 +137,6 @@ def test_two_sweeps_do_not_share_a_folder(tmp_path):
         pytest.raises(InputError, match="another tiltsim sweep"),
     ):
         run_sweep(definition, tmp_path / "out")
-
-
-def test_a_file_appears_whole_or_not_at_all(tmp_path, monkeypatch):
-    def no_disk(_descriptor):
-        raise OSError("no disk")
-
-    write_durably(tmp_path / "file", b"before")
-    monkeypatch.setattr(os, "fsync", no_disk)
-    with pytest.raises(OSError, match="no disk"):
-        write_durably(tmp_path / "file", b"after")
-    assert (tmp_path / "file").read_bytes() == b"before"
 
 
 def test_a_bad_flight_becomes_a_row(tmp_path, monkeypatch):

@@ -8,7 +8,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -19,7 +18,7 @@ from tiltsim.sweeps.chunks import FinishedChunk
 from tiltsim.sweeps.columns import schema
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.points import SweepPoints
-from tiltsim.system.files import prepare_folder
+from tiltsim.system.files import TEMPORARY_SUFFIX, prepare_folder, replacing
 from tiltsim.system.locks import locked
 
 DEFINITION: Final = "sweep.json"
@@ -78,9 +77,9 @@ class SweepFolder:
     def save(self, part: FinishedChunk) -> None:
         """Save a finished chunk durably: after this returns, no crash can lose it."""
         for index, flight in part.flights.items():
-            write_durably(self._flights / f"{index:07d}.parquet", flight)
+            _write(self._flights / f"{index:07d}.parquet", flight)
         # Last, because the part marks the chunk as finished.
-        write_durably(self._part(part.number), part.table)
+        _write(self._part(part.number), part.table)
 
     def _part(self, number: int) -> Path:
         return self._parts / f"{number:06d}.parquet"
@@ -91,9 +90,11 @@ class SweepFolder:
         import pyarrow.parquet as pq
 
         columns = schema(self._points)
-        temporary = _temporary(self.dataset)
         waiting: list[pa.Table] = []
-        with pq.ParquetWriter(temporary, columns, compression="zstd") as writer:
+        with (
+            replacing(self.dataset, durable=True) as temporary,
+            pq.ParquetWriter(temporary, columns, compression="zstd") as writer,
+        ):
             for number in range(self._points.chunks):
                 table = pq.read_table(self._part(number), partitioning=None)
                 waiting.append(table.replace_schema_metadata(columns.metadata))
@@ -101,7 +102,6 @@ class SweepFolder:
                 if last or sum(map(len, waiting)) >= ROW_GROUP:
                     writer.write_table(pa.concat_tables(waiting))
                     waiting.clear()
-        _commit(temporary, self.dataset)
 
 
 @contextmanager
@@ -120,7 +120,8 @@ def open_sweep_folder(path: Path, points: SweepPoints) -> Iterator[SweepFolder]:
             stack.enter_context(locked(path / ".lock", wait=False))
         except BlockingIOError:
             raise InputError(f"--out {path}: another tiltsim sweep is using it") from None
-        for leftover in [*path.glob(".*.new"), *path.glob("*/.*.new")]:
+        temporary = f".*{TEMPORARY_SUFFIX}"
+        for leftover in [*path.glob(temporary), *path.glob(f"*/{temporary}")]:
             leftover.unlink()
         definition = path / DEFINITION
         if definition.exists():
@@ -136,7 +137,7 @@ def open_sweep_folder(path: Path, points: SweepPoints) -> Iterator[SweepFolder]:
             (path / folder).mkdir(exist_ok=True)
         opened = SweepFolder(path, points)
         opened.check()
-        write_durably(definition, points.definition.to_json().encode())
+        _write(definition, points.definition.to_json().encode())
         yield opened
 
 
@@ -150,27 +151,6 @@ def read_definition(file: Path) -> SweepDefinition:
         raise InputError(f"{file}: not the definition of a sweep: {error}") from None
 
 
-def write_durably(path: Path, content: bytes) -> None:
-    """Write a file so that after any crash it is complete or absent."""
-    temporary = _temporary(path)
-    temporary.write_bytes(content)
-    _commit(temporary, path)
-
-
-def _temporary(path: Path) -> Path:
-    return path.with_name(f".{path.name}.new")
-
-
-def _commit(temporary: Path, path: Path) -> None:
-    """Move a complete temporary file to its place, flushed to disk."""
-    _flush(temporary)
-    temporary.replace(path)
-    _flush(path.parent)
-
-
-def _flush(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+def _write(path: Path, content: bytes) -> None:
+    with replacing(path, durable=True) as temporary:
+        temporary.write_bytes(content)

@@ -6,8 +6,12 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Final
 
 from tiltsim.errors import InputError
+
+TEMPORARY_SUFFIX: Final = ".new"
+"""Of files that are being written, whose names begin with a dot; a killed process leaves them."""
 
 
 def prepare_folder(folder: Path) -> None:
@@ -51,12 +55,27 @@ def prepare_file(option: str, file: Path, suffixes: Sequence[str] = ()) -> None:
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """Yield a temporary path that replaces ``path`` atomically when the block succeeds."""
+def replacing(path: Path, *, durable: bool = False) -> Iterator[Path]:
+    """Yield a temporary path that replaces ``path`` atomically when the block succeeds.
+
+    A ``durable`` file is on disk after the block, so that no crash of the machine can lose it.
+    """
     # An ordinary file, unlike tempfile's, gets the permissions of the user's umask.
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}{TEMPORARY_SUFFIX}")
     try:
         yield temporary
+        if durable:
+            _flush(temporary)
         temporary.replace(path)
+        if durable:
+            _flush(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _flush(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
