@@ -69,7 +69,7 @@ def body_derivatives(state: Values, car: TiltCar) -> Values:
     Eq. (21) without its terms in the second derivatives of the inputs, written with the turn rate
     of the bisector, ``(1 - I_T / I_B) alpha'``, for the products of ``J_psi`` and ``J_alpha``.
     """
-    speed_1, speed_2, tilt_rate, rate_1, rate_2 = state[SPEED_1 : SPEED_1 + 5]
+    speed_1, speed_2, tilt_rate, rate_1, rate_2 = state[SPEED_1:]
     turn = turn_per_tilt(car) * tilt_rate
     along, across = body_acceleration(speed_1 * speed_1, speed_2 * speed_2, car)
     along_1, across_1 = body_acceleration(2.0 * speed_1 * rate_1, 2.0 * speed_2 * rate_2, car)
