@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from tiltsim_controllers.analysis.stability import (
     error_loops,
     is_hurwitz,
+    linear_loop,
     routh_first_column,
     third_order_loop,
 )
@@ -157,3 +158,20 @@ def test_position_gains_must_both_be_positive(position):
     loop = error_loops(bad, AR_DRONE, DECOUPLINGS["published"])[-1]
     assert not loop.stable
     assert loop.condition == f"position gains [{velocity}, {place}] must both be positive"
+
+
+@pytest.mark.parametrize(
+    ("gains", "condition"),
+    [
+        ((2.0, 3.0), ""),
+        ((2.0, -3.0), "yaw k2 = -3 must be positive"),
+        ((0.0, 3.0), "yaw k1 = 0 must be positive"),
+        # s^3 + s^2 + s + 2: the third entry is (1 * 1 - 2) / 1.
+        ((1.0, 1.0, 2.0), "yaw [1.0, 1.0, 2.0]: entry 3 of the Routh array's first column is -1"),
+    ],
+)
+def test_a_linear_loop_names_the_first_condition_that_fails(gains, condition):
+    loop = linear_loop("yaw", gains)
+    assert loop.stable == (condition == "") == is_hurwitz((1.0, *gains))
+    assert loop.condition.startswith(condition)
+    assert loop.polynomial == (1.0, *gains)

@@ -32,9 +32,12 @@ def test_rectangles_satisfy_the_first_theorem() -> None:
     red = check_path(rectangle((0.2, 0.8), (-0.8, -0.2), "red"), AR_DRONE)
     assert red.theorem == "two_color"
     assert red.warnings == ()
+    assert red.sound
     blue = check_path(rectangle((-0.8, 1.2), (-0.8, 1.2), "blue"), AR_DRONE)
     assert blue.theorem == "two_color"
     assert blue.warnings == (BLUE_WARNING,)
+    assert blue.accepted
+    assert not blue.sound
 
 
 @pytest.mark.parametrize("example", ["E1", "E2", "E3"])
