@@ -134,13 +134,13 @@ def test_engines_fly_the_same_flight(law, plant, control_timestep):
 @continuous_and_held
 def test_a_saved_state_restarts_bit_identically(law, plant, control_timestep):
     simulation = {"plant": plant, "engine": "python", "control_timestep": control_timestep}
-    wanted = scenario(law, simulation)
-    straight = make_plant(assemble(wanted))
+    desired = scenario(law, simulation)
+    straight = make_plant(assemble(desired))
     straight.advance(100)
     saved, seen = straight.state, straight.observe()
     straight.advance(50)
 
-    restarted = make_plant(assemble(wanted))
+    restarted = make_plant(assemble(desired))
     restarted.advance(17)
     restarted.state = saved
     assert restarted.observe() == seen
@@ -289,9 +289,9 @@ def test_a_step_in_yaw_stops_a_rotor_where_its_torque_ends():
     assert most == pytest.approx(26.4, abs=0.05)
     loop = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-4000.0, -600.0, -40.0]])
     instants = np.linspace(0.0, 0.3, 301)
-    asked = max(abs((expm(loop * t) @ [-1.0, 0.0, 0.0])[2]) for t in instants)
-    assert most / asked == pytest.approx(0.39, abs=0.005)
-    below, above = (turned(share * most / asked, 0.1, hover) for share in (0.98, 1.02))
+    demanded = max(abs((expm(loop * t) @ [-1.0, 0.0, 0.0])[2]) for t in instants)
+    assert most / demanded == pytest.approx(0.39, abs=0.005)
+    below, above = (turned(share * most / demanded, 0.1, hover) for share in (0.98, 1.02))
     assert below.end.kind == "completed"
     assert below.metrics()["min_rotor_speed"] < 0.3 * hover
     assert above.end.kind == "singular"
@@ -341,8 +341,8 @@ def test_plants_agree_on_a_gust():
 
 def test_the_gust_scenarios_gait_is_the_balanced_one():
     gait = tiltsim.load_scenario("ch01_gust/hover#perfect_gait").gait
-    wanted = balanced_gait((1.0, 0.0, 0.0), PRESETS["ar_drone_2"])
-    np.testing.assert_allclose(gait.angles, wanted, atol=1e-8)
+    desired = balanced_gait((1.0, 0.0, 0.0), PRESETS["ar_drone_2"])
+    np.testing.assert_allclose(gait.angles, desired, atol=1e-8)
 
 
 # --- the chapters' experiments -----------------------------------------------------------------
@@ -481,8 +481,8 @@ def test_a_mistake_is_one_clear_line(mistake):
 
 @each_law
 def test_a_scenario_written_out_reads_back(law):
-    wanted = scenario(law)
-    assert tiltsim.parse_scenario(wanted.model_dump(mode="json")) == wanted
+    desired = scenario(law)
+    assert tiltsim.parse_scenario(desired.model_dump(mode="json")) == desired
 
 
 def test_a_new_law_on_the_command_line_empties_its_table():

@@ -71,7 +71,7 @@ def test_thrusts_pass_through_the_axis_at_the_half_angle():
     model = compile_tilt_car(TiltCarSpec(car))
     data = mujoco.MjData(model)
     data.qpos[2:] = 0.3, 0.9
-    data.ctrl[:3] = 0.9, 8000.0, 3000.0  # the servo is where it is told to be
+    data.ctrl[:3] = 0.9, 8000.0, 3000.0  # the servo is at its commanded angle
     mujoco.mj_forward(model, data)
     np.testing.assert_allclose(data.qacc[:2], acceleration(1.2, 8000.0, 3000.0, car), rtol=1e-12)
     # No torque about the axis: neither disc turns for the thrusts.
@@ -141,8 +141,8 @@ def test_the_lean_drifts_as_the_closed_form_says(plant):
     begin = int(np.searchsorted(flight["time"], 20.0))
     for sample in (begin + 500, -1):
         time = flight["time"][sample] - flight["time"][begin]
-        wanted = lean_after(float(time), float(lean[begin]), path, THESIS_CAR)
-        assert lean[sample] == pytest.approx(wanted, rel=1e-4)
+        desired = lean_after(float(time), float(lean[begin]), path, THESIS_CAR)
+        assert lean[sample] == pytest.approx(desired, rel=1e-4)
     assert flight.metrics()["sup_position_error_after_20s"] < 1e-6
 
 
@@ -169,8 +169,8 @@ def test_restoring_ends_the_drift_and_leaves_the_error_alone(plant):
     )
     settled = without["time"] > 20.0
     lean = lean_of(restored["rotor_speed_1"] ** 2, restored["rotor_speed_2"] ** 2, THESIS_CAR)
-    wanted = restored_lean(orbit(10.0, 1.0), THESIS_CAR, 1.0)
-    np.testing.assert_allclose(lean[settled], wanted, rtol=1e-2)
+    desired = restored_lean(orbit(10.0, 1.0), THESIS_CAR, 1.0)
+    np.testing.assert_allclose(lean[settled], desired, rtol=1e-2)
     assert abs(without["input_split"][-1]) > 50.0 * abs(restored["input_split"][-1])
     for axis in "xy":
         np.testing.assert_allclose(restored[axis], without[axis], atol=2e-4)
@@ -259,8 +259,8 @@ def test_the_switch_matrix_is_logged():
 @on_both_plants
 def test_the_thrusts_follow_the_planned_direction(plant):
     flight = fly("ch10_state_drift/planned_direction", plant)
-    wanted = flight["time"]  # psi + alpha = t, Eq. (18)
-    np.testing.assert_allclose(flight["direction"], wanted, atol=1e-6)
+    desired = flight["time"]  # psi + alpha = t, Eq. (18)
+    np.testing.assert_allclose(flight["direction"], desired, atol=1e-6)
     gait = flight.scenario.gait.plan(THESIS_CAR)
     assert tilt_reference(3.0, gait.parameters, gait.knots)[0] == pytest.approx(6.0)
 

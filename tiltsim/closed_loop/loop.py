@@ -229,7 +229,7 @@ class ClosedLoop:
 
     @cached_property
     def signature(self) -> float:
-        """A checksum of the layout of `userdata`, which tells our models from foreign ones."""
+        """A checksum of the layout of `userdata`, which distinguishes our models from others."""
         layout = (self.dynamics.model, self.dynamics.sizes, record_dtype(self.parameters))
         return float(zlib.crc32(repr(layout).encode()))
 

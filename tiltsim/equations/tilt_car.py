@@ -33,5 +33,5 @@ def equations_of_motion(
 
 @scalar
 def limited_rate(speed: float, rate: float) -> float:
-    """The rate (rad/s^2) of a rotor that cannot turn backwards, from the rate asked for."""
+    """The rate (rad/s^2) of a rotor that cannot reverse, from the commanded rate."""
     return 0.0 if speed <= 0.0 and rate < 0.0 else rate

@@ -56,9 +56,9 @@ def against(acceleration, vehicle):
 
 
 def assert_balanced(tilts, acceleration, vehicle):
-    n, wanted = force(tilts, vehicle), against(acceleration, vehicle)
+    n, desired = force(tilts, vehicle), against(acceleration, vehicle)
     np.testing.assert_allclose(
-        n / np.linalg.norm(n), wanted / np.linalg.norm(wanted), rtol=0, atol=1e-12
+        n / np.linalg.norm(n), desired / np.linalg.norm(desired), rtol=0, atol=1e-12
     )
 
 
@@ -101,8 +101,8 @@ def test_no_gait_near_by_or_far_tilts_less(vehicle, acceleration):
     least = sum(value**2 for value in tilts)
     assert least <= sum(value**2 for value in even_load_gait(acceleration, vehicle)) + 1e-12
     assert min(levers(tilts, vehicle)) >= 0.5 - 1e-9
-    wanted = against(acceleration, vehicle)
-    x, y = wanted[:2] / wanted[2]
+    desired = against(acceleration, vehicle)
+    x, y = desired[:2] / desired[2]
 
     def side(point):
         n = force(point, vehicle)
@@ -134,8 +134,8 @@ def test_the_answer_is_stationary(x, min_lever):
     """No step along the balanced gaits, within the levers, tilts less."""
     acceleration = (x, 0.2 * x, 0.0)
     tilts = np.array(balanced_gait(acceleration, AR_DRONE, min_lever=min_lever))
-    wanted = against(acceleration, AR_DRONE)
-    slope = wanted[:2] / wanted[2]
+    desired = against(acceleration, AR_DRONE)
+    slope = desired[:2] / desired[2]
 
     def side(point):
         n = force(point, AR_DRONE)

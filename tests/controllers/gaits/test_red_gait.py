@@ -42,8 +42,8 @@ def red(angles):
 
 @given(angle, angle)
 def test_the_determinant_on_red_is_that_of_the_two_color_map(alpha_1, alpha_2):
-    wanted = float(red_residual(alpha_1, alpha_2, VEHICLE))
-    assert red_determinant(alpha_1, alpha_2, RATIO) == pytest.approx(wanted, abs=1e-12)
+    desired = float(red_residual(alpha_1, alpha_2, VEHICLE))
+    assert red_determinant(alpha_1, alpha_2, RATIO) == pytest.approx(desired, abs=1e-12)
 
 
 @given(st.floats(-1.4, 1.4))

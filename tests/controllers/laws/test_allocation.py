@@ -43,9 +43,9 @@ def program(cost, columns, low, high, bounds):
 @settings(max_examples=50, deadline=None)
 def test_the_share_is_that_of_a_linear_program(attitude, direction, below, above):
     low = -np.array(below)
-    wanted = program([-1.0, 0.0], [attitude, direction], low, above, [(0.0, 1.0), (None, None)])
+    desired = program([-1.0, 0.0], [attitude, direction], low, above, [(0.0, 1.0), (None, None)])
     assert largest_feasible_scale(attitude, direction, tuple(low), above) == pytest.approx(
-        -wanted.fun, abs=1e-6
+        -desired.fun, abs=1e-6
     )
 
 
@@ -63,20 +63,20 @@ def test_the_answer_is_in_the_box_and_wanted_where_allowed(
     )
     assert (found >= low - 1e-9).all()
     assert (found <= high + 1e-9).all()
-    wanted = np.array(tilting) + turning + lift * np.array(direction)
+    desired = np.array(tilting) + turning + lift * np.array(direction)
     # Roll and pitch come first, also where yaw alone would bring them within the box.
     first = largest_feasible_scale(tilting, direction, tuple(low.tolist()), tuple(high.tolist()))
-    if first == 1.0 and (wanted > low + 1e-9).all() and (wanted < high - 1e-9).all():
-        np.testing.assert_allclose(found, wanted, atol=1e-9)
+    if first == 1.0 and (desired > low + 1e-9).all() and (desired < high - 1e-9).all():
+        np.testing.assert_allclose(found, desired, atol=1e-9)
 
 
 @pytest.mark.parametrize("rounding", [-1e-14, 0.0, 1e-14])
 @pytest.mark.parametrize("room", [-1e-14, 0.0, 1e-14])
 def test_rotors_that_a_share_moves_alike_do_not_bound_it(rounding, room):
     """The first cannot go below 2, the third not above: rounding alone would leave no share."""
-    wanted = (1.0, -1.0, 1.0 + rounding, -1.0)
+    desired = (1.0, -1.0, 1.0 + rounding, -1.0)
     low, high = (2.0, -9.0, -9.0, -9.0), (9.0, 9.0, 2.0 + room, 9.0)
-    assert largest_feasible_scale(wanted, (1.0, 1.0, 1.0, 1.0), low, high) == 1.0
+    assert largest_feasible_scale(desired, (1.0, 1.0, 1.0, 1.0), low, high) == 1.0
     assert largest_feasible_scale((1.0, -1.0, 1.1, -1.0), (1.0,) * 4, low, high) < 1e-12
 
 
@@ -91,46 +91,46 @@ def decoupling(angles, rotor_speeds, roll, pitch):
 @example((0.0,) * 4, (200.0,) * 4, 0.0, 0.0, (0.0, 0.0, 3.86401735937295e-07, -2770.0))
 @given(tilts, speeds, st.floats(-0.4, 0.4), st.floats(-0.4, 0.4), accelerations)
 @settings(max_examples=50, deadline=None)
-def test_roll_and_pitch_keep_their_direction_and_come_before_yaw(angles, magnitudes, r, p, wanted):
+def test_roll_and_pitch_keep_their_direction_and_come_before_yaw(angles, magnitudes, r, p, desired):
     signed = tuple(s * m for s, m in zip(SPIN, magnitudes, strict=True))
     matrix = decoupling(angles, signed, r, p)
     assume(np.linalg.cond(matrix) < 1e4)
-    found = allocate_accelerations(wanted, angles, signed, r, p, VEHICLE, LIMITS, HORIZON)
-    asked, got = matrix @ wanted, matrix @ found
+    found = allocate_accelerations(desired, angles, signed, r, p, VEHICLE, LIMITS, HORIZON)
+    requested, allocated = matrix @ desired, matrix @ found
     # What an allocation leaves of one rotor it takes from another: all are good to the largest.
-    scale = np.abs(matrix).sum(axis=1) * np.abs([*wanted, *found]).max() + 1e-9
+    scale = np.abs(matrix).sum(axis=1) * np.abs([*desired, *found]).max() + 1e-9
 
     # Within the limits, in the spin's sense, over the horizon.
     along = np.array(magnitudes) + HORIZON * np.array(found) * SPIN
     assert (along >= LIMITS[0] - 1e-6).all()
     assert (along <= LIMITS[1] + 1e-6).all()
 
-    cross = got[0] * asked[1] - got[1] * asked[0]
+    cross = allocated[0] * requested[1] - allocated[1] * requested[0]
     assert abs(cross) < 1e-9 * scale.max() ** 2
     for axis in (0, 1):
-        if abs(asked[axis]) > 1e-3 * scale[axis]:
-            assert -1e-6 < got[axis] / asked[axis] < 1.0 + 1e-6
+        if abs(requested[axis]) > 1e-3 * scale[axis]:
+            assert -1e-6 < allocated[axis] / requested[axis] < 1.0 + 1e-6
 
 
 def test_what_the_limits_allow_comes_back_untouched():
-    wanted = (10.0, -20.0, 5.0, 1.0)
+    desired = (10.0, -20.0, 5.0, 1.0)
     speeds_now = (-300.0, 300.0, -300.0, 300.0)
     tilts_now = (0.1, -0.1, 0.2, 0.0)
     assert (
-        allocate_accelerations(wanted, tilts_now, speeds_now, 0.1, 0.2, VEHICLE, LIMITS, 0.02)
-        == wanted
+        allocate_accelerations(desired, tilts_now, speeds_now, 0.1, 0.2, VEHICLE, LIMITS, 0.02)
+        == desired
     )
 
 
 def test_a_climb_beyond_the_limit_costs_no_attitude():
     speeds_now = (-395.0, 390.0, -395.0, 390.0)
-    wanted = (-9000.0, 9500.0, -8800.0, 9000.0)
+    desired = (-9000.0, 9500.0, -8800.0, 9000.0)
     found = allocate_accelerations(
-        wanted, (0.0,) * 4, speeds_now, 0.0, 0.0, VEHICLE, LIMITS, HORIZON
+        desired, (0.0,) * 4, speeds_now, 0.0, 0.0, VEHICLE, LIMITS, HORIZON
     )
     matrix = decoupling((0.0,) * 4, speeds_now, 0.0, 0.0)
-    np.testing.assert_allclose((matrix @ found)[:3], (matrix @ wanted)[:3], rtol=1e-9, atol=1e-6)
-    assert (matrix @ found)[3] < (matrix @ wanted)[3]
+    np.testing.assert_allclose((matrix @ found)[:3], (matrix @ desired)[:3], rtol=1e-9, atol=1e-6)
+    assert (matrix @ found)[3] < (matrix @ desired)[3]
 
 
 def test_attitude_comes_before_yaw_and_yaw_before_climb():

@@ -78,16 +78,16 @@ def attitude_for(parameters, alpha, ax, ay):
     if parameters.decoupler == DECOUPLERS["modified"]:
         fx, fy = side_forces(vehicle, alpha)
         return conventional + np.array([fy, -fx]) / (vehicle.mass * g)
-    # The force that hovers without torque, turned by some roll and pitch onto the wanted one.
+    # The force that hovers without torque, turned by some roll and pitch onto the desired one.
     n = force_matrix(vehicle, alpha) @ np.linalg.svd(torque_matrix(vehicle, alpha))[2][3]
     n *= np.sign(n[2]) / np.linalg.norm(n)
-    wanted = rotation(0, 0, -yaw) @ [ax, ay, g]
-    wanted /= np.linalg.norm(wanted)
-    # Rx(roll) n has the wanted y; Ry(pitch) then turns its x and z onto the wanted ones.
+    desired = rotation(0, 0, -yaw) @ [ax, ay, g]
+    desired /= np.linalg.norm(desired)
+    # Rx(roll) n has the desired y; Ry(pitch) then turns its x and z onto the desired ones.
     across = hypot(n[1], n[2])
-    roll = np.arctan2(n[1], n[2]) - asin(wanted[1] / across)
+    roll = np.arctan2(n[1], n[2]) - asin(desired[1] / across)
     turned = rotation(roll, 0, 0) @ n
-    pitch = np.arctan2(wanted[0], wanted[2]) - np.arctan2(turned[0], turned[2])
+    pitch = np.arctan2(desired[0], desired[2]) - np.arctan2(turned[0], turned[2])
     return np.array([roll, pitch])
 
 
@@ -115,7 +115,7 @@ def random_case(seed, decoupling, decoupler):
         decoupler=DECOUPLERS[decoupler],
         decoupling=DECOUPLINGS[decoupling],
     )
-    # Position and velocity near the reference, lest the wanted acceleration exceed any attitude.
+    # Position and velocity near the reference: some attitude gives the desired acceleration.
     position, velocity, _ = reference_motion(parameters.reference)
     return unflatten(Parameters, flatten(parameters)), (
         *(position + spread(3, 0.05)).tolist(),
@@ -293,8 +293,8 @@ def test_exact_decoupler_points_the_torque_free_force_along_the_wanted_one(side)
         yaw = random.uniform(-np.pi, np.pi)
         roll, pitch = exact_decoupler(ax, ay, az, yaw, GRAVITY, tuple(side * n))
         force = rotation(roll, pitch, yaw) @ n / np.linalg.norm(n)
-        wanted = np.array([ax, ay, GRAVITY + az])
-        np.testing.assert_allclose(force, wanted / np.linalg.norm(wanted), rtol=0, atol=1e-13)
+        desired = np.array([ax, ay, GRAVITY + az])
+        np.testing.assert_allclose(force, desired / np.linalg.norm(desired), rtol=0, atol=1e-13)
 
 
 def test_exact_decoupler_has_no_answer_in_free_fall():
@@ -305,16 +305,16 @@ def test_exact_decoupler_has_no_answer_in_free_fall():
 def test_exact_decoupler_gets_as_near_as_any_attitude_where_none_reaches_the_wanted_force():
     n = np.array([3.0, 0.2, 1.0])  # across the body lies at most a third of it
     ax, ay, az, yaw = 1.0, 12.0, 0.0, 0.4
-    wanted = np.array([ax, ay, GRAVITY + az])
+    desired = np.array([ax, ay, GRAVITY + az])
 
     def along(roll, pitch):
-        return wanted @ rotation(roll, pitch, yaw) @ n
+        return desired @ rotation(roll, pitch, yaw) @ n
 
     reached = along(*exact_decoupler(ax, ay, az, yaw, GRAVITY, tuple(n)))
     grid = np.linspace(-np.pi, np.pi, 61)
     best = max(along(roll, pitch) for roll in grid for pitch in grid)
     assert reached >= best
-    assert reached < np.linalg.norm(wanted) * np.linalg.norm(n) * 0.99
+    assert reached < np.linalg.norm(desired) * np.linalg.norm(n) * 0.99
 
 
 def test_modified_decoupler_is_the_conventional_one_where_the_force_is_vertical():

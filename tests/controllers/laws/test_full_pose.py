@@ -71,9 +71,9 @@ def test_the_solve_is_the_pseudo_inverse():
     random = np.random.default_rng(0)
     for _ in range(CASES):
         rows = random.normal(size=(6, 8)) * 10.0 ** random.uniform(-3, 3, (6, 1))
-        wanted = random.normal(size=6)
-        found = minimum_norm_inputs(tuple(map(tuple, rows.tolist())), tuple(wanted.tolist()))
-        expected = np.linalg.pinv(rows, rcond=1e-14) @ wanted
+        desired = random.normal(size=6)
+        found = minimum_norm_inputs(tuple(map(tuple, rows.tolist())), tuple(desired.tolist()))
+        expected = np.linalg.pinv(rows, rcond=1e-14) @ desired
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
 
@@ -86,10 +86,10 @@ def test_the_solve_copes_with_the_vehicles_matrix(weight):
         trig = sines_and_cosines(*random.uniform(-0.6, 0.6, 4))
         w = tuple(random.uniform(4e4, 2e5, 4) * SPIN / WEIGHTS[weight])
         rows = pose_rows(trig, torque_entries(trig, ratio), w)
-        wanted = random.normal(size=6)
-        found = np.array(minimum_norm_inputs(rows, tuple(wanted)))
-        np.testing.assert_allclose(np.array(rows) @ found, wanted, rtol=0, atol=1e-9)
-        expected = np.linalg.lstsq(np.array(rows), wanted, rcond=1e-15)[0]
+        desired = random.normal(size=6)
+        found = np.array(minimum_norm_inputs(rows, tuple(desired)))
+        np.testing.assert_allclose(np.array(rows) @ found, desired, rtol=0, atol=1e-9)
+        expected = np.linalg.lstsq(np.array(rows), desired, rcond=1e-15)[0]
         assert np.linalg.norm(found) <= np.linalg.norm(expected) * (1 + 1e-6)
 
 
@@ -144,8 +144,8 @@ def test_the_attitude_error_is_the_sine_of_the_angle_along_its_axis():
         axis = random.normal(size=3)
         axis /= np.linalg.norm(axis)
         angle = random.uniform(-3.0, 3.0)
-        wanted = now * Rotation.from_rotvec(angle * axis)
-        found = attitude_error(tuple(now.as_matrix().ravel()), tuple(wanted.as_matrix().ravel()))
+        desired = now * Rotation.from_rotvec(angle * axis)
+        found = attitude_error(tuple(now.as_matrix().ravel()), tuple(desired.as_matrix().ravel()))
         np.testing.assert_allclose(found, np.sin(angle) * axis, rtol=0, atol=1e-14)
 
 
@@ -169,7 +169,7 @@ def test_the_outputs_move_as_demanded(weight):
         error = attitude_error(
             rotation_from_euler(*state[6:9]), rotation_from_euler(0.1, -0.2, 0.3)
         )
-        wanted = np.concatenate(
+        desired = np.concatenate(
             [
                 path[3]
                 + 750.0 * (path[2] - now[3:6])
@@ -178,7 +178,7 @@ def test_the_outputs_move_as_demanded(weight):
                 2577.0 * np.array(error) - 1500.0 * np.array(state[9:12]) - 750.0 * now[9:12],
             ]
         )
-        np.testing.assert_allclose(third, wanted, rtol=0, atol=1e-4 * np.abs(wanted).max())
+        np.testing.assert_allclose(third, desired, rtol=0, atol=1e-4 * np.abs(desired).max())
 
 
 @pytest.mark.parametrize("lost", [1, 2, 3, 4])

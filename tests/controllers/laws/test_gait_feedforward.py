@@ -81,8 +81,8 @@ def test_the_torque_free_force_moves_with_the_tilts(vehicle):
         jets, paths = zip(*(path(random, 1.2, 3.0) for _ in range(4)))
         expected = differences(lambda t, paths=paths: force([p(t) for p in paths]))
         found = np.transpose(torque_free_force_jet(jets, ratio))
-        for value, wanted, tolerance in zip(found, expected, (1e-12, 1e-8, 1e-5)):
-            np.testing.assert_allclose(value, wanted, rtol=0, atol=tolerance * 100)
+        for value, desired, tolerance in zip(found, expected, (1e-12, 1e-8, 1e-5)):
+            np.testing.assert_allclose(value, desired, rtol=0, atol=tolerance * 100)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0], ids=["along n", "against n"])
@@ -100,8 +100,8 @@ def test_the_exact_decouplers_attitude_moves_with_its_arguments(side):
         n[2] = (n[2][0] + side * 2.0, *n[2][1:])
         lift = (g + jets[2][0], *jets[2][1:])
         found = np.transpose(exact_decoupler_jet(jets[0], jets[1], lift, jets[3], n))
-        for value, wanted, tolerance in zip(found, differences(attitude), (1e-13, 1e-9, 1e-6)):
-            np.testing.assert_allclose(value, wanted, rtol=0, atol=tolerance)
+        for value, desired, tolerance in zip(found, differences(attitude), (1e-13, 1e-9, 1e-6)):
+            np.testing.assert_allclose(value, desired, rtol=0, atol=tolerance)
 
 
 def test_out_of_reach_the_decoupler_rests_at_the_nearest_roll():
@@ -239,9 +239,9 @@ def demanded(state, law, integral_z):
     p, q, r = state[9:12]
     yaw_rate = (sin(roll) * q + cos(roll) * r) / cos(pitch)
     rates = (p + sin(pitch) * yaw_rate, cos(roll) * q - sin(roll) * r, yaw_rate)
-    wanted = (law.reference.roll, law.reference.pitch, law.reference.yaw)
+    desired = (law.reference.roll, law.reference.pitch, law.reference.yaw)
     attitude = [
-        k3 * (wanted[i] - state[6 + i]) - k2 * rates[i] - k1 * now[i]
+        k3 * (desired[i] - state[6 + i]) - k2 * rates[i] - k1 * now[i]
         for i, (k1, k2, k3) in enumerate((gains[0:3], gains[3:6], gains[6:9]))
     ]
     k1, k2, k3 = gains[9:12]
@@ -259,10 +259,10 @@ def test_roll_pitch_yaw_and_altitude_get_the_third_derivatives_that_the_gains_as
     for seed in range(CASES):
         state, tilt_rates = random_state(random), tuple(random.uniform(-4.0, 4.0, 4).tolist())
         inputs = tracking_inputs(0.3, state, tilt_rates, (0.0, 0.0, 0.02), parameters())[:4]
-        wanted = demanded(state, parameters(), 0.02)
+        desired = demanded(state, parameters(), 0.02)
         found = third_derivatives(state, tilt_rates, inputs)
-        scale = np.abs(wanted).max()
-        np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-5 * scale, err_msg=f"{seed}")
+        scale = np.abs(desired).max()
+        np.testing.assert_allclose(found, desired, rtol=0, atol=1e-5 * scale, err_msg=f"{seed}")
 
 
 @pytest.mark.parametrize("term", ["gait_rates", "euler_rates", "gyroscopic_torque"])
@@ -271,9 +271,9 @@ def test_each_term_of_the_linearization_is_needed_for_that(term):
     law = parameters(terms=FeedforwardTerms()._replace(**{term: 0.0}))
     state, tilt_rates = random_state(random), (3.0, -2.0, 1.0, 4.0)
     inputs = tracking_inputs(0.3, state, tilt_rates, (0.0, 0.0, 0.0), law)[:4]
-    wanted = demanded(state, parameters(), 0.0)
-    off = np.abs(third_derivatives(state, tilt_rates, inputs) - wanted).max()
-    assert off > 1e-3 * np.abs(wanted).max()
+    desired = demanded(state, parameters(), 0.0)
+    off = np.abs(third_derivatives(state, tilt_rates, inputs) - desired).max()
+    assert off > 1e-3 * np.abs(desired).max()
 
 
 def test_hover_on_the_reference_needs_nothing():
@@ -307,8 +307,8 @@ def test_the_attitude_asked_for_points_the_gaits_force_along_the_wanted_accelera
     trig = sines_and_cosines(*alpha)
     n = np.array(torque_free_force(trig, torque_entries(trig, drag_ratio(VEHICLE)), 1.0))
     force = Rotation.from_euler("ZYX", [yaw, pitch, roll]).apply(n)
-    wanted = np.array([-0.5 * cos(0.5 * time), -0.5 * sin(0.5 * time), VEHICLE.gravity])
-    unit = [v / np.linalg.norm(v) for v in (force, wanted)]
+    desired = np.array([-0.5 * cos(0.5 * time), -0.5 * sin(0.5 * time), VEHICLE.gravity])
+    unit = [v / np.linalg.norm(v) for v in (force, desired)]
     np.testing.assert_allclose(unit[0], unit[1], atol=1e-12)
 
 
@@ -317,9 +317,11 @@ def test_the_attitude_asked_for_points_the_gaits_force_along_the_wanted_accelera
 
 @quick
 @given(small, small, small, small)
-def test_within_its_limit_the_attitude_law_is_linear(angle, rate, acceleration, wanted):
-    found = attitude_jerk((wanted, 0.1, -0.2), (angle, rate, acceleration), (30.0, 300.0, 1e3), 1e4)
-    expected = 30 * (-0.2 - acceleration) + 300 * (0.1 - rate) + 1e3 * (wanted - angle)
+def test_within_its_limit_the_attitude_law_is_linear(angle, rate, acceleration, desired):
+    found = attitude_jerk(
+        (desired, 0.1, -0.2), (angle, rate, acceleration), (30.0, 300.0, 1e3), 1e4
+    )
+    expected = 30 * (-0.2 - acceleration) + 300 * (0.1 - rate) + 1e3 * (desired - angle)
     assert found == pytest.approx(expected, abs=1e-9)
 
 
@@ -446,9 +448,9 @@ def test_the_closed_loops_are_those_of_the_poles():
 
 @pytest.mark.parametrize("place", [0, 1, 2])
 def test_a_reference_that_is_no_number_asks_for_no_number(place):
-    wanted = [0.1, 0.2, 0.3]
-    wanted[place] = float("nan")
-    assert isnan(attitude_jerk(tuple(wanted), (0.0, 0.0, 0.0), (40.0, 600.0, 4000.0), 50.0))
+    desired = [0.1, 0.2, 0.3]
+    desired[place] = float("nan")
+    assert isnan(attitude_jerk(tuple(desired), (0.0, 0.0, 0.0), (40.0, 600.0, 4000.0), 50.0))
 
 
 def test_in_free_fall_the_decoupler_has_no_answer():

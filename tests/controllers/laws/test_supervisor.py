@@ -99,7 +99,7 @@ def watch(strategy, **changes):
     return settings._replace(**changes)
 
 
-def asked(time, roll, pitch, state, rate, supervisor, gait=JUMPS):
+def demand(time, roll, pitch, state, rate, supervisor, gait=JUMPS):
     return supervised_derivative(time, roll, pitch, state, rate, gait, (), supervisor, RATIO)[2]
 
 
@@ -134,7 +134,7 @@ def test_supervised_tilts_move_as_their_rates_say(strategy):
 
 @pytest.mark.parametrize("strategy", WITH_STATES)
 def test_a_supervisor_with_room_to_spare_rests(strategy):
-    assert asked(0.1, 0.0, 0.0, 0.0, 0.0, watch(strategy)) == 0.0
+    assert demand(0.1, 0.0, 0.0, 0.0, 0.0, watch(strategy)) == 0.0
 
 
 @pytest.mark.parametrize("strategy", WITH_STATES)
@@ -143,14 +143,14 @@ def test_it_acts_as_soon_as_the_jump_comes_into_sight(strategy):
     n = torque_free_direction(tilt_reference(0.65, JUMPS)[:4], VEHICLE)
     roll, pitch = exact_decoupler(0.0, 0.0, 0.0, 0.0, 9.8, tuple(n))
     supervisor = watch(strategy, horizon=0.4, min_margin=0.5)
-    assert asked(0.55, roll, pitch, 0.0, 0.0, supervisor) == 0.0
-    assert asked(0.65, roll, pitch, 0.0, 0.0, supervisor) > 1.0
+    assert demand(0.55, roll, pitch, 0.0, 0.0, supervisor) == 0.0
+    assert demand(0.65, roll, pitch, 0.0, 0.0, supervisor) > 1.0
     for rate in (0.0, 0.5):
-        wanted = asked(0.65, roll, pitch, 0.0, rate, supervisor) * LAG + rate
+        desired = demand(0.65, roll, pitch, 0.0, rate, supervisor) * LAG + rate
         if strategy == "hold":
-            assert wanted == pytest.approx(1.0)  # the clock is to stand
+            assert desired == pytest.approx(1.0)  # the clock is to stand
         else:
-            assert wanted == pytest.approx(2.0 / 0.8)  # the farthest tilt moves at max_tilt_rate
+            assert desired == pytest.approx(2.0 / 0.8)  # the farthest tilt moves at max_tilt_rate
 
 
 def test_the_clock_slows_down_within_the_band():

@@ -82,8 +82,8 @@ def test_the_outputs_move_as_appendix_b_demands():
         ) / (2 * h)
         first = outputs_rates(state, inputs)
         now = np.array([*state[6:9], state[2]])
-        wanted = 10.0 * (target - now) - 10.0 * first
-        np.testing.assert_allclose(second, wanted, rtol=0, atol=1e-6 * (1 + abs(wanted).max()))
+        desired = 10.0 * (target - now) - 10.0 * first
+        np.testing.assert_allclose(second, desired, rtol=0, atol=1e-6 * (1 + abs(desired).max()))
 
 
 def test_hover_needs_the_weight_and_no_torque():

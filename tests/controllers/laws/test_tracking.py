@@ -138,11 +138,11 @@ def demanded_third_derivatives(motion, law):
     rates = differences(euler, 1e-3)[1]
     actual = list(zip(motion.attitude, rates, now[:3]))
     roll, pitch = attitude_references(motion, law, actual[2])
-    wanted = [roll, pitch, (PATH.yaw, 0.0, 0.0)]
+    desired = [roll, pitch, (PATH.yaw, 0.0, 0.0)]
     gains = law.gains
     attitude = [
         k1 * (goal[2] - real[2]) + k2 * (goal[1] - real[1]) + k3 * (goal[0] - real[0])
-        for goal, real, (k1, k2, k3) in zip(wanted, actual, (gains[0:3], gains[3:6], gains[6:9]))
+        for goal, real, (k1, k2, k3) in zip(desired, actual, (gains[0:3], gains[3:6], gains[6:9]))
     ]
     integral, error, rate = (value[2] for value in motion.errors(0.0, law.terms))
     known, counted = law.terms.reference_derivatives, law.terms.integral_action

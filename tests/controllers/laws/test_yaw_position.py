@@ -186,16 +186,16 @@ def test_the_outputs_move_as_appendix_b_demands(gains):
         )
         jerk = (third_derivatives(ahead) - third_derivatives(behind))[:3] / 2e-5
         errors = reference[:4] - [state[:3], state[3:6], rates[3:6], jerk]
-        wanted = (
+        desired = (
             reference[4]
             + np.array([k.position_4, k.position_3, k.position_2, k.position_1]) @ errors
         )
-        wanted_yaw = k.yaw_2 * (0.3 - state[8]) - k.yaw_1 * rates[8]
+        desired_yaw = k.yaw_2 * (0.3 - state[8]) - k.yaw_1 * rates[8]
         inputs = yaw_position_inputs(time, state, parameters)
         found = numerical_derivatives(state, inputs)
-        wanted = np.array([*wanted, wanted_yaw])
+        desired = np.array([*desired, desired_yaw])
         # Seven-point differences of an angular acceleration that may exceed 1e3 rad/s^2.
-        np.testing.assert_allclose(found, wanted, rtol=0, atol=2e-5 * np.abs(wanted).max())
+        np.testing.assert_allclose(found, desired, rtol=0, atol=2e-5 * np.abs(desired).max())
 
 
 @pytest.mark.parametrize(

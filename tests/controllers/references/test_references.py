@@ -127,9 +127,9 @@ def test_both_views_of_a_reference_agree(name, time):
     full = reference_derivatives(time, MOTIONS[name], table)
     plain = position_reference(time, MOTIONS[name], table)
     assert plain[:6] == pytest.approx(full[:6], abs=1e-13)
-    assert plain[6:] == (0.0, 0.0, 0.0), "the acceleration is left out unless asked for"
-    told = MOTIONS[name]._replace(acceleration_feedforward=1.0)
-    assert position_reference(time, told, table)[6:] == pytest.approx(full[6:9], abs=1e-13)
+    assert plain[6:] == (0.0, 0.0, 0.0), "the acceleration is left out by default"
+    forward = MOTIONS[name]._replace(acceleration_feedforward=1.0)
+    assert position_reference(time, forward, table)[6:] == pytest.approx(full[6:9], abs=1e-13)
 
 
 def test_waypoints_are_passed_at_their_times_from_rest_to_rest():

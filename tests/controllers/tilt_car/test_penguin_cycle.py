@@ -102,8 +102,8 @@ def test_disturbed_cycles_come_back_as_the_multipliers_say():
     disturbed = state + start
     for _ in range(4):
         disturbed = np.array(mirrored_map(CH11, tuple(disturbed)))
-    wanted = np.linalg.matrix_power(jacobian(CH11, tuple(state)), 4) @ start
-    np.testing.assert_allclose(disturbed - state, wanted, atol=2e-8)
+    desired = np.linalg.matrix_power(jacobian(CH11, tuple(state)), 4) @ start
+    np.testing.assert_allclose(disturbed - state, desired, atol=2e-8)
 
 
 def test_from_rest_every_half_period_is_nearer():

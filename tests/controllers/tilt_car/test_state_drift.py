@@ -52,8 +52,8 @@ def follow(jerk, inputs, time, steps, car, rate=0.0):
     def slope(at, values):
         w1, w2, alpha = values
         columns = input_columns(w1, w2, car)
-        wanted = rotate(*jerk(at), -turn_per_tilt(car) * alpha)
-        change = np.array(minimum_norm(columns, wanted))
+        desired = rotate(*jerk(at), -turn_per_tilt(car) * alpha)
+        change = np.array(minimum_norm(columns, desired))
         if rate:
             along, across = body_acceleration(w1 * w1, w2 * w2, car)
             change += restoring_inputs(atan2(across, along), rate, columns, car)
@@ -98,8 +98,8 @@ def test_the_stiffness_is_the_speed_of_the_rotor_speeds(lean):
 
 @given(leans, leans)
 def test_the_drift_time_is_the_integral(start, end):
-    wanted, _ = quad(lambda lean: 1.0 / drift_rate(lean, PATH, CAR), start, end)
-    assert drift_time(start, end, PATH, CAR) == pytest.approx(wanted, rel=1e-9, abs=1e-9)
+    desired, _ = quad(lambda lean: 1.0 / drift_rate(lean, PATH, CAR), start, end)
+    assert drift_time(start, end, PATH, CAR) == pytest.approx(desired, rel=1e-9, abs=1e-9)
 
 
 @given(leans, st.floats(0.0, 500.0))
@@ -170,17 +170,17 @@ def test_small_loops_miss_by_the_twist_times_their_area(lean):
     # The silent direction's length is the area of accelerations that a unit of inputs spans.
     area_of_inputs = size * size / np.linalg.norm(n)
     missed = small_loop(centre, size, THESIS_CAR) @ n / np.linalg.norm(n)
-    wanted = -twist(centre[0], centre[1], THESIS_CAR) * area_of_inputs
-    assert missed == pytest.approx(wanted, rel=0.05)
+    desired = -twist(centre[0], centre[1], THESIS_CAR) * area_of_inputs
+    assert missed == pytest.approx(desired, rel=0.05)
     assert twist(centre[0], centre[1], THESIS_CAR) != 0.0
 
 
 def test_restoring_holds_the_lean_where_drift_and_rate_balance():
     inputs = inputs_of(0.2, 10.0, THESIS_CAR)
     end = follow(circling(PATH), inputs, 15.0, 6000, THESIS_CAR, rate=1.0)
-    wanted = restored_lean(PATH, THESIS_CAR, 1.0)
-    assert lean_at(end, THESIS_CAR) == pytest.approx(wanted, rel=1e-3)
-    assert wanted == pytest.approx(drift_rate(0.0, PATH, THESIS_CAR), rel=1e-5)
+    desired = restored_lean(PATH, THESIS_CAR, 1.0)
+    assert lean_at(end, THESIS_CAR) == pytest.approx(desired, rel=1e-3)
+    assert desired == pytest.approx(drift_rate(0.0, PATH, THESIS_CAR), rel=1e-5)
     along, across = body_acceleration(end[0] ** 2, end[1] ** 2, THESIS_CAR)
     assert hypot(along, across) == pytest.approx(10.0, rel=1e-7)
 

@@ -60,9 +60,9 @@ def test_the_published_share_needs_the_whole_cars_inertia():
 @given(angles, speeds, speeds)
 def test_acceleration_is_eq_3(direction, speed_1, speed_2):
     squares = np.array([speed_1**2, speed_2**2])
-    wanted = rotation(direction) @ printed_j_theta(CAR) @ squares / CAR.mass
+    desired = rotation(direction) @ printed_j_theta(CAR) @ squares / CAR.mass
     np.testing.assert_allclose(
-        acceleration(direction, *squares.tolist(), CAR), wanted, rtol=1e-12, atol=1e-10
+        acceleration(direction, *squares.tolist(), CAR), desired, rtol=1e-12, atol=1e-10
     )
 
 
@@ -105,11 +105,11 @@ INPUTS = ((90.0, 4.0, -3.0), (60.0, -7.0, 5.0), (0.8, 1.5, -2.0))
 
 
 def test_the_columns_are_the_third_derivative_of_the_position():
-    wanted = derivative_values(1, [values[:2] for values in INPUTS])
+    desired = derivative_values(1, [values[:2] for values in INPUTS])
     (w1, d1, _), (w2, d2, _), (alpha, d3, _) = INPUTS
     x1, y1, x2, y2, x3, y3 = third.input_columns(w1, w2, CAR)
     body = x1 * d1 + x2 * d2 + x3 * d3, y1 * d1 + y2 * d2 + y3 * d3
-    np.testing.assert_allclose(rotate(*body, turn_per_tilt(CAR) * alpha), wanted, rtol=1e-12)
+    np.testing.assert_allclose(rotate(*body, turn_per_tilt(CAR) * alpha), desired, rtol=1e-12)
 
 
 def test_the_columns_are_eqs_10_and_11():
@@ -123,7 +123,7 @@ def test_the_columns_are_eqs_10_and_11():
 
 
 def test_drift_and_columns_make_the_fourth_derivative():
-    wanted = derivative_values(2, INPUTS)
+    desired = derivative_values(2, INPUTS)
     (w1, d1, s1), (w2, d2, s2), (alpha, d3, s3) = INPUTS
     yaw = -counter_yaw_per_tilt(CAR) * alpha
     state = (0.0, 0.0, 0.0, 0.0, yaw, alpha, w1, w2, d3, d1, d2)
@@ -133,16 +133,16 @@ def test_drift_and_columns_make_the_fourth_derivative():
         drift_along + x1 * s1 + x2 * s2 + x3 * s3,
         drift_across + y1 * s1 + y2 * s2 + y3 * s3,
     )
-    np.testing.assert_allclose(rotate(*body, yaw + alpha), wanted, rtol=1e-12)
+    np.testing.assert_allclose(rotate(*body, yaw + alpha), desired, rtol=1e-12)
 
 
 @given(speeds, speeds, rates, rates)
 def test_the_inverse_is_numpys(speed_1, speed_2, x, y):
     columns = third.input_columns(speed_1, speed_2, CAR)
     matrix = np.reshape(columns, (3, 2)).T
-    wanted = np.linalg.pinv(matrix) @ (x, y)
-    scale = np.abs(wanted).max() + 1e-9
-    np.testing.assert_allclose(third.minimum_norm(columns, (x, y)), wanted, atol=1e-9 * scale)
+    desired = np.linalg.pinv(matrix) @ (x, y)
+    scale = np.abs(desired).max() + 1e-9
+    np.testing.assert_allclose(third.minimum_norm(columns, (x, y)), desired, atol=1e-9 * scale)
 
 
 def test_one_rotor_at_rest_leaves_full_rank_two_do_not():
@@ -185,14 +185,14 @@ def test_the_third_derivative_law_makes_the_jerk_it_wants(restoring_rate):
     made = rotation(0.6) @ matrix @ inputs
     reference = reference_derivatives(0.7, CIRCLE_10)
     ax, ay = acceleration(0.6, 90.0**2, 70.0**2, CAR)
-    wanted = [
+    desired = [
         reference[9 + i]
         + 6.0 * (reference[6 + i] - a)
         + 12.0 * (reference[3 + i] - state[2 + i])
         + 8.0 * (reference[i] - state[i])
         for i, a in enumerate((ax, ay))
     ]
-    np.testing.assert_allclose(made, wanted, rtol=1e-10)
+    np.testing.assert_allclose(made, desired, rtol=1e-10)
 
 
 def test_nothing_restores_the_lean_where_a_rotor_rests():
@@ -257,13 +257,13 @@ def test_the_planned_law_is_eqs_12_and_13(direction, x, y, vy):
     state = (x, y, 0.3, vy, direction, 0.0, 0.0, 0.0)
     time = 1.7
     x_ref, vx_ref = 0.5 * time**2, time
-    wanted = np.array(
+    desired = np.array(
         [
             1.0 + 12.0 * (vx_ref - 0.3) + 6.0 * (x_ref - x),
             9.0 * (0.0 - vy) + 18.0 * (0.0 - y),
         ]
     )
-    printed = np.linalg.solve(rotation(direction) @ printed_j_theta(THESIS_CAR), wanted)
+    printed = np.linalg.solve(rotation(direction) @ printed_j_theta(THESIS_CAR), desired)
     squares = planned.demanded_squared_speeds(time, state, LAW)
     np.testing.assert_allclose(squares, printed, rtol=1e-9, atol=1e-6)
     inputs = planned.planned_direction_inputs(time, state, LAW)

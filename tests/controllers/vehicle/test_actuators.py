@@ -48,9 +48,9 @@ def test_an_attitude_is_turned_about_the_body_axes(attitude, vector):
     start = Rotation.from_euler("xyz", attitude)
     quaternion = start.as_quat(scalar_first=True).tolist()
     found = Rotation.from_quat(rotate_by_small_angle(*quaternion, *vector), scalar_first=True)
-    wanted = start * Rotation.from_rotvec(vector)
+    desired = start * Rotation.from_rotvec(vector)
     third_order = np.linalg.norm(vector) ** 3 / 12.0
-    assert (found.inv() * wanted).magnitude() < 1.01 * third_order + 1e-12
+    assert (found.inv() * desired).magnitude() < 1.01 * third_order + 1e-12
 
 
 @given(angles, angles, st.floats(0.01, 1.0))

@@ -67,8 +67,8 @@ def test_drag_is_linear_and_quadratic_as_it_says():
 def test_a_gust_is_one_minus_cosine():
     gust = Gust(start=1.0, rise=2.0, x=1.0)
     times = [0.0, 1.0, 1.5, 2.0, 3.0, 50.0]
-    wanted = [0.0, 0.0, 0.5 * (1.0 - np.cos(np.pi / 4.0)), 0.5, 1.0, 1.0]
-    assert [gust_profile(t, gust) for t in times] == pytest.approx(wanted)
+    desired = [0.0, 0.0, 0.5 * (1.0 - np.cos(np.pi / 4.0)), 0.5, 1.0, 1.0]
+    assert [gust_profile(t, gust) for t in times] == pytest.approx(desired)
 
 
 @given(st.floats(0.0, 3.0))
@@ -166,8 +166,8 @@ def test_the_process_has_the_spectrum():
     for column, axis in enumerate("uvw"):
         frequency, density = signal.welch(velocity[:, column], fs=50.0, nperseg=2048)
         band = (frequency > 0.05) & (frequency < 4.0)
-        wanted = 2.0 * np.pi * dryden_spectrum(2.0 * np.pi * frequency[band], fast, axis)
-        ratio = density[band] / wanted
+        desired = 2.0 * np.pi * dryden_spectrum(2.0 * np.pi * frequency[band], fast, axis)
+        ratio = density[band] / desired
         # Some 57 averages: each estimate scatters by 13 %, their mean over the band by much less.
         assert ratio.mean() == pytest.approx(1.0, abs=0.05)
         octaves = np.add.reduceat(ratio, np.searchsorted(frequency[band], [0.05, 0.2, 0.8, 2.0]))

@@ -113,13 +113,13 @@ def test_engines_fly_the_same_flight(timing):
 
 @continuous_and_late
 def test_a_saved_state_restarts_bit_identically(timing):
-    wanted = scenario(EVERYTHING, simulation=timing)
-    straight = make_plant(assemble(wanted))
+    desired = scenario(EVERYTHING, simulation=timing)
+    straight = make_plant(assemble(desired))
     straight.advance(101)
     saved, seen = straight.state, straight.observe()
     straight.advance(60)
 
-    restarted = make_plant(assemble(wanted))
+    restarted = make_plant(assemble(desired))
     restarted.advance(13)
     restarted.state = saved
     assert restarted.observe() == seen
@@ -172,15 +172,15 @@ def test_rotors_follow_the_speeds_they_are_told_with_a_first_order_lag():
     plant = make_plant(
         assemble(scenario(vehicle={"rotor_time_constant": lag}, simulation={"timestep": 0.0005}))
     )
-    speeds, told = [], []
+    speeds, commanded = [], []
     for _ in range(200):
         plant.advance(1)
         speeds.append(plant.data.act[:4].copy())
-        told.append(plant.data.act[4:8].copy())
-    speeds, told = np.array(speeds), np.array(told)
-    assert np.abs(told - speeds).max() > 1.0
+        commanded.append(plant.data.act[4:8].copy())
+    speeds, commanded = np.array(speeds), np.array(commanded)
+    assert np.abs(commanded - speeds).max() > 1.0
     rates = (speeds[2:] - speeds[:-2]) / 0.001
-    np.testing.assert_allclose(rates, (told - speeds)[1:-1] / lag, atol=0.5)
+    np.testing.assert_allclose(rates, (commanded - speeds)[1:-1] / lag, atol=0.5)
 
 
 def test_the_longest_lag_is_where_routh_says():
@@ -232,7 +232,7 @@ def test_flights_with_rotor_lag_end_where_routh_says(share, survives):
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
 @pytest.mark.parametrize("timing", [{}, {"control_timestep": 0.004}], ids=["continuous", "held"])
 def test_a_lagging_rotor_leaves_its_limit_as_soon_as_one_without_lag(plant, timing):
-    """Speeds told beyond it would first have to be taken back: 0.47 m past, or lost where held."""
+    """Commands beyond the limit would wind up: an overshoot of 0.47 m, or divergence if held."""
     past = []
     for lag in ({}, {"rotor_time_constant": 0.02}):
         flight = fly(
@@ -315,17 +315,17 @@ def test_commands_take_effect_after_the_latency():
     plant = make_plant(assemble(late))
     controls = LOOPS["attitude_altitude"].sampling.controls
     setup = loop_of(late).setup(plan_flight(late), 0.0)
-    asked, in_force = [], []
+    requested, in_force = [], []
     for _ in range(30):
         data = plant.data
         state = data.qpos.tolist(), data.qvel.tolist(), data.act[:4].tolist()
         ctrl = controls(plant.time, *state, setup.parameters.inner, setup.knots)
-        asked.append([*ctrl[:4], *ctrl[8:12]])
+        requested.append([*ctrl[:4], *ctrl[8:12]])
         plant.advance(1)
         in_force.append(plant.data.ctrl[-8:].copy())
         plant.advance(1)
-    np.testing.assert_allclose(in_force[3:], asked[:-3], rtol=1e-9, atol=1e-9)
-    assert np.abs(np.array(asked[3]) - asked[0])[4:].max() > 1.0
+    np.testing.assert_allclose(in_force[3:], requested[:-3], rtol=1e-9, atol=1e-9)
+    assert np.abs(np.array(requested[3]) - requested[0])[4:].max() > 1.0
 
 
 @pytest.mark.parametrize(("latency", "survives"), [(0.024, True), (0.032, False)])
@@ -376,8 +376,8 @@ def test_a_lost_rotor_makes_neither_thrust_nor_torque():
     assert (flight["thrust_2"][~lost] > 1.0).all()
     # The roll torque of rotor 4 alone: p' = -L K_f w_4 / I_xx.
     p, time, speed = flight["p"], flight["time"], flight["rotor_speed_4"]
-    wanted = -0.1785 * 8.048e-6 * speed[21] ** 2 / 2.24e-3
-    assert (p[22] - p[21]) / (time[22] - time[21]) == pytest.approx(wanted, rel=0.1)
+    desired = -0.1785 * 8.048e-6 * speed[21] ** 2 / 2.24e-3
+    assert (p[22] - p[21]) / (time[22] - time[21]) == pytest.approx(desired, rel=0.1)
 
 
 # --- mistakes ----------------------------------------------------------------------------------

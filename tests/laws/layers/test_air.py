@@ -107,8 +107,8 @@ def test_a_falling_body_feels_drag_alone():
     without.data.qvel[:3] = [4.0, 0.0, 0.0]
     without.advance(1)
     change = (plant.data.qvel[0] - without.data.qvel[0]) / 0.004
-    wanted = -(0.3 + 0.5 * 1.225 * 0.05 * 4.0) * 4.0 / 0.429
-    assert change == pytest.approx(wanted, rel=1e-2)
+    desired = -(0.3 + 0.5 * 1.225 * 0.05 * 4.0) * 4.0 / 0.429
+    assert change == pytest.approx(desired, rel=1e-2)
 
 
 def test_turbulence_is_logged_as_it_blows():
@@ -135,8 +135,8 @@ def accelerations(air, height, roll):
 
 def test_near_the_ground_the_same_speed_lifts_more():
     lifted = accelerations({"ground_effect": {"height": -0.15}}, 0.0, 0.0)
-    wanted = 9.8 * (ground_effect(0.15, 0.1) - 1.0)
-    np.testing.assert_allclose(lifted, [0.0, 0.0, wanted, 0.0, 0.0, 0.0], atol=1e-9)
+    desired = 9.8 * (ground_effect(0.15, 0.1) - 1.0)
+    np.testing.assert_allclose(lifted, [0.0, 0.0, desired, 0.0, 0.0, 0.0], atol=1e-9)
 
 
 def test_near_the_ground_the_lower_side_is_lifted_more():

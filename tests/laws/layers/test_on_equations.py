@@ -96,9 +96,9 @@ def with_gyroscopic_torque(loop):
 def gyroscopic_torque(monkeypatch):
     """Give the tiltrotor on the thesis plant the gyroscopic torque that MuJoCo's body has."""
 
-    def found(wanted):
-        loop = loop_of(wanted)
-        turns = wanted.simulation.plant == "thesis" and wanted.vehicle.model == "tiltrotor"
+    def found(desired):
+        loop = loop_of(desired)
+        turns = desired.simulation.plant == "thesis" and desired.vehicle.model == "tiltrotor"
         return with_gyroscopic_torque(loop) if turns else loop
 
     monkeypatch.setattr(assembling, "loop_of", found)
@@ -188,12 +188,12 @@ def test_engines_fly_the_same_flight(name):
 
 @on_layered_flights
 def test_a_saved_state_restarts_bit_identically(name):
-    wanted = scenario(*LAYERED[name], {"simulation": {"plant": "thesis"}})
-    straight = make_plant(assemble(wanted))
+    desired = scenario(*LAYERED[name], {"simulation": {"plant": "thesis"}})
+    straight = make_plant(assemble(desired))
     straight.advance(51)
     saved, seen = straight.state, straight.observe()
     straight.advance(40)
-    restarted = make_plant(assemble(wanted))
+    restarted = make_plant(assemble(desired))
     restarted.advance(13)
     restarted.state = saved
     assert restarted.observe() == seen
@@ -221,8 +221,8 @@ def test_a_state_that_has_overflowed_is_seen_as_no_number(base):
 
 
 def test_a_vehicle_that_does_as_told_flies_the_printed_equations():
-    wanted = scenario(TILTROTOR, {"simulation": {"plant": "thesis"}})
-    assert loop_of(wanted) is LOOPS["attitude_altitude"]
+    desired = scenario(TILTROTOR, {"simulation": {"plant": "thesis"}})
+    assert loop_of(desired) is LOOPS["attitude_altitude"]
 
 
 def test_they_are_the_printed_equations():
@@ -243,8 +243,8 @@ def test_a_pod_follows_the_equation_of_its_servo():
     flight = fly(TILTROTOR, level, stuck)
     time, ringing = flight["time"], omega * np.sqrt(1.0 - damping**2)
     swing = np.cos(ringing * time) + damping * omega / ringing * np.sin(ringing * time)
-    wanted = angle * (1.0 - np.exp(-damping * omega * time) * swing)
-    np.testing.assert_allclose(flight["alpha_1"], wanted, atol=1e-6)
+    desired = angle * (1.0 - np.exp(-damping * omega * time) * swing)
+    np.testing.assert_allclose(flight["alpha_1"], desired, atol=1e-6)
 
 
 def test_a_pod_stops_where_its_servo_does():

@@ -38,10 +38,12 @@ def test_engines_fly_the_same_supervised_flight_and_show_what_passed():
         for engine in ("python", "native")
     )
     np.testing.assert_array_equal(python.samples, native.samples)
-    told = np.stack([python[f"alpha_ref_{rotor}"] for rotor in (1, 2, 3, 4)], axis=-1)
-    reached = determinant(told, python["roll"], python["pitch"], VEHICLE)
+    commanded = np.stack([python[f"alpha_ref_{rotor}"] for rotor in (1, 2, 3, 4)], axis=-1)
+    reached = determinant(commanded, python["roll"], python["pitch"], VEHICLE)
     assert reached.min() == pytest.approx(2.0, abs=1e-4)
-    assert np.abs(told - np.stack([python[f"alpha_{i}"] for i in (1, 2, 3, 4)], -1)).max() < 0.01
+    assert (
+        np.abs(commanded - np.stack([python[f"alpha_{i}"] for i in (1, 2, 3, 4)], -1)).max() < 0.01
+    )
 
 
 @pytest.mark.parametrize("strategy", WITH_STATES)
@@ -69,8 +71,8 @@ def test_engines_batches_and_restarts_agree(law, strategy):
         gait={"type": "trot_instant", "amplitude": 0.7, "period": 0.8},
         controller={**law, "supervisor": supervisor},
     )
-    wanted = tiltsim.parse_scenario(tables)
-    python = tiltsim.simulate(wanted)
+    desired = tiltsim.parse_scenario(tables)
+    python = tiltsim.simulate(desired)
     assert python["supervision"].max() > 0.2
     native = {**tables, "simulation": {**tables["simulation"], "engine": "native"}}
     compiled = tiltsim.parse_scenario(native)
@@ -78,11 +80,11 @@ def test_engines_batches_and_restarts_agree(law, strategy):
     (row,) = fly([compiled], keep_samples=True)
     np.testing.assert_array_equal(row.flight.samples, python.samples)
 
-    straight = make_plant(assemble(wanted))
+    straight = make_plant(assemble(desired))
     straight.advance(300)
     saved = straight.state
     straight.advance(60)
-    restarted = make_plant(assemble(wanted))
+    restarted = make_plant(assemble(desired))
     restarted.state = saved
     restarted.advance(60)
     np.testing.assert_array_equal(restarted.state, straight.state)
@@ -130,8 +132,8 @@ def test_it_flies_sampled_and_through_real_actuators(strategy):
     flight = tiltsim.simulate(tiltsim.parse_scenario(tables))
     assert flight.end.kind == "completed"
     assert flight["supervision"].max() > 0.2
-    told = flight["alpha_ref_1"]
-    assert np.isfinite(told).all()
+    commanded = flight["alpha_ref_1"]
+    assert np.isfinite(commanded).all()
     assert "thrust_factor_1" in flight.columns
 
 
@@ -167,10 +169,10 @@ def test_the_way_to_red_is_no_faster_than_asked():
     assert flight.end.kind == "completed"
     assert flight.metrics()["max_tilt_rate"] == pytest.approx(0.2, abs=0.002)
     means = np.array([0.05, -0.05] * 2)
-    told = np.stack([flight[f"alpha_ref_{rotor}"] for rotor in (1, 2, 3, 4)], axis=-1)
+    commanded = np.stack([flight[f"alpha_ref_{rotor}"] for rotor in (1, 2, 3, 4)], axis=-1)
     share = flight["supervision"]
     gap = np.array([-0.8, 0.1, 0.9, -0.2]) - means
-    np.testing.assert_allclose(told, means + np.outer(1.0 - share, gap), atol=1e-12)
+    np.testing.assert_allclose(commanded, means + np.outer(1.0 - share, gap), atol=1e-12)
     assert (np.diff(share) >= 0.0).all()
     assert (np.diff(flight["determinant"][1:]) >= 0.0).all()
     assert 2.35 < flight["determinant"][-1] < 2.4  # ever slower, as there is less to gain
