@@ -1,1 +1,1 @@
-"""What a closed loop is: the contract between control laws, vehicles, engines and plants."""
+"""The contract between control laws, vehicles, engines and plants."""

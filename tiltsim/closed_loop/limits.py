@@ -1,4 +1,4 @@
-"""Where a flight counts as lost: bounds so wide that no flight comes back from beyond them."""
+"""Limits beyond which a vehicle has diverged, so wide that none returns from there."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MAX_BODY_RATE: Final = 1e3  # rad/s, far above what any rotorcraft survives
 MAX_ROTOR_SPEED: Final = 1e5  # rad/s
 
 SINGULAR: Final = 1e-9
-"""What counts as zero, for a determinant of order one and all else that a loop watches."""
+"""Numbers whose sign is checked are zero below this; determinants are of order one."""
 
 WITHIN_LIMITS: Final = 0
 HORIZONTAL_ERROR: Final = 1

@@ -1,7 +1,7 @@
 """A closed loop: a controller, as scalar code, around the model of a vehicle.
 
-What every closed loop has, whichever controller it holds, in four records: the model's `Dynamics`,
-the `Sampling` of the controller, the `Columns` of a flight and the `Monitoring` of its end.
+Whichever controller it holds, a closed loop has four parts: the `Dynamics` of the model, the
+`Sampling` of the controller, the `Columns` of a flight and the `Monitoring` of its end.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Sizes(NamedTuple):
 
 
 class ControlSetup(NamedTuple):
-    """What the control step of one flight reads besides the state."""
+    """Parameters of the control step of one flight."""
 
     parameters: Any  # the loop's record
     knots: tuple[float, ...] = ()  # keyframes of the gait, then waypoints of the reference
@@ -60,7 +60,7 @@ class Dynamics:
     controller_states
         Number of activations that are states of the controller.
     extra_actuators
-        What layers around the controller append to the model's actuators, innermost first.
+        Actuators that layers around the controller append to the model, innermost first.
     """
 
     model: str
@@ -97,7 +97,7 @@ class Sampling:
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """What a flight records, and what is derived from it.
+    """The samples of a flight, and the columns derived from them.
 
     Attributes
     ----------
@@ -176,7 +176,7 @@ class Equations:
 
 
 class SupervisedLaw(NamedTuple):
-    """What a supervisor (`tiltsim.laws.layers.supervision`) needs of a controller, as scalar code.
+    """A controller as a supervisor (`tiltsim.laws.layers.supervision`) uses it, in scalar code.
 
     ``motion`` is the supervisor's state with its rate and acceleration.
     """
@@ -196,7 +196,7 @@ class ClosedLoop:
     Attributes
     ----------
     kind
-        What holds for all loops around such a vehicle.
+        The kind of the vehicle.
     parameters
         Record at the head of `userdata`; its first field is ``signature``. The knots of gait and
         reference follow it.
@@ -208,7 +208,7 @@ class ClosedLoop:
         The same controller on the thesis's equations; None where it is supported in MuJoCo only
         or, inside a layer, by `tiltsim.laws.layers.on_equations`.
     supervised
-        What a supervisor needs of the controller; None where it cannot be supervised.
+        The controller for a supervisor; None where it cannot be supervised.
     follows_position
         Whether a scenario has the controller follow the reference's horizontal position.
     uses_gait

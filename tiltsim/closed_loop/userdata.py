@@ -6,10 +6,10 @@ from typing import Final, NamedTuple
 
 
 class Header(NamedTuple):
-    """What `userdata` begins with, before the parameters of the law.
+    """The beginning of `userdata`, before the parameters of the closed loop.
 
-    A held law counts the evaluations of the callback, so that it needs nothing but MuJoCo's state
-    to know when to sample: a saved state restarts between two samples, too.
+    A held controller counts the evaluations of the callback, so that MuJoCo's state alone decides
+    when to sample: a saved state restarts between two samples, too.
     """
 
     control_period: float = 0.0  # evaluations between samples of a held law; 0 if continuous

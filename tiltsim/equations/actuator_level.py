@@ -34,7 +34,7 @@ Wrench = tuple[float, float, float, float, float, float]
 
 
 class Mechanics(NamedTuple):
-    """What the controls act on."""
+    """The true vehicle and its actuators."""
 
     vehicle: Vehicle  # the true one, not the controller's
     servo_frequency: float  # rad/s, natural
@@ -61,7 +61,19 @@ def mechanics(plan: FlightPlan) -> Mechanics:
 def external_acceleration(
     rotation: Vector, wrench: Wrench, mass: float, disturbance: Triple
 ) -> Triple:
-    """The acceleration (m/s^2, world) by a wrench's force and a disturbance (m/s^2, world)."""
+    """Acceleration (m/s^2, world axes) without rotors and weight.
+
+    Parameters
+    ----------
+    rotation
+        Body to world, rows first.
+    wrench
+        Force (N) and torque (N m), body axes.
+    mass
+        kg.
+    disturbance
+        m/s^2, world axes.
+    """
     force_x, force_y, force_z = to_world(rotation, (wrench[0], wrench[1], wrench[2]))
     gust_x, gust_y, gust_z = disturbance
     return gust_x + force_x / mass, gust_y + force_y / mass, gust_z + force_z / mass

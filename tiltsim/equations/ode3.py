@@ -16,7 +16,7 @@ Stepper = Callable[..., tuple[list[float], Values]]
 
 
 class Integration(NamedTuple):
-    """What stays the same over the steps of a flight."""
+    """Constants of the integration of one flight."""
 
     timestep: float  # s
     control_steps: int  # steps for which the inputs are held; 0: evaluated at every stage

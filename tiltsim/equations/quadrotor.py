@@ -1,8 +1,7 @@
 """The quadrotor as ch. 2 models it (Eq. 15): a rigid body in Euler angles under thrust and torques.
 
 The state begins with position, velocity, roll, pitch, yaw and body rates, the inputs with the total
-thrust and the three torques. Two states of a law, integrated by what follows in the inputs, may
-come after them.
+thrust and the three torques. Two states of the controller and their rates may follow.
 """
 
 from __future__ import annotations
@@ -31,8 +30,16 @@ def equations_of_motion(
 ) -> Values:
     """Time derivative of the rigid body's twelve states.
 
-    ``inputs`` are the thrust (N) and the torques (N m, body axes). ``disturbance`` is an
-    acceleration (m/s^2, world) that the law does not know of.
+    Parameters
+    ----------
+    state
+        Begins with the rigid body's.
+    inputs
+        Thrust (N) and torques (N m, body axes), and any more.
+    vehicle
+        The vehicle that flies.
+    disturbance
+        An acceleration unknown to the controller, m/s^2, world axes.
     """
     _, _, _, vx, vy, vz, roll, pitch, yaw, p, q, r = rigid_body(state)
     gust_x, gust_y, gust_z = disturbance

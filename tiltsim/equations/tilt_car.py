@@ -23,8 +23,18 @@ def equations_of_motion(
 ) -> Values:
     """Rates of position and velocity, the state's first four numbers; Eq. (3).
 
-    ``direction`` (rad) is that of the thrusts' middle, the squares are the rotor speeds', the
-    disturbance is an acceleration (m/s^2, world).
+    Parameters
+    ----------
+    state
+        Begins with position and velocity.
+    direction
+        Of the thrusts' bisector, rad.
+    square_1, square_2
+        Of the rotor speeds, (rad/s)^2.
+    car
+        The vehicle.
+    disturbance
+        An acceleration unknown to the controller, m/s^2, world axes.
     """
     ax, ay = acceleration(direction, square_1, square_2, car)
     gust_x, gust_y, _ = disturbance
@@ -33,5 +43,5 @@ def equations_of_motion(
 
 @scalar
 def limited_rate(speed: float, rate: float) -> float:
-    """The rate (rad/s^2) of a rotor that cannot reverse, from the commanded rate."""
+    """The rate (rad/s^2) of a rotor that cannot turn backwards, from the demanded rate."""
     return 0.0 if speed <= 0.0 and rate < 0.0 else rate

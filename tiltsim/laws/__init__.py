@@ -1,1 +1,1 @@
-"""Control laws in closed loops with the vehicles, one module per law."""
+"""Controllers in closed loops with their vehicles, one module per controller."""

@@ -1,4 +1,4 @@
-"""What the closed loops with the quadrotor share.
+"""Common parts of the closed loops with the quadrotor.
 
 The control laws of ch. 2 demand thrust and torques, which the rotors make at once: their speeds
 follow from the controls and are not states. The model's four rotor speed states stay at zero.

@@ -1,4 +1,4 @@
-"""What the closed loops with the tilt-car share."""
+"""Common parts of the closed loops with the tilt-car."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the closed loops with the tiltrotor share.
+"""Common parts of the closed loops with the tiltrotor.
 
 A control step goes from MuJoCo's state to MuJoCo's controls, as scalar code for every engine. It is
 a pure function of time, `qpos`, `qvel`, `act` and the parameters in `userdata`, so that a saved

@@ -1,7 +1,7 @@
 """Layers around a closed loop: stages between the controller and its vehicle.
 
-A layer has parameters and states of its own and replaces the functions that it is about; all else
-stays as in the loop within. `wrap_loop` is the one place where that is put together.
+A layer has parameters and states of its own and replaces some functions; all else stays as in the
+loop within. `wrap_loop` is the one place where that is put together.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Derive = Callable[[Callable[[], dict[str, Floats]], Samples, ControlSetup], dict
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """What a layer adds to a closed loop, or does in place of it.
+    """The parts of a layer: what it adds to a closed loop or replaces in it.
 
     Its functions see parameters with the fields ``layer``, its own, and ``inner``, those of the
     loop within. Where one is None, the loop within goes on unchanged.
@@ -44,7 +44,7 @@ class Layer:
     controls, hold
         As in `tiltsim.closed_loop.loop.Sampling`.
     actuators
-        What the layer appends to the model's actuators.
+        Appended to those of the model.
     initial_activations
         ``(plan, parameters, inner activations) -> activations`` of these actuators at time
         zero.
@@ -82,7 +82,7 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
     inner
         The loop within.
     layer
-        What to put around it.
+        The layer around it.
 
     Returns
     -------
