@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
+import textwrap
+
 import pytest
 from numba.core.bytecode import ByteCode, FunctionIdentity
 from numba.core.interpreter import Interpreter
@@ -16,3 +20,14 @@ from tiltsim_controllers.mathematics.scalar import scalar_functions
 def test_every_scalar_function_is_translated(function):
     identity = FunctionIdentity.from_function(function)
     assert Interpreter(identity).interpret(ByteCode(identity)).blocks
+
+
+@pytest.mark.parametrize(
+    "function", scalar_functions(), ids=lambda f: f"{f.__module__}.{f.__qualname__}"
+)
+def test_slices_of_tuples_have_constant_bounds(function):
+    """Numba types a slice of a tuple by its bounds, and does not evaluate them."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
+    slices = [node for node in ast.walk(tree) if isinstance(node, ast.Slice)]
+    bounds = [bound for s in slices for bound in (s.lower, s.upper) if bound is not None]
+    assert all(isinstance(bound, ast.Constant | ast.Name) for bound in bounds)
