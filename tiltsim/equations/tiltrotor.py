@@ -88,7 +88,7 @@ def rigid_body(
     w1, w2, w3, w4 = squares
     trig = sines_and_cosines(tilts[0], tilts[1], tilts[2], tilts[3])
 
-    # Eq. (1): force in body axes, rotated to the world, weight and all else.
+    # Eq. (1): force in body axes, rotated to the world, weight and the rest.
     extra_x, extra_y, extra_z = extra_acceleration
     fx, fy, fz = body_force(trig, w1, w2, w3, w4)
     per_force = vehicle.thrust_coefficient / vehicle.mass

@@ -61,7 +61,7 @@ class Flight:
 
     @property
     def scenario(self) -> Scenario:
-        """What was flown."""
+        """The scenario of the flight."""
         return self.assembly.scenario
 
     def __repr__(self) -> str:

@@ -20,7 +20,7 @@ def compute_metrics(
     columns
         Columns of the flight by name, each of shape (N,).
     assembly
-        What was flown.
+        The assembly of the flight.
     end
         How it ended.
     wall_time

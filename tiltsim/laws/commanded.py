@@ -119,7 +119,7 @@ def commanded_parameters(parameters: Any) -> LoopParameters:
 
 
 def with_command(parameters: Any, command: HeldCommand) -> Any:
-    """Parameters of a vehicle under commands, whatever the layers around it, with this one."""
+    """Parameters of a vehicle under commands, within any layers, with this command."""
     if isinstance(parameters, LoopParameters):
         return parameters._replace(command=command)
     return parameters._replace(inner=with_command(parameters.inner, command))

@@ -123,7 +123,7 @@ class Ground:
 
 @dataclass(frozen=True, kw_only=True)
 class ModelSpec:
-    """What the models of all vehicles are compiled from. Raises ValueError if out of range.
+    """Common specification of the vehicles' models. Raises ValueError if a value is out of range.
 
     Attributes
     ----------

@@ -53,7 +53,7 @@ START_SPEED: Final = 300.0
 
 @dataclass(frozen=True)
 class RotorcraftSpec(ModelSpec):
-    """What a rotorcraft's model is compiled from. Raises ValueError if a value is out of range.
+    """Specification of a rotorcraft's model. Raises ValueError if a value is out of range.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
     Parameters
     ----------
     spec
-        What the model is made of.
+        The specification of the model.
     visuals
         Whether to keep what is drawn or measured only: geoms, cameras, lights and sensors. They do
         not affect the physics, but updating them takes a third of a step.
@@ -160,8 +160,8 @@ def _with_parameters(
 ) -> mujoco.MjModel:
     """A copy of a model with another vehicle's mass, inertia, coefficients and gravity.
 
-    Bit for bit the compiler's result, a hundred times faster, but for the mean mass and inertia in
-    ``stat``, which nothing here reads.
+    Bit for bit the compiler's result, a hundred times faster, except for the mean mass and inertia
+    in ``stat``, which nothing here reads.
     """
     import mujoco
 

@@ -21,7 +21,7 @@ START_SPEED: Final = 200.0
 
 @dataclass(frozen=True)
 class TiltCarSpec(ModelSpec):
-    """What a tilt-car's model is compiled from. Raises ValueError if a value is out of range."""
+    """Specification of a tilt-car's model. Raises ValueError if a value is out of range."""
 
     car: TiltCar  # both discs weigh half of the mass
     _: KW_ONLY
@@ -39,7 +39,7 @@ def compile_tilt_car(spec: TiltCarSpec, *, visuals: bool = True) -> mujoco.MjMod
     Parameters
     ----------
     spec
-        What the model is made of.
+        The specification of the model.
     visuals
         Whether to keep what is drawn or measured only, as in `tiltsim.models.rotorcraft`.
     """

@@ -325,7 +325,7 @@ class _Moments(NamedTuple):
 
 
 class _InBody:
-    """A compiled vehicle as its file leaves it, seen from the body ``vehicle``."""
+    """A compiled vehicle in its file's pose, in the frame of the body ``vehicle``."""
 
     def __init__(self, compiled: mujoco.MjModel, data: mujoco.MjData) -> None:
         self.compiled, self.data = compiled, data

@@ -25,7 +25,7 @@ _TABLES_WITHOUT_EFFECT: Final = frozenset(
         "expect",
     )
 )
-"""Tables of a scenario that do not change the model, but for two keys of ``simulation``."""
+"""Tables of a scenario that do not change the model, except for two keys of ``simulation``."""
 
 
 def flight_model(assembly: Assembly, knots: int | None = None) -> mujoco.MjModel:

@@ -28,7 +28,7 @@ from tiltsim.scenario.scenario import Scenario
 
 
 class UserController:
-    """A user's controller in a flight: whatever fails in it is raised as a `ControllerError`."""
+    """A user's controller in a flight: any error in it is raised as a `ControllerError`."""
 
     def __init__(self, controller: Controller, name: str) -> None:
         self._controller, self._name = controller, name

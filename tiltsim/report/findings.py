@@ -14,7 +14,7 @@ from tiltsim.report import finding_numbers as numbers
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """A result of ours."""
+    """A result beyond the thesis."""
 
     key: str
     title: str

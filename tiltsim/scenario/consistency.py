@@ -1,4 +1,4 @@
-"""Checks between the tables of a scenario, each of which is valid by itself."""
+"""Checks between the tables of a scenario, each of which is valid alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the tables of all controllers share."""
+"""The common part of the tables of all controllers."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class ServoTable(Table):
-    """A position servo of second order, ideal but for the keys given."""
+    """A position servo of second order, ideal except for the given keys."""
 
     natural_frequency: Positive = Field(TiltServo.natural_frequency, description="rad/s")
     damping_ratio: Positive = TiltServo.damping_ratio

@@ -31,7 +31,7 @@ class FlightResult:
     Attributes
     ----------
     scenario
-        What was flown.
+        The scenario.
     end
         How it ended.
     metrics
@@ -65,7 +65,7 @@ def fly(
     Yields
     ------
     FlightResult
-        Bit-identical to `tiltsim.simulate` of the scenario, but for ``realtime_factor``, which is
+        Bit-identical to `tiltsim.simulate` of the scenario except ``realtime_factor``, which is
         computed from the time that the flight took of all threads together.
 
     Raises

@@ -1,1 +1,1 @@
-"""Control laws and what they are made of: decouplers, gains, allocation, supervisor."""
+"""Control laws and their parts: decouplers, gains, allocation, supervisor."""

@@ -31,7 +31,7 @@ def hash_word(word: int) -> int:
 def uniform(seed: float, channel: float, index: float) -> float:
     """A uniform draw from (0, 1): the middle of one of 2^32 equal intervals.
 
-    The arguments are whole numbers, of which the lowest 32 bits are used.
+    The arguments are integers, of which the lowest 32 bits are used.
     """
     word = hash_word(int(seed) & _WORD)
     word = hash_word((word + int(channel)) & _WORD)
@@ -43,7 +43,7 @@ def uniform(seed: float, channel: float, index: float) -> float:
 def normal(seed: float, channel: float, index: float) -> float:
     """A draw from the standard normal distribution (Box and Muller, 1958), below 6.7 in magnitude.
 
-    The arguments are whole numbers; it uses the channels ``2 channel`` and ``2 channel + 1`` of
+    The arguments are integers; it uses the channels ``2 channel`` and ``2 channel + 1`` of
     `uniform`.
     """
     radius = sqrt(-2.0 * log(uniform(seed, 2.0 * channel, index)))

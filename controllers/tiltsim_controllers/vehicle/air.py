@@ -121,7 +121,7 @@ def low_altitude_turbulence(
     speed : airspeed of the vehicle, m/s; in hover that of the mean wind
     direction : direction into which the mean wind blows, rad from +x towards +y
     sample_time : time for which a draw of the noise is held, s
-    seed : a whole number
+    seed : an integer
     """
     feet = min(1000.0, max(10.0, height / FOOT))
     base = 0.177 + 0.000823 * feet

@@ -1,6 +1,6 @@
 """Layers around a closed loop: stages between the controller and its vehicle.
 
-A layer has parameters and states of its own and replaces some functions; all else stays as in the
+A layer has parameters and states of its own and replaces some functions; the rest stays as in the
 loop within. `wrap_loop` is the one place where that is put together.
 """
 

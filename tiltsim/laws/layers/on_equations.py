@@ -1,4 +1,4 @@
-"""Any closed loop of a rotorcraft, whatever its layers, on the thesis's equations.
+"""Any closed loop of a rotorcraft, with any layers, on the thesis's equations.
 
 The controls are the same function of time, `qpos`, `qvel` and `act` as in MuJoCo, with the same
 sensors, noise and latency. Only the plant on which they act differs:
