@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.document import scenario_toml
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.files import replacing
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     import pyarrow
-
-    from tiltsim.scenario.scenario import Scenario
 
 
 def write_flight(
