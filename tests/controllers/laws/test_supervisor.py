@@ -196,8 +196,8 @@ def test_towards_either_end_of_the_way_to_red_the_motion_is_critically_damped(le
     eager = watch("return_to_red", max_rate=1e6)
     rates = np.linspace(-0.01, 0.01, 5)
     never = eager._replace(min_determinant=3.99)  # leaning, not even red meets it
-    there = [asked(0.9, 0.4, 0.0, 1.0 - left, rate, never) for rate in rates]
+    there = [demand(0.9, 0.4, 0.0, 1.0 - left, rate, never) for rate in rates]
     np.testing.assert_allclose(there, left / (2 * LAG) ** 2 - rates / LAG, rtol=0, atol=1e-9)
     calm = trot_instant(0.05, 2.0).parameters
-    back = [asked(0.3, 0.0, 0.0, left, rate, eager, calm) for rate in rates]
+    back = [demand(0.3, 0.0, 0.0, left, rate, eager, calm) for rate in rates]
     np.testing.assert_allclose(back, -left / (2 * LAG) ** 2 - rates / LAG, rtol=0, atol=1e-9)
