@@ -61,19 +61,9 @@ def tilt_reference(time: float, gait: GaitParameters, knots: Vector = NO_KNOTS) 
     tuple
         ``(alpha_1, ..., alpha_4, rate_1, ..., rate_4)``.
     """
-    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = planned_angles(time, gait, knots)
-    front = gait.scale
-    back = gait.scale * gait.bias
-    return (
-        front * a1,
-        front * a2,
-        back * a3,
-        back * a4,
-        front * rate_1,
-        front * rate_2,
-        back * rate_3,
-        back * rate_4,
-    )
+    a1, a2, a3, a4, v1, v2, v3, v4 = planned_angles(time, gait, knots)
+    f, b = gait.scale, gait.scale * gait.bias  # of the front and back pods
+    return f * a1, f * a2, b * a3, b * a4, f * v1, f * v2, b * v3, b * v4
 
 
 @scalar

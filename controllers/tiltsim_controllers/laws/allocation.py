@@ -105,12 +105,9 @@ def _nearest_lift(
 @scalar
 def _subtract_scaled(a: Quad, factor: float, b: Quad) -> Quad:
     """The vector ``a - factor b``."""
-    return (
-        a[0] - factor * b[0],
-        a[1] - factor * b[1],
-        a[2] - factor * b[2],
-        a[3] - factor * b[3],
-    )
+    a1, a2, a3, a4 = a
+    b1, b2, b3, b4 = b
+    return a1 - factor * b1, a2 - factor * b2, a3 - factor * b3, a4 - factor * b4
 
 
 @scalar

@@ -108,31 +108,19 @@ def attitude_error(rotation: Values, desired: Values) -> Triple:
 @scalar
 def _dot(a: Octet, b: Octet) -> float:
     """Inner product of two vectors of eight."""
-    return (
-        a[0] * b[0]
-        + a[1] * b[1]
-        + a[2] * b[2]
-        + a[3] * b[3]
-        + a[4] * b[4]
-        + a[5] * b[5]
-        + a[6] * b[6]
-        + a[7] * b[7]
-    )
+    a1, a2, a3, a4, a5, a6, a7, a8 = a
+    b1, b2, b3, b4, b5, b6, b7, b8 = b
+    return a1 * b1 + a2 * b2 + a3 * b3 + a4 * b4 + a5 * b5 + a6 * b6 + a7 * b7 + a8 * b8
 
 
 @scalar
 def _add_scaled(a: Octet, factor: float, b: Octet) -> Octet:
     """The vector ``a + factor b``."""
-    return (
-        a[0] + factor * b[0],
-        a[1] + factor * b[1],
-        a[2] + factor * b[2],
-        a[3] + factor * b[3],
-        a[4] + factor * b[4],
-        a[5] + factor * b[5],
-        a[6] + factor * b[6],
-        a[7] + factor * b[7],
-    )
+    a1, a2, a3, a4, a5, a6, a7, a8 = a
+    b1, b2, b3, b4, b5, b6, b7, b8 = b
+    k = factor
+    low = (a1 + k * b1, a2 + k * b2, a3 + k * b3, a4 + k * b4)
+    return (*low, a5 + k * b5, a6 + k * b6, a7 + k * b7, a8 + k * b8)
 
 
 @scalar
@@ -225,16 +213,8 @@ def pose_rows(trig: Octet, torque: Octet, w: Quad) -> Sextet:
 def _masked(row: Octet, health: Quad) -> Octet:
     """A row of `pose_rows` with both columns of every rotor multiplied by its health, 0 or 1."""
     h1, h2, h3, h4 = health
-    return (
-        h1 * row[0],
-        h2 * row[1],
-        h3 * row[2],
-        h4 * row[3],
-        h1 * row[4],
-        h2 * row[5],
-        h3 * row[6],
-        h4 * row[7],
-    )
+    w1, w2, w3, w4, a1, a2, a3, a4 = row
+    return h1 * w1, h2 * w2, h3 * w3, h4 * w4, h1 * a1, h2 * a2, h3 * a3, h4 * a4
 
 
 @scalar
@@ -359,11 +339,9 @@ def full_pose_inputs(
     if factor_1 == 0.0 or factor_2 == 0.0 or factor_3 == 0.0 or factor_4 == 0.0:
         return nan, nan, nan, nan, nan, nan, nan, nan
     limits = parameters.limits
+    accelerations = (u1 / factor_1, u2 / factor_2, u3 / factor_3, u4 / factor_4)
     return (
-        u1 / factor_1,
-        u2 / factor_2,
-        u3 / factor_3,
-        u4 / factor_4,
+        *accelerations,
         limited_tilt_rate(turn_1 / weight, alpha_1, limits),
         limited_tilt_rate(turn_2 / weight, alpha_2, limits),
         limited_tilt_rate(turn_3 / weight, alpha_3, limits),

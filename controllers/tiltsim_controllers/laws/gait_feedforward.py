@@ -138,20 +138,10 @@ def _planned_force(
 @scalar
 def _trigonometric_rates(trig: Octet, rates: Quad, factor: float) -> Octet:
     """Rates (1/s) of the `sines_and_cosines` at ``factor`` times the tilt rates (rad/s)."""
-    sin_1, cos_1, sin_2, cos_2, sin_3, cos_3, sin_4, cos_4 = trig
-    rate_1, rate_2, rate_3, rate_4 = rates
-    rate_1, rate_2 = factor * rate_1, factor * rate_2
-    rate_3, rate_4 = factor * rate_3, factor * rate_4
-    return (
-        cos_1 * rate_1,
-        -sin_1 * rate_1,
-        cos_2 * rate_2,
-        -sin_2 * rate_2,
-        cos_3 * rate_3,
-        -sin_3 * rate_3,
-        cos_4 * rate_4,
-        -sin_4 * rate_4,
-    )
+    s1, c1, s2, c2, s3, c3, s4, c4 = trig
+    v1, v2, v3, v4 = rates
+    v1, v2, v3, v4 = factor * v1, factor * v2, factor * v3, factor * v4
+    return c1 * v1, -s1 * v1, c2 * v2, -s2 * v2, c3 * v3, -s3 * v3, c4 * v4, -s4 * v4
 
 
 # --- steps of the control law ------------------------------------------------------------------

@@ -189,14 +189,14 @@ def gait_time(time: float, motion: Triple, supervisor: Supervisor) -> float:
 
 
 @scalar
-def _time_scaled(tilt: Jet, motion: Triple) -> Jet:
+def _on_clock(tilt: Jet, motion: Triple) -> Jet:
     """A tilt on the gait's clock as a function of time: the clock runs at one minus the rate."""
     speed = 1.0 - motion[1]
     return tilt[0], tilt[1] * speed, tilt[2] * speed * speed - tilt[1] * motion[2]
 
 
 @scalar
-def _towards(tilt: Jet, red: Jet, share: Jet) -> Jet:
+def _blend(tilt: Jet, red: Jet, share: Jet) -> Jet:
     """A tilt moved by a fraction of the path to red."""
     return jet_sum(1.0, tilt, 1.0, jet_product(share, jet_sum(1.0, red, -1.0, tilt)))
 
@@ -217,26 +217,14 @@ def supervised_tilts(
     """
     a1, a2, a3, a4 = planned
     if supervisor.strategy == HOLD:
-        return (
-            _time_scaled(a1, motion),
-            _time_scaled(a2, motion),
-            _time_scaled(a3, motion),
-            _time_scaled(a4, motion),
-        )
+        m = motion
+        return _on_clock(a1, m), _on_clock(a2, m), _on_clock(a3, m), _on_clock(a4, m)
     if supervisor.strategy == RETURN_TO_RED:
-        red_1, red_2 = nearest_red_angles(planned, drag_ratio, supervisor.clearance)
-        return (
-            _towards(a1, red_1, motion),
-            _towards(a2, red_2, motion),
-            _towards(a3, red_1, motion),
-            _towards(a4, red_2, motion),
-        )
-    return (
-        jet_scaled(scale, a1),
-        jet_scaled(scale, a2),
-        jet_scaled(scale, a3),
-        jet_scaled(scale, a4),
-    )
+        r1, r2 = nearest_red_angles(planned, drag_ratio, supervisor.clearance)
+        m = motion
+        return _blend(a1, r1, m), _blend(a2, r2, m), _blend(a3, r1, m), _blend(a4, r2, m)
+    k = scale
+    return jet_scaled(k, a1), jet_scaled(k, a2), jet_scaled(k, a3), jet_scaled(k, a4)
 
 
 @scalar

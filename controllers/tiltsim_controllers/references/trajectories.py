@@ -154,17 +154,9 @@ def position_reference(
         omega = reference.angular_frequency
         along, across = cos(omega * time), sin(omega * time)
         centripetal = -reference.acceleration_feedforward * radius * omega * omega
-        return (
-            reference.x + radius * along,
-            reference.y + radius * across,
-            reference.z,
-            -radius * omega * across,
-            radius * omega * along,
-            0.0,
-            centripetal * along,
-            centripetal * across,
-            0.0,
-        )
+        position = (reference.x + radius * along, reference.y + radius * across, reference.z)
+        velocity = (-radius * omega * across, radius * omega * along, 0.0)
+        return (*position, *velocity, centripetal * along, centripetal * across, 0.0)
     x, y, z, vx, vy, vz, ax, ay, az, _, _, _, _, _, _ = reference_derivatives(
         time, reference, knots
     )

@@ -24,23 +24,14 @@ from tiltsim_controllers.mathematics.scalar import Octet, Quad, Triple, scalar
 
 
 @scalar
-def sines_and_cosines(alpha_1: float, alpha_2: float, alpha_3: float, alpha_4: float) -> Octet:
+def sines_and_cosines(a1: float, a2: float, a3: float, a4: float) -> Octet:
     """``(sin alpha_1, cos alpha_1, ..., sin alpha_4, cos alpha_4)``.
 
     Parameters
     ----------
-    alpha_1, alpha_2, alpha_3, alpha_4 : tilt angles, rad
+    a1, a2, a3, a4 : tilt angles, rad
     """
-    return (
-        sin(alpha_1),
-        cos(alpha_1),
-        sin(alpha_2),
-        cos(alpha_2),
-        sin(alpha_3),
-        cos(alpha_3),
-        sin(alpha_4),
-        cos(alpha_4),
-    )
+    return sin(a1), cos(a1), sin(a2), cos(a2), sin(a3), cos(a3), sin(a4), cos(a4)
 
 
 @scalar

@@ -35,15 +35,9 @@ def euler_derivatives(
     r_rate = omega_rate[2] - (
         -cr * roll_rate * pitch_rate - (sr * cp * roll_rate + cr * sp * pitch_rate) * yaw_rate
     )
-    yaw_acceleration = (sr * q_rate + cr * r_rate) / cp
-    return (
-        roll_rate,
-        pitch_rate,
-        yaw_rate,
-        p_rate + sp * yaw_acceleration,
-        cr * q_rate - sr * r_rate,
-        yaw_acceleration,
-    )
+    dd_yaw = (sr * q_rate + cr * r_rate) / cp
+    dd_roll, dd_pitch = p_rate + sp * dd_yaw, cr * q_rate - sr * r_rate
+    return roll_rate, pitch_rate, yaw_rate, dd_roll, dd_pitch, dd_yaw
 
 
 @scalar
