@@ -17,6 +17,7 @@ import ast
 import hashlib
 import importlib.abc
 import importlib.util
+import itertools
 import json
 import os
 import random
@@ -59,6 +60,7 @@ PYTEST += [
 ]
 PYTEST += [f"--ignore={TESTS}/test_scalar_is_pure.py"]  # of how the code is written
 PYTEST += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # hypothesis is loaded already
+SHARE_AT_IMPORT = 0.4  # of the tests, by time, for a line that nearly all of them depend on
 SURVIVED = {int(pytest.ExitCode.OK), int(pytest.ExitCode.NO_TESTS_COLLECTED)}
 
 
@@ -108,14 +110,17 @@ class TestMap:
     def tests_of(self, path: str, mutant: Mutant) -> list[str]:
         """Tests that execute the mutant's lines, quickest first.
 
-        For lines that run at import: all tests, those first that execute the module otherwise.
+        For lines that run at import: those that execute the module otherwise, then the quick ones.
         """
         lines = self.by_line.get(path, {})
         found = {test for line in mutant.lines for test in lines.get(str(line), [])}
         if "" not in found:
             return sorted(found, key=lambda test: self.seconds[test])
         own = {test for tests in lines.values() for test in tests}
-        return sorted(self.seconds, key=lambda test: (test not in own, self.seconds[test]))
+        ranked = sorted(self.seconds, key=lambda test: (test not in own, self.seconds[test]))
+        ends = itertools.accumulate(self.seconds[test] for test in ranked)
+        limit = SHARE_AT_IMPORT * sum(self.seconds.values())
+        return [test for test, end in zip(ranked, ends) if end <= limit]
 
 
 class Selection:
