@@ -80,8 +80,28 @@ def modules_loaded_by(code):
     return set(done.stdout.split())
 
 
+CLASSES = {
+    node.name: node
+    for tree in TREES.values()
+    for node in ast.walk(tree)
+    if isinstance(node, ast.ClassDef)
+}
+
+
+def overrides(class_node, name):
+    """Whether a base class of ours defines a member of this name, which documents it."""
+    bases = [CLASSES[base.id] for base in class_node.bases if getattr(base, "id", "") in CLASSES]
+    return any(
+        any(getattr(member, "name", "") == name for member in base.body) or overrides(base, name)
+        for base in bases
+    )
+
+
 def public_definitions(tree):
-    """Functions, classes and their methods with public names, but not setters of properties."""
+    """Functions, classes and their methods with public names, but not setters of properties.
+
+    Methods that override one of a base class are not among them either.
+    """
     for node in tree.body:
         if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
             yield node.name, node
@@ -89,7 +109,8 @@ def public_definitions(tree):
             for member in node.body:
                 if isinstance(member, ast.FunctionDef) and not member.name.startswith("_"):
                     decorators = {ast.unparse(decorator) for decorator in member.decorator_list}
-                    if f"{member.name}.setter" not in decorators:
+                    setter = f"{member.name}.setter" in decorators
+                    if not setter and not overrides(node, member.name):
                         yield f"{node.name}.{member.name}", member
 
 

@@ -18,7 +18,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.closed_loop.userdata import CONTROL_PERIOD, EVALUATIONS, HEADER_SIZE, RECORDER
-from tiltsim.engines.base import EngineName, check_model
+from tiltsim.engines.base import Engine, EngineName, check_model
 from tiltsim.engines.cache import announce_native_code, mark_native_code_compiled
 from tiltsim.engines.compiling import (
     compiled_callback,
@@ -96,7 +96,7 @@ def compile_control(loop: ClosedLoop) -> Any:
     return control
 
 
-class NativeEngine:
+class NativeEngine(Engine):
     """Runs the scalar source as a compiled callback."""
 
     name: EngineName = "native"
@@ -106,7 +106,6 @@ class NativeEngine:
         self._control = compile_control(loop)
 
     def callback(self) -> Any:
-        """See `tiltsim.engines.base.Engine.callback`."""
         return self._control.ctypes
 
 

@@ -9,11 +9,11 @@ import mujoco
 
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.closed_loop.userdata import CONTROL_PERIOD, EVALUATIONS, HEADER_SIZE
-from tiltsim.engines.base import Callback, EngineName, check_model
+from tiltsim.engines.base import Callback, Engine, EngineName, check_model
 from tiltsim_controllers.mathematics.records import slotted, unflatten
 
 
-class PythonEngine:
+class PythonEngine(Engine):
     """Runs the scalar source on Python floats."""
 
     name: EngineName = "python"
@@ -62,5 +62,4 @@ class PythonEngine:
         self._callback = sample_and_hold if header[CONTROL_PERIOD] > 0.0 else sample
 
     def callback(self) -> Callback:
-        """See `Engine.callback`."""
         return self._callback

@@ -15,7 +15,6 @@ import mujoco
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.engines.base import EngineName
 from tiltsim.engines.callback import control_callback
 from tiltsim.laws.commanded import COMMANDED_LOOPS, HeldCommand, commanded_parameters, with_command
 from tiltsim.laws.layers.delay_line import EXTERNAL_COMMANDS
@@ -23,7 +22,6 @@ from tiltsim.laws.layers.sensing import measured_qpos, measured_qvel, sensor_par
 from tiltsim.laws.tiltrotor import gait_servo_commands
 from tiltsim.plants.command import CheckedCommand, ControllerError, Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant, quiet_warnings
-from tiltsim.plants.plant import record_step_by_step
 from tiltsim.vehicles.rotorcraft.layout import ROTOR_STATES
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.mathematics.records import slotted
@@ -35,19 +33,15 @@ from tiltsim_controllers.vehicle.parameters import SPIN
 _NONE: Final = (0.0, 0.0, 0.0, 0.0)
 
 
-class CommandedPlant:
+class CommandedPlant(MujocoPlant):
     """A vehicle that follows commands, each after the scenario's latency.
 
     MuJoCo steps without a callback as long as there is no layer and the rotors keep their speeds;
     else the control callback holds the commands.
     """
 
-    engine: EngineName = "python"
-
     def __init__(self, assembly: Assembly) -> None:
-        self._plant = MujocoPlant(assembly, engine="python")
-        self.model, self.data = self._plant.model, self._plant.data
-        self._loop, self._setup = assembly.loop, assembly.setup
+        super().__init__(assembly, engine="python")
         vehicle = assembly.scenario.rotorcraft
         self.tilting = vehicle.has_tilting_rotors
         self._min_speed, self._max_speed = vehicle.speeds_along_spin
@@ -66,20 +60,6 @@ class CommandedPlant:
         line = self.data.act[first : first + EXTERNAL_COMMANDS * steps]
         self._line = line.reshape(steps, EXTERNAL_COMMANDS)
         self._hold_command(self._commanded.command)
-
-    @property
-    def time(self) -> float:
-        """See `Plant.time`."""
-        return self._plant.time
-
-    @property
-    def state(self) -> Floats:
-        """See `Plant.state`: MuJoCo's."""
-        return self._plant.state
-
-    @state.setter
-    def state(self, value: Floats) -> None:
-        self._plant.state = value
 
     def apply(self, command: CheckedCommand) -> None:
         """Send a command, once per control sample, and hold the one that arrives until the next.
@@ -147,7 +127,6 @@ class CommandedPlant:
         return first, second, third, fourth
 
     def advance(self, steps: int) -> None:
-        """See `Plant.advance`."""
         moving = self._layered or self.data.ctrl[self._rates].any()
         with control_callback(self._hold if moving else None), quiet_warnings():
             mujoco.mj_step(self.model, self.data, nstep=steps)
@@ -162,18 +141,6 @@ class CommandedPlant:
             data.ctrl[:] = self._loop.sampling.hold(*state, data.ctrl.tolist(), self._slotted)
         except (ArithmeticError, ValueError):
             data.ctrl[:] = nan
-
-    def record(self, samples: int, steps: int) -> Floats | None:
-        """See `Plant.record`."""
-        return record_step_by_step(self, samples, steps)
-
-    def observe(self) -> tuple[float, ...]:
-        """See `Plant.observe`."""
-        return self._plant.observe()
-
-    def fault(self) -> str:
-        """See `Plant.fault`."""
-        return self._plant.fault()
 
     @property
     def steps_taken(self) -> int:

@@ -17,14 +17,14 @@ from tiltsim.engines.callback import control_callback
 from tiltsim.engines.factory import make_engine
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.flight_model import evaluations_per_step, flight_model
-from tiltsim.plants.plant import record_step_by_step
+from tiltsim.plants.plant import Plant
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     from tiltsim.engines.recorder import Recorder
 
 
-class MujocoPlant:
+class MujocoPlant(Plant):
     """The compiled MJCF model in MuJoCo, with the control step in its control callback.
 
     Parameters
@@ -63,12 +63,11 @@ class MujocoPlant:
 
     @property
     def time(self) -> float:
-        """See `Plant.time`."""
         return float(self.data.time)
 
     @property
     def state(self) -> Floats:
-        """See `Plant.state`: MuJoCo's integration state, the parameters in userdata included."""
+        """MuJoCo's integration state, the parameters in userdata included."""
         values = np.empty(mujoco.mj_stateSize(self.model, _INTEGRATION))
         mujoco.mj_getState(self.model, self.data, values, _INTEGRATION)
         return values
@@ -82,15 +81,14 @@ class MujocoPlant:
         self._engine = make_engine(self.engine, self._loop, self.model, self.data)
 
     def advance(self, steps: int) -> None:
-        """See `Plant.advance`."""
         with control_callback(self._engine.callback()), quiet_warnings():
             mujoco.mj_step(self.model, self.data, nstep=steps)
 
     def record(self, samples: int, steps: int) -> Floats | None:
-        """See `Plant.record`: natively, all but the last sample come from the callback."""
+        """Natively, all but the last sample come from the callback."""
         if self.engine == "native":
             return self._record_natively(samples, steps)
-        return record_step_by_step(self, samples, steps)
+        return super().record(samples, steps)
 
     @property
     def callback(self) -> Any:
@@ -136,7 +134,6 @@ class MujocoPlant:
         return np.vstack([recorder.samples, (self.time, *self.observe())])
 
     def observe(self) -> tuple[float, ...]:
-        """See `Plant.observe`."""
         data = self.data
         state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
         # MuJoCo keeps the controls of its last integrator stage.
@@ -157,7 +154,7 @@ class MujocoPlant:
             return [nan] * len(self.data.ctrl)
 
     def fault(self) -> str:
-        """See `Plant.fault`: MuJoCo resets an unstable state silently but counts its warnings."""
+        """MuJoCo resets an unstable state silently but counts its warnings."""
         for warning, text in _WARNINGS.items():
             if self.data.warning[warning].number:
                 return text

@@ -35,9 +35,14 @@ class Plant(Protocol):
         None where a sample or the physics engine shows that the flight ended on the way; the state
         of the plant is then undefined.
         """
+        rows = []
+        for _ in range(samples):
+            self.advance(steps)
+            rows.append(take_sample(self))
+        return None if self.fault() else np.array(rows)
 
     def observe(self) -> tuple[float, ...]:
-        """The present values of a sample's fields after the time; see `Loop.sample_fields`."""
+        """The present values of a sample's fields after the time: `ClosedLoop.sample_fields`."""
 
     def fault(self) -> str:
         """The fault that the physics engine has reported so far, in a few words; else empty."""
@@ -46,12 +51,3 @@ class Plant(Protocol):
 def take_sample(plant: Plant) -> Floats:
     """The present sample, shape (fields,); see `ClosedLoop.sample_fields`."""
     return np.array([plant.time, *plant.observe()])
-
-
-def record_step_by_step(plant: Plant, samples: int, steps: int) -> Floats | None:
-    """`Plant.record` by alternating `Plant.advance` and `Plant.observe`."""
-    rows = []
-    for _ in range(samples):
-        plant.advance(steps)
-        rows.append(take_sample(plant))
-    return None if plant.fault() else np.array(rows)

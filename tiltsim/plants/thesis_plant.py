@@ -14,12 +14,12 @@ from tiltsim.engines.cache import mark_native_code_compiled
 from tiltsim.equations.ode3 import Integration, Stepper, make_stepper
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.flight_model import disturbance_acceleration
-from tiltsim.plants.plant import record_step_by_step
+from tiltsim.plants.plant import Plant
 from tiltsim_controllers.mathematics.records import slotted
 from tiltsim_controllers.mathematics.scalar import Floats
 
 
-class ThesisPlant:
+class ThesisPlant(Plant):
     """The thesis's equations, integrated with ode3; see `tiltsim.equations.ode3`.
 
     Parameters
@@ -55,12 +55,11 @@ class ThesisPlant:
 
     @property
     def time(self) -> float:
-        """See `Plant.time`."""
         return self._step_index * self._integration.timestep
 
     @property
     def state(self) -> Floats:
-        """See `Plant.state`: the step count, the inputs held and the state of the equations.
+        """The step count, the inputs held and the state of the equations.
 
         The parameters are not part of it.
         """
@@ -75,7 +74,6 @@ class ThesisPlant:
         self._fault = ""
 
     def advance(self, steps: int) -> None:
-        """See `Plant.advance`."""
         state: Any = np.array(self._state) if self.engine == "native" else self._state
         try:
             state, self._held = self._advance(
@@ -89,10 +87,9 @@ class ThesisPlant:
         self._step_index += steps
 
     def record(self, samples: int, steps: int) -> Floats | None:
-        """See `Plant.record`."""
         if self.engine == "native":
             return self._record_natively(samples, steps)
-        return record_step_by_step(self, samples, steps)
+        return super().record(samples, steps)
 
     def _record_natively(self, samples: int, steps: int) -> Floats | None:
         from tiltsim.engines.recorder import Recorder
@@ -114,7 +111,6 @@ class ThesisPlant:
         return None if recorder.terminated else recorder.samples
 
     def observe(self) -> tuple[float, ...]:
-        """See `Plant.observe`."""
         setup = self._setup
         try:
             return self._equations.observe(
@@ -134,5 +130,4 @@ class ThesisPlant:
             return [nan] * len(self._held)
 
     def fault(self) -> str:
-        """See `Plant.fault`."""
         return self._fault

@@ -31,7 +31,7 @@ class UserControlledPlant(CommandedPlant):
         self._commands: dict[int, CheckedCommand] = {}  # by step
 
     def advance(self, steps: int) -> None:
-        """See `Plant.advance`. Raises `ControllerError` at the time the controller fails."""
+        """Raises `ControllerError` at the time the controller fails."""
         step = self.steps_taken
         self._commands = {known: c for known, c in self._commands.items() if known >= step}
         end = step + steps

@@ -49,7 +49,7 @@ class PythonController(ControllerTable):
         return self.function.rpartition(":")[2]
 
     def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
-        """See `ControllerTable.error_loops`: none is known."""
+        """None is known."""
         return []
 
 

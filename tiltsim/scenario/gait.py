@@ -161,7 +161,6 @@ class TwoColorGait(GaitTable):
 
     @property
     def size(self) -> tuple[str, object]:
-        """See `GaitTable.size`."""
         if self.rectangle is not None:
             return "rectangle", self.rectangle
         return ("radius", self.radius) if self.radius is not None else ("path", len(self.path))

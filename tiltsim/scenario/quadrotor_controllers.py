@@ -47,7 +47,6 @@ class YawPositionController(ControllerTable):
         return _yaw_position_gains(self.gains)
 
     def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
-        """See `ControllerTable.error_loops`."""
         return _yaw_position_loops(self.resolve_gains())
 
 
@@ -78,7 +77,6 @@ class QuadrotorAttitudeAltitudeController(ControllerTable):
         return _attitude_gains(self.gains)
 
     def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
-        """See `ControllerTable.error_loops`."""
         return _attitude_loops(self.resolve_gains())
 
 
@@ -127,7 +125,6 @@ class SwitchingController(ControllerTable):
         return _attitude_gains(self.attitude_gains)
 
     def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
-        """See `ControllerTable.error_loops`."""
         return [
             *_yaw_position_loops(self.resolve_gains()),
             *_attitude_loops(self.resolve_attitude_gains()),

@@ -63,17 +63,14 @@ class _PositionReference(_Reference):
 
     @property
     def adds_acceleration(self) -> bool:
-        """See `_Reference.adds_acceleration`."""
         return self.acceleration_feedforward
 
     @property
     def kind(self) -> ReferenceKind:
-        """See `_Reference.kind`."""
         return "position" if self.roll == self.pitch == 0.0 else "pose"
 
     @property
     def parameters(self) -> ReferenceParameters:
-        """See `_Reference.parameters`."""
         return ReferenceParameters(
             REFERENCE_TYPES[self.type],
             roll=self.roll,
@@ -209,12 +206,10 @@ class AttitudeAltitudeReference(_Reference):
 
     @property
     def kind(self) -> ReferenceKind:
-        """See `_Reference.kind`."""
         return "attitude_altitude"
 
     @property
     def parameters(self) -> ReferenceParameters:
-        """The record that the law reads."""
         return ReferenceParameters(
             REFERENCE_TYPES[self.type],
             z=self.altitude,

@@ -41,7 +41,6 @@ class ThirdDerivativeController(ControllerTable):
         return third_derivative.Gains(*self.gains)
 
     def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
-        """See `ControllerTable.error_loops`."""
         return [linear_loop("position", self.resolve_gains())]
 
 
@@ -72,12 +71,10 @@ class FourthDerivativeController(ControllerTable):
         return fourth_derivative.Gains(*self.gains)
 
     def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
-        """See `ControllerTable.error_loops`."""
         return [linear_loop("position", self.resolve_gains())]
 
     @property
     def rotors_stop_at_zero(self) -> bool:
-        """See `ControllerTable.rotors_stop_at_zero`."""
         return self.anti_windup
 
 
@@ -109,6 +106,5 @@ class PlannedDirectionController(ControllerTable):
         return planned_direction.GAIN_SETS[self.gains]
 
     def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
-        """See `ControllerTable.error_loops`."""
         gains = self.resolve_gains()
         return [linear_loop("x", gains[:2]), linear_loop("y", gains[2:])]

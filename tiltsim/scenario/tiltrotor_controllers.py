@@ -70,7 +70,6 @@ class IntegralPoleTable(PoleTable):
 
     @property
     def poles(self) -> Poles:
-        """See `PoleTable.poles`."""
         return Poles(self.bandwidth, self.damping, self.integral)
 
 
@@ -193,39 +192,32 @@ class AttitudeAltitudeController(ControllerTable):
         return terms._replace(**dict.fromkeys(self.leave_out, 0.0))
 
     def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
-        """See `ControllerTable.error_loops`."""
         if self.gait_rate_feedforward:
             return feedforward_loops(self.resolve_gains(), self.resolve_integral_gains())
         return error_loops(self.resolve_gains(), vehicle, DECOUPLINGS[self.decoupling])
 
     @property
     def loop_name(self) -> str:
-        """See `ControllerTable.loop_name`."""
         return "gait_feedforward" if self.gait_rate_feedforward else self.law
 
     @property
     def linearization(self) -> str:
-        """See `ControllerTable.linearization`."""
         return f"the {self.decoupling} decoupling matrix"
 
     @property
     def supervision(self) -> SupervisorTable | None:
-        """See `ControllerTable.supervision`."""
         return self.supervisor
 
     @property
     def omits_reference_acceleration(self) -> bool:
-        """See `ControllerTable.omits_reference_acceleration`."""
         return not self.gait_rate_feedforward
 
     @property
     def prioritizes_attitude(self) -> bool:
-        """See `ControllerTable.prioritizes_attitude`."""
         return self.allocation == "prioritized"
 
     @property
     def allocation_window(self) -> float:
-        """See `ControllerTable.allocation_window`."""
         return self.allocation_horizon
 
 
@@ -292,6 +284,5 @@ class FullPoseController(ControllerTable):
         return full_pose.Limits(inf if rate is None else rate, inf if angle is None else angle)
 
     def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
-        """See `ControllerTable.error_loops`."""
         gains = self.resolve_gains()
         return [linear_loop("position", gains[:3]), linear_loop("attitude", gains[3:])]

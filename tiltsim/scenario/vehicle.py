@@ -40,7 +40,6 @@ class TiltServoTable(ServoTable):
 
     @property
     def angle_limit(self) -> float | None:
-        """See `ServoTable.angle_limit`."""
         return self.max_angle
 
 

@@ -30,45 +30,39 @@ class VehicleViews(Protocol):
         """Panels and camera in Rerun."""
 
 
-class RotorcraftViews:
+class RotorcraftViews(VehicleViews):
     """Views of tiltrotor and quadrotor."""
 
     def figure(self, flight: Flight) -> Figure:
-        """See `VehicleViews.figure`."""
         from tiltsim.views.figures.rotorcraft import rotorcraft_figure
 
         return rotorcraft_figure(flight)
 
     def overlay(self, flight: Flight, height: int) -> Overlay:
-        """See `VehicleViews.overlay`."""
         from tiltsim.views.video.overlay import RotorcraftOverlay
 
         return RotorcraftOverlay(flight, height)
 
     def display(self) -> VehicleDisplay:
-        """See `VehicleViews.display`."""
         from tiltsim.views.rerun.rotorcraft_display import ROTORCRAFT_DISPLAY
 
         return ROTORCRAFT_DISPLAY
 
 
-class TiltCarViews:
+class TiltCarViews(VehicleViews):
     """Views of the tilt-car."""
 
     def figure(self, flight: Flight) -> Figure:
-        """See `VehicleViews.figure`."""
         from tiltsim.views.figures.tilt_car import tilt_car_figure
 
         return tilt_car_figure(flight)
 
     def overlay(self, flight: Flight, height: int) -> Overlay:
-        """See `VehicleViews.overlay`."""
         from tiltsim.views.video.overlay import TiltCarOverlay
 
         return TiltCarOverlay(flight, height)
 
     def display(self) -> VehicleDisplay:
-        """See `VehicleViews.display`."""
         from tiltsim.views.rerun.tilt_car_display import TILT_CAR_DISPLAY
 
         return TILT_CAR_DISPLAY

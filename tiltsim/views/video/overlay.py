@@ -42,7 +42,7 @@ class Overlay(Protocol):
         """Paint over the frame of a sample, in place."""
 
 
-class RotorcraftOverlay:
+class RotorcraftOverlay(Overlay):
     """Singularity margin, attitude, and the roll-pitch plane in the corner."""
 
     camera = CameraPose(7.5, 130.0, -24.0)
@@ -58,7 +58,6 @@ class RotorcraftOverlay:
         self.caption = Caption("shaded: unreachable attitudes", gap, self._inset.size + gap)
 
     def rows(self, sample: int) -> dict[str, str]:
-        """See `Overlay.rows`."""
         flight = self._flight
         return {
             "singularity margin": f"{abs(flight['singularity_margin'][sample]):.2f} rad",
@@ -66,7 +65,6 @@ class RotorcraftOverlay:
         }
 
     def paint(self, image: Image, sample: int) -> None:
-        """See `Overlay.paint`."""
         trail = self._attitude[self._trail_start(sample) : sample + 1 : 2]
         trail = np.concatenate([trail, self._attitude[sample : sample + 1]])
         margin = float(self._flight["singularity_margin"][sample])
@@ -81,7 +79,7 @@ class RotorcraftOverlay:
         return start - start % 2
 
 
-class TiltCarOverlay:
+class TiltCarOverlay(Overlay):
     """Rotor speeds and the direction error of a tilt-car, seen from above and behind."""
 
     camera = CameraPose(9.0, 90.0, -62.0)
@@ -91,7 +89,6 @@ class TiltCarOverlay:
         self._flight = flight
 
     def rows(self, sample: int) -> dict[str, str]:
-        """See `Overlay.rows`."""
         flight = self._flight
         squares = [flight[f"rotor_speed_{rotor}"][sample] ** 2 for rotor in (1, 2)]
         error = flight["direction_ref"][sample] - flight["direction"][sample]
@@ -101,4 +98,4 @@ class TiltCarOverlay:
         }
 
     def paint(self, image: Image, sample: int) -> None:
-        """See `Overlay.paint`; a tilt-car has no inset."""
+        """Paint nothing: a tilt-car has no inset."""
