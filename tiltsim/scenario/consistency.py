@@ -40,17 +40,15 @@ def check_consistency(scenario: ScenarioTables) -> None:
 def _check_law(scenario: ScenarioTables) -> None:
     controller, vehicle = scenario.controller, scenario.vehicle
     if vehicle.model not in controller.vehicle_models:
-        raise InvalidValueError(
+        raise scenario.mistake(
             "controller.law",
-            controller.law,
             f"controls the {' or '.join(controller.vehicle_models)}, and vehicle.model = "
             f"{vehicle.model!r}; choose {', '.join(laws_for(vehicle.model))}",
         )
     speed = scenario.initial.rotor_speed
     if isinstance(speed, tuple) and len(speed) != vehicle.rotor_count:
-        raise InvalidValueError(
+        raise scenario.mistake(
             "initial.rotor_speed",
-            speed,
             f"the {vehicle.model} has {vehicle.rotor_count} rotors; give one value or one each",
         )
     if vehicle.is_planar:
@@ -65,34 +63,25 @@ def _check_law(scenario: ScenarioTables) -> None:
 
 
 def _check_fixed_rotors(scenario: ScenarioTables) -> None:
-    vehicle = scenario.rotorcraft
-    defaults: list[tuple[str, object, object]] = [
-        ("gait.type", scenario.gait.type, "fixed"),
-        ("gait", scenario.gait.model_dump(), FixedGait().model_dump()),
-        ("vehicle.tilt_servo", vehicle.tilt_servo.model_dump(), TiltServoTable().model_dump()),
-        ("vehicle.pod", vehicle.pod.model_dump(), PodTable().model_dump()),
-    ]
+    keys = {"gait.type": "fixed", "gait": FixedGait()}
+    keys |= {"vehicle.tilt_servo": TiltServoTable(), "vehicle.pod": PodTable()}
     if not scenario.controller.is_external:  # external commands act on rotors with a speed
-        defaults += [
-            ("vehicle.min_rotor_speed", vehicle.min_rotor_speed, None),
-            ("vehicle.max_rotor_speed", vehicle.max_rotor_speed, None),
-            ("initial.rotor_speed", scenario.initial.rotor_speed, InitialTable().rotor_speed),
-        ]
-    for key, value, default in defaults:
-        if value != default:
-            raise InvalidValueError(
-                key,
-                value,
-                "not supported for the quadrotor, whose rotors do not tilt and produce the "
-                "commanded thrust at once; remove it",
-            )
+        keys |= {"vehicle.min_rotor_speed": None, "vehicle.max_rotor_speed": None}
+        keys["initial.rotor_speed"] = InitialTable().rotor_speed
+    for key, default in keys.items():
+        scenario.require(
+            key,
+            default,
+            "not supported for the quadrotor, whose rotors do not tilt and produce the "
+            "commanded thrust at once; remove it",
+        )
 
 
 def _check_actuators(scenario: ScenarioTables) -> None:
     vehicle = scenario.vehicle
     if scenario.has_air and vehicle.is_planar:
-        raise InvalidValueError(
-            "vehicle.model", vehicle.model, "aerodynamic effects are not supported; remove [air]"
+        raise scenario.mistake(
+            "vehicle.model", "aerodynamic effects are not supported; remove [air]"
         )
     supported = vehicle.has_tilting_rotors and not vehicle.is_planar
     for key, value, ideal in scenario.actuator_options:
@@ -101,15 +90,11 @@ def _check_actuators(scenario: ScenarioTables) -> None:
     faults = [(fault.rotor, fault.type == "stuck_servo") for fault in scenario.fault]
     for rotor, stuck in faults:
         if faults.count((rotor, stuck)) > 1:
-            raise InvalidValueError(
-                "fault.rotor",
-                rotor,
-                f"has more than one {'stuck servo' if stuck else 'loss of thrust'}",
-            )
+            twice = "stuck servo" if stuck else "loss of thrust"
+            raise InvalidValueError("fault.rotor", rotor, f"has more than one {twice}")
     if scenario.controller.prioritizes_attitude and not scenario.rotorcraft.has_rotor_limits:
-        raise InvalidValueError(
+        raise scenario.mistake(
             "controller.allocation",
-            "prioritized",
             "needs rotor limits: vehicle.min_rotor_speed or vehicle.max_rotor_speed",
         )
 
@@ -117,24 +102,18 @@ def _check_actuators(scenario: ScenarioTables) -> None:
 def _check_layout(scenario: ScenarioTables) -> None:
     user_vehicle = scenario.rotorcraft.user_vehicle
     if user_vehicle is not None and user_vehicle.layout_mismatch:
-        raise InvalidValueError(
+        raise scenario.mistake(
             "vehicle.mjcf",
-            scenario.rotorcraft.mjcf,
             f"{user_vehicle.layout_mismatch}; the {scenario.controller.law} law needs four equal "
             'arms at right angles, law = "python" supports any layout',
         )
 
 
 def _check_external(scenario: ScenarioTables) -> None:
-    simulation = scenario.simulation
-    for key, value, unsupported, only in (
-        ("plant", simulation.plant, "thesis", "mujoco plant"),
-        ("engine", simulation.engine, "native", "python engine"),
-    ):
-        if value == unsupported:
-            raise InvalidValueError(
-                f"simulation.{key}", value, f'law = "python" is supported on the {only} only'
-            )
+    reason = 'law = "python" is supported on the {} only'
+    scenario.require("simulation.plant", "mujoco", reason.format("mujoco plant"))
+    if scenario.simulation.engine == "native":
+        raise scenario.mistake("simulation.engine", reason.format("python engine"))
 
 
 def _check_model_error(scenario: ScenarioTables) -> None:
@@ -142,15 +121,11 @@ def _check_model_error(scenario: ScenarioTables) -> None:
     if error == ModelErrorTable():
         return
     if not isinstance(scenario.vehicle, VehicleTable):
-        raise InvalidValueError(
-            "vehicle.model",
-            scenario.vehicle.model,
-            "[model_error] is supported for rotorcraft only; remove it",
+        raise scenario.mistake(
+            "vehicle.model", "[model_error] is supported for rotorcraft only; remove it"
         )
-    if error.arm_length != 1.0 and scenario.vehicle.mjcf is not None:
-        raise InvalidValueError(
-            "model_error.arm_length", error.arm_length, "defined by vehicle.mjcf; remove it"
-        )
+    if scenario.vehicle.mjcf is not None:
+        scenario.require("model_error.arm_length", 1.0, "defined by vehicle.mjcf; remove it")
     require_physical_inertia(
         "model_error.inertia", list(error.inertia), scenario.true_rotorcraft[1:4]
     )
@@ -163,24 +138,19 @@ _SPATIAL_KEYS: Final = ("position", "velocity", "acceleration", "amplitude")
 def _check_plane(scenario: ScenarioTables) -> None:
     """Refuse motion out of a tilt-car's plane, and references of yaw, which is not controlled."""
     initial, reference = scenario.initial, scenario.reference
-    out_of_plane: list[tuple[str, tuple[float, ...], tuple[float, ...]]] = [
-        ("initial.position", initial.position, initial.position[2:]),
-        ("initial.velocity", initial.velocity, initial.velocity[2:]),
-        ("initial.attitude", initial.attitude, initial.attitude[:2]),
-        ("initial.angular_velocity", initial.angular_velocity, initial.angular_velocity[:2]),
-    ]
-    out_of_plane += [
-        (f"reference.{key}", value, value[2:]) for key, value in reference if key in _SPATIAL_KEYS
-    ]
-    for key, vector, components in out_of_plane:
+    out_of_plane: dict[str, tuple[float, ...]] = {
+        "initial.position": initial.position[2:],
+        "initial.velocity": initial.velocity[2:],
+        "initial.attitude": initial.attitude[:2],
+        "initial.angular_velocity": initial.angular_velocity[:2],
+    }
+    out_of_plane |= {f"reference.{key}": v[2:] for key, v in reference if key in _SPATIAL_KEYS}
+    for key, components in out_of_plane.items():
         if any(components):
-            raise InvalidValueError(
-                key, vector, "the tilt_car stays in its plane: only x, y and yaw may be nonzero"
+            raise scenario.mistake(
+                key, "the tilt_car stays in its plane: only x, y and yaw may be nonzero"
             )
-    if reference.yaw != 0.0:
-        raise InvalidValueError(
-            "reference.yaw", reference.yaw, "yaw is not an output of the tilt_car's laws"
-        )
+    scenario.require("reference.yaw", 0.0, "yaw is not an output of the tilt_car's laws")
 
 
 def _check_planar_gait(scenario: ScenarioTables) -> None:
@@ -188,19 +158,15 @@ def _check_planar_gait(scenario: ScenarioTables) -> None:
     allowed = scenario.controller.gait_types
     takes_none = allowed == ("fixed",)
     if gait.type not in allowed:
-        raise InvalidValueError(
+        raise scenario.mistake(
             "gait.type",
-            gait.type,
             f"the {law} law does not use a gait; remove [gait]"
             if takes_none
             else f"the {law} law needs one of {', '.join(allowed)}",
         )
-    if takes_none and gait != FixedGait():
-        raise InvalidValueError(
-            "gait",
-            gait.model_dump(mode="json"),
-            f"the {law} law commands the tilt itself; remove [gait]",
-        )
+    if takes_none:
+        reason = f"the {law} law commands the tilt itself; remove [gait]"
+        scenario.require("gait", FixedGait(), reason)
 
 
 def _check_reference(scenario: ScenarioTables) -> None:
@@ -211,32 +177,23 @@ def _check_reference(scenario: ScenarioTables) -> None:
     if reference.kind not in kinds:
         if reference.kind == "pose":
             key = "roll" if reference.roll else "pitch"
-            raise InvalidValueError(
-                f"reference.{key}",
-                reference.roll or reference.pitch,
-                f"roll and pitch are not outputs of the {controller.law} law",
-            )
-        raise InvalidValueError(
-            "reference.type", reference.type, f"the {controller.law} law cannot track it"
-        )
+            reason = f"roll and pitch are not outputs of the {controller.law} law"
+            raise scenario.mistake(f"reference.{key}", reason)
+        raise scenario.mistake("reference.type", f"the {controller.law} law cannot track it")
     if reference.type == "waypoints" and scenario.vehicle.is_planar:
-        raise InvalidValueError(
-            "reference.type", reference.type, "the tilt_car's laws cannot track it"
-        )
+        raise scenario.mistake("reference.type", "the tilt_car's laws cannot track it")
     if reference.adds_acceleration and not controller.omits_reference_acceleration:
         own = isinstance(controller, AttitudeAltitudeController)
         option = " with gait_rate_feedforward" if own else ""
-        raise InvalidValueError(
+        raise scenario.mistake(
             "reference.acceleration_feedforward",
-            True,
             f"the {controller.law} law{option} always includes all derivatives; remove it",
         )
     if isinstance(controller, AttitudeAltitudeController):
         needs_none = reference.kind == "attitude_altitude"
         if needs_none != (controller.decoupler == "none"):
-            raise InvalidValueError(
+            raise scenario.mistake(
                 "controller.decoupler",
-                controller.decoupler,
                 f"reference.type = {reference.type!r} needs "
                 + ("none" if needs_none else "conventional, modified or exact"),
             )
@@ -270,9 +227,8 @@ def _check_gait(scenario: ScenarioTables) -> None:
             f"too many waypoints: {total} numbers with the gait's, at most {MAX_KNOTS}",
         )
     if scenario.controller.commands_tilts and not gait.is_constant:
-        raise InvalidValueError(
+        raise scenario.mistake(
             "gait.type",
-            scenario.gait.type,
             f"the {scenario.controller.law} law commands the tilts itself; give the initial angles "
             "as a fixed gait",
         )
@@ -283,26 +239,16 @@ def _check_ground(scenario: ScenarioTables) -> None:
     if ground is None:
         return
     if scenario.vehicle.is_planar:
-        raise InvalidValueError(
-            "ground", ground.model_dump(), "not supported for the tilt_car, which moves in a plane"
-        )
-    if scenario.simulation.plant == "thesis":
-        raise InvalidValueError(
-            "simulation.plant", "thesis", "its equations have no ground contact; use mujoco"
-        )
+        raise scenario.mistake("ground", "not supported for the tilt_car, which moves in a plane")
+    reason = "its equations have no ground contact; use mujoco"
+    scenario.require("simulation.plant", "mujoco", reason)
     user_vehicle = scenario.rotorcraft.user_vehicle
     if user_vehicle is not None and not user_vehicle.has_contact_geoms:
-        raise InvalidValueError(
-            "ground",
-            ground.model_dump(),
-            "vehicle.mjcf needs a geom 'ground', and geoms whose names end in 'collision'",
+        raise scenario.mistake(
+            "ground", "vehicle.mjcf needs a geom 'ground', and geoms whose names end in 'collision'"
         )
     if scenario.initial.position[2] < ground.height:
-        raise InvalidValueError(
-            "initial.position",
-            scenario.initial.position,
-            f"below ground.height = {ground.height}",
-        )
+        raise scenario.mistake("initial.position", f"below ground.height = {ground.height}")
 
 
 def _check_rotor_limits(scenario: ScenarioTables) -> None:

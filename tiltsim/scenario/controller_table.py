@@ -18,6 +18,7 @@ ReferenceKind = Literal["position", "attitude_altitude", "pose"]
 class ControllerTable(Table, ABC):
     """What every controller has; properties are neutral where a controller lacks the feature."""
 
+    table_name = "controller"
     vehicle_models: ClassVar[tuple[str, ...]]
     reference_kinds: ClassVar[tuple[ReferenceKind, ...]]
     gait_types: ClassVar[tuple[str, ...]] = ("fixed",)  # of the tilt-car's controllers

@@ -6,13 +6,15 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from tiltsim.scenario.messages import InvalidValueError, choose
+from tiltsim.scenario.messages import choose
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS, METRICS
 from tiltsim.scenario.table import NonNegative, Range, Table
 
 
 class Expectation(Table):
     """A bound on a metric, evaluated after the flight."""
+
+    table_name = "expect"
 
     # An editor completes the names; the message on an unknown one is ours.
     metric: str = Field(json_schema_extra={"enum": list(METRICS)})
@@ -44,35 +46,28 @@ class Expectation(Table):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.metric not in METRICS:
-            raise InvalidValueError("expect.metric", self.metric, choose(self.metric, METRICS))
+            raise self.mistake("metric", choose(self.metric, METRICS))
         boolean = self.metric in BOOLEAN_METRICS
         bounded = self.min is not None or self.max is not None
         if boolean and (bounded or self.equals is None):
-            raise InvalidValueError(
-                "expect.metric", self.metric, "is true or false: give equals only"
-            )
+            raise self.mistake("metric", "is true or false: give equals only")
         if not boolean and (self.equals is not None or not bounded):
-            raise InvalidValueError(
-                "expect.metric", self.metric, "is a number: give min, max or both"
-            )
+            raise self.mistake("metric", "is a number: give min, max or both")
         if self.min is not None and self.max is not None and self.min > self.max:
-            raise InvalidValueError("expect.min", self.min, f"must not exceed max = {self.max}")
+            raise self.mistake("min", f"must not exceed max = {self.max}")
         self._check_claim(boolean)
         return self
 
     def _check_claim(self, boolean: bool) -> None:
         published = self.published
         if boolean and published is not None and not isinstance(published, bool):
-            raise InvalidValueError(
-                "expect.published", published, f"{self.metric} is true or false"
-            )
+            raise self.mistake("published", f"{self.metric} is true or false")
         if published is None:
             needs = "needs published: a number, true or false"
-            self._require_defaults("expect", ("claim", "why", "wrong"), needs)
+            self.require_defaults(("claim", "why", "wrong"), needs)
         if published is None or isinstance(published, bool):
-            numeric = ("published_tolerance", "in_kind")
-            self._require_defaults("expect", numeric, "needs a published number")
+            self.require_defaults(("published_tolerance", "in_kind"), "needs a published number")
         if self.wrong and not self.why:
-            raise InvalidValueError("expect.wrong", True, "needs why")
+            raise self.mistake("wrong", "needs why")
         if self.in_kind is not None and not self.in_kind[0] <= self.in_kind[1]:
-            raise InvalidValueError("expect.in_kind", self.in_kind, "write [low, high]")
+            raise self.mistake("in_kind", "write [low, high]")

@@ -8,7 +8,6 @@ from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import Angle, Angles2, Angles4, Factor, Period, Positive, Table
 from tiltsim_controllers.analysis.two_color_planner import (
     Circle,
@@ -27,6 +26,7 @@ from tiltsim_controllers.vehicle.parameters import Vehicle
 class GaitTable(Table, ABC):
     """The keys of every gait: a common scale, and a bias on the two rear angles."""
 
+    table_name = "gait"
     size_key: ClassVar[str]
 
     scale: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(
@@ -140,9 +140,7 @@ class TwoColorGait(GaitTable):
         circle = (self.centre is not None) + (self.radius is not None)
         given = (self.rectangle is not None, circle > 0, bool(self.path))
         if sum(given) != 1 or circle == 1:
-            raise InvalidValueError(
-                "gait.type", "two_color", "give one of rectangle, centre with radius, and path"
-            )
+            raise self.mistake("type", "give one of rectangle, centre with radius, and path")
         return self
 
     @property

@@ -9,7 +9,6 @@ from pydantic import Discriminator, Field, Tag, model_validator
 import tiltsim_controllers.laws.quadrotor_attitude_altitude as quadrotor_attitude_altitude
 import tiltsim_controllers.laws.yaw_position as yaw_position
 from tiltsim.scenario.controller_table import ControllerTable, gain_kind
-from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import Gains2, Gains4, Positive, Table
 from tiltsim_controllers.analysis.stability import (
     ErrorLoop,
@@ -83,6 +82,8 @@ class QuadrotorAttitudeAltitudeController(ControllerTable):
 class ZoneTable(Table):
     """Attitudes at which attitude-altitude control is active, edges included; Eq. (47)."""
 
+    table_name = "controller.zone"
+
     roll: Gains2 = Field((PUBLISHED_ZONE.roll_min, PUBLISHED_ZONE.roll_max), description="rad")
     pitch: Gains2 = Field((PUBLISHED_ZONE.pitch_min, PUBLISHED_ZONE.pitch_max), description="rad")
 
@@ -91,9 +92,7 @@ class ZoneTable(Table):
         for key in ("roll", "pitch"):
             low, high = getattr(self, key)
             if low > high:
-                raise InvalidValueError(
-                    f"controller.zone.{key}", [low, high], "the first must not exceed the second"
-                )
+                raise self.mistake(key, "the first must not exceed the second")
         return self
 
 

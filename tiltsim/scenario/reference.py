@@ -10,7 +10,6 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from tiltsim.scenario.controller_table import ReferenceKind
-from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import Angle, Angles3, Positive, Table, Vector3
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.mathematics.scalar import Triple, Values
@@ -22,6 +21,8 @@ Tilt = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
 
 class _Reference(Table, ABC):
     """What every reference has."""
+
+    table_name = "reference"
 
     @property
     @abstractmethod
@@ -123,7 +124,7 @@ class CircleReference(_PositionReference):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.radius == 0.0:
-            raise InvalidValueError("reference.radius", self.radius, "must not be 0")
+            raise self.mistake("radius", "must not be 0")
         return self
 
 
@@ -180,7 +181,7 @@ class WaypointReference(_PositionReference):
         try:
             _ = self.knots
         except ValueError as error:
-            raise InvalidValueError("reference.times", self.times, str(error)) from None
+            raise self.mistake("times", str(error)) from None
         return self
 
 

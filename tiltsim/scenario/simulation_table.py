@@ -6,7 +6,6 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import (
     Angles3,
     NonNegative,
@@ -26,6 +25,8 @@ MAX_LATENCY_STEPS: Final = 20
 
 class SimulationTable(Table):
     """How the flight is integrated."""
+
+    table_name = "simulation"
 
     duration: Positive = Field(40.0, description="s")
     timestep: Annotated[float, Field(ge=1e-6, le=0.1)] = Field(0.001, description="s, physics")
@@ -75,17 +76,11 @@ class SimulationTable(Table):
                 continue
             steps = value / self.timestep
             if steps > MAX_STEPS:
-                raise InvalidValueError(
-                    f"simulation.{key}", value, f"more than {MAX_STEPS:.0e} steps of timestep"
-                )
+                raise self.mistake(key, f"more than {MAX_STEPS:.0e} steps of timestep")
             if value > self.duration:
-                raise InvalidValueError(
-                    f"simulation.{key}", value, f"longer than the flight, {self.duration} s"
-                )
+                raise self.mistake(key, f"longer than the flight, {self.duration} s")
             if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
-                raise InvalidValueError(
-                    f"simulation.{key}", value, f"must be a multiple of timestep = {self.timestep}"
-                )
+                raise self.mistake(key, f"must be a multiple of timestep = {self.timestep}")
         self._check_latency()
         return self
 
@@ -94,16 +89,13 @@ class SimulationTable(Table):
         if latency == 0.0:
             return
         if period == 0.0:
-            raise InvalidValueError(
-                "simulation.control_latency",
-                latency,
-                "must be a multiple of control_timestep, which is 0",
+            raise self.mistake(
+                "control_latency", "must be a multiple of control_timestep, which is 0"
             )
         steps = latency / period
         if abs(steps - round(steps)) > 1e-6 * steps or not 1 <= round(steps) <= MAX_LATENCY_STEPS:
-            raise InvalidValueError(
-                "simulation.control_latency",
-                latency,
+            raise self.mistake(
+                "control_latency",
                 f"must be 1 to {MAX_LATENCY_STEPS} times control_timestep = {period}",
             )
 

@@ -7,7 +7,6 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import Positive, Table
 from tiltsim_controllers.gaits.red_gait import determinant_at_clearance
 from tiltsim_controllers.laws.supervisor import STRATEGIES, Supervisor
@@ -16,6 +15,8 @@ from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
 class SupervisorTable(Table):
     """Keeps a gait away from singular matrices; see `tiltsim_controllers.laws.supervisor`."""
+
+    table_name = "controller.supervisor"
 
     strategy: Literal["scale", "hold", "return_to_red"] = Field(
         "scale", description="shrink the gait, stop its clock, or go to the nearest red gait"
@@ -50,7 +51,7 @@ class SupervisorTable(Table):
         ):
             if self.strategy not in strategies:
                 needs = f"needs controller.supervisor.strategy = {' or '.join(strategies)}"
-                self._require_defaults("controller.supervisor", keys, needs)
+                self.require_defaults(keys, needs)
         return self
 
     def resolve(self, vehicle: Vehicle) -> Supervisor:
@@ -71,7 +72,7 @@ class SupervisorTable(Table):
                     f"{self.min_determinant:g}; use a larger clearance"
                 )
             if mistake:
-                raise InvalidValueError("controller.supervisor.clearance", self.clearance, mistake)
+                raise self.mistake("clearance", mistake)
         return Supervisor(
             self.min_margin,
             self.min_determinant,

@@ -100,6 +100,8 @@ class DragTable(Table):
 class GustTable(Table):
     """A discrete gust of the shape 1 - cos (MIL-F-8785C)."""
 
+    table_name = "air.gust"
+
     velocity: Vector3 = Field(description="m/s, world, at its peak")
     start: NonNegative = Field(0.0, description="s")
     rise: Positive = Field(description="time to reach the peak, and to decay from it, s")
@@ -108,11 +110,7 @@ class GustTable(Table):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if 0.0 < self.duration < 2.0 * self.rise:
-            raise InvalidValueError(
-                "air.gust.duration",
-                self.duration,
-                f"must be 0 or at least twice rise = {self.rise}",
-            )
+            raise self.mistake("duration", f"must be 0 or at least twice rise = {self.rise}")
         return self
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from math import pi
-from typing import Annotated
+from operator import attrgetter
+from typing import Annotated, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -34,10 +35,20 @@ class Table(BaseModel):
     """A table of the scenario file: unknown keys, NaN and loose types are errors."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    table_name: ClassVar[str] = ""  # before its keys in messages; empty for the whole document
 
-    def _require_defaults(self, name: str, keys: Iterable[str], reason: str) -> None:
+    def mistake(self, key: str, allowed: str) -> InvalidValueError:
+        """The error of the value of a dotted key that is not allowed; see `InvalidValueError`."""
+        value = attrgetter(key)(self)
+        shown = value.model_dump() if isinstance(value, BaseModel) else value
+        return InvalidValueError(f"{self.table_name}.{key}".removeprefix("."), shown, allowed)
+
+    def require(self, key: str, value: object, reason: str) -> None:
+        """Refuse any other value of a dotted key, for a reason."""
+        if attrgetter(key)(self) != value:
+            raise self.mistake(key, reason)
+
+    def require_defaults(self, keys: Iterable[str], reason: str) -> None:
         """Refuse keys that are set although they have no effect, for a reason."""
         for key in keys:
-            value = getattr(self, key)
-            if value != type(self).model_fields[key].default:
-                raise InvalidValueError(f"{name}.{key}", value, reason)
+            self.require(key, type(self).model_fields[key].default, reason)

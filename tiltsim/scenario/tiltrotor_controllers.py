@@ -9,7 +9,6 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 import tiltsim_controllers.laws.full_pose as full_pose
 from tiltsim.scenario.controller_table import ControllerTable, gain_kind
-from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.supervisor_table import SupervisorTable
 from tiltsim.scenario.table import Gains2, NonNegative, Positive, Table, Vector3
 from tiltsim_controllers.analysis.stability import (
@@ -154,18 +153,14 @@ class AttitudeAltitudeController(ControllerTable):
     def _check(self) -> Self:
         if not self.gait_rate_feedforward:
             needs = "needs controller.gait_rate_feedforward = true"
-            self._require_defaults("controller", _RATE_KEYS, needs)
+            self.require_defaults(_RATE_KEYS, needs)
             if any(self.resolve_integral_gains()):
-                gains = self.model_dump()["gains"]
-                raise InvalidValueError("controller.gains", gains, f"integral action {needs}")
+                raise self.mistake("gains", f"integral action {needs}")
             return self
         for key, choices in (("decoupling", ("exact",)), ("decoupler", ("exact", "none"))):
             if getattr(self, key) not in choices:
-                raise InvalidValueError(
-                    f"controller.{key}",
-                    getattr(self, key),
-                    f"gait_rate_feedforward = true needs {' or '.join(choices)}",
-                )
+                needs = f"gait_rate_feedforward = true needs {' or '.join(choices)}"
+                raise self.mistake(key, needs)
         return self
 
     def resolve_gains(self) -> Gains:

@@ -6,7 +6,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim_controllers.analysis.stability import ErrorLoop
 from tiltsim_controllers.laws.supervisor import LAG
@@ -49,9 +48,8 @@ def _check_servo(scenario: ScenarioTables) -> None:
     # On the thesis plant ideal pods follow the gait exactly.
     moves = plant == "mujoco" or not scenario.has_ideal_actuators_in_still_air
     if scenario.vehicle.has_tilting_rotors and moves and fastest * timestep > limit:
-        raise InvalidValueError(
+        raise scenario.mistake(
             "simulation.timestep",
-            timestep,
             f"too long for a tilt servo at {servo.natural_frequency:g} rad/s; at most "
             f"{limit / fastest:.3g} s, or a slower vehicle.tilt_servo",
         )
@@ -66,9 +64,8 @@ def _check_supervisor(scenario: ScenarioTables) -> None:
     longest = MAX_HELD_STEP * LAG
     step, strategy = scenario.simulation.control_timestep, supervisor.strategy
     if strategy != "scale" and step >= longest:
-        raise InvalidValueError(
+        raise scenario.mistake(
             "simulation.control_timestep",
-            step,
             f"too long for controller.supervisor.strategy = {strategy}, which moves with a lag "
             f"of {LAG:g} s; below {longest:g} s",
         )
@@ -81,9 +78,8 @@ def _check_stability(scenario: ScenarioTables) -> None:
     vehicle: Any = scenario.vehicle.resolve()  # each controller's table takes its own vehicle
     for loop in controller.error_loops(vehicle):
         if not loop.stable:
-            raise InvalidValueError(
+            raise scenario.mistake(
                 "controller.gains",
-                controller.model_dump()["gains"],
                 f"fails the Routh-Hurwitz criterion under {controller.linearization}: "
                 f"{loop.condition}; change the gains or set controller.allow_unstable = true",
             )
@@ -101,9 +97,8 @@ def _check_speed(scenario: ScenarioTables, loop: ErrorLoop) -> None:
     for key, limit in limits.items():
         step = getattr(scenario.simulation, key)
         if fastest * step > limit:
-            raise InvalidValueError(
+            raise scenario.mistake(
                 f"simulation.{key}",
-                step,
                 f"too long for the {loop.name} loop under "
                 f"{scenario.controller.linearization}, with its fastest pole at {fastest:.4g} "
                 f"rad/s; at most {limit / fastest:.3g} s, or slower gains, or "

@@ -54,20 +54,7 @@ class PodTable(Table):
 
 
 def require_physical_inertia(key: str, value: object, moments: tuple[float, ...]) -> None:
-    """Refuse principal moments of inertia that no body can have.
-
-    Parameters
-    ----------
-    key, value
-        What the message names: the key of the scenario and its value.
-    moments
-        Principal moments, kg m^2.
-
-    Raises
-    ------
-    InvalidValueError
-        If they violate the triangle inequality.
-    """
+    """Raise `InvalidValueError` for principal moments (kg m^2) that no body can have."""
     a, b, c = sorted(moments)
     if a + b < c:
         raise InvalidValueError(
@@ -80,6 +67,7 @@ def require_physical_inertia(key: str, value: object, moments: tuple[float, ...]
 class AnyVehicleTable(Table, ABC):
     """What every vehicle has."""
 
+    table_name = "vehicle"
     rotor_count: ClassVar[int]
     is_planar: ClassVar[bool] = False  # moves on a plane, without gravity, air or ground
 
@@ -162,29 +150,17 @@ class VehicleTable(AnyVehicleTable):
         try:
             return read_user_vehicle(self.mjcf, self.model)
         except ValueError as error:
-            raise InvalidValueError("vehicle.mjcf", self.mjcf, str(error)) from None
-
-    def _check_mjcf(self) -> None:
-        for key, value, default in (
-            ("arm_length", self.arm_length, None),
-            ("pod", self.pod.model_dump(), PodTable().model_dump()),
-        ):
-            if value != default:
-                raise InvalidValueError(
-                    f"vehicle.{key}", value, "defined by vehicle.mjcf; remove it"
-                )
+            raise self.mistake("mjcf", str(error)) from None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.mjcf is not None:
-            self._check_mjcf()
+            self.require_defaults(("arm_length", "pod"), "defined by vehicle.mjcf; remove it")
         moments = self.resolve()[1:4]
         require_physical_inertia("vehicle.inertia", sorted(moments), moments)
         low, high = self.min_rotor_speed, self.max_rotor_speed
         if low is not None and high is not None and low >= high:
-            raise InvalidValueError(
-                "vehicle.min_rotor_speed", low, f"must be below max_rotor_speed = {high}"
-            )
+            raise self.mistake("min_rotor_speed", f"must be below max_rotor_speed = {high}")
         return self
 
 
