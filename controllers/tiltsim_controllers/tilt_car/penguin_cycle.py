@@ -35,7 +35,7 @@ class Swing:
     ----------
     half_angle : ``theta``, rad
     half_period : ``T / 2``, s
-    gains : the law's
+    gains : of the controller
     reference_acceleration : along x, m/s^2
     """
 

@@ -19,7 +19,7 @@ and slows down on the way there, as ``W`` grows without bound.
 
 from __future__ import annotations
 
-from math import cos, log, pi, sin, tan
+from math import cos, log, sin, tan
 from typing import NamedTuple
 
 import numpy as np
@@ -62,12 +62,6 @@ def drift_rate(lean: float, path: Orbit, car: TiltCar) -> float:
     """The rate (rad/s) at which the lean (rad) advances under the minimum-norm controller."""
     stiffness = lean_stiffness(lean, path.acceleration, car)
     return path.angular_frequency / (1.0 + turn_per_tilt(car) ** 2 * stiffness)
-
-
-def holonomy(lean: float, path: Orbit, car: TiltCar) -> float:
-    """The advance (rad) of the lean over one lap that begins with this lean (rad)."""
-    time = 2.0 * pi / abs(path.angular_frequency)
-    return lean_after(time, lean, path, car) - lean
 
 
 def turned_angle(lean: float, path: Orbit, car: TiltCar) -> float:

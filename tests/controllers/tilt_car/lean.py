@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from math import copysign, cos, sin
+from math import copysign, cos, pi, sin
 
 import numpy as np
 
-from tiltsim_controllers.tilt_car.state_drift import drift_rate, turned_angle
+from tiltsim_controllers.tilt_car.state_drift import drift_rate, lean_after, turned_angle
 from tiltsim_controllers.tilt_car.vehicle import body_acceleration, squared_speeds
 
 
@@ -71,3 +71,9 @@ def restored_lean(path, car, rate):
         else:
             high = middle
     return copysign(low, path.angular_frequency)
+
+
+def holonomy(lean, path, car):
+    """The advance (rad) of the lean over one lap that begins with this lean (rad)."""
+    time = 2.0 * pi / abs(path.angular_frequency)
+    return lean_after(time, lean, path, car) - lean

@@ -12,6 +12,7 @@ from scipy.integrate import quad
 
 from tests.controllers.tilt_car.lean import (
     drift_time,
+    holonomy,
     lean_of,
     lean_of_split,
     restored_lean,
@@ -20,7 +21,6 @@ from tests.controllers.tilt_car.lean import (
 from tiltsim_controllers.tilt_car.state_drift import (
     Orbit,
     drift_rate,
-    holonomy,
     lean_after,
     lean_stiffness,
     orbit,
