@@ -117,6 +117,17 @@ def test_seven_classes_as_published_and_none_mixed(vehicle) -> None:
     assert sum(classes.values()) == 2 * 15 * 15
 
 
+@pytest.mark.parametrize(("share", "plane"), [(0.999, "?"), (1.001, "+")])
+def test_planes_count_as_intersecting_within_half_a_grid_step(share, plane) -> None:
+    """Without tilt they are ``2 delta`` apart; the grid of 17 points has steps of pi / 16."""
+    ratio = np.tan(0.5 * share * 0.5 * np.pi / 16.0)
+    lever = AR_DRONE.arm_length * AR_DRONE.thrust_coefficient
+    vehicle = AR_DRONE._replace(drag_coefficient=float(ratio * lever))
+    untilted = grid_roots(vehicle)[8][8]
+    found = {(root.plane_3, root.plane_4) for root in untilted if abs(root.alpha_3) < 1e-9}
+    assert found == {(plane, plane)}
+
+
 def test_positive_residual_needs_red_and_fills_a_triangle(vehicle) -> None:
     """R > 0 for one root of each pair above the diagonal.
 

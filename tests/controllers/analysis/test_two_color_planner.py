@@ -64,6 +64,13 @@ def test_a_red_path_that_only_touches_l_is_refused() -> None:
     assert report.crossings == (pytest.approx(on_l),)
 
 
+def test_a_red_path_that_ends_its_leg_just_before_l_does_not_cross_it() -> None:
+    start, on_l = np.array((0.6, -0.6)), np.array((0.5, float(curve_l(0.5, AR_DRONE))))
+    near = start + 0.97 * (on_l - start)
+    report = check_path(polygon(((0.6, -0.6), (near[0], near[1]), (0.8, -0.5)), "red"), AR_DRONE)
+    assert report.crossings == ()
+
+
 def test_a_red_path_that_dips_across_l_between_samples_is_refused() -> None:
     """A circle tangent to L, moved across by 1e-7: two crossings about 1e-3 apart."""
     first, offset = 0.2, 1e-7

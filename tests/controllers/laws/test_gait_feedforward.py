@@ -460,6 +460,11 @@ def test_in_free_fall_the_decoupler_has_no_answer():
         assert all(map(isnan, jet))
 
 
+def test_a_force_without_vertical_part_counts_as_along_its_direction():
+    turning = ((1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 0.0))
+    assert jerk_along(turning, (10.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0) == (0.0, 20.0, 0.0)
+
+
 @pytest.mark.parametrize("counted", [0.0, 0.5, 1.0])
 def test_the_jerk_is_that_of_a_force_that_turns_with_the_body_and_with_its_direction(counted):
     random = np.random.default_rng(12)

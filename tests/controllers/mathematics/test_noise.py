@@ -21,6 +21,26 @@ def test_the_hash_permutes_words():
     assert max(words) < 2**32
 
 
+def published_inverse(word):
+    """The inverse of the permutation, from the same source: ``lowbias32_r``."""
+    word ^= word >> 16
+    word = word * 0x43021123 & 0xFFFFFFFF
+    word ^= word >> 15 ^ word >> 30
+    word = word * 0x1D69E2A5 & 0xFFFFFFFF
+    return word ^ word >> 16
+
+
+def test_the_published_inverse_undoes_the_hash():
+    words = [*range(100), *np.random.default_rng(0).integers(0, 2**32, 1000).tolist(), 2**32 - 1]
+    assert [published_inverse(hash_word(word)) for word in words] == words
+
+
+def test_a_draw_uses_seed_channel_and_index_in_turn():
+    word = hash_word((hash_word((hash_word(5) + 7) % 2**32) + 11) % 2**32)
+    assert uniform(5.0, 7.0, 11.0) == (word + 0.5) / 2**32
+    assert uniform(5.0 + 2.0**32, 7.0, 11.0) == uniform(5.0, 7.0, 11.0)
+
+
 def test_a_changed_bit_changes_half_of_the_bits():
     flips = [
         bin(hash_word(word) ^ hash_word(word ^ (1 << bit))).count("1")
