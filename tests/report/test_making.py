@@ -23,7 +23,7 @@ from tiltsim.report.flights import FlightRecord, Unsupported, fly, report_entrie
 from tiltsim.report.html_page import page
 from tiltsim.report.making import make_report
 from tiltsim.report.markdown import markdown
-from tiltsim.report.pictures import AnalysisPicture
+from tiltsim.report.pictures import Picture
 from tiltsim.report.store import flight_key
 from tiltsim.studies.checking import collect
 from tiltsim.views.figures.style import CYCLE, new_figure
@@ -199,7 +199,7 @@ def full(report):
 
     figure = Figure(figsize=(2.0, 1.0))
     figure.subplots().plot([0.0, 1.0])
-    picture = AnalysisPicture(4, "line", "A <line>", draw=lambda: figure)
+    picture = Picture(4, "line", "A <line>", lambda _: figure)
     return dataclasses.replace(report, findings=FINDINGS, drawings=[Drawing(picture, png(figure))])
 
 

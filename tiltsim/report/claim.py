@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from decimal import Decimal
 from enum import Enum
 from math import isfinite
@@ -42,7 +42,7 @@ class ClaimVerdict(Enum):
         return list(ClaimVerdict).index(self)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Claim:
     """One statement of the thesis that has a number or a yes/no answer.
 
@@ -53,6 +53,7 @@ class Claim:
     """Chapter first, then section, figure or equation: "ch. 3, Sec. 4, Eq. (19)"."""
     statement: str
     """The statement of the thesis, one sentence in our words."""
+    _: KW_ONLY
     published: Published = True
     """The published value; True if the thesis says that the statement holds."""
     case: str = ""
@@ -109,7 +110,7 @@ class Claim:
         return float(digits), half_a_digit if self.tolerance is None else self.tolerance
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class AnalysisClaim(Claim):
     """A claim that is computed, without a flight."""
 
@@ -121,7 +122,7 @@ class AnalysisClaim(Claim):
         return f"{self.source}: {self.statement} [{self.case}]"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class FlightClaim(Claim):
     """A claim about several flights, for example that one tracks better than another."""
 

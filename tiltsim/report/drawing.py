@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from tiltsim.report.claim import Metrics
-from tiltsim.report.flights import FlightRecord, Flights, Plant, ReportEntry
-from tiltsim.report.pictures import PICTURES, AnalysisPicture, Picture
-from tiltsim.report.store import code_digest, sources_digest, store
+from tiltsim.report.flights import FlightRecord, Flights, ReportEntry
+from tiltsim.report.pictures import PICTURES, FlightMetrics, Picture
+from tiltsim.report.store import code_digest, flight_key, sources_digest, store
 from tiltsim.report.workers import results
 from tiltsim.scenario.scenario import Scenario
 
@@ -67,9 +65,10 @@ def draw_all(
     metrics = {key: r.metrics for key, r in flights.items() if isinstance(r, FlightRecord)}
     files: dict[str, Path] = {}
     for picture in PICTURES:
-        content = picture.content(scenarios, metrics)
-        if content is not None and (whole or not isinstance(picture, AnalysisPicture)):
-            digest = hashlib.sha256(style + picture.name.encode() + content.encode()).hexdigest()
+        if (picture.flights or whole) and all(flight in scenarios for flight in picture.flights):
+            shown = [scenarios[flight] for flight in picture.flights]
+            content = [picture.name, *(flight_key(one) + one.title for one in shown)]
+            digest = hashlib.sha256(style + "".join(content).encode()).hexdigest()
             files[picture.name] = folder / f"{digest[:24]}.png"
     missing = [(name, file) for name, file in files.items() if not file.is_file()]
     for _ in results(
@@ -83,10 +82,10 @@ def draw_all(
     ]
 
 
-def _draw_one(task: tuple[str, Path], metrics: Mapping[tuple[str, Plant], Metrics]) -> None:
+def _draw_one(task: tuple[str, Path], metrics: FlightMetrics) -> None:
     name, file = task
     picture = next(candidate for candidate in PICTURES if candidate.name == name)
-    store(file, png(picture.figure(metrics)))
+    store(file, png(picture.draw(metrics)))
 
 
 def png(figure: Figure) -> bytes:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise, product
 from math import hypot
 from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from tiltsim.report.claim import Metrics
+from tiltsim.report.claim import AnalysisClaim, Metrics
 from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS, robustness
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.analysis.stability import third_order_loop
@@ -49,6 +49,32 @@ def determinant_coefficients(vehicle: Vehicle) -> Coefficients:
     angles = [[np.pi / 2 if letter == "s" else 0.0 for letter in name] for name in names]
     values = residuals(angles, vehicle)
     return Coefficients(*(dict(zip(names, part.tolist(), strict=True)) for part in values))
+
+
+def coefficient_claims(
+    source: str,
+    statement: str,
+    vehicle: Vehicle,
+    printed: Iterable[tuple[str, str, str, str]],
+    scale: float = 1.0,
+) -> Iterator[AnalysisClaim]:
+    """Claims about single coefficients of the determinant, up to their sign.
+
+    Parameters
+    ----------
+    source, statement, vehicle
+        Common to all.
+    printed
+        For each the published value, the part of the determinant, the product, and the case.
+    scale
+        Constant by which the chapter multiplies the determinant.
+    """
+    for value, part, product_, case in printed:
+
+        def measure(part: str = part, name: str = product_) -> float:
+            return scale * abs(float(getattr(determinant_coefficients(vehicle), part)[name]))
+
+        yield AnalysisClaim(source, statement, measure, case=case, published=value)
 
 
 def worst_coefficient(printed: Coefficients, vehicle: Vehicle) -> float:
@@ -114,6 +140,12 @@ def grows(value: Quantity, flights: Mapping[str, Metrics]) -> bool:
 def falls(value: Quantity, flights: Mapping[str, Metrics]) -> bool:
     """Whether a metric decreases from each flight of the claim to the next."""
     return grows(value, dict(reversed(list(flights.items()))))
+
+
+def planned_gait_tilts_less(flights: Mapping[str, Metrics]) -> bool:
+    """Whether the second flight, with the planned gait, tilts a hundred times more slowly."""
+    own, planned = (float(metrics["max_tilt_rate"]) for metrics in flights.values())
+    return planned < 0.01 * own
 
 
 def no_rotor_stops(flights: Mapping[str, Metrics]) -> bool:

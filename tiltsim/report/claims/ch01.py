@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from math import acos, hypot
 from typing import Final
 
 import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
+from tiltsim.report.measures import planned_gait_tilts_less
 from tiltsim_controllers.analysis.singularity import torque_free_direction
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
@@ -34,11 +34,6 @@ def _some_gait_tilts_more_than_the_quadrotor() -> bool:
     return lean > acos(float(direction[2]))
 
 
-def _planned_gaits_tilt_less(flights: Mapping[str, Metrics]) -> bool:
-    own, planned = (float(flights[address]["max_tilt_rate"]) for address in _TILTING)
-    return planned < 0.01 * own
-
-
 def _map_enlarges_the_attitudes() -> bool:
     from tiltsim_controllers.analysis.published_gaits import robustness_table
 
@@ -47,36 +42,34 @@ def _map_enlarges_the_attitudes() -> bool:
 
 CLAIMS = (
     FlightClaim(
-        source="ch. 1, Sec. 2, Figs. 2-4",
-        statement="In a constant gust the perfect gait needs the smallest attitude of the three",
-        flights=_FLIGHTS,
-        measure=lambda flights: (
-            min(flights, key=lambda address: _tilt(flights[address])) == _PERFECT
-        ),
+        "ch. 1, Sec. 2, Figs. 2-4",
+        "In a constant gust the perfect gait needs the smallest attitude of the three",
+        _FLIGHTS,
+        lambda flights: min(flights, key=lambda address: _tilt(flights[address])) == _PERFECT,
     ),
     FlightClaim(
-        source="ch. 1, Sec. 2, Fig. 4",
-        statement="A quadrotor leans more than the tiltrotor with the perfect gait",
-        flights=(_PERFECT, _QUADROTOR),
-        measure=lambda flights: _tilt(flights[_QUADROTOR]) > _tilt(flights[_PERFECT]),
+        "ch. 1, Sec. 2, Fig. 4",
+        "A quadrotor leans more than the tiltrotor with the perfect gait",
+        (_PERFECT, _QUADROTOR),
+        lambda flights: _tilt(flights[_QUADROTOR]) > _tilt(flights[_PERFECT]),
     ),
     AnalysisClaim(
-        source="ch. 1, Sec. 2, Fig. 3",
-        statement="An imperfect gait may need a larger attitude than the quadrotor",
-        measure=_some_gait_tilts_more_than_the_quadrotor,
+        "ch. 1, Sec. 2, Fig. 3",
+        "An imperfect gait may need a larger attitude than the quadrotor",
+        _some_gait_tilts_more_than_the_quadrotor,
     ),
     FlightClaim(
-        source="ch. 1, Abstract of the thesis; Sec. 3, Fig. 5",
-        statement="Planned gaits avoid the over-intensive changes of the tilt angles that feedback "
+        "ch. 1, Abstract of the thesis; Sec. 3, Fig. 5",
+        "Planned gaits avoid the over-intensive changes of the tilt angles that feedback "
         "linearization of all eight inputs requires",
-        flights=_TILTING,
-        measure=_planned_gaits_tilt_less,
+        _TILTING,
+        planned_gait_tilts_less,
     ),
     AnalysisClaim(
-        source="ch. 1, Abstract of the thesis",
-        statement="The Two Color Map enlarges the acceptable attitudes of all gaits compared",
+        "ch. 1, Abstract of the thesis",
+        "The Two Color Map enlarges the acceptable attitudes of all gaits compared",
+        _map_enlarges_the_attitudes,
         wrong=True,
         why="It does so for every red gait but for no blue one: there every attitude is singular.",
-        measure=_map_enlarges_the_attitudes,
     ),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from typing import Final
 
@@ -12,8 +12,9 @@ from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
 from tiltsim.report.measures import (
     PRINTED,
     Coefficients,
-    determinant_coefficients,
+    coefficient_claims,
     grows,
+    planned_gait_tilts_less,
     terms,
     terms_hold,
     worst_coefficient,
@@ -44,20 +45,6 @@ EQ_17: Final = Coefficients(
     ),
 )
 """The printed condition at any attitude, term by term, with its misprints."""
-
-
-def _coefficient(part: int, product: str) -> Callable[[], float]:
-    return lambda: abs(determinant_coefficients(_VEHICLE)[part][product])
-
-
-def _coefficient_claim(printed: str, case: str, part: int, product: str) -> AnalysisClaim:
-    return AnalysisClaim(
-        source="ch. 3, Sec. 4, Eqs. (17), (19)",
-        statement="Coefficients of the determinant",
-        case=case,
-        published=printed,
-        measure=_coefficient(part, product),
-    )
 
 
 def _triangle_is_regular(case: str) -> bool:
@@ -144,132 +131,124 @@ def _corners(*corners: str) -> tuple[str, ...]:
     return tuple(f"ch03_gaits/corners#{pair}_{corner}" for pair in pairs for corner in corners)
 
 
-def _tilts_less(gait: str, flights: Mapping[str, Metrics]) -> bool:
-    own, planned = (flights[address] for address in _pair(gait))
-    return planned["max_tilt_rate"] < 0.01 * own["max_tilt_rate"]
-
-
 _NO_CROSSING: Final = (
     "At α₁ = -α₃ = ±1.4 both ends lie in one region and R stays above 0.5 all the way; the other "
     "three pairs are as published."
 )
-_GAITS: Final = {"gait_1": "Gait 1", "gait_2": "Gait 2"}
 
 CLAIMS = (
-    _coefficient_claim("4.000", "c1 c2 c3 c4, cos φ cos θ", 0, "cccc"),
-    _coefficient_claim("5.592", "c1 c2 c3 s4, cos φ cos θ", 0, "cccs"),
-    _coefficient_claim("0.9716", "c1 c2 s3 s4, cos φ cos θ", 0, "ccss"),
-    _coefficient_claim("2.000", "c1 s2 c3 s4, cos φ cos θ", 0, "cscs"),
-    _coefficient_claim("0.1687", "c1 s2 s3 s4, cos φ cos θ", 0, "csss"),
-    _coefficient_claim("1.000", "c1 c2 s3 c4, sin φ cos θ", 1, "ccsc"),
-    _coefficient_claim("2.880", "c1 c2 s3 s4, sin φ cos θ", 1, "ccss"),
+    *coefficient_claims(
+        "ch. 3, Sec. 4, Eqs. (17), (19)",
+        "Coefficients of the determinant",
+        _VEHICLE,
+        (
+            ("4.000", "R", "cccc", "c1 c2 c3 c4, cos φ cos θ"),
+            ("5.592", "R", "cccs", "c1 c2 c3 s4, cos φ cos θ"),
+            ("0.9716", "R", "ccss", "c1 c2 s3 s4, cos φ cos θ"),
+            ("2.000", "R", "cscs", "c1 s2 c3 s4, cos φ cos θ"),
+            ("0.1687", "R", "csss", "c1 s2 s3 s4, cos φ cos θ"),
+            ("1.000", "R_phi", "ccsc", "c1 c2 s3 c4, sin φ cos θ"),
+            ("2.880", "R_phi", "ccss", "c1 c2 s3 s4, sin φ cos θ"),
+        ),
+    ),
     AnalysisClaim(
-        source="ch. 3, Sec. 4, Eq. (17)",
-        statement="Eq. (17), term by term, is the determinant at any attitude",
+        "ch. 3, Sec. 4, Eq. (17)",
+        "Eq. (17), term by term, is the determinant at any attitude",
+        lambda: worst_coefficient(EQ_17, _VEHICLE) < PRINTED,
         wrong=True,
         why="Two misprints: -2.880 s1 s2 c3 s4 sin φ cos θ should be s1 s2 c3 c4, as in ch. 5 "
         "and 6, and -2.880 s1 c2 s3 s4 sin φ cos θ should be s1 c2 c3 s4.",
-        measure=lambda: worst_coefficient(EQ_17, _VEHICLE) < PRINTED,
     ),
     AnalysisClaim(
-        source="ch. 3, Sec. 4, Eq. (19)",
-        statement="Eq. (19), term by term, is the determinant at level attitude",
-        measure=partial(terms_hold, "R", EQ_19, _VEHICLE),
+        "ch. 3, Sec. 4, Eq. (19)",
+        "Eq. (19), term by term, is the determinant at level attitude",
+        partial(terms_hold, "R", EQ_19, _VEHICLE),
     ),
     *(
         AnalysisClaim(
-            source="ch. 3, Sec. 5.2, Figs. 10-13",
-            statement="The triangle U, V, M of (α₂, α₄) contains no singular gait",
+            "ch. 3, Sec. 5.2, Figs. 10-13",
+            "The triangle U, V, M of (α₂, α₄) contains no singular gait",
+            partial(_triangle_is_regular, case),
             case=restriction,
-            measure=partial(_triangle_is_regular, case),
         )
         for case, (restriction, _) in DETERMINANT_CASES.items()
     ),
     *(
         AnalysisClaim(
-            source="ch. 3, Sec. 5.2, Figs. 3, 5, 7, 9",
-            statement="From (α₂, α₄) = (1, 1) to (-1, -1) a gait crosses a singular one",
+            "ch. 3, Sec. 5.2, Figs. 3, 5, 7, 9",
+            "From (α₂, α₄) = (1, 1) to (-1, -1) a gait crosses a singular one",
+            partial(_switching_crosses, case),
             case=restriction,
             wrong=case == "negative",
             why=_NO_CROSSING if case == "negative" else "",
-            measure=partial(_switching_crosses, case),
         )
         for case, (restriction, _) in DETERMINANT_CASES.items()
     ),
     AnalysisClaim(
-        source="ch. 3, Sec. 7",
-        statement="The untilted vehicle's decoupling matrix is always invertible",
-        measure=_untilted_is_regular,
+        "ch. 3, Sec. 7",
+        "The untilted vehicle's decoupling matrix is always invertible",
+        _untilted_is_regular,
     ),
     *(
-        FlightClaim(
-            source="ch. 3, Sec. 6.3, Figs. 24-27",
-            statement="Over-actuated control responds faster than the planned gait",
-            case=title,
-            flights=_pair(gait),
-            measure=partial(grows, "altitude_settling_time"),
+        FlightClaim(f"ch. 3, {section}", statement, _pair(gait), measure, case=title)
+        for section, statement, measure in (
+            (
+                "Sec. 6.3, Figs. 24-27",
+                "Over-actuated control responds faster than the planned gait",
+                partial(grows, "altitude_settling_time"),
+            ),
+            (
+                "Sec. 7",
+                "Over-actuated control overshoots less than the planned gait",
+                partial(grows, "altitude_overshoot"),
+            ),
+            (
+                "Sec. 6.3, Fig. 27",
+                "Over-actuated control tilts over-rapidly, the planned gait does not",
+                planned_gait_tilts_less,
+            ),
         )
-        for gait, title in _GAITS.items()
-    ),
-    *(
-        FlightClaim(
-            source="ch. 3, Sec. 7",
-            statement="Over-actuated control overshoots less than the planned gait",
-            case=title,
-            flights=_pair(gait),
-            measure=partial(grows, "altitude_overshoot"),
-        )
-        for gait, title in _GAITS.items()
-    ),
-    *(
-        FlightClaim(
-            source="ch. 3, Sec. 6.3, Fig. 27",
-            statement="Over-actuated control tilts over-rapidly, the planned gait does not",
-            case=title,
-            flights=_pair(gait),
-            measure=partial(_tilts_less, gait),
-        )
-        for gait, title in _GAITS.items()
+        for gait, title in (("gait_1", "Gait 1"), ("gait_2", "Gait 2"))
     ),
     AnalysisClaim(
-        source="ch. 3, Sec. 6.1.1, Eq. (12)",
-        statement="A rotor at rest makes the decoupling matrix singular",
+        "ch. 3, Sec. 6.1.1, Eq. (12)",
+        "A rotor at rest makes the decoupling matrix singular",
+        partial(_rest_is_singular, exact=True),
         case="with the factor 2|ϖ| in all rows",
-        measure=partial(_rest_is_singular, exact=True),
     ),
     AnalysisClaim(
-        source="ch. 3, Sec. 6.1.1, Eq. (12)",
-        statement="A rotor at rest makes the decoupling matrix singular",
+        "ch. 3, Sec. 6.1.1, Eq. (12)",
+        "A rotor at rest makes the decoupling matrix singular",
+        partial(_rest_is_singular, exact=False),
         case="as printed, in the fourth row only",
         wrong=True,
         why="As printed the column of the resting rotor keeps its torques: regular. The statement "
         "holds for the exact matrix.",
-        measure=partial(_rest_is_singular, exact=False),
     ),
     AnalysisClaim(
-        source="ch. 3, Sec. 5.3",
-        statement="The untilted rotors carry the weight at the initial 300 rad/s",
+        "ch. 3, Sec. 5.3",
+        "The untilted rotors carry the weight at the initial 300 rad/s",
+        _lifts_at_start,
         published=False,
-        measure=_lifts_at_start,
     ),
     AnalysisClaim(
-        source="ch. 3, Sec. 7",
-        statement="Every gait of the region can return to no tilt without a singularity",
-        measure=_return_to_no_tilt_is_regular,
+        "ch. 3, Sec. 7",
+        "Every gait of the region can return to no tilt without a singularity",
+        _return_to_no_tilt_is_regular,
     ),
     FlightClaim(
-        source="ch. 3, Sec. 6.2, Figs. 20-23",
-        statement="Stable corners (-1.3, 1.3), (1.3, -1.3), (1, 1) of five pairs, each restriction "
+        "ch. 3, Sec. 6.2, Figs. 20-23",
+        "Stable corners (-1.3, 1.3), (1.3, -1.3), (1, 1) of five pairs, each restriction "
         "at its largest tilt and no tilt",
+        _corners("s", "t", "m"),
+        _stable_flights,
         published="15",
-        flights=_corners("s", "t", "m"),
-        measure=_stable_flights,
     ),
     FlightClaim(
-        source="ch. 3, Sec. 7",
-        statement="Stable gaits beyond them, at (-1.5, 1.5) and (1.5, -1.5), of the same pairs",
+        "ch. 3, Sec. 7",
+        "Stable gaits beyond them, at (-1.5, 1.5) and (1.5, -1.5), of the same pairs",
+        _corners("u", "v"),
+        _stable_flights,
         published="0",
-        flights=_corners("u", "v"),
-        measure=_stable_flights,
     ),
 )

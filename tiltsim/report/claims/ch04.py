@@ -113,55 +113,55 @@ def _better(
     source: str, case: str, conventional: str, modified: str, *, setpoint: bool = False
 ) -> FlightClaim:
     return FlightClaim(
-        source=source,
-        statement="The modified decoupler reduces the remaining error",
+        source,
+        "The modified decoupler reduces the remaining error",
+        (conventional, modified),
+        partial(falls, resting_error if setpoint else tracking_error),
         case=case,
-        flights=(conventional, modified),
-        measure=partial(falls, resting_error if setpoint else tracking_error),
         why="" if "instant_t3" not in conventional else _GYROSCOPIC,
     )
 
 
 CLAIMS = (
     AnalysisClaim(
-        source="ch. 4, Sec. 3.3, Eq. (25)",
-        statement="For the trot the determinant at level attitude is 4 cos² ρ",
-        measure=_eq_25_holds,
+        "ch. 4, Sec. 3.3, Eq. (25)",
+        "For the trot the determinant at level attitude is 4 cos² ρ",
+        _eq_25_holds,
     ),
     AnalysisClaim(
-        source="ch. 4, Sec. 3.3, Prop. 3",
-        statement="The trot meets no singularity at level attitude for |ρ| <= 0.65",
-        measure=_trot_is_regular,
+        "ch. 4, Sec. 3.3, Prop. 3",
+        "The trot meets no singularity at level attitude for |ρ| <= 0.65",
+        _trot_is_regular,
     ),
     AnalysisClaim(
-        source="ch. 4, Sec. 5.1, Prop. 4",
-        statement="The gains satisfy Eqs. (35)-(38), so that attitude and altitude are stable",
+        "ch. 4, Sec. 5.1, Prop. 4",
+        "The gains satisfy Eqs. (35)-(38), so that attitude and altitude are stable",
+        partial(routh_holds, ("roll", "pitch")),
         case="roll and pitch",
         wrong=True,
         why="K_P1 K_P2 = 10 does not exceed K_P3 = 50. The flights are stable nevertheless: the "
         "matrix is printed, and used, without the factor 2|ϖ| in its first three rows, which "
         "multiplies the gains of these loops by about 720.",
-        measure=partial(routh_holds, ("roll", "pitch")),
     ),
     AnalysisClaim(
-        source="ch. 4, Sec. 5.1, Prop. 4",
-        statement="The gains satisfy Eqs. (35)-(38), so that attitude and altitude are stable",
+        "ch. 4, Sec. 5.1, Prop. 4",
+        "The gains satisfy Eqs. (35)-(38), so that attitude and altitude are stable",
+        partial(routh_holds, ("yaw",)),
         case="yaw",
         wrong=True,
         why="K_P1 K_P2 = 1 does not exceed K_P3 = 1: on the boundary. The missing factor 2|ϖ| "
         "makes it stable, as above.",
-        measure=partial(routh_holds, ("yaw",)),
     ),
     AnalysisClaim(
-        source="ch. 4, Sec. 5.1, Prop. 4",
-        statement="The gains satisfy Eqs. (35)-(38), so that attitude and altitude are stable",
+        "ch. 4, Sec. 5.1, Prop. 4",
+        "The gains satisfy Eqs. (35)-(38), so that attitude and altitude are stable",
+        partial(routh_holds, ("altitude",)),
         case="altitude",
-        measure=partial(routh_holds, ("altitude",)),
     ),
     AnalysisClaim(
-        source="ch. 4, Sec. 5.1, Prop. 5",
-        statement="The gains of the position loop satisfy Eqs. (39)-(40)",
-        measure=_position_gains_are_positive,
+        "ch. 4, Sec. 5.1, Prop. 5",
+        "The gains of the position loop satisfy Eqs. (39)-(40)",
+        _position_gains_are_positive,
     ),
     *(
         _better(
@@ -197,67 +197,67 @@ CLAIMS = (
     ),
     *(
         FlightClaim(
-            source=f"ch. 4, Sec. {'7.2, Figs. 8-9' if reference == 'line' else '7.3, Figs. 13-14'}",
-            statement="The error grows with the period of the trot (T = 1, 2, 3 s)",
+            f"ch. 4, Sec. {'7.2, Figs. 8-9' if reference == 'line' else '7.3, Figs. 13-14'}",
+            "The error grows with the period of the trot (T = 1, 2, 3 s)",
+            tuple(_trot(reference, form, T, decoupler) for T in _PERIODS),
+            partial(grows, tracking_error),
             case=f"{reference}, {_FORMS[form]}, {decoupler}",
-            flights=tuple(_trot(reference, form, T, decoupler) for T in _PERIODS),
-            measure=partial(grows, tracking_error),
             why=_GYROSCOPIC if (form, decoupler) == ("instant", "conventional") else "",
         )
         for reference, form, decoupler in product(_REFERENCES, _FORMS, _DECOUPLERS)
     ),
     *(
         FlightClaim(
-            source=f"ch. 4, Sec. {'7.2, Figs. 8-9' if reference == 'line' else '7.3, Figs. 13-14'}",
-            statement="At the short period the decouplers hardly differ "
+            f"ch. 4, Sec. {'7.2, Figs. 8-9' if reference == 'line' else '7.3, Figs. 13-14'}",
+            "At the short period the decouplers hardly differ "
             "(T = 1 s: by less than a tenth of the difference at T = 3 s)",
+            _trots(reference, form),
+            partial(_short_periods_do_not_differ, reference, form),
             case=f"{reference}, {_FORMS[form]}",
-            flights=_trots(reference, form),
-            measure=partial(_short_periods_do_not_differ, reference, form),
             why=_GYROSCOPIC if form == "instant" else "",
         )
         for reference, form in product(_REFERENCES, _FORMS)
     ),
     *(
         FlightClaim(
-            source=f"ch. 4, Sec. {'7.2, Figs. 8-9' if reference == 'line' else '7.3, Figs. 13-14'}",
-            statement="The continuous trot tracks better than the instant one, period by period",
+            f"ch. 4, Sec. {'7.2, Figs. 8-9' if reference == 'line' else '7.3, Figs. 13-14'}",
+            "The continuous trot tracks better than the instant one, period by period",
+            tuple(_trot(reference, f, T, decoupler) for f in _FORMS for T in _PERIODS),
+            partial(_continuous_is_better, reference, decoupler),
             case=f"{reference}, {decoupler}",
-            flights=tuple(_trot(reference, f, T, decoupler) for f in _FORMS for T in _PERIODS),
-            measure=partial(_continuous_is_better, reference, decoupler),
             why=_GYROSCOPIC if decoupler == "conventional" else "",
         )
         for reference, decoupler in product(_REFERENCES, _DECOUPLERS)
     ),
     FlightClaim(
-        source="ch. 4, Sec. 8",
-        statement="The trot tracks line and circle, with either decoupler and every period",
-        flights=_ALL_TROTS,
-        measure=every_flight_completed,
+        "ch. 4, Sec. 8",
+        "The trot tracks line and circle, with either decoupler and every period",
+        _ALL_TROTS,
+        every_flight_completed,
         why=_GYROSCOPIC,
     ),
     FlightClaim(
-        source="ch. 4, Sec. 5.1",
-        statement="No rotor reaches the limit of zero speed",
-        flights=_ALL_TROTS,
-        measure=no_rotor_stops,
+        "ch. 4, Sec. 5.1",
+        "No rotor reaches the limit of zero speed",
+        _ALL_TROTS,
+        no_rotor_stops,
         why="In MuJoCo a rotor of the flight that loses control (see above) reverses.",
     ),
     AnalysisClaim(
-        source="ch. 4, Sec. 3.2, Remark 2",
-        statement="Without tilt the modified decoupler is the conventional one",
-        measure=_decouplers_agree_without_tilt,
+        "ch. 4, Sec. 3.2, Remark 2",
+        "Without tilt the modified decoupler is the conventional one",
+        _decouplers_agree_without_tilt,
     ),
     *(
         FlightClaim(
-            source="ch. 4, Sec. 8",
-            statement="Without neglecting higher-order terms the error decreases further",
-            case=f"setpoint, {title}",
-            flights=(
+            "ch. 4, Sec. 8",
+            "Without neglecting higher-order terms the error decreases further",
+            (
                 f"ch04_tracking/setpoint#{name}_modified",
                 f"beyond/setpoint_exact_decoupler#{name}",
             ),
-            measure=partial(falls, resting_error),
+            partial(falls, resting_error),
+            case=f"setpoint, {title}",
         )
         for name, title in _RHOS.items()
     ),

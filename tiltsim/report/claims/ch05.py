@@ -152,11 +152,11 @@ def _of_all_gaits(
     """A claim about all flights of a reference, for each reference."""
     for reference, figure in _REFERENCES.items():
         yield FlightClaim(
-            source=f"ch. 5, {section or figure}",
-            statement=statement,
+            f"ch. 5, {section or figure}",
+            statement,
+            _all(reference),
+            partial(measure, reference),
             case=reference,
-            flights=_all(reference),
-            measure=partial(measure, reference),
         )
 
 
@@ -166,78 +166,77 @@ def _of_one_gait(
     """A claim about all flights of a gait, for each reference and gait."""
     for (reference, figure), gait in product(_REFERENCES.items(), gaits):
         yield FlightClaim(
-            source=f"ch. 5, {figure}",
-            statement=statement,
+            f"ch. 5, {figure}",
+            statement,
+            _all(reference, (gait,)),
+            partial(measure, reference, gait),
             case=f"{reference}, {_GAITS[gait]}",
-            flights=_all(reference, (gait,)),
-            measure=partial(measure, reference, gait),
         )
 
 
 CLAIMS = (
     AnalysisClaim(
-        source="ch. 5, Sec. 3.1, Eq. (11)",
-        statement="Eq. (11), term by term, is the determinant at level attitude",
-        measure=partial(terms_hold, "R", EQ_19, _VEHICLE),
+        "ch. 5, Sec. 3.1, Eq. (11)",
+        "Eq. (11), term by term, is the determinant at level attitude",
+        partial(terms_hold, "R", EQ_19, _VEHICLE),
     ),
     AnalysisClaim(
-        source="ch. 5, Sec. 4, Eq. (15)",
-        statement="Eq. (15), term by term, is the determinant at any attitude",
+        "ch. 5, Sec. 4, Eq. (15)",
+        "Eq. (15), term by term, is the determinant at any attitude",
+        lambda: worst_coefficient(EQ_17._replace(R_phi=EQ_15_R_PHI), _VEHICLE) < PRINTED,
         wrong=True,
         why="-2.880 s1 c2 s3 s4 sin φ cos θ should be s1 c2 c3 s4, and the last term, "
         "1.000 s1 s2 s3 c4 sin φ cos θ, should be s1 s2 c3 s4.",
-        measure=lambda: worst_coefficient(EQ_17._replace(R_phi=EQ_15_R_PHI), _VEHICLE) < PRINTED,
     ),
     *(
         AnalysisClaim(
-            source="ch. 5, Abstract and Sec. 4",
-            statement="Unscaled, the gait meets a singular matrix at level attitude" + _FITTED,
+            "ch. 5, Abstract and Sec. 4",
+            "Unscaled, the gait meets a singular matrix at level attitude" + _FITTED,
+            partial(_is_singular, gait),
             case=gait.replace("_", " "),
             published=gait != "run",
-            measure=partial(_is_singular, gait),
         )
         for gait in (*_SCALED, "run")
     ),
     AnalysisClaim(
-        source="ch. 5, Sec. 4, Prop. 1, Eq. (18)",
-        statement="Some integer n makes a gait scaled by 1/n regular",
-        measure=_some_scale_is_regular,
+        "ch. 5, Sec. 4, Prop. 1, Eq. (18)",
+        "Some integer n makes a gait scaled by 1/n regular",
+        _some_scale_is_regular,
     ),
     *(
         AnalysisClaim(
-            source=f"ch. 5, Sec. 4, Fig. {figure}",
-            statement="Scaled by 1/2 and 1/3 the singular attitudes move away from level" + _FITTED,
+            f"ch. 5, Sec. 4, Fig. {figure}",
+            "Scaled by 1/2 and 1/3 the singular attitudes move away from level" + _FITTED,
+            partial(_scaling_enlarges, gait),
             case=gait.replace("_", " "),
-            measure=partial(_scaling_enlarges, gait),
         )
         for gait, figure in zip(_SCALED, (9, 10, 11), strict=True)
     ),
     AnalysisClaim(
-        source="ch. 5, App. A, Eqs. (A1)-(A4)",
-        statement="With the printed gains the attitude loops are stable",
+        "ch. 5, App. A, Eqs. (A1)-(A4)",
+        "With the printed gains the attitude loops are stable",
+        partial(routh_holds, ("roll", "pitch", "yaw")),
         wrong=True,
         why="K1 K2 > K3 fails as in ch. 4, Prop. 4: 10 against 50 for roll and pitch, 1 against 1 "
         "for yaw. The factor missing in the printed matrix makes the flights stable.",
-        measure=partial(routh_holds, ("roll", "pitch", "yaw")),
     ),
     *(
         FlightClaim(
-            source=f"ch. 5, {section}",
-            statement="The gaits track the reference with either decoupler and every period"
-            + _FITTED,
+            f"ch. 5, {section}",
+            "The gaits track the reference with either decoupler and every period" + _FITTED,
+            _all(reference),
+            every_flight_completed,
             case=f"{reference}, walk and gallops at 1/3, run",
-            flights=_all(reference),
-            measure=every_flight_completed,
         )
         for reference, section in _REFERENCES.items()
     ),
     *(
         FlightClaim(
-            source=f"ch. 5, {section}",
-            statement="The modified decoupler decreases the error for all gaits" + _FITTED,
+            f"ch. 5, {section}",
+            "The modified decoupler decreases the error for all gaits" + _FITTED,
+            tuple(_address(reference, gait, period, d) for d in _DECOUPLERS),
+            partial(falls, tracking_error),
             case=f"{reference}, {title}, T = {period} s",
-            flights=tuple(_address(reference, gait, period, d) for d in _DECOUPLERS),
-            measure=partial(falls, tracking_error),
         )
         for (reference, section), (gait, title), period in product(
             _REFERENCES.items(), _GAITS.items(), _PERIODS
@@ -272,10 +271,10 @@ CLAIMS = (
         "Sec. 7",
     ),
     FlightClaim(
-        source="ch. 5, Sec. 7, Figs. 14-15",
-        statement="The scale of the walk, 1/3 or 1/6, changes the rotor speeds "
+        "ch. 5, Sec. 7, Figs. 14-15",
+        "The scale of the walk, 1/3 or 1/6, changes the rotor speeds "
         "(their range by at least a tenth)",
-        flights=tuple(_address("line", f"walk_{n}", 3, "modified") for n in ("third", "sixth")),
-        measure=_scale_changes_the_speeds,
+        tuple(_address("line", f"walk_{n}", 3, "modified") for n in ("third", "sixth")),
+        _scale_changes_the_speeds,
     ),
 )

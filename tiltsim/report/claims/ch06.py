@@ -161,18 +161,18 @@ _BLUE: Final = ("ch06_gait_1", "ch06_gait_2")
 
 CLAIMS = (
     AnalysisClaim(
-        source="ch. 6, Sec. 2, Eq. (1)",
-        statement="Eq. (1), term by term, is the determinant at any attitude",
+        "ch. 6, Sec. 2, Eq. (1)",
+        "Eq. (1), term by term, is the determinant at any attitude",
+        partial(terms_hold, "R_phi", EQ_1_ROLL, _VEHICLE),
         case="terms with sin φ",
         wrong=True,
         why="-2.880 s1 c2 s3 s4 sin φ cos θ should be s1 c2 c3 s4, as in Eq. (4).",
-        measure=partial(terms_hold, "R_phi", EQ_1_ROLL, _VEHICLE),
     ),
     *(
         AnalysisClaim(
-            source=f"ch. 6, Sec. {section}",
-            statement=f"{name} is printed correctly, term by term",
-            measure=partial(terms_hold, part, printed, _VEHICLE),
+            f"ch. 6, Sec. {section}",
+            f"{name} is printed correctly, term by term",
+            partial(terms_hold, part, printed, _VEHICLE),
         )
         for section, name, part, printed in (
             ("2, Eq. (2)", "R at level attitude", "R", EQ_19),
@@ -182,70 +182,68 @@ CLAIMS = (
         )
     ),
     AnalysisClaim(
-        source="ch. 6, Sec. 3, Fig. 4",
-        statement="Roots (α₃, α₄) for a grid point inside, on a side, in a corner",
+        "ch. 6, Sec. 3, Fig. 4",
+        "Roots (α₃, α₄) for a grid point inside, on a side, in a corner",
+        _counts,
         published=("2", "3", "5"),
-        measure=_counts,
     ),
     AnalysisClaim(
-        source="ch. 6, Sec. 3, Figs. 5-10",
-        statement="α₃ lies on two planes, and so does α₄",
-        measure=_on_two_planes,
+        "ch. 6, Sec. 3, Figs. 5-10", "α₃ lies on two planes, and so does α₄", _on_two_planes
     ),
     AnalysisClaim(
-        source="ch. 6, Sec. 3",
-        statement="Classes of roots by their planes",
+        "ch. 6, Sec. 3",
+        "Classes of roots by their planes",
+        lambda: float(len(root_classes(_grid()))),
         published="7",
-        measure=lambda: float(len(root_classes(_grid()))),
     ),
     AnalysisClaim(
-        source="ch. 6, Sec. 3",
-        statement="Some root mixes the planes: (+,-) or (-,+)",
+        "ch. 6, Sec. 3",
+        "Some root mixes the planes: (+,-) or (-,+)",
+        lambda: bool(_classes(lambda root: True) & {"(+,-)", "(-,+)"}),
         published=False,
-        measure=lambda: bool(_classes(lambda root: True) & {"(+,-)", "(-,+)"}),
     ),
     AnalysisClaim(
-        source="ch. 6, Sec. 3, Figs. 11-14",
-        statement="Roots with R > 0 are of the classes (+,+), (+,?) and (?,+) only",
+        "ch. 6, Sec. 3, Figs. 11-14",
+        "Roots with R > 0 are of the classes (+,+), (+,?) and (?,+) only",
+        lambda: _classes(lambda root: root.R > _ZERO) <= {"(+,+)", "(+,?)", "(?,+)"},
         why="Where both pairs of planes meet within half a grid step there are also (?,?): "
         "three grid points next to P.",
-        measure=lambda: _classes(lambda root: root.R > _ZERO) <= {"(+,+)", "(+,?)", "(?,+)"},
     ),
     AnalysisClaim(
-        source="ch. 6, Sec. 3, Figs. 11-14",
-        statement="At most one root with R > 0",
-        measure=lambda: sum(root.R > _ZERO for root in _inside()) == len(_positive_points()),
+        "ch. 6, Sec. 3, Figs. 11-14",
+        "At most one root with R > 0",
+        lambda: sum(root.R > _ZERO for root in _inside()) == len(_positive_points()),
     ),
     AnalysisClaim(
-        source="ch. 6, Sec. 3",
-        statement="The points with R > 0 fill the triangle (-7, 7), (-7, -5), (5, 7) in π/16",
+        "ch. 6, Sec. 3",
+        "The points with R > 0 fill the triangle (-7, 7), (-7, -5), (5, 7) in π/16",
+        _triangle_is_the_published,
         wrong=True,
         why="They reach (-7, -7) and (7, 7), and include the untilted vehicle, whose R is 4.",
-        measure=_triangle_is_the_published,
     ),
     AnalysisClaim(
-        source="ch. 6, Sec. 3, Figs. 15-16",
-        statement="Roots with R < 0 cover all seven classes",
+        "ch. 6, Sec. 3, Figs. 15-16",
+        "Roots with R < 0 cover all seven classes",
+        lambda: len(_classes(lambda root: root.R < -_ZERO)) == 7,
         wrong=True,
         why="Blue roots, those with a minus, have R = 0 exactly; with the printed coefficients "
         "the sign of R there is rounding.",
-        measure=lambda: len(_classes(lambda root: root.R < -_ZERO)) == 7,
     ),
     AnalysisClaim(
-        source="ch. 6, Sec. 3",
-        statement="For an (α₁, α₂) with R < 0 there may be two usable roots, red and blue",
-        wrong=True,
-        why="Only red ones are usable: " + RANK,
-        measure=lambda: any(
+        "ch. 6, Sec. 3",
+        "For an (α₁, α₂) with R < 0 there may be two usable roots, red and blue",
+        lambda: any(
             sum(root.R < -_ZERO for root in cell) == 2
             for row in _grid()[1:-1]
             for cell in row[1:-1]
         ),
+        wrong=True,
+        why="Only red ones are usable: " + RANK,
     ),
     AnalysisClaim(
-        source="ch. 6, Sec. 6",
-        statement="On (+,+) α₁ = α₃ and α₂ = α₄",
-        measure=lambda: all(
+        "ch. 6, Sec. 6",
+        "On (+,+) α₁ = α₃ and α₂ = α₄",
+        lambda: all(
             abs(root.alpha_3 - root.alpha_1) + abs(root.alpha_4 - root.alpha_2) < _ZERO
             for root in _inside()
             if (root.plane_3, root.plane_4) == ("+", "+")
@@ -253,70 +251,70 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            source="ch. 6, Sec. 4, Theorem 1",
-            statement="A closed path in one color gives a continuous gait",
+            "ch. 6, Sec. 4, Theorem 1",
+            "A closed path in one color gives a continuous gait",
+            partial(_one_color_is_accepted, color),
             case=color,
-            measure=partial(_one_color_is_accepted, color),
         )
         for color in ("red", "blue")
     ),
     *(
         AnalysisClaim(
-            source="ch. 6, Sec. 5",
-            statement="The printed angles lie on the surface",
+            "ch. 6, Sec. 5",
+            "The printed angles lie on the surface",
+            partial(_angles_on_lines, key),
             case=name,
-            measure=partial(_angles_on_lines, key),
         )
         for key, name in _GAITS.items()
     ),
     *(
         AnalysisClaim(
-            source="ch. 6, Sec. 5",
-            statement="Sign of R along the whole gait, on the exact lines",
+            "ch. 6, Sec. 5",
+            "Sign of R along the whole gait, on the exact lines",
+            partial(_signs, key),
             case=name,
             published=_SIGN[key],
             wrong=key in _BLUE,
             why=RANK + " R is 0." if key in _BLUE else "",
-            measure=partial(_signs, key),
         )
         for key, name in _GAITS.items()
     ),
     *(
         AnalysisClaim(
-            source=f"ch. 6, Sec. 5, Fig. {_FIGURES[key]}",
-            statement="The gait is more robust than its biased twin",
+            f"ch. 6, Sec. 5, Fig. {_FIGURES[key]}",
+            "The gait is more robust than its biased twin",
+            partial(is_more_robust, key),
             case=name,
             wrong=key in _BLUE,
             why=RANK if key in _BLUE else "",
-            measure=partial(is_more_robust, key),
         )
         for key, name in _GAITS.items()
     ),
     *(
         AnalysisClaim(
-            source=f"ch. 6, Sec. 5, Fig. {_FIGURES[key]}",
-            statement="Nearly all attitudes within 90 degrees are admissible",
+            f"ch. 6, Sec. 5, Fig. {_FIGURES[key]}",
+            "Nearly all attitudes within 90 degrees are admissible",
+            partial(_nearly_all, key),
             case=_GAITS[key],
-            measure=partial(_nearly_all, key),
         )
         for key in ("ch06_gait_3", "ch06_gait_4")
     ),
     AnalysisClaim(
-        source="ch. 6, Sec. 6, Figs. 23, 28",
-        statement="Gait 2, as printed, has a greater advantage over the gait with a bias of 99 % "
+        "ch. 6, Sec. 6, Figs. 23, 28",
+        "Gait 2, as printed, has a greater advantage over the gait with a bias of 99 % "
         "than over that of 80 %",
+        _greater_advantage_over_99,
         why="By the margin the printed Gait 2 has none over either: 0.7251 rad compared with "
         "0.7285 and 0.7851. The diagrams compare rounding.",
-        measure=_greater_advantage_over_99,
     ),
     AnalysisClaim(
-        source="ch. 6, Sec. 6",
-        statement="Gaits on (+,+) have more acceptable attitudes than those on (-,-)",
-        measure=_red_beats_blue,
+        "ch. 6, Sec. 6",
+        "Gaits on (+,+) have more acceptable attitudes than those on (-,-)",
+        _red_beats_blue,
     ),
     AnalysisClaim(
-        source="ch. 6, Sec. 6",
-        statement="Scaling only α₃ and α₄ may make a gait less robust",
-        measure=_partial_scaling_can_harm,
+        "ch. 6, Sec. 6",
+        "Scaling only α₃ and α₄ may make a gait less robust",
+        _partial_scaling_can_harm,
     ),
 )

@@ -31,33 +31,33 @@ def _some_gait_tracks(flights: Mapping[str, Metrics]) -> bool:
 CLAIMS = (
     *(
         AnalysisClaim(
-            source=f"ch. 7, Sec. 3.2, Fig. {figure}",
-            statement="The gait is more robust than its biased twin",
+            f"ch. 7, Sec. 3.2, Fig. {figure}",
+            "The gait is more robust than its biased twin",
+            partial(is_more_robust, key),
             case=name,
             wrong=key == "ch07_gait_1",
             why=RANK if key == "ch07_gait_1" else "",
-            measure=partial(is_more_robust, key),
         )
         for (key, name), figure in zip(_GAITS.items(), (5, 6, 7), strict=True)
     ),
     AnalysisClaim(
-        source="ch. 7, Sec. 3.2, Fig. 6",
-        statement="The biased Gait 2 is very sensitive to the attitude (margin below 0.2 rad)",
+        "ch. 7, Sec. 3.2, Fig. 6",
+        "The biased Gait 2 is very sensitive to the attitude (margin below 0.2 rad)",
+        partial(_is_sensitive, "ch07_gait_2"),
         why=_SHAPES
         + "The biased gait keeps 1.45 rad. A larger rectangle reduces it: 0.25 rad with a "
         "corner at (-1.40, 1.40) rad, beyond which the red gait itself is singular.",
-        measure=partial(_is_sensitive, "ch07_gait_2"),
     ),
     FlightClaim(
-        source="ch. 7, Sec. 4.2, Figs. 10-11",
-        statement="A gait on the map tracks the circle with little error (0.1 m)",
-        flights=tuple(_CIRCLE + name for name in ("gait_1_blue", "gait_2", "gait_3")),
-        measure=_some_gait_tracks,
+        "ch. 7, Sec. 4.2, Figs. 10-11",
+        "A gait on the map tracks the circle with little error (0.1 m)",
+        tuple(_CIRCLE + name for name in ("gait_1_blue", "gait_2", "gait_3")),
+        _some_gait_tracks,
     ),
     FlightClaim(
-        source="ch. 7, Sec. 5, Fig. 9",
-        statement="No rotor reaches zero speed while tracking (the red gaits, which track)",
-        flights=tuple(_CIRCLE + name for name in ("gait_2", "gait_3")),
-        measure=no_rotor_stops,
+        "ch. 7, Sec. 5, Fig. 9",
+        "No rotor reaches zero speed while tracking (the red gaits, which track)",
+        tuple(_CIRCLE + name for name in ("gait_2", "gait_3")),
+        no_rotor_stops,
     ),
 )

@@ -94,115 +94,111 @@ def _both_are_sufficient() -> bool:
 _AT_P: Final = "P lies on L, where R = 0, and the other half of the gait is blue. "
 
 CLAIMS = (
+    AnalysisClaim("ch. 8, Sec. 3.1, Eq. (7)", "Eq. (7), term by term, is R on red", _eq_7_holds),
     AnalysisClaim(
-        source="ch. 8, Sec. 3.1, Eq. (7)",
-        statement="Eq. (7), term by term, is R on red",
-        measure=_eq_7_holds,
+        "ch. 8, Sec. 3.1, Fig. 6",
+        "L divides the square |α₁|, |α₂| <= 1 in two, with R > 0 above and R < 0 below",
+        _divides_in_two,
     ),
     AnalysisClaim(
-        source="ch. 8, Sec. 3.1, Fig. 6",
-        statement="L divides the square |α₁|, |α₂| <= 1 in two, with R > 0 above and R < 0 below",
-        measure=_divides_in_two,
-    ),
-    AnalysisClaim(
-        source="ch. 8, Sec. 3.4",
-        statement="The colors meet at P = (p, -p) with p",
+        "ch. 8, Sec. 3.4",
+        "The colors meet at P = (p, -p) with p",
+        lambda: _P[0],
         published="0.167099",
         unit="rad",
         in_kind=(0.167, 0.1672),
         why=DIGITS,
-        measure=lambda: _P[0],
     ),
     AnalysisClaim(
-        source="ch. 8, Sec. 3.1",
-        statement="P lies below L, in S_D",
+        "ch. 8, Sec. 3.1",
+        "P lies below L, in S_D",
+        lambda: region(*_P, _VEHICLE) == "S_D",
         wrong=True,
         why="P lies on L exactly: tan(-δ) = tan δ - 2r with r = tan δ. The printed P has "
         "R = -1.4e-4, from its rounding.",
-        measure=lambda: region(*_P, _VEHICLE) == "S_D",
     ),
     AnalysisClaim(
-        source="ch. 8, Sec. 3.5, Eq. (12)",
-        statement="On blue α₁ + α₃ = -(α₂ + α₄) is",
+        "ch. 8, Sec. 3.5, Eq. (12)",
+        "On blue α₁ + α₃ = -(α₂ + α₄) is",
+        lambda: 2.0 * delta(_VEHICLE),
         published="0.334198",
         unit="rad",
         in_kind=(0.3341, 0.3343),
         why=DIGITS,
-        measure=lambda: 2.0 * delta(_VEHICLE),
     ),
     *(
         AnalysisClaim(
-            source="ch. 8, Sec. 2.2",
-            statement="The coefficients of roll and pitch vanish exactly",
+            "ch. 8, Sec. 2.2",
+            "The coefficients of roll and pitch vanish exactly",
+            partial(_is_zero_on, color),
             case=color,
             published=color == "red",
             wrong=color == "blue",
             why="They also vanish exactly on blue, and so does R: " + RANK
             if color == "blue"
             else "",
-            measure=partial(_is_zero_on, color),
         )
         for color in ("red", "blue")
     ),
     *(
         AnalysisClaim(
-            source="ch. 8, Sec. 3.3, Fig. 7",
-            statement="The example follows the generalized theorem",
+            "ch. 8, Sec. 3.3, Fig. 7",
+            "The example follows the generalized theorem",
+            partial(_accepted, name),
             case=name,
             published=name != "E4",
-            measure=partial(_accepted, name),
         )
         for name in PATHS
     ),
     AnalysisClaim(
-        source="ch. 8, Secs. 3.4-3.5",
-        statement="At P both colors have the same angles, so that the color can change",
-        measure=_colors_meet_at_p,
+        "ch. 8, Secs. 3.4-3.5",
+        "At P both colors have the same angles, so that the color can change",
+        _colors_meet_at_p,
     ),
     *(
         AnalysisClaim(
-            source="ch. 8, Sec. 4",
-            statement="The gait violates the Two Color Map Theorem and follows the generalized one",
+            "ch. 8, Sec. 4",
+            "The gait violates the Two Color Map Theorem and follows the generalized one",
+            partial(_needs_the_generalized, name),
             case=name,
-            measure=partial(_needs_the_generalized, name),
         )
         for name in _GAITS
     ),
     *(
         AnalysisClaim(
-            source="ch. 8, Sec. 3.5",
-            statement="According to the theorem the determinant at level attitude is never zero",
+            "ch. 8, Sec. 3.5",
+            "According to the theorem the determinant at level attitude is never zero",
+            partial(_regular, name),
             case=name,
             wrong=name != "Gait 2",
             why={"Gait 1": _AT_P + RANK, "Gait 3": RANK}.get(name, ""),
-            measure=partial(_regular, name),
         )
         for name in _GAITS
     ),
     AnalysisClaim(
-        source="ch. 8, Sec. 4.1, Fig. 10",
-        statement="The gait is more robust than its biased twin",
+        "ch. 8, Sec. 4.1, Fig. 10",
+        "The gait is more robust than its biased twin",
+        partial(is_more_robust, "ch08_gait_1"),
         case="Gait 1",
         wrong=True,
         why=_AT_P + RANK,
-        measure=partial(is_more_robust, "ch08_gait_1"),
     ),
     AnalysisClaim(
-        source="ch. 8, Sec. 4.2, Fig. 12",
-        statement="The gait is more robust than its biased twin",
+        "ch. 8, Sec. 4.2, Fig. 12",
+        "The gait is more robust than its biased twin",
+        partial(is_more_robust, "ch08_gait_2"),
         case="Gait 2",
-        measure=partial(is_more_robust, "ch08_gait_2"),
     ),
     AnalysisClaim(
-        source="ch. 8, Sec. 4.2, Fig. 12",
-        statement="Gait 2 has no singular attitude at all",
-        measure=lambda: robustness(PUBLISHED_GAITS["ch08_gait_2"]).margin > np.pi / 2 - 1e-9,
+        "ch. 8, Sec. 4.2, Fig. 12",
+        "Gait 2 has no singular attitude at all",
+        lambda: robustness(PUBLISHED_GAITS["ch08_gait_2"]).margin > np.pi / 2 - 1e-9,
     ),
     AnalysisClaim(
-        source="ch. 8, Sec. 4.3, Fig. 14",
-        statement="Gait 3 and its biased twin both leave enough attitudes (0.2 rad)",
+        "ch. 8, Sec. 4.3, Fig. 14",
+        "Gait 3 and its biased twin both leave enough attitudes (0.2 rad)",
+        _both_are_sufficient,
         wrong=True,
         why=RANK + " R of the biased gait changes sign.",
-        measure=_both_are_sufficient,
     ),
 )

@@ -105,66 +105,67 @@ def _circle(name: str) -> str:
 
 CLAIMS = (
     AnalysisClaim(
-        source="ch. 9, Sec. 2, Eq. (8)",
-        statement="Eq. (8), term by term, is R on red",
-        measure=partial(terms_hold, "R", EQ_19, _VEHICLE),
+        "ch. 9, Sec. 2, Eq. (8)",
+        "Eq. (8), term by term, is R on red",
+        partial(terms_hold, "R", EQ_19, _VEHICLE),
     ),
     AnalysisClaim(
-        source="ch. 9, Sec. 3.1",
-        statement="Thrust of four untilted rotors at the speed limits, 305.27 and 394.10 rad/s",
+        "ch. 9, Sec. 3.1",
+        "Thrust of four untilted rotors at the speed limits, 305.27 and 394.10 rad/s",
+        _thrusts,
         published=("3.00", "5.00"),
         unit="N",
-        measure=_thrusts,
     ),
     *(
         AnalysisClaim(
-            source="ch. 9, Sec. 3.2",
-            statement="Without yaw torque there is a solution within the rotor limits",
+            "ch. 9, Sec. 3.2",
+            "Without yaw torque there is a solution within the rotor limits",
+            partial(_has_solution, number),
             case=f"Gait {number}",
             published=number not in (1, 4),
-            measure=partial(_has_solution, number),
         )
         for number in (*_RED, *_BLUE)
     ),
     *(
         AnalysisClaim(
-            source="ch. 9, Sec. 3.3",
-            statement="The gaits with solutions can carry 4.2 N, the weight",
+            "ch. 9, Sec. 3.3",
+            "The gaits with solutions can carry 4.2 N, the weight",
+            partial(_can_carry_the_weight, number),
             case=f"Gait {number}",
             wrong=number == 6,
             why="Under Eq. (11) a rotor produces at most 1.25 N; two tilted by 0.5 rad and two by "
             "0.834 rad lift 3.87 N."
             if number == 6
             else "",
-            measure=partial(_can_carry_the_weight, number),
         )
         for number in (2, 3, *_BLUE)
     ),
     *(
         AnalysisClaim(
-            source=f"ch. 9, Sec. 3.2, Fig. {number if number in _RED else number - 1}",
-            statement="For a given thrust the torques about x and y are linearly coupled",
+            f"ch. 9, Sec. 3.2, Fig. {number if number in _RED else number - 1}",
+            "For a given thrust the torques about x and y are linearly coupled",
+            partial(_is_coupled, number),
             case=f"Gait {number}",
             published=number in _BLUE,
-            measure=partial(_is_coupled, number),
         )
         for number in (2, 3, *_BLUE)
     ),
     *(
         AnalysisClaim(
-            source="ch. 9, Sec. 5",
-            statement="The coupling is not a singularity: τ has full rank",
+            "ch. 9, Sec. 5",
+            "The coupling is not a singularity: τ has full rank",
+            partial(_has_full_rank, number),
             case=f"Gait {number}",
             wrong=True,
             why=RANK,
-            measure=partial(_has_full_rank, number),
         )
         for number in _BLUE
     ),
     *(
         AnalysisClaim(
-            source=f"ch. 9, Sec. 3.3, Fig. {figure}",
-            statement="Attainable accelerations in body axes: minimum and maximum along x and y",
+            f"ch. 9, Sec. 3.3, Fig. {figure}",
+            "Attainable accelerations in body axes: minimum and maximum along x and y",
+            partial(_acceleration, number),
             case=f"Gait {number}",
             published=("-2", "-2", "2", "2"),
             unit="m/s^2",
@@ -172,60 +173,59 @@ CLAIMS = (
             why=_LESS + " To lift 4.2 N, tilted by 0.5 rad, the four produce 4.79 N of the 5 N "
             "that Eq. (11) allows: opposite ones differ by at most 0.21 N, which is 0.24 m/s^2 "
             "sideways, and half of it without yaw torque.",
-            measure=partial(_acceleration, number),
         )
         for number, figure in ((2, 8), (3, 9))
     ),
     *(
         AnalysisClaim(
-            source="ch. 9, Sec. 5",
-            statement="The region of accelerations is a rectangle",
+            "ch. 9, Sec. 5",
+            "The region of accelerations is a rectangle",
+            partial(_is_rectangle, number),
             case=f"Gait {number}",
-            measure=partial(_is_rectangle, number),
         )
         for number in (2, 3)
     ),
     AnalysisClaim(
-        source="ch. 9, Sec. 3.3",
-        statement="Gaits 2 and 3 reach similar accelerations",
-        measure=lambda: bool(np.allclose(_acceleration(2), _acceleration(3), rtol=1e-6)),
+        "ch. 9, Sec. 3.3",
+        "Gaits 2 and 3 reach similar accelerations",
+        lambda: bool(np.allclose(_acceleration(2), _acceleration(3), rtol=1e-6)),
     ),
     AnalysisClaim(
-        source="ch. 9, Sec. 4.1",
-        statement="Centripetal accelerations of the four circles",
+        "ch. 9, Sec. 4.1",
+        "Centripetal accelerations of the four circles",
+        lambda: tuple(5.0 * omega**2 for omega in (0.1, 0.5, 1.0, 1.5)),
         published=("0.05", "1.25", "5", "11.25"),
         unit="m/s^2",
-        measure=lambda: tuple(5.0 * omega**2 for omega in (0.1, 0.5, 1.0, 1.5)),
     ),
     FlightClaim(
-        source="ch. 9, Sec. 4.2, Fig. 10",
-        statement="All four references end in periodic trajectories: none of the flights diverges",
-        flights=tuple(map(_circle, ("01", "05", "10", "15"))),
-        measure=lambda flights: not any(metrics["diverged"] for metrics in flights.values()),
+        "ch. 9, Sec. 4.2, Fig. 10",
+        "All four references end in periodic trajectories: none of the flights diverges",
+        tuple(map(_circle, ("01", "05", "10", "15"))),
+        lambda flights: not any(metrics["diverged"] for metrics in flights.values()),
     ),
     FlightClaim(
-        source="ch. 9, Sec. 5",
-        statement="The faster the circle, the larger the error; the fastest diverges",
-        flights=tuple(map(_circle, ("01", "05", "10", "15", "20"))),
-        measure=_faster_is_worse,
+        "ch. 9, Sec. 5",
+        "The faster the circle, the larger the error; the fastest diverges",
+        tuple(map(_circle, ("01", "05", "10", "15", "20"))),
+        _faster_is_worse,
     ),
     *(
         FlightClaim(
-            source="ch. 9, Sec. 4.2, Fig. 10",
-            statement="Roundness of the orbit, largest over smallest radius",
+            "ch. 9, Sec. 4.2, Fig. 10",
+            "Roundness of the orbit, largest over smallest radius",
+            (_circle(name),),
+            partial(_spread, _circle(name)),
             case=f"{omega} rad/s",
             published="1.00",
             in_kind=(1.0, 1.15),
             why="A circle at 0.5 rad/s, a tenth off at 1.0 rad/s." if omega == "1.0" else "",
-            flights=(_circle(name),),
-            measure=partial(_spread, _circle(name)),
         )
         for omega, name in (("0.1", "01"), ("0.5", "05"), ("1.0", "10"))
     ),
     FlightClaim(
-        source="ch. 9, Sec. 4.2, Fig. 10",
-        statement="At 1.5 rad/s the orbit is an ellipse (radii at least a fifth apart)",
-        flights=(_circle("15"),),
-        measure=lambda flights: _spread(_circle("15"), flights) > 1.2,
+        "ch. 9, Sec. 4.2, Fig. 10",
+        "At 1.5 rad/s the orbit is an ellipse (radii at least a fifth apart)",
+        (_circle("15"),),
+        lambda flights: _spread(_circle("15"), flights) > 1.2,
     ),
 )

@@ -9,7 +9,7 @@ import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim
 from tiltsim.report.claims.ch08 import DIGITS
-from tiltsim.report.measures import determinant_coefficients, terms, terms_hold
+from tiltsim.report.measures import coefficient_claims, determinant_coefficients, terms, terms_hold
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.analysis.two_color_map import (
     curve_l,
@@ -40,10 +40,6 @@ EQ_7: Final = terms(
     "1.025 cccs - 1.025 cscc - 1.025 scss + 1.025 sssc - 2.927 ccss + 2.927 cssc "
     "- 2.927 sccs + 2.927 sscc"
 )
-
-
-def _coefficient(part: str, name: str) -> float:
-    return SCALE * abs(float(getattr(determinant_coefficients(_VEHICLE), part)[name]))
 
 
 def _coefficients_differ_greatly() -> bool:
@@ -88,29 +84,26 @@ def _two_vehicles_can_share_a_map() -> bool:
 
 
 CLAIMS = (
-    *(
-        AnalysisClaim(
-            source="ch. 12, Eq. (4)",
-            statement="Coefficients of the determinant, times 1.025",
-            case=f"{part}, {name}",
-            published=printed,
-            measure=partial(_coefficient, part, name),
-        )
-        for printed, part, name in (
-            ("4.100", "R", "cccc"),
-            ("5.680", "R", "cccs"),
-            ("0.9954", "R", "ccss"),
-            ("2.050", "R", "cscs"),
-            ("0.1743", "R", "csss"),
-            ("1.025", "R_phi", "ccsc"),
-            ("2.927", "R_phi", "ccss"),
-        )
+    *coefficient_claims(
+        "ch. 12, Eq. (4)",
+        "Coefficients of the determinant, times 1.025",
+        _VEHICLE,
+        (
+            ("4.100", "R", "cccc", "R, cccc"),
+            ("5.680", "R", "cccs", "R, cccs"),
+            ("0.9954", "R", "ccss", "R, ccss"),
+            ("2.050", "R", "cscs", "R, cscs"),
+            ("0.1743", "R", "csss", "R, csss"),
+            ("1.025", "R_phi", "ccsc", "R_phi, ccsc"),
+            ("2.927", "R_phi", "ccss", "R_phi, ccss"),
+        ),
+        SCALE,
     ),
     *(
         AnalysisClaim(
-            source=f"ch. 12, {equations}",
-            statement=f"{name} is printed correctly, term by term",
-            measure=partial(terms_hold, part, printed, _VEHICLE, SCALE),
+            f"ch. 12, {equations}",
+            f"{name} is printed correctly, term by term",
+            partial(terms_hold, part, printed, _VEHICLE, SCALE),
         )
         for equations, name, part, printed in (
             ("Eqs. (4), (6)", "R_φ", "R_phi", EQ_6),
@@ -119,53 +112,49 @@ CLAIMS = (
         )
     ),
     AnalysisClaim(
-        source="ch. 12",
-        statement="The coefficients differ greatly from those of ch. 3",
+        "ch. 12",
+        "The coefficients differ greatly from those of ch. 3",
+        _coefficients_differ_greatly,
         wrong=True,
         why="Up to the common factor 1.025 they are those of ch. 3 within 1 %: K_m / (L K_f) is "
         "0.1700 instead of 0.1687.",
-        measure=_coefficients_differ_greatly,
     ),
     AnalysisClaim(
-        source="ch. 12",
-        statement="L, K_f and K_m are the only parameters that the map depends on",
-        measure=_only_three_parameters_matter,
+        "ch. 12",
+        "L, K_f and K_m are the only parameters that the map depends on",
+        _only_three_parameters_matter,
     ),
     AnalysisClaim(
-        source="ch. 12",
-        statement="Every set of L, K_f and K_m has its own map",
+        "ch. 12",
+        "Every set of L, K_f and K_m has its own map",
+        lambda: not _two_vehicles_can_share_a_map(),
         wrong=True,
         why="The map depends only on the ratio K_m / (L K_f).",
-        measure=lambda: not _two_vehicles_can_share_a_map(),
     ),
+    AnalysisClaim("ch. 12, Fig. 1", "The map is very similar to that of ch. 8", _maps_are_similar),
     AnalysisClaim(
-        source="ch. 12, Fig. 1",
-        statement="The map is very similar to that of ch. 8",
-        measure=_maps_are_similar,
-    ),
-    AnalysisClaim(
-        source="ch. 12, Fig. 1",
-        statement="The colors meet at P = (p, -p) with p",
+        "ch. 12, Fig. 1",
+        "The colors meet at P = (p, -p) with p",
+        lambda: _P[0],
         published="0.168421",
         unit="rad",
         in_kind=(0.1684, 0.1685),
         why=DIGITS,
-        measure=lambda: _P[0],
     ),
     AnalysisClaim(
-        source="ch. 12, Fig. 1",
-        statement="P lies below L, in S_D",
+        "ch. 12, Fig. 1",
+        "P lies below L, in S_D",
+        lambda: region(*_P, _VEHICLE) == "S_D",
         wrong=True,
         why="As in ch. 8: P lies on L exactly.",
-        measure=lambda: region(*_P, _VEHICLE) == "S_D",
     ),
     AnalysisClaim(
-        source="ch. 12, Eq. (12)",
-        statement="On blue α₁ + α₃ = -(α₂ + α₄) is",
+        "ch. 12, Eq. (12)",
+        "On blue α₁ + α₃ = -(α₂ + α₄) is",
+        lambda: 2.0 * delta(_VEHICLE),
         published="0.336842",
         unit="rad",
         in_kind=(0.3368, 0.3369),
         why=DIGITS,
-        measure=lambda: 2.0 * delta(_VEHICLE),
     ),
 )
