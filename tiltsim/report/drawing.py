@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from tiltsim.report.flights import FlightRecord, Flights, ReportEntry
 from tiltsim.report.pictures import PICTURES, FlightMetrics, Picture
-from tiltsim.report.store import code_digest, flight_key, sources_digest, store
-from tiltsim.report.workers import results
+from tiltsim.report.store import code_digest, flight_key, results, sources_digest, store
 from tiltsim.scenario.scenario import Scenario
 
 if TYPE_CHECKING:

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 from tiltsim.errors import InputError
 from tiltsim.plants.engine_choice import with_engine
-from tiltsim.report.store import flight_key, store
-from tiltsim.report.workers import results
+from tiltsim.report.store import flight_key, results, store
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.metric_names import WALL_CLOCK_METRICS
 from tiltsim.simulation.shared_engine import shared_engine

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from tiltsim.report.analysis import analyze
-from tiltsim.report.claim_rows import failures, make_rows
+from tiltsim.report.claim_rows import analyze, failures, make_rows
 from tiltsim.report.comparisons import compare
 from tiltsim.report.content import Report
 from tiltsim.report.drawing import draw_all

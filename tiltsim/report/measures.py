@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise, product
 from math import hypot
 from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from tiltsim.report.claim import AnalysisClaim, Metrics
+from tiltsim.report.claim import Metrics
 from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS, robustness
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.analysis.stability import third_order_loop
@@ -51,40 +51,9 @@ def determinant_coefficients(vehicle: Vehicle) -> Coefficients:
     return Coefficients(*(dict(zip(names, part.tolist(), strict=True)) for part in values))
 
 
-def coefficient_claims(
-    source: str,
-    statement: str,
-    vehicle: Vehicle,
-    printed: Iterable[tuple[str, str, str, str]],
-    scale: float = 1.0,
-) -> Iterator[AnalysisClaim]:
-    """Claims about single coefficients of the determinant, up to their sign.
-
-    Parameters
-    ----------
-    source, statement, vehicle
-        Common to all.
-    printed
-        For each the published value, the part of the determinant, the product, and the case.
-    scale
-        Constant by which the chapter multiplies the determinant.
-    """
-    for value, part, product_, case in printed:
-
-        def measure(part: str = part, name: str = product_) -> float:
-            return scale * abs(float(getattr(determinant_coefficients(vehicle), part)[name]))
-
-        yield AnalysisClaim(source, statement, measure, case=case, published=value)
-
-
-def worst_coefficient(printed: Coefficients, vehicle: Vehicle) -> float:
-    """Largest difference of a printed coefficient from the computed one; absent ones are 0."""
-    computed = determinant_coefficients(vehicle)
-    return max(
-        abs(own.get(name, 0.0) - table.get(name, 0.0))
-        for own, table in zip(computed, printed, strict=True)
-        for name in own.keys() | table.keys()
-    )
+def coefficient(part: str, name: str, vehicle: Vehicle, scale: float = 1.0) -> float:
+    """Absolute value of one coefficient of the determinant; arguments as in `terms_hold`."""
+    return scale * abs(float(getattr(determinant_coefficients(vehicle), part)[name]))
 
 
 def terms_hold(

@@ -9,17 +9,23 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from tiltsim.engines.cache import core_sources
+from tiltsim.errors import InputError
 from tiltsim.resources import shipped_folder
 from tiltsim.system.files import replacing
+from tiltsim.system.processes import in_processes
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
 
 
 def store(path: Path, content: bytes) -> None:
@@ -48,3 +54,37 @@ def sources_digest(sources: list[Path], *more: str) -> bytes:
     """Digest of the names and contents of files, in any order and place, and of more strings."""
     files = (hashlib.sha256(f.name.encode() + f.read_bytes()).digest() for f in sources)
     return hashlib.sha256(repr(more).encode() + b"".join(sorted(files))).digest()
+
+
+def results(
+    work: Callable[[Task], Result],
+    tasks: Sequence[Task],
+    jobs: int,
+    describe: Callable[[Task], str],
+) -> Iterator[tuple[Task, Result]]:
+    """Yield every task with its result, as they finish; one failure ends the work.
+
+    Parameters
+    ----------
+    work
+        Called once per task; picklable unless ``jobs`` is 1.
+    tasks
+        The work to do.
+    jobs
+        Processes; with 1, or a single task, everything runs in this one.
+    describe
+        Names a task in the message of an error.
+
+    Raises
+    ------
+    InputError
+        If a task fails in a process, or the process dies.
+    """
+    if jobs == 1 or len(tasks) < 2:
+        yield from ((task, work(task)) for task in tasks)
+        return
+    for task, future in in_processes(work, tasks, jobs):
+        error = future.exception()
+        if error is not None:
+            raise InputError(f"{describe(task)}: {type(error).__name__}: {error}") from error
+        yield task, future.result()

@@ -9,7 +9,7 @@ import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim
 from tiltsim.report.claims.ch08 import DIGITS
-from tiltsim.report.measures import coefficient_claims, determinant_coefficients, terms, terms_hold
+from tiltsim.report.measures import coefficient, determinant_coefficients, terms, terms_hold
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.analysis.two_color_map import (
     curve_l,
@@ -84,20 +84,23 @@ def _two_vehicles_can_share_a_map() -> bool:
 
 
 CLAIMS = (
-    *coefficient_claims(
-        "ch. 12, Eq. (4)",
-        "Coefficients of the determinant, times 1.025",
-        _VEHICLE,
-        (
-            ("4.100", "R", "cccc", "R, cccc"),
-            ("5.680", "R", "cccs", "R, cccs"),
-            ("0.9954", "R", "ccss", "R, ccss"),
-            ("2.050", "R", "cscs", "R, cscs"),
-            ("0.1743", "R", "csss", "R, csss"),
-            ("1.025", "R_phi", "ccsc", "R_phi, ccsc"),
-            ("2.927", "R_phi", "ccss", "R_phi, ccss"),
-        ),
-        SCALE,
+    *(
+        AnalysisClaim(
+            "ch. 12, Eq. (4)",
+            "Coefficients of the determinant, times 1.025",
+            partial(coefficient, part, name, _VEHICLE, SCALE),
+            case=f"{part}, {name}",
+            published=published,
+        )
+        for published, part, name in (
+            ("4.100", "R", "cccc"),
+            ("5.680", "R", "cccs"),
+            ("0.9954", "R", "ccss"),
+            ("2.050", "R", "cscs"),
+            ("0.1743", "R", "csss"),
+            ("1.025", "R_phi", "ccsc"),
+            ("2.927", "R_phi", "ccss"),
+        )
     ),
     *(
         AnalysisClaim(
