@@ -66,7 +66,7 @@ def test_computed_claims_have_verdicts_and_reasons(claim):
     verdict = verdict_on(claim, plain(claim.measure()))
     if verdict is ClaimVerdict.NOT_REPRODUCED:
         assert claim.why
-    if claim.wrong:
+    if claim.refuted:
         assert verdict is ClaimVerdict.WRONG, "it agrees after all"
 
 

@@ -63,10 +63,10 @@ class Claim:
     """Difference up to which numbers count as equal; default: half of the last printed digit."""
     in_kind: tuple[float, float] | None = None
     """Range in which the statement still holds although the number differs."""
-    wrong: bool = False
-    """Refuted by proof or by the thesis's own equations, not merely not observed."""
     why: str = ""
     """The reason if it is not reproduced."""
+    refuted: str = ""
+    """The reason if proof or the thesis's own equations refute it, not merely our flights."""
 
     def __post_init__(self) -> None:
         yes_or_no = isinstance(self.published, bool)
@@ -76,8 +76,6 @@ class Claim:
             raise ValueError(f"{self.source}: a claim needs a statement")
         if yes_or_no and (self.tolerance is not None or self.in_kind is not None):
             raise ValueError(f"{self.statement!r}: yes or no has neither tolerance nor in_kind")
-        if self.wrong and not self.why:
-            raise ValueError(f"{self.statement!r}: wrong requires why")
         if not yes_or_no:
             self.numbers()
 
@@ -158,7 +156,7 @@ def verdict_on(claim: Claim, measured: Value | None) -> ClaimVerdict:
     """The verdict on a claim; ``measured`` is None if there is no value."""
     if measured is not None and _agrees(claim, measured):
         return ClaimVerdict.REPRODUCED
-    if claim.wrong:
+    if claim.refuted:
         return ClaimVerdict.WRONG
     if claim.in_kind is not None and measured is not None:
         low, high = claim.in_kind
@@ -208,8 +206,8 @@ def scenario_claims(scenario: Scenario) -> list[ExpectationClaim]:
             unit=unit_of(expectation.metric),
             tolerance=expectation.published_tolerance,
             in_kind=expectation.in_kind,
-            wrong=expectation.wrong,
             why=expectation.why,
+            refuted=expectation.why if expectation.wrong else "",
             address=scenario.address,
             expectation=expectation,
         )

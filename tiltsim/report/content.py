@@ -122,7 +122,7 @@ class Group:
 
 def why_of(row: Row) -> str:
     """The reason of a row that is not reproduced."""
-    return "" if row.verdict is ClaimVerdict.REPRODUCED else row.claim.why
+    return "" if row.verdict is ClaimVerdict.REPRODUCED else row.claim.refuted or row.claim.why
 
 
 def published_text(claim: Claim) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from tiltsim.report.claim import Metrics
+from tiltsim.report.claim import AnalysisClaim, Metrics
 from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS, robustness
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.analysis.stability import third_order_loop
@@ -78,9 +78,22 @@ def terms_hold(
     )
 
 
-def is_more_robust(key: str) -> bool:
-    """Whether the thesis's claim about the robustness of a published gait holds."""
-    return bool(robustness(PUBLISHED_GAITS[key]).claim_holds)
+def robustness_claim(source: str, key: str, case: str, refuted: str = "") -> AnalysisClaim:
+    """The claim that a published gait is more robust than its biased twin.
+
+    Parameters
+    ----------
+    source, case, refuted
+        Of the claim.
+    key
+        Of the gait in `PUBLISHED_GAITS`.
+    """
+
+    def measure() -> bool:
+        return bool(robustness(PUBLISHED_GAITS[key]).claim_holds)
+
+    statement = "The gait is more robust than its biased twin"
+    return AnalysisClaim(source, statement, measure, case=case, refuted=refuted)
 
 
 def routh_holds(rows: Sequence[str]) -> bool:

@@ -2,31 +2,18 @@
 
 One module per chapter, found by its name; each has a tuple ``CLAIMS``, in the order of the text::
 
-    from tiltsim.report.claim import AnalysisClaim, FlightClaim
-
-    CLAIMS = (
-        AnalysisClaim(
-            source="ch. 6, Sec. 3, Eq. (13)",
-            statement="On blue, alpha_1 + alpha_3 is constant",
-            published="0.334198",           # a string keeps the digits: good to 0.0000005
-            unit="rad",
-            in_kind=(0.33, 0.34),           # the statement holds, the number differs
-            why="The thesis searches with coefficients rounded to four digits.",
-            measure=lambda: 2.0 * delta(AR_DRONE_2),
-        ),
-        FlightClaim(
-            source="ch. 4, Sec. 7.2, Fig. 9",
-            statement="The error grows with the period of the trot",
-            flights=("ch04_tracking/line#instant_t1_modified", ...),
-            measure=grows,                  # gets {address: metrics} of one plant
-        ),
+    AnalysisClaim(
+        "ch. 6, Sec. 3, Eq. (13)",
+        "On blue, alpha_1 + alpha_3 is constant",
+        lambda: 2.0 * delta(AR_DRONE_2),
+        published="0.334198",           # a string keeps the digits: good to 0.0000005
     )
 
 ``published`` is True by default: the thesis says yes. ``measure`` returns a number, several numbers
-or a bool, always computed, never a constant, within about a second. Import heavy modules (scipy,
-mujoco) inside the functions. ``source`` begins with the chapter; a statement with several cases is
-written several times with different ``case``. A flight that terminates early has ``diverged`` true
-in its metrics and may lack others.
+or a bool, always computed, never a constant, within about a second; that of a `FlightClaim` gets
+{address: metrics} of one plant. A flight that terminates early has ``diverged`` true in its metrics
+and may lack others. A statement with several cases is written several times with different
+``case``. Import heavy modules (scipy, mujoco) inside the functions.
 """
 
 from __future__ import annotations

@@ -69,7 +69,7 @@ CLAIMS = (
         "ch. 1, Abstract of the thesis",
         "The Two Color Map enlarges the acceptable attitudes of all gaits compared",
         _map_enlarges_the_attitudes,
-        wrong=True,
-        why="It does so for every red gait but for no blue one: there every attitude is singular.",
+        refuted="It does so for every red gait but for no blue one: there every attitude is "
+        "singular.",
     ),
 )

@@ -11,7 +11,7 @@ import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim
 from tiltsim.report.claims.ch03 import EQ_17, EQ_19
-from tiltsim.report.measures import is_more_robust, terms, terms_hold
+from tiltsim.report.measures import robustness_claim, terms, terms_hold
 from tiltsim_controllers.analysis.published_gaits import (
     PUBLISHED_GAITS,
     Robustness,
@@ -165,8 +165,7 @@ CLAIMS = (
         "Eq. (1), term by term, is the determinant at any attitude",
         partial(terms_hold, "R_phi", EQ_1_ROLL, _VEHICLE),
         case="terms with sin φ",
-        wrong=True,
-        why="-2.880 s1 c2 s3 s4 sin φ cos θ should be s1 c2 c3 s4, as in Eq. (4).",
+        refuted="-2.880 s1 c2 s3 s4 sin φ cos θ should be s1 c2 c3 s4, as in Eq. (4).",
     ),
     *(
         AnalysisClaim(
@@ -218,15 +217,13 @@ CLAIMS = (
         "ch. 6, Sec. 3",
         "The points with R > 0 fill the triangle (-7, 7), (-7, -5), (5, 7) in π/16",
         _triangle_is_the_published,
-        wrong=True,
-        why="They reach (-7, -7) and (7, 7), and include the untilted vehicle, whose R is 4.",
+        refuted="They reach (-7, -7) and (7, 7), and include the untilted vehicle, whose R is 4.",
     ),
     AnalysisClaim(
         "ch. 6, Sec. 3, Figs. 15-16",
         "Roots with R < 0 cover all seven classes",
         lambda: len(_classes(lambda root: root.R < -_ZERO)) == 7,
-        wrong=True,
-        why="Blue roots, those with a minus, have R = 0 exactly; with the printed coefficients "
+        refuted="Blue roots, those with a minus, have R = 0 exactly; with the printed coefficients "
         "the sign of R there is rounding.",
     ),
     AnalysisClaim(
@@ -237,8 +234,7 @@ CLAIMS = (
             for row in _grid()[1:-1]
             for cell in row[1:-1]
         ),
-        wrong=True,
-        why="Only red ones are usable: " + RANK,
+        refuted="Only red ones are usable: " + RANK,
     ),
     AnalysisClaim(
         "ch. 6, Sec. 6",
@@ -274,19 +270,13 @@ CLAIMS = (
             partial(_signs, key),
             case=name,
             published=_SIGN[key],
-            wrong=key in _BLUE,
-            why=RANK + " R is 0." if key in _BLUE else "",
+            refuted=RANK + " R is 0." if key in _BLUE else "",
         )
         for key, name in _GAITS.items()
     ),
     *(
-        AnalysisClaim(
-            f"ch. 6, Sec. 5, Fig. {_FIGURES[key]}",
-            "The gait is more robust than its biased twin",
-            partial(is_more_robust, key),
-            case=name,
-            wrong=key in _BLUE,
-            why=RANK if key in _BLUE else "",
+        robustness_claim(
+            f"ch. 6, Sec. 5, Fig. {_FIGURES[key]}", key, name, RANK if key in _BLUE else ""
         )
         for key, name in _GAITS.items()
     ),

@@ -93,9 +93,8 @@ CLAIMS = (
         lambda: -counter_yaw_per_tilt(THESIS_CAR._replace(bottom_inertia=0.002)),
         case="I_B read as the bottom disc's own inertia, as the text says",
         published="-0.5",
-        wrong=True,
-        why="α is the top disc's angle on the bottom one, so that I_T (ψ' + α') + I_bottom ψ' = 0: "
-        "-1/3. Eq. (2) holds where I_B is the inertia of the whole car.",
+        refuted="α is the top disc's angle on the bottom one, so that I_T (ψ' + α') + I_bottom ψ' "
+        "= 0: -1/3. Eq. (2) holds where I_B is the inertia of the whole car.",
     ),
     AnalysisClaim(
         "ch. 10, Sec. 2, Eq. (6)",
@@ -113,15 +112,13 @@ CLAIMS = (
         "Rank 2 if and only if both rotors turn",
         partial(_full_rank_needs_both, tilting=True),
         case="with the column of the tilt, [Δ1 | Δ2]",
-        wrong=True,
-        why="With one rotor at rest the tilt turns the other one's thrust: still rank 2.",
+        refuted="With one rotor at rest the tilt turns the other one's thrust: still rank 2.",
     ),
     AnalysisClaim(
         "ch. 10, Sec. 6.1, Eq. (28)",
         "The columns of the rotors have rank 2 unless both rotors are at rest",
         _full_rank_unless_both_rest,
-        wrong=True,
-        why="One rotor at rest leaves one column: rank 1. Both must turn.",
+        refuted="One rotor at rest leaves one column: rank 1. Both must turn.",
     ),
     FlightClaim(
         "ch. 10, Sec. 4.1, Figs. 7-8",
@@ -146,9 +143,8 @@ CLAIMS = (
         "The cause of the drift from one equilibrium to another is known",
         _drift_has_a_cause,
         published=False,
-        wrong=True,
-        why="It is: the minimum-norm distribution is not integrable, and the lean advances by a "
-        "holonomy, β' = Ω / (1 + κ² W(β)) on a circle.",
+        refuted="It is: the minimum-norm distribution is not integrable, and the lean advances by "
+        "a holonomy, β' = Ω / (1 + κ² W(β)) on a circle.",
     ),
     FlightClaim(
         "ch. 10, Sec. 5, Figs. 20-21",

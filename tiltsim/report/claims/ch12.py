@@ -118,9 +118,8 @@ CLAIMS = (
         "ch. 12",
         "The coefficients differ greatly from those of ch. 3",
         _coefficients_differ_greatly,
-        wrong=True,
-        why="Up to the common factor 1.025 they are those of ch. 3 within 1 %: K_m / (L K_f) is "
-        "0.1700 instead of 0.1687.",
+        refuted="Up to the common factor 1.025 they are those of ch. 3 within 1 %: K_m / (L K_f) "
+        "is 0.1700 instead of 0.1687.",
     ),
     AnalysisClaim(
         "ch. 12",
@@ -131,8 +130,7 @@ CLAIMS = (
         "ch. 12",
         "Every set of L, K_f and K_m has its own map",
         lambda: not _two_vehicles_can_share_a_map(),
-        wrong=True,
-        why="The map depends only on the ratio K_m / (L K_f).",
+        refuted="The map depends only on the ratio K_m / (L K_f).",
     ),
     AnalysisClaim("ch. 12, Fig. 1", "The map is very similar to that of ch. 8", _maps_are_similar),
     AnalysisClaim(
@@ -148,8 +146,7 @@ CLAIMS = (
         "ch. 12, Fig. 1",
         "P lies below L, in S_D",
         lambda: region(*_P, _VEHICLE) == "S_D",
-        wrong=True,
-        why="As in ch. 8: P lies on L exactly.",
+        refuted="As in ch. 8: P lies on L exactly.",
     ),
     AnalysisClaim(
         "ch. 12, Eq. (12)",
