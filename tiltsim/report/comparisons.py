@@ -26,26 +26,14 @@ EXPLANATION: Final = (
 
 @dataclass(frozen=True)
 class Comparison:
-    """One metric of a flight and of the flight without the feature.
-
-    Attributes
-    ----------
-    address, title, source
-        Of the scenario.
-    metric
-        The compared metric.
-    without
-        Address of the other flight, empty if there is none.
-    plants
-        The values on each supported plant, as text.
-    """
+    """One metric of a flight and of the flight without the feature."""
 
     address: str
     title: str
     source: str
     metric: str
-    without: str
-    plants: dict[Plant, str]
+    without: str  # address of the other flight, empty if there is none
+    plants: dict[Plant, str]  # the values on each supported plant, as text
 
     @property
     def file(self) -> str:

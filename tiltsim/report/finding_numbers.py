@@ -6,6 +6,20 @@ from typing import Final
 
 import numpy as np
 
+from tiltsim_controllers.analysis.attainable import (
+    attainable_accelerations,
+    attainable_torque_thrust,
+    published_speed_limits,
+)
+from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS
+from tiltsim_controllers.analysis.quadrotor_singularity import (
+    normalized_determinant,
+    published_singular_curve,
+)
+from tiltsim_controllers.analysis.singularity import residuals, singular_values
+from tiltsim_controllers.analysis.stability import third_order_loop
+from tiltsim_controllers.analysis.two_color_map import delta
+from tiltsim_controllers.laws import gains, yaw_position
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
@@ -13,25 +27,20 @@ _VEHICLE: Final = PRESETS["ar_drone_2"]
 
 def matrix_gain() -> dict[str, str]:
     """Routh's numbers for ch. 4's roll gains, and the loop gain that the printed matrix adds."""
-    from tiltsim_controllers.analysis.stability import third_order_loop
-    from tiltsim_controllers.laws.gains import GAIN_SETS
-
-    gains = GAIN_SETS["ch04"]
+    roll = gains.GAIN_SETS["ch04"]
     factor = 2.0 * _VEHICLE.hover_rotor_speed
-    loop = third_order_loop("roll", (gains.roll_1, gains.roll_2, gains.roll_3), 1.0)
+    loop = third_order_loop("roll", (roll.roll_1, roll.roll_2, roll.roll_3), 1.0)
     worst = max(root.real for root in np.roots(loop.polynomial))
     return {
         "factor": f"{factor:.0f}",
-        "product": f"{gains.roll_1 * gains.roll_2:g}",
-        "third": f"{gains.roll_3:g}",
+        "product": f"{roll.roll_1 * roll.roll_2:g}",
+        "third": f"{roll.roll_3:g}",
         "root": f"{worst:+.2f}",
     }
 
 
 def map_numbers() -> dict[str, str]:
     """2 delta of both published vehicles, rad."""
-    from tiltsim_controllers.analysis.two_color_map import delta
-
     return {
         "ar": f"{2.0 * delta(_VEHICLE):.9f}",
         "luukkonen": f"{2.0 * delta(PRESETS['luukkonen']):.9f}",
@@ -40,9 +49,6 @@ def map_numbers() -> dict[str, str]:
 
 def blue_numbers() -> dict[str, str]:
     """Ratios of the singular values of ch. 6's blue gait, as printed and on the exact lines."""
-    from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS
-    from tiltsim_controllers.analysis.singularity import residuals, singular_values
-
     printed = PUBLISHED_GAITS["ch06_gait_1"]
     assert printed.exact is not None
     shares = []
@@ -60,16 +66,10 @@ def blue_numbers() -> dict[str, str]:
 
 def quadrotor_numbers() -> dict[str, str]:
     """The exact determinant on ch. 2's published curve, and the unstable root of its gains."""
-    from tiltsim_controllers.analysis.quadrotor_singularity import (
-        normalized_determinant,
-        published_singular_curve,
-    )
-    from tiltsim_controllers.laws.yaw_position import GAIN_SETS
-
     vehicle = PRESETS["ar_drone_2_unrounded"]
     hover = vehicle.mass * vehicle.gravity
     on_curve = normalized_determinant(*published_singular_curve(), hover, vehicle)
-    roots = np.roots((1.0, *GAIN_SETS["ch02"][:4]))
+    roots = np.roots((1.0, *yaw_position.GAIN_SETS["ch02"][:4]))
     worst = roots[np.argmax(roots.real)]
     return {
         "low": f"{on_curve.min():.3f}",
@@ -80,13 +80,6 @@ def quadrotor_numbers() -> dict[str, str]:
 
 def attainable_numbers() -> dict[str, str]:
     """Rotor limits of ch. 9, and what gait 2 attains within them."""
-    from tiltsim_controllers.analysis.attainable import (
-        attainable_accelerations,
-        attainable_torque_thrust,
-        published_speed_limits,
-    )
-    from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS
-
     limits = published_speed_limits(_VEHICLE)
     angles = PUBLISHED_GAITS["ch09_gait_2"].gait.angles(0.0)
     found = attainable_torque_thrust(angles, _VEHICLE, limits)

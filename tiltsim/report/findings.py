@@ -42,6 +42,12 @@ class Finding:
         return " \\\n  ".join(("pytest -n 0", *self.nodes))
 
 
+_SINGULARITY: Final = "controllers/analysis/test_singularity.py"
+_MAP: Final = "controllers/analysis/test_two_color_map.py"
+_CLAIMS: Final = "report/test_claims.py"
+_ATTAINABLE: Final = "controllers/analysis/test_attainable.py"
+_FLIGHTS: Final = "simulation/test_simulate.py"
+
 FINDINGS: Final = (
     Finding(
         key="determinant",
@@ -58,9 +64,7 @@ FINDINGS: Final = (
             "controllers/vehicle/test_decoupling_matrix.py": (
                 "test_determinant_has_the_closed_form",
             ),
-            "controllers/analysis/test_singularity.py": (
-                "test_margin_is_the_smallest_rotation_to_a_singular_attitude",
-            ),
+            _SINGULARITY: ("test_margin_is_the_smallest_rotation_to_a_singular_attitude",),
             "controllers/analysis/test_unacceptable_attitudes.py": (
                 "test_the_closed_form_is_singular_and_agrees_with_the_great_circle",
             ),
@@ -76,11 +80,11 @@ FINDINGS: Final = (
             "c3 s4`. All other printed coefficients are correct to their last digit.",
         ),
         tests={
-            "controllers/analysis/test_singularity.py": (
+            _SINGULARITY: (
                 "test_the_slips_of_the_pen_are_slips",
                 "test_printed_coefficients_of_chapter_3",
             ),
-            "report/test_claims.py": ("test_chapter_3_prints_two_wrong_terms_of_the_determinant",),
+            _CLAIMS: ("test_chapter_3_prints_two_wrong_terms_of_the_determinant",),
         },
     ),
     Finding(
@@ -118,7 +122,7 @@ FINDINGS: Final = (
             "removes the limitation that ch. 12 names, a map known only by numerical search.",
         ),
         tests={
-            "controllers/analysis/test_two_color_map.py": (
+            _MAP: (
                 "test_residuals_factor",
                 "test_roots_are_roots_and_lie_on_the_lines",
                 "test_printed_coefficients_explain_the_published_offset",
@@ -136,12 +140,8 @@ FINDINGS: Final = (
             "on L, not slightly below it; switching colors there passes through a singular point.",
         ),
         tests={
-            "controllers/analysis/test_singularity.py": (
-                "test_blue_gaits_lose_rank_and_red_gaits_are_vertical",
-            ),
-            "controllers/analysis/test_two_color_map.py": (
-                "test_p_lies_on_l_and_both_colors_meet_there",
-            ),
+            _SINGULARITY: ("test_blue_gaits_lose_rank_and_red_gaits_are_vertical",),
+            _MAP: ("test_p_lies_on_l_and_both_colors_meet_there",),
         },
     ),
     Finding(
@@ -157,16 +157,10 @@ FINDINGS: Final = (
             "simulation every flight with a blue gait ends as singular immediately.",
         ),
         tests={
-            "controllers/analysis/test_two_color_map.py": (
-                "test_blue_has_no_margin_and_red_all_of_it",
-            ),
-            "controllers/analysis/test_attainable.py": (
-                "test_linear_coupling_of_blue_gaits_is_their_loss_of_rank",
-            ),
-            "controllers/analysis/test_singularity.py": (
-                "test_thesis_rounding_of_the_blue_offset_leaves_a_trace_of_rank",
-            ),
-            "simulation/test_simulate.py": ("test_blue_gait_is_singular_from_the_start",),
+            _MAP: ("test_blue_has_no_margin_and_red_all_of_it",),
+            _ATTAINABLE: ("test_linear_coupling_of_blue_gaits_is_their_loss_of_rank",),
+            _SINGULARITY: ("test_thesis_rounding_of_the_blue_offset_leaves_a_trace_of_rank",),
+            _FLIGHTS: ("test_blue_gait_is_singular_from_the_start",),
         },
         numbers=numbers.blue_numbers,
     ),
@@ -179,11 +173,7 @@ FINDINGS: Final = (
             "and (5, 7), in units of π/16. It excludes the untilted vehicle, for which R = 4. "
             "Computed, it reaches (-7, -7) and (7, 7).",
         ),
-        tests={
-            "controllers/analysis/test_two_color_map.py": (
-                "test_positive_residual_needs_red_and_fills_a_triangle",
-            ),
-        },
+        tests={_MAP: ("test_positive_residual_needs_red_and_fills_a_triangle",)},
     ),
     Finding(
         key="switching",
@@ -194,9 +184,7 @@ FINDINGS: Final = (
             " gait in all cases. For α₁ = -α₃ = ±1.4 it need not: both ends are in the same "
             "region.",
         ),
-        tests={
-            "report/test_claims.py": ("test_one_pair_of_chapter_3_can_switch_without_a_crossing",),
-        },
+        tests={_CLAIMS: ("test_one_pair_of_chapter_3_can_switch_without_a_crossing",)},
     ),
     Finding(
         key="statics",
@@ -211,7 +199,7 @@ FINDINGS: Final = (
             "steady-state error.",
         ),
         tests={
-            "simulation/test_simulate.py": (
+            _FLIGHTS: (
                 "test_setpoint_flights_come_to_rest_where_statics_say",
                 "test_setpoint_error_is_the_published_one",
                 "test_exact_decoupler_leaves_no_steady_error",
@@ -231,7 +219,7 @@ FINDINGS: Final = (
             " an exception: it completes on the thesis's equations and loses control in MuJoCo.",
         ),
         tests={
-            "simulation/test_simulate.py": (
+            _FLIGHTS: (
                 "test_plants_differ_by_the_gyroscopic_torque_once_the_body_rolls_and_yaws",
                 "test_plants_agree_where_they_model_the_same",
             ),
@@ -292,7 +280,7 @@ FINDINGS: Final = (
             "programs alike, where ch. 9 prints ±2 m/s².",
         ),
         tests={
-            "controllers/analysis/test_attainable.py": (
+            _ATTAINABLE: (
                 "test_published_speed_limits",
                 "test_gaits_1_and_4_cannot_free_themselves_of_yaw",
                 "test_gaits_2_and_3",
