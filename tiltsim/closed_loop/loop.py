@@ -71,7 +71,7 @@ class Dynamics:
 
 
 @scalar
-def held_controls(
+def _held_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: Any
 ) -> Values:
     """For controllers whose controls stay as they were sampled."""
@@ -92,7 +92,7 @@ class Sampling:
     """
 
     controls: Callable[..., Values]
-    hold: Callable[..., Values] = held_controls
+    hold: Callable[..., Values] = _held_controls
 
 
 @dataclass(frozen=True, eq=False)

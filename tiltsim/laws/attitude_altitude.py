@@ -81,7 +81,7 @@ def tiltrotor_controls(
 
 
 @scalar
-def supervised_controls(
+def _supervised_controls(
     time: float,
     state: Values,
     qvel: Vector,
@@ -110,7 +110,7 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
 
 
 @scalar
-def reference_values(
+def _reference_values(
     time: float, state: Values, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """`REFERENCE_COLUMNS` and `TILT_REFERENCE_COLUMNS`."""
@@ -126,15 +126,15 @@ def reference_values(
 
 
 @scalar
-def supervised_reference_values(
+def _supervised_reference_values(
     time: float, state: Values, motion: Triple, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """`REFERENCE_COLUMNS`; see `tiltsim.closed_loop.loop.SupervisedLaw`."""
-    return reference_values(time, state, parameters, knots)[:6]
+    return _reference_values(time, state, parameters, knots)[:6]
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    columns = reference_columns(reference_values, TILTROTOR_FIELDS, samples, setup)
+    columns = reference_columns(_reference_values, TILTROTOR_FIELDS, samples, setup)
     return columns | singularity_columns(samples, setup.parameters.law.vehicle)
 
 
@@ -151,7 +151,7 @@ def sign_check_values(values: Vector, parameters: LoopParameters) -> Values:
 
 
 @scalar
-def equation_inputs(time: float, state: Vector, parameters: LoopParameters, knots: Vector) -> Quad:
+def _equation_inputs(time: float, state: Vector, parameters: LoopParameters, knots: Vector) -> Quad:
     """Rotor accelerations (rad/s^2) on the thesis's equations."""
     law = parameters.law
     a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, knots)
@@ -174,13 +174,13 @@ TILTROTOR: Final = ClosedLoop(
     columns=Columns(observe_tiltrotor, _derive),
     monitoring=Monitoring(sign_check_values, determinant_and_speed_causes),
     equations=Equations(
-        inputs=equation_inputs,
+        inputs=_equation_inputs,
         inputs_size=4,
         rates=gait_equation_rates,
         initial=lambda plan, _setup: initial_equation_state(plan),
         observe=observe_gait_equations,
     ),
-    supervised=SupervisedLaw(supervised_controls, supervised_reference_values, TILTROTOR_FIELDS),
+    supervised=SupervisedLaw(_supervised_controls, _supervised_reference_values, TILTROTOR_FIELDS),
     follows_position=follows_position,
 )
 """The attitude-altitude controller of the tiltrotor."""

@@ -62,7 +62,7 @@ class LoopParameters(NamedTuple):
 
 
 @scalar
-def commanded_tiltrotor_controls(
+def _commanded_tiltrotor_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """All twelve controls of the tiltrotor."""
@@ -81,7 +81,7 @@ def commanded_tiltrotor_controls(
 
 
 @scalar
-def commanded_quadrotor_controls(
+def _commanded_quadrotor_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """All eight controls of the quadrotor."""
@@ -96,7 +96,7 @@ def commanded_quadrotor_controls(
 
 
 @scalar
-def refreshed_quadrotor_controls(
+def _refreshed_quadrotor_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: LoopParameters
 ) -> Values:
     """Held controls with the thrusts of the present rotor speeds."""
@@ -126,14 +126,14 @@ def with_command(parameters: Any, command: HeldCommand) -> Any:
 
 
 @scalar
-def observe_commanded_quadrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
+def _observe_commanded_quadrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """The rigid body, no tilt, the rotor speeds, which are states here, no tilt rates."""
     body = rigid_body_state(qpos, qvel, 0.0, 0.0)[:12]
     return (*body, 0.0, 0.0, 0.0, 0.0, *four(act, 0), 0.0, 0.0, 0.0, 0.0)
 
 
 @scalar
-def observe_commanded_tiltrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
+def _observe_commanded_tiltrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """A sample of any tiltrotor, and the commands of its servos."""
     return (*observe_tiltrotor(qpos, qvel, act, ctrl), *four(ctrl, 0))
 
@@ -164,9 +164,9 @@ TILTROTOR: Final = ClosedLoop(
     parameters=LoopParameters,
     setup=_setup,
     dynamics=tiltrotor_dynamics(),
-    sampling=Sampling(commanded_tiltrotor_controls, refreshed_controls),
+    sampling=Sampling(_commanded_tiltrotor_controls, refreshed_controls),
     columns=Columns(
-        observe_commanded_tiltrotor,
+        _observe_commanded_tiltrotor,
         _derive_tiltrotor,
         fields=TILT_COMMANDS,
         units=dict.fromkeys(TILT_COMMANDS, "rad"),
@@ -184,8 +184,8 @@ QUADROTOR: Final = ClosedLoop(
         Sizes(qpos=7, qvel=6, act=4, ctrl=8),
         lambda plan, _setup: initial_signed_rotor_speeds(plan.scenario),
     ),
-    sampling=Sampling(commanded_quadrotor_controls, refreshed_quadrotor_controls),
-    columns=Columns(observe_commanded_quadrotor, _derive_quadrotor),
+    sampling=Sampling(_commanded_quadrotor_controls, _refreshed_quadrotor_controls),
+    columns=Columns(_observe_commanded_quadrotor, _derive_quadrotor),
     follows_position=_follows_position,
     uses_gait=False,
 )

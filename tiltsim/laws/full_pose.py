@@ -55,7 +55,7 @@ class LoopParameters(NamedTuple):
 
 
 @scalar
-def full_pose_controls(
+def _full_pose_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """All sixteen controls: tilt servos, thrusts, rotor accelerations, tilt rates.
@@ -80,7 +80,7 @@ def full_pose_controls(
 
 
 @scalar
-def observe_full_pose(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
+def _observe_full_pose(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """The tiltrotor and the commands of its servos."""
     return (*observe_tiltrotor(qpos, qvel, act, ctrl), *four(act, ROTOR_STATES))
 
@@ -118,7 +118,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 
 
 @scalar
-def equation_inputs(
+def _equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """Rotor accelerations and tilt rates on the thesis's equations."""
@@ -155,13 +155,13 @@ FULL_POSE: Final = ClosedLoop(
     parameters=LoopParameters,
     setup=_setup,
     dynamics=tiltrotor_dynamics(len(TILT_COMMANDS), lambda plan: initial_tilts(plan)[0]),
-    sampling=Sampling(full_pose_controls, refreshed_controls),
+    sampling=Sampling(_full_pose_controls, refreshed_controls),
     columns=Columns(
-        observe_full_pose, _derive, fields=TILT_COMMANDS, units=dict.fromkeys(TILT_COMMANDS, "rad")
+        _observe_full_pose, _derive, fields=TILT_COMMANDS, units=dict.fromkeys(TILT_COMMANDS, "rad")
     ),
     monitoring=Monitoring(sign_check_values, lambda _sample: ROTOR_STOPS),
     equations=Equations(
-        inputs=equation_inputs,
+        inputs=_equation_inputs,
         inputs_size=8,
         rates=equation_rates,
         initial=lambda plan, _setup: (*initial_equation_state(plan), *initial_tilts(plan)[0]),

@@ -59,7 +59,7 @@ class LoopParameters(NamedTuple):
 
 
 @scalar
-def supervised_controls(
+def _supervised_controls(
     time: float,
     state: Values,
     qvel: Vector,
@@ -74,7 +74,7 @@ def supervised_controls(
 
 
 @scalar
-def gait_feedforward_controls(
+def _gait_feedforward_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """All fifteen controls: tilt servos, thrusts, rotor accelerations, rates of the integrals."""
@@ -83,7 +83,7 @@ def gait_feedforward_controls(
     return (
         *gait_servo_commands(time, parameters.servo_lead, law.gait, knots),
         *rotor_thrust_controls(act),
-        *supervised_controls(time, state, qvel, act, SUPERVISOR_AT_REST, parameters, knots),
+        *_supervised_controls(time, state, qvel, act, SUPERVISOR_AT_REST, parameters, knots),
     )
 
 
@@ -113,7 +113,7 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
 
 
 @scalar
-def supervised_reference_values(
+def _supervised_reference_values(
     time: float, state: Vector, motion: Triple, parameters: LoopParameters, knots: Vector
 ) -> tuple[float, float, float, float, float, float]:
     """Position (m) and attitude (rad) to track; ``state`` has the `REFERENCE_FIELDS`."""
@@ -132,13 +132,13 @@ def supervised_reference_values(
 
 
 @scalar
-def reference_values(
+def _reference_values(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """Columns of references; ``state`` has the `REFERENCE_FIELDS`."""
     a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, parameters.law.gait, knots)
     return (
-        *supervised_reference_values(time, state, SUPERVISOR_AT_REST, parameters, knots),
+        *_supervised_reference_values(time, state, SUPERVISOR_AT_REST, parameters, knots),
         a1,
         a2,
         a3,
@@ -151,18 +151,18 @@ REFERENCE_FIELDS: Final = (*TILTROTOR_FIELDS, *TILT_RATE_COLUMNS, *INTEGRAL_FIEL
 
 
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    columns = reference_columns(reference_values, REFERENCE_FIELDS, samples, setup)
+    columns = reference_columns(_reference_values, REFERENCE_FIELDS, samples, setup)
     return columns | singularity_columns(samples, setup.parameters.law.vehicle)
 
 
 @scalar
-def observe_gait_feedforward(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
+def _observe_gait_feedforward(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """The tiltrotor and the integrals."""
     return (*observe_tiltrotor(qpos, qvel, act, ctrl), act[4], act[5], act[6])
 
 
 @scalar
-def equation_inputs(
+def _equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """Rotor accelerations and rates of the integrals on the thesis's equations."""
@@ -207,22 +207,22 @@ GAIT_FEEDFORWARD: Final = ClosedLoop(
     parameters=LoopParameters,
     setup=_setup,
     dynamics=tiltrotor_dynamics(len(INTEGRAL_FIELDS), lambda _plan: (0.0, 0.0, 0.0)),
-    sampling=Sampling(gait_feedforward_controls, refreshed_controls),
+    sampling=Sampling(_gait_feedforward_controls, refreshed_controls),
     columns=Columns(
-        observe_gait_feedforward,
+        _observe_gait_feedforward,
         _derive,
         fields=INTEGRAL_FIELDS,
         units=dict.fromkeys(INTEGRAL_FIELDS, "m s"),
     ),
     monitoring=Monitoring(determinant_and_speeds, determinant_and_speed_causes),
     equations=Equations(
-        inputs=equation_inputs,
+        inputs=_equation_inputs,
         inputs_size=7,
         rates=equation_rates,
         initial=lambda plan, _setup: (*initial_equation_state(plan), 0.0, 0.0, 0.0),
         observe=observe_equations,
     ),
-    supervised=SupervisedLaw(supervised_controls, supervised_reference_values, REFERENCE_FIELDS),
+    supervised=SupervisedLaw(_supervised_controls, _supervised_reference_values, REFERENCE_FIELDS),
     follows_position=follows_position,
 )
 """The attitude-altitude controller with tilt-rate feed-forward, of the tiltrotor."""

@@ -124,7 +124,7 @@ def observe_equations(
 
 
 @scalar
-def extended_equation_rates(
+def _extended_equation_rates(
     time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector, disturbance: Triple
 ) -> Values:
     """Ch. 2's equations of motion, followed by the controller's own two states."""
@@ -133,7 +133,7 @@ def extended_equation_rates(
 
 
 @scalar
-def observe_extended_equations(
+def _observe_extended_equations(
     time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
 ) -> Values:
     """As `observe_equations`, followed by the controller's own states."""
@@ -181,9 +181,9 @@ def extended_loop(
         equations=Equations(
             inputs=inputs,
             inputs_size=6,
-            rates=extended_equation_rates,
+            rates=_extended_equation_rates,
             initial=lambda plan, _setup: (*initial_state(plan.scenario), *_hover_thrust(plan)),
-            observe=observe_extended_equations,
+            observe=_observe_extended_equations,
         ),
         uses_gait=False,
     )

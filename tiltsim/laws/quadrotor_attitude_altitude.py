@@ -50,7 +50,7 @@ class LoopParameters(NamedTuple):
 
 
 @scalar
-def attitude_altitude_controls(
+def _attitude_altitude_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """All eight controls: thrusts, idle rotor states."""
@@ -84,7 +84,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 
 
 @scalar
-def equation_inputs(
+def _equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """The control law on the thesis's equations."""
@@ -106,11 +106,11 @@ QUADROTOR_ATTITUDE_ALTITUDE: Final = ClosedLoop(
         Sizes(qpos=7, qvel=6, act=4, ctrl=8),
         lambda _plan, _setup: (0.0, 0.0, 0.0, 0.0),
     ),
-    sampling=Sampling(attitude_altitude_controls),
+    sampling=Sampling(_attitude_altitude_controls),
     columns=Columns(observe_quadrotor, _derive, observe_reads_controls=True),
     monitoring=Monitoring(thrust_axis_value, thrust_axis_cause),
     equations=Equations(
-        inputs=equation_inputs,
+        inputs=_equation_inputs,
         inputs_size=4,
         rates=equation_rates,
         initial=lambda plan, _setup: initial_state(plan.scenario),

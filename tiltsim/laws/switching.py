@@ -47,7 +47,7 @@ class LoopParameters(NamedTuple):
 
 
 @scalar
-def switching_controls(
+def _switching_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """All ten controls: thrusts, idle rotor states, the controller's states."""
@@ -86,7 +86,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 
 
 @scalar
-def equation_inputs(
+def _equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """The control law on the thesis's equations."""
@@ -97,8 +97,8 @@ SWITCHING: Final = replace(
     extended_loop(
         LoopParameters,
         _setup,
-        switching_controls,
-        equation_inputs,
+        _switching_controls,
+        _equation_inputs,
         Columns(
             observe_extended_quadrotor,
             _derive,

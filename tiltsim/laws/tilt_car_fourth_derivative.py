@@ -46,7 +46,7 @@ def law_speed(speed: float, anti_windup: float) -> float:
 
 
 @scalar
-def fourth_derivative_controls(
+def _fourth_derivative_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """All nine controls: tilt servo, thrusts, then the rates of rotor speeds and law states.
@@ -64,7 +64,7 @@ def fourth_derivative_controls(
 
 
 @scalar
-def refreshed_fourth_derivative_controls(
+def _refreshed_fourth_derivative_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: LoopParameters
 ) -> Values:
     """Held second derivatives, with the present states that integrate them."""
@@ -82,7 +82,7 @@ def fourth_derivative_law_state(state: Vector, parameters: LoopParameters) -> Va
 
 
 @scalar
-def fourth_derivative_equation_inputs(
+def _fourth_derivative_equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Triple:
     """The control law on the thesis's equations."""
@@ -97,7 +97,7 @@ def integrated_rate(speed: float, rate: float, anti_windup: float) -> float:
 
 
 @scalar
-def fourth_derivative_equation_rates(
+def _fourth_derivative_equation_rates(
     time: float,
     state: Vector,
     inputs: Triple,
@@ -135,7 +135,7 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
 
 
 @scalar
-def observe_fourth_derivative(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
+def _observe_fourth_derivative(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """The car and the controller's states."""
     x, y, vx, vy, yaw, alpha, speed_1, speed_2 = car_state(qpos, qvel, act[0], act[1])
     return (
@@ -145,7 +145,7 @@ def observe_fourth_derivative(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vec
 
 
 @scalar
-def observe_fourth_derivative_equations(
+def _observe_fourth_derivative_equations(
     time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """A sample of the thesis's equations."""
@@ -161,9 +161,9 @@ def observe_fourth_derivative_equations(
 FOURTH_DERIVATIVE: Final = integrating_loop(
     LoopParameters,
     _setup,
-    Sampling(fourth_derivative_controls, refreshed_fourth_derivative_controls),
+    Sampling(_fourth_derivative_controls, _refreshed_fourth_derivative_controls),
     Columns(
-        observe_fourth_derivative,
+        _observe_fourth_derivative,
         derive_columns,
         fields=("alpha_ref", "alpha_ref_rate", *ACCELERATIONS, *SPEEDS),
         units={
@@ -172,9 +172,9 @@ FOURTH_DERIVATIVE: Final = integrating_loop(
             **dict.fromkeys(SPEEDS, "rad/s"),
         },
     ),
-    inputs=fourth_derivative_equation_inputs,
-    rates=fourth_derivative_equation_rates,
-    observe=observe_fourth_derivative_equations,
+    inputs=_fourth_derivative_equation_inputs,
+    rates=_fourth_derivative_equation_rates,
+    observe=_observe_fourth_derivative_equations,
     controller_states=4,
 )
 """Fourth-derivative feedback linearization of the tilt-car."""

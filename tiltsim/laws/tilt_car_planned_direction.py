@@ -54,7 +54,7 @@ class LoopParameters(NamedTuple):
 
 
 @scalar
-def planned_direction_controls(
+def _planned_direction_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """All five controls: tilt servo, thrusts, idle rotor states.
@@ -68,7 +68,7 @@ def planned_direction_controls(
 
 
 @scalar
-def planned_direction_law_state(
+def _planned_direction_law_state(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> CarState:
     """State of the control law from that of the thesis's equations, with the planned tilt."""
@@ -78,16 +78,16 @@ def planned_direction_law_state(
 
 
 @scalar
-def planned_direction_equation_inputs(
+def _planned_direction_equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Pair:
     """The squares of the rotor speeds on the thesis's equations."""
-    law_state = planned_direction_law_state(time, state, parameters, knots)
+    law_state = _planned_direction_law_state(time, state, parameters, knots)
     return planned_direction_inputs(time, law_state, parameters.law)
 
 
 @scalar
-def planned_direction_equation_rates(
+def _planned_direction_equation_rates(
     time: float,
     state: Vector,
     inputs: Pair,
@@ -96,7 +96,7 @@ def planned_direction_equation_rates(
     disturbance: Triple,
 ) -> Values:
     """The thesis's equations with a tilt that follows the gait exactly."""
-    law_state = planned_direction_law_state(time, state, parameters, knots)
+    law_state = _planned_direction_law_state(time, state, parameters, knots)
     direction = law_state[4] + law_state[5]
     car = parameters.law.car
     return equations_of_motion(state, direction, inputs[0], inputs[1], car, disturbance)
@@ -118,7 +118,7 @@ def speed_of_square(square: float) -> float:
 
 
 @scalar
-def observe_planned_direction(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
+def _observe_planned_direction(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """The car, its rotor speeds from the controls in force."""
     x, y, vx, vy, yaw, alpha, _, _ = car_state(qpos, qvel, 0.0, 0.0)
     speed_1, speed_2 = speed_of_square(ctrl[1]), speed_of_square(ctrl[2])
@@ -126,11 +126,11 @@ def observe_planned_direction(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vec
 
 
 @scalar
-def observe_planned_direction_equations(
+def _observe_planned_direction_equations(
     time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """A sample of the thesis's equations."""
-    x, y, vx, vy, yaw, alpha, _, _ = planned_direction_law_state(time, state, parameters, knots)
+    x, y, vx, vy, yaw, alpha, _, _ = _planned_direction_law_state(time, state, parameters, knots)
     tilt_rate = tilt_reference(time, parameters.gait, knots)[4]
     r = yaw_of(tilt_rate, 0.0, parameters.law.car)
     speed_1, speed_2 = speed_of_square(inputs[0]), speed_of_square(inputs[1])
@@ -166,9 +166,9 @@ PLANNED_DIRECTION: Final = ClosedLoop(
     dynamics=Dynamics(
         "tilt_car", Sizes(qpos=4, qvel=4, act=2, ctrl=5), lambda _plan, _setup: (0.0, 0.0)
     ),
-    sampling=Sampling(planned_direction_controls),
+    sampling=Sampling(_planned_direction_controls),
     columns=Columns(
-        observe_planned_direction,
+        _observe_planned_direction,
         _derive,
         units={
             **{f"wanted_square_{rotor}": "rad^2/s^2" for rotor in ROTORS},
@@ -178,11 +178,11 @@ PLANNED_DIRECTION: Final = ClosedLoop(
         observe_reads_controls=True,
     ),
     equations=Equations(
-        inputs=planned_direction_equation_inputs,
+        inputs=_planned_direction_equation_inputs,
         inputs_size=2,
-        rates=planned_direction_equation_rates,
+        rates=_planned_direction_equation_rates,
         initial=lambda plan, _setup: initial_motion(plan.scenario),
-        observe=observe_planned_direction_equations,
+        observe=_observe_planned_direction_equations,
     ),
 )
 """The tilt-car with a planned direction of its thrusts.

@@ -33,7 +33,7 @@ class LoopParameters(NamedTuple):
 
 
 @scalar
-def third_derivative_controls(
+def _third_derivative_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """All six controls: tilt servo, thrusts, rotor accelerations, tilt rate.
@@ -47,7 +47,7 @@ def third_derivative_controls(
 
 
 @scalar
-def refreshed_third_derivative_controls(
+def _refreshed_third_derivative_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: LoopParameters
 ) -> Values:
     """Held controls with the thrusts of the present rotor speeds."""
@@ -63,7 +63,7 @@ def third_derivative_law_state(state: Vector, parameters: LoopParameters) -> Car
 
 
 @scalar
-def third_derivative_equation_inputs(
+def _third_derivative_equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Triple:
     """Rotor accelerations and tilt rate on the thesis's equations."""
@@ -72,7 +72,7 @@ def third_derivative_equation_inputs(
 
 
 @scalar
-def third_derivative_equation_rates(
+def _third_derivative_equation_rates(
     time: float,
     state: Vector,
     inputs: Triple,
@@ -101,14 +101,14 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
 
 
 @scalar
-def observe_third_derivative(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
+def _observe_third_derivative(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """The car and the command of its servo."""
     x, y, vx, vy, yaw, alpha, speed_1, speed_2 = car_state(qpos, qvel, act[0], act[1])
     return x, y, vx, vy, yaw, qvel[2], alpha, qvel[3], speed_1, speed_2, act[2]
 
 
 @scalar
-def observe_third_derivative_equations(
+def _observe_third_derivative_equations(
     time: float, state: Vector, inputs: Triple, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """A sample of the thesis's equations."""
@@ -121,11 +121,11 @@ def observe_third_derivative_equations(
 THIRD_DERIVATIVE: Final = integrating_loop(
     LoopParameters,
     _setup,
-    Sampling(third_derivative_controls, refreshed_third_derivative_controls),
-    Columns(observe_third_derivative, derive_columns, fields=("alpha_ref",)),
-    inputs=third_derivative_equation_inputs,
-    rates=third_derivative_equation_rates,
-    observe=observe_third_derivative_equations,
+    Sampling(_third_derivative_controls, _refreshed_third_derivative_controls),
+    Columns(_observe_third_derivative, derive_columns, fields=("alpha_ref",)),
+    inputs=_third_derivative_equation_inputs,
+    rates=_third_derivative_equation_rates,
+    observe=_observe_third_derivative_equations,
     controller_states=1,
 )
 """Third-derivative feedback linearization of the tilt-car."""

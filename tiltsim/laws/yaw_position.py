@@ -37,7 +37,7 @@ class LoopParameters(NamedTuple):
 
 
 @scalar
-def yaw_position_controls(
+def _yaw_position_controls(
     time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """All ten controls: thrusts, idle rotor states, the controller's states."""
@@ -69,7 +69,7 @@ def sign_check_values(values: Vector, parameters: LoopParameters) -> tuple[float
 
 
 @scalar
-def equation_inputs(
+def _equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
     """The control law on the thesis's equations."""
@@ -81,8 +81,8 @@ def equation_inputs(
 YAW_POSITION: Final = extended_loop(
     LoopParameters,
     _setup,
-    yaw_position_controls,
-    equation_inputs,
+    _yaw_position_controls,
+    _equation_inputs,
     Columns(
         observe_extended_quadrotor,
         _derive,

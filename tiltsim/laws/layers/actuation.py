@@ -89,7 +89,7 @@ class Actuation(NamedTuple):
 
 
 @scalar
-def allocated_accelerations(
+def _allocated_accelerations(
     demanded: Quad, qpos: Vector, act: Vector, allocation: Allocation
 ) -> Quad:
     """The demanded rotor accelerations (rad/s^2), within the speed limits if allocation is on."""
@@ -109,7 +109,7 @@ def allocated_accelerations(
 
 
 @scalar
-def servo_controls(time: float, qpos: Vector, commands: Vector, actuation: Actuation) -> Quad:
+def _servo_controls(time: float, qpos: Vector, commands: Vector, actuation: Actuation) -> Quad:
     """Set points (rad) of the four tilt servos."""
     a1, a2, a3, a4 = four(qpos, TILT_1)
     reach, faults = actuation.servo_reach, actuation.faults
@@ -134,7 +134,7 @@ def thrust_controls(time: float, act: Vector, faults: Faults) -> Quad:
 
 
 @scalar
-def motor_controls(act: Vector, first: int, commands: Vector, actuation: Actuation) -> Quad:
+def _motor_controls(act: Vector, first: int, commands: Vector, actuation: Actuation) -> Quad:
     """Rotor accelerations (rad/s^2): as commanded, or by the lag behind the speed commands.
 
     The speed commands are activations from ``first`` on.
@@ -151,7 +151,7 @@ def motor_controls(act: Vector, first: int, commands: Vector, actuation: Actuati
 
 
 @scalar
-def speed_command_rates(act: Vector, first: int, commands: Vector, actuation: Actuation) -> Quad:
+def _speed_command_rates(act: Vector, first: int, commands: Vector, actuation: Actuation) -> Quad:
     """Rates (rad/s^2) of the motors' speed commands, activations from ``first`` on."""
     low, high = actuation.slowest, actuation.fastest
     return (
@@ -196,17 +196,17 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
         seen_qpos = measured_qpos(time, qpos, actuation.sensors)
         seen_qvel = measured_qvel(time, qvel, actuation.sensors)
         ctrl = law_controls(time, seen_qpos, seen_qvel, act, parameters.inner, knots)
-        u1, u2, u3, u4 = allocated_accelerations(
+        u1, u2, u3, u4 = _allocated_accelerations(
             four(ctrl, ACCELERATION_1), seen_qpos, act, actuation.allocation
         )
         sent = (ctrl[0], ctrl[1], ctrl[2], ctrl[3], u1, u2, u3, u4)
         commands = delivered(act, sent)
         return (
-            *servo_controls(time, qpos, commands, actuation),
+            *_servo_controls(time, qpos, commands, actuation),
             *thrust_controls(time, act, actuation.faults),
-            *motor_controls(act, law_act, commands, actuation),
+            *_motor_controls(act, law_act, commands, actuation),
             *ctrl[FURTHER_RATES:],
-            *speed_command_rates(act, law_act, commands, actuation),
+            *_speed_command_rates(act, law_act, commands, actuation),
             *line_rates(act, sent, actuation.control_timestep),
             *commands,
         )
@@ -218,11 +218,11 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
         actuation = parameters.layer
         commands = first_eight(ctrl[memory:])
         return (
-            *servo_controls(time, qpos, commands, actuation),
+            *_servo_controls(time, qpos, commands, actuation),
             *thrust_controls(time, act, actuation.faults),
-            *motor_controls(act, law_act, commands, actuation),
+            *_motor_controls(act, law_act, commands, actuation),
             *ctrl[FURTHER_RATES:law_ctrl],
-            *speed_command_rates(act, law_act, commands, actuation),
+            *_speed_command_rates(act, law_act, commands, actuation),
             *ctrl[line_ctrl:],
         )
 

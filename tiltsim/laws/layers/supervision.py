@@ -88,7 +88,7 @@ def supervised_servo_commands(
 
 
 @scalar
-def gait_scale(time: float, roll: float, pitch: float, parameters: Any, knots: Vector) -> float:
+def _gait_scale(time: float, roll: float, pitch: float, parameters: Any, knots: Vector) -> float:
     """`supervised_gait_scale` of the planned gait at an attitude (rad)."""
     law = parameters.inner.law
     planned = tilt_reference(time, law.gait, knots)
@@ -105,7 +105,7 @@ def _scaling(loop: ClosedLoop) -> Layer:
     ) -> Values:
         planned = inner_controls(time, qpos, qvel, act, parameters.inner, knots)
         roll, pitch, _yaw = euler_from_quaternion(qpos[QW], qpos[QX], qpos[QY], qpos[QZ])
-        scale = gait_scale(time, roll, pitch, parameters, knots)
+        scale = _gait_scale(time, roll, pitch, parameters, knots)
         return (
             scale * planned[0],
             scale * planned[1],
@@ -119,7 +119,9 @@ def _scaling(loop: ClosedLoop) -> Layer:
     ) -> dict[str, Floats]:
         columns, (parameters, knots) = inner(), setup
         rows = zip(*(samples[name].tolist() for name in ("time", "roll", "pitch")), strict=True)
-        scale = np.array([gait_scale(t, roll, pitch, parameters, knots) for t, roll, pitch in rows])
+        scale = np.array(
+            [_gait_scale(t, roll, pitch, parameters, knots) for t, roll, pitch in rows]
+        )
         scaled = {name: scale * columns[name] for name in TILT_REFERENCE_COLUMNS}
         return {**columns, **scaled, SUPERVISION: 1.0 - scale}
 
