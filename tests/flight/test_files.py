@@ -18,8 +18,7 @@ from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.flight.reading import load_flight
 from tiltsim.flight.writing import metrics_json
-from tiltsim.scenario.document import scenario_toml, without_none
-from tiltsim.scenario.loading import parse_scenario
+from tiltsim.scenario.loading import parse_scenario, scenario_toml, without_none
 from tiltsim.system.files import prepare_folder
 from tiltsim.vehicles.rotorcraft import COLUMN_UNITS
 

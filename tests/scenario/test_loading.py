@@ -9,9 +9,14 @@ from pathlib import Path
 import pytest
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.document import scenario_toml
 from tiltsim.scenario.library import library_entries
-from tiltsim.scenario.loading import load_scenario, merge, parse_override, parse_scenario
+from tiltsim.scenario.loading import (
+    load_scenario,
+    merge,
+    parse_override,
+    parse_scenario,
+    scenario_toml,
+)
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.studies.checking import collect
 

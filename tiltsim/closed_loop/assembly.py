@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.scenario.flight_plan import FlightPlan
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim_controllers.mathematics.scalar import Values, Vector
 
 

@@ -20,8 +20,7 @@ from tiltsim_controllers.mathematics.records import flatten, record_dtype, recor
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 
 class Sizes(NamedTuple):

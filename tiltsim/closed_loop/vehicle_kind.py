@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     import mujoco
 
     from tiltsim.models.parts import ExtraActuators
-    from tiltsim.scenario.flight_plan import FlightPlan
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.document import without_none
+from tiltsim.scenario.loading import without_none
 from tiltsim.scenario.messages import one_line_message
 from tiltsim.sweeps.checks import check_points
 from tiltsim.sweeps.definition import SweepDefinition

@@ -27,7 +27,7 @@ from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, clipp
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
+    from tiltsim.scenario.scenario import FlightPlan
 
 Wrench = tuple[float, float, float, float, float, float]
 """Force (N) and torque (N m) on the body, body axes."""

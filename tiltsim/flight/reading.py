@@ -14,8 +14,7 @@ from tiltsim.errors import InputError
 from tiltsim.flight.end import End, EndKind
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
-from tiltsim.scenario.document import without_none
-from tiltsim.scenario.loading import parse_scenario
+from tiltsim.scenario.loading import parse_scenario, without_none
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tiltsim.scenario.controller import PythonController
-from tiltsim.scenario.document import scenario_toml
+from tiltsim.scenario.loading import scenario_toml
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.files import replacing
 

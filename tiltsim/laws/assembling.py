@@ -19,7 +19,7 @@ from tiltsim.laws.tilt_car_fourth_derivative import FOURTH_DERIVATIVE
 from tiltsim.laws.tilt_car_planned_direction import PLANNED_DIRECTION
 from tiltsim.laws.tilt_car_third_derivative import THIRD_DERIVATIVE
 from tiltsim.laws.yaw_position import YAW_POSITION
-from tiltsim.scenario.flight_plan import plan_flight
+from tiltsim.scenario.scenario import plan_flight
 
 if TYPE_CHECKING:
     from tiltsim.closed_loop.loop import ClosedLoop

@@ -50,8 +50,7 @@ from tiltsim_controllers.vehicle.parameters import drag_ratio
 from tiltsim_controllers.vehicle.states import ALPHA_1, TILTROTOR_FIELDS
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 
 class LoopParameters(NamedTuple):

@@ -33,8 +33,7 @@ from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 
 class HeldCommand(NamedTuple):

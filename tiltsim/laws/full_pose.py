@@ -37,7 +37,7 @@ from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values,
 from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
+    from tiltsim.scenario.scenario import FlightPlan
 
 TILT_COMMANDS: Final = tuple(f"tilt_command_{rotor}" for rotor in ROTORS)
 """The controller's states: the commands of the servos (rad) without their lead."""

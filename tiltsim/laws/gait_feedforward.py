@@ -45,7 +45,7 @@ from tiltsim_controllers.references.trajectories import position_reference
 from tiltsim_controllers.vehicle.states import ROTORS, TILTROTOR_FIELDS
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
+    from tiltsim.scenario.scenario import FlightPlan
 
 TILT_RATE_COLUMNS: Final = tuple(f"alpha_rate_{rotor}" for rotor in ROTORS)
 

@@ -37,7 +37,7 @@ from tiltsim_controllers.vehicle.quadrotor_mixer import speed_along_spin, thrust
 from tiltsim_controllers.vehicle.states import PITCH, ROLL
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
+    from tiltsim.scenario.scenario import FlightPlan
 
 EXTENSION_FIELDS: Final = ("extension_thrust", "extension_thrust_rate")
 """The controller's states, ``zeta`` and ``xi``, in a sample."""

@@ -37,7 +37,7 @@ from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.quadrotor_mixer import thrust_controls
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
+    from tiltsim.scenario.scenario import FlightPlan
 
 
 class LoopParameters(NamedTuple):

@@ -24,8 +24,7 @@ from tiltsim_controllers.references.trajectories import ReferenceParameters, ref
 from tiltsim_controllers.tilt_car.vehicle import TiltCar
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 CarState = tuple[float, float, float, float, float, float, float, float]
 

@@ -23,7 +23,7 @@ from tiltsim_controllers.tilt_car.fourth_derivative import (
 )
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
+    from tiltsim.scenario.scenario import FlightPlan
 
 ACCELERATIONS: Final = ("rotor_acceleration_1", "rotor_acceleration_2")
 SPEEDS: Final = ("law_speed_1", "law_speed_2")

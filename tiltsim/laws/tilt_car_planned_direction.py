@@ -40,7 +40,7 @@ from tiltsim_controllers.tilt_car.planned_direction import (
 )
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
+    from tiltsim.scenario.scenario import FlightPlan
 
 
 class LoopParameters(NamedTuple):

@@ -20,7 +20,7 @@ from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scala
 from tiltsim_controllers.tilt_car.third_derivative import Parameters, third_derivative_inputs
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
+    from tiltsim.scenario.scenario import FlightPlan
 
 
 class LoopParameters(NamedTuple):

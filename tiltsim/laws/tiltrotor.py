@@ -30,8 +30,7 @@ from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle, drag_ratio
 from tiltsim_controllers.vehicle.states import ALPHA_1, PITCH, ROLL, ROTORS, SPEED_1, TILT_FIELDS
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
-    from tiltsim.scenario.scenario import Scenario
+    from tiltsim.scenario.scenario import FlightPlan, Scenario
     from tiltsim.scenario.vehicle import ServoTable
 
 REFERENCE_COLUMNS: Final = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")

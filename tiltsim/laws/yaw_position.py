@@ -25,7 +25,7 @@ from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scala
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
+    from tiltsim.scenario.scenario import FlightPlan
 
 
 class LoopParameters(NamedTuple):

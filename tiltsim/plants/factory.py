@@ -8,7 +8,7 @@ from tiltsim.plants.command import Controller
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.plant import Plant
 from tiltsim.plants.thesis_plant import ThesisPlant
-from tiltsim.plants.user_controlled_plant import UserControlledPlant
+from tiltsim.plants.user_controller import UserControlledPlant
 from tiltsim.system.interrupts import reraise_swallowed_interrupts
 
 

@@ -1,4 +1,4 @@
-"""Loading and calling a user's own controller, and the messages when it fails.
+"""A user's own controller: the plant that it flies, its loading, and messages when it fails.
 
 A controller is anything that takes an `Observation` and returns a `Command`: a function, or an
 object with ``__call__`` for one with a memory. It is called at every control sample, and its
@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.errors import InputError
 from tiltsim.plants.command import (
     CheckedCommand,
@@ -23,6 +24,7 @@ from tiltsim.plants.command import (
     check_command,
     short_repr,
 )
+from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.scenario import Scenario
 
@@ -92,8 +94,7 @@ def with_external_commands(
     ``name`` is their source, for ``controller.function``; ``simulation`` has keys to replace in
     that table. Raises `InputError` if the scenario does not support them.
     """
-    from tiltsim.scenario.document import without_none
-    from tiltsim.scenario.loading import parse_scenario
+    from tiltsim.scenario.loading import parse_scenario, without_none
 
     table = scenario.controller
     if isinstance(table, PythonController) and table.function == name and not simulation:
@@ -171,3 +172,47 @@ def _run_file(start: str, file: Path) -> Any:
     except (Exception, SystemExit) as error:
         raise InputError(f"{start}: raised {_describe(error)}") from error
     return module
+
+
+class UserControlledPlant(CommandedPlant):
+    """A vehicle under a user's own controller, which is called at every control sample.
+
+    An interval may be repeated from a saved state, to find the step on which a flight ended. The
+    commands are kept for that, so that a controller with a memory is called once per sample.
+
+    Parameters
+    ----------
+    assembly
+        The flight.
+    controller
+        Default: the one that the scenario names.
+    """
+
+    def __init__(self, assembly: Assembly, controller: Controller | type | None = None) -> None:
+        super().__init__(assembly)
+        self._controller = load_controller(assembly.scenario, controller)
+        self._scenario = assembly.scenario
+        self._was_reset = False
+        self._every = max(1, assembly.scenario.simulation.control_steps)
+        self._commands: dict[int, CheckedCommand] = {}  # by step
+
+    def advance(self, steps: int) -> None:
+        """Raises `ControllerError` at the time the controller fails."""
+        step = self.steps_taken
+        self._commands = {known: c for known, c in self._commands.items() if known >= step}
+        end = step + steps
+        while step < end:
+            if step % self._every == 0:
+                self.apply(self._command(step))
+            chunk = min(end - step, self._every - step % self._every)
+            super().advance(chunk)
+            step += chunk
+
+    def _command(self, step: int) -> CheckedCommand:
+        if not self._was_reset:
+            self._was_reset = True
+            self._controller.reset(self._scenario)
+        if step not in self._commands:
+            command = self._controller.command(self.observation(), tilting=self.tilting)
+            self._commands[step] = command
+        return self._commands[step]

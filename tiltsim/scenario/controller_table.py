@@ -3,16 +3,89 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar, Literal
+from math import atan, pi
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
-from pydantic import Field
+from pydantic import Discriminator, Field, Tag, model_validator
 
-from tiltsim.scenario.supervisor_table import SupervisorTable
-from tiltsim.scenario.table import Table
+from tiltsim.scenario.table import Positive, Table
 from tiltsim_controllers.analysis.stability import ErrorLoop
+from tiltsim_controllers.gaits.red_gait import determinant_at_clearance
+from tiltsim_controllers.laws.supervisor import STRATEGIES, Supervisor
+from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
 ReferenceKind = Literal["position", "attitude_altitude", "pose"]
 """What a controller tracks: position and yaw, attitude and altitude, or position and attitude."""
+
+
+class SupervisorTable(Table):
+    """Keeps a gait away from singular matrices; see `tiltsim_controllers.laws.supervisor`."""
+
+    table_name = "controller.supervisor"
+
+    strategy: Literal["scale", "hold", "return_to_red"] = Field(
+        "scale", description="shrink the gait, stop its clock, or go to the nearest red gait"
+    )
+    min_margin: Annotated[float, Field(ge=0.0, lt=pi / 2)] = Field(
+        0.2, description="smallest singularity margin to allow, rad; 0 disables the limit"
+    )
+    min_determinant: Annotated[float, Field(ge=0.0, lt=4.0)] = Field(
+        0.5,
+        description="smallest determinant to allow, 4 for a level untilted vehicle; 0 disables the "
+        "limit",
+    )
+    horizon: Annotated[float, Field(gt=0.0, le=10.0)] = Field(
+        0.5, description="how far to look ahead along the gait, s; needs hold or return_to_red"
+    )
+    max_tilt_rate: Positive = Field(
+        1.0,
+        description="tilt rate on the way to red and back, on top of the gait's, rad/s; needs "
+        "return_to_red",
+    )
+    clearance: Annotated[float, Field(gt=0.0, lt=pi / 4)] = Field(
+        0.1,
+        description="distance on red from the curve L, where rotors stop, rad, below atan(r); "
+        "needs return_to_red",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for keys, strategies in (
+            (("horizon",), ("hold", "return_to_red")),
+            (("max_tilt_rate", "clearance"), ("return_to_red",)),
+        ):
+            if self.strategy not in strategies:
+                needs = f"needs controller.supervisor.strategy = {' or '.join(strategies)}"
+                self.require_defaults(keys, needs)
+        return self
+
+    def resolve(self, vehicle: Vehicle) -> Supervisor:
+        """The supervisor's parameters for a vehicle.
+
+        Raises `InvalidValueError` if red gaits at the clearance have too small a determinant, or
+        not even the untilted vehicle keeps the clearance.
+        """
+        if self.strategy == "return_to_red":
+            ratio = drag_ratio(vehicle)
+            delta, reached = atan(ratio), determinant_at_clearance(self.clearance, ratio)
+            mistake = ""
+            if self.clearance >= delta:
+                mistake = f"must be below {delta:.4g}, which the untilted vehicle keeps"
+            elif reached < self.min_determinant:
+                mistake = (
+                    f"the determinant is only {reached:.3g} there, below min_determinant = "
+                    f"{self.min_determinant:g}; use a larger clearance"
+                )
+            if mistake:
+                raise self.mistake("clearance", mistake)
+        return Supervisor(
+            self.min_margin,
+            self.min_determinant,
+            STRATEGIES[self.strategy],
+            self.horizon,
+            self.max_tilt_rate,
+            self.clearance,
+        )
 
 
 class ControllerTable(Table, ABC):
@@ -71,3 +144,11 @@ class ControllerTable(Table, ABC):
 def gain_kind(value: object) -> str:
     """The tag of a controller's gains: ``named`` for a set, ``table`` for numbers."""
     return "named" if isinstance(value, str) else "table"
+
+
+_Names = TypeVar("_Names")
+_Numbers = TypeVar("_Numbers")
+NamedGains = Annotated[
+    Annotated[_Names, Tag("named")] | Annotated[_Numbers, Tag("table")], Discriminator(gain_kind)
+]
+"""The name of a set of gains, or explicit gains."""

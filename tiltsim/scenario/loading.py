@@ -1,4 +1,4 @@
-"""Reading scenarios: files, variants and overrides merged into one validated `Scenario`."""
+"""Reading scenarios: files, variants and overrides merged into one `Scenario`; and writing them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
+import tomli_w
 from pydantic import ValidationError
 
 from tiltsim.errors import InputError
@@ -231,3 +232,17 @@ def parse_override(text: str) -> tuple[str, Any]:
         return key, tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
         return key, value
+
+
+def scenario_toml(scenario: Scenario) -> str:
+    """A scenario with all defaults filled in, as TOML that reads back to the same scenario."""
+    return tomli_w.dumps(without_none(scenario.model_dump(mode="json")))
+
+
+def without_none(value: Any) -> Any:
+    """A document without the keys whose value is None, which TOML cannot express."""
+    if isinstance(value, dict):
+        return {key: without_none(item) for key, item in value.items() if item is not None}
+    if isinstance(value, list | tuple):
+        return [without_none(item) for item in value]
+    return value

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Field, model_validator
 
 import tiltsim_controllers.laws.quadrotor_attitude_altitude as quadrotor_attitude_altitude
 import tiltsim_controllers.laws.yaw_position as yaw_position
-from tiltsim.scenario.controller_table import ControllerTable, gain_kind
+from tiltsim.scenario.controller_table import ControllerTable, NamedGains
 from tiltsim.scenario.table import Gains2, Gains4, Positive, Table
-from tiltsim_controllers.analysis.stability import (
-    ErrorLoop,
-    linear_loop,
-)
+from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.laws.switching import PUBLISHED_ZONE
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
@@ -25,11 +22,7 @@ class YawPositionGainTable(Table):
     yaw: Gains2 = Field((5.0, 5.0), description="on the rate and on yaw")
 
 
-YawPositionGains = Annotated[
-    Annotated[Literal["ch02", "stable"], Tag("named")]
-    | Annotated[YawPositionGainTable, Tag("table")],
-    Discriminator(gain_kind),
-]
+YawPositionGains = NamedGains[Literal["ch02", "stable"], YawPositionGainTable]
 
 
 class YawPositionController(ControllerTable):
@@ -56,10 +49,7 @@ class QuadrotorAttitudeGainTable(Table):
     attitude: Gains2 = Field(description="on the rates and on roll, pitch and yaw")
 
 
-QuadrotorAttitudeGains = Annotated[
-    Annotated[Literal["ch02"], Tag("named")] | Annotated[QuadrotorAttitudeGainTable, Tag("table")],
-    Discriminator(gain_kind),
-]
+QuadrotorAttitudeGains = NamedGains[Literal["ch02"], QuadrotorAttitudeGainTable]
 
 
 class QuadrotorAttitudeAltitudeController(ControllerTable):

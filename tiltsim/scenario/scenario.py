@@ -6,6 +6,7 @@ else. `tiltsim.scenario.loading` reads the files, `tiltsim.scenario.messages` wo
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Self
 
 from pydantic import ConfigDict, Field, model_validator
@@ -14,6 +15,9 @@ from tiltsim.scenario.consistency import check_consistency
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.table import Table
 from tiltsim.scenario.time_steps import check_time_steps
+from tiltsim_controllers.gaits.plans import Gait
+from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.references.trajectories import ReferenceParameters
 
 
 class Scenario(ScenarioTables):
@@ -32,3 +36,31 @@ class Variant(Table):
     model_config = ConfigDict(extra="allow")
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$")]
+
+
+@dataclass(frozen=True, eq=False)
+class FlightPlan:
+    """A scenario with its gait planned and its reference placed.
+
+    Attributes
+    ----------
+    scenario
+        The scenario.
+    gait
+        Its gait, planned for its vehicle.
+    reference
+        The record of its reference.
+    knots
+        Keyframes of the gait, then waypoints of the reference, as scalar functions read them.
+    """
+
+    scenario: Scenario
+    gait: Gait
+    reference: ReferenceParameters
+    knots: Values
+
+
+def plan_flight(scenario: Scenario) -> FlightPlan:
+    """Plan a scenario's gait, and place the knots of its reference after the gait's."""
+    gait = scenario.gait.plan(scenario.vehicle.resolve())
+    return FlightPlan(scenario, gait, *scenario.reference.after_gait(gait.knots))

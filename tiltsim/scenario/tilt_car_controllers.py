@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Field
 
 import tiltsim_controllers.tilt_car.fourth_derivative as fourth_derivative
 import tiltsim_controllers.tilt_car.planned_direction as planned_direction
 import tiltsim_controllers.tilt_car.third_derivative as third_derivative
-from tiltsim.scenario.controller_table import ControllerTable, gain_kind
+from tiltsim.scenario.controller_table import ControllerTable, NamedGains
 from tiltsim.scenario.table import Gains2, Gains4, NonNegative, Table, Vector3
-from tiltsim_controllers.analysis.stability import (
-    ErrorLoop,
-    linear_loop,
-)
+from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 
 
 class ThirdDerivativeController(ControllerTable):
@@ -24,10 +21,9 @@ class ThirdDerivativeController(ControllerTable):
     reference_kinds = ("position",)
 
     law: Literal["tilt_car_third_derivative"]
-    gains: Annotated[
-        Annotated[Literal["ch10"], Tag("named")] | Annotated[Vector3, Tag("table")],
-        Discriminator(gain_kind),
-    ] = Field("ch10", description="a set by name, or gains on acceleration, velocity and position")
+    gains: NamedGains[Literal["ch10"], Vector3] = Field(
+        "ch10", description="a set by name, or gains on acceleration, velocity and position"
+    )
     restoring_rate: NonNegative = Field(
         0.0,
         description="rate of turning the mean thrust direction towards the acceleration, 1/s; "
@@ -57,10 +53,7 @@ class FourthDerivativeController(ControllerTable):
     anti_windup: bool = Field(
         False, description="stop the rotor speeds that the law integrates at zero"
     )
-    gains: Annotated[
-        Annotated[Literal["ch10"], Tag("named")] | Annotated[Gains4, Tag("table")],
-        Discriminator(gain_kind),
-    ] = Field(
+    gains: NamedGains[Literal["ch10"], Gains4] = Field(
         "ch10", description="a set by name, or gains on jerk, acceleration, velocity and position"
     )
 
@@ -93,11 +86,7 @@ class PlannedDirectionController(ControllerTable):
     gait_types = ("penguin_small", "penguin_large", "rotating")
 
     law: Literal["tilt_car_planned_direction"]
-    gains: Annotated[
-        Annotated[Literal["ch10", "ch11"], Tag("named")]
-        | Annotated[PlannedDirectionGainTable, Tag("table")],
-        Discriminator(gain_kind),
-    ] = "ch11"
+    gains: NamedGains[Literal["ch10", "ch11"], PlannedDirectionGainTable] = "ch11"
 
     def resolve_gains(self) -> planned_direction.Gains:
         """The gains of a named set or a table."""

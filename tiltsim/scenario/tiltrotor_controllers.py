@@ -8,8 +8,12 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import Discriminator, Field, Tag, model_validator
 
 import tiltsim_controllers.laws.full_pose as full_pose
-from tiltsim.scenario.controller_table import ControllerTable, gain_kind
-from tiltsim.scenario.supervisor_table import SupervisorTable
+from tiltsim.scenario.controller_table import (
+    ControllerTable,
+    NamedGains,
+    SupervisorTable,
+    gain_kind,
+)
 from tiltsim.scenario.table import Gains2, NonNegative, Positive, Table, Vector3
 from tiltsim_controllers.analysis.stability import (
     ErrorLoop,
@@ -235,10 +239,7 @@ class FullPoseController(ControllerTable):
     commands_tilts = True
 
     law: Literal["full_pose"]
-    gains: Annotated[
-        Annotated[Literal["ch03"], Tag("named")] | Annotated[FullPoseGainTable, Tag("table")],
-        Discriminator(gain_kind),
-    ] = "ch03"
+    gains: NamedGains[Literal["ch03"], FullPoseGainTable] = "ch03"
     tilt_weight: Literal["even", "published"] = Field(
         "even",
         description="weight of tilt rates in the norm: by the force that they change, or as "

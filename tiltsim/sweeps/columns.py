@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.document import without_none
+from tiltsim.scenario.loading import without_none
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS
 from tiltsim.sweeps.definition import VERSIONS
 from tiltsim.sweeps.executing import ScenarioResult

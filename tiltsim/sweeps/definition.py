@@ -9,8 +9,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.document import without_none
-from tiltsim.scenario.loading import parse_scenario
+from tiltsim.scenario.loading import parse_scenario, without_none
 from tiltsim.scenario.messages import show
 from tiltsim.sweeps.tables import Sweep
 

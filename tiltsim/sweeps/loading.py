@@ -11,13 +11,13 @@ from typing import Any
 from pydantic import ValidationError
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.document import without_none
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.loading import (
     apply_overrides,
     load_scenario,
     locate_named_files,
     parse_scenario,
+    without_none,
 )
 from tiltsim.scenario.messages import one_line_message
 from tiltsim.sweeps.checks import check_points

@@ -9,7 +9,7 @@ import tiltsim
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.factory import make_plant
-from tiltsim.scenario.flight_plan import plan_flight
+from tiltsim.scenario.scenario import plan_flight
 from tiltsim_controllers.analysis.stability import is_hurwitz
 from tiltsim_controllers.laws.gains import GAIN_SETS
 

@@ -60,7 +60,7 @@ from tiltsim_controllers.vehicle.sensors import Sensors
 from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
+    from tiltsim.scenario.scenario import FlightPlan
 
 THRUST_FACTORS: Final = tuple(f"thrust_factor_{rotor}" for rotor in ROTORS)
 

@@ -47,7 +47,7 @@ from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
+    from tiltsim.scenario.scenario import FlightPlan
 
 AIR_COLUMNS: Final = ("air_vx", "air_vy", "air_vz")
 DRYDEN_FIELDS: Final = tuple(f"dryden_{index}" for index in range(1, DRYDEN_STATES + 1))

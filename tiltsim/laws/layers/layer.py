@@ -17,7 +17,7 @@ from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
+    from tiltsim.scenario.scenario import FlightPlan
 
 WRENCH_SIZE: Final = 6
 _NO_ACTUATORS: Final = ExtraActuators()

@@ -19,7 +19,7 @@ from tiltsim.vehicles.rotorcraft.layout import ROTOR_STATES
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
+    from tiltsim.scenario.scenario import FlightPlan
 
 
 @cache

@@ -36,7 +36,7 @@ from tiltsim_controllers.vehicle.parameters import drag_ratio
 from tiltsim_controllers.vehicle.states import PITCH, ROLL
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.flight_plan import FlightPlan
+    from tiltsim.scenario.scenario import FlightPlan
 
 SUPERVISION: Final = "supervision"
 """A column: how much the supervisor intervenes, from 0 to 1.
