@@ -68,16 +68,15 @@ class SupervisorTable(Table):
         if self.strategy == "return_to_red":
             ratio = drag_ratio(vehicle)
             delta, reached = atan(ratio), determinant_at_clearance(self.clearance, ratio)
-            mistake = ""
             if self.clearance >= delta:
-                mistake = f"must be below {delta:.4g}, which the untilted vehicle keeps"
-            elif reached < self.min_determinant:
-                mistake = (
+                reason = f"must be below {delta:.4g}, which the untilted vehicle keeps"
+                raise self.mistake("clearance", reason)
+            if reached < self.min_determinant:
+                raise self.mistake(
+                    "clearance",
                     f"the determinant is only {reached:.3g} there, below min_determinant = "
-                    f"{self.min_determinant:g}; use a larger clearance"
+                    f"{self.min_determinant:g}; use a larger clearance",
                 )
-            if mistake:
-                raise self.mistake("clearance", mistake)
         return Supervisor(
             self.min_margin,
             self.min_determinant,

@@ -174,11 +174,8 @@ def _override(address: str, document: dict[str, Any], key: str, value: object) -
     if isinstance(last, int):
         if not isinstance(target, list) or last >= len(target):
             hint = _other_list(document, path)
-            raise InputError(
-                f"{address}: {key} = {show(value)}: no such entry; {hint}give "
-                f"the whole "
-                f"list {key.rpartition('[')[0]}"
-            )
+            hint += f"give the whole list {key.rpartition('[')[0]}"
+            raise InputError(f"{address}: {key} = {show(value)}: no such entry; {hint}")
     elif not isinstance(target, dict):
         raise InputError(
             f"{address}: {key} = {show(value)}: {key.rpartition('.')[0]} is not a table"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from math import inf, pi
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -16,6 +16,10 @@ from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle
 
 if TYPE_CHECKING:
     from tiltsim.models.user_vehicle import UserVehicle
+
+
+MOMENTS: Final = ("inertia_xx", "inertia_yy", "inertia_zz")
+"""The principal moments among the fields of `Vehicle`."""
 
 
 class ServoTable(Table):
@@ -115,15 +119,10 @@ class VehicleTable(AnyVehicleTable):
 
     def resolve(self) -> Vehicle:
         """The physical parameters: the preset's or the file's, overridden by the keys given."""
-        given = {
-            key: getattr(self, key)
-            for key in ("mass", "arm_length", "thrust_coefficient", "drag_coefficient", "gravity")
-        }
-        if self.inertia is not None:
-            given |= dict(
-                zip(("inertia_xx", "inertia_yy", "inertia_zz"), self.inertia, strict=True)
-            )
+        given = self.model_dump(include={*Vehicle._fields})
         known = {key: value for key, value in given.items() if value is not None}
+        if self.inertia is not None:
+            known |= zip(MOMENTS, self.inertia, strict=True)
         user_vehicle = self.user_vehicle
         base = PRESETS[self.preset] if user_vehicle is None else user_vehicle.vehicle
         return base._replace(**known)
@@ -189,14 +188,7 @@ class TiltCarTable(AnyVehicleTable):
     tilt_servo: ServoTable = ServoTable()
 
     def resolve(self) -> TiltCar:
-        """The physical parameters."""
-        return TiltCar(
-            self.mass,
-            self.top_inertia,
-            self.bottom_inertia,
-            self.half_angle,
-            self.thrust_coefficient,
-        )
+        return TiltCar(**self.model_dump(include={*TiltCar._fields}))
 
 
 def _model(value: Any) -> str:
@@ -232,13 +224,7 @@ class ModelErrorTable(Table):
 
     def apply(self, vehicle: Vehicle) -> Vehicle:
         """The simulated vehicle, where the controller assumes ``vehicle``."""
-        xx, yy, zz = self.inertia
-        return vehicle._replace(
-            mass=self.mass * vehicle.mass,
-            inertia_xx=xx * vehicle.inertia_xx,
-            inertia_yy=yy * vehicle.inertia_yy,
-            inertia_zz=zz * vehicle.inertia_zz,
-            arm_length=self.arm_length * vehicle.arm_length,
-            thrust_coefficient=self.thrust_coefficient * vehicle.thrust_coefficient,
-            drag_coefficient=self.drag_coefficient * vehicle.drag_coefficient,
-        )
+        factors = self.model_dump(exclude={"inertia"})
+        factors |= zip(MOMENTS, self.inertia, strict=True)
+        known = vehicle._asdict()
+        return vehicle._replace(**{key: factor * known[key] for key, factor in factors.items()})

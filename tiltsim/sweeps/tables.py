@@ -22,6 +22,8 @@ Group = Annotated[str | None, Field(description="axes of one group advance toget
 class AxisTable(Table):
     """The keys that every axis has: one key, or several that move together."""
 
+    table_name = "axis"
+
     key: str | None = Field(
         None,
         description="a key of the scenario such as gait.period or gait.angles[0], or a name "
@@ -43,11 +45,9 @@ class AxisTable(Table):
     @model_validator(mode="after")
     def _check_keys(self) -> Self:
         if (self.key is None) == (self.keys is None):
-            raise InvalidValueError("axis.key", self.key, "give either key or keys")
+            raise self.mistake("key", "give either key or keys")
         if self.relative and not all("." in key for key in self.targets):
-            raise InvalidValueError(
-                "axis.relative", True, "only keys of the scenario have a base value"
-            )
+            raise self.mistake("relative", "only keys of the scenario have a base value")
         return self
 
 
@@ -123,7 +123,7 @@ class UniformAxis(AxisTable):
     @model_validator(mode="after")
     def _check_range(self) -> Self:
         if self.low >= self.high:
-            raise InvalidValueError("axis.low", self.low, f"must be below high = {self.high}")
+            raise self.mistake("low", f"must be below high = {self.high}")
         return self
 
 
@@ -158,9 +158,7 @@ class CasesAxis(AxisTable):
     @model_validator(mode="after")
     def _check_name(self) -> Self:
         if "." in self.key:
-            raise InvalidValueError(
-                "axis.key", self.key, "the key of cases is a name without a dot"
-            )
+            raise self.mistake("key", "the key of cases is a name without a dot")
         return self
 
     @property
@@ -188,6 +186,8 @@ Axis = Annotated[
 class SampleTable(Table):
     """How all uniform and normal axes are drawn together."""
 
+    table_name = "sample"
+
     method: Literal["random", "latin_hypercube", "sobol"] = "random"
     count: Count
     seed: Annotated[int, Field(ge=0)] = 0
@@ -195,9 +195,7 @@ class SampleTable(Table):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.method == "sobol" and self.count & (self.count - 1):
-            raise InvalidValueError(
-                "sample.count", self.count, "Sobol's sequence is balanced only for powers of two"
-            )
+            raise self.mistake("count", "Sobol's sequence is balanced only for powers of two")
         return self
 
 
@@ -290,9 +288,7 @@ class Sweep(Table):
                 "axis.type", drawn[0].type, "needs a [sample] table with its count and seed"
             )
         if self.sample is not None and not drawn:
-            raise InvalidValueError(
-                "sample.count", self.sample.count, "no axis is of type uniform, normal or seed"
-            )
+            raise self.mistake("sample.count", "no axis is of type uniform, normal or seed")
         targets = [key for axis in self.axis for key in axis.targets]
         targets += [self.bisect.key] if self.bisect is not None else []
         targets += [*self.derive]
