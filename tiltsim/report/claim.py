@@ -10,6 +10,7 @@ from enum import Enum
 from math import isfinite
 from typing import TYPE_CHECKING, Final, TypeAlias
 
+from tiltsim.flight.expectations import Verdict
 from tiltsim.scenario.metric_names import unit_of
 
 if TYPE_CHECKING:
@@ -144,8 +145,6 @@ class ExpectationClaim(Claim):
 
     def measure(self, metrics: Metrics) -> Value | None:
         """The measured value, or whether the bounds hold if the thesis gives a yes/no answer."""
-        from tiltsim.flight.expectations import Verdict
-
         value = metrics.get(self.expectation.metric)
         if value is None or isinstance(value, bool) or not isinstance(self.published, bool):
             return value

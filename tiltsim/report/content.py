@@ -14,6 +14,7 @@ from tiltsim.report.claim_rows import Cell, Failure, Row
 from tiltsim.report.comparisons import Comparison
 from tiltsim.report.drawing import Drawing
 from tiltsim.report.findings import FINDINGS, Finding
+from tiltsim.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
     from tiltsim.report.flights import Flights, ReportEntry
@@ -203,14 +204,9 @@ def failure_text(failure: Failure) -> str:
 
 def flown_text(report: Report) -> str:
     """The number of simulated scenarios, as text."""
-    records = [entry for entry in report.entries if all(map(_flies, entry.plants.values()))]
-    both = len(records)
-    rest = len(report.entries) - both
+    both = sum(
+        all(isinstance(scenario, Scenario) for scenario in entry.plants.values())
+        for entry in report.entries
+    )
     text = f"{len(report.entries)} scenarios, {both} of them on both plants"
-    return text if rest else f"{both} scenarios, each on both plants"
-
-
-def _flies(scenario: object) -> bool:
-    from tiltsim.scenario.scenario import Scenario
-
-    return isinstance(scenario, Scenario)
+    return text if both < len(report.entries) else f"{both} scenarios, each on both plants"

@@ -7,15 +7,16 @@ from dataclasses import dataclass
 from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
+
+from matplotlib.figure import Figure
+from PIL import Image
 
 from tiltsim.report.flights import FlightRecord, Flights, ReportEntry
 from tiltsim.report.pictures import PICTURES, FlightMetrics, Picture
 from tiltsim.report.store import code_digest, flight_key, results, sources_digest, store
 from tiltsim.scenario.scenario import Scenario
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from tiltsim.views.figures.style import paper_style
 
 DPI: Final = 144
 COLORS: Final = 256
@@ -92,10 +93,6 @@ def png(figure: Figure) -> bytes:
 
     A palette of 256 colors makes the page a third as large without a visible difference.
     """
-    from PIL import Image
-
-    from tiltsim.views.figures.style import paper_style
-
     drawn, packed = BytesIO(), BytesIO()
     with paper_style():
         figure.savefig(drawn, format="png", dpi=DPI)
