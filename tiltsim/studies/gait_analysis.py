@@ -119,13 +119,10 @@ def gait_report(
             "min_singularity_margin": min(table["singularity_margin"]),
             "time": table,
         }
-    report["warnings"] = gait_warnings(gait, vehicle, samples)
-    report["hover_rotor_speeds"] = None
-    if gait.is_constant:
-        a1, a2, a3, a4 = start.tolist()
-        speeds = hover_rotor_speeds((a1, a2, a3, a4), vehicle)
-        report["hover_rotor_speeds"] = speeds
-        report["warnings"] += _backward_rotors(speeds)
+    a1, a2, a3, a4 = start.tolist()
+    speeds = hover_rotor_speeds((a1, a2, a3, a4), vehicle) if gait.is_constant else None
+    report["warnings"] = gait_warnings(gait, vehicle, samples) + _backward_rotors(speeds)
+    report["hover_rotor_speeds"] = speeds
     return report
 
 
