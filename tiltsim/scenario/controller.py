@@ -19,8 +19,6 @@ from tiltsim.scenario.tilt_car_controllers import (
     ThirdDerivativeController,
 )
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController, FullPoseController
-from tiltsim_controllers.analysis.stability import ErrorLoop
-from tiltsim_controllers.vehicle.parameters import Vehicle
 
 DEFAULT_LAW: Final = "attitude_altitude"
 
@@ -47,10 +45,6 @@ class PythonController(ControllerTable):
     def attribute(self) -> str:
         """The name within the file."""
         return self.function.rpartition(":")[2]
-
-    def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
-        """None is known."""
-        return []
 
 
 def _law(value: Any) -> str:

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from itertools import islice
 from math import atan, pi
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from tiltsim.scenario.table import Positive, Table
-from tiltsim_controllers.analysis.stability import ErrorLoop
+from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.gaits.red_gait import determinant_at_clearance
 from tiltsim_controllers.laws.supervisor import STRATEGIES, Supervisor
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
 ReferenceKind = Literal["position", "attitude_altitude", "pose"]
 """What a controller tracks: position and yaw, attitude and altitude, or position and attitude."""
+
+LoopGains = tuple[tuple[str, int], ...]
+"""Linear loops: the name of each, and how many gains it has."""
 
 
 class SupervisorTable(Table):
@@ -87,22 +91,27 @@ class SupervisorTable(Table):
         )
 
 
-class ControllerTable(Table, ABC):
+class ControllerTable(Table):
     """What every controller has; properties are neutral where a controller lacks the feature."""
 
     table_name = "controller"
     vehicle_models: ClassVar[tuple[str, ...]]
     reference_kinds: ClassVar[tuple[ReferenceKind, ...]]
     gait_types: ClassVar[tuple[str, ...]] = ("fixed",)  # of the tilt-car's controllers
+    loop_gains: ClassVar[LoopGains] = ()  # of independent linear loops
     is_external: ClassVar[bool] = False  # commands come from Python code, not from a built-in law
     commands_tilts: ClassVar[bool] = False  # the tilt angles are inputs, not planned by a gait
 
     allow_unstable: bool = Field(False, description="accept gains that fail the Routh condition")
     law: str
 
-    @abstractmethod
+    def resolve_gains(self) -> tuple[float, ...]:
+        """The gains: of a named set, or as given."""
+        return ()
+
     def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
         """The linear closed loops that the gains make around a vehicle's parameters."""
+        return linear_loops(self.resolve_gains(), self.loop_gains)
 
     @property
     def linearization(self) -> str:
@@ -138,6 +147,12 @@ class ControllerTable(Table, ABC):
     def rotors_stop_at_zero(self) -> bool:
         """Whether rotor speeds that the law integrates stop at zero."""
         return True
+
+
+def linear_loops(gains: Sequence[float], sizes: LoopGains) -> list[ErrorLoop]:
+    """Independent linear loops, given the gains of all, one after another."""
+    rest = iter(gains)
+    return [linear_loop(name, [*islice(rest, size)]) for name, size in sizes]
 
 
 def gain_kind(value: object) -> str:

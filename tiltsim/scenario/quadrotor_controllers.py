@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Final, Literal, Self
 
 from pydantic import Field, model_validator
 
 import tiltsim_controllers.laws.quadrotor_attitude_altitude as quadrotor_attitude_altitude
 import tiltsim_controllers.laws.yaw_position as yaw_position
-from tiltsim.scenario.controller_table import ControllerTable, NamedGains
+from tiltsim.scenario.controller_table import ControllerTable, NamedGains, linear_loops
 from tiltsim.scenario.table import Gains2, Gains4, Positive, Table
-from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
+from tiltsim_controllers.analysis.stability import ErrorLoop
 from tiltsim_controllers.laws.switching import PUBLISHED_ZONE
 from tiltsim_controllers.vehicle.parameters import Vehicle
+
+_YAW_POSITION_LOOPS: Final = (("position", 4), ("yaw", 2))
+_ATTITUDE_LOOPS: Final = (("altitude", 2), ("attitude", 2))
 
 
 class YawPositionGainTable(Table):
@@ -30,16 +33,13 @@ class YawPositionController(ControllerTable):
 
     vehicle_models = ("quadrotor",)
     reference_kinds = ("position",)
+    loop_gains = _YAW_POSITION_LOOPS
 
     law: Literal["yaw_position"]
     gains: YawPositionGains = "stable"
 
     def resolve_gains(self) -> yaw_position.Gains:
-        """The gains of a named set or a table."""
         return _yaw_position_gains(self.gains)
-
-    def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
-        return _yaw_position_loops(self.resolve_gains())
 
 
 class QuadrotorAttitudeGainTable(Table):
@@ -57,16 +57,13 @@ class QuadrotorAttitudeAltitudeController(ControllerTable):
 
     vehicle_models = ("quadrotor",)
     reference_kinds = ("attitude_altitude",)
+    loop_gains = _ATTITUDE_LOOPS
 
     law: Literal["quadrotor_attitude_altitude"]
     gains: QuadrotorAttitudeGains = "ch02"
 
     def resolve_gains(self) -> quadrotor_attitude_altitude.Gains:
-        """The gains of a named set or a table."""
         return _attitude_gains(self.gains)
-
-    def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
-        return _attitude_loops(self.resolve_gains())
 
 
 class ZoneTable(Table):
@@ -91,6 +88,7 @@ class SwitchingController(ControllerTable):
 
     vehicle_models = ("quadrotor",)
     reference_kinds = ("pose",)
+    loop_gains = (*_YAW_POSITION_LOOPS, *_ATTITUDE_LOOPS)
 
     law: Literal["switching"]
     gains: YawPositionGains = Field("stable", description="gains of the yaw-position law")
@@ -106,7 +104,6 @@ class SwitchingController(ControllerTable):
     )
 
     def resolve_gains(self) -> yaw_position.Gains:
-        """The gains of the yaw-position law."""
         return _yaw_position_gains(self.gains)
 
     def resolve_attitude_gains(self) -> quadrotor_attitude_altitude.Gains:
@@ -114,10 +111,8 @@ class SwitchingController(ControllerTable):
         return _attitude_gains(self.attitude_gains)
 
     def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
-        return [
-            *_yaw_position_loops(self.resolve_gains()),
-            *_attitude_loops(self.resolve_attitude_gains()),
-        ]
+        gains = *self.resolve_gains(), *self.resolve_attitude_gains()
+        return linear_loops(gains, self.loop_gains)
 
 
 def _yaw_position_gains(gains: str | YawPositionGainTable) -> yaw_position.Gains:
@@ -126,15 +121,7 @@ def _yaw_position_gains(gains: str | YawPositionGainTable) -> yaw_position.Gains
     return yaw_position.GAIN_SETS[gains]
 
 
-def _yaw_position_loops(gains: yaw_position.Gains) -> list[ErrorLoop]:
-    return [linear_loop("position", gains[:4]), linear_loop("yaw", gains[4:])]
-
-
 def _attitude_gains(gains: str | QuadrotorAttitudeGainTable) -> quadrotor_attitude_altitude.Gains:
     if isinstance(gains, QuadrotorAttitudeGainTable):
         return quadrotor_attitude_altitude.Gains(*gains.altitude, *gains.attitude)
     return quadrotor_attitude_altitude.GAIN_SETS[gains]
-
-
-def _attitude_loops(gains: quadrotor_attitude_altitude.Gains) -> list[ErrorLoop]:
-    return [linear_loop("altitude", gains[:2]), linear_loop("attitude", gains[2:])]

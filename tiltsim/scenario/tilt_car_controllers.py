@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field
 
@@ -11,7 +11,6 @@ import tiltsim_controllers.tilt_car.planned_direction as planned_direction
 import tiltsim_controllers.tilt_car.third_derivative as third_derivative
 from tiltsim.scenario.controller_table import ControllerTable, NamedGains
 from tiltsim.scenario.table import Gains2, Gains4, NonNegative, Table, Vector3
-from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 
 
 class ThirdDerivativeController(ControllerTable):
@@ -19,6 +18,7 @@ class ThirdDerivativeController(ControllerTable):
 
     vehicle_models = ("tilt_car",)
     reference_kinds = ("position",)
+    loop_gains = (("position", 3),)
 
     law: Literal["tilt_car_third_derivative"]
     gains: NamedGains[Literal["ch10"], Vector3] = Field(
@@ -31,13 +31,9 @@ class ThirdDerivativeController(ControllerTable):
     )
 
     def resolve_gains(self) -> third_derivative.Gains:
-        """The gains of a named set or a list."""
         if isinstance(self.gains, str):
             return third_derivative.GAIN_SETS[self.gains]
         return third_derivative.Gains(*self.gains)
-
-    def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
-        return [linear_loop("position", self.resolve_gains())]
 
 
 class FourthDerivativeController(ControllerTable):
@@ -45,6 +41,7 @@ class FourthDerivativeController(ControllerTable):
 
     vehicle_models = ("tilt_car",)
     reference_kinds = ("position",)
+    loop_gains = (("position", 4),)
 
     law: Literal["tilt_car_fourth_derivative"]
     decoupling: Literal["published", "exact"] = Field(
@@ -58,13 +55,9 @@ class FourthDerivativeController(ControllerTable):
     )
 
     def resolve_gains(self) -> fourth_derivative.Gains:
-        """The gains of a named set or a list."""
         if isinstance(self.gains, str):
             return fourth_derivative.GAIN_SETS[self.gains]
         return fourth_derivative.Gains(*self.gains)
-
-    def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
-        return [linear_loop("position", self.resolve_gains())]
 
     @property
     def rotors_stop_at_zero(self) -> bool:
@@ -84,16 +77,12 @@ class PlannedDirectionController(ControllerTable):
     vehicle_models = ("tilt_car",)
     reference_kinds = ("position",)
     gait_types = ("penguin_small", "penguin_large", "rotating")
+    loop_gains = (("x", 2), ("y", 2))
 
     law: Literal["tilt_car_planned_direction"]
     gains: NamedGains[Literal["ch10", "ch11"], PlannedDirectionGainTable] = "ch11"
 
     def resolve_gains(self) -> planned_direction.Gains:
-        """The gains of a named set or a table."""
         if isinstance(self.gains, PlannedDirectionGainTable):
             return planned_direction.Gains(*self.gains.x, *self.gains.y)
         return planned_direction.GAIN_SETS[self.gains]
-
-    def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
-        gains = self.resolve_gains()
-        return [linear_loop("x", gains[:2]), linear_loop("y", gains[2:])]

@@ -19,7 +19,6 @@ from tiltsim_controllers.analysis.stability import (
     ErrorLoop,
     error_loops,
     feedforward_loops,
-    linear_loop,
 )
 from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS, Gains
 from tiltsim_controllers.laws.gains import (
@@ -168,7 +167,6 @@ class AttitudeAltitudeController(ControllerTable):
         return self
 
     def resolve_gains(self) -> Gains:
-        """The gains of a named set, a table or poles."""
         if isinstance(self.gains, GainTable):
             return gains_from_rows(self.gains.attitude, self.gains.altitude, self.gains.position)
         if isinstance(self.gains, PolePlacementTable):
@@ -236,6 +234,7 @@ class FullPoseController(ControllerTable):
 
     vehicle_models = ("tiltrotor",)
     reference_kinds = ("position", "pose", "attitude_altitude")
+    loop_gains = (("position", 3), ("attitude", 3))
     commands_tilts = True
 
     law: Literal["full_pose"]
@@ -257,7 +256,6 @@ class FullPoseController(ControllerTable):
     )
 
     def resolve_gains(self) -> full_pose.Gains:
-        """The gains of a named set or a table."""
         if isinstance(self.gains, FullPoseGainTable):
             return full_pose.Gains(*self.gains.position, *self.gains.attitude)
         return full_pose.GAIN_SETS[self.gains]
@@ -278,7 +276,3 @@ class FullPoseController(ControllerTable):
         """The limits that the law enforces, infinite where there are none."""
         rate, angle = self.max_tilt_rate, self.max_tilt_angle
         return full_pose.Limits(inf if rate is None else rate, inf if angle is None else angle)
-
-    def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
-        gains = self.resolve_gains()
-        return [linear_loop("position", gains[:3]), linear_loop("attitude", gains[3:])]
