@@ -45,16 +45,8 @@ class Picture:
     """Flights that it shows; one without flights needs only analysis."""
 
 
-def flight_picture(chapter: int, name: str, caption: str, address: str) -> Picture:
-    """The page of one flight in MuJoCo, which is flown again.
-
-    Parameters
-    ----------
-    chapter, name, caption
-        Of the picture.
-    address
-        Of the scenario in the library.
-    """
+def _flight_picture(chapter: int, name: str, caption: str, address: str) -> Picture:
+    """The page of one flight in MuJoCo, which is flown again."""
 
     def draw(metrics: object) -> Figure:
         return flight_figure(simulate(variant_for(address, "mujoco")))
@@ -124,7 +116,7 @@ def _gait_and_biased(key: str) -> Figure:
 
 
 PICTURES: Final[tuple[Picture, ...]] = (
-    flight_picture(
+    _flight_picture(
         1,
         "gust",
         "Tiltrotor with the perfect gait in a gust of 1 m/s² along x (MuJoCo): it hovers level.",
@@ -137,7 +129,7 @@ PICTURES: Final[tuple[Picture, ...]] = (
         "and the exact determinant of the same matrix, which has no zero.",
         lambda _: singularity_figure(PRESETS["ar_drone_2_unrounded"]),
     ),
-    flight_picture(
+    _flight_picture(
         2,
         "through-the-curve",
         "Yaw-position control with gains that satisfy the Routh-Hurwitz criterion: the flight from "
@@ -151,7 +143,7 @@ PICTURES: Final[tuple[Picture, ...]] = (
         "10): surfaces, their zero curves with the triangle U, V, M, and sections.",
         lambda _: determinant_figure("equal", _VEHICLE),
     ),
-    flight_picture(
+    _flight_picture(
         3,
         "over-actuated",
         "Over-actuated control from gait 1 (ch. 3, Figs. 24-27), in MuJoCo.",
@@ -173,7 +165,7 @@ PICTURES: Final[tuple[Picture, ...]] = (
         _trot_errors,
         tuple(product(_TROTS, PLANTS)),
     ),
-    flight_picture(
+    _flight_picture(
         5,
         "walk",
         "The walk at 1/3 with a period of 1 s along the line, modified decoupler (MuJoCo).",
@@ -200,7 +192,7 @@ PICTURES: Final[tuple[Picture, ...]] = (
         "matrix is singular at every attitude.",
         lambda _: _gait_and_biased("ch06_gait_1"),
     ),
-    flight_picture(
+    _flight_picture(
         7,
         "red-circle",
         "Gait 2 (red) on the circle, modified decoupler (MuJoCo).",
@@ -218,19 +210,19 @@ PICTURES: Final[tuple[Picture, ...]] = (
         "Gait 2 of ch. 9: torques and thrust within the rotor limits at zero yaw torque.",
         lambda _: attainable_figure(PUBLISHED_GAITS["ch09_gait_2"].gait, _VEHICLE),
     ),
-    flight_picture(
+    _flight_picture(
         9,
         "ellipse",
         "The circle at 1.5 rad/s with gait 2: the vehicle flies an ellipse (MuJoCo).",
         "ch09_input_limits/circle#omega_15",
     ),
-    flight_picture(
+    _flight_picture(
         10,
         "drift",
         "Two thousand seconds on the circle: no error, and diverging rotor speeds (MuJoCo).",
         "ch10_state_drift/third_derivative#two_thousand_seconds",
     ),
-    flight_picture(
+    _flight_picture(
         11,
         "penguin",
         "The large swing: the error along y ends in a limit cycle (MuJoCo).",
