@@ -13,8 +13,8 @@ from tiltsim_controllers.analysis.singularity import (
     torque_free_direction,
     world_up,
 )
+from tiltsim_controllers.gaits.plans import fixed, waypoints
 from tiltsim_controllers.gaits.plans import instant_trot as trot_instant
-from tiltsim_controllers.gaits.plans import waypoints
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.decouplers import exact_decoupler
 from tiltsim_controllers.laws.supervisor import (
@@ -23,6 +23,7 @@ from tiltsim_controllers.laws.supervisor import (
     STRATEGIES,
     Supervisor,
     allowed_scale,
+    margin_and_determinant,
     supervised_derivative,
     supervised_gait_scale,
     supervised_tilts,
@@ -201,3 +202,39 @@ def test_towards_either_end_of_the_way_to_red_the_motion_is_critically_damped(le
     calm = trot_instant(0.05, 2.0).parameters
     back = [demand(0.3, 0.0, 0.0, left, rate, eager, calm) for rate in rates]
     np.testing.assert_allclose(back, -left / (2 * LAG) ** 2 - rates / LAG, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+def test_on_the_way_to_red_the_tilts_lie_on_the_line_to_it(share):
+    """Opposite tilts of a red gait are equal: each pair's mean, apart from the drag."""
+    supervisor = watch("return_to_red", clearance=0.0)
+    start = np.array([-0.3, 0.4, -0.6, 0.1])  # of which the nearest red gait is regular
+    still = tuple((angle, 0.0, 0.0) for angle in start)
+    moved = supervised_tilts(still, 1.0, (share, 0.0, 0.0), supervisor, RATIO)
+    red = supervised_tilts(still, 1.0, (1.0, 0.0, 0.0), supervisor, RATIO)
+    ends = np.array([jet[0] for jet in red])
+    np.testing.assert_allclose(ends, np.tile(0.5 * (start[:2] + start[2:]), 2), atol=1e-12)
+    found = np.array([jet[0] for jet in moved])
+    np.testing.assert_allclose(found, start + share * (ends - start), rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("rotor", [0, 1, 2, 3])
+def test_on_the_way_to_red_the_tilt_with_the_longest_way_has_the_maximum_rate(rotor):
+    """The other rotor of its pair has as long a way: each moves half of their difference."""
+    angles = [-0.05, 0.05, -0.04, 0.06]
+    angles[rotor] = (-0.9, 0.9)[rotor % 2]
+    gait = fixed(angles).parameters
+    supervisor = watch("return_to_red", min_determinant=3.99, max_rate=0.2, clearance=0.0)
+    half = 0.5 * abs(angles[rotor] - angles[(rotor + 2) % 4])
+    # Far from both ends and from rest the state is driven to that rate, with the lag.
+    rate = demand(0.0, 0.4, 0.0, 0.5, 0.0, supervisor, gait) * LAG
+    assert abs(rate) == pytest.approx(0.2 / half)
+
+
+def test_what_meets_its_threshold_exactly_is_allowed():
+    untilted = (0.0, 0.0, 0.0, 0.0)
+    margin, determinant_there = margin_and_determinant(untilted, (0.0, 0.0, 1.0), RATIO)
+    for threshold in ({"min_margin": margin}, {"min_determinant": determinant_there}):
+        assert allowed_scale(untilted, 0.0, 0.0, Supervisor(**threshold), RATIO) == 1.0
+        above = {name: value * (1.0 + 1e-15) for name, value in threshold.items()}
+        assert allowed_scale(untilted, 0.0, 0.0, Supervisor(**above), RATIO) == 0.0
