@@ -99,12 +99,6 @@ class RotorcraftSpec(ModelSpec):
         """Whether the hinges have stops."""
         return self.tilts and self.tilt_servo.max_angle is not None
 
-    @property
-    def structure(self) -> RotorcraftSpec:
-        """The same spec with all parameters that `_with_parameters` sets replaced by a preset's."""
-        preset = PRESETS["ar_drone_2"]._replace(arm_length=self.vehicle.arm_length)
-        return replace(self, vehicle=preset)
-
 
 def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjModel:
     """Compile the MuJoCo model of a rotorcraft.
@@ -132,7 +126,9 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
     """
     import mujoco
 
-    key = spec.structure, visuals
+    # A preset's parameters in place of all that `_with_parameters` sets.
+    preset = PRESETS["ar_drone_2"]._replace(arm_length=spec.vehicle.arm_length)
+    key = replace(spec, vehicle=preset), visuals
     if key in _compiled:
         return _with_parameters(*_compiled[key], spec)
     complete, bare, assets = _compose(spec)

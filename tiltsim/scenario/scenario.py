@@ -11,10 +11,9 @@ from typing import Annotated, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
-from tiltsim.scenario.consistency import check_consistency
+from tiltsim.scenario.consistency import check_consistency, check_time_steps
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.table import Table
-from tiltsim.scenario.time_steps import check_time_steps
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.references.trajectories import ReferenceParameters
@@ -40,24 +39,12 @@ class Variant(Table):
 
 @dataclass(frozen=True, eq=False)
 class FlightPlan:
-    """A scenario with its gait planned and its reference placed.
-
-    Attributes
-    ----------
-    scenario
-        The scenario.
-    gait
-        Its gait, planned for its vehicle.
-    reference
-        The record of its reference.
-    knots
-        Keyframes of the gait, then waypoints of the reference, as scalar functions read them.
-    """
+    """A scenario with its gait planned and its reference placed."""
 
     scenario: Scenario
-    gait: Gait
+    gait: Gait  # planned for the scenario's vehicle
     reference: ReferenceParameters
-    knots: Values
+    knots: Values  # keyframes of the gait, then waypoints of the reference
 
 
 def plan_flight(scenario: Scenario) -> FlightPlan:
