@@ -223,14 +223,13 @@ def _read(path: str, model: str, modified: int) -> UserVehicle:
 
 def _check_names(compiled: mujoco.MjModel, model: str) -> None:
     """Raise ValueError with the name that is missing, superfluous or out of order."""
-    joints = [compiled.joint(j).name for j in range(compiled.njnt)]
-    actuators = [compiled.actuator(a).name for a in range(compiled.nu)]
-    for kind, found, required in (
-        ("body", [compiled.body(b).name for b in range(compiled.nbody)], ("vehicle",)),
-        ("joint", joints, JOINTS[model]),
-        ("site", [compiled.site(s).name for s in range(compiled.nsite)], SITES),
-        ("actuator", actuators, ACTUATORS[model]),
-    ):
+    kinds = {
+        "body": ([compiled.body(b).name for b in range(compiled.nbody)], ("vehicle",)),
+        "joint": ([compiled.joint(j).name for j in range(compiled.njnt)], JOINTS[model]),
+        "site": ([compiled.site(s).name for s in range(compiled.nsite)], SITES),
+        "actuator": ([compiled.actuator(a).name for a in range(compiled.nu)], ACTUATORS[model]),
+    }
+    for kind, (found, required) in kinds.items():
         missing = [name for name in required if name not in found]
         if missing:
             more = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
@@ -238,10 +237,8 @@ def _check_names(compiled: mujoco.MjModel, model: str) -> None:
                 f"no {kind} {missing[0]!r}{more}; a {model} has the {kind} names "
                 f"{', '.join(required)}"
             )
-    for kind, found, required in (
-        ("joint", joints, JOINTS[model]),
-        ("actuator", actuators, ACTUATORS[model]),
-    ):
+    for kind in ("joint", "actuator"):
+        found, required = kinds[kind]
         superfluous = [name for name in found if name not in required]
         if superfluous:
             raise ValueError(
