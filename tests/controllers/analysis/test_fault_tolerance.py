@@ -162,3 +162,14 @@ def test_more_thrust_never_needs_more_speed():
 def test_a_stuck_servo_is_never_worse_than_a_lost_rotor(angle):
     least = minimum_hover_speed(VEHICLE, stuck=(1, angle))
     assert HOVER < least < 1.3286 * HOVER
+
+
+def test_a_servo_stuck_upright_costs_nothing_and_all_rotors_are_alike():
+    assert minimum_hover_speed(VEHICLE, stuck=(2, 0.0)) == pytest.approx(HOVER, rel=1e-6)
+    # Half a revolution exchanges rotors 1 and 3, a mirror image rotors 1 and 2.
+    speeds = [
+        minimum_hover_speed(VEHICLE, stuck=(rotor, angle))
+        for rotor, angle in ((1, 0.8), (2, -0.8), (3, 0.8), (4, -0.8))
+    ]
+    assert speeds == pytest.approx([speeds[0]] * 4, rel=1e-6)
+    assert speeds[0] > 1.01 * HOVER

@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tiltsim_controllers.analysis.published_gaits import PATHS, PUBLISHED_GAITS, robustness_table
+from tiltsim_controllers.analysis.published_gaits import (
+    DETERMINANT_CASES,
+    PATHS,
+    PUBLISHED_GAITS,
+    robustness_table,
+)
 from tiltsim_controllers.analysis.singularity import rank, residuals, singularity_margin
 from tiltsim_controllers.analysis.two_color_map import curve_l, delta, point_p, region
 from tiltsim_controllers.analysis.two_color_planner import (
@@ -158,6 +163,23 @@ def test_printed_vertices_lie_on_the_published_lines() -> None:
         for offset in (0.334198, 2 * delta(AR_DRONE)):
             np.testing.assert_allclose(angles[:, 2], offset - angles[:, 0], atol=6e-4)
             np.testing.assert_allclose(angles[:, 3], -offset - angles[:, 1], atol=6e-4)
+
+
+@pytest.mark.parametrize("key", ["ch08_gait_2", "ch08_gait_3"])
+def test_the_circles_of_chapter_8_start_beside_their_centre(key) -> None:
+    phases = np.arange(4) / 4.0
+    found = PUBLISHED_GAITS[key].gait.angles(phases)[:, :2]
+    expected = [(0.8, -0.5), (0.5, -0.2), (0.2, -0.5), (0.5, -0.8)]
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "factor"), [("equal", 1), ("half", 2), ("negative", -1), ("negative_half", -2)]
+)
+def test_the_restrictions_of_chapter_3_are_even_grids_around_no_tilt(name, factor) -> None:
+    first, third = np.transpose(DETERMINANT_CASES[name].pairs)
+    np.testing.assert_allclose(third, factor * first, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(first, np.linspace(-first[-1], first[-1], 5), rtol=0, atol=1e-15)
 
 
 def test_where_the_robustness_claims_hold() -> None:

@@ -184,3 +184,7 @@ def test_no_bump_between_waypoints_lowers_the_snap():
 def test_waypoints_that_make_no_motion_are_refused(points, times, message):
     with pytest.raises(ValueError, match=message):
         minimum_snap_knots(points, times)
+
+
+def test_what_a_reference_leaves_out_is_zero():
+    assert not any(ReferenceParameters(REFERENCE_TYPES["line"])[1:])

@@ -73,6 +73,9 @@ def test_faults_begin_at_their_time():
     ("speed", "rate", "passes"),
     [
         (499.0, 10.0, True),
+        (500.0, 1e-3, False),
+        (500.0, 0.0, True),
+        (100.0, -1e-3, False),
         (500.0, 10.0, False),
         (501.0, 10.0, False),
         (500.0, -10.0, True),
