@@ -124,6 +124,10 @@ def test_each_law_flies_in_its_zone(extension):
                 1.0, state, QUADROTOR, GAINS, law.yaw_position.reference
             )
             assert inputs[:4] == attitude
+            if extension == "held":
+                assert inputs[4:] == (0.0, 0.0)
+            if extension == "running":
+                assert inputs[4:] == yaw_position.yaw_position_inputs(1.0, state, position)[4:]
         else:
             assert inputs == yaw_position.yaw_position_inputs(1.0, state, position)
 
