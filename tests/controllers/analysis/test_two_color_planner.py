@@ -127,6 +127,14 @@ def test_what_is_no_path_is_an_error(path) -> None:
         check_path(path, AR_DRONE)
 
 
+def test_a_short_path_is_a_gait() -> None:
+    small = polygon(((0.3, -0.3), (0.4, -0.3), (0.4, -0.4)), "red")
+    gait = four_angle_gait(small, 2.0, AR_DRONE)
+    np.testing.assert_allclose(gait.angles(0.0)[:2], (0.3, -0.3), atol=1e-12)
+    length = 0.2 + 0.1 * np.sqrt(2.0)
+    assert np.hypot(*gait.rates(0.01)[:2]) == pytest.approx(length / 2.0)
+
+
 def test_a_path_without_length_is_no_gait() -> None:
     with pytest.raises(ValueError, match="no length"):
         four_angle_gait(polygon(((0.5, -0.5), (0.5, -0.5)), "red"), 1.0, AR_DRONE)
