@@ -154,8 +154,10 @@ def test_the_outputs_move_as_demanded(weight):
     random = np.random.default_rng(5)
     law = parameters(weight, reference=PATH._replace(roll=0.1, pitch=-0.2, yaw=0.3))
     path = [reference(TIME, order) for order in range(4)]
-    for _ in range(CASES):
+    for case in range(CASES):
         state = random_state(random)
+        if case % 2:  # backwards, too
+            state = (*state[:16], *(-speed for speed in state[16:]))
         inputs = full_pose_inputs(TIME, state, law)
 
         def rates(_, state, inputs=inputs):
