@@ -61,6 +61,14 @@ def test_drag_is_linear_and_quadratic_as_it_says():
     assert along_x == pytest.approx((0.5 * 1.2 * 0.02 * 9.0, 0.0, 0.0))
 
 
+def test_quadratic_drag_grows_with_the_whole_speed():
+    velocity = np.array([2.0, -3.0, 6.0])  # 7 m/s
+    areas = np.array([0.01, 0.02, 0.03])
+    expected = -0.5 * 1.2 * areas * 7.0 * velocity
+    found = drag_force(tuple(velocity.tolist()), Drag(0.0, 0.0, 0.0, *areas.tolist(), 1.2))
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
 # --- gusts -------------------------------------------------------------------------------------
 
 
