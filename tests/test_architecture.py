@@ -33,6 +33,16 @@ ORDER = {
 """Folders and root modules of each package; imports go to the same or to an earlier one."""
 
 FLYING_PREFIXES = tuple(f"tiltsim.{folder}." for folder in FLYING)
+PRESCRIBED = {
+    signature
+    for module, tree in TREES.items()
+    for node in ast.walk(tree)
+    if module.startswith(("tiltsim.closed_loop.", "tiltsim.equations."))
+    if isinstance(node, ast.ClassDef)
+    for signature in re.findall(r"``\((.*?)\) ->", ast.get_docstring(node) or "")
+}
+"""Argument lists of the functions that make a closed loop, as its records document them."""
+
 HEAVY = {"av", "mujoco", "numba", "matplotlib", "rerun", "pyarrow", "dm_control", "pydantic"}
 
 
@@ -195,6 +205,29 @@ def test_every_public_definition_has_a_docstring():
         for name, node in public_definitions(tree)
         if not ast.get_docstring(node)
     ]
+    assert bare == []
+
+
+def documented_arguments(docstring):
+    """Names in the Args section of a docstring; several may share a line."""
+    section = re.search(r"^Args:\n((?:    .*\n|\n)*)", docstring + "\n", re.MULTILINE)
+    heads = re.findall(
+        r"^    ([\w*, ]+)(?: \(.*?\))?:", section[1] if section else "", re.MULTILINE
+    )
+    return {name.strip(" *") for head in heads for name in head.split(",")}
+
+
+def test_every_public_function_documents_its_arguments():
+    """From four arguments on; a signature that a record prescribes is documented there."""
+    bare = []
+    for module, tree in TREES.items():
+        for name, node in public_definitions(tree):
+            if isinstance(node, ast.FunctionDef):
+                arguments = node.args.posonlyargs + node.args.args + node.args.kwonlyargs
+                names = [a.arg for a in arguments if a.arg not in {"self", "cls"}]
+                missing = {*names} - documented_arguments(ast.get_docstring(node))
+                if len(names) >= 4 and missing and not PRESCRIBED & {", ".join(names)}:
+                    bare.append(f"{module}.{name}: {', '.join(sorted(missing))}")
     assert bare == []
 
 

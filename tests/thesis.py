@@ -21,11 +21,6 @@ def torque_matrix(vehicle, alpha):
         [
             [0, lkf * c2 - km * s2, 0, -lkf * c4 + km * s4],
             [lkf * c1 + km * s1, 0, -lkf * c3 - km * s3, 0],
-            [
-                lkf * s1 - km * c1,
-                -lkf * s2 - km * c2,
-                lkf * s3 - km * c3,
-                -lkf * s4 - km * c4,
-            ],
+            [lkf * s1 - km * c1, -lkf * s2 - km * c2, lkf * s3 - km * c3, -lkf * s4 - km * c4],
         ]
     )

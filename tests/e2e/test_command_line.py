@@ -48,10 +48,7 @@ max = {bound}
 def tiltsim(*arguments):
     """Run the command in a process of its own, as from a shell."""
     return subprocess.run(
-        [*COMMAND, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
+        [*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False
     )
 
 

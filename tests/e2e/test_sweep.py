@@ -198,7 +198,7 @@ def test_lost_flights_lie_below_the_lines_in_the_order_of_the_legend(grid, tmp_p
     axes = sweep_figure(results, ("max_abs_roll",)).axes[0]
     named = [line for line in axes.lines if not line.get_label().startswith("_")]
     assert [line.get_label() for line in named] == [
-        *("conventional", "modified", "terminated early, in this order"),
+        *("conventional", "modified", "terminated early, in this order")
     ]
     rows = [line for line in axes.lines if line.get_marker() == "x" and len(line.get_xdata())]
     first, second = (line.get_ydata()[0] for line in rows)

@@ -392,10 +392,7 @@ def test_the_drawn_mass_is_the_one_that_flies():
     ("axis", "words"),
     [
         ({"key": "vehicle.mass", "type": "uniform", "low": 2.0, "high": 1.0}, "must be below high"),
-        (
-            {"key": "vehicle.mass", "type": "gaussian"},
-            "choose list, linspace, cases, uniform",
-        ),
+        ({"key": "vehicle.mass", "type": "gaussian"}, "choose list, linspace, cases, uniform"),
         ({"type": "uniform", "low": 1.0, "high": 2.0}, "give either key or keys"),
         ({"key": "vehicle.mass", "type": "list", "values": [0.4, -1.0]}, r"mass = -1\.0"),
         ({"key": "vehicle.mas", "type": "uniform", "low": 0.4, "high": 0.5}, "did you mean mass"),

@@ -461,10 +461,7 @@ MISTAKES = {
         'disturbance.0.type = "earthquake": choose acceleration',
     ),
     "zone turned round": (
-        {
-            **LAWS["switching"],
-            "controller": {"law": "switching", "zone": {"roll": [0.2, -0.2]}},
-        },
+        {**LAWS["switching"], "controller": {"law": "switching", "zone": {"roll": [0.2, -0.2]}}},
         "controller.zone.roll = [0.2, -0.2]: the first must not exceed the second",
     ),
 }

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import tiltsim
-from tests.controllers.tilt_car.lean import lean_of, restored_lean
+from tests.controllers.tilt_car.lean import lean_after, lean_of, restored_lean
 from tests.flights import flight as screen_flight
 from tiltsim.cli import main
 from tiltsim.models.tilt_car import TiltCarSpec, compile_tilt_car
@@ -23,15 +23,10 @@ from tiltsim.views.vehicle_views import flight_figure
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.tilt_car.penguin_cycle import Swing, limit_cycle, lyapunov, lyapunov_bound
 from tiltsim_controllers.tilt_car.planned_direction import GAIN_SETS
-from tiltsim_controllers.tilt_car.state_drift import lean_after, orbit
+from tiltsim_controllers.tilt_car.state_drift import orbit
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, acceleration, counter_yaw_per_tilt
 
-CIRCLE = {
-    "type": "circle",
-    "position": [10.0, 0.0, 0.0],
-    "radius": -10.0,
-    "angular_frequency": 1.0,
-}
+CIRCLE = {"type": "circle", "position": [10.0, 0.0, 0.0], "radius": -10.0, "angular_frequency": 1.0}
 PLANTS = ("mujoco", "thesis")
 on_both_plants = pytest.mark.parametrize("plant", PLANTS)
 

@@ -451,10 +451,7 @@ def test_models_compiled_alike_are_independent():
         (lambda: compile_of("tiltrotor", AR_DRONE, timestep=0.0), "timestep = 0.0"),
         (lambda: compile_of("tiltrotor", AR_DRONE, userdata_size=-1), "userdata_size = -1"),
         (lambda: compile_of("quadrotor", AR_DRONE._replace(mass=-1.0)), "mass = -1.0"),
-        (
-            lambda: compile_of("quadrotor", AR_DRONE._replace(arm_length=inf)),
-            "arm_length = inf",
-        ),
+        (lambda: compile_of("quadrotor", AR_DRONE._replace(arm_length=inf)), "arm_length = inf"),
         (lambda: compile_of("quadrotor", AR_DRONE._replace(inertia_zz=6e-3)), "0.006"),
     ],
 )

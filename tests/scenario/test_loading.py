@@ -140,11 +140,7 @@ MISTAKES = {
     "number for a string": ("title = 3", "title = 3", "must be a string"),
     "number for a table": ("simulation = 3", "simulation = 3", "must be a table"),
     "number for a gait": ("gait = 3", "gait = 3", "must be a table"),
-    "number for a list": (
-        "[initial]\nposition = 3.0",
-        "initial.position = 3.0",
-        "must be a list",
-    ),
+    "number for a list": ("[initial]\nposition = 3.0", "initial.position = 3.0", "must be a list"),
     "string in a list of numbers": (
         '[initial]\nposition = [0, 0, "up"]',
         'initial.position.2 = "up"',

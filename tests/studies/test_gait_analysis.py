@@ -164,10 +164,7 @@ SCENARIOS = {
         'type = "rotary_gallop"\namplitude = 0.4\nlean = 1.3\nperiod = 2.0\nscale = 0.3333333',
         1.2187,
     ),
-    "red": (
-        'type = "two_color"\nperiod = 1.0\nrectangle = [[0.2, 0.8], [-0.8, -0.2]]',
-        np.pi / 2,
-    ),
+    "red": ('type = "two_color"\nperiod = 1.0\nrectangle = [[0.2, 0.8], [-0.8, -0.2]]', np.pi / 2),
     "blue": (
         'type = "two_color"\nperiod = 1.0\ncolor = "blue"\ncentre = [0.5, -0.5]\nradius = 0.2',
         0.0,

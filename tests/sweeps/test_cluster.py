@@ -61,11 +61,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_local_dataset(tmp_path):
     address = f"tcp://127.0.0.1:{port}"
     scheduler = ["--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
     worker = [address, "--nthreads", "1", "--no-dashboard", "--local-directory", str(tmp_path)]
-    with (
-        dask("scheduler", *scheduler),
-        dask("worker", *worker),
-        dask("worker", *worker) as second,
-    ):
+    with dask("scheduler", *scheduler), dask("worker", *worker), dask("worker", *worker) as second:
         wait_for_workers(address, 2)
         killed_at = []
 

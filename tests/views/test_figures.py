@@ -202,10 +202,7 @@ def test_flights_are_compared_by_margin_determinant_and_error():
         for line, expected in zip(drawn, columns, strict=True):
             np.testing.assert_array_equal(line, np.maximum(expected, 0.0))
     (legend,) = figure.legends
-    assert [text.get_text() for text in legend.get_texts()] == [
-        "jumps",
-        "supervised",
-    ]
+    assert [text.get_text() for text in legend.get_texts()] == ["jumps", "supervised"]
     assert legend.get_title().get_text() == "2 flights compared"
 
 

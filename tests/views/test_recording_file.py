@@ -14,9 +14,7 @@ import pytest
 
 from tests.flights import flight, saved
 from tests.views.recordings import entities, rerun_rrd, rows, scalars
-from tests.views.viewer_shot import (
-    free_port,
-)
+from tests.views.viewer_shot import free_port
 from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.flight.reading import load_flight

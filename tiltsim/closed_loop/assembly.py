@@ -16,14 +16,10 @@ class Assembly(FlightPlan):
     `tiltsim.laws.assembling.assemble` builds it; plants, engines, the termination monitor, flights,
     metrics and views read it.
 
-    Attributes
-    ----------
-    loop
-        The controller around the vehicle, with all layers.
-    setup
-        What the control step reads besides the state.
-    follows_position
-        Whether the controller follows the reference's horizontal position.
+    Attributes:
+        loop: The controller around the vehicle, with all layers.
+        setup: What the control step reads besides the state.
+        follows_position: Whether the controller follows the reference's horizontal position.
     """
 
     loop: ClosedLoop

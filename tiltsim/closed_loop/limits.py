@@ -28,7 +28,13 @@ ROTOR_SPEED: Final = 6
 def horizontal_error(
     time: float, values: Vector, reference: ReferenceParameters, knots: Vector
 ) -> float:
-    """Horizontal distance (m) to the reference."""
+    """Horizontal distance (m) to the reference.
+
+    Args:
+        time: s
+        values: fields of a sample after its time; they begin with the position, m
+        reference, knots: the reference trajectory
+    """
     target = position_reference(time, reference, knots)
     return hypot(target[0] - values[0], target[1] - values[1])
 
@@ -37,5 +43,9 @@ def horizontal_error(
 def altitude_error(
     time: float, values: Vector, reference: ReferenceParameters, knots: Vector
 ) -> float:
-    """Absolute altitude error (m)."""
+    """Absolute altitude error (m).
+
+    Args:
+        time, values, reference, knots: as in `horizontal_error`
+    """
     return abs(position_reference(time, reference, knots)[2] - values[2])

@@ -48,18 +48,13 @@ class ControlSetup(NamedTuple):
 class Dynamics:
     """The model in MuJoCo and its state.
 
-    Attributes
-    ----------
-    model
-        Name of the MJCF model.
-    sizes
-        Lengths of its vectors, the controller's own states among the activations.
-    initial_activations
-        ``(plan, setup) -> act`` at time zero.
-    controller_states
-        Number of activations that are states of the controller.
-    extra_actuators
-        Actuators that layers around the controller append to the model, innermost first.
+    Attributes:
+        model: Name of the MJCF model.
+        sizes: Lengths of its vectors, the controller's own states among the activations.
+        initial_activations: ``(plan, setup) -> act`` at time zero.
+        controller_states: Number of activations that are states of the controller.
+        extra_actuators: Actuators that layers around the controller append to the model, innermost
+            first.
     """
 
     model: str
@@ -81,13 +76,11 @@ def _held_controls(
 class Sampling:
     """The control step, at the samples of the controller and between them.
 
-    Attributes
-    ----------
-    controls
-        Scalar function ``(time, qpos, qvel, act, parameters, knots) -> ctrl``: the whole step.
-    hold
-        Scalar function ``(time, qpos, qvel, act, ctrl, parameters) -> ctrl``: what still changes
-        between the samples of a held controller.
+    Attributes:
+        controls: Scalar function ``(time, qpos, qvel, act, parameters, knots) -> ctrl``: the whole
+            step.
+        hold: Scalar function ``(time, qpos, qvel, act, ctrl, parameters) -> ctrl``: what still
+            changes between the samples of a held controller.
     """
 
     controls: Callable[..., Values]
@@ -98,19 +91,14 @@ class Sampling:
 class Columns:
     """The samples of a flight, and the columns derived from them.
 
-    Attributes
-    ----------
-    observe
-        Scalar function ``(qpos, qvel, act, ctrl) -> values`` of the kind's fields and ``fields``.
-    derive
-        ``(samples by field, setup) -> columns``: references, determinant, margin and those of
-        ``units``.
-    fields
-        Fields of a sample beyond those of the vehicle's kind.
-    units
-        Columns of a flight beyond those of the vehicle's kind, with their units.
-    observe_reads_controls
-        Whether ``observe`` needs the controls in force.
+    Attributes:
+        observe: Scalar function ``(qpos, qvel, act, ctrl) -> values`` of the kind's fields and
+            ``fields``.
+        derive: ``(samples by field, setup) -> columns``: references, determinant, margin and those
+            of ``units``.
+        fields: Fields of a sample beyond those of the vehicle's kind.
+        units: Columns of a flight beyond those of the vehicle's kind, with their units.
+        observe_reads_controls: Whether ``observe`` needs the controls in force.
     """
 
     observe: Callable[..., Values]
@@ -130,13 +118,10 @@ def nothing_singular(values: Vector, parameters: Any) -> tuple[float]:
 class Monitoring:
     """Where the controller becomes singular: numbers that have to keep their sign.
 
-    Attributes
-    ----------
-    sign_check_values
-        Scalar function ``(values, parameters) -> numbers``, from ``values`` as `Columns.observe`
-        returns them.
-    causes
-        ``(sample by field) -> texts``: why the flight ends where each of them reaches zero.
+    Attributes:
+        sign_check_values: Scalar function ``(values, parameters) -> numbers``, from ``values`` as
+            `Columns.observe` returns them.
+        causes: ``(sample by field) -> texts``: why the flight ends where each of them reaches zero.
     """
 
     sign_check_values: Callable[..., Values] = nothing_singular
@@ -147,23 +132,16 @@ class Monitoring:
 class Equations:
     """A controller on the equations of motion that the thesis prints for its vehicle.
 
-    Attributes
-    ----------
-    inputs
-        Scalar function ``(time, state, parameters, knots) -> inputs``: the controller.
-    inputs_size
-        Number of inputs.
-    rates
-        Scalar function ``(time, state, inputs, parameters, knots, disturbance) -> derivative`` of
-        the state; the disturbance is an acceleration (m/s^2, world).
-    initial
-        ``(plan, setup) -> state`` at time zero.
-    observe
-        Scalar function ``(time, state, inputs, parameters, knots) -> values`` of the loop's
-        `sample_fields` after the time; ``inputs`` are those in force.
-    project_onto_limits
-        Scalar function ``(state, parameters) -> state`` for the end of each step: puts back what
-        has passed a limit. None where there are no limits.
+    Attributes:
+        inputs: Scalar function ``(time, state, parameters, knots) -> inputs``: the controller.
+        inputs_size: Number of inputs.
+        rates: Scalar function ``(time, state, inputs, parameters, knots, disturbance) ->
+            derivative`` of the state; the disturbance is an acceleration (m/s^2, world).
+        initial: ``(plan, setup) -> state`` at time zero.
+        observe: Scalar function ``(time, state, inputs, parameters, knots) -> values`` of the
+            loop's `sample_fields` after the time; ``inputs`` are those in force.
+        project_onto_limits: Scalar function ``(state, parameters) -> state`` for the end of each
+            step: puts back what has passed a limit. None where there are no limits.
     """
 
     inputs: Callable[..., Values]
@@ -192,26 +170,18 @@ class SupervisedLaw(NamedTuple):
 class ClosedLoop:
     """A controller around the model of a vehicle.
 
-    Attributes
-    ----------
-    kind
-        The kind of the vehicle.
-    parameters
-        Record at the head of `userdata`; its first field is ``signature``. The knots of gait and
-        reference follow it.
-    setup
-        ``(plan, signature) -> ControlSetup``.
-    dynamics, sampling, columns, monitoring
-        See there.
-    equations
-        The same controller on the thesis's equations; None where it is supported in MuJoCo only
-        or, inside a layer, by `tiltsim.laws.layers.on_equations`.
-    supervised
-        The controller for a supervisor; None where it cannot be supervised.
-    follows_position
-        Whether a scenario has the controller follow the reference's horizontal position.
-    uses_gait
-        Whether the scenario's gait has a part in the flight.
+    Attributes:
+        kind: The kind of the vehicle.
+        parameters: Record at the head of `userdata`; its first field is ``signature``. The knots of
+            gait and reference follow it.
+        setup: ``(plan, signature) -> ControlSetup``.
+        dynamics, sampling, columns, monitoring: See there.
+        equations: The same controller on the thesis's equations; None where it is supported in
+            MuJoCo only or, inside a layer, by `tiltsim.laws.layers.on_equations`.
+        supervised: The controller for a supervisor; None where it cannot be supervised.
+        follows_position: Whether a scenario has the controller follow the reference's horizontal
+            position.
+        uses_gait: Whether the scenario's gait has a part in the flight.
     """
 
     kind: VehicleKind

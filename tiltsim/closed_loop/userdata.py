@@ -19,6 +19,5 @@ class Header(NamedTuple):
 
 HEADER_SIZE: Final = len(Header._fields)
 
-
 CONTROL_PERIOD, EVALUATIONS, RECORDER = range(HEADER_SIZE)
 """Where in `userdata` the fields of the `Header` lie."""

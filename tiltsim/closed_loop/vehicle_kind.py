@@ -22,26 +22,18 @@ if TYPE_CHECKING:
 class VehicleKind:
     """What all vehicles of a kind have in common, and how MuJoCo builds them.
 
-    Attributes
-    ----------
-    observed_fields
-        Fields of a sample after the time.
-    columns
-        Columns of every flight and their units, in the order of the file.
-    thrusts
-        ``(columns so far, scenario) -> columns``: the rotors' thrusts, N.
-    compile
-        ``(scenario, law_states, extra_actuators, userdata_size, visuals) -> model``. Raises
-        `ValueError` where MuJoCo cannot build it.
-    initial_motion
-        ``(plan) -> qpos, qvel`` at time zero.
-    limit_exceeded
-        Scalar function ``(time, values, reference, knots, follows_position) -> code`` of the first
-        limit of `tiltsim.closed_loop.limits` that a sample exceeds; ``values`` begin with the
-        observed fields.
-    metrics
-        ``(columns, scenario, follows_position) -> metrics`` of a flight, without those of all
-        kinds.
+    Attributes:
+        observed_fields: Fields of a sample after the time.
+        columns: Columns of every flight and their units, in the order of the file.
+        thrusts: ``(columns so far, scenario) -> columns``: the rotors' thrusts, N.
+        compile: ``(scenario, law_states, extra_actuators, userdata_size, visuals) -> model``.
+            Raises `ValueError` where MuJoCo cannot build it.
+        initial_motion: ``(plan) -> qpos, qvel`` at time zero.
+        limit_exceeded: Scalar function ``(time, values, reference, knots, follows_position) ->
+            code`` of the first limit of `tiltsim.closed_loop.limits` that a sample exceeds;
+            ``values`` begin with the observed fields.
+        metrics: ``(columns, scenario, follows_position) -> metrics`` of a flight, without those of
+            all kinds.
     """
 
     observed_fields: tuple[str, ...]

@@ -14,19 +14,13 @@ def make_engine(
 ) -> Engine:
     """Build an engine for a model whose parameters are in ``data.userdata`` already.
 
-    Parameters
-    ----------
-    name
-        The engine.
-    loop
-        The closed loop of the model.
-    model, data
-        A model for the loop and its data.
+    Args:
+        name: The engine.
+        loop: The closed loop of the model.
+        model, data: A model for the loop and its data.
 
-    Raises
-    ------
-    ValueError
-        If model and data do not belong to a flight of this loop.
+    Raises:
+        ValueError: If model and data do not belong to a flight of this loop.
     """
     if name == "python":
         return PythonEngine(loop, model, data)

@@ -52,10 +52,8 @@ class Layout(NamedTuple):
 def mjdata_layout() -> Layout:
     """Measure the offsets.
 
-    Raises
-    ------
-    RuntimeError
-        If a field is not found in the search range.
+    Raises:
+        RuntimeError: If a field is not found in the search range.
     """
     model = mujoco.MjModel.from_xml_string(_PROBE)
     data = mujoco.MjData(model)

@@ -20,18 +20,9 @@ from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.closed_loop.userdata import CONTROL_PERIOD, EVALUATIONS, HEADER_SIZE, RECORDER
 from tiltsim.engines.base import Engine, EngineName, check_model
 from tiltsim.engines.cache import announce_native_code, mark_native_code_compiled
-from tiltsim.engines.compiling import (
-    compiled_callback,
-    register_scalar_functions,
-)
+from tiltsim.engines.compiling import compiled_callback, register_scalar_functions
 from tiltsim.engines.mjdata_layout import mjdata_layout
-from tiltsim.engines.native_memory import (
-    addresses_at,
-    array_at,
-    bytes_at,
-    floats_at,
-    integers_at,
-)
+from tiltsim.engines.native_memory import addresses_at, array_at, bytes_at, floats_at, integers_at
 from tiltsim.engines.recorder import record_sample, recording_is_over, sample_is_due
 from tiltsim_controllers.mathematics.records import record_dtype
 

@@ -10,11 +10,7 @@ from numba.extending import register_jitable
 
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.engines.cache import announce_native_code
-from tiltsim.engines.compiling import (
-    INNER,
-    compiled,
-    register_scalar_functions,
-)
+from tiltsim.engines.compiling import INNER, compiled, register_scalar_functions
 from tiltsim.engines.recorder import record_sample, recording_is_over
 from tiltsim.equations.ode3 import make_stepper
 from tiltsim_controllers.mathematics.records import record_dtype
@@ -25,14 +21,10 @@ from tiltsim_controllers.mathematics.scalar import Floats
 def compile_stepper(loop: ClosedLoop) -> tuple[Any, Any]:
     """Compile the thesis plant's solver for a loop, or load it from the cache on disk.
 
-    Parameters
-    ----------
-    loop
-        A closed loop with equations.
+    Args:
+        loop: A closed loop with equations.
 
-    Returns
-    -------
-    advance, record
+    Returns:
         ``advance`` is the stepper of `tiltsim.equations.ode3.make_stepper` with an array for the
         state. ``record`` takes the address of a `Recorder` and the number of samples before the
         same arguments, and stops when the recording is over. Neither holds Python's lock.

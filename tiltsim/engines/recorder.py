@@ -52,16 +52,12 @@ def sample_is_due(recorder):  # type: ignore[no-untyped-def]
 def record_sample(recorder, time, values, checked, limit_exceeded, knots):  # type: ignore[no-untyped-def]
     """Record a sample; end the recording where the `TerminationMonitor` would end the flight.
 
-    Parameters
-    ----------
-    recorder
-        Address of a `Recorder`'s memory.
-    time, values
-        The time (s) and the fields after it.
-    checked
-        The numbers that must keep their signs.
-    limit_exceeded, knots
-        See `tiltsim.closed_loop.vehicle_kind.VehicleKind`; knots of gait and reference.
+    Args:
+        recorder: Address of a `Recorder`'s memory.
+        time, values: The time (s) and the fields after it.
+        checked: The numbers that must keep their signs.
+        limit_exceeded, knots: See `tiltsim.closed_loop.vehicle_kind.VehicleKind`; knots of gait and
+            reference.
     """
     head = carray(bytes_at(recorder), (1,), _RECORDER)
     samples = int(head[0].samples)
@@ -106,16 +102,12 @@ class Recorder:
     there is no room for more, or a sample ends the flight, it returns NaN controls: MuJoCo warns of
     them and a batch stops there.
 
-    Parameters
-    ----------
-    assembly
-        The flight.
-    samples
-        How many to take.
-    interval, last_interval
-        Evaluations of the control step between samples, and between the last two.
-    checked
-        The numbers that must keep their signs, as they are now; see `ClosedLoop.watch`.
+    Args:
+        assembly: The flight.
+        samples: How many to take.
+        interval, last_interval: Evaluations of the control step between samples, and between the
+            last two.
+        checked: The numbers that must keep their signs, as they are now; see `ClosedLoop.watch`.
     """
 
     def __init__(

@@ -26,22 +26,14 @@ def evaluate_over_samples(
 ) -> Floats:
     """Evaluate a scalar function for every sample.
 
-    Parameters
-    ----------
-    function
-        Scalar function ``(time, state, parameters, knots) -> values``.
-    width
-        How many values it returns.
-    time
-        Times of the samples (N,), s.
-    states
-        The fields of the samples that the function reads, shape (N, fields).
-    setup
-        Parameters and knots.
+    Args:
+        function: Scalar function ``(time, state, parameters, knots) -> values``.
+        width: How many values it returns.
+        time: Times of the samples (N,), s.
+        states: The fields of the samples that the function reads, shape (N, fields).
+        setup: Parameters and knots.
 
-    Returns
-    -------
-    Floats
+    Returns:
         The values, shape (N, width), equal for Python and native code. Where an operation on floats
         has no result, as beside the state of a diverged flight, Python's whole row is NaN.
     """

@@ -43,13 +43,10 @@ HOVER: Final[dict[str, Any]] = {
 class Environment(dm_env.Environment):  # type: ignore[misc]
     """Steps a plant for a `Task`; owns the plant, the time and the random numbers.
 
-    Parameters
-    ----------
-    task
-        Its scenario, observation, reward and termination make an episode.
-    seed
-        Of the scenarios drawn; default: the ``simulation.seed`` of the task's scenario. The same
-        seed and the same actions give the same episodes, bit for bit.
+    Args:
+        task: Its scenario, observation, reward and termination make an episode.
+        seed: Of the scenarios drawn; default: the ``simulation.seed`` of the task's scenario. The
+            same seed and the same actions give the same episodes, bit for bit.
     """
 
     def __init__(self, task: Task, *, seed: int | None = None) -> None:
@@ -170,28 +167,19 @@ class TiltrotorEnv(Environment):
     `tiltsim.env.arrays.BOUNDS`. An episode ends after ``simulation.duration`` with a discount of
     1, or with a discount and a reward of 0 when the vehicle is lost.
 
-    Parameters
-    ----------
-    scenario
-        A scenario, its file or its name in the library; its own controller is not used.
-        Default: `HOVER`.
-    control_timestep
-        How long (s) an action is held, in place of the scenario's ``simulation.control_timestep``;
-        where both are 0, one physics step.
-    reward
-        See `Reward`.
-    domain
-        Axes as in a sweep file, such as ``{"key": "vehicle.mass", "type": "uniform", "low": 0.9,
-        "high": 1.1, "relative": True}``, drawn anew for every episode.
-    seed
-        Of the draws; default: the scenario's ``simulation.seed``.
-    max_position_error
-        Distance from the reference (m) beyond which the vehicle counts as lost.
+    Args:
+        scenario: A scenario, its file or its name in the library; its own controller is not used.
+            Default: `HOVER`.
+        control_timestep: How long (s) an action is held, in place of the scenario's
+            ``simulation.control_timestep``; where both are 0, one physics step.
+        reward: See `Reward`.
+        domain: Axes as in a sweep file, such as ``{"key": "vehicle.mass", "type": "uniform", "low":
+            0.9, "high": 1.1, "relative": True}``, drawn anew for every episode.
+        seed: Of the draws; default: the scenario's ``simulation.seed``.
+        max_position_error: Distance from the reference (m) beyond which the vehicle counts as lost.
 
-    Raises
-    ------
-    InputError
-        If the scenario cannot be flown under commands, or an axis is invalid.
+    Raises:
+        InputError: If the scenario cannot be flown under commands, or an axis is invalid.
     """
 
     def __init__(
@@ -221,17 +209,12 @@ class TiltrotorEnv(Environment):
     def from_sweep(cls, path: str | Path, **arguments: Any) -> Self:
         """An environment whose episodes are drawn along the axes of a sweep file.
 
-        Parameters
-        ----------
-        path
-            A TOML file or the name of a sweep in the library.
-        **arguments
-            As for `TiltrotorEnv`, without ``scenario`` and ``domain``.
+        Args:
+            path: A TOML file or the name of a sweep in the library.
+            **arguments: As for `TiltrotorEnv`, without ``scenario`` and ``domain``.
 
-        Raises
-        ------
-        InputError
-            If there is no such sweep, or it is a search.
+        Raises:
+            InputError: If there is no such sweep, or it is a search.
         """
         domain = Domain.from_sweep(path)
         return cls(domain.base, domain=domain, **arguments)

@@ -32,12 +32,9 @@ class GymnasiumEnv(gymnasium.Env):  # type: ignore[misc]
     ``gymnasium.wrappers.FlattenObservation`` makes one vector of it. An episode terminates when the
     vehicle is lost, and is truncated at the end of the scenario.
 
-    Parameters
-    ----------
-    env
-        The environment to adapt; default: a `TiltrotorEnv` with the other arguments.
-    **arguments
-        Those of `TiltrotorEnv`.
+    Args:
+        env: The environment to adapt; default: a `TiltrotorEnv` with the other arguments.
+        **arguments: Those of `TiltrotorEnv`.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": []}

@@ -63,16 +63,11 @@ def external_acceleration(
 ) -> Triple:
     """Acceleration (m/s^2, world axes) without rotors and weight.
 
-    Parameters
-    ----------
-    rotation
-        Body to world, rows first.
-    wrench
-        Force (N) and torque (N m), body axes.
-    mass
-        kg.
-    disturbance
-        m/s^2, world axes.
+    Args:
+        rotation: Body to world, rows first.
+        wrench: Force (N) and torque (N m), body axes.
+        mass: kg.
+        disturbance: m/s^2, world axes.
     """
     force_x, force_y, force_z = to_world(rotation, (wrench[0], wrench[1], wrench[2]))
     gust_x, gust_y, gust_z = disturbance
@@ -124,7 +119,7 @@ def _servo_acceleration(command: float, angle: float, rate: float, mechanics: Me
 
 
 @scalar
-def tiltrotor_rates(
+def _tiltrotor_rates(
     state: Vector, ctrl: Vector, wrench: Wrench, mechanics: Mechanics, disturbance: Triple
 ) -> Values:
     """Chapter 3's rigid body under thrusts, servos and a wrench; see `ActuatorPlant.rates`."""
@@ -197,7 +192,7 @@ def quadrotor_qvel(state: Vector) -> Values:
 
 
 @scalar
-def quadrotor_rates(
+def _quadrotor_rates(
     state: Vector, ctrl: Vector, wrench: Wrench, mechanics: Mechanics, disturbance: Triple
 ) -> Values:
     """Chapter 2's rigid body under thrusts and a wrench; see `ActuatorPlant.rates`."""
@@ -228,7 +223,7 @@ ACTUATOR_PLANTS: Final[dict[str, ActuatorPlant]] = {
         rotor_states=8,
         qpos=tiltrotor_qpos,
         qvel=tiltrotor_qvel,
-        rates=tiltrotor_rates,
+        rates=_tiltrotor_rates,
         project_onto_limits=project_tiltrotor,
         initial=initial_tiltrotor,
     ),
@@ -237,7 +232,7 @@ ACTUATOR_PLANTS: Final[dict[str, ActuatorPlant]] = {
         rotor_states=4,
         qpos=quadrotor_qpos,
         qvel=quadrotor_qvel,
-        rates=quadrotor_rates,
+        rates=_quadrotor_rates,
         project_onto_limits=project_quadrotor,
         initial=lambda plan: initial_state(plan.scenario),
     ),

@@ -40,9 +40,7 @@ def identity(state: list[float], parameters: Any) -> list[float]:
 def make_stepper(equations: Equations) -> Stepper:
     """The solver for a loop's equations, as scalar code.
 
-    Returns
-    -------
-    Stepper
+    Returns:
         ``(step_index, state, held, steps, integration) -> state, held``: integrates as many steps
         with ode3, the third-order method of Bogacki and Shampine, from a step on. ``held`` are the
         inputs since the last control sample.

@@ -30,16 +30,11 @@ def equations_of_motion(
 ) -> Values:
     """Time derivative of the rigid body's twelve states.
 
-    Parameters
-    ----------
-    state
-        Begins with the rigid body's.
-    inputs
-        Thrust (N) and torques (N m, body axes), and any more.
-    vehicle
-        The vehicle that flies.
-    disturbance
-        An acceleration unknown to the controller, m/s^2, world axes.
+    Args:
+        state: Begins with the rigid body's.
+        inputs: Thrust (N) and torques (N m, body axes), and any more.
+        vehicle: The vehicle that flies.
+        disturbance: An acceleration unknown to the controller, m/s^2, world axes.
     """
     _, _, _, vx, vy, vz, roll, pitch, yaw, p, q, r = rigid_body(state)
     gust_x, gust_y, gust_z = disturbance

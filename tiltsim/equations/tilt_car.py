@@ -23,18 +23,12 @@ def equations_of_motion(
 ) -> Values:
     """Rates of position and velocity, the state's first four numbers; Eq. (3).
 
-    Parameters
-    ----------
-    state
-        Begins with position and velocity.
-    direction
-        Of the thrusts' bisector, rad.
-    square_1, square_2
-        Of the rotor speeds, (rad/s)^2.
-    car
-        The vehicle.
-    disturbance
-        An acceleration unknown to the controller, m/s^2, world axes.
+    Args:
+        state: Begins with position and velocity.
+        direction: Of the thrusts' bisector, rad.
+        square_1, square_2: Of the rotor speeds, (rad/s)^2.
+        car: The vehicle.
+        disturbance: An acceleration unknown to the controller, m/s^2, world axes.
     """
     ax, ay = acceleration(direction, square_1, square_2, car)
     gust_x, gust_y, _ = disturbance

@@ -68,20 +68,13 @@ def rigid_body(
 ) -> Values:
     """Time derivative of position, velocity, rotation and body rates.
 
-    Parameters
-    ----------
-    state
-        These eighteen numbers, and any more.
-    tilts
-        rad.
-    squares
-        ``varpi |varpi|`` of the rotors, (rad/s)^2.
-    vehicle
-        The vehicle that flies.
-    extra_acceleration
-        By all but weight and rotors, m/s^2, world axes.
-    extra_angular_acceleration
-        By all but the rotors, rad/s^2, body axes.
+    Args:
+        state: These eighteen numbers, and any more.
+        tilts: rad.
+        squares: ``varpi |varpi|`` of the rotors, (rad/s)^2.
+        vehicle: The vehicle that flies.
+        extra_acceleration: By all but weight and rotors, m/s^2, world axes.
+        extra_angular_acceleration: By all but the rotors, rad/s^2, body axes.
     """
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_of(state)
     vx, vy, vz, p, q, r = velocity_of(state)
@@ -119,18 +112,12 @@ def equations_of_motion(
 ) -> Values:
     """Time derivative of the state.
 
-    Parameters
-    ----------
-    state
-        22 numbers, and any more.
-    tilts
-        rad.
-    inputs
-        Rotor accelerations, rad/s^2.
-    vehicle
-        The vehicle that flies.
-    disturbance
-        An acceleration unknown to the controller, m/s^2, world axes.
+    Args:
+        state: 22 numbers, and any more.
+        tilts: rad.
+        inputs: Rotor accelerations, rad/s^2.
+        vehicle: The vehicle that flies.
+        disturbance: An acceleration unknown to the controller, m/s^2, world axes.
     """
     s1, s2, s3, s4 = state[SPEED_1], state[SPEED_2], state[SPEED_3], state[SPEED_4]
     squares = s1 * abs(s1), s2 * abs(s2), s3 * abs(s3), s4 * abs(s4)

@@ -52,7 +52,12 @@ class Flight:
     def of_scenario(
         cls, scenario: Scenario, samples: Floats, end: End, engine: EngineName, wall_time: float
     ) -> Self:
-        """A flight of a scenario that is assembled here; the other fields as above."""
+        """A flight of a scenario that is assembled here.
+
+        Args:
+            scenario: what was flown
+            samples, end, engine, wall_time: fields of the flight
+        """
         return cls(assemble(scenario), samples, end, engine, wall_time)
 
     def __reduce__(self) -> tuple[object, ...]:

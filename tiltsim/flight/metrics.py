@@ -15,17 +15,11 @@ def compute_metrics(
 ) -> dict[str, float | bool]:
     """All metrics that a flight has of `tiltsim.scenario.metric_names.METRICS`.
 
-    Parameters
-    ----------
-    columns
-        Columns of the flight by name, each of shape (N,).
-    assembly
-        The assembly of the flight.
-    end
-        How it ended.
-    wall_time
-        Duration of the integration, s.
-
+    Args:
+        columns: Columns of the flight by name, each of shape (N,).
+        assembly: The assembly of the flight.
+        end: How it ended.
+        wall_time: Duration of the integration, s.
     """
     duration = float(columns["time"][-1])
     metrics = assembly.loop.kind.metrics(columns, assembly.scenario, assembly.follows_position) | {

@@ -24,15 +24,11 @@ if TYPE_CHECKING:
 def load_flight(path: str | Path) -> Flight:
     """Read a flight back: samples, scenario, engine, end and wall time.
 
-    Parameters
-    ----------
-    path
-        A folder of results or a ``flight.parquet``.
+    Args:
+        path: A folder of results or a ``flight.parquet``.
 
-    Raises
-    ------
-    InputError
-        If there is no such file, or it is not a complete flight of tiltsim.
+    Raises:
+        InputError: If there is no such file, or it is not a complete flight of tiltsim.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq

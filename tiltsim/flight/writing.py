@@ -17,23 +17,16 @@ if TYPE_CHECKING:
 
 
 def write_flight(
-    folder: Path,
-    table: pyarrow.Table,
-    metrics: Mapping[str, float | bool],
-    scenario: Scenario,
+    folder: Path, table: pyarrow.Table, metrics: Mapping[str, float | bool], scenario: Scenario
 ) -> None:
     """Write a flight into a folder; each file appears whole or not at all.
 
-    Parameters
-    ----------
-    folder
-        Where to; created if missing.
-    table
-        The columns, for flight.parquet.
-    metrics
-        For metrics.json.
-    scenario
-        For scenario.toml, with all defaults filled in; the file of a user's controller is copied.
+    Args:
+        folder: Where to; created if missing.
+        table: The columns, for flight.parquet.
+        metrics: For metrics.json.
+        scenario: For scenario.toml, with all defaults filled in; the file of a user's controller is
+            copied.
     """
     import pyarrow.parquet as pq
 

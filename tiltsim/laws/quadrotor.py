@@ -51,7 +51,12 @@ EXTENSION_COLUMNS: Final = {
 
 @scalar
 def rigid_body_state(qpos: Vector, qvel: Vector, thrust: float, thrust_rate: float) -> Values:
-    """State of the control laws from MuJoCo's and the thrust (N) with its rate (N/s)."""
+    """State of the control laws.
+
+    Args:
+        qpos, qvel: MuJoCo's state
+        thrust, thrust_rate: N and N/s
+    """
     x, y, z, qw, qx, qy, qz = qpos
     vx, vy, vz, p, q, r = qvel
     roll, pitch, yaw = euler_from_quaternion(qw, qx, qy, qz)
@@ -156,14 +161,10 @@ def extended_loop(
 ) -> ClosedLoop:
     """A closed loop around a control law that integrates its thrust twice.
 
-    Parameters
-    ----------
-    parameters
-        Record with the fields ``signature`` and ``vehicle`` at least.
-    setup, controls, columns, monitoring
-        As in `tiltsim.closed_loop.loop.ClosedLoop`.
-    inputs
-        The control law on ch. 2's equations; see `tiltsim.closed_loop.loop.Equations`.
+    Args:
+        parameters: Record with the fields ``signature`` and ``vehicle`` at least.
+        setup, controls, columns, monitoring: As in `tiltsim.closed_loop.loop.ClosedLoop`.
+        inputs: The control law on ch. 2's equations; see `tiltsim.closed_loop.loop.Equations`.
     """
     return ClosedLoop(
         kind=ROTORCRAFT,
@@ -203,14 +204,10 @@ def references(
 ) -> dict[str, Floats]:
     """The columns of references; those of the tilts are zero.
 
-    Parameters
-    ----------
-    samples
-        By field.
-    reference, knots
-        Of the position.
-    attitude
-        Columns of roll, pitch and yaw (rad): arrays or constants.
+    Args:
+        samples: By field.
+        reference, knots: Of the position.
+        attitude: Columns of roll, pitch and yaw (rad): arrays or constants.
     """
     time = samples["time"]
     position = np.array([position_reference(t, reference, knots)[:3] for t in time.tolist()])

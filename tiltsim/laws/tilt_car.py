@@ -39,7 +39,12 @@ def running_speed(speed: float) -> float:
 
 @scalar
 def car_state(qpos: Vector, qvel: Vector, speed_1: float, speed_2: float) -> CarState:
-    """State of the control laws from MuJoCo's and the rotor speeds (rad/s)."""
+    """State of the control laws.
+
+    Args:
+        qpos, qvel: MuJoCo's state
+        speed_1, speed_2: rotor speeds, rad/s
+    """
     x, y, yaw, alpha = qpos[0], qpos[1], qpos[2], qpos[3]
     return x, y, qvel[0], qvel[1], yaw, alpha, running_speed(speed_1), running_speed(speed_2)
 
@@ -66,16 +71,11 @@ def derived_columns(
 ) -> dict[str, Floats]:
     """Reference, directions and the split of the inputs.
 
-    Parameters
-    ----------
-    samples
-        By field.
-    reference
-        `reference_columns`.
-    acceleration
-        Along x and y: the thrusts are to bracket its direction.
-    car
-        The vehicle.
+    Args:
+        samples: By field.
+        reference: `reference_columns`.
+        acceleration: Along x and y: the thrusts are to bracket its direction.
+        car: The vehicle.
     """
     direction = samples["yaw"] + samples["alpha"]
     away = np.arctan2(acceleration[1], acceleration[0]) - direction
@@ -127,15 +127,12 @@ def integrating_loop(
 ) -> ClosedLoop:
     """A closed loop whose control law integrates both rotor speeds and the servo's command.
 
-    Parameters
-    ----------
-    parameters, setup, sampling, columns
-        As in `tiltsim.closed_loop.loop.ClosedLoop`.
-    inputs, rates, observe
-        As in `tiltsim.closed_loop.loop.Equations`; the state is position, velocity, tilt angle,
-        rotor speeds and the further states of the controller.
-    controller_states
-        How many there are, the servo's command (rad) the first; the others start at zero.
+    Args:
+        parameters, setup, sampling, columns: As in `tiltsim.closed_loop.loop.ClosedLoop`.
+        inputs, rates, observe: As in `tiltsim.closed_loop.loop.Equations`; the state is position,
+            velocity, tilt angle, rotor speeds and the further states of the controller.
+        controller_states: How many there are, the servo's command (rad) the first; the others start
+            at zero.
     """
     further = (0.0,) * (controller_states - 1)
     return ClosedLoop(

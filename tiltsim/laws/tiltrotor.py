@@ -74,7 +74,12 @@ def rotor_thrust_controls(act: Vector) -> Quad:
 
 @scalar
 def gait_servo_commands(time: float, lead: float, gait: GaitParameters, knots: Vector) -> Quad:
-    """Commands (rad) of the tilt servos, ahead of the planned gait by their lag ``lead`` (s)."""
+    """Commands (rad) of the tilt servos, ahead of the planned gait by their lag.
+
+    Args:
+        time, lead: s
+        gait, knots: the planned gait
+    """
     a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, gait, knots)
     return a1 + lead * rate_1, a2 + lead * rate_2, a3 + lead * rate_3, a4 + lead * rate_4
 
@@ -129,12 +134,9 @@ def tiltrotor_dynamics(
 ) -> Dynamics:
     """The model of the tiltrotor.
 
-    Parameters
-    ----------
-    controller_states
-        Number of states of the controller.
-    initial
-        ``(plan) -> states`` at time zero.
+    Args:
+        controller_states: Number of states of the controller.
+        initial: ``(plan) -> states`` at time zero.
     """
     return Dynamics(
         "tiltrotor",
@@ -168,16 +170,11 @@ def reference_columns(
 ) -> dict[str, Floats]:
     """The columns of references, evaluated over samples.
 
-    Parameters
-    ----------
-    in_force
-        Scalar function ``(time, values, parameters, knots)`` of the columns' values.
-    fields
-        Fields of a sample, its ``values``.
-    samples
-        By field.
-    setup
-        The flight's parameters and knots.
+    Args:
+        in_force: Scalar function ``(time, values, parameters, knots)`` of the columns' values.
+        fields: Fields of a sample, its ``values``.
+        samples: By field.
+        setup: The flight's parameters and knots.
     """
     states = np.stack([samples[name] for name in fields], axis=-1)
     names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)

@@ -46,14 +46,10 @@ def set_servo_gains(position: Any, inertia: float, servo: TiltServo) -> None:
 def set_stop(joint: Any, position: Any, max_angle: float, timestep: float) -> None:
     """Limit a hinge and its servo's command to plus and minus an angle.
 
-    Parameters
-    ----------
-    joint, position
-        Elements of the hinge and of its position actuator, or their defaults.
-    max_angle
-        rad.
-    timestep
-        Physics time step, s, which limits the stiffness of the stop.
+    Args:
+        joint, position: Elements of the hinge and of its position actuator, or their defaults.
+        max_angle: rad.
+        timestep: Physics time step, s, which limits the stiffness of the stop.
     """
     joint.range = position.ctrlrange = (-max_angle, max_angle)
     # As stiff as MuJoCo allows: its usual stop is softer than the servo and would do nothing.

@@ -36,15 +36,11 @@ class TiltServo:
     This holds exactly on a body that does not move; on a free one, which gives way to the pod's
     reaction, the servo is slightly faster.
 
-    Attributes
-    ----------
-    natural_frequency
-        ``w``, rad/s.
-    damping_ratio
-        ``zeta``, dimensionless.
-    max_angle
-        Largest tilt angle either way, rad: the command is clipped there and the hinge has a stop.
-        None leaves the pod free to turn around.
+    Attributes:
+        natural_frequency: ``w``, rad/s.
+        damping_ratio: ``zeta``, dimensionless.
+        max_angle: Largest tilt angle either way, rad: the command is clipped there and the hinge
+            has a stop. None leaves the pod free to turn around.
     """
 
     natural_frequency: float = 300.0
@@ -60,13 +56,10 @@ class Pod:
     1 rad then turns chapter 3's body by less than 5e-11 rad. MuJoCo refuses moving bodies below
     1e-15; the armature keeps the hinge's equation well conditioned.
 
-    Attributes
-    ----------
-    mass
-        kg.
-    inertia
-        About any axis through the pod's centre of mass, kg m^2; the same for all axes, so that
-        the vehicle's inertia does not depend on the tilt.
+    Attributes:
+        mass: kg.
+        inertia: About any axis through the pod's centre of mass, kg m^2; the same for all axes, so
+            that the vehicle's inertia does not depend on the tilt.
     """
 
     mass: float = 1e-9
@@ -80,14 +73,13 @@ class RotorLimits:
     Within a step the stages of RK4 may see speeds beyond a limit by what one step adds. The thrust
     stays within the limits there, too.
 
-    Attributes
-    ----------
-    min_speed
-        Smallest ``|varpi|``, rad/s: the rotor cannot reverse. None lets it stop and reverse.
-    max_speed
-        Largest ``|varpi|``, rad/s, in either sense where the rotor may reverse. None is unlimited.
-    thrust_factors
-        The smallest and the largest factor that faults put on the thrust during the flight.
+    Attributes:
+        min_speed: Smallest ``|varpi|``, rad/s: the rotor cannot reverse. None lets it stop and
+            reverse.
+        max_speed: Largest ``|varpi|``, rad/s, in either sense where the rotor may reverse. None is
+            unlimited.
+        thrust_factors: The smallest and the largest factor that faults put on the thrust during the
+            flight.
     """
 
     min_speed: float | None = None
@@ -125,19 +117,13 @@ class Ground:
 class ModelSpec:
     """Common specification of the vehicles' models. Raises ValueError if a value is out of range.
 
-    Attributes
-    ----------
-    timestep
-        Physics time step, s.
-    integrator
-        MuJoCo's name: ``Euler``, ``RK4``, ``implicit`` or ``implicitfast``.
-    userdata_size
-        Numbers of user data in the simulation's state.
-    tilt_servo
-        The tilt servos. Ignored for a quadrotor; a tilt-car's angle is not limited.
-    law_states
-        Number of the control law's own states: integrators ``law_1``, ``law_2``, ... after the
-        vehicle's actuators, which act on nothing; ctrl is the state's rate.
+    Attributes:
+        timestep: Physics time step, s.
+        integrator: MuJoCo's name: ``Euler``, ``RK4``, ``implicit`` or ``implicitfast``.
+        userdata_size: Numbers of user data in the simulation's state.
+        tilt_servo: The tilt servos. Ignored for a quadrotor; a tilt-car's angle is not limited.
+        law_states: Number of the control law's own states: integrators ``law_1``, ``law_2``, ...
+            after the vehicle's actuators, which act on nothing; ctrl is the state's rate.
     """
 
     timestep: float = 1e-3

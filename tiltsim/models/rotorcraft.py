@@ -55,23 +55,15 @@ START_SPEED: Final = 300.0
 class RotorcraftSpec(ModelSpec):
     """Specification of a rotorcraft's model. Raises ValueError if a value is out of range.
 
-    Attributes
-    ----------
-    model
-        ``tiltrotor`` or ``quadrotor`` (without hinges; its pods are part of the body).
-    vehicle
-        Physical parameters, the pods' included.
-    pod
-        Mass and inertia of a pod. Ignored for a quadrotor.
-    rotor_limits
-        Limits on the rotor speeds.
-    extra_actuators
-        What layers around the control law append after the law's states.
-    ground
-        Ground to take off from and land on; None disables contacts.
-    user_vehicle
-        A user's file in place of the shipped one, with its own arms and pods; its geoms may have
-        mass and are always kept.
+    Attributes:
+        model: ``tiltrotor`` or ``quadrotor`` (without hinges; its pods are part of the body).
+        vehicle: Physical parameters, the pods' included.
+        pod: Mass and inertia of a pod. Ignored for a quadrotor.
+        rotor_limits: Limits on the rotor speeds.
+        extra_actuators: What layers around the control law append after the law's states.
+        ground: Ground to take off from and land on; None disables contacts.
+        user_vehicle: A user's file in place of the shipped one, with its own arms and pods; its
+            geoms may have mass and are always kept.
     """
 
     model: str
@@ -106,23 +98,16 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
     Mass and inertia of the compiled model are the vehicle's at any tilt: those of the pods are
     subtracted from the body's. There are no contacts but those between vehicle and ground.
 
-    Parameters
-    ----------
-    spec
-        The specification of the model.
-    visuals
-        Whether to keep what is drawn or measured only: geoms, cameras, lights and sensors. They do
-        not affect the physics, but updating them takes a third of a step.
+    Args:
+        spec: The specification of the model.
+        visuals: Whether to keep what is drawn or measured only: geoms, cameras, lights and sensors.
+            They do not affect the physics, but updating them takes a third of a step.
 
-    Returns
-    -------
-    mujoco.MjModel
+    Returns:
         With the keyframes ``hover`` (in equilibrium) and ``start`` (rotors at 300 rad/s).
 
-    Raises
-    ------
-    ValueError
-        If the pods are too heavy for the vehicle.
+    Raises:
+        ValueError: If the pods are too heavy for the vehicle.
     """
     import mujoco
 

@@ -36,12 +36,9 @@ class TiltCarSpec(ModelSpec):
 def compile_tilt_car(spec: TiltCarSpec, *, visuals: bool = True) -> mujoco.MjModel:
     """Compile the MuJoCo model of a tilt-car, with the keyframes ``rest`` and ``start``.
 
-    Parameters
-    ----------
-    spec
-        The specification of the model.
-    visuals
-        Whether to keep what is drawn or measured only, as in `tiltsim.models.rotorcraft`.
+    Args:
+        spec: The specification of the model.
+        visuals: Whether to keep what is drawn or measured only, as in `tiltsim.models.rotorcraft`.
     """
     import mujoco
 

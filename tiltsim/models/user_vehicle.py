@@ -44,26 +44,17 @@ PRODUCT_TOLERANCE: Final = 0.01
 class UserVehicle:
     """A user's MJCF file and what was measured of it, untilted, along the body's axes.
 
-    Attributes
-    ----------
-    path
-        The file.
-    modified
-        When it was last changed, ns, to distinguish its versions.
-    vehicle
-        Its parameters; inertia about the centre of mass.
-    layout_mismatch
-        How it differs from the layout that the built-in control laws assume; empty if it does not.
-    hinge_inertias
-        About each tilt hinge, armature included, kg m^2.
-    carried
-        Mass properties of all bodies that the body ``vehicle`` carries, about its origin.
-    center
-        The whole vehicle's centre of mass, m, shape (3,).
-    products
-        The entries xy, xz and yz of its inertia about the centre of mass, kg m^2.
-    has_contact_geoms
-        Whether it has the geoms that contacts with a scenario's ground need.
+    Attributes:
+        path: The file.
+        modified: When it was last changed, ns, to distinguish its versions.
+        vehicle: Its parameters; inertia about the centre of mass.
+        layout_mismatch: How it differs from the layout that the built-in control laws assume; empty
+            if it does not.
+        hinge_inertias: About each tilt hinge, armature included, kg m^2.
+        carried: Mass properties of all bodies that the body ``vehicle`` carries, about its origin.
+        center: The whole vehicle's centre of mass, m, shape (3,).
+        products: The entries xy, xz and yz of its inertia about the centre of mass, kg m^2.
+        has_contact_geoms: Whether it has the geoms that contacts with a scenario's ground need.
     """
 
     path: str
@@ -95,17 +86,12 @@ class UserVehicle:
 
         Centre of mass and products of inertia stay the file's.
 
-        Parameters
-        ----------
-        root
-            The file as dm_control's tree.
-        vehicle
-            The parameters to set.
+        Args:
+            root: The file as dm_control's tree.
+            vehicle: The parameters to set.
 
-        Raises
-        ------
-        ValueError
-            If no body could have the mass and moments that remain for it.
+        Raises:
+            ValueError: If no body could have the mass and moments that remain for it.
         """
         if vehicle[:4] == self.vehicle[:4]:
             return
@@ -156,17 +142,12 @@ class UserVehicle:
 def read_user_vehicle(path: str, model: str) -> UserVehicle:
     """Check and measure an MJCF file.
 
-    Parameters
-    ----------
-    path
-        The file.
-    model
-        ``tiltrotor`` or ``quadrotor``: the names that it must have.
+    Args:
+        path: The file.
+        model: ``tiltrotor`` or ``quadrotor``: the names that it must have.
 
-    Raises
-    ------
-    ValueError
-        In one line: the file cannot be read or compiled, or lacks a name.
+    Raises:
+        ValueError: In one line: the file cannot be read or compiled, or lacks a name.
     """
     try:
         modified = Path(path).stat().st_mtime_ns

@@ -57,16 +57,12 @@ class Command:
 
     It takes effect after the scenario's latency; speeds then at once, or with the rotors' lag.
 
-    Attributes
-    ----------
-    thrusts
-        (4,), N, along each rotor's axis; they set its speed.
-    rotor_speeds
-        (4,), rad/s, positive along each rotor's spin.
-    rotor_accelerations
-        (4,), rad/s^2, likewise, held until the next sample.
-    tilt_angles
-        (4,), rad, for the tilt servos; default: the planned gait. The quadrotor has none.
+    Attributes:
+        thrusts: (4,), N, along each rotor's axis; they set its speed.
+        rotor_speeds: (4,), rad/s, positive along each rotor's spin.
+        rotor_accelerations: (4,), rad/s^2, likewise, held until the next sample.
+        tilt_angles: (4,), rad, for the tilt servos; default: the planned gait. The quadrotor has
+            none.
     """
 
     thrusts: npt.ArrayLike | None = None
@@ -95,11 +91,10 @@ class CheckedCommand:
 def check_command(command: object, *, tilting: bool) -> CheckedCommand:
     """Check what a controller returned, for a vehicle with or without tilt servos.
 
-    Raises
-    ------
-    ControllerError
-        If it is not a `Command`, does not give exactly one of `ROTOR_COMMANDS`, has an entry of the
-        wrong shape or a non-finite one, or gives tilt angles to a vehicle that is not ``tilting``.
+    Raises:
+        ControllerError: If it is not a `Command`, does not give exactly one of `ROTOR_COMMANDS`,
+            has an entry of the wrong shape or a non-finite one, or gives tilt angles to a vehicle
+            that is not ``tilting``.
     """
     if not isinstance(command, Command):
         raise ControllerError(f"returned {short_repr(command)}; expected a tiltsim.Command")

@@ -95,10 +95,8 @@ class CommandedPlant(MujocoPlant):
     def thrusts_and_tilts(self, command: CheckedCommand) -> Floats:
         """A command as thrusts (N) and tilt angles (rad), shape (8,) or (4,).
 
-        Raises
-        ------
-        ControllerError
-            If it commands accelerations, which have no thrust yet.
+        Raises:
+            ControllerError: If it commands accelerations, which have no thrust yet.
         """
         if command.kind == "rotor_accelerations":
             raise ControllerError("commanded rotor_accelerations; expected thrusts or rotor_speeds")

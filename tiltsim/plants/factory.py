@@ -19,19 +19,14 @@ def make_plant(
 ) -> Plant:
     """The plant that a scenario requests, at its initial state.
 
-    Parameters
-    ----------
-    assembly
-        The flight.
-    controller
-        A user's own, for scenarios whose law is ``python``; default: the one that it names.
-    engine
-        In place of the scenario's.
+    Args:
+        assembly: The flight.
+        controller: A user's own, for scenarios whose law is ``python``; default: the one that it
+            names.
+        engine: In place of the scenario's.
 
-    Raises
-    ------
-    InputError
-        If MuJoCo cannot compile the vehicle, or the user's controller cannot be loaded.
+    Raises:
+        InputError: If MuJoCo cannot compile the vehicle, or the user's controller cannot be loaded.
     """
     if assembly.scenario.controller.is_external:
         return UserControlledPlant(assembly, controller)

@@ -59,14 +59,11 @@ def build_model(
 ) -> mujoco.MjModel:
     """Compile the vehicle of a flight. Raises `InputError` if MuJoCo cannot.
 
-    Parameters
-    ----------
-    assembly
-        The flight.
-    knots
-        Room for knots in ``userdata``, where several flights share the model; default: its own.
-    visuals
-        Whether the model has the parts that are only drawn.
+    Args:
+        assembly: The flight.
+        knots: Room for knots in ``userdata``, where several flights share the model; default: its
+            own.
+        visuals: Whether the model has the parts that are only drawn.
     """
     loop, scenario = assembly.loop, assembly.scenario
     size = HEADER_SIZE + loop.record_size + (len(assembly.setup.knots) if knots is None else knots)

@@ -27,14 +27,10 @@ if TYPE_CHECKING:
 class MujocoPlant(Plant):
     """The compiled MJCF model in MuJoCo, with the control step in its control callback.
 
-    Parameters
-    ----------
-    assembly
-        The flight.
-    model
-        Its model; default: the one that `flight_model` compiles.
-    engine
-        Default: the one that the scenario requests.
+    Args:
+        assembly: The flight.
+        model: Its model; default: the one that `flight_model` compiles.
+        engine: Default: the one that the scenario requests.
     """
 
     def __init__(
@@ -104,12 +100,9 @@ class MujocoPlant(Plant):
     def recorder(self, samples: int, steps: int, last_steps: int) -> Recorder:
         """Memory for the samples of the native engine; its address goes to ``userdata[RECORDER]``.
 
-        Parameters
-        ----------
-        samples
-            Number of samples.
-        steps, last_steps
-            Physics steps between samples, and before the last one.
+        Args:
+            samples: Number of samples.
+            steps, last_steps: Physics steps between samples, and before the last one.
         """
         from tiltsim.engines.recorder import Recorder
 

@@ -22,12 +22,9 @@ from tiltsim_controllers.mathematics.scalar import Floats
 class ThesisPlant(Plant):
     """The thesis's equations, integrated with ode3; see `tiltsim.equations.ode3`.
 
-    Parameters
-    ----------
-    assembly
-        The flight; its loop has equations.
-    engine
-        Default: the one that the scenario requests.
+    Args:
+        assembly: The flight; its loop has equations.
+        engine: Default: the one that the scenario requests.
     """
 
     def __init__(self, assembly: Assembly, engine: EngineName | None = None) -> None:

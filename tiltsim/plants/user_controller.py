@@ -180,12 +180,9 @@ class UserControlledPlant(CommandedPlant):
     An interval may be repeated from a saved state, to find the step on which a flight ended. The
     commands are kept for that, so that a controller with a memory is called once per sample.
 
-    Parameters
-    ----------
-    assembly
-        The flight.
-    controller
-        Default: the one that the scenario names.
+    Args:
+        assembly: The flight.
+        controller: Default: the one that the scenario names.
     """
 
     def __init__(self, assembly: Assembly, controller: Controller | type | None = None) -> None:

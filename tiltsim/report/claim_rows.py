@@ -76,10 +76,8 @@ def analyze(folder: Path, jobs: int) -> dict[str, Value]:
 
     They are stored in the folder until the core or the report changes.
 
-    Raises
-    ------
-    InputError
-        If a claim cannot be computed or a process dies.
+    Raises:
+        InputError: If a claim cannot be computed or a process dies.
     """
     digest = sources_digest([*Path(__file__).parent.rglob("*.py")], code_digest().hex()).hex()
     path = folder / f"analysis-{digest[:24]}.json"
@@ -111,17 +109,13 @@ def make_rows(
 ) -> list[Row]:
     """All claims that can be evaluated, in the order of the text.
 
-    Parameters
-    ----------
-    entries
-        The scenarios, in order.
-    flights
-        Their records.
-    values
-        Measured values of the computed claims, by `AnalysisClaim.key`; read only if ``whole``.
-    whole
-        Whether this is the whole library. Otherwise computed claims are omitted, and so are claims
-        about several flights of which one is missing.
+    Args:
+        entries: The scenarios, in order.
+        flights: Their records.
+        values: Measured values of the computed claims, by `AnalysisClaim.key`; read only if
+            ``whole``.
+        whole: Whether this is the whole library. Otherwise computed claims are omitted, and so are
+            claims about several flights of which one is missing.
     """
     rows = _expectation_rows(entries, flights)
     for claim in registered_claims():

@@ -35,21 +35,14 @@ def draw_all(
 ) -> list[Drawing]:
     """Draw the pictures whose flights are available; drawings are stored in the folder.
 
-    Parameters
-    ----------
-    entries, flights
-        The scenarios and their records.
-    folder
-        Where drawings are stored.
-    jobs
-        Processes.
-    whole
-        Whether to include pictures that need no flight.
+    Args:
+        entries, flights: The scenarios and their records.
+        folder: Where drawings are stored.
+        jobs: Processes.
+        whole: Whether to include pictures that need no flight.
 
-    Raises
-    ------
-    InputError
-        If a figure cannot be drawn or a process dies.
+    Raises:
+        InputError: If a figure cannot be drawn or a process dies.
     """
     sources = Path(__file__).parents[1] / "views" / "figures"
     own = Path(__file__).parent

@@ -193,7 +193,7 @@ FINDINGS: Final = (
                 "test_published_attitude_gains_fail_under_the_exact_matrix",
                 "test_published_gains_pass_under_the_published_matrix",
                 "test_published_matrix_multiplies_the_attitude_loops_by_twice_the_hover_speed",
-            ),
+            )
         },
         numbers=_matrix_gain,
     ),
@@ -213,7 +213,7 @@ FINDINGS: Final = (
                 "test_residuals_factor",
                 "test_roots_are_roots_and_lie_on_the_lines",
                 "test_printed_coefficients_explain_the_published_offset",
-            ),
+            )
         },
         numbers=_map_numbers,
     ),
@@ -309,7 +309,7 @@ FINDINGS: Final = (
             _FLIGHTS: (
                 "test_plants_differ_by_the_gyroscopic_torque_once_the_body_rolls_and_yaws",
                 "test_plants_agree_where_they_model_the_same",
-            ),
+            )
         },
     ),
     Finding(
@@ -353,7 +353,7 @@ FINDINGS: Final = (
             "controllers/laws/test_switching.py": (
                 "test_experiment_2_is_lost_after_switches",
                 "test_experiment_2_with_the_other_reference_rests_on_the_zones_edge",
-            ),
+            )
         },
     ),
     Finding(
@@ -372,7 +372,7 @@ FINDINGS: Final = (
                 "test_gaits_1_and_4_cannot_free_themselves_of_yaw",
                 "test_gaits_2_and_3",
                 "test_support_function_is_that_of_a_linear_program",
-            ),
+            )
         },
         numbers=_attainable_numbers,
     ),

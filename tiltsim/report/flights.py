@@ -106,21 +106,14 @@ def fly(
 ) -> dict[tuple[str, Plant], FlightRecord | Unsupported]:
     """Records of scenarios on both plants: stored ones from the folder, the others flown.
 
-    Parameters
-    ----------
-    entries
-        The scenarios, from `report_entries`.
-    folder
-        Where records are stored; created if it is missing.
-    jobs
-        Processes.
-    progress
-        Called with the number of finished flights and the total.
+    Args:
+        entries: The scenarios, from `report_entries`.
+        folder: Where records are stored; created if it is missing.
+        jobs: Processes.
+        progress: Called with the number of finished flights and the total.
 
-    Raises
-    ------
-    InputError
-        If a process dies or fails.
+    Raises:
+        InputError: If a process dies or fails.
     """
     folder.mkdir(parents=True, exist_ok=True)
     flights: dict[tuple[str, Plant], FlightRecord | Unsupported] = {}

@@ -23,22 +23,15 @@ def make_report(
 ) -> Report:
     """Fly, compute and draw everything that a report shows.
 
-    Parameters
-    ----------
-    paths
-        Files, folders or library names, as in `tiltsim.studies.checking.collect`. With none, the
-        report is complete: all scenarios, all claims, and the findings.
-    folder
-        Where flights, computed values and drawings are stored.
-    jobs
-        Processes.
-    progress
-        Called with the number of finished flights and the total.
+    Args:
+        paths: Files, folders or library names, as in `tiltsim.studies.checking.collect`. With none,
+            the report is complete: all scenarios, all claims, and the findings.
+        folder: Where flights, computed values and drawings are stored.
+        jobs: Processes.
+        progress: Called with the number of finished flights and the total.
 
-    Raises
-    ------
-    InputError
-        If a scenario is invalid, or a process dies.
+    Raises:
+        InputError: If a scenario is invalid, or a process dies.
     """
     whole = not paths
     entries = report_entries(collect(paths or [str(shipped_folder("scenarios"))]))

@@ -52,7 +52,11 @@ def determinant_coefficients(vehicle: Vehicle) -> Coefficients:
 
 
 def coefficient(part: str, name: str, vehicle: Vehicle, scale: float = 1.0) -> float:
-    """Absolute value of one coefficient of the determinant; arguments as in `terms_hold`."""
+    """Absolute value of one coefficient of the determinant.
+
+    Args:
+        part, name, vehicle, scale: as in `terms_hold`
+    """
     return scale * abs(float(getattr(determinant_coefficients(vehicle), part)[name]))
 
 
@@ -61,16 +65,11 @@ def terms_hold(
 ) -> bool:
     """Whether the printed terms of a part of the determinant are correct and complete.
 
-    Parameters
-    ----------
-    part
-        ``R``, ``R_phi`` or ``R_theta``.
-    printed
-        Printed coefficients by product; absent ones are 0.
-    vehicle
-        The vehicle of the chapter.
-    scale
-        Constant by which the chapter multiplies the determinant.
+    Args:
+        part: ``R``, ``R_phi`` or ``R_theta``.
+        printed: Printed coefficients by product; absent ones are 0.
+        vehicle: The vehicle of the chapter.
+        scale: Constant by which the chapter multiplies the determinant.
     """
     computed = getattr(determinant_coefficients(vehicle), part)
     return all(
@@ -81,12 +80,9 @@ def terms_hold(
 def robustness_claim(source: str, key: str, case: str, refuted: str = "") -> AnalysisClaim:
     """The claim that a published gait is more robust than its biased twin.
 
-    Parameters
-    ----------
-    source, case, refuted
-        Of the claim.
-    key
-        Of the gait in `PUBLISHED_GAITS`.
+    Args:
+        source, case, refuted: Of the claim.
+        key: Of the gait in `PUBLISHED_GAITS`.
     """
 
     def measure() -> bool:

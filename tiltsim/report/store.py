@@ -64,21 +64,14 @@ def results(
 ) -> Iterator[tuple[Task, Result]]:
     """Yield every task with its result, as they finish; one failure ends the work.
 
-    Parameters
-    ----------
-    work
-        Called once per task; picklable unless ``jobs`` is 1.
-    tasks
-        The work to do.
-    jobs
-        Processes; with 1, or a single task, everything runs in this one.
-    describe
-        Names a task in the message of an error.
+    Args:
+        work: Called once per task; picklable unless ``jobs`` is 1.
+        tasks: The work to do.
+        jobs: Processes; with 1, or a single task, everything runs in this one.
+        describe: Names a task in the message of an error.
 
-    Raises
-    ------
-    InputError
-        If a task fails in a process, or the process dies.
+    Raises:
+        InputError: If a task fails in a process, or the process dies.
     """
     if jobs == 1 or len(tasks) < 2:
         yield from ((task, work(task)) for task in tasks)

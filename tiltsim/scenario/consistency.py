@@ -233,7 +233,7 @@ def _check_gait(scenario: ScenarioTables) -> None:
     if limit is not None and gait.amplitude > limit:
         raise mistake(
             f"tilts by {gait.amplitude:.4g} rad, beyond the servo limit "
-            f"vehicle.tilt_servo.max_angle = {limit}",
+            f"vehicle.tilt_servo.max_angle = {limit}"
         )
     knots = len(gait.knots)
     if knots > MAX_KNOTS:

@@ -26,19 +26,14 @@ FILE_KEYS: Final = (("controller", "function", ".py:"), ("vehicle", "mjcf", ""))
 def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Scenario:
     """Read a scenario.
 
-    Parameters
-    ----------
-    path
-        A TOML file or the name of a scenario in the library, with ``#variant`` for a member of a
-        family; for example ``ch04_tracking/setpoint#rho_065_modified``.
-    overrides
-        Values by dotted key, for example ``{"controller.decoupler": "exact"}``. For a family
-        without ``#variant`` they are required and change its base.
+    Args:
+        path: A TOML file or the name of a scenario in the library, with ``#variant`` for a member
+            of a family; for example ``ch04_tracking/setpoint#rho_065_modified``.
+        overrides: Values by dotted key, for example ``{"controller.decoupler": "exact"}``. For a
+            family without ``#variant`` they are required and change its base.
 
-    Raises
-    ------
-    InputError
-        In one line: the file, the key, the value and what is allowed.
+    Raises:
+        InputError: In one line: the file, the key, the value and what is allowed.
     """
     name, _, variant = str(path).partition("#")
     file = find_scenario_file(name)
@@ -70,19 +65,13 @@ def locate_named_files(document: Mapping[str, Any], folder: Path) -> None:
 def apply_overrides(document: dict[str, Any], overrides: Mapping[str, Any], address: str) -> None:
     """Set values in a document.
 
-    Parameters
-    ----------
-    document
-        Changed in place.
-    overrides
-        Values by dotted key; entries of lists as ``gait.angles[0]``.
-    address
-        Name of the document in messages.
+    Args:
+        document: Changed in place.
+        overrides: Values by dotted key; entries of lists as ``gait.angles[0]``.
+        address: Name of the document in messages.
 
-    Raises
-    ------
-    InputError
-        If a key does not exist.
+    Raises:
+        InputError: If a key does not exist.
     """
     for key, value in _kinds_first(overrides):
         _override(address, document, key, value)
@@ -91,17 +80,12 @@ def apply_overrides(document: dict[str, Any], overrides: Mapping[str, Any], addr
 def parse_scenario(document: Mapping[str, Any], address: str = "scenario") -> Scenario:
     """Validate a scenario's document.
 
-    Parameters
-    ----------
-    document
-        Plain dicts and lists, as read from TOML.
-    address
-        Name of the document in messages.
+    Args:
+        document: Plain dicts and lists, as read from TOML.
+        address: Name of the document in messages.
 
-    Raises
-    ------
-    InputError
-        As `load_scenario` does.
+    Raises:
+        InputError: As `load_scenario` does.
     """
     try:
         scenario = Scenario.model_validate(document)

@@ -15,12 +15,9 @@ if TYPE_CHECKING:
 class InvalidValueError(ValueError):
     """A value that is well formed but not allowed.
 
-    Parameters
-    ----------
-    key, value
-        The dotted key and its value.
-    allowed
-        What is wrong with the value, or allowed instead.
+    Args:
+        key, value: The dotted key and its value.
+        allowed: What is wrong with the value, or allowed instead.
     """
 
     def __init__(self, key: str, value: object, allowed: str) -> None:
@@ -63,14 +60,10 @@ def one_line_message(
 ) -> str:
     """The first mistake in one line, and the number of others.
 
-    Parameters
-    ----------
-    error
-        What pydantic found.
-    document
-        The document that was validated.
-    schema
-        The table that it was validated against.
+    Args:
+        error: What pydantic found.
+        document: The document that was validated.
+        schema: The table that it was validated against.
     """
     details = error.errors(include_url=False)
     # A misspelt key is often a missing key, too: the unknown one is more helpful.

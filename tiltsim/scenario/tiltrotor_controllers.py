@@ -15,11 +15,7 @@ from tiltsim.scenario.controller_table import (
     gain_kind,
 )
 from tiltsim.scenario.table import Gains2, NonNegative, Positive, Table, Vector3
-from tiltsim_controllers.analysis.stability import (
-    ErrorLoop,
-    error_loops,
-    feedforward_loops,
-)
+from tiltsim_controllers.analysis.stability import ErrorLoop, error_loops, feedforward_loops
 from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS, Gains
 from tiltsim_controllers.laws.gains import (
     GAIN_SETS,

@@ -207,7 +207,6 @@ VehicleUnion = Annotated[
 ]
 """The ``[vehicle]`` table, discriminated by its model."""
 
-
 ScaleFactor = Annotated[float, Field(ge=0.01, le=100.0)]
 
 

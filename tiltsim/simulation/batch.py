@@ -28,16 +28,11 @@ WINDOW: Final = 512
 class FlightResult:
     """The result of one flight among many.
 
-    Attributes
-    ----------
-    scenario
-        The scenario.
-    end
-        How it ended.
-    metrics
-        Its metrics; see `tiltsim.scenario.metric_names.METRICS`.
-    flight
-        The flight itself, if its samples are kept.
+    Attributes:
+        scenario: The scenario.
+        end: How it ended.
+        metrics: Its metrics; see `tiltsim.scenario.metric_names.METRICS`.
+        flight: The flight itself, if its samples are kept.
     """
 
     scenario: Scenario
@@ -51,27 +46,20 @@ def fly(
 ) -> Iterator[FlightResult]:
     """Fly scenarios and yield their results, in their order, as they become available.
 
-    Parameters
-    ----------
-    scenarios
-        What to fly; they may differ in anything. Those with one closed loop in MuJoCo that do not
-        request the Python engine are flown in batches if they are long enough together.
-    threads
-        Maximum number of threads; None takes all cores.
-    keep_samples
-        Whether results hold their flights. Without them memory does not grow with the number of
-        scenarios.
+    Args:
+        scenarios: What to fly; they may differ in anything. Those with one closed loop in MuJoCo
+            that do not request the Python engine are flown in batches if they are long enough
+            together.
+        threads: Maximum number of threads; None takes all cores.
+        keep_samples: Whether results hold their flights. Without them memory does not grow with the
+            number of scenarios.
 
-    Yields
-    ------
-    FlightResult
+    Yields:
         Bit-identical to `tiltsim.simulate` of the scenario except ``realtime_factor``, which is
         computed from the time that the flight took of all threads together.
 
-    Raises
-    ------
-    KeyboardInterrupt
-        If interrupted; results yielded before are complete.
+    Raises:
+        KeyboardInterrupt: If interrupted; results yielded before are complete.
     """
     threads = threads or os.cpu_count() or 1
     native = native_pays_off(scenarios)

@@ -93,16 +93,11 @@ class _Row:
 class NativeBatch(Generic[Result]):
     """Flights with one closed loop in a `mujoco.batch.Batch`.
 
-    Parameters
-    ----------
-    assemblies
-        The flights, in the order of their places.
-    threads
-        How many step rows.
-    pool
-        Where the results are computed.
-    result
-        Makes the result of a flight.
+    Args:
+        assemblies: The flights, in the order of their places.
+        threads: How many step rows.
+        pool: Where the results are computed.
+        result: Makes the result of a flight.
     """
 
     def __init__(

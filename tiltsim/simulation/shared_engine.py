@@ -15,16 +15,11 @@ from tiltsim.system.interrupts import reraise_swallowed_interrupts
 def shared_engine(scenarios: Sequence[Scenario], steps: int | None = None) -> EngineName | None:
     """Choose one engine for flights in several processes, and compile it for all of them.
 
-    Parameters
-    ----------
-    scenarios
-        The flights, or examples of them.
-    steps
-        Physics steps of all flights; default: of ``scenarios``.
+    Args:
+        scenarios: The flights, or examples of them.
+        steps: Physics steps of all flights; default: of ``scenarios``.
 
-    Returns
-    -------
-    EngineName or None
+    Returns:
         "native" if the flights together repay compilation, else None, the choice of each scenario.
     """
     if steps is None:

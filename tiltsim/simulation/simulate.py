@@ -39,32 +39,23 @@ def simulate(
 ) -> Flight:
     """Fly a scenario from start to end.
 
-    Parameters
-    ----------
-    scenario
-        What to fly; see `tiltsim.load_scenario`.
-    observer
-        Called with every sample (floats in the order of `ClosedLoop.sample_fields`) as it is
-        recorded.
-    controller
-        A controller of your own in place of the scenario's: a function from
-        `tiltsim.Observation` to `tiltsim.Command`, an object with ``__call__`` and, if it has a
-        memory, ``reset(scenario)``, or a class of such objects.
+    Args:
+        scenario: What to fly; see `tiltsim.load_scenario`.
+        observer: Called with every sample (floats in the order of `ClosedLoop.sample_fields`) as it
+            is recorded.
+        controller: A controller of your own in place of the scenario's: a function from
+            `tiltsim.Observation` to `tiltsim.Command`, an object with ``__call__`` and, if it has a
+            memory, ``reset(scenario)``, or a class of such objects.
 
-    Returns
-    -------
-    Flight
-        All samples up to the end. A flight that diverges or reaches a singular decoupling matrix
-        is a result, not an error: its log is complete up to there, and ``flight.end`` gives the
-        cause and, to one physics step, the time. The same holds for a flight that is interrupted,
-        or whose controller of your own raises an exception or returns an invalid command.
+    Returns:
+        All samples up to the end. A flight that diverges or reaches a singular decoupling matrix is
+        a result, not an error: its log is complete up to there, and ``flight.end`` gives the cause
+        and, to one physics step, the time. The same holds for a flight that is interrupted, or
+        whose controller of your own raises an exception or returns an invalid command.
 
-    Raises
-    ------
-    InputError
-        If the vehicle cannot be built, or your controller cannot be used.
-    KeyboardInterrupt
-        If interrupted before the first sample.
+    Raises:
+        InputError: If the vehicle cannot be built, or your controller cannot be used.
+        KeyboardInterrupt: If interrupted before the first sample.
     """
     if controller is not None:
         scenario = with_controller(scenario, controller)
@@ -80,14 +71,10 @@ def simulate_assembly(
 ) -> Flight:
     """As `simulate`, for a flight that is assembled already.
 
-    Parameters
-    ----------
-    assembly
-        The flight; under a ``controller`` of the user's its scenario's law is ``python``.
-    observer, controller
-        See `simulate`.
-    engine
-        In place of the scenario's.
+    Args:
+        assembly: The flight; under a ``controller`` of the user's its scenario's law is ``python``.
+        observer, controller: See `simulate`.
+        engine: In place of the scenario's.
     """
     simulation = assembly.scenario.simulation
     plant = make_plant(assembly, controller, engine)
@@ -139,18 +126,12 @@ def fly_chunk(
     If the flight ends within them, they are repeated sample by sample, and the last one step by
     step, to find the exact step.
 
-    Parameters
-    ----------
-    plant, monitor
-        The plant, which is advanced, and the monitor of its flight.
-    samples
-        Number of intervals.
-    steps
-        Physics steps of each.
+    Args:
+        plant, monitor: The plant, which is advanced, and the monitor of its flight.
+        samples: Number of intervals.
+        steps: Physics steps of each.
 
-    Returns
-    -------
-    samples, end
+    Returns:
         The finite samples, and the end if the flight ended.
     """
     before = plant.state

@@ -120,20 +120,13 @@ def bench_batch(integrator: str, threads: int, rounds: int = BATCH_ROUNDS) -> Ro
 def bench_flights(vehicles: int, duration: float, integrator: str, timestep: float) -> Rows:
     """Time whole flights with samples, termination checks and metrics.
 
-    Parameters
-    ----------
-    vehicles
-        Number of flights.
-    duration
-        Of each, s.
-    integrator
-        MuJoCo's.
-    timestep
-        Of the physics, s.
+    Args:
+        vehicles: Number of flights.
+        duration: Of each, s.
+        integrator: MuJoCo's.
+        timestep: Of the physics, s.
 
-    Returns
-    -------
-    list of dict
+    Returns:
         One row without a ratio; ``memory`` is the peak of the process, bytes.
     """
     simulation = {"integrator": integrator, "duration": duration, "timestep": timestep}

@@ -120,20 +120,13 @@ def check_all(
     If a process dies, only the scenario that it was flying is reported as crashed. An interrupt
     from the keyboard ends all processes at once.
 
-    Parameters
-    ----------
-    addresses
-        Of scenarios, as from `collect`.
-    jobs
-        Number of processes.
-    overrides
-        Values by dotted key, for every scenario.
-    report
-        Called with each result as it becomes known.
+    Args:
+        addresses: Of scenarios, as from `collect`.
+        jobs: Number of processes.
+        overrides: Values by dotted key, for every scenario.
+        report: Called with each result as it becomes known.
 
-    Returns
-    -------
-    list of CheckResult
+    Returns:
         In the order of the addresses.
     """
     scenarios = _valid(addresses, overrides)

@@ -64,20 +64,14 @@ def gait_report(
 ) -> dict[str, Any]:
     """The singularities of a gait (``tiltsim gait --json``).
 
-    Parameters
-    ----------
-    gait
-        Tilt angles over time.
-    vehicle
-        Their vehicle.
-    roll, pitch
-        Attitude of the margins and the determinant, rad; without either, margins at level.
-    samples
-        Number of samples over one period.
+    Args:
+        gait: Tilt angles over time.
+        vehicle: Their vehicle.
+        roll, pitch: Attitude of the margins and the determinant, rad; without either, margins at
+            level.
+        samples: Number of samples over one period.
 
-    Returns
-    -------
-    dict
+    Returns:
         Values at time zero. A moving gait adds ``time``, a table of arrays over one period, and
         ``min_singularity_margin`` over it. Fixed angles have ``hover_rotor_speeds`` (rad/s, along
         the spins), null if they cannot hover.
@@ -178,18 +172,13 @@ def _backward_rotors(speeds: Quad | None) -> list[str]:
 def fault_report(tilts: Quad, vehicle: Vehicle, opposite_speed: float) -> dict[str, Any]:
     """Hovering after the loss of each rotor (``tiltsim gait --faults``).
 
-    Parameters
-    ----------
-    tilts
-        Tilt angles, rad.
-    vehicle
-        Their vehicle.
-    opposite_speed
-        Of the rotor opposite the failed one in the hover with free tilt angles, rad/s.
+    Args:
+        tilts: Tilt angles, rad.
+        vehicle: Their vehicle.
+        opposite_speed: Of the rotor opposite the failed one in the hover with free tilt angles,
+            rad/s.
 
-    Returns
-    -------
-    dict
+    Returns:
         For each rotor: how far (rad) the tilt angles are from a hover on the other three, and a
         hover on three rotors with free tilt angles. ``least_speed`` is the maximum speed (rad/s)
         that the rotors must reach for it.

@@ -35,16 +35,11 @@ def make_row(
 ) -> dict[str, Any]:
     """The row of a point, by column, without versions.
 
-    Parameters
-    ----------
-    points
-        The sweep's.
-    index
-        Number of the point.
-    values
-        Those that the axes set, by key.
-    result
-        Of the flight with these values.
+    Args:
+        points: The sweep's.
+        index: Number of the point.
+        values: Those that the axes set, by key.
+        result: Of the flight with these values.
     """
     try:
         document = without_none(points.scenario(values).model_dump(mode="json"))

@@ -38,18 +38,14 @@ CONSTANTS: Final = {"pi": math.pi}
 def evaluate(expression: str, values: Mapping[str, Any]) -> float:
     """The value of an expression over named numbers.
 
-    Parameters
-    ----------
-    expression
-        ``+ - * / **``, parentheses, numbers, `FUNCTIONS`, pi, and names: those of ``values``,
-        dots and positions included, as in ``2 * gait.period``.
-    values
-        Numbers by name.
+    Args:
+        expression: ``+ - * / **``, parentheses, numbers, `FUNCTIONS`, pi, and names: those of
+            ``values``, dots and positions included, as in ``2 * gait.period``.
+        values: Numbers by name.
 
-    Raises
-    ------
-    ValueError
-        If the expression cannot be parsed or has no value; the message is a predicate of it.
+    Raises:
+        ValueError: If the expression cannot be parsed or has no value; the message is a predicate
+            of it.
     """
     try:
         value = _value(_parse(expression), values)

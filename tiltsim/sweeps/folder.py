@@ -108,11 +108,9 @@ class SweepFolder:
 def open_sweep_folder(path: Path, points: SweepPoints) -> Iterator[SweepFolder]:
     """Open a new folder, or one to continue, with exclusive access.
 
-    Raises
-    ------
-    InputError
-        If the folder cannot be written, is in use, or contains another sweep; the message names the
-        difference.
+    Raises:
+        InputError: If the folder cannot be written, is in use, or contains another sweep; the
+            message names the difference.
     """
     prepare_folder(path)
     with ExitStack() as stack:

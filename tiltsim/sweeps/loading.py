@@ -29,18 +29,13 @@ from tiltsim.sweeps.tables import CasesAxis, Sweep, dotted
 def load_sweep(path: str | Path, overrides: dict[str, Any] | None = None) -> SweepDefinition:
     """Read a sweep file.
 
-    Parameters
-    ----------
-    path
-        A TOML file or the name of a sweep in the library.
-    overrides
-        Values by dotted key of the scenario, on top of the file's ``[set]``.
+    Args:
+        path: A TOML file or the name of a sweep in the library.
+        overrides: Values by dotted key of the scenario, on top of the file's ``[set]``.
 
-    Raises
-    ------
-    InputError
-        In one line: the file, the key, the value and what is allowed. The base scenario and every
-        value of every axis are tried.
+    Raises:
+        InputError: In one line: the file, the key, the value and what is allowed. The base scenario
+            and every value of every axis are tried.
     """
     file = find_scenario_file(path)
     address = library_name(file)

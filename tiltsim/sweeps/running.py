@@ -29,28 +29,19 @@ def run_sweep(
 ) -> Path:
     """Fly the chunks of a sweep that are not yet finished.
 
-    Parameters
-    ----------
-    definition
-        The sweep, from `tiltsim.sweeps.loading.load_sweep`.
-    out
-        Its folder; see `tiltsim.sweeps.folder`.
-    jobs
-        Processes on this machine.
-    cluster
-        Address of a Dask scheduler whose workers fly instead.
-    report
-        Called with the number of finished rows, at the start and after every chunk.
+    Args:
+        definition: The sweep, from `tiltsim.sweeps.loading.load_sweep`.
+        out: Its folder; see `tiltsim.sweeps.folder`.
+        jobs: Processes on this machine.
+        cluster: Address of a Dask scheduler whose workers fly instead.
+        report: Called with the number of finished rows, at the start and after every chunk.
 
-    Returns
-    -------
-    pathlib.Path
+    Returns:
         The finished dataset, which does not depend on interruptions or on the machines.
 
-    Raises
-    ------
-    InputError
-        As `open_sweep_folder`, or if the cluster cannot be used or processes keep dying.
+    Raises:
+        InputError: As `open_sweep_folder`, or if the cluster cannot be used or processes keep
+            dying.
     """
     points = SweepPoints(definition)
     with open_sweep_folder(out, points) as folder:

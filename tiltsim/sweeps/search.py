@@ -26,14 +26,10 @@ def boundary(
     all values before the boundary, as in ch. 3, Eq. (26). After the first failure the bracket is
     halved.
 
-    Parameters
-    ----------
-    start, stop
-        Ends of the walk.
-    step
-        Its step; the last one may be shorter.
-    tolerance
-        Maximum width of the final bracket, unless floats are coarser.
+    Args:
+        start, stop: Ends of the walk.
+        step: Its step; the last one may be shorter.
+        tolerance: Maximum width of the final bracket, unless floats are coarser.
     """
     length = abs(stop - start)
     last = start

@@ -27,19 +27,13 @@ def prepare_folder(folder: Path) -> None:
 def prepare_file(option: str, file: Path, suffixes: Sequence[str] = ()) -> None:
     """Check that a file can be written, before the work for it begins.
 
-    Parameters
-    ----------
-    option
-        Of the command line, for the message.
-    file
-        The file.
-    suffixes
-        Allowed suffixes, lower case with their dots; empty allows any.
+    Args:
+        option: Of the command line, for the message.
+        file: The file.
+        suffixes: Allowed suffixes, lower case with their dots; empty allows any.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written or its suffix is not allowed.
+    Raises:
+        InputError: If the file cannot be written or its suffix is not allowed.
     """
     if suffixes and file.suffix.lower() not in suffixes:
         raise InputError(

@@ -14,13 +14,9 @@ TOLERANCE: Final = 1e-9  # relative: the integrator stops at a limit up to round
 
 def at_upper_limit(speeds: Floats, limit: float | None) -> npt.NDArray[np.bool_]:
     """Where rotor speeds along the spin (rad/s) are at their upper limit; nowhere without one."""
-    return (
-        np.zeros(speeds.shape, dtype=bool) if limit is None else speeds >= limit * (1.0 - TOLERANCE)
-    )
+    return speeds >= (np.inf if limit is None else limit * (1.0 - TOLERANCE))
 
 
 def at_lower_limit(speeds: Floats, limit: float | None) -> npt.NDArray[np.bool_]:
     """Where rotor speeds along the spin (rad/s) are at their lower limit; nowhere without one."""
-    return (
-        np.zeros(speeds.shape, dtype=bool) if limit is None else speeds <= limit * (1.0 + TOLERANCE)
-    )
+    return speeds <= (-np.inf if limit is None else limit * (1.0 + TOLERANCE))

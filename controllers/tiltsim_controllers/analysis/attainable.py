@@ -85,10 +85,8 @@ class AttainableSet:
 def input_box(speed_limits: tuple[float, float]) -> tuple[Floats, Floats]:
     """Bounds of ``w`` (rad^2/s^2), each of shape (4,), under limits of |varpi| (rad/s; Eq. 11).
 
-    Raises
-    ------
-    ValueError
-        If the limits are not ``0 <= minimum < maximum``.
+    Raises:
+        ValueError: If the limits are not ``0 <= minimum < maximum``.
     """
     low, high = speed_limits
     if not 0.0 <= low < high < np.inf:
@@ -103,10 +101,9 @@ def box_slice_vertices(lower: Floats, upper: Floats, conditions: Floats, values:
     A vertex of the slice lies on a face of the box with as many free coordinates as there are
     conditions, the others at a bound.
 
-    Parameters
-    ----------
-    lower, upper : shape (4,)
-    conditions, values : shapes (k, 4) and (k,), k from 0 to 4
+    Args:
+        lower, upper: shape (4,)
+        conditions, values: shapes (k, 4) and (k,), k from 0 to 4
     """
     count = len(conditions)
     size = lower.size
@@ -145,13 +142,12 @@ def attainable_torque_thrust(
 ) -> AttainableSet:
     """Attainable ``(tau_L, tau_M, F_Z)`` (N m, N m, N; body axes; ch. 9, Figs. 2-7).
 
-    Parameters
-    ----------
-    angles : tilt angles, shape (4,), rad
-    vehicle : the tiltrotor
-    speed_limits : minimum and maximum rotor speed, rad/s
-    yaw_torque : condition (Eq. 20), N m; None for none
-    vertical_thrust : condition (slices of the figures), N; None for none
+    Args:
+        angles: tilt angles, shape (4,), rad
+        vehicle: the tiltrotor
+        speed_limits: minimum and maximum rotor speed, rad/s
+        yaw_torque: condition (Eq. 20), N m; None for none
+        vertical_thrust: condition (slices of the figures), N; None for none
     """
     torque, force = _wrench(angles, vehicle)
     image = np.stack([torque[0], torque[1], force[2]])
@@ -172,9 +168,9 @@ def attainable_accelerations(
 
     With the stated limits gaits 2 and 3 reach about 0.12 m/s^2, not the published 2 m/s^2.
 
-    Parameters
-    ----------
-    angles, vehicle, speed_limits, yaw_torque, vertical_thrust : as for `attainable_torque_thrust`
+    Args:
+        angles, vehicle, speed_limits, yaw_torque, vertical_thrust: as for
+            `attainable_torque_thrust`
     """
     torque, force = _wrench(angles, vehicle)
     labels = ("a_X (m/s^2)", "a_Y (m/s^2)")

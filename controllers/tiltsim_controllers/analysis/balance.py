@@ -24,10 +24,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from scipy.optimize import minimize
 
-from tiltsim_controllers.vehicle.decoupling_matrix import (
-    torque_entries,
-    torque_free_force,
-)
+from tiltsim_controllers.vehicle.decoupling_matrix import torque_entries, torque_free_force
 from tiltsim_controllers.vehicle.parameters import drag_ratio
 
 if TYPE_CHECKING:
@@ -45,10 +42,8 @@ _TOLERANCE: Final = 1e-9
 def side_slopes(acceleration: Triple, gravity: float) -> tuple[float, float]:
     """Ratio of side force to lift, along x and y, that balances an acceleration (m/s^2).
 
-    Raises
-    ------
-    ValueError
-        If the acceleration is not finite or the vehicle would have to push downwards.
+    Raises:
+        ValueError: If the acceleration is not finite or the vehicle would have to push downwards.
     """
     ax, ay, az = acceleration
     lift = gravity - az
@@ -68,14 +63,11 @@ def even_load_gait(acceleration: Triple, vehicle: Vehicle) -> Quad:
     ``sin 2b = X N`` and ``-sin 2a = Y N`` with ``N = 2 + cos 2a + cos 2b`` and the `side_slopes` X
     and Y; it does not depend on the drag ratio. All four rotors have nearly the same thrust.
 
-    Parameters
-    ----------
-    acceleration : constant acceleration that acts on the vehicle, m/s^2, world axes at yaw 0
-    vehicle : of which gravity alone matters
+    Args:
+        acceleration: constant acceleration that acts on the vehicle, m/s^2, world axes at yaw 0
+        vehicle: of which gravity alone matters
 
-    Returns
-    -------
-    tuple
+    Returns:
         The four tilt angles in rad.
     """
     x, y = side_slopes(acceleration, vehicle.gravity)
@@ -106,25 +98,20 @@ def balanced_gait(
 ) -> Quad:
     """The gait with the smallest sum of squared tilts that hovers level under an acceleration.
 
-    Parameters
-    ----------
-    acceleration : tuple
-        Constant acceleration that acts on the vehicle, m/s^2, world axes at yaw 0; a gust along +x
-        is ``(1, 0, 0)``.
-    vehicle : the tiltrotor
-    max_tilt : largest tilt angle of a pod, rad
-    min_lever : float
-        Lower bound of A and B, the yaw levers of the two pairs of rotors relative to no tilt.
+    Args:
+        acceleration: Constant acceleration that acts on the vehicle, m/s^2, world axes at yaw 0; a
+            gust along +x is ``(1, 0, 0)``.
+        vehicle: the tiltrotor
+        max_tilt: largest tilt angle of a pod, rad
+        min_lever: Lower bound of A and B, the yaw levers of the two pairs of rotors relative to no
+            tilt.
 
-    Returns
-    -------
-    tuple
+    Returns:
         The four tilt angles in rad.
 
-    Raises
-    ------
-    ValueError
-        If no gait within the limits balances the acceleration, naming it and the limits.
+    Raises:
+        ValueError: If no gait within the limits balances the acceleration, naming it and the
+            limits.
     """
     if not 0.0 < max_tilt < 0.5 * pi:
         raise ValueError(f"max_tilt = {max_tilt:g}: must lie between 0 and pi/2 rad")

@@ -66,11 +66,10 @@ def pose_matrix(tilts: Quad, rotor_speeds: Quad, vehicle: Vehicle, lost: int | N
     Forces are in units of the weight, torques in units of the weight times the arm's length, inputs
     are relative changes of thrust and tilts in rad.
 
-    Parameters
-    ----------
-    tilts, rotor_speeds : rad, rad/s
-    vehicle : the tiltrotor
-    lost : failed rotor, 1 to 4, or None
+    Args:
+        tilts, rotor_speeds: rad, rad/s
+        vehicle: the tiltrotor
+        lost: failed rotor, 1 to 4, or None
     """
     w = [spin * speed * speed for spin, speed in zip(SPIN, rotor_speeds, strict=True)]
     trig = sines_and_cosines(*tilts)
@@ -94,18 +93,15 @@ def _hover(tilts: Quad, rotor_speeds: Quad, vehicle: Vehicle, lost: int | None) 
 def three_rotor_hover(lost: int, vehicle: Vehicle, *, opposite_speed: float) -> Hover:
     """The hover without a rotor in which its two neighbours share the weight evenly.
 
-    Parameters
-    ----------
-    lost : the lost rotor, 1 to 4
-    vehicle : the tiltrotor
-    opposite_speed : float
-        Speed of the rotor opposite the lost one, rad/s; it determines the authority over the torque
-        that only this rotor produces. At 0 the other two hover alone.
+    Args:
+        lost: the lost rotor, 1 to 4
+        vehicle: the tiltrotor
+        opposite_speed: Speed of the rotor opposite the lost one, rad/s; it determines the authority
+            over the torque that only this rotor produces. At 0 the other two hover alone.
 
-    Raises
-    ------
-    ValueError
-        If there is no such rotor, or the opposite rotor alone would outweigh the vehicle.
+    Raises:
+        ValueError: If there is no such rotor, or the opposite rotor alone would outweigh the
+            vehicle.
     """
     if lost not in ROTORS:
         raise ValueError(f"lost = {lost!r}: must be a rotor, 1 to 4")
@@ -152,12 +148,11 @@ def fixed_tilt_hover(
     Rotors do not turn backwards. Without a fault it is the torque-free input of
     `tiltsim_controllers.vehicle.decoupling_matrix`, unless a rotor would have to reverse.
 
-    Parameters
-    ----------
-    tilts : rad
-    vehicle : the tiltrotor
-    lost : failed rotor, 1 to 4, or None
-    factors : remaining fraction of each rotor's thrust
+    Args:
+        tilts: rad
+        vehicle: the tiltrotor
+        lost: failed rotor, 1 to 4, or None
+        factors: remaining fraction of each rotor's thrust
     """
     sound = [index for index in range(4) if lost is None or index != lost - 1]
     sound = [index for index in sound if factors[index] > 0.0]
@@ -188,16 +183,12 @@ def minimum_hover_speed(
 ) -> float:
     """The minimum over all tilts of the largest rotor speed (rad/s) in hover after a fault.
 
-    Parameters
-    ----------
-    vehicle : the tiltrotor
-    factors : remaining fraction of each rotor's thrust and drag torque; 0 for a failed one
-    stuck : tuple, optional
-        A rotor, 1 to 4, and the angle (rad) its servo holds.
+    Args:
+        vehicle: the tiltrotor
+        factors: remaining fraction of each rotor's thrust and drag torque; 0 for a failed one
+        stuck: A rotor, 1 to 4, and the angle (rad) its servo holds.
 
-    Returns
-    -------
-    float
+    Returns:
         With a lower speed limit no hover is possible, at any attitude.
     """
     from scipy.optimize import minimize

@@ -186,9 +186,7 @@ PUBLISHED_GAITS: Final = {
         _path("ch07_gait_3", "red", rectangle((0.2, 0.8), (-0.8, -0.2), "red")),
         # ch. 8, Fig. 8 (missing): a triangle through P that changes its colour there; two circles
         _path(
-            "ch08_gait_1",
-            "red and blue",
-            Polyline((Leg("red", _TRIANGLE), Leg("blue", _TRIANGLE))),
+            "ch08_gait_1", "red and blue", Polyline((Leg("red", _TRIANGLE), Leg("blue", _TRIANGLE)))
         ),
         _path("ch08_gait_2", "red", Circle("red", (0.5, -0.5), 0.3)),
         _path("ch08_gait_3", "blue", Circle("blue", (0.5, -0.5), 0.3)),

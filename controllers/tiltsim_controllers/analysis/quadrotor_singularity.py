@@ -32,10 +32,8 @@ if TYPE_CHECKING:
 def published_determinant(roll: ArrayLike, pitch: ArrayLike) -> Floats:
     """The surface ``S(theta, phi)`` as published (ch. 2, Eqs. 44-46), dimensionless.
 
-    Parameters
-    ----------
-    roll, pitch : array_like
-        Attitudes in rad, of any shapes that broadcast.
+    Args:
+        roll, pitch: Attitudes in rad, of any shapes that broadcast.
     """
     roll, pitch = np.asarray(roll, dtype=float), np.asarray(pitch, dtype=float)
     surface = np.cos(pitch) ** 2 * np.cos(roll) * (np.cos(roll) - np.sin(roll)) - 1.0
@@ -48,10 +46,9 @@ def published_singular_curve(points: int = 181) -> tuple[Floats, Floats]:
     ``cos(theta)^2 = 1 / (cos(phi) (cos(phi) - sin(phi)))`` has a solution only for
     ``-pi/4 <= phi <= 0``. The curve passes through level attitude and ``(-pi/4, 0)``.
 
-    Parameters
-    ----------
-    points : int
-        Number of points on each half; pitch is positive on the first half, negative on the second.
+    Args:
+        points: Number of points on each half; pitch is positive on the first half, negative on the
+            second.
     """
     # Evenly spaced in the angle about the curve's centre: pitch grows like the square root of the
     # distance from either end.
@@ -66,13 +63,10 @@ def exact_determinant(
 ) -> Floats:
     """The determinant of ``Delta``, Eq. (42) without its errors, in SI units.
 
-    Parameters
-    ----------
-    roll, pitch : array_like
-        Attitudes in rad.
-    thrust : array_like
-        Total thrust ``zeta`` in N.
-    vehicle : the quadrotor; ``d`` is its arm length
+    Args:
+        roll, pitch: Attitudes in rad.
+        thrust: Total thrust ``zeta`` in N.
+        vehicle: the quadrotor; ``d`` is its arm length
     """
     roll, pitch = np.asarray(roll, dtype=float), np.asarray(pitch, dtype=float)
     inertia = vehicle.inertia_xx * vehicle.inertia_yy * vehicle.inertia_zz
@@ -85,13 +79,10 @@ def normalized_determinant(
 ) -> Floats:
     """`exact_determinant` over its value in level hover: 1 there, 0 where singular.
 
-    Parameters
-    ----------
-    roll, pitch : array_like
-        Attitudes in rad.
-    thrust : array_like
-        Total thrust ``zeta`` in N.
-    vehicle : the quadrotor
+    Args:
+        roll, pitch: Attitudes in rad.
+        thrust: Total thrust ``zeta`` in N.
+        vehicle: the quadrotor
     """
     hover = vehicle.mass * vehicle.gravity
     level = exact_determinant(0.0, 0.0, hover, vehicle)

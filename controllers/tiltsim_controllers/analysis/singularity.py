@@ -86,11 +86,10 @@ def decoupling_matrix(
 ) -> Floats:
     """``[tau(alpha); r3^T F(alpha)]`` in SI units, shape (..., 4, 4) (ch. 3, Eqs. 16, 18).
 
-    Parameters
-    ----------
-    angles : tilt angles, shape (..., 4), rad
-    roll, pitch : rad
-    vehicle : the tiltrotor
+    Args:
+        angles: tilt angles, shape (..., 4), rad
+        roll, pitch: rad
+        vehicle: the tiltrotor
     """
     torque = torque_matrix(angles, vehicle) * vehicle.arm_length * vehicle.thrust_coefficient
     force = force_matrix(angles) * vehicle.thrust_coefficient
@@ -121,20 +120,14 @@ def residuals(angles: ArrayLike, vehicle: Vehicle) -> Residuals:
 def determinant(angles: ArrayLike, roll: ArrayLike, pitch: ArrayLike, vehicle: Vehicle) -> Floats:
     """The determinant ``n . r3``, normalized as in ch. 3, shape (...) (ch. 3, Eq. 17).
 
-    That of `decoupling_matrix`, whose arguments it takes, is `determinant_unit` times this.
+    That of `decoupling_matrix`, whose arguments it takes, is ``2 L^2 K_f^3 K_m`` times this.
 
-    Parameters
-    ----------
-    angles, roll, pitch, vehicle : as for `decoupling_matrix`
+    Args:
+        angles, roll, pitch, vehicle: as for `decoupling_matrix`
     """
     R, R_phi, R_theta = residuals(angles, vehicle)
     up = world_up(roll, pitch)
     return R * up[..., 2] + R_phi * up[..., 1] - R_theta * up[..., 0]
-
-
-def determinant_unit(vehicle: Vehicle) -> float:
-    """``2 L^2 K_f^3 K_m``: the SI value of one unit of `determinant`."""
-    return 2.0 * vehicle.arm_length**2 * vehicle.thrust_coefficient**3 * vehicle.drag_coefficient
 
 
 def torque_free_direction(angles: ArrayLike, vehicle: Vehicle) -> Floats:
@@ -180,9 +173,8 @@ def singularity_margin(
     positive on the side of the level attitude and negative beyond the unacceptable-attitude curve.
     At level attitude it is the gait's robustness in the sense of ch. 5 and 6.
 
-    Parameters
-    ----------
-    angles, vehicle, roll, pitch : as for `decoupling_matrix`
+    Args:
+        angles, vehicle, roll, pitch: as for `decoupling_matrix`
     """
     direction = torque_free_direction(angles, vehicle)
     sine = np.einsum("...i,...i->...", direction, world_up(roll, pitch))
@@ -199,10 +191,9 @@ def margin_over_gait(
     whose determinant changes sign passes a singularity even if no sample is zero, and its margin is
     negative from there on.
 
-    Parameters
-    ----------
-    angles : shape (N, 4), in order of time, rad
-    vehicle, roll, pitch : as for `decoupling_matrix`
+    Args:
+        angles: shape (N, 4), in order of time, rad
+        vehicle, roll, pitch: as for `decoupling_matrix`
     """
     sign = np.sign(residuals(angles, vehicle).R)
     started = np.flatnonzero(sign)

@@ -118,18 +118,15 @@ def find_roots(
     ``(cos, sin)`` of ``alpha_3`` and of ``alpha_4``, so eliminating ``alpha_4`` leaves one
     quadratic, and no root is missed.
 
-    Parameters
-    ----------
-    alpha_1, alpha_2 : rad
-    vehicle : the tiltrotor
-    same_plane : distance below which planes intersect, rad; for "?" of ch. 6 half a grid step,
-        pi/32, as no grid point lies exactly on an intersection
+    Args:
+        alpha_1, alpha_2: rad
+        vehicle: the tiltrotor
+        same_plane: distance below which planes intersect, rad; for "?" of ch. 6 half a grid step,
+            pi/32, as no grid point lies exactly on an intersection
 
-    Raises
-    ------
-    ValueError
-        If the roots are not isolated: on ``alpha_1 = delta`` or ``alpha_2 = -delta`` every value of
-        one angle is a root.
+    Raises:
+        ValueError: If the roots are not isolated: on ``alpha_1 = delta`` or ``alpha_2 = -delta``
+            every value of one angle is a root.
     """
     corner = np.array([[[alpha_1, alpha_2, a, b] for b in (0.0, pi / 2)] for a in (0.0, pi / 2)])
     _, roll_form, pitch_form = residuals(corner, vehicle)

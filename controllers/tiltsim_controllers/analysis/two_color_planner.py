@@ -112,10 +112,8 @@ def polygon(vertices: tuple[Point, ...], color: str) -> Polyline:
 def check_path(path: Path, vehicle: Vehicle) -> PathReport:
     """Check a path by both published theorems, and for singularities they do not consider.
 
-    Raises
-    ------
-    ValueError
-        If the path has no extent, a number is not finite, or a colour is unknown.
+    Raises:
+        ValueError: If the path has no extent, a number is not finite, or a colour is unknown.
     """
     pieces = _pieces(path)
     joints = _joints(path)
@@ -169,19 +167,15 @@ def plan(
 
     The path is followed at constant speed in the alpha_1-alpha_2 plane.
 
-    Parameters
-    ----------
-    path : in the alpha_1-alpha_2 plane
-    period : s
-    vehicle : its drag ratio sets the offset of the blue lines
-    name, source : name and origin of the gait
+    Args:
+        path: in the alpha_1-alpha_2 plane
+        period: s
+        vehicle: its drag ratio sets the offset of the blue lines
+        name, source: name and origin of the gait
 
-    Raises
-    ------
-    PathRefusedError
-        If neither theorem accepts the path.
-    ValueError
-        As `check_path`, or if the period is not positive.
+    Raises:
+        PathRefusedError: If neither theorem accepts the path.
+        ValueError: As `check_path`, or if the period is not positive.
     """
     report = check_path(path, vehicle)
     if not report.accepted:
@@ -194,9 +188,8 @@ def four_angle_gait(
 ) -> Gait:
     """The four-angle gait of a path, without checking it.
 
-    Parameters
-    ----------
-    path, period, vehicle, name, source : as for `plan`
+    Args:
+        path, period, vehicle, name, source: as for `plan`
     """
     if isinstance(path, Circle):
         return plans.two_color_circle(

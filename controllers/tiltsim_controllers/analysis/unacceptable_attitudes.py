@@ -71,10 +71,8 @@ def acceptable_share(angles: ArrayLike, vehicle: Vehicle, half_width: float = pi
     That is the part where the determinant has the same sign as at level attitude; it is connected,
     as the curve crosses each line of constant roll at most once. Zero if level is singular.
 
-    Raises
-    ------
-    ValueError
-        If ``half_width`` is not in (0, pi/2].
+    Raises:
+        ValueError: If ``half_width`` is not in (0, pi/2].
     """
     if not 0.0 < half_width <= pi / 2:
         raise ValueError(f"half_width = {half_width}: must be in (0, pi/2]")

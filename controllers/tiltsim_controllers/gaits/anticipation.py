@@ -37,11 +37,10 @@ def rounded_corner(
 
     The window contains at most one corner, where the lines meet.
 
-    Parameters
-    ----------
-    start, stop : values at the ends of the window
-    start_rate, stop_rate : rates at its ends, 1/s
-    half : half the length of the window, s
+    Args:
+        start, stop: values at the ends of the window
+        start_rate, stop_rate: rates at its ends, 1/s
+        half: half the length of the window, s
     """
     middle = start + half * start_rate
     bend = stop_rate - start_rate
@@ -61,15 +60,12 @@ def anticipated_tilts(time: float, gait: GaitParameters, knots: Vector, half: fl
     it; the errors before and after cancel to first order. Smooth gaits and jumps, which have no
     rates, are unchanged.
 
-    Parameters
-    ----------
-    time : s
-    gait, knots : as for `tilt_reference`
-    half : time before and after a corner, s
+    Args:
+        time: s
+        gait, knots: as for `tilt_reference`
+        half: time before and after a corner, s
 
-    Returns
-    -------
-    tuple
+    Returns:
         Four jets, rad and s.
     """
     if half <= 0.0 or gait.type == FIXED or gait.type == TWO_COLOR_CIRCLE:

@@ -38,11 +38,10 @@ def keyframe_row(phase: float, rows: int, knots: Vector) -> int:
 def keyframe_gait(time: float, period: float, rows: float, knots: Vector) -> TiltsAndRates:
     """Tilt angles (rad) and rates (rad/s) of a gait through keyframes.
 
-    Parameters
-    ----------
-    time, period : s
-    rows : number of keyframes
-    knots : the keyframes; further floats may follow
+    Args:
+        time, period: s
+        rows: number of keyframes
+        knots: the keyframes; further floats may follow
     """
     turns = time / period
     phase = turns - floor(turns)

@@ -130,10 +130,8 @@ class Gait:
     def scaled(self, divisor: float) -> Gait:
         """The gait with all tilt angles divided by ``divisor`` (ch. 5, Eq. 16).
 
-        Raises
-        ------
-        ValueError
-            If the divisor is not positive and finite.
+        Raises:
+            ValueError: If the divisor is not positive and finite.
         """
         if not (isfinite(divisor) and divisor > 0.0):
             raise ValueError(f"scale 1/{divisor}: must be positive and finite")
@@ -197,18 +195,14 @@ def rotating(start: float, rate: float) -> Gait:
 def cat(name: str, amplitude: float, period: float, lean: float = 0.0) -> Gait:
     """A cat gait (ch. 5, Sec. 3.2).
 
-    Parameters
-    ----------
-    name : a name in `FOOTFALLS`
-    amplitude, lean
-        The legs swing by ``amplitude`` to either side of ``lean`` (forward), rad;
-        `tiltsim_controllers.gaits.cat.SWINGS` has the values reconstructed from ch. 5.
-    period : s
+    Args:
+        name: a name in `FOOTFALLS`
+        amplitude, lean: The legs swing by ``amplitude`` to either side of ``lean`` (forward), rad;
+            `tiltsim_controllers.gaits.cat.SWINGS` has the values reconstructed from ch. 5.
+        period: s
 
-    Raises
-    ------
-    ValueError
-        If there is no cat gait of this name.
+    Raises:
+        ValueError: If there is no cat gait of this name.
     """
     if name not in FOOTFALLS:
         raise ValueError(f"{name!r} is not a cat gait; choose {', '.join(FOOTFALLS)}")
@@ -221,16 +215,13 @@ def waypoints(
 ) -> Gait:
     """A closed, piecewise linear gait through the given tilt angles.
 
-    Parameters
-    ----------
-    angles : waypoints of four tilt angles, rad; the last segment leads back to the first
-    period : s
-    phases : when each waypoint is reached, as a fraction of the period; evenly spaced by default
+    Args:
+        angles: waypoints of four tilt angles, rad; the last segment leads back to the first
+        period: s
+        phases: when each waypoint is reached, as a fraction of the period; evenly spaced by default
 
-    Raises
-    ------
-    ValueError
-        If the numbers of waypoints and phases differ, or as `keyframes`.
+    Raises:
+        ValueError: If the numbers of waypoints and phases differ, or as `keyframes`.
     """
     count = len(angles)
     if phases is None:
@@ -248,17 +239,14 @@ def keyframes(
 ) -> Gait:
     """A gait through keyframes, linear in between.
 
-    Parameters
-    ----------
-    rows : ``(phase, alpha_1, ..., alpha_4)``, phase from 0 to 1, angles in rad
-    period : s
-    name, source : name and origin of the gait
+    Args:
+        rows: ``(phase, alpha_1, ..., alpha_4)``, phase from 0 to 1, angles in rad
+        period: s
+        name, source: name and origin of the gait
 
-    Raises
-    ------
-    ValueError
-        If a row is not five finite numbers, the phases do not run from 0 to 1 or decrease, three
-        rows share a phase (two make a jump), or the period is not positive.
+    Raises:
+        ValueError: If a row is not five finite numbers, the phases do not run from 0 to 1 or
+            decrease, three rows share a phase (two make a jump), or the period is not positive.
     """
     frames = [tuple(map(float, row)) for row in rows]
     for frame in frames:
@@ -289,18 +277,15 @@ def two_color_circle(
 ) -> Gait:
     """A circle in the alpha_1-alpha_2 plane on one colour (ch. 8, Sec. 4).
 
-    Parameters
-    ----------
-    centre, radius : ``(alpha_1, alpha_2)`` of the centre and the radius, rad
-    color : ``red`` or ``blue``
-    period : s
-    vehicle : its drag ratio sets the offset of the blue lines
-    name, source : name and origin of the gait
+    Args:
+        centre, radius: ``(alpha_1, alpha_2)`` of the centre and the radius, rad
+        color: ``red`` or ``blue``
+        period: s
+        vehicle: its drag ratio sets the offset of the blue lines
+        name, source: name and origin of the gait
 
-    Raises
-    ------
-    ValueError
-        If the colour is unknown or the period not positive.
+    Raises:
+        ValueError: If the colour is unknown or the period not positive.
     """
     parameters = GaitParameters(
         TWO_COLOR_CIRCLE,

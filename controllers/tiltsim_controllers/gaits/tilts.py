@@ -48,17 +48,14 @@ def tilt_reference(time: float, gait: GaitParameters, knots: Vector = NO_KNOTS) 
     At a jump and at a corner the values after it hold, except that the first half of a trot's
     period includes its end, as printed in ch. 4.
 
-    Parameters
-    ----------
-    time : s
-    gait : type and parameters
-    knots
-        The keyframes of gaits that have them (`tiltsim_controllers.gaits.keyframes`): a flat tuple
-        of floats in Python, a one-dimensional array in native code. Other gaits do not read it.
+    Args:
+        time: s
+        gait: type and parameters
+        knots: The keyframes of gaits that have them (`tiltsim_controllers.gaits.keyframes`): a flat
+            tuple of floats in Python, a one-dimensional array in native code. Other gaits do not
+            read it.
 
-    Returns
-    -------
-    tuple
+    Returns:
         ``(alpha_1, ..., alpha_4, rate_1, ..., rate_4)``.
     """
     a1, a2, a3, a4, v1, v2, v3, v4 = planned_angles(time, gait, knots)

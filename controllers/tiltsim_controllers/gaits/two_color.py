@@ -27,11 +27,10 @@ def colored_angles(
 ) -> tuple[float, float]:
     """``(alpha_3, alpha_4)`` (rad) of a colour (ch. 8, Eqs. 11-12, with the exact offset).
 
-    Parameters
-    ----------
-    alpha_1, alpha_2 : rad
-    color : `RED` or `BLUE`
-    drag_ratio : ``r = K_m / (L K_f)``
+    Args:
+        alpha_1, alpha_2: rad
+        color: `RED` or `BLUE`
+        drag_ratio: ``r = K_m / (L K_f)``
     """
     if color == RED:
         return alpha_1, alpha_2

@@ -58,11 +58,10 @@ def largest_feasible_scale(attitude: Quad, direction: Quad, low: Quad, high: Qua
     For ``kappa = 0`` such a ``beta`` must exist. A rotor whose entry of ``d`` is zero bounds only
     ``kappa``.
 
-    Parameters
-    ----------
-    attitude : ``a``, rad/s^2
-    direction : ``d``, rad/s^2
-    low, high : the box, rad/s^2
+    Args:
+        attitude: ``a``, rad/s^2
+        direction: ``d``, rad/s^2
+        low, high: the box, rad/s^2
     """
     scale = 1.0
     for i in range(4):
@@ -129,11 +128,10 @@ def allocate_by_priority(
 
     Requested are ``kappa = lambda = 1`` and ``beta = lift``.
 
-    Parameters
-    ----------
-    tilting, turning, direction : the parts ``a``, ``y`` and ``d``, rad/s^2
-    lift : requested ``beta``
-    low, high : the box, which must contain zero, rad/s^2
+    Args:
+        tilting, turning, direction: the parts ``a``, ``y`` and ``d``, rad/s^2
+        lift: requested ``beta``
+        low, high: the box, which must contain zero, rad/s^2
     """
     scale = largest_feasible_scale(tilting, direction, low, high)
     low, high = _subtract_scaled(low, scale, tilting), _subtract_scaled(high, scale, tilting)
@@ -164,14 +162,13 @@ def allocate_accelerations(
 
     The requested ones if the limits allow them, and where the decoupling matrix is singular.
 
-    Parameters
-    ----------
-    requested : solution of the decoupling matrix, rad/s^2
-    tilts, speeds : tilt angles, rad; signed rotor speeds, rad/s
-    roll, pitch : rad
-    vehicle : the tiltrotor
-    limits : minimum and maximum absolute rotor speed, rad/s
-    horizon : time for which the limits must hold, s
+    Args:
+        requested: solution of the decoupling matrix, rad/s^2
+        tilts, speeds: tilt angles, rad; signed rotor speeds, rad/s
+        roll, pitch: rad
+        vehicle: the tiltrotor
+        limits: minimum and maximum absolute rotor speed, rad/s
+        horizon: time for which the limits must hold, s
     """
     w1, w2, w3, w4 = requested
     s1, s2, s3, s4 = speeds

@@ -85,16 +85,13 @@ def attitude_reference(
 ) -> tuple[float, float, float, float, float, float]:
     """Attitude and altitude to track, with the altitude's derivatives (ch. 4, Eqs. 28-30).
 
-    Parameters
-    ----------
-    time : s
-    state : `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`
-    trig, torque : `sines_and_cosines` and `torque_entries` of the tilt angles
-    parameters, knots : of the controller, and of gait and reference
+    Args:
+        time: s
+        state: `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`
+        trig, torque: `sines_and_cosines` and `torque_entries` of the tilt angles
+        parameters, knots: of the controller, and of gait and reference
 
-    Returns
-    -------
-    tuple
+    Returns:
         ``(roll, pitch, yaw, z, vz, az)``, rad, m and s.
     """
     reference = parameters.reference
@@ -134,9 +131,8 @@ def rotor_accelerations(
     are used for the rates of roll, pitch and yaw (ch. 3, Eq. 8), second derivatives come from the
     model. NaN where the decoupling matrix is singular.
 
-    Parameters
-    ----------
-    time, state, parameters, knots : as for `attitude_reference`
+    Args:
+        time, state, parameters, knots: as for `attitude_reference`
     """
     _x, _y, z, _vx, _vy, vz, roll, pitch, yaw, p, q, r, a1, a2, a3, a4, s1, s2, s3, s4 = state
     vehicle = parameters.vehicle

@@ -31,11 +31,10 @@ DECOUPLERS: Final = {
 def conventional_decoupler(ax: float, ay: float, yaw: float, gravity: float) -> tuple[float, float]:
     """Roll and pitch (rad) of a plain quadrotor near hover (ch. 4, Eqs. 7-8).
 
-    Parameters
-    ----------
-    ax, ay : desired acceleration, m/s^2, world
-    yaw : rad
-    gravity : m/s^2
+    Args:
+        ax, ay: desired acceleration, m/s^2, world
+        yaw: rad
+        gravity: m/s^2
     """
     sin_yaw, cos_yaw = sin(yaw), cos(yaw)
     return (ax * sin_yaw - ay * cos_yaw) / gravity, (ax * cos_yaw + ay * sin_yaw) / gravity
@@ -51,10 +50,9 @@ def modified_decoupler(
     attitude. Their force is parallel to ``n``, so ``F_X = m g n_x / n_z`` and ``F_Y = m g n_y /
     n_z``: the printed 4 x 4 inverse in closed form. NaN where no such inputs exist.
 
-    Parameters
-    ----------
-    ax, ay, yaw, gravity : as for `conventional_decoupler`
-    n : the torque-free force, of arbitrary unit, body axes
+    Args:
+        ax, ay, yaw, gravity: as for `conventional_decoupler`
+        n: the torque-free force, of arbitrary unit, body axes
     """
     nx, ny, nz = n
     if nz == 0.0:
@@ -74,10 +72,9 @@ def exact_decoupler(
     ``d`` the nearest one is returned; NaN where the torque-free force has neither a lateral nor a
     vertical part, and in free fall, ``d = 0``.
 
-    Parameters
-    ----------
-    ax, ay, az : desired acceleration, m/s^2, world
-    yaw, gravity, n : as for `modified_decoupler`
+    Args:
+        ax, ay, az: desired acceleration, m/s^2, world
+        yaw, gravity, n: as for `modified_decoupler`
     """
     sin_yaw, cos_yaw = sin(yaw), cos(yaw)
     dx = ax * cos_yaw + ay * sin_yaw

@@ -28,11 +28,10 @@ def limited_acceleration(x: Jet, y: Jet, limit: float) -> tuple[Jet, Jet]:
 def position_feedback(error: Jet, jerk_error: float, integral: float, gains: Triple) -> Jet:
     """``k1 e' + k2 e + k3 integral`` of a position error, with its first two derivatives.
 
-    Parameters
-    ----------
-    error, jerk_error : the error ``e`` with its first two derivatives, and its third, m and s
-    integral : its integral, m s
-    gains : ``(k1, k2, k3)``, 1/s to 1/s^3
+    Args:
+        error, jerk_error: the error ``e`` with its first two derivatives, and its third, m and s
+        integral: its integral, m s
+        gains: ``(k1, k2, k3)``, 1/s to 1/s^3
     """
     k1, k2, k3 = gains
     return (
@@ -58,11 +57,10 @@ def attitude_jerk(desired: Jet, present: Jet, gains: Triple, limit: float) -> fl
     the rate an acceleration), the acceleration due to the errors is limited, and the rate to that
     from which it brakes, so that a large error does not stop a rotor.
 
-    Parameters
-    ----------
-    desired, present : the angle with its first two derivatives, rad and s
-    gains : ``(k1, k2, k3)``, 1/s to 1/s^3
-    limit : largest acceleration, rad/s^2
+    Args:
+        desired, present: the angle with its first two derivatives, rad and s
+        gains: ``(k1, k2, k3)``, 1/s to 1/s^3
+        limit: largest acceleration, rad/s^2
     """
     k1, k2, k3 = gains
     rate = clipped(k3 / k2 * (desired[0] - present[0]), -limit * k1 / k2, limit * k1 / k2)
@@ -74,11 +72,10 @@ def attitude_jerk(desired: Jet, present: Jet, gains: Triple, limit: float) -> fl
 def attitude_motion(attitude: Triple, omega: Triple, omega_rate: Triple, exact: float) -> Jets3:
     """Roll, pitch and yaw with their first two derivatives.
 
-    Parameters
-    ----------
-    attitude : the angles, rad
-    omega, omega_rate : body rates (rad/s) and their rates (rad/s^2)
-    exact : 0 to use the body rates for the rates of the angles (ch. 3, Eq. 8).
+    Args:
+        attitude: the angles, rad
+        omega, omega_rate: body rates (rad/s) and their rates (rad/s^2)
+        exact: 0 to use the body rates for the rates of the angles (ch. 3, Eq. 8).
     """
     roll, pitch, yaw = attitude
     if exact == 0.0:

@@ -55,15 +55,12 @@ def torque_free_force_jet(tilts: Jets4, drag_ratio: float) -> Jets3:
 def exact_decoupler_jet(ax: Jet, ay: Jet, lift: Jet, yaw: Jet, force: Jets3) -> tuple[Jet, Jet]:
     """`tiltsim_controllers.laws.decouplers.exact_decoupler` of moving arguments.
 
-    Parameters
-    ----------
-    ax, ay, lift : desired horizontal acceleration and ``g + az``, m/s^2
-    yaw : rad
-    force : the torque-free force, of arbitrary unit
+    Args:
+        ax, ay, lift: desired horizontal acceleration and ``g + az``, m/s^2
+        yaw: rad
+        force: the torque-free force, of arbitrary unit
 
-    Returns
-    -------
-    tuple
+    Returns:
         Roll and pitch, rad: at rest where no roll reaches the desired direction and the nearest one
         is returned, NaN where the force has neither a lateral nor a vertical part or the desired
         acceleration is that of free fall.
@@ -100,12 +97,11 @@ def exact_decoupler_jet(ax: Jet, ay: Jet, lift: Jet, yaw: Jet, force: Jets3) -> 
 def jerk_along(force: Jets3, specific: Triple, omega: Triple, factor: float) -> Triple:
     """Jerk (m/s^3, body axes) of a body whose force stays along the torque-free force.
 
-    Parameters
-    ----------
-    force : the torque-free force, of arbitrary unit
-    specific : the present force per mass, m/s^2, body axes
-    omega : body rates, rad/s: the force rotates with the body
-    factor : weight of the torque-free force's motion in the body, 1 or 0
+    Args:
+        force: the torque-free force, of arbitrary unit
+        specific: the present force per mass, m/s^2, body axes
+        omega: body rates, rad/s: the force rotates with the body
+        factor: weight of the torque-free force's motion in the body, 1 or 0
     """
     nx, ny, nz = force
     across = jet_sum(1.0, jet_product(nx, nx), 1.0, jet_product(ny, ny))

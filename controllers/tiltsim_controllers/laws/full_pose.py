@@ -76,7 +76,7 @@ class Parameters(NamedTuple):
 
 GAIN_SETS: Final = {
     # the author's public model, HansOersted/tiltrotor_simulator
-    "ch03": Gains(750.0, 1875.0, 1562.0, 750.0, 1500.0, 2577.0),
+    "ch03": Gains(750.0, 1875.0, 1562.0, 750.0, 1500.0, 2577.0)
 }
 """Gains by name."""
 
@@ -280,11 +280,10 @@ def full_pose_inputs(
     All NaN where the 6 x 8 matrix is rank-deficient or a rotor stands still, where its acceleration
     does not change its thrust.
 
-    Parameters
-    ----------
-    time : s
-    state : `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`
-    parameters, knots : the reference has position, roll, pitch and yaw, or x = y = 0 without one
+    Args:
+        time: s
+        state: `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`
+        parameters, knots: the reference has position, roll, pitch and yaw, or x = y = 0 without one
     """
     vehicle = parameters.vehicle
     _, _, _, _, _, _, roll, pitch, yaw, p, q, r = state[0:12]

@@ -60,10 +60,9 @@ def gains_from_poles(
 ) -> tuple[Gains, IntegralGains]:
     """Gains by pole placement, for the exact decoupling matrix.
 
-    Parameters
-    ----------
-    attitude, yaw, altitude : poles of third-order loops, with a real pole at the bandwidth
-    position : poles of a second-order loop
+    Args:
+        attitude, yaw, altitude: poles of third-order loops, with a real pole at the bandwidth
+        position: poles of a second-order loop
     """
     lean, turn = third_order_gains(attitude)[:3], third_order_gains(yaw)[:3]
     *climb, climb_integral = third_order_gains(altitude)

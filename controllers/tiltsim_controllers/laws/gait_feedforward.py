@@ -48,21 +48,9 @@ from tiltsim_controllers.laws.supervisor import (
     supervised_gait_scale,
     supervised_tilts,
 )
-from tiltsim_controllers.mathematics.jets import (
-    Jet,
-    Jets3,
-    jet_sum,
-)
+from tiltsim_controllers.mathematics.jets import Jet, Jets3, jet_sum
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler, to_world, wrap_angle
-from tiltsim_controllers.mathematics.scalar import (
-    Octet,
-    Pair,
-    Quad,
-    Triple,
-    Values,
-    Vector,
-    scalar,
-)
+from tiltsim_controllers.mathematics.scalar import Octet, Pair, Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     body_force,
@@ -258,14 +246,13 @@ def tracking_inputs(
 
     NaN where the decoupling matrix is singular.
 
-    Parameters
-    ----------
-    time : s
-    state : `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`
-    tilt_rates : rates of its tilt angles, rad/s
-    integrals : `INTEGRAL_FIELDS`
-    parameters, knots : of the controller, and of gait and reference
-    supervisor_motion : the supervisor's state with its rate and acceleration
+    Args:
+        time: s
+        state: `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`
+        tilt_rates: rates of its tilt angles, rad/s
+        integrals: `INTEGRAL_FIELDS`
+        parameters, knots: of the controller, and of gait and reference
+        supervisor_motion: the supervisor's state with its rate and acceleration
     """
     _, _, _, _, _, _, roll, pitch, yaw, p, q, r, a1, a2, a3, a4, s1, s2, s3, s4 = state
     vehicle, terms, reference = parameters.vehicle, parameters.terms, parameters.reference

@@ -44,12 +44,11 @@ def attitude_altitude_inputs(
 
     NaN at a roll or pitch of 90 degrees.
 
-    Parameters
-    ----------
-    time : s
-    state : `tiltsim_controllers.vehicle.states.BODY_FIELDS`; what follows is not read
-    vehicle, gains : the quadrotor and its gains
-    reference, knots : altitude, roll, pitch and yaw, the angles constant
+    Args:
+        time: s
+        state: `tiltsim_controllers.vehicle.states.BODY_FIELDS`; what follows is not read
+        vehicle, gains: the quadrotor and its gains
+        reference, knots: altitude, roll, pitch and yaw, the angles constant
     """
     _, _, z, _, _, vz, roll, pitch, yaw, p, q, r = state[:12]
     sin_roll, cos_roll = sin(roll), cos(roll)

@@ -114,12 +114,11 @@ def allowed_scale(
 
     0 where not even the untilted vehicle satisfies them, as it leans too far.
 
-    Parameters
-    ----------
-    tilts : planned tilt angles, rad
-    roll, pitch : rad
-    supervisor : thresholds
-    drag_ratio : ``r = K_m / (L K_f)``
+    Args:
+        tilts: planned tilt angles, rad
+        roll, pitch: rad
+        supervisor: thresholds
+        drag_ratio: ``r = K_m / (L K_f)``
     """
     up = world_up_in_body(roll, pitch)
     low, high = 0.0, 1.0
@@ -145,11 +144,10 @@ def supervised_gait_scale(
 ) -> float:
     """The factor of a planned gait at an attitude, 1 unless the strategy is ``SCALE``.
 
-    Parameters
-    ----------
-    planned : `tiltsim_controllers.gaits.tilts.tilt_reference`
-    roll, pitch : rad
-    supervisor, vehicle : thresholds and drag ratio
+    Args:
+        planned: `tiltsim_controllers.gaits.tilts.tilt_reference`
+        roll, pitch: rad
+        supervisor, vehicle: thresholds and drag ratio
     """
     if supervisor.strategy != SCALE:
         return 1.0
@@ -168,12 +166,11 @@ def threshold_clearance(
 ) -> float:
     """Distance above the thresholds relative to the largest possible; negative below them.
 
-    Parameters
-    ----------
-    tilts : rad
-    up : `world_up_in_body`
-    supervisor : thresholds
-    drag_ratio : ``r = K_m / (L K_f)``
+    Args:
+        tilts: rad
+        up: `world_up_in_body`
+        supervisor: thresholds
+        drag_ratio: ``r = K_m / (L K_f)``
     """
     margin, determinant = margin_and_determinant(tilts, up, drag_ratio)
     return min(
@@ -207,13 +204,12 @@ def supervised_tilts(
 ) -> Jets4:
     """The supervised tilts with rates and accelerations, rad and s.
 
-    Parameters
-    ----------
-    planned : the gait at its `gait_time`
-    scale : `supervised_gait_scale`
-    motion : the supervisor's state with its rate and acceleration
-    supervisor : strategy and clearance
-    drag_ratio : ``r = K_m / (L K_f)``
+    Args:
+        planned: the gait at its `gait_time`
+        scale: `supervised_gait_scale`
+        motion: the supervisor's state with its rate and acceleration
+        supervisor: strategy and clearance
+        drag_ratio: ``r = K_m / (L K_f)``
     """
     a1, a2, a3, a4 = planned
     if supervisor.strategy == HOLD:
@@ -253,11 +249,7 @@ def _min_clearance_ahead(
 
 @scalar
 def _return_speed(
-    time: float,
-    gait: GaitParameters,
-    knots: Vector,
-    supervisor: Supervisor,
-    drag_ratio: float,
+    time: float, gait: GaitParameters, knots: Vector, supervisor: Supervisor, drag_ratio: float
 ) -> float:
     """Rate (1/s) along the path to red at which the fastest tilt has its maximum rate."""
     a1, a2, a3, a4 = planned = planned_jets(time, gait, knots)
@@ -285,14 +277,13 @@ def supervised_derivative(
     ``RETURN_TO_RED``: towards red where the thresholds would be violated, back where they allow it,
     slowing down towards both ends.
 
-    Parameters
-    ----------
-    time : s
-    roll, pitch : rad
-    state, rate : of the supervisor, s or a fraction
-    gait, knots : as for `tilt_reference`
-    supervisor : thresholds and strategy
-    drag_ratio : ``r = K_m / (L K_f)``
+    Args:
+        time: s
+        roll, pitch: rad
+        state, rate: of the supervisor, s or a fraction
+        gait, knots: as for `tilt_reference`
+        supervisor: thresholds and strategy
+        drag_ratio: ``r = K_m / (L K_f)``
     """
     up = world_up_in_body(roll, pitch)
     smallest = _min_clearance_ahead(time, up, state, gait, knots, supervisor, drag_ratio)

@@ -67,20 +67,15 @@ def in_attitude_zone(roll: float, pitch: float, zone: Zone) -> bool:
 
 @scalar
 def attitude_altitude_thrust_rate(
-    time: float,
-    state: Values,
-    thrust: float,
-    parameters: Parameters,
-    knots: Vector = NO_KNOTS,
+    time: float, state: Values, thrust: float, parameters: Parameters, knots: Vector = NO_KNOTS
 ) -> float:
     """Rate (N/s) of the attitude-altitude controller's thrust.
 
-    Parameters
-    ----------
-    time : s
-    state : `tiltsim_controllers.vehicle.states.BODY_FIELDS`; what follows is not read
-    thrust : N
-    parameters, knots : of the controller and of the reference
+    Args:
+        time: s
+        state: `tiltsim_controllers.vehicle.states.BODY_FIELDS`; what follows is not read
+        thrust: N
+        parameters, knots: of the controller and of the reference
     """
     _, _, _, _, _, vz, roll, pitch, _, p, q, r = state[:12]
     vehicle, gains = parameters.yaw_position.vehicle, parameters.attitude_altitude
@@ -104,11 +99,10 @@ def switching_inputs(
 ) -> Inputs:
     """`INPUT_FIELDS`: thrust, torques and rates of the extension's states, world z up.
 
-    Parameters
-    ----------
-    time : s
-    state : `tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`
-    parameters, knots : of the controllers and of the reference
+    Args:
+        time: s
+        state: `tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`
+        parameters, knots: of the controllers and of the reference
     """
     law = parameters.yaw_position
     if not in_attitude_zone(state[ROLL], state[PITCH], parameters.zone):

@@ -19,11 +19,7 @@ from typing import Final, NamedTuple
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler, wrap_angle
 from tiltsim_controllers.mathematics.scalar import Quad, Triple, Values, Vector, scalar
-from tiltsim_controllers.mathematics.z_down import (
-    flip_attitude,
-    flip_state,
-    flip_vector,
-)
+from tiltsim_controllers.mathematics.z_down import flip_attitude, flip_state, flip_vector
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.states import PITCH, ROLL, THRUST, THRUST_RATE, YAW
@@ -73,10 +69,9 @@ GAIN_SETS: Final = {
 def euler_rates(roll: float, pitch: float, p: float, q: float, r: float) -> Triple:
     """Rates (rad/s) of roll, pitch and yaw from the body rates (ch. 2, Eq. 15, rows 4-6).
 
-    Parameters
-    ----------
-    roll, pitch : rad
-    p, q, r : body rates, rad/s
+    Args:
+        roll, pitch: rad
+        p, q, r: body rates, rad/s
     """
     sin_roll, cos_roll, cos_pitch = sin(roll), cos(roll), cos(pitch)
     if cos_pitch == 0.0:
@@ -89,10 +84,9 @@ def euler_rates(roll: float, pitch: float, p: float, q: float, r: float) -> Trip
 def gyroscopic_acceleration(p: float, q: float, r: float, vehicle: Vehicle) -> Triple:
     """Angular acceleration (rad/s^2) without torque (ch. 2, Eq. 15, last three rows).
 
-    Parameters
-    ----------
-    p, q, r : body rates, rad/s
-    vehicle : its inertia
+    Args:
+        p, q, r: body rates, rad/s
+        vehicle: its inertia
     """
     ix, iy, iz = vehicle.inertia_xx, vehicle.inertia_yy, vehicle.inertia_zz
     return (iy - iz) / ix * q * r, (iz - ix) / iy * p * r, (ix - iy) / iz * p * q
@@ -207,11 +201,10 @@ def demanded_derivatives(
 ) -> Quad:
     """The desired fourth derivative of the position and second of yaw (Eqs. A2-A6).
 
-    Parameters
-    ----------
-    time : s
-    z_down : the state with z down
-    parameters, knots : of the controller and of the reference
+    Args:
+        time: s
+        z_down: the state with z down
+        parameters, knots: of the controller and of the reference
     """
     x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r, _, _ = z_down
     gains = parameters.gains
@@ -243,11 +236,10 @@ def yaw_position_inputs(
     The inputs of ch. 2, Eqs. (1)-(8), with ``u_2`` to ``u_4`` converted from forces at the arms to
     torques. NaN where the decoupling matrix is singular.
 
-    Parameters
-    ----------
-    time : s
-    state : `tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`, z up
-    parameters, knots : of the controller and of the reference
+    Args:
+        time: s
+        state: `tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`, z up
+        parameters, knots: of the controller and of the reference
     """
     z_down = flip_state(state)
     vehicle = parameters.vehicle

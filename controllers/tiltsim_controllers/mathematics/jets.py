@@ -20,10 +20,9 @@ Jets4 = tuple[Jet, Jet, Jet, Jet]
 def jet_sum(a: float, x: Jet, b: float, y: Jet) -> Jet:
     """The linear combination ``a x + b y``.
 
-    Parameters
-    ----------
-    a, b : constant factors
-    x, y : the jets
+    Args:
+        a, b: constant factors
+        x, y: the jets
     """
     return a * x[0] + b * y[0], a * x[1] + b * y[1], a * x[2] + b * y[2]
 
@@ -37,11 +36,7 @@ def jet_scaled(a: float, x: Jet) -> Jet:
 @scalar
 def jet_product(x: Jet, y: Jet) -> Jet:
     """The product ``x y``."""
-    return (
-        x[0] * y[0],
-        x[1] * y[0] + x[0] * y[1],
-        x[2] * y[0] + 2.0 * x[1] * y[1] + x[0] * y[2],
-    )
+    return (x[0] * y[0], x[1] * y[0] + x[0] * y[1], x[2] * y[0] + 2.0 * x[1] * y[1] + x[0] * y[2])
 
 
 @scalar

@@ -12,9 +12,8 @@ from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
 def euler_from_quaternion(w: float, x: float, y: float, z: float) -> Triple:
     """Roll, pitch and yaw (rad) of a unit quaternion.
 
-    Parameters
-    ----------
-    w, x, y, z : the components, real part first
+    Args:
+        w, x, y, z: the components, real part first
     """
     sin_pitch = 2.0 * (w * y - z * x)
     # Rounding may carry the sine past one at pitch = +-90 degrees.
@@ -79,9 +78,8 @@ def rotation_from_euler(roll: float, pitch: float, yaw: float) -> tuple[float, .
 def rotation_from_quaternion(w: float, x: float, y: float, z: float) -> tuple[float, ...]:
     """The body-to-world rotation of a unit quaternion: nine entries, row by row.
 
-    Parameters
-    ----------
-    w, x, y, z : the components, real part first
+    Args:
+        w, x, y, z: the components, real part first
     """
     return (
         1.0 - 2.0 * (y * y + z * z),
@@ -101,11 +99,7 @@ def to_world(rotation: Sequence[float], vector: Triple) -> Triple:
     """A body-frame vector in world axes; ``rotation`` holds nine entries, row by row."""
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
     x, y, z = vector
-    return (
-        r11 * x + r12 * y + r13 * z,
-        r21 * x + r22 * y + r23 * z,
-        r31 * x + r32 * y + r33 * z,
-    )
+    return (r11 * x + r12 * y + r13 * z, r21 * x + r22 * y + r23 * z, r31 * x + r32 * y + r33 * z)
 
 
 @scalar

@@ -69,11 +69,10 @@ def sine_motion(
 ) -> tuple[float, float, float, float, float]:
     """``amplitude sin(frequency time + phase)`` and its first four derivatives.
 
-    Parameters
-    ----------
-    time : s
-    amplitude : m
-    frequency, phase : rad/s and rad
+    Args:
+        time: s
+        amplitude: m
+        frequency, phase: rad/s and rad
     """
     along = amplitude * sin(frequency * time + phase)
     across = amplitude * frequency * cos(frequency * time + phase)
@@ -87,15 +86,12 @@ def reference_derivatives(
 ) -> Values:
     """A reference and its first four derivatives, for controllers of up to fourth order.
 
-    Parameters
-    ----------
-    time : s
-    reference : type and parameters
-    knots : those of the flight; `ReferenceParameters.offset` is the index where waypoints begin
+    Args:
+        time: s
+        reference: type and parameters
+        knots: those of the flight; `ReferenceParameters.offset` is the index where waypoints begin
 
-    Returns
-    -------
-    tuple
+    Returns:
         Position, velocity, acceleration, jerk and snap, three floats each, m and s, world axes.
     """
     if reference.type == CIRCLE:

@@ -45,12 +45,11 @@ def polynomial_motion(
 def waypoint_motion(time: float, rows: float, offset: float, knots: Vector) -> Values:
     """Position, velocity, acceleration, jerk and snap, three floats each, m and s.
 
-    Parameters
-    ----------
-    time : s
-    rows : number of segments
-    offset : index of the first knot
-    knots : contains the segments of `minimum_snap_knots`
+    Args:
+        time: s
+        rows: number of segments
+        offset: index of the first knot
+        knots: contains the segments of `minimum_snap_knots`
     """
     begin = int(offset)
     low, high = 0, int(rows)
@@ -73,16 +72,13 @@ def minimum_snap_knots(
 ) -> tuple[float, ...]:
     """The knots of `waypoint_motion`: one segment between two points, and a last one at rest.
 
-    Parameters
-    ----------
-    points : waypoints, m, of three coordinates each
-    times : when they are reached, s: 0 and increasing
+    Args:
+        points: waypoints, m, of three coordinates each
+        times: when they are reached, s: 0 and increasing
 
-    Raises
-    ------
-    ValueError
-        If there are fewer than two points, the number of times differs, the times do not start at
-        0 or do not increase, or a number is not finite.
+    Raises:
+        ValueError: If there are fewer than two points, the number of times differs, the times do
+            not start at 0 or do not increase, or a number is not finite.
     """
     from scipy.interpolate import make_interp_spline  # a third of a second to import
 

@@ -57,7 +57,7 @@ class Parameters(NamedTuple):
 
 GAIN_SETS: Final = {
     # Ours, all four poles at -3: the thesis prints none.
-    "ch10": Gains(12.0, 54.0, 108.0, 81.0),
+    "ch10": Gains(12.0, 54.0, 108.0, 81.0)
 }
 """Gains by name."""
 
@@ -88,12 +88,11 @@ def body_derivatives(state: Values, car: TiltCar) -> Values:
 def demanded_snap(time: float, state: Values, derivatives: Quad, parameters: Parameters) -> Pair:
     """The desired fourth derivative of the position (m/s^4, world).
 
-    Parameters
-    ----------
-    time : s
-    state : `EXTENDED_STATE_FIELDS`
-    derivatives : present acceleration and jerk, two floats each, world
-    parameters : of the controller
+    Args:
+        time: s
+        state: `EXTENDED_STATE_FIELDS`
+        derivatives: present acceleration and jerk, two floats each, world
+        parameters: of the controller
     """
     gains = parameters.gains
     k1, k2, k3, k4 = gains.jerk, gains.acceleration, gains.velocity, gains.position

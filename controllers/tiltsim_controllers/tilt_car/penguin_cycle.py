@@ -31,12 +31,11 @@ STEPS = 64
 class Swing:
     """A penguin swing under the controller of ch. 11.
 
-    Attributes
-    ----------
-    half_angle : ``theta``, rad
-    half_period : ``T / 2``, s
-    gains : of the controller
-    reference_acceleration : along x, m/s^2
+    Attributes:
+        half_angle: ``theta``, rad
+        half_period: ``T / 2``, s
+        gains: of the controller
+        reference_acceleration: along x, m/s^2
     """
 
     half_angle: float
@@ -149,10 +148,8 @@ def jacobian(swing: Swing, state: Pair) -> Floats:
 def limit_cycle(swing: Swing, guess: Pair = (0.2, 0.7)) -> Pair:
     """The fixed point of the mirrored map, by Newton's method.
 
-    Raises
-    ------
-    ValueError
-        If there is none near the guess.
+    Raises:
+        ValueError: If there is none near the guess.
     """
     state = np.array(guess)
     for _ in range(50):
@@ -188,12 +185,12 @@ def lyapunov_growth(swing: Swing, state: Pair) -> float:
 class LyapunovBound:
     """Proposition 7 in numbers.
 
-    Attributes
-    ----------
-    critical
-        ``L_critical``: the largest candidate from which the next half period may still raise it.
-    largest_gain : the largest growth over a half period; the chapter rounds it up to 3/4 (Eq. 71).
-    at : the state of ``L_critical``
+    Attributes:
+        critical: ``L_critical``: the largest candidate from which the next half period may still
+            raise it.
+        largest_gain: the largest growth over a half period; the chapter rounds it up to 3/4 (Eq.
+            71).
+        at: the state of ``L_critical``
     """
 
     critical: float

@@ -66,10 +66,7 @@ def planned_direction_inputs(time: float, state: Values, parameters: Parameters)
     """The squares of the rotor speeds (rad^2/s^2), never below zero; ch. 11, Eqs. (12), (13)."""
     square_1, square_2 = demanded_squared_speeds(time, state, parameters)
     # Written so that NaN stays NaN.
-    return (
-        0.0 if square_1 < 0.0 else square_1,
-        0.0 if square_2 < 0.0 else square_2,
-    )
+    return (0.0 if square_1 < 0.0 else square_1, 0.0 if square_2 < 0.0 else square_2)
 
 
 def lyapunov_candidate(error_y: float, error_rate_y: float, gains: Gains) -> float:

@@ -19,17 +19,14 @@ and slows down on the way there, as ``W`` grows without bound.
 
 from __future__ import annotations
 
-from math import cos, log, sin, tan
+from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
 
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.tilt_car.third_derivative import input_columns, null_space_input
-from tiltsim_controllers.tilt_car.vehicle import (
-    TiltCar,
-    turn_per_tilt,
-)
+from tiltsim_controllers.tilt_car.vehicle import TiltCar, turn_per_tilt
 
 
 class Orbit(NamedTuple):
@@ -62,39 +59,6 @@ def drift_rate(lean: float, path: Orbit, car: TiltCar) -> float:
     """The rate (rad/s) at which the lean (rad) advances under the minimum-norm controller."""
     stiffness = lean_stiffness(lean, path.acceleration, car)
     return path.angular_frequency / (1.0 + turn_per_tilt(car) ** 2 * stiffness)
-
-
-def turned_angle(lean: float, path: Orbit, car: TiltCar) -> float:
-    """The integral of ``1 + kappa^2 W`` from zero to a lean (rad): rotation of the acceleration."""
-    theta = car.half_angle
-
-    def integral(angle: float) -> float:  # of cos^2 / sin
-        return log(tan(0.5 * angle)) + cos(angle)
-
-    weight = turn_per_tilt(car) ** 2 * _scale(path.acceleration, car)
-    return lean + weight * (integral(theta + lean) - integral(theta - lean))
-
-
-def lean_after(time: float, start: float, path: Orbit, car: TiltCar) -> float:
-    """The lean (rad) after a time on an orbit, in steady state.
-
-    Parameters
-    ----------
-    time : s
-    start : initial lean, rad
-    path, car : the orbit and the tilt-car
-    """
-    target = turned_angle(start, path, car) + path.angular_frequency * time
-    low, high = -car.half_angle, car.half_angle
-    for _ in range(200):  # bisection; the integral grows from minus to plus infinity
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        if turned_angle(middle, path, car) < target:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
 
 
 def twist(speed_1: float, speed_2: float, car: TiltCar) -> float:

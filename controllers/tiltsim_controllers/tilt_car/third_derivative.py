@@ -35,7 +35,7 @@ class Parameters(NamedTuple):
 
 GAIN_SETS: Final = {
     # Ours, all three poles at -2: the thesis prints none.
-    "ch10": Gains(6.0, 12.0, 8.0),
+    "ch10": Gains(6.0, 12.0, 8.0)
 }
 """Gains by name."""
 
@@ -86,12 +86,11 @@ def restoring_inputs(lean: float, rate: float, columns: Values, car: TiltCar) ->
 
     Zero where a rotor rests, as then no input in the null space turns the bisector.
 
-    Parameters
-    ----------
-    lean : angle from the thrusts' bisector to the acceleration, rad
-    rate : 1/s
-    columns : `input_columns`
-    car : the tilt-car
+    Args:
+        lean: angle from the thrusts' bisector to the acceleration, rad
+        rate: 1/s
+        columns: `input_columns`
+        car: the tilt-car
     """
     n1, n2, n3 = null_space_input(columns)
     if n3 == 0.0:

@@ -25,11 +25,7 @@ class TiltCar(NamedTuple):
 
 
 THESIS_CAR: Final = TiltCar(
-    mass=1.0,
-    top_inertia=0.001,
-    bottom_inertia=0.001,
-    half_angle=pi / 6,
-    thrust_coefficient=0.001,
+    mass=1.0, top_inertia=0.001, bottom_inertia=0.001, half_angle=pi / 6, thrust_coefficient=0.001
 )
 """Ch. 10's car.
 
@@ -90,11 +86,10 @@ def rotate(x: float, y: float, angle: float) -> Pair:
 def acceleration(direction: float, square_1: float, square_2: float, car: TiltCar) -> Pair:
     """Acceleration (m/s^2, world); Eq. (3).
 
-    Parameters
-    ----------
-    direction : of the thrusts' bisector, rad
-    square_1, square_2 : squared rotor speeds, rad^2/s^2
-    car : the tilt-car
+    Args:
+        direction: of the thrusts' bisector, rad
+        square_1, square_2: squared rotor speeds, rad^2/s^2
+        car: the tilt-car
     """
     along, across = body_acceleration(square_1, square_2, car)
     return rotate(along, across, direction)

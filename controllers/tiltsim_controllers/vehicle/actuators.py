@@ -37,12 +37,11 @@ def limited_speed_command_rate(
     A command beyond what the rotor can follow would have to be undone before the rotor responds
     again.
 
-    Parameters
-    ----------
-    speed_command : the present command, rad/s
-    rate : the requested rate, rad/s^2
-    spin : sign of the rotor's nominal rotation
-    min_speed, max_speed : limits along the spin, rad/s
+    Args:
+        speed_command: the present command, rad/s
+        rate: the requested rate, rad/s^2
+        spin: sign of the rotor's nominal rotation
+        min_speed, max_speed: limits along the spin, rad/s
     """
     if spin * speed_command >= max_speed and spin * rate > 0.0:
         return 0.0

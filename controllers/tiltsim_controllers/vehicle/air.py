@@ -114,14 +114,13 @@ def low_altitude_turbulence(
     ``L_w = h``, ``L_u = L_v = h / (0.177 + 0.000823 h)^1.2``, ``sigma_w = 0.1 W_20`` and
     ``sigma_u = sigma_v = sigma_w / (0.177 + 0.000823 h)^0.4``, ``h`` in feet.
 
-    Parameters
-    ----------
-    wind_at_20_ft : mean wind 6 m above the ground, m/s
-    height : above the ground, m; limited to 10 to 1000 ft
-    speed : airspeed of the vehicle, m/s; in hover that of the mean wind
-    direction : direction into which the mean wind blows, rad from +x towards +y
-    sample_time : time for which a draw of the noise is held, s
-    seed : an integer
+    Args:
+        wind_at_20_ft: mean wind 6 m above the ground, m/s
+        height: above the ground, m; limited to 10 to 1000 ft
+        speed: airspeed of the vehicle, m/s; in hover that of the mean wind
+        direction: direction into which the mean wind blows, rad from +x towards +y
+        sample_time: time for which a draw of the noise is held, s
+        seed: an integer
     """
     feet = min(1000.0, max(10.0, height / FOOT))
     base = 0.177 + 0.000823 * feet

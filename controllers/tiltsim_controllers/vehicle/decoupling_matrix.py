@@ -27,9 +27,8 @@ from tiltsim_controllers.mathematics.scalar import Octet, Quad, Triple, scalar
 def sines_and_cosines(a1: float, a2: float, a3: float, a4: float) -> Octet:
     """``(sin alpha_1, cos alpha_1, ..., sin alpha_4, cos alpha_4)``.
 
-    Parameters
-    ----------
-    a1, a2, a3, a4 : tilt angles, rad
+    Args:
+        a1, a2, a3, a4: tilt angles, rad
     """
     return sin(a1), cos(a1), sin(a2), cos(a2), sin(a3), cos(a3), sin(a4), cos(a4)
 
@@ -59,27 +58,21 @@ def torque_entries(trig: Octet, drag_ratio: float) -> Octet:
 def body_force(trig: Octet, w1: float, w2: float, w3: float, w4: float) -> Triple:
     """The force ``F(alpha) w / K_f`` in body axes (ch. 3, Eq. 3).
 
-    Parameters
-    ----------
-    trig : `sines_and_cosines` of the tilt angles
-    w1, w2, w3, w4 : rotor inputs, rad^2/s^2
+    Args:
+        trig: `sines_and_cosines` of the tilt angles
+        w1, w2, w3, w4: rotor inputs, rad^2/s^2
     """
     s1, c1, s2, c2, s3, c3, s4, c4 = trig
-    return (
-        s2 * w2 - s4 * w4,
-        s1 * w1 - s3 * w3,
-        -c1 * w1 + c2 * w2 - c3 * w3 + c4 * w4,
-    )
+    return (s2 * w2 - s4 * w4, s1 * w1 - s3 * w3, -c1 * w1 + c2 * w2 - c3 * w3 + c4 * w4)
 
 
 @scalar
 def body_torque(torque: Octet, w1: float, w2: float, w3: float, w4: float) -> Triple:
     """The torque ``tau(alpha) w / (L K_f)`` in body axes (ch. 3, Eq. 5).
 
-    Parameters
-    ----------
-    torque : `torque_entries` of the tilt angles
-    w1, w2, w3, w4 : rotor inputs, rad^2/s^2
+    Args:
+        torque: `torque_entries` of the tilt angles
+        w1, w2, w3, w4: rotor inputs, rad^2/s^2
     """
     x2, x4, y1, y3, z1, z2, z3, z4 = torque
     return x2 * w2 + x4 * w4, y1 * w1 + y3 * w3, z1 * w1 + z2 * w2 + z3 * w3 + z4 * w4
@@ -91,18 +84,12 @@ def vertical_force_entries(trig: Octet, ux: float, uy: float, uz: float) -> Quad
 
     With ``u = r3`` this is the last row of the decoupling matrix (ch. 3, Eq. 18).
 
-    Parameters
-    ----------
-    trig : `sines_and_cosines` of the tilt angles
-    ux, uy, uz : the direction, body axes
+    Args:
+        trig: `sines_and_cosines` of the tilt angles
+        ux, uy, uz: the direction, body axes
     """
     s1, c1, s2, c2, s3, c3, s4, c4 = trig
-    return (
-        s1 * uy - c1 * uz,
-        s2 * ux + c2 * uz,
-        -s3 * uy - c3 * uz,
-        -s4 * ux + c4 * uz,
-    )
+    return (s1 * uy - c1 * uz, s2 * ux + c2 * uz, -s3 * uy - c3 * uz, -s4 * ux + c4 * uz)
 
 
 @scalar
@@ -153,15 +140,12 @@ def solve_by_pairs(
     part that does not: ``(v2, v4) = roll (x2, x4) / |(x2, x4)|^2 + mu (-x4, x2)``, likewise
     ``(v1, v3)`` with pitch and ``nu``; yaw and lift then determine ``mu`` and ``nu``.
 
-    Parameters
-    ----------
-    torque : `torque_entries` of the tilt angles
-    force : the four entries of the last row, `vertical_force_entries`
-    roll, pitch, yaw, lift : the right-hand side, in units of ``L K_f`` and ``K_f``
+    Args:
+        torque: `torque_entries` of the tilt angles
+        force: the four entries of the last row, `vertical_force_entries`
+        roll, pitch, yaw, lift: the right-hand side, in units of ``L K_f`` and ``K_f``
 
-    Returns
-    -------
-    tuple
+    Returns:
         ``(v1, v2, v3, v4)``, all NaN where the matrix is singular.
     """
     x2, x4, y1, y3, z1, z2, z3, z4 = torque

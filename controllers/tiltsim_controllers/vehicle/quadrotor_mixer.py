@@ -20,11 +20,10 @@ def thrust_controls(
 ) -> Quad:
     """The ``c_i`` (rad^2/s^2) that produce a thrust and torques.
 
-    Parameters
-    ----------
-    thrust : N
-    roll_torque, pitch_torque, yaw_torque : n m, body axes, z up
-    vehicle : the quadrotor
+    Args:
+        thrust: N
+        roll_torque, pitch_torque, yaw_torque: n m, body axes, z up
+        vehicle: the quadrotor
     """
     lever = vehicle.arm_length * vehicle.thrust_coefficient
     lift = thrust / vehicle.thrust_coefficient

@@ -17,10 +17,9 @@ def euler_derivatives(
     Inverts ``omega = M(roll, pitch) eta'`` and ``omega' = M eta'' + M' eta'`` (the exact relation
     that ch. 3, Eq. 8, approximates); divides by ``cos(pitch)``.
 
-    Parameters
-    ----------
-    roll, pitch : rad
-    omega, omega_rate : body rates (rad/s) and their rates (rad/s^2)
+    Args:
+        roll, pitch: rad
+        omega, omega_rate: body rates (rad/s) and their rates (rad/s^2)
     """
     p, q, r = omega
     sr, cr, sp, cp = sin(roll), cos(roll), sin(pitch), cos(pitch)
@@ -47,10 +46,9 @@ def angular_jerk(roll: Jet, pitch: Jet, yaw: Jet, jerk: Triple) -> Triple:
     ``p = roll' - yaw' sin(pitch)``, ``q = pitch' cos(roll) + yaw' sin(roll) cos(pitch)``, ``r =
     -pitch' sin(roll) + yaw' cos(roll) cos(pitch)``, each differentiated twice.
 
-    Parameters
-    ----------
-    roll, pitch, yaw : the angles with their first two derivatives, rad and s
-    jerk : third derivatives of the three angles, rad/s^3
+    Args:
+        roll, pitch, yaw: the angles with their first two derivatives, rad and s
+        jerk: third derivatives of the three angles, rad/s^3
     """
     sin_roll, cos_roll = jet_sine(roll), jet_cosine(roll)
     sin_pitch, cos_pitch = jet_sine(pitch), jet_cosine(pitch)
@@ -75,12 +73,11 @@ def angular_acceleration(
 ) -> Triple:
     """The angular acceleration ``I^-1 (torque - gyroscopic omega x I omega)`` (rad/s^2).
 
-    Parameters
-    ----------
-    torque : n m, body axes
-    omega : body rates, rad/s
-    inertia : principal moments of inertia, kg m^2
-    gyroscopic : factor of the gyroscopic torque, 1 or 0
+    Args:
+        torque: n m, body axes
+        omega: body rates, rad/s
+        inertia: principal moments of inertia, kg m^2
+        gyroscopic: factor of the gyroscopic torque, 1 or 0
     """
     ixx, iyy, izz = inertia
     cx, cy, cz = cross(omega, (ixx * omega[0], iyy * omega[1], izz * omega[2]))
@@ -97,11 +94,10 @@ def torque_rate(
 ) -> Triple:
     """Torque rate (N m/s) that gives an angular jerk: derivative of ``I omega' + omega x I omega``.
 
-    Parameters
-    ----------
-    omega, omega_rate, jerk : body rates (rad/s) and their first two derivatives
-    inertia : principal moments of inertia, kg m^2
-    gyroscopic : factor of the gyroscopic torque ``omega x I omega``, 1 or 0
+    Args:
+        omega, omega_rate, jerk: body rates (rad/s) and their first two derivatives
+        inertia: principal moments of inertia, kg m^2
+        gyroscopic: factor of the gyroscopic torque ``omega x I omega``, 1 or 0
     """
     ixx, iyy, izz = inertia
     mx, my, mz = cross(omega_rate, (ixx * omega[0], iyy * omega[1], izz * omega[2]))

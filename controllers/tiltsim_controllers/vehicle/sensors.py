@@ -38,10 +38,9 @@ class Sensors(NamedTuple):
 def reading_error(sensor: Sensor, seed: float, channel: float, index: float) -> Triple:
     """The error that a reading adds to the true vector, in the units of the sensor.
 
-    Parameters
-    ----------
-    sensor : noise and bias
-    seed, channel, index : as for `normal`; the sensor uses ``channel`` and the next two
+    Args:
+        sensor: noise and bias
+        seed, channel, index: as for `normal`; the sensor uses ``channel`` and the next two
     """
     x, y, z = sensor.bias_x, sensor.bias_y, sensor.bias_z
     noise = sensor.noise
@@ -66,10 +65,9 @@ def rotate_by_small_angle(
 
     The exact rotation has ``tan(angle / 2) = |vector| / 2``.
 
-    Parameters
-    ----------
-    qw, qx, qy, qz : the quaternion, scalar first
-    x, y, z : the rotation vector in body axes, rad
+    Args:
+        qw, qx, qy, qz: the quaternion, scalar first
+        x, y, z: the rotation vector in body axes, rad
     """
     x, y, z = 0.5 * x, 0.5 * y, 0.5 * z
     scale = 1.0 / sqrt(1.0 + x * x + y * y + z * z)

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from tiltsim_controllers.analysis.singularity import (
     decoupling_matrix,
     determinant,
-    determinant_unit,
     force_matrix,
     margin_over_gait,
     rank,
@@ -37,6 +36,11 @@ LUUKKONEN = PRESETS["luukkonen"]
 
 tilt = st.floats(-1.5, 1.5)
 gaits = st.tuples(tilt, tilt, tilt, tilt)
+
+
+def determinant_unit(vehicle):
+    """``2 L^2 K_f^3 K_m``: the SI value of one unit of `determinant`."""
+    return 2.0 * vehicle.arm_length**2 * vehicle.thrust_coefficient**3 * vehicle.drag_coefficient
 
 
 def vehicle_with(arm_length: float, thrust: float, drag: float) -> Vehicle:

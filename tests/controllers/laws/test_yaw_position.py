@@ -199,9 +199,7 @@ def test_the_outputs_move_as_appendix_b_demands(gains):
 
 
 @pytest.mark.parametrize(
-    "change",
-    [{"thrust": 0.0}, {"thrust": float("nan")}],
-    ids=["no thrust", "unknown thrust"],
+    "change", [{"thrust": 0.0}, {"thrust": float("nan")}], ids=["no thrust", "unknown thrust"]
 )
 def test_inputs_are_nan_where_the_matrix_is_singular(change):
     state = dict(zip(EXTENDED_QUADROTOR_FIELDS, START)) | change

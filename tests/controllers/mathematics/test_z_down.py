@@ -7,11 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
-from tiltsim_controllers.mathematics.z_down import (
-    flip_attitude,
-    flip_state,
-    flip_vector,
-)
+from tiltsim_controllers.mathematics.z_down import flip_attitude, flip_state, flip_vector
 
 OVER = np.diag([1.0, -1.0, -1.0])
 

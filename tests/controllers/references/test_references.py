@@ -19,10 +19,7 @@ CIRCLE = ReferenceParameters(
     REFERENCE_TYPES["circle"], 1.0, -2.0, 3.0, radius=5.0, angular_frequency=0.1
 )
 LINE = ReferenceParameters(
-    *(REFERENCE_TYPES["line"], 1.0, 2.0, 3.0),
-    velocity_x=1.5,
-    velocity_y=-0.5,
-    velocity_z=0.25,
+    *(REFERENCE_TYPES["line"], 1.0, 2.0, 3.0), velocity_x=1.5, velocity_y=-0.5, velocity_z=0.25
 )
 
 times = st.floats(0.0, 300.0)

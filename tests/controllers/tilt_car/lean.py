@@ -2,12 +2,44 @@
 
 from __future__ import annotations
 
-from math import copysign, cos, pi, sin
+from math import copysign, cos, log, pi, sin, tan
 
 import numpy as np
 
-from tiltsim_controllers.tilt_car.state_drift import drift_rate, lean_after, turned_angle
-from tiltsim_controllers.tilt_car.vehicle import body_acceleration, squared_speeds
+from tiltsim_controllers.tilt_car.state_drift import _scale, drift_rate
+from tiltsim_controllers.tilt_car.vehicle import body_acceleration, squared_speeds, turn_per_tilt
+
+
+def turned_angle(lean, path, car):
+    """The integral of ``1 + kappa^2 W`` from zero to a lean (rad): rotation of the acceleration."""
+    theta = car.half_angle
+
+    def integral(angle):  # of cos^2 / sin
+        return log(tan(0.5 * angle)) + cos(angle)
+
+    weight = turn_per_tilt(car) ** 2 * _scale(path.acceleration, car)
+    return lean + weight * (integral(theta + lean) - integral(theta - lean))
+
+
+def lean_after(time, start, path, car):
+    """The lean (rad) after a time on an orbit, in steady state.
+
+    Args:
+        time: s
+        start: initial lean, rad
+        path, car: the orbit and the tilt-car
+    """
+    target = turned_angle(start, path, car) + path.angular_frequency * time
+    low, high = -car.half_angle, car.half_angle
+    for _ in range(200):  # bisection; the integral grows from minus to plus infinity
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            break
+        if turned_angle(middle, path, car) < target:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
 
 
 def drift_time(start, end, path, car):
@@ -16,10 +48,8 @@ def drift_time(start, end, path, car):
     Negative where the drift leads the other way. Both must lie within plus and minus the half
     angle.
 
-    Raises
-    ------
-    ValueError
-        If a lean is not within.
+    Raises:
+        ValueError: If a lean is not within.
     """
     for lean in (start, end):
         if not abs(lean) < car.half_angle:
@@ -54,10 +84,8 @@ def restored_lean(path, car, rate):
 
     There is one for every rate above 0, for the drift dies away towards the half angle.
 
-    Raises
-    ------
-    ValueError
-        If the rate is not above 0.
+    Raises:
+        ValueError: If the rate is not above 0.
     """
     if not rate > 0.0:
         raise ValueError(f"rate = {rate!r}: must be above 0")

@@ -13,19 +13,13 @@ from scipy.integrate import quad
 from tests.controllers.tilt_car.lean import (
     drift_time,
     holonomy,
+    lean_after,
     lean_of,
     lean_of_split,
     restored_lean,
     split_of_lean,
 )
-from tiltsim_controllers.tilt_car.state_drift import (
-    Orbit,
-    drift_rate,
-    lean_after,
-    lean_stiffness,
-    orbit,
-    twist,
-)
+from tiltsim_controllers.tilt_car.state_drift import Orbit, drift_rate, lean_stiffness, orbit, twist
 from tiltsim_controllers.tilt_car.third_derivative import (
     input_columns,
     minimum_norm,

@@ -129,10 +129,7 @@ def test_drift_and_columns_make_the_fourth_derivative():
     state = (0.0, 0.0, 0.0, 0.0, yaw, alpha, w1, w2, d3, d1, d2)
     *_, drift_along, drift_across = fourth.body_derivatives(state, CAR)
     x1, y1, x2, y2, x3, y3 = third.input_columns(w1, w2, CAR)
-    body = (
-        drift_along + x1 * s1 + x2 * s2 + x3 * s3,
-        drift_across + y1 * s1 + y2 * s2 + y3 * s3,
-    )
+    body = (drift_along + x1 * s1 + x2 * s2 + x3 * s3, drift_across + y1 * s1 + y2 * s2 + y3 * s3)
     np.testing.assert_allclose(rotate(*body, yaw + alpha), desired, rtol=1e-12)
 
 
@@ -237,10 +234,7 @@ def test_the_printed_tilt_column_lacks_the_yaws_answer():
     made = {}
     for name, (s1, s2, s3) in inputs.items():
         factor = 1.0 / share if name == "published" else 1.0
-        made[name] = (
-            x1 * s1 + x2 * s2 + factor * x3 * s3,
-            y1 * s1 + y2 * s2 + factor * y3 * s3,
-        )
+        made[name] = (x1 * s1 + x2 * s2 + factor * x3 * s3, y1 * s1 + y2 * s2 + factor * y3 * s3)
     # Each makes the same with its own columns: only the exact one's are the car's.
     np.testing.assert_allclose(made["published"], made["exact"], rtol=1e-9)
     assert abs(inputs["published"][2] - inputs["exact"][2]) > 1e-3
@@ -258,10 +252,7 @@ def test_the_planned_law_is_eqs_12_and_13(direction, x, y, vy):
     time = 1.7
     x_ref, vx_ref = 0.5 * time**2, time
     desired = np.array(
-        [
-            1.0 + 12.0 * (vx_ref - 0.3) + 6.0 * (x_ref - x),
-            9.0 * (0.0 - vy) + 18.0 * (0.0 - y),
-        ]
+        [1.0 + 12.0 * (vx_ref - 0.3) + 6.0 * (x_ref - x), 9.0 * (0.0 - vy) + 18.0 * (0.0 - y)]
     )
     printed = np.linalg.solve(rotation(direction) @ printed_j_theta(THESIS_CAR), desired)
     squares = planned.demanded_squared_speeds(time, state, LAW)

@@ -166,15 +166,12 @@ def _speed_command_rates(act: Vector, first: int, commands: Vector, actuation: A
 def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False) -> ClosedLoop:
     """A loop around the tiltrotor with real sensors and actuators.
 
-    Parameters
-    ----------
-    loop
-        Without them.
-    latency_steps
-        Control steps between a reading and its command taking effect.
-    external
-        Whether commands come from outside. Then `tiltsim.plants.commanded_plant` moves the
-        `EXTERNAL_COMMANDS` along the delay line: speeds jump, which no rate of activations can do.
+    Args:
+        loop: Without them.
+        latency_steps: Control steps between a reading and its command taking effect.
+        external: Whether commands come from outside. Then `tiltsim.plants.commanded_plant` moves
+            the `EXTERNAL_COMMANDS` along the delay line: speeds jump, which no rate of activations
+            can do.
     """
     law_controls = loop.sampling.controls
     law_act, law_ctrl = loop.dynamics.sizes.act, loop.dynamics.sizes.ctrl

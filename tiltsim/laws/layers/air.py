@@ -84,20 +84,13 @@ def air_wrench(
 ) -> Values:
     """Force (N) and torque (N m) of the air, body axes: drag and ground effect.
 
-    Parameters
-    ----------
-    time
-        s.
-    qpos, qvel
-        MuJoCo's.
-    states
-        Of the turbulence's filters.
-    tilts
-        rad.
-    thrusts
-        Controls of the thrust actuators, (rad/s)^2.
-    surroundings
-        The parameters of the layer.
+    Args:
+        time: s.
+        qpos, qvel: MuJoCo's.
+        states: Of the turbulence's filters.
+        tilts: rad.
+        thrusts: Controls of the thrust actuators, (rad/s)^2.
+        surroundings: The parameters of the layer.
     """
     air, vehicle = surroundings.air, surroundings.vehicle
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_from_quaternion(

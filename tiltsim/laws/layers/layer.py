@@ -33,30 +33,19 @@ class Layer:
     Its functions see parameters with the fields ``layer``, its own, and ``inner``, those of the
     loop within. Where one is None, the loop within goes on unchanged.
 
-    Attributes
-    ----------
-    name
-        Part of the name of compiled code.
-    parameters
-        The type of the layer's parameters.
-    read
-        ``(plan) -> parameters``.
-    controls, hold
-        As in `tiltsim.closed_loop.loop.Sampling`.
-    actuators
-        Appended to those of the model.
-    initial_activations
-        ``(plan, parameters, inner activations) -> activations`` of these actuators at time
-        zero.
-    derive
-        ``(inner columns, samples by field, setup) -> columns``; the first is a function.
-    fields
-        Fields of a sample: the first activations of the layer's actuators.
-    units
-        Columns of a flight that the layer adds, with their units.
-    equations
-        As in `ClosedLoop`, for these parameters. The equations of the loop within are not used:
-        they do not know the layer.
+    Attributes:
+        name: Part of the name of compiled code.
+        parameters: The type of the layer's parameters.
+        read: ``(plan) -> parameters``.
+        controls, hold: As in `tiltsim.closed_loop.loop.Sampling`.
+        actuators: Appended to those of the model.
+        initial_activations: ``(plan, parameters, inner activations) -> activations`` of these
+            actuators at time zero.
+        derive: ``(inner columns, samples by field, setup) -> columns``; the first is a function.
+        fields: Fields of a sample: the first activations of the layer's actuators.
+        units: Columns of a flight that the layer adds, with their units.
+        equations: As in `ClosedLoop`, for these parameters. The equations of the loop within are
+            not used: they do not know the layer.
     """
 
     name: str
@@ -77,16 +66,11 @@ class Layer:
 def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
     """A closed loop with one more layer around it.
 
-    Parameters
-    ----------
-    inner
-        The loop within.
-    layer
-        The layer around it.
+    Args:
+        inner: The loop within.
+        layer: The layer around it.
 
-    Returns
-    -------
-    ClosedLoop
+    Returns:
         Its parameters hold the signature, the ``layer``'s and those of the ``inner`` loop.
     """
     record = make_record_type(

@@ -68,18 +68,12 @@ def supervised_servo_commands(
 ) -> Quad:
     """Commands (rad) of the tilt servos under a supervisor with states.
 
-    Parameters
-    ----------
-    time
-        s.
-    motion
-        The supervisor's state with its rate and acceleration.
-    gait, knots, supervisor
-        See `tiltsim_controllers.laws.supervisor.supervised_tilts`.
-    ratio
-        The vehicle's drag ratio.
-    lead
-        s, of the servos.
+    Args:
+        time: s.
+        motion: The supervisor's state with its rate and acceleration.
+        gait, knots, supervisor: See `tiltsim_controllers.laws.supervisor.supervised_tilts`.
+        ratio: The vehicle's drag ratio.
+        lead: s, of the servos.
     """
     clock = gait_time(time, motion, supervisor)
     planned = planned_jets(clock, gait, knots)

@@ -29,10 +29,8 @@ def comparison_figure(flights: Sequence[Flight], names: Sequence[str] = ()) -> F
 
     ``names`` are those of the flights, by default `flight_names`.
 
-    Raises
-    ------
-    InputError
-        If there are more flights than colours, or a vehicle has no singularity margin.
+    Raises:
+        InputError: If there are more flights than colours, or a vehicle has no singularity margin.
     """
     if len(flights) > MAX_FLIGHTS:
         raise InputError(f"plot: {len(flights)} flights: at most {MAX_FLIGHTS} fit on one page")

@@ -162,11 +162,7 @@ def _ranks(values: Column) -> Column:
 
 
 def _draw_scatter(
-    axes: Axes,
-    results: SweepResults,
-    key: str,
-    metric: str,
-    groups: list[tuple[str, Column]],
+    axes: Axes, results: SweepResults, key: str, metric: str, groups: list[tuple[str, Column]]
 ) -> None:
     draws, values, completed = (
         results.columns[key],

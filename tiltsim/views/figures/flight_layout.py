@@ -70,16 +70,11 @@ def legend_below(axes: Axes) -> None:
 def label(axes: Axes, title: str, unit: str, *, name: str = "", columns: int = 3) -> None:
     """Label a panel.
 
-    Parameters
-    ----------
-    axes
-        The panel, with its lines.
-    title
-        Its title.
-    unit, name
-        Unit and, optionally, name of the y axis.
-    columns
-        Columns of the legend, which is placed above the plot.
+    Args:
+        axes: The panel, with its lines.
+        title: Its title.
+        unit, name: Unit and, optionally, name of the y axis.
+        columns: Columns of the legend, which is placed above the plot.
     """
     axes.set_title(title)
     axes.set_ylabel(f"{name} ({unit})" if name else unit)

@@ -151,10 +151,8 @@ def save(figure: Figure, path: Path) -> None:
 
     `tiltsim.system.files.prepare_file` checks a path beforehand.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
+    Raises:
+        InputError: If the file cannot be written.
     """
     suffix = path.suffix.lower()
     undated = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}

@@ -46,10 +46,8 @@ def sweep_figure(results: SweepResults, metrics: tuple[str, ...] = ()) -> Figure
 
     ``metrics`` default to those of the ``[plot]`` table, else to the first three that vary.
 
-    Raises
-    ------
-    InputError
-        If a column or metric is unknown, or there would be too many panels.
+    Raises:
+        InputError: If a column or metric is unknown, or there would be too many panels.
     """
     plot = results.points.sweep.plot
     kind = plot.kind or _kind(results)

@@ -68,18 +68,13 @@ class Panel:
 class VehicleDisplay:
     """What the viewer shows for one kind of vehicle.
 
-    Attributes
-    ----------
-    conditions
-        The conditions of a flight that are reported as events.
-    panels, series, levels
-        The plots of a flight from top to bottom, and their lines.
-    plane
-        Draws the roll-pitch plane; None for vehicles without one.
-    eye, up
-        Camera position relative to the vehicle, in vehicle radii, and the camera's up direction.
-    overview
-        Whether the trajectory, too, is viewed from above.
+    Attributes:
+        conditions: The conditions of a flight that are reported as events.
+        panels, series, levels: The plots of a flight from top to bottom, and their lines.
+        plane: Draws the roll-pitch plane; None for vehicles without one.
+        eye, up: Camera position relative to the vehicle, in vehicle radii, and the camera's up
+            direction.
+        overview: Whether the trajectory, too, is viewed from above.
     """
 
     conditions: Callable[[Flight], Iterator[Condition]]

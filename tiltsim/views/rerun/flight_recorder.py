@@ -31,18 +31,13 @@ class FlightRecorder:
     Call `begin` and `draw_references` once, `append` with pieces of the flight in order, and
     `finish`.
 
-    Parameters
-    ----------
-    recording
-        The recording to write to.
-    assembly
-        The assembly of the flight.
-    name
-        The flight's name in a comparison; empty for a single flight.
-    color
-        The flight's colour.
-    first
-        Whether this is the first flight of the recording, which also draws the shared entities.
+    Args:
+        recording: The recording to write to.
+        assembly: The assembly of the flight.
+        name: The flight's name in a comparison; empty for a single flight.
+        color: The flight's colour.
+        first: Whether this is the first flight of the recording, which also draws the shared
+            entities.
     """
 
     def __init__(

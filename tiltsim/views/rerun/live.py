@@ -32,10 +32,8 @@ class LiveStream:
     never delays it. Use it as a context manager and as `simulate`'s observer. ``url`` is the
     viewer's address; None opens a viewer.
 
-    Raises
-    ------
-    InputError
-        If no viewer listens at the address, or there is no screen to open one on.
+    Raises:
+        InputError: If no viewer listens at the address, or there is no screen to open one on.
     """
 
     def __init__(self, scenario: Scenario, url: str | None = None) -> None:

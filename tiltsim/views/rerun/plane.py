@@ -47,18 +47,13 @@ BOUND: Final = HALF_WIDTH * 1.28
 class AttitudePlane:
     """The entities below ``plane`` for one flight.
 
-    Parameters
-    ----------
-    recording
-        The recording to write to.
-    scenario
-        The scenario of the flight, of a rotorcraft.
-    root
-        The entity of the plane.
-    color
-        The flight's colour.
-    compared
-        Whether the recording compares several flights, whose labels would cover each other.
+    Args:
+        recording: The recording to write to.
+        scenario: The scenario of the flight, of a rotorcraft.
+        root: The entity of the plane.
+        color: The flight's colour.
+        compared: Whether the recording compares several flights, whose labels would cover each
+            other.
     """
 
     def __init__(

@@ -31,10 +31,8 @@ class RecordingProcess:
     Use it as a context manager: call `start` after the flight and `finish` after all other work.
     The process receives no keyboard interrupt and ends with its parent.
 
-    Raises
-    ------
-    InputError
-        If the environment switches Rerun off.
+    Raises:
+        InputError: If the environment switches Rerun off.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -70,10 +68,8 @@ class RecordingProcess:
     def finish(self) -> None:
         """Wait until the file of `start` is written.
 
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
+        Raises:
+            InputError: If the file cannot be written.
         """
         assert self._work is not None
         try:

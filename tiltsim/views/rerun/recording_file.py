@@ -53,10 +53,8 @@ class RecordingFile:
     def save(self, flights: Sequence[Flight], path: Path) -> None:
         """Write the flights, one per assembly, atomically; equal flights give equal files.
 
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
+        Raises:
+            InputError: If the file cannot be written.
         """
         write_flights(self._recorders, flights)
         content = self._content.drain_as_bytes()
@@ -82,16 +80,11 @@ def new_recording(
 ) -> rr.RecordingStream:
     """An empty recording whose identifier depends on its arguments only.
 
-    Parameters
-    ----------
-    scenarios
-        The scenarios of the flights.
-    names
-        Names of several flights, by default `flight_names`.
-    salt
-        Distinguishes recordings of equal scenarios, which the viewer would merge.
-    batching
-        When Rerun flushes rows; None for its default.
+    Args:
+        scenarios: The scenarios of the flights.
+        names: Names of several flights, by default `flight_names`.
+        salt: Distinguishes recordings of equal scenarios, which the viewer would merge.
+        batching: When Rerun flushes rows; None for its default.
     """
     content = "\n".join([*(scenario.model_dump_json() for scenario in scenarios), *names, salt])
     digest = hashlib.sha256(content.encode()).hexdigest()[:16]

@@ -31,20 +31,13 @@ FLOOR_CELLS: Final = 12  # to each side of the vehicle
 class Scene:
     """The entities below ``world`` for one flight.
 
-    Parameters
-    ----------
-    recording
-        The recording to write to.
-    assembly
-        The assembly of the flight.
-    model
-        The vehicle's model, visual geometry included.
-    root
-        The entity of the scene.
-    color
-        The flight's colour.
-    name
-        The label of the vehicle in a comparison; empty for a single flight.
+    Args:
+        recording: The recording to write to.
+        assembly: The assembly of the flight.
+        model: The vehicle's model, visual geometry included.
+        root: The entity of the scene.
+        color: The flight's colour.
+        name: The label of the vehicle in a comparison; empty for a single flight.
     """
 
     def __init__(

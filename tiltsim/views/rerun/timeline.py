@@ -16,16 +16,11 @@ TIMELINE: Final = "sim_time"
 def send_rows(recording: rr.RecordingStream, path: str, times: Floats, *columns: Any) -> None:
     """Send one row per time to an entity.
 
-    Parameters
-    ----------
-    recording
-        The recording to write to.
-    path
-        The entity.
-    times
-        Times of the rows, s.
-    columns
-        Values with one row per time, from the ``columns`` methods of archetypes.
+    Args:
+        recording: The recording to write to.
+        path: The entity.
+        times: Times of the rows, s.
+        columns: Values with one row per time, from the ``columns`` methods of archetypes.
     """
     if len(times) == 0:
         return

@@ -29,10 +29,8 @@ def view_flights(
 
     ``names`` are those of several flights, by default `flight_names`.
 
-    Raises
-    ------
-    InputError
-        If no viewer listens at the address, or there is no screen to open one on.
+    Raises:
+        InputError: If no viewer listens at the address, or there is no screen to open one on.
     """
     from tiltsim.views.rerun.blueprint import flight_blueprint
     from tiltsim.views.rerun.recording_file import make_recorders, new_recording, write_flights
@@ -50,10 +48,8 @@ def view_flights(
 def view_recordings(paths: Sequence[Path]) -> None:
     """Open saved recordings in a viewer.
 
-    Raises
-    ------
-    InputError
-        If a file cannot be read or is not a recording, or there is no screen.
+    Raises:
+        InputError: If a file cannot be read or is not a recording, or there is no screen.
     """
     import rerun_cli
 

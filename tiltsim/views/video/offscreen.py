@@ -30,10 +30,8 @@ def make_contexts(model: mujoco.MjModel, width: int, height: int) -> tuple[Any, 
     MUJOCO_GL selects the implementation; without it, EGL is tried first if there is no display.
     The context has at least the given size (pixels).
 
-    Raises
-    ------
-    InputError
-        If no implementation works.
+    Raises:
+        InputError: If no implementation works.
     """
     failures = []
     for name, make in _implementations().items():
@@ -79,10 +77,8 @@ class Caption(NamedTuple):
 class Canvas:
     """Renders frames of one model, of a size in pixels; use it as a context manager.
 
-    Raises
-    ------
-    InputError
-        If no OpenGL implementation works.
+    Raises:
+        InputError: If no OpenGL implementation works.
     """
 
     def __init__(self, model: mujoco.MjModel, width: int, height: int) -> None:

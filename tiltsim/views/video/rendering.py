@@ -48,21 +48,14 @@ def write_video(
 ) -> None:
     """Write a flight as an MP4 video, atomically.
 
-    Parameters
-    ----------
-    flight
-        The flight.
-    path
-        The file.
-    video
-        Size and rate.
-    progress
-        Called with the time (s) of every frame.
+    Args:
+        flight: The flight.
+        path: The file.
+        video: Size and rate.
+        progress: Called with the time (s) of every frame.
 
-    Raises
-    ------
-    InputError
-        If no OpenGL implementation works or the file cannot be written.
+    Raises:
+        InputError: If no OpenGL implementation works or the file cannot be written.
     """
     import av
 
