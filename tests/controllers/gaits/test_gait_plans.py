@@ -328,3 +328,9 @@ def test_a_scale_or_bias_of_one_is_the_gait_itself():
     gait = plans.continuous_trot(0.4, 2.0)
     assert gait.scaled(1.0) is gait
     assert gait.biased(1.0) is gait
+
+
+def test_a_slow_gait_has_a_small_maximum_rate():
+    slow = plans.keyframes([(0, 0, 0, 0, 0), (0.5, 0.1, 0, -0.05, 0), (1, 0, 0, 0, 0)], 2.0)
+    assert slow.max_rate == pytest.approx(0.1)
+    assert slow.amplitude == pytest.approx(0.1)
