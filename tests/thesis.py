@@ -1,4 +1,4 @@
-"""The thesis' matrices, written out as printed: what the code is checked against."""
+"""The thesis's matrices, written out as printed: what the code is checked against."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tilt-car in MuJoCo and on the thesis' equations: its physics, its drift, its limit cycle."""
+"""The tilt-car in MuJoCo and on the thesis's equations: its physics, its drift, its limit cycle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The compiled models against the thesis' equations and closed forms of mechanics."""
+"""The compiled models against the thesis's equations and closed forms of mechanics."""
 
 from __future__ import annotations
 

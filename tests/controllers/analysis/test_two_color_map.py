@@ -155,7 +155,7 @@ def test_no_grid_point_lies_exactly_on_a_crossing_of_planes() -> None:
 def test_printed_coefficients_explain_the_published_offset(monkeypatch) -> None:
     """With four digits the search yields 0.334198 and a blue R of about -1e-4, as in ch. 6 to 8.
 
-    So the thesis' blue gaits were invertible by the rounding of its coefficients alone.
+    So the thesis's blue gaits were invertible by the rounding of its coefficients alone.
     """
 
     def printed(angles, vehicle):

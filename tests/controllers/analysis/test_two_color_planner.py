@@ -164,7 +164,7 @@ def test_paths_of_chapter_8_start_where_it_says() -> None:
 
 
 def test_printed_vertices_lie_on_the_published_lines() -> None:
-    """To the three printed decimals, with the thesis' rounded offset and with the exact one."""
+    """To the three printed decimals, with the thesis's rounded offset and with the exact one."""
     for key in ("ch06_gait_1", "ch06_gait_2"):
         gait = PUBLISHED_GAITS[key].gait
         angles = gait.angles(np.arange(4) / 4)

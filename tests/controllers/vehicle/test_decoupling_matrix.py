@@ -30,7 +30,7 @@ PIGEON = Vehicle(
     inertia_zz=4e-5,
     arm_length=0.07,
     thrust_coefficient=3e-7,
-    drag_coefficient=1.5e-8,  # drag ratio 0.71, far from the thesis' 0.17
+    drag_coefficient=1.5e-8,  # drag ratio 0.71, far from the thesis's 0.17
     gravity=3.7,
 )
 VEHICLES = [*PRESETS.values(), PIGEON]

@@ -1,4 +1,4 @@
-"""Layered loops on the thesis' equations, an integration of its own to check MuJoCo's by."""
+"""Layered loops on the thesis's equations, an integration of its own to check MuJoCo's by."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def fly(*changes, plant="thesis", **more):
 
 
 def with_gyroscopic_torque(loop):
-    """A loop on the thesis' equations with the torque that chapter 3 leaves out."""
+    """A loop on the thesis's equations with the torque that chapter 3 leaves out."""
     rates = loop.equations.rates
 
     def turning(time, state, inputs, parameters, table, disturbance):
@@ -201,7 +201,7 @@ def test_a_saved_state_restarts_bit_identically(name):
     np.testing.assert_array_equal(restarted.state, straight.state)
 
 
-# --- the thesis' vehicle -----------------------------------------------------------------------
+# --- the thesis's vehicle -----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("base", [TILTROTOR, QUADROTOR])

@@ -1,5 +1,4 @@
 """Figures in print quality, one module per subject, in one style.
 
-Every function returns an independent matplotlib `Figure`, without global state or windows.
-matplotlib is imported when a figure is drawn.
+Every function returns an independent matplotlib `Figure` and imports matplotlib when it is called.
 """
