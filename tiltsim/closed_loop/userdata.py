@@ -18,6 +18,5 @@ class Header(NamedTuple):
 
 
 HEADER_SIZE: Final = len(Header._fields)
-
 CONTROL_PERIOD, EVALUATIONS, RECORDER = range(HEADER_SIZE)
 """Where in `userdata` the fields of the `Header` lie."""
