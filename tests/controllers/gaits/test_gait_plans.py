@@ -12,10 +12,16 @@ from hypothesis import strategies as st
 from tiltsim_controllers.analysis.published_gaits import smallest_margin
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.gaits import plans
+from tiltsim_controllers.gaits.anticipation import anticipated_tilts
 from tiltsim_controllers.gaits.cat import FOOTFALLS, FORWARD, SWINGS, Footfall, cat_keyframes
-from tiltsim_controllers.gaits.parameters import GAIT_TYPES, GaitParameters
+from tiltsim_controllers.gaits.parameters import (
+    GAIT_TYPES,
+    KEYFRAMES,
+    TROT_CONTINUOUS,
+    GaitParameters,
+)
 from tiltsim_controllers.gaits.plans import Gait
-from tiltsim_controllers.gaits.tilts import tilt_reference
+from tiltsim_controllers.gaits.tilts import planned_jets, tilt_acceleration, tilt_reference
 from tiltsim_controllers.gaits.trot import continuous_trot as scalar_trot
 from tiltsim_controllers.gaits.two_color import BLUE, RED, colored_angles
 from tiltsim_controllers.mathematics.records import flatten, record_dtype
@@ -65,6 +71,24 @@ def test_gaits_are_periodic_and_rates_are_their_derivatives(gait: Gait) -> None:
     np.testing.assert_allclose(
         gait.angles(time)[off_corners], gait.angles(time + period)[off_corners], atol=1e-9
     )
+
+
+@pytest.mark.parametrize("gait", GAITS.values(), ids=GAITS)
+def test_accelerations_are_derivatives_and_smooth_gaits_need_no_rounded_corners(gait: Gait) -> None:
+    period = gait.period or 1.0
+    smooth = gait.is_continuous
+    for time in np.linspace(0.0, 2.0, 211) * period + 1e-4:
+        step = 1e-6 * period
+        difference = (gait.rates(time + step) - gait.rates(time - step)) / (2.0 * step)
+        corner = np.abs(difference).max() > 1e4
+        smooth &= not corner
+        if not corner:
+            found = tilt_acceleration(time, gait.parameters)
+            np.testing.assert_allclose(found, difference, atol=1e-3)
+    smooth &= gait.parameters.type not in {KEYFRAMES, TROT_CONTINUOUS}  # corners between samples
+    if smooth:
+        rounded = anticipated_tilts(0.3, gait.parameters, gait.knots, 0.1)
+        assert rounded == planned_jets(0.3, gait.parameters, gait.knots)
 
 
 @pytest.mark.parametrize("gait", GAITS.values(), ids=GAITS)
