@@ -165,6 +165,7 @@ def merged(base, *layers):
     return tables
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layers", LAYERS)
 def test_a_shipped_law_flown_as_a_users_own_flies_the_same_flight(layers):
     """Sampled rotor accelerations and the planned gait are just what a held law of ours does.

@@ -328,6 +328,7 @@ def test_under_the_published_weight_tilting_is_faster_than_any_step():
     assert min(fastest) > 1e3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weight", WEIGHTS)
 def test_compiled_code_gives_the_same_bits(weight, native):
     random = np.random.default_rng(6)

@@ -138,6 +138,7 @@ FLIGHTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_the_plants_differ_by_the_error_of_the_solver(name, gyroscopic_torque):
     """Half the step, and the difference falls by two to the order."""
