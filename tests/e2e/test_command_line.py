@@ -274,6 +274,7 @@ def test_check_survives_a_file_that_cannot_be_read_as_toml(tmp_path, capsys):
     assert "3 scenarios: 2 invalid, 1 passed" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("jobs", "signal_", "code"),
     [("1", signal.SIGINT, 130), ("2", signal.SIGINT, 130), ("2", signal.SIGTERM, 143)],

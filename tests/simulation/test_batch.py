@@ -113,6 +113,7 @@ def test_every_gait_flies_the_same_three_ways_with_continuous_and_held_control()
     three_ways(scenarios)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["RK4", "implicitfast", "implicit", "Euler"])
 def test_rows_may_differ_in_vehicle_time_step_recording_and_duration(integrator):
     gait = {"type": "trot_continuous", **TROT}

@@ -214,6 +214,7 @@ def test_two_thousand_flights_killed_twenty_times(tmp_path):
     assert (folder / "sweep.parquet").read_bytes() == whole.read_bytes()
 
 
+@pytest.mark.slow
 def test_processes_end_with_their_parent(tmp_path):
     file = short_sweep(tmp_path / "sweep.toml", count=4000, chunk_size=8)
     process = subprocess.Popen(command(file, tmp_path / "out", "--jobs=2"), start_new_session=True)
@@ -257,6 +258,7 @@ def test_all_processes_may_die_at_once_but_not_again_and_again(times, monkeypatc
             list(flown)
 
 
+@pytest.mark.slow
 def test_a_terminated_sweep_cleans_up_and_continues(tmp_path):
     file = short_sweep(tmp_path / "sweep.toml", count=60, chunk_size=2)
     folder = tmp_path / "out"

@@ -102,6 +102,7 @@ def test_drawing_does_not_change_matplotlibs_parameters():
     assert dict(matplotlib.rcParams) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", SIGNATURES)
 def test_the_command_writes_the_format_of_the_ending(ending, tmp_path, capsys):
     folder = saved("fixed", tmp_path)
