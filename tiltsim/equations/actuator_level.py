@@ -149,13 +149,22 @@ def _tiltrotor_rates(
 
 
 @scalar
-def project_tiltrotor(state: list[float], mechanics: Mechanics) -> list[float]:
-    """Rotors within their speed limits, pods within their stops."""
-    low, high, stop = mechanics.min_speed, mechanics.max_speed, mechanics.max_tilt
-    projected = state[:]
+def limit_speeds(state: list[float], first: int, mechanics: Mechanics) -> list[float]:
+    """Rotor speeds, or commands of them, from ``first`` on within the rotors' limits."""
+    low, high = mechanics.min_speed, mechanics.max_speed
+    limited = state[:]
     for rotor in range(4):
         spin = -1.0 if rotor % 2 == 0 else 1.0
-        projected[SPEED_1 + rotor] = spin * clipped(spin * state[SPEED_1 + rotor], low, high)
+        limited[first + rotor] = spin * clipped(spin * state[first + rotor], low, high)
+    return limited
+
+
+@scalar
+def project_tiltrotor(state: list[float], mechanics: Mechanics) -> list[float]:
+    """Rotors within their speed limits, pods within their stops."""
+    stop = mechanics.max_tilt
+    projected = limit_speeds(state, SPEED_1, mechanics)
+    for rotor in range(4):
         tilt, rate = state[TILT_1 + rotor], state[RATE_1 + rotor]
         if abs(tilt) > stop:
             projected[TILT_1 + rotor] = stop if tilt > 0.0 else -stop

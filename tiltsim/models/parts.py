@@ -27,6 +27,7 @@ class ExtraActuators(NamedTuple):
     states: int = 0  # integrators that act on nothing: ctrl is the rate of an activation
     memories: int = 0  # act on nothing and have no state: a held ctrl is all there is
     wrench: bool = False  # force (N) and torque (N m) on the body, six, in body axes
+    begins_with_rotor_speeds: bool = False  # the first four states keep within the rotors' limits
 
 
 @dataclass(frozen=True)

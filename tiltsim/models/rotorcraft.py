@@ -195,6 +195,8 @@ def _compose(spec: RotorcraftSpec) -> tuple[str, str, dict[str, bytes]]:
     add_states(root, "law", spec.law_states)
     for index, extra in enumerate(spec.extra_actuators, start=1):
         add_states(root, f"layer_{index}_state", extra.states)
+        if extra.begins_with_rotor_speeds:
+            _limit_speeds(root, f"layer_{index}_state", spec.rotor_limits)
         add_memories(root, f"layer_{index}_memory", extra.memories)
         if extra.wrench:
             add_wrench(root, f"layer_{index}")
@@ -222,11 +224,19 @@ def _scale_lengths(root: Any, arm_length: float) -> None:
 
 def _set_rotors(root: Any, vehicle: Vehicle, limits: RotorLimits) -> None:
     for i, spin in zip(ROTORS, SPIN, strict=True):
-        root.find("actuator", f"thrust_{i}").gear = _thrust_gear(vehicle, spin)
+        thrust = root.find("actuator", f"thrust_{i}")
+        thrust.gear = _thrust_gear(vehicle, spin)
+        if limits.thrust_range is not None:
+            thrust.ctrlrange = limits.thrust_range
+    _limit_speeds(root, "rotor_speed", limits)
+
+
+def _limit_speeds(root: Any, name: str, limits: RotorLimits) -> None:
+    """Keep the activations ``name_1`` to ``name_4`` within the limits of the rotors' speeds."""
+    for i, spin in zip(ROTORS, SPIN, strict=True):
         speed_range = limits.speed_range(spin)
         if speed_range is not None:
-            root.find("actuator", f"rotor_speed_{i}").actrange = speed_range
-            root.find("actuator", f"thrust_{i}").ctrlrange = limits.thrust_range
+            root.find("actuator", f"{name}_{i}").actrange = speed_range
 
 
 def _thrust_gear(vehicle: Vehicle, spin: float) -> tuple[float, ...]:

@@ -28,28 +28,6 @@ def rate_limited_command(command: float, angle: float, reach: float) -> float:
     return command
 
 
-@scalar
-def limited_speed_command_rate(
-    speed_command: float, rate: float, spin: float, min_speed: float, max_speed: float
-) -> float:
-    """The rate (rad/s^2) of a motor's speed command, zero where it would leave the limits.
-
-    A command beyond what the rotor can follow would have to be undone before the rotor responds
-    again.
-
-    Args:
-        speed_command: the present command, rad/s
-        rate: the requested rate, rad/s^2
-        spin: sign of the rotor's nominal rotation
-        min_speed, max_speed: limits along the spin, rad/s
-    """
-    if spin * speed_command >= max_speed and spin * rate > 0.0:
-        return 0.0
-    if spin * speed_command <= min_speed and spin * rate < 0.0:
-        return 0.0
-    return rate
-
-
 class RotorFault(NamedTuple):
     """The faults of one rotor and their times; none by default."""
 

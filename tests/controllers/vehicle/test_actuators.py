@@ -14,7 +14,6 @@ from tiltsim_controllers.mathematics.noise import normal
 from tiltsim_controllers.vehicle.actuators import (
     Faults,
     RotorFault,
-    limited_speed_command_rate,
     rate_limited_command,
     servo_command,
     thrust_factor,
@@ -66,30 +65,6 @@ def test_faults_begin_at_their_time():
     assert [thrust_factor(t, fault) for t in (0.0, 1.999, 2.0, 9.0)] == [1.0, 1.0, 0.3, 0.3]
     assert [servo_command(t, 0.5, fault) for t in (0.999, 1.0)] == [0.5, 0.2]
     assert thrust_factor(1e9, RotorFault()) == 1.0
-
-
-@pytest.mark.parametrize("spin", [1.0, -1.0])
-@pytest.mark.parametrize(
-    ("speed", "rate", "passes"),
-    [
-        (499.0, 10.0, True),
-        (500.0, 1e-3, False),
-        (500.0, 0.0, True),
-        (100.0, -1e-3, False),
-        (500.0, 10.0, False),
-        (501.0, 10.0, False),
-        (500.0, -10.0, True),
-        (501.0, -10.0, True),
-        (101.0, -10.0, True),
-        (100.0, -10.0, False),
-        (99.0, -10.0, False),
-        (100.0, 10.0, True),
-        (99.0, 10.0, True),
-    ],
-)
-def test_a_speed_command_stops_at_its_limits_and_comes_back(spin, speed, rate, passes):
-    found = limited_speed_command_rate(spin * speed, spin * rate, spin, 100.0, 500.0)
-    assert found == (spin * rate if passes else 0.0)
 
 
 @pytest.mark.parametrize("channel", [0.0, 3.0])

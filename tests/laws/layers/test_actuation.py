@@ -247,6 +247,50 @@ def test_a_lagging_rotor_leaves_its_limit_as_soon_as_one_without_lag(plant, timi
     assert past[1] == pytest.approx(past[0], abs=0.02)
 
 
+def fly_to_the_limits(plant, timestep, **simulation):
+    """Onto a circle with lagging rotors that are commanded beyond either limit."""
+    return tiltsim.simulate(
+        tiltsim.parse_scenario(
+            BASE
+            | {
+                "simulation": {"timestep": timestep, "plant": plant, **simulation},
+                "initial": {"rotor_speed": 361.0},
+                "vehicle": {
+                    **{"min_rotor_speed": 330.0, "max_rotor_speed": 380.0},
+                    "rotor_time_constant": 0.03,
+                },
+                "gait": {"type": "fixed", "angles": [-0.325, -0.325, 0.325, 0.325]},
+                "reference": {"type": "circle", "radius": 2.0, "angular_frequency": 0.5},
+            }
+        )
+    )
+
+
+def distance(flight, other):
+    """The largest distance (m) between two flights."""
+    return np.linalg.norm([flight[axis] - other[axis] for axis in "xyz"], axis=0).max()
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_a_limited_command_hardly_depends_on_the_step(plant):
+    """First order: 4 um a millisecond. Commands that pass their limit by a step: 1 to 5 mm."""
+    short = {"duration": 0.48, "record_timestep": 0.04, "engine": "python"}
+    fine = fly_to_the_limits(plant, 0.0005, **short)
+    for step in (0.004, 0.002):
+        assert distance(fly_to_the_limits(plant, step, **short), fine) < 0.01 * step
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_flights_at_the_limits_converge_at_first_order(plant):
+    long = {"duration": 8.0, "record_timestep": 0.1, "engine": "native"}
+    steps = [0.002 / 2**halving for halving in range(6)]
+    flights = [fly_to_the_limits(plant, step, **long) for step in steps]
+    for step, coarse, fine in zip(steps, flights, flights[1:], strict=False):
+        assert distance(coarse, fine) < 0.6 * step
+    assert distance(flights[1], flights[-1]) < 0.002
+
+
 # --- servos ------------------------------------------------------------------------------------
 
 

@@ -46,11 +46,10 @@ from tiltsim.vehicles.rotorcraft.layout import (
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.allocation import allocate_accelerations
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
-from tiltsim_controllers.mathematics.scalar import Floats, Quad, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Quad, Values, Vector, clipped, scalar
 from tiltsim_controllers.vehicle.actuators import (
     Faults,
     RotorFault,
-    limited_speed_command_rate,
     rate_limited_command,
     servo_command,
     thrust_factor,
@@ -137,28 +136,17 @@ def thrust_controls(time: float, act: Vector, faults: Faults) -> Quad:
 def _motor_controls(act: Vector, first: int, commands: Vector, actuation: Actuation) -> Quad:
     """Rotor accelerations (rad/s^2): as commanded, or by the lag behind the speed commands.
 
-    The speed commands are activations from ``first`` on.
+    The speed commands are activations from ``first`` on. The plant keeps them within the rotors'
+    limits at the end of each step, `clipped` at the stages of an integrator, too.
     """
-    pole = actuation.rotor_pole
+    pole, low, high = actuation.rotor_pole, actuation.slowest, actuation.fastest
     if pole == 0.0:
         return four(commands, 4)
     return (
-        pole * (act[first] - act[0]),
-        pole * (act[first + 1] - act[1]),
-        pole * (act[first + 2] - act[2]),
-        pole * (act[first + 3] - act[3]),
-    )
-
-
-@scalar
-def _speed_command_rates(act: Vector, first: int, commands: Vector, actuation: Actuation) -> Quad:
-    """Rates (rad/s^2) of the motors' speed commands, activations from ``first`` on."""
-    low, high = actuation.slowest, actuation.fastest
-    return (
-        limited_speed_command_rate(act[first], commands[4], -1.0, low, high),
-        limited_speed_command_rate(act[first + 1], commands[5], 1.0, low, high),
-        limited_speed_command_rate(act[first + 2], commands[6], -1.0, low, high),
-        limited_speed_command_rate(act[first + 3], commands[7], 1.0, low, high),
+        pole * (clipped(act[first], -high, -low) - act[0]),
+        pole * (clipped(act[first + 1], low, high) - act[1]),
+        pole * (clipped(act[first + 2], -high, -low) - act[2]),
+        pole * (clipped(act[first + 3], low, high) - act[3]),
     )
 
 
@@ -203,7 +191,7 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
             *thrust_controls(time, act, actuation.faults),
             *_motor_controls(act, law_act, commands, actuation),
             *ctrl[FURTHER_RATES:],
-            *_speed_command_rates(act, law_act, commands, actuation),
+            *four(commands, 4),
             *line_rates(act, sent, actuation.control_timestep),
             *commands,
         )
@@ -219,7 +207,7 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
             *thrust_controls(time, act, actuation.faults),
             *_motor_controls(act, law_act, commands, actuation),
             *ctrl[FURTHER_RATES:law_ctrl],
-            *_speed_command_rates(act, law_act, commands, actuation),
+            *four(commands, 4),
             *ctrl[line_ctrl:],
         )
 
@@ -234,7 +222,9 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
         _actuation,
         controls=controls,
         hold=hold,
-        actuators=ExtraActuators(states=ROTOR_STATES + under_way, memories=COMMANDS),
+        actuators=ExtraActuators(
+            states=ROTOR_STATES + under_way, memories=COMMANDS, begins_with_rotor_speeds=True
+        ),
         initial_activations=initial_activations,
         derive=_derive,
         units=dict.fromkeys(THRUST_FACTORS, "1"),

@@ -12,7 +12,13 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations
-from tiltsim.equations.actuator_level import ACTUATOR_PLANTS, Mechanics, Wrench, mechanics
+from tiltsim.equations.actuator_level import (
+    ACTUATOR_PLANTS,
+    Mechanics,
+    Wrench,
+    limit_speeds,
+    mechanics,
+)
 from tiltsim.laws.layers.layer import WRENCH_SIZE, Layer, wrap_loop
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.vehicles.rotorcraft.layout import ROTOR_STATES
@@ -70,6 +76,27 @@ def _read_actuators(
     return rates, wrench
 
 
+def _projection(
+    project_motion: Callable[..., list[float]], first: int, actuators: tuple[ExtraActuators, ...]
+) -> Callable[..., list[float]]:
+    """A projection of the motion and of commanded rotor speeds onto their limits.
+
+    The states of the actuators begin at ``first``. In scalar code, ``(state, mechanics) -> state``.
+    """
+    for this in actuators:
+        if this.begins_with_rotor_speeds:
+            break
+        first += this.states
+    else:
+        return project_motion
+
+    @scalar
+    def project(state: list[float], mechanics: Mechanics) -> list[float]:
+        return limit_speeds(project_motion(state, mechanics), first, mechanics)
+
+    return project
+
+
 @cache
 def on_equations(loop: ClosedLoop) -> ClosedLoop:
     """A loop with equations in which its controls act on the thesis's rigid body.
@@ -79,11 +106,14 @@ def on_equations(loop: ClosedLoop) -> ClosedLoop:
     dynamics = loop.dynamics
     plant = ACTUATOR_PLANTS[dynamics.model]
     first, qpos_of, qvel_of = plant.motion, plant.qpos, plant.qvel
-    motion_rates, project_motion = plant.rates, plant.project_onto_limits
+    motion_rates = plant.rates
     controls, held = loop.sampling.controls, loop.sampling.hold
     observe = loop.columns.observe
     own = ExtraActuators(states=ROTOR_STATES + dynamics.controller_states)
     activation_rates, wrench = _read_actuators((own, *dynamics.extra_actuators), plant.rotor_states)
+    project_motion = _projection(
+        plant.project_onto_limits, first + own.states, dynamics.extra_actuators
+    )
 
     @scalar
     def equation_inputs(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
