@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from inspect import unwrap
 
 import numpy as np
 import pytest
@@ -102,7 +103,7 @@ def test_each_plant_announces_its_compilation(monkeypatch, tmp_path, plant):
     loop = LOOPS["attitude_altitude"]
     compiling = compile_control if plant == "mujoco" else compile_stepper
     with pytest.raises(AnnouncedError, match=re.escape(loop.native_name(plant))):
-        compiling.__wrapped__(loop)
+        unwrap(compiling)(loop)
 
 
 def test_all_that_processes_fly_with_is_compiled_for_them_once(monkeypatch):

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from threading import Lock
 from typing import Any, Final
 
 from numba import njit, types
@@ -23,7 +22,7 @@ from numba.core.ccallback import CFunc
 from numba.core.typing.templates import infer, infer_global, make_overload_template
 
 from tiltsim.engines.cache import native_code_folder, native_code_is_cacheable
-from tiltsim.system.locks import locked
+from tiltsim.system.locks import locked, one_thread_at_a_time
 from tiltsim_controllers.mathematics.scalar import scalar_functions
 
 ERROR_MODEL: Final = {"error_model": "numpy"}
@@ -125,12 +124,11 @@ def _decorator_of_inner(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     return decorate
 
 
+@one_thread_at_a_time
 def register_scalar_functions() -> None:
     """Let compiled code call every scalar function defined so far."""
-    with _registering:  # batches build plants in threads
-        for function in scalar_functions()[len(_registered) :]:
-            _registered.append(callable_natively(function))
+    for function in scalar_functions()[len(_registered) :]:
+        _registered.append(callable_natively(function))
 
 
 _registered: Final[list[Callable[..., Any]]] = []
-_registering: Final = Lock()

@@ -24,11 +24,13 @@ from tiltsim.engines.compiling import compiled_callback, register_scalar_functio
 from tiltsim.engines.mjdata_layout import mjdata_layout
 from tiltsim.engines.native_memory import addresses_at, array_at, bytes_at, floats_at, integers_at
 from tiltsim.engines.recorder import record_sample, recording_is_over, sample_is_due
+from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.records import record_dtype
 
 _CONTROL_SIGNATURE: Final = types.void(types.intp, types.intp)
 
 
+@one_thread_at_a_time
 @cache
 def compile_control(loop: ClosedLoop) -> Any:
     """Compile a loop's control step as a C callback, or load it from the cache on disk.
@@ -111,6 +113,7 @@ def compile_empty() -> Any:
     return empty
 
 
+@one_thread_at_a_time
 @cache
 def compile_stopped_clock() -> Any:
     """A clock for MuJoCo's timers that always reads zero."""

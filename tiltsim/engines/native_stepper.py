@@ -13,10 +13,12 @@ from tiltsim.engines.cache import announce_native_code
 from tiltsim.engines.compiling import INNER, compiled, register_scalar_functions
 from tiltsim.engines.recorder import record_sample, recording_is_over
 from tiltsim.equations.ode3 import make_stepper
+from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.records import record_dtype
 from tiltsim_controllers.mathematics.scalar import Floats
 
 
+@one_thread_at_a_time
 @cache
 def compile_stepper(loop: ClosedLoop) -> tuple[Any, Any]:
     """Compile the thesis plant's solver for a loop, or load it from the cache on disk.

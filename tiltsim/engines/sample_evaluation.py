@@ -12,6 +12,7 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.system.interrupts import reraise_swallowed_interrupts
+from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.records import record_dtype, record_size
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 
@@ -60,6 +61,7 @@ def _evaluate_natively(
     return values
 
 
+@one_thread_at_a_time
 @cache
 def _compile_rows(function: Callable[..., Values]) -> Any:
     from tiltsim.engines.compiling import compiled, register_scalar_functions

@@ -20,6 +20,7 @@ from tiltsim.laws.tilt_car_planned_direction import PLANNED_DIRECTION
 from tiltsim.laws.tilt_car_third_derivative import THIRD_DERIVATIVE
 from tiltsim.laws.yaw_position import YAW_POSITION
 from tiltsim.scenario.scenario import plan_flight
+from tiltsim.system.locks import one_thread_at_a_time
 
 if TYPE_CHECKING:
     from tiltsim.closed_loop.loop import ClosedLoop
@@ -39,6 +40,7 @@ LOOPS: Final[dict[str, ClosedLoop]] = {
 """Loops by their names; see `tiltsim.scenario.controller_table.ControllerTable.loop_name`."""
 
 
+@one_thread_at_a_time
 def loop_of(scenario: Scenario) -> ClosedLoop:
     """The closed loop of a scenario: its controller inside layers for all that is not ideal."""
     controller, external = scenario.controller, scenario.controller.is_external

@@ -33,6 +33,7 @@ from tiltsim.models.parts import (
 )
 from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.resources import shipped_folder
+from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
 from tiltsim_controllers.vehicle.states import ROTORS
 
@@ -92,6 +93,7 @@ class RotorcraftSpec(ModelSpec):
         return self.tilts and self.tilt_servo.max_angle is not None
 
 
+@one_thread_at_a_time
 def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjModel:
     """Compile the MuJoCo model of a rotorcraft.
 

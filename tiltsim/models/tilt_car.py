@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from tiltsim.models.mjcf_editing import add_states, parse_mjcf, remove_visuals, set_servo_gains
 from tiltsim.models.parts import ModelSpec, TiltServo, require_positive
 from tiltsim.resources import shipped_folder
+from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.tilt_car.vehicle import TiltCar
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ class TiltCarSpec(ModelSpec):
             require_positive(name, value, "(SI)")
 
 
+@one_thread_at_a_time
 def compile_tilt_car(spec: TiltCarSpec, *, visuals: bool = True) -> mujoco.MjModel:
     """Compile the MuJoCo model of a tilt-car, with the keyframes ``rest`` and ``start``.
 

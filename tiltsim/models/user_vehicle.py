@@ -16,6 +16,7 @@ import numpy as np
 
 from tiltsim.models.mjcf_editing import set_servo_gains, set_stop
 from tiltsim.models.parts import TiltServo
+from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 from tiltsim_controllers.vehicle.states import ROTORS
@@ -139,6 +140,7 @@ class UserVehicle:
                 joint.limited = actuator.ctrllimited = "true"
 
 
+@one_thread_at_a_time
 def read_user_vehicle(path: str, model: str) -> UserVehicle:
     """Check and measure an MJCF file.
 

@@ -21,7 +21,7 @@ from tiltsim.laws.layers.delay_line import EXTERNAL_COMMANDS
 from tiltsim.laws.layers.sensing import measured_qpos, measured_qvel, sensor_parameters
 from tiltsim.laws.tiltrotor import gait_servo_commands
 from tiltsim.plants.command import CheckedCommand, ControllerError, Observation, Reference
-from tiltsim.plants.mujoco_plant import MujocoPlant, quiet_warnings
+from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.vehicles.rotorcraft.layout import ROTOR_STATES
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.mathematics.records import slotted
@@ -126,7 +126,7 @@ class CommandedPlant(MujocoPlant):
 
     def advance(self, steps: int) -> None:
         moving = self._layered or self.data.ctrl[self._rates].any()
-        with control_callback(self._hold if moving else None), quiet_warnings():
+        with control_callback(self._hold if moving else None):
             mujoco.mj_step(self.model, self.data, nstep=steps)
 
     def _hold(self, _model: mujoco.MjModel, called: mujoco.MjData) -> None:

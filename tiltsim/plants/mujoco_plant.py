@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from math import nan
 from typing import TYPE_CHECKING, Any, Final
 
@@ -55,7 +54,8 @@ class MujocoPlant(Plant):
         data.userdata[HEADER_SIZE : HEADER_SIZE + len(parameters)] = parameters
         data.qpos[:], data.qvel[:] = self._loop.kind.initial_motion(assembly)
         data.act[:] = self._loop.dynamics.initial_activations(assembly, self._setup)
-        mujoco.mj_forward(self.model, data)
+        with control_callback(None):
+            mujoco.mj_forward(self.model, data)
 
     @property
     def time(self) -> float:
@@ -72,12 +72,13 @@ class MujocoPlant(Plant):
     def state(self, value: Floats) -> None:
         mujoco.mj_resetData(self.model, self.data)  # clears the warnings
         mujoco.mj_setState(self.model, self.data, value, _INTEGRATION)
-        mujoco.mj_forward(self.model, self.data)
+        with control_callback(None):
+            mujoco.mj_forward(self.model, self.data)
         # The state brings its own parameters, which the Python engine reads once.
         self._engine = make_engine(self.engine, self._loop, self.model, self.data)
 
     def advance(self, steps: int) -> None:
-        with control_callback(self._engine.callback()), quiet_warnings():
+        with control_callback(self._engine.callback()):
             mujoco.mj_step(self.model, self.data, nstep=steps)
 
     def record(self, samples: int, steps: int) -> Floats | None:
@@ -152,17 +153,6 @@ class MujocoPlant(Plant):
             if self.data.warning[warning].number:
                 return text
         return ""
-
-
-@contextmanager
-def quiet_warnings() -> Iterator[None]:
-    """Keep MuJoCo from printing its warnings or leaving a log file; `Plant.fault` reports them."""
-    previous = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda _message: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(previous)
 
 
 _INTEGRATION: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)

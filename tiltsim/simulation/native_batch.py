@@ -22,7 +22,7 @@ from tiltsim.engines.callback import control_callback
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.plants.flight_model import flight_model, model_cache_key
-from tiltsim.plants.mujoco_plant import MujocoPlant, quiet_warnings
+from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.plant import take_sample
 from tiltsim.simulation.monitor import TerminationMonitor
 from tiltsim.simulation.simulate import fly_chunk
@@ -160,12 +160,7 @@ class NativeBatch(Generic[Result]):
             if recorder.full or recorder.terminated or self._batch.warning[place].any():
                 self._batch.warning[place] = 0
                 self._rows[place] = None
-                if recorder.terminated or not recorder.full:
-                    # Its end is located here, with MuJoCo's callback, which is global.
-                    flight = row.finish()
-                    self._unfinished.append((row.index, self._pool.submit(self._result, flight)))
-                else:
-                    self._finish_in_pool(row)
+                self._finish_in_pool(row)
 
     def _finish_in_pool(self, row: _Row) -> None:
         future = self._pool.submit(lambda: self._result(row.finish()))
@@ -191,7 +186,7 @@ class NativeBatch(Generic[Result]):
             row.save(batch.state[place])
         before = batch.bind("time")[places].copy()
         start = perf_counter()
-        with control_callback(any_row.plant.callback), quiet_warnings():
+        with control_callback(any_row.plant.callback):
             batch.rollout(steps, record=(), ids=places)
         seconds = perf_counter() - start
         flown = batch.bind("time")[places] - before

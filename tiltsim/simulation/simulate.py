@@ -39,13 +39,17 @@ def simulate(
 ) -> Flight:
     """Fly a scenario from start to end.
 
+    Threads may call it at once; each flight is bit for bit the one that is flown alone. In parallel
+    run native flights with the same kind of controller, and all native flights on the thesis plant;
+    other flights in MuJoCo take turns, after each recorded sample or up to 0.1 s of native code.
+
     Args:
         scenario: What to fly; see `tiltsim.load_scenario`.
         observer: Called with every sample (floats in the order of `ClosedLoop.sample_fields`) as it
             is recorded.
         controller: A controller of your own in place of the scenario's: a function from
             `tiltsim.Observation` to `tiltsim.Command`, an object with ``__call__`` and, if it has a
-            memory, ``reset(scenario)``, or a class of such objects.
+            memory, ``reset(scenario)``, or a class of such objects, which threads do not share.
 
     Returns:
         All samples up to the end. A flight that diverges or reaches a singular decoupling matrix is

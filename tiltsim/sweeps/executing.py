@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from tiltsim.errors import InputError
 from tiltsim.simulation.batch import fly
@@ -14,9 +13,6 @@ from tiltsim.simulation.batch import fly
 if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
     from tiltsim.scenario.scenario import Scenario
-
-_ONE_FLIGHT_AT_A_TIME: Final = threading.Lock()
-"""MuJoCo's control callback is global to the process, and a cluster may use threads."""
 
 
 @dataclass(frozen=True)
@@ -37,12 +33,11 @@ def fly_scenarios(
 
     Raises KeyboardInterrupt if a flight was interrupted from the keyboard.
     """
-    with _ONE_FLIGHT_AT_A_TIME:
-        try:
-            return _fly(scenarios, keep_flights)
-        except Exception:
-            # One bad flight must not end the others: find it by flying one at a time.
-            return [_fly_alone(scenario, keep_flights) for scenario in scenarios]
+    try:
+        return _fly(scenarios, keep_flights)
+    except Exception:
+        # One bad flight must not end the others: find it by flying one at a time.
+        return [_fly_alone(scenario, keep_flights) for scenario in scenarios]
 
 
 def _fly(scenarios: Sequence[Scenario], keep_flights: bool) -> list[ScenarioResult]:

@@ -1,10 +1,32 @@
-"""Locks between processes."""
+"""Locks between processes, and between the threads of one."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
+from threading import RLock
+from typing import Final, ParamSpec, TypeVar
+
+Parameters = ParamSpec("Parameters")
+Result = TypeVar("Result")
+
+_BUILDING: Final = RLock()
+
+
+def one_thread_at_a_time(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+    """Let threads call a function, and all others decorated so, one after the other.
+
+    For what builds and caches the parts that flights share: models, closed loops, compiled code.
+    """
+
+    @wraps(function)
+    def alone(*arguments: Parameters.args, **keywords: Parameters.kwargs) -> Result:
+        with _BUILDING:
+            return function(*arguments, **keywords)
+
+    return alone
 
 
 @contextmanager
