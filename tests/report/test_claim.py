@@ -9,23 +9,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tiltsim.errors import InputError
-from tiltsim.report.claim import (
-    AnalysisClaim,
-    Claim,
-    ClaimVerdict,
-    FlightClaim,
-    scenario_claims,
-    verdict_on,
-    worst,
-)
-from tiltsim.report.claims import registered_claims
+from tiltsim.report.claim import Claim, ClaimVerdict, scenario_claims, verdict_on, worst
+from tiltsim.report.statement import Origin, Statement
 from tiltsim.scenario.loading import parse_scenario
 
 
+def statement(**more):
+    words = {"text": "It is so", "thesis": "“It is.”", "criterion": "It is."}
+    return Statement(**{"id": "ch3-so", "source": "ch. 3, Sec. 4, Eq. (19)"} | words | more)
+
+
 def claim(published, **more):
-    return Claim(
-        source="ch. 3, Sec. 4, Eq. (19)", statement="It is so", published=published, **more
-    )
+    return Claim(statement(), published=published, **more)
 
 
 @pytest.mark.parametrize(
@@ -109,8 +104,8 @@ def test_the_worst_verdict_counts():
 @pytest.mark.parametrize(
     ("record", "words"),
     [
-        ({"source": "Sec. 4"}, "must begin with a chapter"),
-        ({"statement": ""}, "needs a statement"),
+        ({"where": "Sec. 4"}, "must begin with 'ch. 3'"),
+        ({"where": "ch. 4, Sec. 1"}, "must begin with 'ch. 3'"),
         ({"published": "four"}, "not a number"),
         ({"published": "inf"}, "not a finite number"),
         ({"published": True, "tolerance": 0.1}, "neither tolerance"),
@@ -118,20 +113,50 @@ def test_the_worst_verdict_counts():
     ],
 )
 def test_a_claim_that_contradicts_itself_is_rejected(record, words):
-    good = {"source": "ch. 3, Eq. (19)", "statement": "It is so", "published": 1.0}
     with pytest.raises(ValueError, match=words):
-        Claim(**(good | record))
+        claim(**({"published": 1.0} | record))
+
+
+@pytest.mark.parametrize(
+    ("record", "words"),
+    [
+        ({"source": "Sec. 4"}, "must begin with a chapter"),
+        ({"id": "ch4-so"}, "must be like 'ch3-two-words'"),
+        ({"id": "ch3"}, "must be like 'ch3-two-words'"),
+        ({"text": ""}, "text is empty"),
+        ({"thesis": " "}, "thesis is empty"),
+        ({"criterion": ""}, "criterion is empty"),
+    ],
+)
+def test_a_statement_needs_all_its_words(record, words):
+    with pytest.raises(ValueError, match=words):
+        statement(**record)
+
+
+def test_what_was_fitted_is_no_evidence():
+    fitted = claim(3.35, fitted=True, in_kind=(1.0, inf))
+    assert verdict_on(fitted, 3.35) is ClaimVerdict.FITTED
+    assert verdict_on(fitted, 2.0) is ClaimVerdict.FITTED
+    assert verdict_on(fitted, 0.5) is ClaimVerdict.NOT_REPRODUCED
+    assert verdict_on(Claim(statement(fitted=True)), True) is ClaimVerdict.FITTED
+
+
+def test_an_id_is_that_of_the_statement_and_the_case():
+    assert claim(1.0).id == "ch3-so"
+    assert claim(1.0, case="ρ = -0.65, T = 2 s").id == "ch3-so-rho-minus-0-65-t-2-s"
+    assert claim(1.0, case="anything", key="247").id == "ch3-so-247"
 
 
 def test_the_source_splits_into_chapter_and_section():
     assert claim(1.0).chapter == 3
     assert claim(1.0).section == "Sec. 4, Eq. (19)"
-    assert Claim(source="ch. 12, Eq. (4)", statement="It is so", published=1.0).chapter == 12
+    assert claim(1.0, where="ch. 3, Fig. 2").section == "Fig. 2"
+    assert statement(id="ch12-so", source="ch. 12, Eq. (4)").chapter == 12
 
 
-def scenario(expect, source="ch. 4, Sec. 6.1"):
+def scenario(expect, source="ch. 4, Sec. 6.1", **more):
     document = {"title": "A flight", "source": source, "expect": expect}
-    return parse_scenario(document)
+    return parse_scenario(document | more)
 
 
 def test_an_expectation_with_a_published_value_is_a_claim():
@@ -145,7 +170,8 @@ def test_an_expectation_with_a_published_value_is_a_claim():
             ]
         )
     )
-    assert [c.statement for c in made] == ["Final roll", "It rolls"]
+    meaning = "Mean over the last second, rad"
+    assert [c.statement.text for c in made] == [meaning, "It rolls"]
     assert made[1].case == "A flight"
     assert made[1].unit == "rad"
     assert made[1].in_kind == (0.1, inf)
@@ -158,12 +184,38 @@ def test_a_flight_of_ours_claims_nothing_for_the_thesis():
     assert scenario_claims(scenario(expect, source="ours")) == []
 
 
+def test_the_words_of_a_claim_stand_in_its_table():
+    words = {"statement": "It rolls", "thesis": "“It rolls.”", "criterion": "Its roll."}
+    bounds = {"metric": "final_roll", "min": 0.1, "published": 0.3, "claim": "ch4-roll"}
+    [made] = scenario_claims(
+        scenario(
+            [bounds | {"case": "at the end"}],
+            ours=["gains", "flight"],
+            claim={"ch4-roll": words | {"fitted": True, "finding": "gains", "note": "Ours."}},
+        )
+    )
+    assert made.statement == Statement(
+        id="ch4-roll", source="ch. 4, Sec. 6.1", text="It rolls", thesis="“It rolls.”",
+        criterion="Its roll.", note="Ours.", fitted=True, finding="gains",
+    )  # fmt: skip
+    assert made.case == "A flight, at the end"
+    assert made.origins == (Origin.GAINS, Origin.FLIGHT)
+    assert made.id == "ch4-roll-scenario-at-the-end"
+
+
 def test_yes_about_a_number_means_that_it_lies_within_the_bounds():
     expect = {"metric": "max_tilt_rate", "min": 20.0, "published": True, "claim": "Tilting is fast"}
     [made] = scenario_claims(scenario([expect]))
     assert made.measure({"max_tilt_rate": 30.0}) is True
     assert made.measure({"max_tilt_rate": 10.0}) is False
     assert verdict_on(made, made.measure({"max_tilt_rate": 10.0})) is ClaimVerdict.NOT_REPRODUCED
+
+
+def test_where_a_statement_is_true_is_not_where_our_value_lies():
+    tight = {"metric": "final_roll", "min": 0.31, "max": 0.33, "claim": "It rolls by 0.2 or more"}
+    [made] = scenario_claims(scenario([tight | {"published": True, "holds": [0.2, inf]}]))
+    assert made.measure({"final_roll": 0.25}) is True
+    assert made.measure({"final_roll": 0.15}) is False
 
 
 def test_a_flight_published_as_flown_and_lost_here_is_not_reproduced():
@@ -184,6 +236,10 @@ def test_a_flight_published_as_flown_and_lost_here_is_not_reproduced():
         ({"published": 0.1, "in_kind": [1.0, 0.0]}, "expect.in_kind"),
         ({"published": 0.1, "in_kind": [nan, 1.0]}, "expect.in_kind"),
         ({"published": 0.1, "wrong": True}, "expect.wrong"),
+        ({"case": "at the end"}, "expect.case"),
+        ({"published": 0.1, "holds": [0.0, 1.0]}, "expect.holds"),
+        ({"published": True, "holds": [1.0, 0.0]}, "expect.holds"),
+        ({"published": 0.1, "claim": "ch4-no-such"}, "expect.claim"),
         ({"published": inf}, r"expect.0.published"),
         ({"metric": "diverged", "equals": True, "min": None, "published": 1.0}, "expect.published"),
     ],
@@ -193,10 +249,3 @@ def test_an_invalid_claim_is_rejected_with_its_key(more, words):
     expect = {key: value for key, value in expect.items() if value is not None}
     with pytest.raises(InputError, match=words):
         scenario([expect])
-
-
-def test_the_registry_holds_claims_that_can_be_told_apart():
-    claims = registered_claims()
-    assert all(isinstance(c, AnalysisClaim | FlightClaim) for c in claims)
-    keys = [(c.chapter, c.statement, c.case) for c in claims]
-    assert len(set(keys)) == len(keys)

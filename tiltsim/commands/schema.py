@@ -34,13 +34,14 @@ def scenario_schema() -> dict[str, Any]:
     A variant lists only the differences from the base, so that only its name is required.
     """
     from tiltsim.scenario.scenario import Scenario, Variant
+    from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 
     schema = Scenario.model_json_schema()
     schema["title"] = "tiltsim scenario"
     schema["$schema"] = DIALECT
     variant = Variant.model_json_schema()
     variant["properties"] |= {
-        key: value if key in {"title", "source", "expect", "disturbance"} else {"type": "object"}
+        key: value if key in {*DESCRIPTIVE, "disturbance"} else {"type": "object"}
         for key, value in schema["properties"].items()
     }
     variant["additionalProperties"] = False

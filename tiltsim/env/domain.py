@@ -14,7 +14,7 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.loading import without_none
 from tiltsim.scenario.messages import one_line_message
 from tiltsim.sweeps.checks import check_points
-from tiltsim.sweeps.definition import SweepDefinition
+from tiltsim.sweeps.definition import UNUSED, SweepDefinition
 from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.tables import NormalAxis, SeedAxis, Sweep, UniformAxis
@@ -50,8 +50,7 @@ class Domain:
             sweep = Sweep.model_validate(document)
         except ValidationError as error:
             raise InputError(f"domain: {one_line_message(error, document, Sweep)}") from None
-        base = without_none(scenario.model_dump(mode="json"))
-        base.pop("expect", None)
+        base = without_none(scenario.model_dump(mode="json", exclude=UNUSED))
         tables = json.loads(sweep.model_dump_json(exclude_none=True))
         definition = SweepDefinition("domain", tables, json.loads(json.dumps(base)), {})
         points = SweepPoints(definition)

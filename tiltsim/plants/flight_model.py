@@ -10,20 +10,11 @@ from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.userdata import HEADER_SIZE
 from tiltsim.errors import InputError
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim_controllers.mathematics.scalar import Triple
 
 _TABLES_WITHOUT_EFFECT: Final = frozenset(
-    (
-        "title",
-        "source",
-        "without",
-        "simulation",
-        "initial",
-        "gait",
-        "reference",
-        "sensors",
-        "expect",
-    )
+    (*DESCRIPTIVE, "simulation", "initial", "gait", "reference", "sensors")
 )
 """Tables of a scenario that do not change the model, except for two keys of ``simulation``."""
 

@@ -1,28 +1,60 @@
 """The reproduction report: the claims of the thesis compared with measured values.
 
-A claim comes from one of two places.
+A **statement** (`tiltsim.report.statement.Statement`) is one thing that the thesis says, with
 
-**One flight is enough.** The claim is in the scenario file::
+* ``id``: the anchor on the page, "ch4-period"; never changed once published;
+* ``source``: chapter, section, equation or figure;
+* ``text``: the statement in one sentence of ours;
+* ``thesis``: the words that make it, quoted in “ ” or paraphrased, or what the figure shows;
+* ``criterion``: what counts as reproduced and what would not, in words; tolerances and ranges of
+  the row are added by themselves;
+* ``note``: what a reader must know to judge it, whatever the verdict.
+
+A **row** (`tiltsim.report.claim.Claim`) is one case of a statement. Its id is that of the statement
+and its label. What of it does not come from the thesis is told by `Origin`: scenario files say it
+of their flights (``ours = ["path", "gains", "keyframes", "parameters", "flight"]``), statements and
+rows of what they compute (``origins``). Where the flight is ours the published value is shown as
+implied. A row that holds because parameters were chosen so (``fitted``) is no evidence and gets its
+own verdict. ``refuted`` is for a statement refuted by proof or by the thesis's own equations, not
+merely not observed, and ``finding`` names the finding that does it: rows settled by one finding are
+one error of the thesis. Rows come from two places.
+
+**One flight is enough.** The row is in the scenario file::
+
+    [claim.ch4-rest]
+    statement = "The vehicle comes to rest beside the reference"
+    thesis = "Fig. 4 prints both components for every rho."
+    criterion = "Each component rounds to the printed digits"
 
     [[variant.expect]]
     metric = "final_position_error_x"
     min = -0.37948                # bounds are for `tiltsim check`: our values
     max = -0.37928
-    claim = "Steady error along x at rho = 0.65, modified decoupler"
+    claim = "ch4-rest"
+    case = "x"                    # if a flight has several rows of the claim
     published = -0.38             # the printed value
 
-`tiltsim.scenario.expectation.Expectation` describes the keys. Variants with the same ``claim`` are
-shown as cases of one claim, labelled with their titles. With a boolean metric, ``published`` is
-compared with the metric; with any other, true or false states whether the value is within ``min``
-and ``max`` according to the thesis. A number is reproduced to half a unit of its last digit (3.35
-means 3.345 to 3.355), or to 0.05 for an integer. ``wrong = true`` is for a statement refuted by
-proof or by the thesis's own equations, not merely not observed; if the measured value agrees
-nevertheless, the claim counts as reproduced.
+`tiltsim.scenario.expectation.Expectation` and `tiltsim.scenario.claim.ClaimTable` describe the
+keys. Rows are labelled with the titles of their variants. With a boolean metric, ``published`` is
+compared with the metric; with any other, true or false states whether the value is within
+``holds``, where the sentence is true, which is not the narrow range around our own value. A number
+is reproduced to half a unit of its last digit (3.35 means 3.345 to 3.355), or to 0.05 for an
+integer. ``source`` of the scenario is that of the row. Each plant gets its own verdict.
+Expectations with the same claim and case but different ``plant`` are one row. ``claim`` may also be
+a sentence, which then is the whole statement; files of the library use tables.
 
-The chapter comes from the scenario's ``source`` ("ch. 4, Sec. 6.1, Fig. 4 (A1)"). Each plant gets
-its own verdict. Expectations with the same claim and metric but different ``plant`` are one row.
+**Analysis or several flights are needed.** The row is in a module of `tiltsim.report.claims`, one
+per chapter, in a tuple ``CLAIMS`` of `AnalysisClaim` and `FlightClaim`::
 
-**Analysis or several flights are needed.** The claim is in a module of `tiltsim.report.claims`, one
-per chapter, in a tuple ``CLAIMS`` of `AnalysisClaim` and `FlightClaim`; see there for examples. No
-measured value is written down: verdicts are computed when the report is made.
+    PERIOD = Statement(
+        id="ch4-period",
+        source="ch. 4, Sec. 7.2, Figs. 8-9",
+        text="The error grows with the period of the trot",
+        thesis="“…”",
+        criterion="The largest error after 20 s grows from T = 1 s to 2 s and from 2 s to 3 s",
+    )
+    FlightClaim(PERIOD, ("ch04_tracking/line#a", "ch04_tracking/line#b"), grows, case="line")
+
+No measured value is written down: verdicts are computed when the report is made. Texts may have
+`code` between backticks. ``tests/report/test_statements.py`` checks every row.
 """

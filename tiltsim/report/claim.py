@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass
 from decimal import Decimal
 from enum import Enum
 from math import isfinite
+from pathlib import Path
 from typing import TYPE_CHECKING, Final, TypeAlias
 
 from tiltsim.flight.expectations import Verdict
-from tiltsim.scenario.metric_names import unit_of
+from tiltsim.report.statement import CHAPTER, Origin, Statement, slug
+from tiltsim.scenario.metric_names import METRICS, unit_of
 
 if TYPE_CHECKING:
     from tiltsim.scenario.expectation import Expectation
@@ -25,7 +26,6 @@ Published: TypeAlias = "float | str | bool | tuple[float | str, ...]"
 
 Metrics: TypeAlias = Mapping[str, float | bool]
 
-CHAPTER: Final = re.compile(r"ch\. (\d+)")
 ROUNDING: Final = 1.0 + 1e-9  # 0.345 is not exact in binary, but should round to 0.35
 
 
@@ -34,8 +34,9 @@ class ClaimVerdict(Enum):
 
     REPRODUCED = "reproduced"
     QUALITATIVE = "reproduced qualitatively"
+    FITTED = "consistent with a fit"
     NOT_REPRODUCED = "not reproduced"
-    WRONG = "published claim is wrong"
+    WRONG = "published claim wrong"
 
     @property
     def rank(self) -> int:
@@ -45,20 +46,21 @@ class ClaimVerdict(Enum):
 
 @dataclass(frozen=True)
 class Claim:
-    """One statement of the thesis that has a number or a yes/no answer.
+    """One case of a statement of the thesis, with a number or a yes/no answer: a row.
 
     Raises `ValueError` if the fields contradict each other.
     """
 
-    source: str
-    """Chapter first, then section, figure or equation: "ch. 3, Sec. 4, Eq. (19)"."""
-    statement: str
-    """The statement of the thesis, one sentence in our words."""
+    statement: Statement
     _: KW_ONLY
     published: Published = True
     """The published value; True if the thesis says that the statement holds."""
     case: str = ""
-    """Label, if several claims share a statement."""
+    """Label, if the statement has several rows."""
+    key: str = ""
+    """End of the row's id; default: from its label."""
+    where: str = ""
+    """Place in the thesis, if it is not that of the statement."""
     unit: str = ""
     tolerance: float | None = None
     """Difference up to which numbers count as equal; default: half of the last printed digit."""
@@ -68,29 +70,54 @@ class Claim:
     """The reason if it is not reproduced."""
     refuted: str = ""
     """The reason if proof or the thesis's own equations refute it, not merely our flights."""
+    note: str = ""
+    """What a reader must know to judge the row, whatever its verdict."""
+    origins: tuple[Origin, ...] = ()
+    """What is not the thesis's in this row, beside what its statement and its flights say."""
+    fitted: bool = False
+    """Whether parameters were chosen so that this row holds."""
+    finding: str = ""
+    """Key of the finding that settles it; default: that of the statement."""
 
     def __post_init__(self) -> None:
         yes_or_no = isinstance(self.published, bool)
-        if CHAPTER.match(self.source) is None:
-            raise ValueError(f"source {self.source!r}: must begin with a chapter: 'ch. 3, Sec.'")
-        if not self.statement:
-            raise ValueError(f"{self.source}: a claim needs a statement")
+        chapter = CHAPTER.match(self.source)
+        if chapter is None or int(chapter[1]) != self.chapter:
+            raise ValueError(f"source {self.source!r}: must begin with 'ch. {self.chapter}'")
         if yes_or_no and (self.tolerance is not None or self.in_kind is not None):
-            raise ValueError(f"{self.statement!r}: yes or no has neither tolerance nor in_kind")
+            raise ValueError(f"{self.id}: yes or no has neither tolerance nor in_kind")
         if not yes_or_no:
             self.numbers()
 
     @property
+    def id(self) -> str:
+        """Anchor on the page, unique among all claims."""
+        return "-".join(filter(None, (self.statement.id, self.key or slug(self.case))))
+
+    @property
+    def source(self) -> str:
+        """Chapter, section, figure or equation."""
+        return self.where or self.statement.source
+
+    @property
     def chapter(self) -> int:
         """The chapter's number."""
-        found = CHAPTER.match(self.source)
-        assert found is not None
-        return int(found[1])
+        return self.statement.chapter
 
     @property
     def section(self) -> str:
         """The source without its chapter."""
         return CHAPTER.sub("", self.source, count=1).lstrip(", ")
+
+    @property
+    def is_fit(self) -> bool:
+        """Whether parameters were chosen so that it holds."""
+        return self.fitted or self.statement.fitted
+
+    @property
+    def settled_by(self) -> str:
+        """Key of the finding that settles it, empty if none does."""
+        return self.finding or self.statement.finding
 
     def numbers(self) -> list[tuple[float, float]]:
         """The published numbers with their tolerances. Raises `ValueError` for other values."""
@@ -115,11 +142,6 @@ class AnalysisClaim(Claim):
 
     measure: Callable[[], Value]
 
-    @property
-    def key(self) -> str:
-        """Unique among all claims."""
-        return f"{self.source}: {self.statement} [{self.case}]"
-
 
 @dataclass(frozen=True)
 class FlightClaim(Claim):
@@ -138,30 +160,28 @@ class ExpectationClaim(Claim):
     address: str
     expectation: Expectation
 
-    @property
-    def key(self) -> tuple[str, str, str]:
-        """Equal for expectations that are the same claim on different plants."""
-        return self.address, self.expectation.metric, self.statement
-
     def measure(self, metrics: Metrics) -> Value | None:
         """The measured value, or whether the bounds hold if the thesis gives a yes/no answer."""
         value = metrics.get(self.expectation.metric)
         if value is None or isinstance(value, bool) or not isinstance(self.published, bool):
             return value
-        return Verdict(self.expectation, value).holds
+        if self.expectation.holds is None:
+            return Verdict(self.expectation, value).holds
+        low, high = self.expectation.holds
+        return low <= value <= high
 
 
 def verdict_on(claim: Claim, measured: Value | None) -> ClaimVerdict:
     """The verdict on a claim; ``measured`` is None if there is no value."""
     if measured is not None and _agrees(claim, measured):
-        return ClaimVerdict.REPRODUCED
+        return ClaimVerdict.FITTED if claim.is_fit else ClaimVerdict.REPRODUCED
     if claim.refuted:
         return ClaimVerdict.WRONG
     if claim.in_kind is not None and measured is not None:
         low, high = claim.in_kind
         values = measured if isinstance(measured, tuple) else (measured,)
         if all(low <= value <= high for value in values):
-            return ClaimVerdict.QUALITATIVE
+            return ClaimVerdict.FITTED if claim.is_fit else ClaimVerdict.QUALITATIVE
     return ClaimVerdict.NOT_REPRODUCED
 
 
@@ -198,15 +218,17 @@ def scenario_claims(scenario: Scenario) -> list[ExpectationClaim]:
         return []
     return [
         ExpectationClaim(
-            source=scenario.source,
-            statement=expectation.claim or _meaning(expectation.metric),
-            case=scenario.title,
+            statement=_statement(scenario, expectation),
+            case=", ".join(filter(None, (scenario.title, case := _case(scenario, expectation)))),
+            key=slug(f"{_short(scenario.address)} {case}"),
+            where=scenario.source,
             published=expectation.published,
             unit=unit_of(expectation.metric),
             tolerance=expectation.published_tolerance,
             in_kind=expectation.in_kind,
             why=expectation.why,
             refuted=expectation.why if expectation.wrong else "",
+            origins=tuple(Origin[name.upper()] for name in scenario.ours),
             address=scenario.address,
             expectation=expectation,
         )
@@ -215,6 +237,39 @@ def scenario_claims(scenario: Scenario) -> list[ExpectationClaim]:
     ]
 
 
-def _meaning(metric: str) -> str:
-    name = metric.replace("_", " ")
-    return name[0].upper() + name[1:]
+def _case(scenario: Scenario, expectation: Expectation) -> str:
+    """The label; the metric, if the flight has the claim for several and the file has no label."""
+    metrics = {other.metric for other in scenario.expect if other.claim == expectation.claim}
+    return expectation.case or (expectation.metric.replace("_", " ") if len(metrics) > 1 else "")
+
+
+def _short(address: str) -> str:
+    """File and variant, without folders: "line walk_third"."""
+    file, _, variant = address.partition("#")
+    return f"{Path(file).stem} {variant}"
+
+
+def _statement(scenario: Scenario, expectation: Expectation) -> Statement:
+    """From the table that the expectation names; otherwise its own words are the statement."""
+    table = scenario.claim.get(expectation.claim)
+    if table is not None:
+        return Statement(
+            id=expectation.claim,
+            source=scenario.source,
+            text=table.statement,
+            thesis=table.thesis,
+            criterion=table.criterion,
+            note=table.note,
+            fitted=table.fitted,
+            finding=table.finding,
+        )
+    words = expectation.claim or METRICS[expectation.metric].capitalize()
+    chapter = CHAPTER.match(scenario.source)
+    assert chapter is not None
+    return Statement(
+        id=f"ch{chapter[1]}-{slug(words)[:50].strip('-')}",
+        source=scenario.source,
+        text=words,
+        thesis=words,
+        criterion=f"{METRICS[expectation.metric].capitalize()}, compared with the published value.",
+    )

@@ -23,6 +23,7 @@ from tiltsim.report.claim import (
 )
 from tiltsim.report.claims import registered_claims
 from tiltsim.report.flights import PLANTS, FlightRecord, Flights, Plant, ReportEntry
+from tiltsim.report.statement import Origin, Statement
 from tiltsim.report.store import code_digest, results, sources_digest, store
 from tiltsim.scenario.scenario import Scenario
 
@@ -46,6 +47,18 @@ class Row:
     claim: Claim
     analysis: Cell | None = None
     plants: tuple[tuple[Plant, Cell], ...] = ()
+    origins: tuple[Origin, ...] = ()
+    """What of it is not the thesis's, by its statement, itself and its flights."""
+
+    @property
+    def statement(self) -> Statement:
+        """What it is a case of."""
+        return self.claim.statement
+
+    @property
+    def on_the_thesis_alone(self) -> bool:
+        """Whether it is reproduced, and nothing in it is ours."""
+        return self.verdict is ClaimVerdict.REPRODUCED and not self.origins
 
     @property
     def cells(self) -> list[Cell]:
@@ -72,7 +85,7 @@ class Failure:
 
 
 def analyze(folder: Path, jobs: int) -> dict[str, Value]:
-    """The measured values of all computed claims, by `AnalysisClaim.key`.
+    """The measured values of all computed claims, by `Claim.id`.
 
     They are stored in the folder until the core or the report changes.
 
@@ -101,7 +114,7 @@ def _measure(key: str) -> Value:
 
 
 def _computed() -> dict[str, AnalysisClaim]:
-    return {claim.key: claim for claim in registered_claims() if isinstance(claim, AnalysisClaim)}
+    return {claim.id: claim for claim in registered_claims() if isinstance(claim, AnalysisClaim)}
 
 
 def make_rows(
@@ -112,34 +125,46 @@ def make_rows(
     Args:
         entries: The scenarios, in order.
         flights: Their records.
-        values: Measured values of the computed claims, by `AnalysisClaim.key`; read only if
+        values: Measured values of the computed claims, by `Claim.id`; read only if
             ``whole``.
         whole: Whether this is the whole library. Otherwise computed claims are omitted, and so are
             claims about several flights of which one is missing.
     """
     rows = _expectation_rows(entries, flights)
+    ours = {entry.address: entry.scenario.ours for entry in entries}
     for claim in registered_claims():
         if isinstance(claim, FlightClaim):
             if whole or all((address, "mujoco") in flights for address in claim.flights):
                 rows.append(_flight_row(claim, flights))
         elif whole:
-            value = values[claim.key]
+            value = values[claim.id]
             rows.append(Row(claim, analysis=Cell(value, verdict_on(claim, value))))
-    return sorted((row for row in rows if row.cells), key=lambda row: row.claim.chapter)
+    return [
+        replace(row, origins=_origins(row.claim, ours))
+        for row in sorted(rows, key=lambda row: row.claim.chapter)
+        if row.cells
+    ]
+
+
+def _origins(claim: Claim, ours: Mapping[str, tuple[str, ...]]) -> tuple[Origin, ...]:
+    flights = claim.flights if isinstance(claim, FlightClaim) else ()
+    flown = {Origin[name.upper()] for address in flights for name in ours.get(address, ())}
+    found = {*claim.statement.origins, *claim.origins, *flown}
+    return tuple(origin for origin in Origin if origin in found)
 
 
 def _expectation_rows(entries: list[ReportEntry], flights: Flights) -> list[Row]:
-    rows: dict[tuple[str, str, str], Row] = {}
+    rows: dict[str, Row] = {}
     for entry in entries:
         for claim in scenario_claims(entry.scenario):
             for plant in PLANTS:
                 record = flights[entry.address, plant]
                 if claim.expectation.plant in {None, plant} and isinstance(record, FlightRecord):
-                    row = rows.get(claim.key, Row(claim))
+                    row = rows.get(claim.id, Row(claim))
                     cell = _expectation_cell(claim, record)
                     if claim.why and not row.claim.why:
                         row = replace(row, claim=replace(row.claim, why=claim.why))
-                    rows[claim.key] = replace(row, plants=(*row.plants, (plant, cell)))
+                    rows[claim.id] = replace(row, plants=(*row.plants, (plant, cell)))
     return list(rows.values())
 
 
@@ -189,3 +214,17 @@ def failures(entries: list[ReportEntry], flights: Flights) -> list[Failure]:
 def count(rows: Iterable[Row]) -> Counter[ClaimVerdict]:
     """The number of rows with each verdict."""
     return Counter(row.verdict for row in rows)
+
+
+def count_statements(rows: Iterable[Row]) -> Counter[ClaimVerdict]:
+    """The number of distinct statements with each verdict, the worst of their rows."""
+    verdicts: dict[str, list[ClaimVerdict]] = {}
+    for row in rows:
+        verdicts.setdefault(row.statement.id, []).append(row.verdict)
+    return Counter(map(worst, verdicts.values()))
+
+
+def errors(rows: Iterable[Row]) -> set[str]:
+    """The distinct errors of the thesis: findings, or statements that no finding settles."""
+    wrong = (row for row in rows if row.verdict is ClaimVerdict.WRONG)
+    return {row.claim.settled_by or row.statement.id for row in wrong}

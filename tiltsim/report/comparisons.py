@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Final
 
-from tiltsim.report.claim import CHAPTER
 from tiltsim.report.flights import PLANTS, FlightRecord, Flights, Plant, ReportEntry
+from tiltsim.report.statement import CHAPTER
 from tiltsim.scenario.metric_names import unit_of
 
 TITLE: Final = "Beyond the thesis"

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from decimal import Decimal
 from itertools import groupby
-from math import floor, isfinite, log10
+from math import floor, inf, isfinite, log10
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.report.claim import Claim, ClaimVerdict, ExpectationClaim
@@ -14,6 +14,8 @@ from tiltsim.report.claim_rows import Cell, Failure, Row
 from tiltsim.report.comparisons import Comparison
 from tiltsim.report.drawing import Drawing
 from tiltsim.report.findings import FINDINGS, Finding
+from tiltsim.report.statement import Origin, Statement
+from tiltsim.scenario.metric_names import METRICS
 from tiltsim.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -42,6 +44,7 @@ CHAPTERS: Final = {
 MEANINGS: Final = {
     ClaimVerdict.REPRODUCED: "equal within the printed digits, or the same yes/no answer",
     ClaimVerdict.QUALITATIVE: "the statement holds, but the number differs",
+    ClaimVerdict.FITTED: "it holds, but parameters were chosen so that it does: no evidence",
     ClaimVerdict.NOT_REPRODUCED: "the result differs; the reason is given",
     ClaimVerdict.WRONG: "refuted by proof or by the thesis's own equations",
 }
@@ -76,17 +79,21 @@ class Report:
     def chapter_groups(self, chapter: int) -> list[Group]:
         """The rows of a chapter grouped by statement, in order of first appearance."""
         rows = [row for row in self.rows if row.claim.chapter == chapter]
-        order = list(dict.fromkeys(row.claim.statement for row in rows))
-        rows.sort(key=lambda row: order.index(row.claim.statement))
-        return [Group(s, list(group)) for s, group in groupby(rows, lambda r: r.claim.statement)]
+        order = list(dict.fromkeys(row.statement.id for row in rows))
+        rows.sort(key=lambda row: order.index(row.statement.id))
+        return [Group(list(group)) for _, group in groupby(rows, lambda row: row.statement.id)]
 
 
 @dataclass(frozen=True)
 class Group:
     """Claims that share a statement."""
 
-    statement: str
     rows: list[Row]
+
+    @property
+    def statement(self) -> Statement:
+        """What all rows are cases of."""
+        return self.rows[0].statement
 
     @property
     def sources(self) -> str:
@@ -105,32 +112,46 @@ class Group:
         reasons = [reason for row in self.rows if (reason := why_of(row))]
         return reasons[0] if len(reasons) > 1 and len(set(reasons)) == 1 else ""
 
-    def case(self, row: Row) -> str:
-        """Label of a row within the group; with file or metric if titles are equal."""
-        claim = row.claim
-        alike = [other.claim for other in self.rows if other.claim.case == claim.case]
-        if len(alike) < 2 or not isinstance(claim, ExpectationClaim):
-            return claim.case
-        flights = [other for other in alike if isinstance(other, ExpectationClaim)]
-        details = []
-        if len({other.address for other in flights}) > 1:
-            file = claim.address.partition("#")[0].rpartition("/")[2]
-            details.append(file.removesuffix(".toml").replace("_", " "))
-        if sum(other.address == claim.address for other in flights) > 1:
-            details.append(claim.expectation.metric.replace("_", " "))
-        return f"{claim.case} ({', '.join(details)})"
-
 
 def why_of(row: Row) -> str:
     """The reason of a row that is not reproduced."""
     return "" if row.verdict is ClaimVerdict.REPRODUCED else row.claim.refuted or row.claim.why
 
 
-def published_text(claim: Claim) -> str:
-    """The published value: yes, no, or the number with its printed digits."""
+def criterion_text(claim: Claim) -> str:
+    """What would have made the row fail, in words, with its tolerance or range."""
+    parts = [claim.statement.criterion.rstrip(".")]
+    if not isinstance(claim.published, bool):
+        tolerances = dict.fromkeys(f"{tolerance:g}" for _, tolerance in claim.numbers())
+        parts.append(f"tolerance {' and '.join(tolerances)} {claim.unit}".rstrip())
+    elif isinstance(claim, ExpectationClaim) and claim.expectation.equals is None:
+        low, high = claim.expectation.holds or (claim.expectation.min, claim.expectation.max)
+        parts.append(_range_text(METRICS[claim.expectation.metric], low, high, claim.unit))
+    if claim.in_kind is not None:
+        parts.append("qualitatively: " + _range_text("value", *claim.in_kind, claim.unit))
+    return "; ".join(parts) + "."
+
+
+def _range_text(name: str, low: float | None, high: float | None, unit: str) -> str:
+    low = None if low == -inf else low
+    high = None if high == inf else high
+    if low is None:
+        text = f"at most {high:g}"
+    else:
+        text = f"at least {low:g}" if high is None else f"from {low:g} to {high:g}"
+    return f"{name.removesuffix(f', {unit}')} {text} {unit}".rstrip()
+
+
+def published_text(row: Row) -> str:
+    """The published value: yes, no, or the number with its printed digits.
+
+    Where the thesis flew nothing, what its statement implies.
+    """
+    claim = row.claim
     value = claim.published
     if isinstance(value, bool):
-        return _yes_or_no(value, claim)
+        implied = "implied: " if Origin.FLIGHT in row.origins else ""
+        return implied + _yes_or_no(value, claim)
     several = value if isinstance(value, tuple) else (value,)
     shown = [one if isinstance(one, str) else f"{one:g}" for one in several]
     text = _sign(shown[0]) if len(shown) == 1 else f"({', '.join(map(_sign, shown))})"

@@ -35,6 +35,7 @@ from tiltsim.report.flights import PLANTS
 _CLASSES: Final = {
     ClaimVerdict.REPRODUCED: "reproduced",
     ClaimVerdict.QUALITATIVE: "qualitative",
+    ClaimVerdict.FITTED: "fitted",
     ClaimVerdict.NOT_REPRODUCED: "not-reproduced",
     ClaimVerdict.WRONG: "wrong",
 }
@@ -208,21 +209,22 @@ def _group(group: Group) -> Iterator[str]:
     yield "<tbody>"
     if not single:
         why = f'<span class="why">{_prose(group.shared_why)}</span>' if group.shared_why else ""
+        text = _prose(group.statement.text)
         yield (
-            f'<tr class="group"><th colspan="5" scope="rowgroup"><div>{_prose(group.statement)} '
+            f'<tr class="group"><th colspan="5" scope="rowgroup"><div>{text} '
             f'<span class="section">{escape(group.sources)}</span>{why}</div></th></tr>'
         )
     for row in group.rows:
-        head = _prose(group.case(row))
+        head = _prose(row.claim.case)
         if single:
             section = f'<span class="section">{escape(row.claim.section)}</span>'
-            head = f"{_prose(group.statement)} {section}"
+            head = f"{_prose(group.statement.text)} {section}"
         why = why_of(row) if not group.shared_why else ""
         note = f'<span class="why">{_prose(why)}</span>' if why else ""
         kind = "" if single else ' class="case"'
         yield (
             f'<tr{kind}><th class="what" scope="row">{head}</th>'
-            f'<td class="n">{_number(published_text(row.claim), row)}</td>{_measured(row)}'
+            f'<td class="n">{_number(published_text(row), row)}</td>{_measured(row)}'
             f'<td class="verdict">{_mark(row.verdict)}{note}</td></tr>'
         )
     yield "</tbody>"

@@ -88,14 +88,14 @@ def _group(group: Group) -> Iterator[str]:
     single = len(group.rows) == 1
     if not single:
         note = f"<br>{group.shared_why}" if group.shared_why else ""
-        yield _cells([f"**{group.statement}** ({group.sources}){note}", "", "", "", ""])
+        yield _cells([f"**{group.statement.text}** ({group.sources}){note}", "", "", "", ""])
     for row in group.rows:
         claim = row.claim
-        head = f"**{claim.statement}** ({claim.section})" if single else group.case(row)
+        head = f"**{claim.statement.text}** ({claim.section})" if single else row.claim.case
         verdict = row.verdict.value
         if why_of(row) and not group.shared_why:
             verdict += f": {why_of(row)}"
-        yield _cells([head, published_text(claim), *_measured(row), verdict])
+        yield _cells([head, published_text(row), *_measured(row), verdict])
 
 
 def _measured(row: Row) -> list[str]:

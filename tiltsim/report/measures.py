@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim, Metrics
+from tiltsim.report.draft import draft
 from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS, robustness
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.analysis.stability import third_order_loop
@@ -89,7 +90,7 @@ def robustness_claim(source: str, key: str, case: str, refuted: str = "") -> Ana
         return bool(robustness(PUBLISHED_GAITS[key]).claim_holds)
 
     statement = "The gait is more robust than its biased twin"
-    return AnalysisClaim(source, statement, measure, case=case, refuted=refuted)
+    return AnalysisClaim(draft(source, statement), measure, case=case, refuted=refuted)
 
 
 def routh_holds(rows: Sequence[str]) -> bool:

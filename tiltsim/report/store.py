@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, TypeVar
 from tiltsim.engines.cache import core_sources
 from tiltsim.errors import InputError
 from tiltsim.resources import shipped_folder
+from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.system.files import replacing
 from tiltsim.system.processes import in_processes
 
@@ -36,7 +37,7 @@ def store(path: Path, content: bytes) -> None:
 
 def flight_key(scenario: Scenario) -> str:
     """Digest of everything that the numbers of a flight depend on."""
-    content = scenario.model_dump(mode="json", exclude={"title", "source", "without", "expect"})
+    content = scenario.model_dump(mode="json", exclude=set(DESCRIPTIVE))
     digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode())
     digest.update(code_digest())
     return digest.hexdigest()[:24]

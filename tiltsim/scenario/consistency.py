@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any, Final
 
 import numpy as np
 
+from tiltsim.scenario.claim import NAME
 from tiltsim.scenario.controller import laws_for
 from tiltsim.scenario.gait import FixedGait
-from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.reference import WaypointReference
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.simulation_table import InitialTable
@@ -55,6 +57,7 @@ def check_consistency(scenario: ScenarioTables) -> None:
     _check_reference(scenario)
     _check_rotor_limits(scenario)
     _check_ground(scenario)
+    _check_claims(scenario)
 
 
 def _check_law(scenario: ScenarioTables) -> None:
@@ -361,3 +364,10 @@ def _check_speed(scenario: ScenarioTables, loop: ErrorLoop) -> None:
                 f"rad/s; at most {limit / fastest:.3g} s, or slower gains, or "
                 "controller.allow_unstable = true",
             )
+
+
+def _check_claims(scenario: ScenarioTables) -> None:
+    for expectation in scenario.expect:
+        name = expectation.claim
+        if re.match(NAME, name) and name not in scenario.claim:
+            raise expectation.mistake("claim", "no such table; " + choose(name, scenario.claim))

@@ -18,11 +18,21 @@ class Expectation(Table):
 
     # An editor completes the names; the message on an unknown one is ours.
     metric: str = Field(json_schema_extra={"enum": list(METRICS)})
-    claim: str = Field("", description="the thesis's statement, paraphrased for the report")
+    claim: str = Field(
+        "", description="name of the [claim.NAME] table with the thesis's statement, or a sentence"
+    )
+    case: str = Field(
+        "", description="label among the claim's rows, if a flight has several; default: its title"
+    )
     published: float | bool | None = Field(
         None,
         description="the thesis's value, shown beside the measured one; true or false: whether the "
-        "metric, or the statement that it lies within the bounds, holds in the thesis",
+        "metric, or the statement that it lies within holds, is true in the thesis",
+    )
+    holds: Range | None = Field(
+        None,
+        description="where the thesis's statement is true; default: from min to max, which are "
+        "narrower bounds around our own value",
     )
     published_tolerance: NonNegative | None = Field(
         None,
@@ -64,10 +74,14 @@ class Expectation(Table):
             raise self.mistake("published", f"{self.metric} is true or false")
         if published is None:
             needs = "needs published: a number, true or false"
-            self.require_defaults(("claim", "why", "wrong"), needs)
+            self.require_defaults(("claim", "case", "why", "wrong"), needs)
         if published is None or isinstance(published, bool):
             self.require_defaults(("published_tolerance", "in_kind"), "needs a published number")
+        if boolean or not isinstance(published, bool):
+            self.require_defaults(("holds",), "needs a metric with a number, and true or false")
         if self.wrong and not self.why:
             raise self.mistake("wrong", "needs why")
-        if self.in_kind is not None and not self.in_kind[0] <= self.in_kind[1]:
-            raise self.mistake("in_kind", "write [low, high]")
+        for key in ("holds", "in_kind"):
+            bounds = getattr(self, key)
+            if bounds is not None and not bounds[0] <= bounds[1]:
+                raise self.mistake(key, "write [low, high]")

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Final
 
 from pydantic import Field, PrivateAttr
 
+from tiltsim.scenario.claim import ClaimName, ClaimTable, Origin
 from tiltsim.scenario.controller import Controller
 from tiltsim.scenario.expectation import Expectation
 from tiltsim.scenario.gait import FixedGait, Gait
@@ -23,6 +24,9 @@ from tiltsim.scenario.vehicle import (
 )
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
+DESCRIPTIVE: Final = ("title", "source", "without", "ours", "claim", "expect")
+"""Keys that describe and judge a flight, and change nothing in it."""
+
 
 class ScenarioTables(Table):
     """One flight, fully specified; `tiltsim.scenario.scenario.Scenario` adds the checks."""
@@ -34,6 +38,10 @@ class ScenarioTables(Table):
         description="address of the same flight without the feature that this one shows, #NAME in "
         "the same file: tiltsim report compares the two",
     )
+    ours: Annotated[tuple[Origin, ...], Field(strict=False)] = Field(
+        (), description="what of this flight is not given in its source, for tiltsim report"
+    )
+    claim: dict[ClaimName, ClaimTable] = Field({}, description="statements of the source")
     vehicle: VehicleUnion = VehicleTable()
     model_error: ModelErrorTable = ModelErrorTable()
     simulation: SimulationTable = SimulationTable()

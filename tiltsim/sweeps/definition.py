@@ -11,13 +11,17 @@ from pydantic import ValidationError
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import parse_scenario, without_none
 from tiltsim.scenario.messages import show
+from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.sweeps.tables import Sweep
 
 VERSIONS: Final = ("tiltsim", "mujoco", "numpy", "scipy")
 """Packages whose arithmetic the rows depend on."""
 
-COSMETIC: Final = ("title", "source", "without", "plot")
+COSMETIC: Final = (*DESCRIPTIVE, "plot")
 """Keys of a sweep file that change no flight."""
+
+UNUSED: Final = {"expect", "claim"}
+"""Tables of a scenario that have no effect in a sweep of it."""
 
 
 @dataclass(frozen=True)
@@ -59,10 +63,10 @@ class SweepDefinition:
         """The same with today's defaults written out; unchanged if it is no longer valid."""
         try:
             sweep = Sweep.model_validate(self.sweep).model_dump_json(exclude_none=True)
-            base = without_none(parse_scenario(self.base).model_dump(mode="json"))
+            scenario = parse_scenario(self.base)
+            base = without_none(scenario.model_dump(mode="json", exclude=UNUSED))
         except (ValidationError, InputError):
             return self
-        base.pop("expect", None)
         return replace(self, sweep=json.loads(sweep), base=base)
 
     def _decisive(self) -> dict[str, Any]:

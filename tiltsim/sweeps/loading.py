@@ -21,7 +21,7 @@ from tiltsim.scenario.loading import (
 )
 from tiltsim.scenario.messages import one_line_message
 from tiltsim.sweeps.checks import check_points
-from tiltsim.sweeps.definition import VERSIONS, SweepDefinition
+from tiltsim.sweeps.definition import UNUSED, VERSIONS, SweepDefinition
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.tables import CasesAxis, Sweep, dotted
 
@@ -78,6 +78,5 @@ def _base(sweep: Sweep, folder: Path, address: str) -> dict[str, Any]:
         locate_named_files(document, folder)
         apply_overrides(document, sweep.set, f"{address}: scenario")
         scenario = parse_scenario(document, f"{address}: scenario")
-    base: dict[str, Any] = without_none(scenario.model_dump(mode="json"))
-    del base["expect"]
+    base: dict[str, Any] = without_none(scenario.model_dump(mode="json", exclude=UNUSED))
     return base

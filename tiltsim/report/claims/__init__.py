@@ -1,19 +1,17 @@
 """Claims that need more than one flight, or none: computed, or derived from several flights.
 
-One module per chapter, found by its name; each has a tuple ``CLAIMS``, in the order of the text::
+One module per chapter, found by its name; each has its statements and a tuple ``CLAIMS`` of rows,
+in the order of the text::
 
-    AnalysisClaim(
-        "ch. 6, Sec. 3, Eq. (13)",
-        "On blue, alpha_1 + alpha_3 is constant",
-        lambda: 2.0 * delta(AR_DRONE_2),
-        published="0.334198",           # a string keeps the digits: good to 0.0000005
-    )
+    OFFSET = Statement(id="ch6-blue-offset", source="ch. 6, Sec. 3, Eq. (13)", ...)
+    AnalysisClaim(OFFSET, lambda: 2.0 * delta(AR_DRONE_2), published="0.334198")
 
-``published`` is True by default: the thesis says yes. ``measure`` returns a number, several numbers
-or a bool, always computed, never a constant, within about a second; that of a `FlightClaim` gets
-{address: metrics} of one plant. A flight that terminates early has ``diverged`` true in its metrics
-and may lack others. A statement with several cases is written several times with different
-``case``. Import heavy modules (scipy, mujoco) inside the functions.
+A number written as a string keeps its digits: this one is good to 0.0000005. ``published`` is True
+by default: the thesis says yes. ``measure`` returns a number, several numbers or a bool, always
+computed, never a constant, within about a second; that of a `FlightClaim` gets {address: metrics}
+of one plant. A flight that terminates early has ``diverged`` true in its metrics and may lack
+others. A statement with several cases has one row for each, with different ``case``. Import heavy
+modules (scipy, mujoco) inside the functions.
 """
 
 from __future__ import annotations

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
+from tiltsim.report.draft import draft
 from tiltsim.report.measures import planned_gait_tilts_less
 from tiltsim_controllers.analysis.singularity import torque_free_direction
 from tiltsim_controllers.vehicle.parameters import PRESETS
@@ -42,32 +43,42 @@ def _map_enlarges_the_attitudes() -> bool:
 
 CLAIMS = (
     FlightClaim(
-        "ch. 1, Sec. 2, Figs. 2-4",
-        "In a constant gust the perfect gait needs the smallest attitude of the three",
+        draft(
+            "ch. 1, Sec. 2, Figs. 2-4",
+            "In a constant gust the perfect gait needs the smallest attitude of the three",
+        ),
         _FLIGHTS,
         lambda flights: min(flights, key=lambda address: _tilt(flights[address])) == _PERFECT,
     ),
     FlightClaim(
-        "ch. 1, Sec. 2, Fig. 4",
-        "A quadrotor leans more than the tiltrotor with the perfect gait",
+        draft(
+            "ch. 1, Sec. 2, Fig. 4",
+            "A quadrotor leans more than the tiltrotor with the perfect gait",
+        ),
         (_PERFECT, _QUADROTOR),
         lambda flights: _tilt(flights[_QUADROTOR]) > _tilt(flights[_PERFECT]),
     ),
     AnalysisClaim(
-        "ch. 1, Sec. 2, Fig. 3",
-        "An imperfect gait may need a larger attitude than the quadrotor",
+        draft(
+            "ch. 1, Sec. 2, Fig. 3",
+            "An imperfect gait may need a larger attitude than the quadrotor",
+        ),
         _some_gait_tilts_more_than_the_quadrotor,
     ),
     FlightClaim(
-        "ch. 1, Abstract of the thesis; Sec. 3, Fig. 5",
-        "Planned gaits avoid the over-intensive changes of the tilt angles that feedback "
-        "linearization of all eight inputs requires",
+        draft(
+            "ch. 1, Abstract of the thesis; Sec. 3, Fig. 5",
+            "Planned gaits avoid the over-intensive changes of the tilt angles that feedback "
+            "linearization of all eight inputs requires",
+        ),
         _TILTING,
         planned_gait_tilts_less,
     ),
     AnalysisClaim(
-        "ch. 1, Abstract of the thesis",
-        "The Two Color Map enlarges the acceptable attitudes of all gaits compared",
+        draft(
+            "ch. 1, Abstract of the thesis",
+            "The Two Color Map enlarges the acceptable attitudes of all gaits compared",
+        ),
         _map_enlarges_the_attitudes,
         refuted="It does so for every red gait but for no blue one: there every attitude is "
         "singular.",

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
+from tiltsim.report.draft import draft
 from tiltsim_controllers.analysis.quadrotor_singularity import (
     normalized_determinant,
     published_determinant,
@@ -93,75 +94,83 @@ def _crossing_is_harmful(flights: Mapping[str, Metrics]) -> bool:
 
 CLAIMS = (
     AnalysisClaim(
-        "ch. 2, Sec. 3, Eqs. (21), (44)",
-        "Yaw-position control has singular attitudes within 90 degrees of roll and pitch",
+        draft(
+            "ch. 2, Sec. 3, Eqs. (21), (44)",
+            "Yaw-position control has singular attitudes within 90 degrees of roll and pitch",
+        ),
         _zero_inside,
         refuted=_ONE_ENTRY,
     ),
     AnalysisClaim(
-        "ch. 2, Sec. 3, Eqs. (43)-(44)",
-        "S(θ, φ) is the determinant of the matrix in Eq. (43)",
+        draft(
+            "ch. 2, Sec. 3, Eqs. (43)-(44)", "S(θ, φ) is the determinant of the matrix in Eq. (43)"
+        ),
         _eq_43_as_printed,
     ),
     AnalysisClaim(
-        "ch. 2, Sec. 4, Fig. 3",
-        "On the curve S(θ, φ) = 0 the decoupling matrix is singular",
+        draft(
+            "ch. 2, Sec. 4, Fig. 3", "On the curve S(θ, φ) = 0 the decoupling matrix is singular"
+        ),
         _exact_on_published_curve,
         refuted="As above: on the curve the exact determinant is far from zero.",
     ),
     AnalysisClaim(
-        "ch. 2, Sec. 4, Fig. 3",
-        "At level attitude the determinant is zero (here over its value in hover)",
+        draft(
+            "ch. 2, Sec. 4, Fig. 3",
+            "At level attitude the determinant is zero (here over its value in hover)",
+        ),
         lambda: float(normalized_determinant(0.0, 0.0, _HOVER, _VEHICLE)),
         published="0.00",
         refuted="As above; the matrix is best conditioned in level hover.",
     ),
     AnalysisClaim(
-        "ch. 2, Sec. 5",
-        "Attitude-altitude control has singular attitudes within 90 degrees",
+        draft(
+            "ch. 2, Sec. 5", "Attitude-altitude control has singular attitudes within 90 degrees"
+        ),
         _attitude_altitude_is_singular,
         published=False,
     ),
     AnalysisClaim(
-        "ch. 2, App. B, Eqs. (A3)-(A6)",
-        "The gains of the yaw-position controller stabilize the linearized system",
+        draft(
+            "ch. 2, App. B, Eqs. (A3)-(A6)",
+            "The gains of the yaw-position controller stabilize the linearized system",
+        ),
         lambda: _are_stable(GAIN_SETS["ch02"], 4),
         refuted="s⁴ + 10s³ + 20s² + 50s + 500 has roots at 1.30 ± 3.26j: Routh's condition fails.",
     ),
     AnalysisClaim(
-        "ch. 2, App. B, Eqs. (A8)-(A9)",
-        "The gains of the attitude-altitude controller stabilize the linearized system",
+        draft(
+            "ch. 2, App. B, Eqs. (A8)-(A9)",
+            "The gains of the attitude-altitude controller stabilize the linearized system",
+        ),
         lambda: _are_stable(quadrotor_attitude_altitude.GAIN_SETS["ch02"], 2),
     ),
     AnalysisClaim(
-        "ch. 2, Sec. 3.2",
-        "Without thrust the yaw-position matrix is singular",
+        draft("ch. 2, Sec. 3.2", "Without thrust the yaw-position matrix is singular"),
         lambda: float(normalized_determinant(0.3, 0.2, 0.0, _VEHICLE)) == 0.0,
     ),
     FlightClaim(
-        "ch. 2, Sec. 4",
-        "Crossing the curve S = 0 makes the control law fail",
+        draft("ch. 2, Sec. 4", "Crossing the curve S = 0 makes the control law fail"),
         (_STABLE,),
         _crossing_is_harmful,
         refuted="With stable gains the same control law crosses it on the way to the circle, "
         "and tracks.",
     ),
     FlightClaim(
-        "ch. 2, Sec. 6",
-        "The singular matrix is why the yaw-position controller fails",
+        draft("ch. 2, Sec. 6", "The singular matrix is why the yaw-position controller fails"),
         (_STABLE,),
         lambda flights: bool(flights[_STABLE]["diverged"]),
         refuted="The cause is the gains: Appendix B's are unstable on their own, and with stable "
         "ones the flight completes from the same start.",
     ),
     AnalysisClaim(
-        "ch. 2, Sec. 4",
-        "The direction of the body-fixed axes has no influence on the result",
+        draft(
+            "ch. 2, Sec. 4", "The direction of the body-fixed axes has no influence on the result"
+        ),
         lambda: not _signs_of_axes_matter(),
     ),
     AnalysisClaim(
-        "ch. 2, Sec. 6",
-        "Choices of four outputs out of six, and of three",
+        draft("ch. 2, Sec. 6", "Choices of four outputs out of six, and of three"),
         lambda: (float(comb(6, 4)), float(comb(6, 3))),
         published=("15", "20"),
     ),

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
+from tiltsim.report.draft import draft
 from tiltsim.report.measures import (
     Coefficients,
     coefficient,
@@ -136,8 +137,7 @@ _RESTING_COLUMN: Final = (
 CLAIMS = (
     *(
         AnalysisClaim(
-            "ch. 3, Sec. 4, Eqs. (17), (19)",
-            "Coefficients of the determinant",
+            draft("ch. 3, Sec. 4, Eqs. (17), (19)", "Coefficients of the determinant"),
             partial(coefficient, part, name, _VEHICLE),
             case=" ".join(map("{}{}".format, name, (1, 2, 3, 4))) + factors,
             published=published,
@@ -153,8 +153,9 @@ CLAIMS = (
         )
     ),
     AnalysisClaim(
-        "ch. 3, Sec. 4, Eq. (17)",
-        "Eq. (17), term by term, is the determinant at any attitude",
+        draft(
+            "ch. 3, Sec. 4, Eq. (17)", "Eq. (17), term by term, is the determinant at any attitude"
+        ),
         lambda: all(
             terms_hold(part, printed, _VEHICLE) for part, printed in EQ_17._asdict().items()
         ),
@@ -162,14 +163,18 @@ CLAIMS = (
         "and 6, and -2.880 s1 c2 s3 s4 sin φ cos θ should be s1 c2 c3 s4.",
     ),
     AnalysisClaim(
-        "ch. 3, Sec. 4, Eq. (19)",
-        "Eq. (19), term by term, is the determinant at level attitude",
+        draft(
+            "ch. 3, Sec. 4, Eq. (19)",
+            "Eq. (19), term by term, is the determinant at level attitude",
+        ),
         partial(terms_hold, "R", EQ_19, _VEHICLE),
     ),
     *(
         AnalysisClaim(
-            "ch. 3, Sec. 5.2, Figs. 10-13",
-            "The triangle U, V, M of (α₂, α₄) contains no singular gait",
+            draft(
+                "ch. 3, Sec. 5.2, Figs. 10-13",
+                "The triangle U, V, M of (α₂, α₄) contains no singular gait",
+            ),
             partial(_triangle_is_regular, case),
             case=restriction,
         )
@@ -177,8 +182,10 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            "ch. 3, Sec. 5.2, Figs. 3, 5, 7, 9",
-            "From (α₂, α₄) = (1, 1) to (-1, -1) a gait crosses a singular one",
+            draft(
+                "ch. 3, Sec. 5.2, Figs. 3, 5, 7, 9",
+                "From (α₂, α₄) = (1, 1) to (-1, -1) a gait crosses a singular one",
+            ),
             partial(_switching_crosses, case),
             case=restriction,
             refuted=_NO_CROSSING if case == "negative" else "",
@@ -186,12 +193,11 @@ CLAIMS = (
         for case, (restriction, _) in DETERMINANT_CASES.items()
     ),
     AnalysisClaim(
-        "ch. 3, Sec. 7",
-        "The untilted vehicle's decoupling matrix is always invertible",
+        draft("ch. 3, Sec. 7", "The untilted vehicle's decoupling matrix is always invertible"),
         _untilted_is_regular,
     ),
     *(
-        FlightClaim(f"ch. 3, {section}", statement, _pair(gait), measure, case=title)
+        FlightClaim(draft(f"ch. 3, {section}", statement), _pair(gait), measure, case=title)
         for section, statement, measure in (
             (
                 "Sec. 6.3, Figs. 24-27",
@@ -213,8 +219,10 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            "ch. 3, Sec. 6.1.1, Eq. (12)",
-            "A rotor at rest makes the decoupling matrix singular",
+            draft(
+                "ch. 3, Sec. 6.1.1, Eq. (12)",
+                "A rotor at rest makes the decoupling matrix singular",
+            ),
             partial(_rest_is_singular, exact=not reason),
             case=case,
             refuted=reason,
@@ -225,27 +233,31 @@ CLAIMS = (
         )
     ),
     AnalysisClaim(
-        "ch. 3, Sec. 5.3",
-        "The untilted rotors carry the weight at the initial 300 rad/s",
+        draft("ch. 3, Sec. 5.3", "The untilted rotors carry the weight at the initial 300 rad/s"),
         lambda: _VEHICLE.hover_rotor_speed <= 300.0,
         published=False,
     ),
     AnalysisClaim(
-        "ch. 3, Sec. 7",
-        "Every gait of the region can return to no tilt without a singularity",
+        draft(
+            "ch. 3, Sec. 7", "Every gait of the region can return to no tilt without a singularity"
+        ),
         _return_to_no_tilt_is_regular,
     ),
     FlightClaim(
-        "ch. 3, Sec. 6.2, Figs. 20-23",
-        "Stable corners (-1.3, 1.3), (1.3, -1.3), (1, 1) of five pairs, each restriction "
-        "at its largest tilt and no tilt",
+        draft(
+            "ch. 3, Sec. 6.2, Figs. 20-23",
+            "Stable corners (-1.3, 1.3), (1.3, -1.3), (1, 1) of five pairs, each restriction "
+            "at its largest tilt and no tilt",
+        ),
         _corners("s", "t", "m"),
         _stable_flights,
         published="15",
     ),
     FlightClaim(
-        "ch. 3, Sec. 7",
-        "Stable gaits beyond them, at (-1.5, 1.5) and (1.5, -1.5), of the same pairs",
+        draft(
+            "ch. 3, Sec. 7",
+            "Stable gaits beyond them, at (-1.5, 1.5) and (1.5, -1.5), of the same pairs",
+        ),
         _corners("u", "v"),
         _stable_flights,
         published="0",

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
+from tiltsim.report.draft import draft
 from tiltsim.report.measures import (
     every_flight_completed,
     falls,
@@ -115,8 +116,7 @@ def _better(
 ) -> FlightClaim:
     flights = tuple(flights)
     return FlightClaim(
-        source,
-        "The modified decoupler reduces the remaining error",
+        draft(source, "The modified decoupler reduces the remaining error"),
         flights,
         partial(falls, error),
         case=case,
@@ -126,19 +126,25 @@ def _better(
 
 CLAIMS = (
     AnalysisClaim(
-        "ch. 4, Sec. 3.3, Eq. (25)",
-        "For the trot the determinant at level attitude is 4 cos² ρ",
+        draft(
+            "ch. 4, Sec. 3.3, Eq. (25)",
+            "For the trot the determinant at level attitude is 4 cos² ρ",
+        ),
         _eq_25_holds,
     ),
     AnalysisClaim(
-        "ch. 4, Sec. 3.3, Prop. 3",
-        "The trot meets no singularity at level attitude for |ρ| <= 0.65",
+        draft(
+            "ch. 4, Sec. 3.3, Prop. 3",
+            "The trot meets no singularity at level attitude for |ρ| <= 0.65",
+        ),
         lambda: bool((_trot_residuals()[1] > 0.0).all()),
     ),
     *(
         AnalysisClaim(
-            "ch. 4, Sec. 5.1, Prop. 4",
-            "The gains satisfy Eqs. (35)-(38), so that attitude and altitude are stable",
+            draft(
+                "ch. 4, Sec. 5.1, Prop. 4",
+                "The gains satisfy Eqs. (35)-(38), so that attitude and altitude are stable",
+            ),
             partial(routh_holds, case.split(" and ")),
             case=case,
             refuted=reason,
@@ -159,8 +165,7 @@ CLAIMS = (
         )
     ),
     AnalysisClaim(
-        "ch. 4, Sec. 5.1, Prop. 5",
-        "The gains of the position loop satisfy Eqs. (39)-(40)",
+        draft("ch. 4, Sec. 5.1, Prop. 5", "The gains of the position loop satisfy Eqs. (39)-(40)"),
         lambda: min(GAIN_SETS["ch04"].position_1, GAIN_SETS["ch04"].position_2) > 0.0,
     ),
     *(
@@ -196,8 +201,10 @@ CLAIMS = (
     ),
     *(
         FlightClaim(
-            _PERIOD_FIGURES[reference],
-            "The error grows with the period of the trot (T = 1, 2, 3 s)",
+            draft(
+                _PERIOD_FIGURES[reference],
+                "The error grows with the period of the trot (T = 1, 2, 3 s)",
+            ),
             tuple(_trot(reference, form, T, decoupler) for T in _PERIODS),
             partial(grows, tracking_error),
             case=f"{reference}, {_FORMS[form]}, {decoupler}",
@@ -207,9 +214,11 @@ CLAIMS = (
     ),
     *(
         FlightClaim(
-            _PERIOD_FIGURES[reference],
-            "At the short period the decouplers hardly differ "
-            "(T = 1 s: by less than a tenth of the difference at T = 3 s)",
+            draft(
+                _PERIOD_FIGURES[reference],
+                "At the short period the decouplers hardly differ "
+                "(T = 1 s: by less than a tenth of the difference at T = 3 s)",
+            ),
             _trots(reference, form),
             partial(_short_periods_do_not_differ, reference, form),
             case=f"{reference}, {_FORMS[form]}",
@@ -219,8 +228,10 @@ CLAIMS = (
     ),
     *(
         FlightClaim(
-            _PERIOD_FIGURES[reference],
-            "The continuous trot tracks better than the instant one, period by period",
+            draft(
+                _PERIOD_FIGURES[reference],
+                "The continuous trot tracks better than the instant one, period by period",
+            ),
             tuple(_trot(reference, f, T, decoupler) for f in _FORMS for T in _PERIODS),
             partial(_continuous_is_better, reference, decoupler),
             case=f"{reference}, {decoupler}",
@@ -229,28 +240,32 @@ CLAIMS = (
         for reference, decoupler in product(_PERIOD_FIGURES, _DECOUPLERS)
     ),
     FlightClaim(
-        "ch. 4, Sec. 8",
-        "The trot tracks line and circle, with either decoupler and every period",
+        draft(
+            "ch. 4, Sec. 8",
+            "The trot tracks line and circle, with either decoupler and every period",
+        ),
         _ALL_TROTS,
         every_flight_completed,
         why=_GYROSCOPIC,
     ),
     FlightClaim(
-        "ch. 4, Sec. 5.1",
-        "No rotor reaches the limit of zero speed",
+        draft("ch. 4, Sec. 5.1", "No rotor reaches the limit of zero speed"),
         _ALL_TROTS,
         no_rotor_stops,
         why="In MuJoCo a rotor of the flight that loses control (see above) reverses.",
     ),
     AnalysisClaim(
-        "ch. 4, Sec. 3.2, Remark 2",
-        "Without tilt the modified decoupler is the conventional one",
+        draft(
+            "ch. 4, Sec. 3.2, Remark 2",
+            "Without tilt the modified decoupler is the conventional one",
+        ),
         _decouplers_agree_without_tilt,
     ),
     *(
         FlightClaim(
-            "ch. 4, Sec. 8",
-            "Without neglecting higher-order terms the error decreases further",
+            draft(
+                "ch. 4, Sec. 8", "Without neglecting higher-order terms the error decreases further"
+            ),
             (_address("setpoint", name, "modified"), f"beyond/setpoint_exact_decoupler#{name}"),
             partial(falls, resting_error),
             case=f"setpoint, {title}",

@@ -17,6 +17,7 @@ import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
 from tiltsim.report.claims.ch03 import EQ_17, EQ_19
+from tiltsim.report.draft import draft
 from tiltsim.report.measures import (
     every_flight_completed,
     falls,
@@ -152,8 +153,7 @@ def _of_references(
     """A claim about all flights of a reference, for each reference."""
     for reference, figure in _REFERENCES.items():
         yield FlightClaim(
-            f"ch. 5, {section or figure}",
-            statement,
+            draft(f"ch. 5, {section or figure}", statement),
             _all(reference),
             partial(measure, reference),
             case=reference + case,
@@ -166,8 +166,7 @@ def _of_one_gait(
     """A claim about all flights of a gait, for each reference and gait."""
     for (reference, figure), gait in product(_REFERENCES.items(), gaits):
         yield FlightClaim(
-            f"ch. 5, {figure}",
-            statement,
+            draft(f"ch. 5, {figure}", statement),
             _all(reference, (gait,)),
             partial(measure, reference, gait),
             case=f"{reference}, {_GAITS[gait]}",
@@ -176,13 +175,16 @@ def _of_one_gait(
 
 CLAIMS = (
     AnalysisClaim(
-        "ch. 5, Sec. 3.1, Eq. (11)",
-        "Eq. (11), term by term, is the determinant at level attitude",
+        draft(
+            "ch. 5, Sec. 3.1, Eq. (11)",
+            "Eq. (11), term by term, is the determinant at level attitude",
+        ),
         partial(terms_hold, "R", EQ_19, _VEHICLE),
     ),
     AnalysisClaim(
-        "ch. 5, Sec. 4, Eq. (15)",
-        "Eq. (15), term by term, is the determinant at any attitude",
+        draft(
+            "ch. 5, Sec. 4, Eq. (15)", "Eq. (15), term by term, is the determinant at any attitude"
+        ),
         lambda: all(
             terms_hold(part, printed, _VEHICLE) for part, printed in EQ_15._asdict().items()
         ),
@@ -191,8 +193,10 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            "ch. 5, Abstract and Sec. 4",
-            "Unscaled, the gait meets a singular matrix at level attitude" + _FITTED,
+            draft(
+                "ch. 5, Abstract and Sec. 4",
+                "Unscaled, the gait meets a singular matrix at level attitude" + _FITTED,
+            ),
             partial(_is_singular, gait),
             case=gait.replace("_", " "),
             published=gait != "run",
@@ -200,22 +204,26 @@ CLAIMS = (
         for gait in (*_SCALED, "run")
     ),
     AnalysisClaim(
-        "ch. 5, Sec. 4, Prop. 1, Eq. (18)",
-        "Some integer n makes a gait scaled by 1/n regular",
+        draft(
+            "ch. 5, Sec. 4, Prop. 1, Eq. (18)", "Some integer n makes a gait scaled by 1/n regular"
+        ),
         _some_scale_is_regular,
     ),
     *(
         AnalysisClaim(
-            f"ch. 5, Sec. 4, Fig. {figure}",
-            "Scaled by 1/2 and 1/3 the singular attitudes move away from level" + _FITTED,
+            draft(
+                f"ch. 5, Sec. 4, Fig. {figure}",
+                "Scaled by 1/2 and 1/3 the singular attitudes move away from level" + _FITTED,
+            ),
             partial(_scaling_enlarges, gait),
             case=gait.replace("_", " "),
         )
         for gait, figure in zip(_SCALED, (9, 10, 11), strict=True)
     ),
     AnalysisClaim(
-        "ch. 5, App. A, Eqs. (A1)-(A4)",
-        "With the printed gains the attitude loops are stable",
+        draft(
+            "ch. 5, App. A, Eqs. (A1)-(A4)", "With the printed gains the attitude loops are stable"
+        ),
         partial(routh_holds, ("roll", "pitch", "yaw")),
         refuted="K1 K2 > K3 fails as in ch. 4, Prop. 4: 10 against 50 for roll and pitch, 1 "
         "against 1 for yaw. The factor missing in the printed matrix makes the flights stable.",
@@ -227,8 +235,10 @@ CLAIMS = (
     ),
     *(
         FlightClaim(
-            f"ch. 5, {section}",
-            "The modified decoupler decreases the error for all gaits" + _FITTED,
+            draft(
+                f"ch. 5, {section}",
+                "The modified decoupler decreases the error for all gaits" + _FITTED,
+            ),
             tuple(_address(reference, gait, period, d) for d in _DECOUPLERS),
             partial(falls, tracking_error),
             case=f"{reference}, {title}, T = {period} s",
@@ -266,9 +276,11 @@ CLAIMS = (
         "Sec. 7",
     ),
     FlightClaim(
-        "ch. 5, Sec. 7, Figs. 14-15",
-        "The scale of the walk, 1/3 or 1/6, changes the rotor speeds "
-        "(their range by at least a tenth)",
+        draft(
+            "ch. 5, Sec. 7, Figs. 14-15",
+            "The scale of the walk, 1/3 or 1/6, changes the rotor speeds "
+            "(their range by at least a tenth)",
+        ),
         tuple(_address("line", f"walk_{n}", 3, "modified") for n in ("third", "sixth")),
         _scale_changes_the_speeds,
     ),

@@ -11,6 +11,7 @@ import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim
 from tiltsim.report.claims.ch03 import EQ_17, EQ_19
+from tiltsim.report.draft import draft
 from tiltsim.report.measures import robustness_claim, terms, terms_hold
 from tiltsim_controllers.analysis.published_gaits import (
     PUBLISHED_GAITS,
@@ -161,16 +162,16 @@ _BLUE: Final = ("ch06_gait_1", "ch06_gait_2")
 
 CLAIMS = (
     AnalysisClaim(
-        "ch. 6, Sec. 2, Eq. (1)",
-        "Eq. (1), term by term, is the determinant at any attitude",
+        draft(
+            "ch. 6, Sec. 2, Eq. (1)", "Eq. (1), term by term, is the determinant at any attitude"
+        ),
         partial(terms_hold, "R_phi", EQ_1_ROLL, _VEHICLE),
         case="terms with sin φ",
         refuted="-2.880 s1 c2 s3 s4 sin φ cos θ should be s1 c2 c3 s4, as in Eq. (4).",
     ),
     *(
         AnalysisClaim(
-            f"ch. 6, Sec. {section}",
-            f"{name} is printed correctly, term by term",
+            draft(f"ch. 6, Sec. {section}", f"{name} is printed correctly, term by term"),
             partial(terms_hold, part, printed, _VEHICLE),
         )
         for section, name, part, printed in (
@@ -181,54 +182,58 @@ CLAIMS = (
         )
     ),
     AnalysisClaim(
-        "ch. 6, Sec. 3, Fig. 4",
-        "Roots (α₃, α₄) for a grid point inside, on a side, in a corner",
+        draft(
+            "ch. 6, Sec. 3, Fig. 4",
+            "Roots (α₃, α₄) for a grid point inside, on a side, in a corner",
+        ),
         _counts,
         published=("2", "3", "5"),
     ),
     AnalysisClaim(
-        "ch. 6, Sec. 3, Figs. 5-10", "α₃ lies on two planes, and so does α₄", _on_two_planes
+        draft("ch. 6, Sec. 3, Figs. 5-10", "α₃ lies on two planes, and so does α₄"), _on_two_planes
     ),
     AnalysisClaim(
-        "ch. 6, Sec. 3",
-        "Classes of roots by their planes",
+        draft("ch. 6, Sec. 3", "Classes of roots by their planes"),
         lambda: float(len(root_classes(_grid()))),
         published="7",
     ),
     AnalysisClaim(
-        "ch. 6, Sec. 3",
-        "Some root mixes the planes: (+,-) or (-,+)",
+        draft("ch. 6, Sec. 3", "Some root mixes the planes: (+,-) or (-,+)"),
         lambda: bool(_classes(lambda root: True) & {"(+,-)", "(-,+)"}),
         published=False,
     ),
     AnalysisClaim(
-        "ch. 6, Sec. 3, Figs. 11-14",
-        "Roots with R > 0 are of the classes (+,+), (+,?) and (?,+) only",
+        draft(
+            "ch. 6, Sec. 3, Figs. 11-14",
+            "Roots with R > 0 are of the classes (+,+), (+,?) and (?,+) only",
+        ),
         lambda: _classes(lambda root: root.R > _ZERO) <= {"(+,+)", "(+,?)", "(?,+)"},
         why="Where both pairs of planes meet within half a grid step there are also (?,?): "
         "three grid points next to P.",
     ),
     AnalysisClaim(
-        "ch. 6, Sec. 3, Figs. 11-14",
-        "At most one root with R > 0",
+        draft("ch. 6, Sec. 3, Figs. 11-14", "At most one root with R > 0"),
         lambda: sum(root.R > _ZERO for root in _inside()) == len(_positive_points()),
     ),
     AnalysisClaim(
-        "ch. 6, Sec. 3",
-        "The points with R > 0 fill the triangle (-7, 7), (-7, -5), (5, 7) in π/16",
+        draft(
+            "ch. 6, Sec. 3",
+            "The points with R > 0 fill the triangle (-7, 7), (-7, -5), (5, 7) in π/16",
+        ),
         _triangle_is_the_published,
         refuted="They reach (-7, -7) and (7, 7), and include the untilted vehicle, whose R is 4.",
     ),
     AnalysisClaim(
-        "ch. 6, Sec. 3, Figs. 15-16",
-        "Roots with R < 0 cover all seven classes",
+        draft("ch. 6, Sec. 3, Figs. 15-16", "Roots with R < 0 cover all seven classes"),
         lambda: len(_classes(lambda root: root.R < -_ZERO)) == 7,
         refuted="Blue roots, those with a minus, have R = 0 exactly; with the printed coefficients "
         "the sign of R there is rounding.",
     ),
     AnalysisClaim(
-        "ch. 6, Sec. 3",
-        "For an (α₁, α₂) with R < 0 there may be two usable roots, red and blue",
+        draft(
+            "ch. 6, Sec. 3",
+            "For an (α₁, α₂) with R < 0 there may be two usable roots, red and blue",
+        ),
         lambda: any(
             sum(root.R < -_ZERO for root in cell) == 2
             for row in _grid()[1:-1]
@@ -237,8 +242,7 @@ CLAIMS = (
         refuted="Only red ones are usable: " + RANK,
     ),
     AnalysisClaim(
-        "ch. 6, Sec. 6",
-        "On (+,+) α₁ = α₃ and α₂ = α₄",
+        draft("ch. 6, Sec. 6", "On (+,+) α₁ = α₃ and α₂ = α₄"),
         lambda: all(
             abs(root.alpha_3 - root.alpha_1) + abs(root.alpha_4 - root.alpha_2) < _ZERO
             for root in _inside()
@@ -247,8 +251,7 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            "ch. 6, Sec. 4, Theorem 1",
-            "A closed path in one color gives a continuous gait",
+            draft("ch. 6, Sec. 4, Theorem 1", "A closed path in one color gives a continuous gait"),
             partial(_one_color_is_accepted, color),
             case=color,
         )
@@ -256,8 +259,7 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            "ch. 6, Sec. 5",
-            "The printed angles lie on the surface",
+            draft("ch. 6, Sec. 5", "The printed angles lie on the surface"),
             partial(_angles_on_lines, key),
             case=name,
         )
@@ -265,8 +267,7 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            "ch. 6, Sec. 5",
-            "Sign of R along the whole gait, on the exact lines",
+            draft("ch. 6, Sec. 5", "Sign of R along the whole gait, on the exact lines"),
             partial(_signs, key),
             case=name,
             published=_SIGN[key],
@@ -282,29 +283,31 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            f"ch. 6, Sec. 5, Fig. {_FIGURES[key]}",
-            "Nearly all attitudes within 90 degrees are admissible",
+            draft(
+                f"ch. 6, Sec. 5, Fig. {_FIGURES[key]}",
+                "Nearly all attitudes within 90 degrees are admissible",
+            ),
             partial(_nearly_all, key),
             case=_GAITS[key],
         )
         for key in ("ch06_gait_3", "ch06_gait_4")
     ),
     AnalysisClaim(
-        "ch. 6, Sec. 6, Figs. 23, 28",
-        "Gait 2, as printed, has a greater advantage over the gait with a bias of 99 % "
-        "than over that of 80 %",
+        draft(
+            "ch. 6, Sec. 6, Figs. 23, 28",
+            "Gait 2, as printed, has a greater advantage over the gait with a bias of 99 % "
+            "than over that of 80 %",
+        ),
         _greater_advantage_over_99,
         why="By the margin the printed Gait 2 has none over either: 0.7251 rad compared with "
         "0.7285 and 0.7851. The diagrams compare rounding.",
     ),
     AnalysisClaim(
-        "ch. 6, Sec. 6",
-        "Gaits on (+,+) have more acceptable attitudes than those on (-,-)",
+        draft("ch. 6, Sec. 6", "Gaits on (+,+) have more acceptable attitudes than those on (-,-)"),
         _red_beats_blue,
     ),
     AnalysisClaim(
-        "ch. 6, Sec. 6",
-        "Scaling only α₃ and α₄ may make a gait less robust",
+        draft("ch. 6, Sec. 6", "Scaling only α₃ and α₄ may make a gait less robust"),
         _partial_scaling_can_harm,
     ),
 )

@@ -10,6 +10,7 @@ import numpy as np
 from tiltsim.report.claim import AnalysisClaim
 from tiltsim.report.claims.ch03 import EQ_19
 from tiltsim.report.claims.ch06 import RANK
+from tiltsim.report.draft import draft
 from tiltsim.report.measures import robustness_claim, terms_hold
 from tiltsim_controllers.analysis.published_gaits import PATHS, PUBLISHED_GAITS, robustness
 from tiltsim_controllers.analysis.singularity import residuals
@@ -94,15 +95,18 @@ def _both_are_sufficient() -> bool:
 _AT_P: Final = "P lies on L, where R = 0, and the other half of the gait is blue. "
 
 CLAIMS = (
-    AnalysisClaim("ch. 8, Sec. 3.1, Eq. (7)", "Eq. (7), term by term, is R on red", _eq_7_holds),
     AnalysisClaim(
-        "ch. 8, Sec. 3.1, Fig. 6",
-        "L divides the square |α₁|, |α₂| <= 1 in two, with R > 0 above and R < 0 below",
+        draft("ch. 8, Sec. 3.1, Eq. (7)", "Eq. (7), term by term, is R on red"), _eq_7_holds
+    ),
+    AnalysisClaim(
+        draft(
+            "ch. 8, Sec. 3.1, Fig. 6",
+            "L divides the square |α₁|, |α₂| <= 1 in two, with R > 0 above and R < 0 below",
+        ),
         _divides_in_two,
     ),
     AnalysisClaim(
-        "ch. 8, Sec. 3.4",
-        "The colors meet at P = (p, -p) with p",
+        draft("ch. 8, Sec. 3.4", "The colors meet at P = (p, -p) with p"),
         lambda: _P[0],
         published="0.167099",
         unit="rad",
@@ -110,15 +114,13 @@ CLAIMS = (
         why=DIGITS,
     ),
     AnalysisClaim(
-        "ch. 8, Sec. 3.1",
-        "P lies below L, in S_D",
+        draft("ch. 8, Sec. 3.1", "P lies below L, in S_D"),
         lambda: region(*_P, _VEHICLE) == "S_D",
         refuted="P lies on L exactly: tan(-δ) = tan δ - 2r with r = tan δ. The printed P has "
         "R = -1.4e-4, from its rounding.",
     ),
     AnalysisClaim(
-        "ch. 8, Sec. 3.5, Eq. (12)",
-        "On blue α₁ + α₃ = -(α₂ + α₄) is",
+        draft("ch. 8, Sec. 3.5, Eq. (12)", "On blue α₁ + α₃ = -(α₂ + α₄) is"),
         lambda: 2.0 * delta(_VEHICLE),
         published="0.334198",
         unit="rad",
@@ -127,8 +129,7 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            "ch. 8, Sec. 2.2",
-            "The coefficients of roll and pitch vanish exactly",
+            draft("ch. 8, Sec. 2.2", "The coefficients of roll and pitch vanish exactly"),
             partial(_is_zero_on, color),
             case=color,
             published=color == "red",
@@ -140,8 +141,7 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            "ch. 8, Sec. 3.3, Fig. 7",
-            "The example follows the generalized theorem",
+            draft("ch. 8, Sec. 3.3, Fig. 7", "The example follows the generalized theorem"),
             partial(_accepted, name),
             case=name,
             published=name != "E4",
@@ -149,14 +149,18 @@ CLAIMS = (
         for name in PATHS
     ),
     AnalysisClaim(
-        "ch. 8, Secs. 3.4-3.5",
-        "At P both colors have the same angles, so that the color can change",
+        draft(
+            "ch. 8, Secs. 3.4-3.5",
+            "At P both colors have the same angles, so that the color can change",
+        ),
         _colors_meet_at_p,
     ),
     *(
         AnalysisClaim(
-            "ch. 8, Sec. 4",
-            "The gait violates the Two Color Map Theorem and follows the generalized one",
+            draft(
+                "ch. 8, Sec. 4",
+                "The gait violates the Two Color Map Theorem and follows the generalized one",
+            ),
             partial(_needs_the_generalized, name),
             case=name,
         )
@@ -164,8 +168,10 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            "ch. 8, Sec. 3.5",
-            "According to the theorem the determinant at level attitude is never zero",
+            draft(
+                "ch. 8, Sec. 3.5",
+                "According to the theorem the determinant at level attitude is never zero",
+            ),
             partial(_regular, name),
             case=name,
             refuted={"Gait 1": _AT_P + RANK, "Gait 3": RANK}.get(name, ""),
@@ -175,13 +181,14 @@ CLAIMS = (
     robustness_claim("ch. 8, Sec. 4.1, Fig. 10", "ch08_gait_1", "Gait 1", _AT_P + RANK),
     robustness_claim("ch. 8, Sec. 4.2, Fig. 12", "ch08_gait_2", "Gait 2"),
     AnalysisClaim(
-        "ch. 8, Sec. 4.2, Fig. 12",
-        "Gait 2 has no singular attitude at all",
+        draft("ch. 8, Sec. 4.2, Fig. 12", "Gait 2 has no singular attitude at all"),
         lambda: robustness(PUBLISHED_GAITS["ch08_gait_2"]).margin > np.pi / 2 - 1e-9,
     ),
     AnalysisClaim(
-        "ch. 8, Sec. 4.3, Fig. 14",
-        "Gait 3 and its biased twin both leave enough attitudes (0.2 rad)",
+        draft(
+            "ch. 8, Sec. 4.3, Fig. 14",
+            "Gait 3 and its biased twin both leave enough attitudes (0.2 rad)",
+        ),
         _both_are_sufficient,
         refuted=RANK + " R of the biased gait changes sign.",
     ),

@@ -12,6 +12,7 @@ import numpy as np
 from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
 from tiltsim.report.claims.ch03 import EQ_19
 from tiltsim.report.claims.ch06 import RANK
+from tiltsim.report.draft import draft
 from tiltsim.report.measures import every_flight_completed, terms_hold, tracking_error
 from tiltsim_controllers.analysis.attainable import (
     AttainableSet,
@@ -91,21 +92,23 @@ def _circle(name: str) -> str:
 
 CLAIMS = (
     AnalysisClaim(
-        "ch. 9, Sec. 2, Eq. (8)",
-        "Eq. (8), term by term, is R on red",
+        draft("ch. 9, Sec. 2, Eq. (8)", "Eq. (8), term by term, is R on red"),
         partial(terms_hold, "R", EQ_19, _VEHICLE),
     ),
     AnalysisClaim(
-        "ch. 9, Sec. 3.1",
-        "Thrust of four untilted rotors at the speed limits, 305.27 and 394.10 rad/s",
+        draft(
+            "ch. 9, Sec. 3.1",
+            "Thrust of four untilted rotors at the speed limits, 305.27 and 394.10 rad/s",
+        ),
         lambda: tuple(4.0 * _VEHICLE.thrust_coefficient * speed**2 for speed in _LIMITS),
         published=("3.00", "5.00"),
         unit="N",
     ),
     *(
         AnalysisClaim(
-            "ch. 9, Sec. 3.2",
-            "Without yaw torque there is a solution within the rotor limits",
+            draft(
+                "ch. 9, Sec. 3.2", "Without yaw torque there is a solution within the rotor limits"
+            ),
             partial(_has_solution, number),
             case=f"Gait {number}",
             published=number not in (1, 4),
@@ -114,8 +117,7 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            "ch. 9, Sec. 3.3",
-            "The gaits with solutions can carry 4.2 N, the weight",
+            draft("ch. 9, Sec. 3.3", "The gaits with solutions can carry 4.2 N, the weight"),
             partial(_has_solution, number, 4.2),
             case=f"Gait {number}",
             refuted="Under Eq. (11) a rotor produces at most 1.25 N; two tilted by 0.5 rad and two "
@@ -127,8 +129,10 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            f"ch. 9, Sec. 3.2, Fig. {number if number in _RED else number - 1}",
-            "For a given thrust the torques about x and y are linearly coupled",
+            draft(
+                f"ch. 9, Sec. 3.2, Fig. {number if number in _RED else number - 1}",
+                "For a given thrust the torques about x and y are linearly coupled",
+            ),
             partial(_is_coupled, number),
             case=f"Gait {number}",
             published=number in _BLUE,
@@ -137,8 +141,7 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            "ch. 9, Sec. 5",
-            "The coupling is not a singularity: τ has full rank",
+            draft("ch. 9, Sec. 5", "The coupling is not a singularity: τ has full rank"),
             partial(_has_full_rank, number),
             case=f"Gait {number}",
             refuted=RANK,
@@ -147,8 +150,10 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            f"ch. 9, Sec. 3.3, Fig. {figure}",
-            "Attainable accelerations in body axes: minimum and maximum along x and y",
+            draft(
+                f"ch. 9, Sec. 3.3, Fig. {figure}",
+                "Attainable accelerations in body axes: minimum and maximum along x and y",
+            ),
             partial(_acceleration, number),
             case=f"Gait {number}",
             published=("-2", "-2", "2", "2"),
@@ -161,41 +166,40 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            "ch. 9, Sec. 5",
-            "The region of accelerations is a rectangle",
+            draft("ch. 9, Sec. 5", "The region of accelerations is a rectangle"),
             partial(_is_rectangle, number),
             case=f"Gait {number}",
         )
         for number in (2, 3)
     ),
     AnalysisClaim(
-        "ch. 9, Sec. 3.3",
-        "Gaits 2 and 3 reach similar accelerations",
+        draft("ch. 9, Sec. 3.3", "Gaits 2 and 3 reach similar accelerations"),
         lambda: bool(np.allclose(_acceleration(2), _acceleration(3), rtol=1e-6)),
     ),
     AnalysisClaim(
-        "ch. 9, Sec. 4.1",
-        "Centripetal accelerations of the four circles",
+        draft("ch. 9, Sec. 4.1", "Centripetal accelerations of the four circles"),
         lambda: tuple(5.0 * omega**2 for omega in (0.1, 0.5, 1.0, 1.5)),
         published=("0.05", "1.25", "5", "11.25"),
         unit="m/s^2",
     ),
     FlightClaim(
-        "ch. 9, Sec. 4.2, Fig. 10",
-        "All four references end in periodic trajectories: none of the flights diverges",
+        draft(
+            "ch. 9, Sec. 4.2, Fig. 10",
+            "All four references end in periodic trajectories: none of the flights diverges",
+        ),
         tuple(map(_circle, ("01", "05", "10", "15"))),
         every_flight_completed,
     ),
     FlightClaim(
-        "ch. 9, Sec. 5",
-        "The faster the circle, the larger the error; the fastest diverges",
+        draft("ch. 9, Sec. 5", "The faster the circle, the larger the error; the fastest diverges"),
         tuple(map(_circle, ("01", "05", "10", "15", "20"))),
         _faster_is_worse,
     ),
     *(
         FlightClaim(
-            "ch. 9, Sec. 4.2, Fig. 10",
-            "Roundness of the orbit, largest over smallest radius",
+            draft(
+                "ch. 9, Sec. 4.2, Fig. 10", "Roundness of the orbit, largest over smallest radius"
+            ),
             (_circle(name),),
             _spread,
             case=f"{omega} rad/s",
@@ -206,8 +210,10 @@ CLAIMS = (
         for omega, name in (("0.1", "01"), ("0.5", "05"), ("1.0", "10"))
     ),
     FlightClaim(
-        "ch. 9, Sec. 4.2, Fig. 10",
-        "At 1.5 rad/s the orbit is an ellipse (radii at least a fifth apart)",
+        draft(
+            "ch. 9, Sec. 4.2, Fig. 10",
+            "At 1.5 rad/s the orbit is an ellipse (radii at least a fifth apart)",
+        ),
         (_circle("15"),),
         lambda flights: _spread(flights) > 1.2,
     ),

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
+from tiltsim.report.draft import draft
 from tiltsim_controllers.tilt_car.state_drift import drift_rate, orbit
 from tiltsim_controllers.tilt_car.third_derivative import input_columns
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, counter_yaw_per_tilt, turn_per_tilt
@@ -82,14 +83,18 @@ def _fails_after_a_rotor_stops(flights: Mapping[str, Metrics]) -> bool:
 
 CLAIMS = (
     AnalysisClaim(
-        "ch. 10, Sec. 2, Eq. (2)",
-        "Bottom disc over top disc: ψ over α, with I_T = 0.001 and I_B = 0.002",
+        draft(
+            "ch. 10, Sec. 2, Eq. (2)",
+            "Bottom disc over top disc: ψ over α, with I_T = 0.001 and I_B = 0.002",
+        ),
         lambda: -counter_yaw_per_tilt(THESIS_CAR),
         published="-0.5",
     ),
     AnalysisClaim(
-        "ch. 10, Sec. 2, Eq. (2)",
-        "Bottom disc over top disc: ψ over α, with I_T = 0.001 and I_B = 0.002",
+        draft(
+            "ch. 10, Sec. 2, Eq. (2)",
+            "Bottom disc over top disc: ψ over α, with I_T = 0.001 and I_B = 0.002",
+        ),
         lambda: -counter_yaw_per_tilt(THESIS_CAR._replace(bottom_inertia=0.002)),
         case="I_B read as the bottom disc's own inertia, as the text says",
         published="-0.5",
@@ -97,82 +102,98 @@ CLAIMS = (
         "= 0: -1/3. Eq. (2) holds where I_B is the inertia of the whole car.",
     ),
     AnalysisClaim(
-        "ch. 10, Sec. 2, Eq. (6)",
-        "The matrix from squared speeds to acceleration can be inverted",
+        draft(
+            "ch. 10, Sec. 2, Eq. (6)",
+            "The matrix from squared speeds to acceleration can be inverted",
+        ),
         _thrusts_can_be_inverted,
     ),
     AnalysisClaim(
-        "ch. 10, Sec. 3.1, Eqs. (10)-(12)",
-        "Rank 2 if and only if both rotors turn",
+        draft("ch. 10, Sec. 3.1, Eqs. (10)-(12)", "Rank 2 if and only if both rotors turn"),
         partial(_full_rank_needs_both, tilting=False),
         case="columns of the rotors, Δ1",
     ),
     AnalysisClaim(
-        "ch. 10, Sec. 3.1, Eqs. (10)-(12)",
-        "Rank 2 if and only if both rotors turn",
+        draft("ch. 10, Sec. 3.1, Eqs. (10)-(12)", "Rank 2 if and only if both rotors turn"),
         partial(_full_rank_needs_both, tilting=True),
         case="with the column of the tilt, [Δ1 | Δ2]",
         refuted="With one rotor at rest the tilt turns the other one's thrust: still rank 2.",
     ),
     AnalysisClaim(
-        "ch. 10, Sec. 6.1, Eq. (28)",
-        "The columns of the rotors have rank 2 unless both rotors are at rest",
+        draft(
+            "ch. 10, Sec. 6.1, Eq. (28)",
+            "The columns of the rotors have rank 2 unless both rotors are at rest",
+        ),
         _full_rank_unless_both_rest,
         refuted="One rotor at rest leaves one column: rank 1. Both must turn.",
     ),
     FlightClaim(
-        "ch. 10, Sec. 4.1, Figs. 7-8",
-        "The third-derivative controller makes the error vanish in ten seconds (0.01 m)",
+        draft(
+            "ch. 10, Sec. 4.1, Figs. 7-8",
+            "The third-derivative controller makes the error vanish in ten seconds (0.01 m)",
+        ),
         (_THIRD + "ten_seconds",),
         _both_small,
     ),
     FlightClaim(
-        "ch. 10, Sec. 4.1, Figs. 12-13",
-        "The error stays at zero for 2000 s (0.01 m after 20 s)",
+        draft(
+            "ch. 10, Sec. 4.1, Figs. 12-13",
+            "The error stays at zero for 2000 s (0.01 m after 20 s)",
+        ),
         (_THIRD + "two_thousand_seconds",),
         partial(_small, _THIRD + "two_thousand_seconds", "sup_position_error_after_20s", 0.01),
     ),
     FlightClaim(
-        "ch. 10, Sec. 4.1, Figs. 9, 14",
-        "State drift: the inputs diverge after the error has vanished",
+        draft(
+            "ch. 10, Sec. 4.1, Figs. 9, 14",
+            "State drift: the inputs diverge after the error has vanished",
+        ),
         (_THIRD + "ten_seconds", _THIRD + "two_thousand_seconds"),
         _inputs_diverge,
     ),
     AnalysisClaim(
-        "ch. 10, Sec. 6.2",
-        "The cause of the drift from one equilibrium to another is known",
+        draft(
+            "ch. 10, Sec. 6.2", "The cause of the drift from one equilibrium to another is known"
+        ),
         _drift_has_a_cause,
         published=False,
         refuted="It is: the minimum-norm distribution is not integrable, and the lean advances by "
         "a holonomy, β' = Ω / (1 + κ² W(β)) on a circle.",
     ),
     FlightClaim(
-        "ch. 10, Sec. 5, Figs. 20-21",
-        "With the tilt planned the error also vanishes (0.01 m at 10 s)",
+        draft(
+            "ch. 10, Sec. 5, Figs. 20-21",
+            "With the tilt planned the error also vanishes (0.01 m at 10 s)",
+        ),
         (_PLANNED,),
         partial(_small, _PLANNED, "final_position_error_x", 0.01),
     ),
     FlightClaim(
-        "ch. 10, Sec. 5, Fig. 22",
-        "With the tilt planned the inputs become identical: no state drift",
+        draft(
+            "ch. 10, Sec. 5, Fig. 22",
+            "With the tilt planned the inputs become identical: no state drift",
+        ),
         (_PLANNED,),
         partial(_small, _PLANNED, "final_input_split", 1.0),
     ),
     FlightClaim(
-        "ch. 10, Sec. 5, Fig. 23",
-        "With the tilt planned the inputs saturate for a while",
+        draft("ch. 10, Sec. 5, Fig. 23", "With the tilt planned the inputs saturate for a while"),
         (_PLANNED,),
         lambda flights: float(flights[_PLANNED]["saturated_fraction"]) > 0.0,
     ),
     AnalysisClaim(
-        "ch. 10, Sec. 5, Eq. (18)",
-        "α = t / (1 - I_T / I_B) keeps the thrusts pointed at the center",
+        draft(
+            "ch. 10, Sec. 5, Eq. (18)",
+            "α = t / (1 - I_T / I_B) keeps the thrusts pointed at the center",
+        ),
         _thrust_points_to_the_center,
     ),
     FlightClaim(
-        "ch. 10, Sec. 6.1, Figs. 24-25",
-        "With the fourth-derivative controller the inputs drift until a rotor stops, "
-        "and then it fails",
+        draft(
+            "ch. 10, Sec. 6.1, Figs. 24-25",
+            "With the fourth-derivative controller the inputs drift until a rotor stops, "
+            "and then it fails",
+        ),
         (_FAILURE,),
         _fails_after_a_rotor_stops,
     ),

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim, FlightClaim
+from tiltsim.report.draft import draft
 from tiltsim_controllers.mathematics.scalar import Pair
 from tiltsim_controllers.tilt_car.penguin_cycle import (
     LyapunovBound,
@@ -117,34 +118,35 @@ def _bound() -> LyapunovBound:
 
 CLAIMS = (
     AnalysisClaim(
-        "ch. 11, Sec. 3, Figs. 5-8",
-        "The thrusts can keep the acceleration along y at zero",
+        draft("ch. 11, Sec. 3, Figs. 5-8", "The thrusts can keep the acceleration along y at zero"),
         lambda: _can_push_straight_ahead(pi / 8),
         case="small swing, π/8",
     ),
     AnalysisClaim(
-        "ch. 11, Sec. 3, Figs. 5-8",
-        "The thrusts can keep the acceleration along y at zero",
+        draft("ch. 11, Sec. 3, Figs. 5-8", "The thrusts can keep the acceleration along y at zero"),
         lambda: _can_push_straight_ahead(pi / 3),
         case="large swing, π/3",
         published=False,
     ),
     FlightClaim(
-        "ch. 11, Sec. 4.4",
-        "With the small swing the errors stay below 0.1 m",
+        draft("ch. 11, Sec. 4.4", "With the small swing the errors stay below 0.1 m"),
         (_SMALL,),
         lambda flights: all(float(flights[_SMALL][f"max_abs_error_{axis}"]) < 0.1 for axis in "xy"),
     ),
     FlightClaim(
-        "ch. 11, Sec. 4.4, Fig. 10",
-        "With the small swing no input saturates (fraction of samples)",
+        draft(
+            "ch. 11, Sec. 4.4, Fig. 10",
+            "With the small swing no input saturates (fraction of samples)",
+        ),
         (_SMALL,),
         lambda flights: float(flights[_SMALL]["saturated_fraction"]),
         published="0.00",
     ),
     FlightClaim(
-        "ch. 11, Sec. 6, Prop. 3; Sec. 7, Fig. 24",
-        "With the large swing the error along x is zero all the time",
+        draft(
+            "ch. 11, Sec. 6, Prop. 3; Sec. 7, Fig. 24",
+            "With the large swing the error along x is zero all the time",
+        ),
         (_LARGE,),
         lambda flights: float(flights[_LARGE]["max_abs_error_x"]),
         published="0.000",
@@ -153,68 +155,83 @@ CLAIMS = (
         why=_SERVO,
     ),
     AnalysisClaim(
-        "ch. 11, Sec. 6, Prop. 4",
-        "K_Y1 e_y' + K_Y2 e_y where a rotor stops: 1/√3",
+        draft("ch. 11, Sec. 6, Prop. 4", "K_Y1 e_y' + K_Y2 e_y where a rotor stops: 1/√3"),
         _switch_line,
         published="0.57735",
         unit="m/s^2",
     ),
     AnalysisClaim(
-        "ch. 11, Sec. 6, Lemma 5, Eq. (42)",
-        "The printed solution with both rotors pushing is correct",
+        draft(
+            "ch. 11, Sec. 6, Lemma 5, Eq. (42)",
+            "The printed solution with both rotors pushing is correct",
+        ),
         lambda: _for_all(_eq_42_holds),
     ),
     AnalysisClaim(
-        "ch. 11, Sec. 6, Lemmas 5 and 6",
-        "From the zone of Eq. (39) a rotor stops within 0 < t < 1 s",
+        draft(
+            "ch. 11, Sec. 6, Lemmas 5 and 6",
+            "From the zone of Eq. (39) a rotor stops within 0 < t < 1 s",
+        ),
         lambda: _for_all(_switches_within),
     ),
     AnalysisClaim(
-        "ch. 11, Sec. 6, Lemmas 7 and 8, Prop. 5",
-        "Half a period leads from the zone into its mirror image",
+        draft(
+            "ch. 11, Sec. 6, Lemmas 7 and 8, Prop. 5",
+            "Half a period leads from the zone into its mirror image",
+        ),
         lambda: _for_all(_comes_back_mirrored),
     ),
     AnalysisClaim(
-        "ch. 11, Sec. 6, Remark 8",
-        "The first half period, from rest, ends in the zone",
+        draft("ch. 11, Sec. 6, Remark 8", "The first half period, from rest, ends in the zone"),
         _first_half_period,
     ),
     AnalysisClaim(
-        "ch. 11, Sec. 6, Prop. 6",
-        "In between, the Lyapunov candidate does not exceed its values at half periods",
+        draft(
+            "ch. 11, Sec. 6, Prop. 6",
+            "In between, the Lyapunov candidate does not exceed its values at half periods",
+        ),
         lambda: _for_all(_largest_at_the_ends),
     ),
     AnalysisClaim(
-        "ch. 11, Sec. 6, Remark 10, Eq. (71)",
-        "The candidate grows by at most 3/4 over half a period",
+        draft(
+            "ch. 11, Sec. 6, Remark 10, Eq. (71)",
+            "The candidate grows by at most 3/4 over half a period",
+        ),
         lambda: _bound().largest_gain,
         published="0.75",
     ),
     AnalysisClaim(
-        "ch. 11, Sec. 6, Remark 10",
-        "It grows by more nowhere in the zone",
+        draft("ch. 11, Sec. 6, Remark 10", "It grows by more nowhere in the zone"),
         lambda: _for_all(lambda state: lyapunov_growth(_SWING, state) <= 0.75 + 1e-12),
     ),
     AnalysisClaim(
-        "ch. 11, Sec. 6, Remark 9; Sec. 7",
-        "With the large swing the error along y goes to zero",
+        draft(
+            "ch. 11, Sec. 6, Remark 9; Sec. 7",
+            "With the large swing the error along y goes to zero",
+        ),
         _is_asymptotically_stable,
         published=False,
     ),
     AnalysisClaim(
-        "ch. 11, Secs. 6-7, Prop. 2, Figs. 24, 31",
-        "The error along y stays bounded: the oscillation is stable",
+        draft(
+            "ch. 11, Secs. 6-7, Prop. 2, Figs. 24, 31",
+            "The error along y stays bounded: the oscillation is stable",
+        ),
         lambda: bool(np.abs(multipliers(_SWING, limit_cycle(_SWING))).max() < 1.0),
     ),
     FlightClaim(
-        "ch. 11, Sec. 7, Figs. 25-26",
-        "With the large swing inputs saturate from time to time, not always",
+        draft(
+            "ch. 11, Sec. 7, Figs. 25-26",
+            "With the large swing inputs saturate from time to time, not always",
+        ),
         (_LARGE,),
         lambda flights: 0.0 < float(flights[_LARGE]["saturated_fraction"]) < 1.0,
     ),
     FlightClaim(
-        "ch. 11, Sec. 8, Prop. 7, Eq. (77)",
-        "The candidate stays below L_critical + 3/4 (here 2.56 m²/s²)",
+        draft(
+            "ch. 11, Sec. 8, Prop. 7, Eq. (77)",
+            "The candidate stays below L_critical + 3/4 (here 2.56 m²/s²)",
+        ),
         (_LARGE,),
         lambda flights: float(flights[_LARGE]["max_lyapunov"]) <= _bound().published,
     ),

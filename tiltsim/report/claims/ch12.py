@@ -9,6 +9,7 @@ import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim
 from tiltsim.report.claims.ch08 import DIGITS
+from tiltsim.report.draft import draft
 from tiltsim.report.measures import coefficient, determinant_coefficients, terms, terms_hold
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.analysis.two_color_map import (
@@ -86,8 +87,7 @@ def _two_vehicles_can_share_a_map() -> bool:
 CLAIMS = (
     *(
         AnalysisClaim(
-            "ch. 12, Eq. (4)",
-            "Coefficients of the determinant, times 1.025",
+            draft("ch. 12, Eq. (4)", "Coefficients of the determinant, times 1.025"),
             partial(coefficient, part, name, _VEHICLE, SCALE),
             case=f"{part}, {name}",
             published=published,
@@ -104,8 +104,7 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            f"ch. 12, {equations}",
-            f"{name} is printed correctly, term by term",
+            draft(f"ch. 12, {equations}", f"{name} is printed correctly, term by term"),
             partial(terms_hold, part, printed, _VEHICLE, SCALE),
         )
         for equations, name, part, printed in (
@@ -115,27 +114,25 @@ CLAIMS = (
         )
     ),
     AnalysisClaim(
-        "ch. 12",
-        "The coefficients differ greatly from those of ch. 3",
+        draft("ch. 12", "The coefficients differ greatly from those of ch. 3"),
         _coefficients_differ_greatly,
         refuted="Up to the common factor 1.025 they are those of ch. 3 within 1 %: K_m / (L K_f) "
         "is 0.1700 instead of 0.1687.",
     ),
     AnalysisClaim(
-        "ch. 12",
-        "L, K_f and K_m are the only parameters that the map depends on",
+        draft("ch. 12", "L, K_f and K_m are the only parameters that the map depends on"),
         _only_three_parameters_matter,
     ),
     AnalysisClaim(
-        "ch. 12",
-        "Every set of L, K_f and K_m has its own map",
+        draft("ch. 12", "Every set of L, K_f and K_m has its own map"),
         lambda: not _two_vehicles_can_share_a_map(),
         refuted="The map depends only on the ratio K_m / (L K_f).",
     ),
-    AnalysisClaim("ch. 12, Fig. 1", "The map is very similar to that of ch. 8", _maps_are_similar),
     AnalysisClaim(
-        "ch. 12, Fig. 1",
-        "The colors meet at P = (p, -p) with p",
+        draft("ch. 12, Fig. 1", "The map is very similar to that of ch. 8"), _maps_are_similar
+    ),
+    AnalysisClaim(
+        draft("ch. 12, Fig. 1", "The colors meet at P = (p, -p) with p"),
         lambda: _P[0],
         published="0.168421",
         unit="rad",
@@ -143,14 +140,12 @@ CLAIMS = (
         why=DIGITS,
     ),
     AnalysisClaim(
-        "ch. 12, Fig. 1",
-        "P lies below L, in S_D",
+        draft("ch. 12, Fig. 1", "P lies below L, in S_D"),
         lambda: region(*_P, _VEHICLE) == "S_D",
         refuted="As in ch. 8: P lies on L exactly.",
     ),
     AnalysisClaim(
-        "ch. 12, Eq. (12)",
-        "On blue α₁ + α₃ = -(α₂ + α₄) is",
+        draft("ch. 12, Eq. (12)", "On blue α₁ + α₃ = -(α₂ + α₄) is"),
         lambda: 2.0 * delta(_VEHICLE),
         published="0.336842",
         unit="rad",

@@ -1,0 +1,96 @@
+"""Statements of the thesis, as the report judges them, and what of a test is not the thesis's."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+CHAPTER: Final = re.compile(r"ch\. (\d+)")
+ID: Final = re.compile(r"ch(\d+)(-[a-z0-9]+)+")
+
+_SPELLED: Final = {
+    "α": "alpha", "δ": "delta", "Δ": "delta", "η": "eta", "θ": "theta", "π": "pi", "ρ": "rho",
+    "τ": "tau", "φ": "phi", "ψ": "psi", "ω": "omega", "−": "minus ", "<": "below",
+}  # fmt: skip
+
+
+class Origin(Enum):
+    """What of a test does not come from the thesis; a row may have several."""
+
+    PATH = "path ours"
+    GAINS = "gains ours"
+    KEYFRAMES = "keyframes fitted"
+    PARAMETERS = "parameters ours"
+    FLIGHT = "flight ours"
+
+    @property
+    def meaning(self) -> str:
+        """One sentence."""
+        return _MEANINGS[self]
+
+
+_MEANINGS: Final = {
+    Origin.PATH: "the thesis's figure with the gait's path is not available: we drew one",
+    Origin.GAINS: "the thesis prints no gains: we chose them",
+    Origin.KEYFRAMES: "its keyframes are not available: ours were fitted to its statements",
+    Origin.PARAMETERS: "the thesis does not give all masses or coefficients: we chose them",
+    Origin.FLIGHT: "the thesis flies nothing here: the flight tests what its statement implies",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Statement:
+    """One statement of the thesis; its rows are the cases in which it is tested.
+
+    Raises `ValueError` if a field is empty or the fields contradict each other.
+    """
+
+    id: str
+    """Anchor on the page, never changed once published: "ch4-period"."""
+    source: str
+    """Chapter first, then section, figure or equation: "ch. 3, Sec. 4, Eq. (19)"."""
+    text: str
+    """The statement in one sentence of ours."""
+    thesis: str
+    """The sentence that makes it, quoted or paraphrased, or what the figure shows."""
+    criterion: str
+    """What counts as reproduced, and what would not, in words."""
+    note: str = ""
+    """What a reader must know to judge it, shown with every row."""
+    origins: tuple[Origin, ...] = ()
+    """What is not the thesis's in every row, beside what its flights say (``ours``)."""
+    fitted: bool = False
+    """Whether parameters were chosen so that it holds."""
+    finding: str = ""
+    """Key of the finding that settles it; rows refuted by one finding are one error."""
+    pictures: tuple[str, ...] = ()
+    """Names of pictures that show it, beside those of its flights."""
+    tests: tuple[str, ...] = ()
+    """Tests beside the row's own: "controllers/analysis/test_x.py::test_y"."""
+
+    def __post_init__(self) -> None:
+        for name in ("text", "thesis", "criterion"):
+            if not getattr(self, name).strip():
+                raise ValueError(f"{self.id}: {name} is empty")
+        chapter, named = CHAPTER.match(self.source), ID.fullmatch(self.id)
+        if chapter is None:
+            raise ValueError(f"source {self.source!r}: must begin with a chapter: 'ch. 3, Sec.'")
+        if named is None or named[1] != chapter[1]:
+            raise ValueError(f"id {self.id!r}: must be like 'ch{chapter[1]}-two-words'")
+
+    @property
+    def chapter(self) -> int:
+        """The chapter's number."""
+        found = CHAPTER.match(self.source)
+        assert found is not None
+        return int(found[1])
+
+
+def slug(text: str) -> str:
+    """A text as part of an address: "ρ = -0.65, circle" is "rho-minus-0-65-circle"."""
+    spelled = re.sub(r"-(?=\d)", " minus ", "".join(_SPELLED.get(c, c) for c in text))
+    plain = unicodedata.normalize("NFKD", spelled).encode("ascii", "ignore").decode().lower()
+    return re.sub(r"[^a-z0-9]+", "-", plain).strip("-")

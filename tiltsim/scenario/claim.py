@@ -1,0 +1,31 @@
+"""The ``[claim.NAME]`` tables of a scenario file: what the thesis says of its flights."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal
+
+from pydantic import Field
+
+from tiltsim.scenario.table import Table
+
+Origin = Literal["path", "gains", "keyframes", "parameters", "flight"]
+"""What of a flight does not come from its source."""
+
+NAME: Final = r"^[a-z0-9]+(-[a-z0-9]+)+$"
+ClaimName = Annotated[str, Field(pattern=NAME)]
+Words = Annotated[str, Field(min_length=1)]
+
+
+class ClaimTable(Table):
+    """A statement that a scenario's ``source`` makes; expectations refer to it by its name."""
+
+    table_name = "claim"
+
+    statement: Words = Field(description="the statement in one sentence")
+    thesis: Words = Field(
+        description="the sentence that makes it, quoted or paraphrased, or what the figure shows"
+    )
+    criterion: Words = Field(description="what counts as reproduced, and what would not, in words")
+    note: str = Field("", description="what a reader must know to judge it, shown with every row")
+    fitted: bool = Field(False, description="parameters were chosen so that it holds")
+    finding: str = Field("", description="key of the finding that settles it, if one does")
