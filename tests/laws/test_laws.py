@@ -296,6 +296,8 @@ def test_a_step_in_yaw_stops_a_rotor_where_its_torque_ends():
     assert below.metrics()["min_rotor_speed"] < 0.3 * hover
     assert above.end.kind == "singular"
     assert "came to a stop" in above.end.cause
+    assert turned(0.31, 0.1, 300.0).end.kind == "completed"
+    assert turned(0.315, 0.1, 300.0).end.kind == "singular"
     assert turned(0.35, 0.1, 300.0).end.time == pytest.approx(0.022, abs=0.003)
 
 
