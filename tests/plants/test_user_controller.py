@@ -737,6 +737,7 @@ def python_blocks(name):
     return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
 
 
+@pytest.mark.slow
 def test_the_documented_examples_fly(capsys):
     names = {}
     for block in python_blocks("docs/own_controller.md"):

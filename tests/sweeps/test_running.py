@@ -81,6 +81,7 @@ def test_rows_hold_what_was_flown(tmp_path):
     assert "realtime_factor" not in table[7]
 
 
+@pytest.mark.slow
 def test_processes_make_the_same_dataset_bit_for_bit(tmp_path):
     definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
     one = run_sweep(definition, tmp_path / "one", jobs=1)
