@@ -660,7 +660,7 @@ def test_a_class_in_a_file_beside_the_scenario(hover_file, monkeypatch, tmp_path
     )
     monkeypatch.chdir(tmp_path)
     assert main(["run", str(scenario_file), "--quiet"]) == 0
-    assert main(["check", str(scenario_file)]) == 0
+    assert main(["check", "--trust", str(scenario_file)]) == 0
 
 
 def test_a_failing_controller_exits_3_and_leaves_its_log(tmp_path, capsys):

@@ -95,11 +95,11 @@ def test_a_sweep_continues_where_it_stopped(tmp_path, monkeypatch):
     flown = []
     original = chunks.fly_points
 
-    def fly_points(sweep, points, engine):
+    def fly_points(sweep, points, engine, **options):
         flown.append(list(points))
         if len(flown) == 3:
             raise KeyboardInterrupt
-        return original(sweep, points, engine)
+        return original(sweep, points, engine, **options)
 
     monkeypatch.setattr(chunks, "fly_points", fly_points)
     with pytest.raises(KeyboardInterrupt):
