@@ -111,8 +111,13 @@ def tiltrotor_qvel(state: Vector) -> Values:
 
 
 @scalar
-def _servo_acceleration(command: float, angle: float, rate: float, mechanics: Mechanics) -> float:
-    """``omega^2 (command - alpha) - 2 zeta omega alpha'`` (rad/s^2) of a massless pod."""
+def servo_acceleration(command: float, angle: float, rate: float, mechanics: Mechanics) -> float:
+    """``omega^2 (command - alpha) - 2 zeta omega alpha'`` (rad/s^2) of a massless pod.
+
+    Args:
+        command, angle, rate: set point and tilt, rad, and its rate, rad/s
+        mechanics: of the vehicle
+    """
     omega, limit = mechanics.servo_frequency, mechanics.max_tilt
     command = clipped(command, -limit, limit)
     return omega * omega * (command - angle) - 2.0 * mechanics.servo_damping * omega * rate
@@ -141,10 +146,10 @@ def _tiltrotor_rates(
         rate_2,
         rate_3,
         rate_4,
-        _servo_acceleration(ctrl[0], a1, rate_1, mechanics),
-        _servo_acceleration(ctrl[1], a2, rate_2, mechanics),
-        _servo_acceleration(ctrl[2], a3, rate_3, mechanics),
-        _servo_acceleration(ctrl[3], a4, rate_4, mechanics),
+        servo_acceleration(ctrl[0], a1, rate_1, mechanics),
+        servo_acceleration(ctrl[1], a2, rate_2, mechanics),
+        servo_acceleration(ctrl[2], a3, rate_3, mechanics),
+        servo_acceleration(ctrl[3], a4, rate_4, mechanics),
     )
 
 

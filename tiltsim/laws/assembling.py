@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.laws.attitude_altitude import TILTROTOR
+from tiltsim.laws.attitude_altitude import MEASURED_TILTROTOR, TILTROTOR
 from tiltsim.laws.commanded import COMMANDED_LOOPS
 from tiltsim.laws.full_pose import FULL_POSE
-from tiltsim.laws.gait_feedforward import GAIT_FEEDFORWARD
+from tiltsim.laws.gait_feedforward import GAIT_FEEDFORWARD, MEASURED_GAIT_FEEDFORWARD
 from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.air import with_air
+from tiltsim.laws.layers.measured_acceleration import with_measured_acceleration
 from tiltsim.laws.layers.on_equations import on_equations
 from tiltsim.laws.layers.supervision import with_supervisor
 from tiltsim.laws.quadrotor_attitude_altitude import QUADROTOR_ATTITUDE_ALTITUDE
@@ -39,12 +40,27 @@ LOOPS: Final[dict[str, ClosedLoop]] = {
 }
 """Loops by their names; see `tiltsim.scenario.controller_table.ControllerTable.loop_name`."""
 
+MEASURED_LOOPS: Final = {
+    "attitude_altitude": MEASURED_TILTROTOR,
+    "gait_feedforward": MEASURED_GAIT_FEEDFORWARD,
+}
+"""Those that feed back the angular acceleration of the plant."""
+
 
 @one_thread_at_a_time
 def loop_of(scenario: Scenario) -> ClosedLoop:
     """The closed loop of a scenario: its controller inside layers for all that is not ideal."""
     controller, external = scenario.controller, scenario.controller.is_external
-    loop = COMMANDED_LOOPS[scenario.vehicle.model] if external else LOOPS[controller.loop_name]
+    by_controls = (
+        scenario.simulation.plant == "thesis" and not scenario.has_ideal_actuators_in_still_air
+    )
+    # The thesis's equations have no torque but the model's, as long as all is ideal.
+    on_plant = scenario.simulation.plant == "mujoco" or by_controls
+    measured = on_plant and controller.measures_angular_acceleration
+    if external:
+        loop = COMMANDED_LOOPS[scenario.vehicle.model]
+    else:
+        loop = (MEASURED_LOOPS if measured else LOOPS)[controller.loop_name]
     supervisor = controller.supervision
     if supervisor is not None:
         loop = with_supervisor(loop, supervisor.strategy)
@@ -52,9 +68,8 @@ def loop_of(scenario: Scenario) -> ClosedLoop:
         loop = with_actuation(loop, scenario.simulation.latency_steps, external)
     if scenario.has_air:
         loop = with_air(loop)
-    by_controls = (
-        scenario.simulation.plant == "thesis" and not scenario.has_ideal_actuators_in_still_air
-    )
+    if measured:
+        loop = with_measured_acceleration(loop)
     return on_equations(loop) if by_controls else loop
 
 

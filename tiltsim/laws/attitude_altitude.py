@@ -22,6 +22,7 @@ from tiltsim.laws.tiltrotor import (
     gait_equation_rates,
     gait_servo_commands,
     initial_equation_state,
+    measured_acceleration,
     observe_gait_equations,
     observe_tiltrotor,
     reference_columns,
@@ -31,6 +32,7 @@ from tiltsim.laws.tiltrotor import (
     singularity_columns,
     tiltrotor_dynamics,
     tiltrotor_state,
+    with_measured_inputs,
 )
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
@@ -91,6 +93,20 @@ def _supervised_controls(
 ) -> Quad:
     """Rotor accelerations (rad/s^2); see `tiltsim.closed_loop.loop.SupervisedLaw`."""
     return rotor_accelerations(time, state, parameters.law, knots)
+
+
+@scalar
+def _measured_inputs(
+    time: float,
+    state: Values,
+    qvel: Vector,
+    act: Vector,
+    motion: Triple,
+    parameters: LoopParameters,
+    knots: Vector,
+) -> Quad:
+    """`_supervised_controls` by the measured angular acceleration."""
+    return rotor_accelerations(time, state, parameters.law, knots, measured_acceleration(qvel))
 
 
 def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
@@ -183,3 +199,6 @@ TILTROTOR: Final = ClosedLoop(
     follows_position=follows_position,
 )
 """The attitude-altitude controller of the tiltrotor."""
+
+MEASURED_TILTROTOR: Final = with_measured_inputs(TILTROTOR, _measured_inputs)
+"""The same with the angular acceleration of the plant in place of the model's."""

@@ -23,6 +23,7 @@ from tiltsim.laws.tiltrotor import (
     gait_equation_rates,
     gait_servo_commands,
     initial_equation_state,
+    measured_acceleration,
     observe_gait_equations,
     observe_tiltrotor,
     reference_columns,
@@ -32,6 +33,7 @@ from tiltsim.laws.tiltrotor import (
     singularity_columns,
     tiltrotor_dynamics,
     tiltrotor_state,
+    with_measured_inputs,
 )
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
@@ -71,6 +73,23 @@ def _supervised_controls(
     """Rotor accelerations and rates of the integrals; see `SupervisedLaw`."""
     tilt_rates, integrals = four(qvel, TILT_RATE_1), (act[4], act[5], act[6])
     return tracking_inputs(time, state, tilt_rates, integrals, parameters.law, knots, motion)[:7]
+
+
+@scalar
+def _measured_inputs(
+    time: float,
+    state: Values,
+    qvel: Vector,
+    act: Vector,
+    motion: Triple,
+    parameters: LoopParameters,
+    knots: Vector,
+) -> Values:
+    """`_supervised_controls` by the measured angular acceleration."""
+    tilt_rates, integrals = four(qvel, TILT_RATE_1), (act[4], act[5], act[6])
+    measured = measured_acceleration(qvel)
+    law = parameters.law
+    return tracking_inputs(time, state, tilt_rates, integrals, law, knots, motion, measured)[:7]
 
 
 @scalar
@@ -226,3 +245,6 @@ GAIT_FEEDFORWARD: Final = ClosedLoop(
     follows_position=follows_position,
 )
 """The attitude-altitude controller with tilt-rate feed-forward, of the tiltrotor."""
+
+MEASURED_GAIT_FEEDFORWARD: Final = with_measured_inputs(GAIT_FEEDFORWARD, _measured_inputs)
+"""The same with the angular acceleration of the plant in place of the model's."""

@@ -8,17 +8,19 @@ state restarts exactly and an integrator may call it at every stage.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ControlSetup, Dynamics, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Sizes
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.vehicles.rotorcraft.layout import TILT_RATE_1
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.gaits.tilts import tilt_reference
+from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion, world_up_in_body
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.vehicle.decoupling_matrix import (
@@ -45,7 +47,7 @@ def tiltrotor_state(qpos: Vector, qvel: Vector, act: Vector) -> Values:
     in world axes, the body rates in body axes and the tilt rates in ``qvel``.
     """
     x, y, z, qw, qx, qy, qz, alpha_1, alpha_2, alpha_3, alpha_4 = qpos
-    vx, vy, vz, p, q, r, _, _, _, _ = qvel
+    vx, vy, vz, p, q, r = qvel[:6]
     roll, pitch, yaw = euler_from_quaternion(qw, qx, qy, qz)
     # One tuple: to join two costs Python a third of this function.
     return (
@@ -82,6 +84,43 @@ def gait_servo_commands(time: float, lead: float, gait: GaitParameters, knots: V
     """
     a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, gait, knots)
     return a1 + lead * rate_1, a2 + lead * rate_2, a3 + lead * rate_3, a4 + lead * rate_4
+
+
+@scalar
+def measured_acceleration(qvel: Vector) -> Triple:
+    """The angular acceleration (rad/s^2, body axes) that follows MuJoCo's ten velocities."""
+    return qvel[10], qvel[11], qvel[12]
+
+
+def with_measured_inputs(loop: ClosedLoop, inputs: Callable[..., Values]) -> ClosedLoop:
+    """A gait-following controller that reads the `measured_acceleration`.
+
+    `tiltsim.laws.layers.measured_acceleration` measures it.
+
+    Args:
+        loop: The same controller without.
+        inputs: Its controls from the rotor accelerations on, as `SupervisedLaw.controls`.
+    """
+    assert loop.supervised is not None  # so has every controller that follows a gait
+
+    @scalar
+    def controls(
+        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
+    ) -> Values:
+        state = tiltrotor_state(qpos, qvel, act)
+        return (
+            *gait_servo_commands(time, parameters.servo_lead, parameters.law.gait, knots),
+            *rotor_thrust_controls(act),
+            *inputs(time, state, qvel, act, SUPERVISOR_AT_REST, parameters, knots),
+        )
+
+    controls.__qualname__ = f"measured.{loop.sampling.controls.__qualname__}"
+    return replace(
+        loop,
+        sampling=replace(loop.sampling, controls=controls),
+        equations=None,
+        supervised=loop.supervised._replace(controls=inputs),
+    )
 
 
 @scalar

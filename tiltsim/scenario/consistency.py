@@ -115,6 +115,10 @@ def _check_actuators(scenario: ScenarioTables) -> None:
         if faults.count((rotor, stuck)) > 1:
             twice = "stuck servo" if stuck else "loss of thrust"
             raise InvalidValueError("fault.rotor", rotor, f"has more than one {twice}")
+    if scenario.controller.measures_angular_acceleration:
+        reason = 'not supported with controller.angular_acceleration = "measured"; remove it'
+        scenario.require("ground", None, reason)
+        scenario.require("vehicle.mjcf", None, reason)
     if scenario.controller.prioritizes_attitude and not scenario.rotorcraft.has_rotor_limits:
         raise scenario.mistake(
             "controller.allocation",

@@ -144,6 +144,11 @@ class ControllerTable(Table):
         return 1.0
 
     @property
+    def measures_angular_acceleration(self) -> bool:
+        """Whether the law feeds back the plant's angular acceleration, not its model's."""
+        return False
+
+    @property
     def rotors_stop_at_zero(self) -> bool:
         """Whether rotor speeds that the law integrates stop at zero."""
         return True

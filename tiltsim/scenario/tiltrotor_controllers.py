@@ -126,6 +126,11 @@ class AttitudeAltitudeController(ControllerTable):
     supervisor: SupervisorTable | None = Field(
         None, description="acts on the gait before its decoupling matrix becomes singular"
     )
+    angular_acceleration: Literal["model", "measured"] = Field(
+        "model",
+        description="fed back as second derivatives of roll, pitch and yaw: that of the law's "
+        "model, I^-1 tau w, or the simulated vehicle's, as ch. 4, Eq. (26), is written",
+    )
     gait_rate_feedforward: bool = Field(
         False, description="feed the tilt rates forward: the exact law with integral action"
     )
@@ -204,6 +209,10 @@ class AttitudeAltitudeController(ControllerTable):
     @property
     def omits_reference_acceleration(self) -> bool:
         return not self.gait_rate_feedforward
+
+    @property
+    def measures_angular_acceleration(self) -> bool:
+        return self.angular_acceleration == "measured"
 
     @property
     def prioritizes_attitude(self) -> bool:

@@ -20,10 +20,11 @@ from tiltsim_controllers.laws.decouplers import (
     modified_decoupler,
 )
 from tiltsim_controllers.mathematics.rotation import world_up_in_body, wrap_angle
-from tiltsim_controllers.mathematics.scalar import Octet, Quad, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Octet, Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     body_force,
+    body_torque,
     sines_and_cosines,
     solve_by_pairs,
     torque_entries,
@@ -121,18 +122,49 @@ def attitude_reference(
 
 
 @scalar
+def _torque_rates(
+    errors: Triple, omega: Triple, torque: Triple, per_torque: Triple, gains: Gains
+) -> Triple:
+    """Rates of the torques about the body axes, by the error dynamics of ch. 4, Eq. (26).
+
+    The references of roll, pitch and yaw are treated as constant.
+
+    Args:
+        errors: of roll, pitch and yaw, rad
+        omega: body rates, rad/s
+        torque: moments of inertia times angular acceleration, in units of ``L K_f``
+        per_torque: moments of inertia in the same units
+        gains: of the controller
+    """
+    roll_error, pitch_error, yaw_error = errors
+    p, q, r = omega
+    roll_torque, pitch_torque, yaw_torque = torque
+    return (
+        per_torque[0] * (gains.roll_3 * roll_error - gains.roll_2 * p) - gains.roll_1 * roll_torque,
+        per_torque[1] * (gains.pitch_3 * pitch_error - gains.pitch_2 * q)
+        - gains.pitch_1 * pitch_torque,
+        per_torque[2] * (gains.yaw_3 * yaw_error - gains.yaw_2 * r) - gains.yaw_1 * yaw_torque,
+    )
+
+
+@scalar
 def rotor_accelerations(
-    time: float, state: Values, parameters: Parameters, knots: Vector = NO_KNOTS
+    time: float,
+    state: Values,
+    parameters: Parameters,
+    knots: Vector = NO_KNOTS,
+    angular_acceleration: Triple | None = None,
 ) -> Quad:
     """The rotor accelerations (rad/s^2) of the feedback linearization.
 
     Third-order error dynamics (ch. 4, Eqs. 26-27) give the desired third derivatives of the
     outputs; the decoupling matrix and ``Ma`` (Eq. 18) convert them to inputs (Eq. 19). Body rates
-    are used for the rates of roll, pitch and yaw (ch. 3, Eq. 8), second derivatives come from the
-    model. NaN where the decoupling matrix is singular.
+    are used for the rates of roll, pitch and yaw (ch. 3, Eq. 8). NaN where the decoupling matrix is
+    singular.
 
     Args:
         time, state, parameters, knots: as for `attitude_reference`
+        angular_acceleration: measured, rad/s^2, body axes; None takes the model's, ``I^-1 tau w``
     """
     _x, _y, z, _vx, _vy, vz, roll, pitch, yaw, p, q, r, a1, a2, a3, a4, s1, s2, s3, s4 = state
     vehicle = parameters.vehicle
@@ -140,7 +172,6 @@ def rotor_accelerations(
 
     trig = sines_and_cosines(a1, a2, a3, a4)
     torque = torque_entries(trig, drag_ratio(vehicle))
-    x2, x4, y1, y3, z1, z2, z3, z4 = torque
     roll_ref, pitch_ref, yaw_ref, z_ref, vz_ref, az_ref = attitude_reference(
         time, state, trig, torque, parameters, knots
     )
@@ -151,31 +182,22 @@ def rotor_accelerations(
     h1, h2, h3, h4 = vertical_force_entries(trig, ux, uy, uz)
     size_1, size_2, size_3, size_4 = abs(s1), abs(s2), abs(s3), abs(s4)
     w1, w2, w3, w4 = s1 * size_1, s2 * size_2, s3 * size_3, s4 * size_4
-    roll_torque = x2 * w2 + x4 * w4
-    pitch_torque = y1 * w1 + y3 * w3
-    yaw_torque = z1 * w1 + z2 * w2 + z3 * w3 + z4 * w4
+    unit = 1.0 / (vehicle.arm_length * vehicle.thrust_coefficient)
+    inertia = (vehicle.inertia_xx * unit, vehicle.inertia_yy * unit, vehicle.inertia_zz * unit)
+    if angular_acceleration is None:
+        body_torques = body_torque(torque, w1, w2, w3, w4)
+    else:
+        p_rate, q_rate, r_rate = angular_acceleration
+        body_torques = (inertia[0] * p_rate, inertia[1] * q_rate, inertia[2] * r_rate)
     lift = h1 * w1 + h2 * w2 + h3 * w3 + h4 * w4
 
     # Ma, Eq. (18): the thrust direction turns with the body, r3^T (omega x F w).
     fx, fy, fz = body_force(trig, w1, w2, w3, w4)
     turning = ux * (q * fz - r * fy) + uy * (r * fx - p * fz) + uz * (p * fy - q * fx)
 
-    # Third-order error dynamics, Eqs. (26)-(27), as rates of those torques and of the lift; the
-    # references of roll, pitch and yaw are treated as constant.
-    per_torque = 1.0 / (vehicle.arm_length * vehicle.thrust_coefficient)
-    roll_rate = (
-        vehicle.inertia_xx * per_torque * (gains.roll_3 * (roll_ref - roll) - gains.roll_2 * p)
-        - gains.roll_1 * roll_torque
-    )
-    pitch_rate = (
-        vehicle.inertia_yy * per_torque * (gains.pitch_3 * (pitch_ref - pitch) - gains.pitch_2 * q)
-        - gains.pitch_1 * pitch_torque
-    )
-    yaw_error = wrap_angle(yaw_ref - yaw)
-    yaw_rate = (
-        vehicle.inertia_zz * per_torque * (gains.yaw_3 * yaw_error - gains.yaw_2 * r)
-        - gains.yaw_1 * yaw_torque
-    )
+    # Third-order error dynamics, Eqs. (26)-(27), as rates of those torques and of the lift.
+    errors = (roll_ref - roll, pitch_ref - pitch, wrap_angle(yaw_ref - yaw))
+    roll_rate, pitch_rate, yaw_rate = _torque_rates(errors, (p, q, r), body_torques, inertia, gains)
     lift_rate = (
         vehicle.mass
         / vehicle.thrust_coefficient

@@ -241,6 +241,7 @@ def tracking_inputs(
     parameters: Parameters,
     knots: Vector = NO_KNOTS,
     supervisor_motion: Triple = SUPERVISOR_AT_REST,
+    measured: Triple | None = None,
 ) -> Values:
     """Rotor accelerations (rad/s^2), integrator rates (m) and the attitude reference (rad).
 
@@ -253,6 +254,7 @@ def tracking_inputs(
         integrals: `INTEGRAL_FIELDS`
         parameters, knots: of the controller, and of gait and reference
         supervisor_motion: the supervisor's state with its rate and acceleration
+        measured: the angular acceleration (rad/s^2, body axes); None takes the model's
     """
     _, _, _, _, _, _, roll, pitch, yaw, p, q, r, a1, a2, a3, a4, s1, s2, s3, s4 = state
     vehicle, terms, reference = parameters.vehicle, parameters.terms, parameters.reference
@@ -273,7 +275,10 @@ def tracking_inputs(
 
     # Newton and Euler: accelerations of the body and of its Euler angles.
     omega, torque = (p, q, r), (per_torque * tx, per_torque * ty, per_torque * tz)
-    omega_rate = angular_acceleration(torque, omega, inertia, terms.gyroscopic_torque)
+    if measured is None:
+        omega_rate = angular_acceleration(torque, omega, inertia, terms.gyroscopic_torque)
+    else:
+        omega_rate = measured
     attitude = attitude_motion((roll, pitch, yaw), omega, omega_rate, terms.euler_rates)
     rotation = rotation_from_euler(roll, pitch, yaw)
     specific = (per_force * fx, per_force * fy, per_force * fz)

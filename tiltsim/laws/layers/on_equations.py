@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Equations
 from tiltsim.equations.actuator_level import (
     ACTUATOR_PLANTS,
     Mechanics,
@@ -28,14 +28,21 @@ if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
 
 
+def read_actuators(dynamics: Dynamics) -> tuple[Callable[..., Values], Callable[..., Wrench]]:
+    """Scalar code that reads what a model's controls do besides thrusts and servos.
+
+    Returns ``rates(ctrl)`` of the activations, in their order, and ``wrench(ctrl)``.
+    """
+    own = ExtraActuators(states=ROTOR_STATES + dynamics.controller_states)
+    first = ACTUATOR_PLANTS[dynamics.model].rotor_states
+    return _read_actuators((own, *dynamics.extra_actuators), first)
+
+
 @cache
 def _read_actuators(
     actuators: tuple[ExtraActuators, ...], first: int
 ) -> tuple[Callable[..., Values], Callable[..., Wrench]]:
-    """Scalar code that reads what actuators do, whose controls begin at an index.
-
-    Returns ``rates(ctrl)`` of the activations, in their order, and ``wrench(ctrl)``.
-    """
+    """`read_actuators` of these, whose controls begin at an index."""
     if not actuators:
 
         @scalar
@@ -109,11 +116,9 @@ def on_equations(loop: ClosedLoop) -> ClosedLoop:
     motion_rates = plant.rates
     controls, held = loop.sampling.controls, loop.sampling.hold
     observe = loop.columns.observe
-    own = ExtraActuators(states=ROTOR_STATES + dynamics.controller_states)
-    activation_rates, wrench = _read_actuators((own, *dynamics.extra_actuators), plant.rotor_states)
-    project_motion = _projection(
-        plant.project_onto_limits, first + own.states, dynamics.extra_actuators
-    )
+    activation_rates, wrench = read_actuators(dynamics)
+    further = first + ROTOR_STATES + dynamics.controller_states
+    project_motion = _projection(plant.project_onto_limits, further, dynamics.extra_actuators)
 
     @scalar
     def equation_inputs(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:

@@ -35,14 +35,17 @@ def measured_qpos(time: float, qpos: Vector, sensors: Sensors) -> Values:
 
 @scalar
 def measured_qvel(time: float, qvel: Vector, sensors: Sensors) -> Values:
-    """The tiltrotor's ``qvel`` as its sensors read them; tilt rates are exact."""
-    vx, vy, vz, p, q, r, rate_1, rate_2, rate_3, rate_4 = qvel
+    """The tiltrotor's ``qvel`` as its sensors read them.
+
+    Tilt rates are exact, and so is an angular acceleration that follows them.
+    """
+    vx, vy, vz, p, q, r = qvel[:6]
     if sensors.active == 0.0:
-        return vx, vy, vz, p, q, r, rate_1, rate_2, rate_3, rate_4
+        return (vx, vy, vz, p, q, r, *qvel[6:])
     index = reading_index(time, sensors.period)
     ex, ey, ez = reading_error(sensors.velocity, sensors.seed, 3.0, index)
     ep, eq, er = reading_error(sensors.body_rates, sensors.seed, 9.0, index)
-    return vx + ex, vy + ey, vz + ez, p + ep, q + eq, r + er, rate_1, rate_2, rate_3, rate_4
+    return (vx + ex, vy + ey, vz + ez, p + ep, q + eq, r + er, *qvel[6:])
 
 
 def sensor_parameters(scenario: Scenario) -> Sensors:

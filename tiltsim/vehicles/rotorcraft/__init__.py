@@ -21,6 +21,7 @@ from tiltsim.closed_loop.limits import (
     horizontal_error,
 )
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
+from tiltsim.models.parts import RotorLimits
 from tiltsim.vehicles.rotorcraft.layout import OBSERVED_FIELDS
 from tiltsim.vehicles.rotorcraft.metrics import rotorcraft_metrics
 from tiltsim_controllers.gaits.tilts import tilt_reference
@@ -105,6 +106,13 @@ def _thrust_factors(scenario: Scenario) -> tuple[float, float]:
     return min(factors), max(factors)
 
 
+def rotor_limits(scenario: Scenario) -> RotorLimits:
+    """The limits of a rotorcraft's speeds and thrusts."""
+    vehicle = scenario.rotorcraft
+    speeds = vehicle.min_rotor_speed, vehicle.max_rotor_speed
+    return RotorLimits(*speeds, _thrust_factors(scenario))
+
+
 def _compile(
     scenario: Scenario,
     law_states: int,
@@ -112,7 +120,7 @@ def _compile(
     userdata_size: int,
     visuals: bool,
 ) -> mujoco.MjModel:
-    from tiltsim.models.parts import Ground, Pod, RotorLimits, TiltServo
+    from tiltsim.models.parts import Ground, Pod, TiltServo
     from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 
     vehicle: VehicleTable = scenario.rotorcraft
@@ -125,9 +133,7 @@ def _compile(
         userdata_size=userdata_size,
         tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump(exclude={"max_rate"})),
         pod=Pod(**vehicle.pod.model_dump()),
-        rotor_limits=RotorLimits(
-            vehicle.min_rotor_speed, vehicle.max_rotor_speed, _thrust_factors(scenario)
-        ),
+        rotor_limits=rotor_limits(scenario),
         law_states=law_states,
         extra_actuators=extra_actuators,
         ground=None if ground is None else Ground(ground.height, ground.friction),
