@@ -408,7 +408,9 @@ def test_schema_knows_every_table_and_the_variants(capsys):
     tables = {"vehicle", "simulation", "initial", "controller", "gait", "reference"}
     tables |= {"air", "ground", "model_error", "sensors"}
     lists = {"disturbance", "expect", "fault", "variant"}
-    assert tables | lists | {"title", "source", "without", "ours", "claim"} == set(schema["properties"])
+    assert tables | lists | {"title", "source", "without", "ours", "claim"} == set(
+        schema["properties"]
+    )
     assert schema["additionalProperties"] is False
 
 

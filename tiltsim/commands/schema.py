@@ -1,4 +1,4 @@
-"""``tiltsim schema``: prints the JSON Schema of the scenario or the sweep file, for editors."""
+"""``tiltsim schema``: the keys of the scenario or the sweep file, for editors and for people."""
 
 from __future__ import annotations
 
@@ -15,16 +15,30 @@ def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
     parser = subparsers.add_parser(
         "schema",
-        help="print the JSON Schema of the scenario file",
-        description="Print the JSON Schema of the scenario file, with which editors complete TOML.",
+        help="print the keys of the scenario file, or its JSON Schema",
+        description="Print the JSON Schema of the scenario file, with which editors complete TOML; "
+        "or the keys of one of its tables, for people.",
     )
-    parser.add_argument("--sweep", action="store_true", help="the schema of the sweep file instead")
+    add = parser.add_argument
+    address = "a table or key such as gait, gait.walk or simulation.duration, to read"
+    add("address", nargs="?", metavar="TABLE", help=address)
+    add("--sweep", action="store_true", help="of the sweep file instead")
+    add("--markdown", action="store_true", help="all keys as a page; docs/scenario.md")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the schema."""
-    print(json.dumps(sweep_schema() if arguments.sweep else scenario_schema(), indent=2))
+    """Print the schema, or what it says about a table."""
+    from tiltsim.commands.key_tables import key_tables
+    from tiltsim.commands.key_text import description, page
+
+    schema = sweep_schema() if arguments.sweep else scenario_schema()
+    if arguments.address is not None:
+        print(description(key_tables(schema), arguments.address))
+    elif arguments.markdown:
+        print(page(key_tables(schema)), end="")
+    else:
+        print(json.dumps(schema, indent=2))
     return 0
 
 
@@ -40,13 +54,17 @@ def scenario_schema() -> dict[str, Any]:
     schema["title"] = "tiltsim scenario"
     schema["$schema"] = DIALECT
     variant = Variant.model_json_schema()
-    variant["properties"] |= {
-        key: value if key in {*DESCRIPTIVE, "disturbance"} else {"type": "object"}
-        for key, value in schema["properties"].items()
-    }
+    for key, value in schema["properties"].items():
+        partial = {"type": "object", "description": value["description"]}
+        whole = key in DESCRIPTIVE or value.get("type") == "array"
+        variant["properties"][key] = value if whole else partial
     variant["additionalProperties"] = False
     schema["$defs"]["Variant"] = variant
-    schema["properties"]["variant"] = {"type": "array", "items": {"$ref": "#/$defs/Variant"}}
+    schema["properties"]["variant"] = {
+        "type": "array",
+        "items": {"$ref": "#/$defs/Variant"},
+        "description": "a family of flights: each lists only what differs from the file's base",
+    }
     return schema
 
 

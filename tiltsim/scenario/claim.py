@@ -21,11 +21,25 @@ class ClaimTable(Table):
 
     table_name = "claim"
 
-    statement: Words = Field(description="the statement in one sentence")
-    thesis: Words = Field(
-        description="the sentence that makes it, quoted or paraphrased, or what the figure shows"
+    statement: Words = Field(
+        description="the statement in one sentence", examples=["The error at rest is -0.38 m."]
     )
-    criterion: Words = Field(description="what counts as reproduced, and what would not, in words")
-    note: str = Field("", description="what a reader must know to judge it, shown with every row")
+    thesis: Words = Field(
+        description="the sentence that makes it, quoted or paraphrased, or what the figure shows",
+        examples=["Fig. 4 shows A at -0.38 m."],
+    )
+    criterion: Words = Field(
+        description="what counts as reproduced, and what would not, in words",
+        examples=["The same to two digits."],
+    )
+    note: str = Field(
+        "",
+        description="what a reader must know to judge it, shown with every row",
+        examples=["The thesis does not give the mass."],
+    )
     fitted: bool = Field(False, description="parameters were chosen so that it holds")
-    finding: str = Field("", description="key of the finding that settles it, if one does")
+    finding: str = Field(
+        "",
+        description="key of the finding that settles it, if one does",
+        examples=["exact-decoupler"],
+    )

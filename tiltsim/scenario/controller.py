@@ -30,9 +30,10 @@ class PythonController(ControllerTable):
     reference_kinds = ("position", "pose", "attitude_altitude")
     is_external = True
 
-    law: Literal["python"]
+    law: Literal["python"] = Field(description="your own controller")
     function: str = Field(
-        description="FILE.py:NAME of a function or class; FILE is relative to the scenario's folder"
+        description="FILE.py:NAME of a function or class; FILE relative to the scenario's folder",
+        examples=["my_controller.py:hover"],
     )
 
     @property

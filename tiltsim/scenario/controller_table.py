@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from tiltsim.scenario.table import Positive, Table
+from tiltsim.scenario.table import Positive, Table, example
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.gaits.red_gait import determinant_at_clearance
 from tiltsim_controllers.laws.supervisor import STRATEGIES, Supervisor
@@ -25,31 +25,41 @@ LoopGains = tuple[tuple[str, int], ...]
 class SupervisorTable(Table):
     """Keeps a gait away from singular matrices; see `tiltsim_controllers.laws.supervisor`."""
 
+    model_config = example(strategy="hold", min_margin=0.3)
     table_name = "controller.supervisor"
 
     strategy: Literal["scale", "hold", "return_to_red"] = Field(
-        "scale", description="shrink the gait, stop its clock, or go to the nearest red gait"
+        "scale",
+        description="what it does: scale shrinks the gait, hold stops its clock, return_to_red "
+        "goes to the nearest red gait, in which opposite rotors have equal angles",
     )
     min_margin: Annotated[float, Field(ge=0.0, lt=pi / 2)] = Field(
-        0.2, description="smallest singularity margin to allow, rad; 0 disables the limit"
+        0.2,
+        description="smallest singularity margin to allow: the rotation to the nearest attitude "
+        "at which the decoupling matrix is singular, where tilted rotors cannot carry the weight "
+        "without a torque; 0 disables the limit [rad]",
     )
     min_determinant: Annotated[float, Field(ge=0.0, lt=4.0)] = Field(
         0.5,
-        description="smallest determinant to allow, 4 for a level untilted vehicle; 0 disables the "
-        "limit",
+        description="smallest determinant of the decoupling matrix to allow, which relates rotor "
+        "speeds to torques and vertical force: 4 for a level untilted vehicle, 0 where it is "
+        "singular; 0 disables the limit [-]",
     )
     horizon: Annotated[float, Field(gt=0.0, le=10.0)] = Field(
-        0.5, description="how far to look ahead along the gait, s; needs hold or return_to_red"
+        0.5,
+        description="how far to look ahead along the gait; needs strategy hold or return_to_red "
+        "[s]",
+        examples=[1.0],
     )
     max_tilt_rate: Positive = Field(
         1.0,
-        description="tilt rate on the way to red and back, on top of the gait's, rad/s; needs "
-        "return_to_red",
+        description="tilt rate on the way to red and back, on top of the gait's; needs strategy "
+        "return_to_red [rad/s]",
     )
     clearance: Annotated[float, Field(gt=0.0, lt=pi / 4)] = Field(
         0.1,
-        description="distance on red from the curve L, where rotors stop, rad, below atan(r); "
-        "needs return_to_red",
+        description="distance on red from angles at which two rotors stop, below "
+        "delta = atan(K_m / (L K_f)); needs strategy return_to_red [rad]",
     )
 
     @model_validator(mode="after")
@@ -102,7 +112,9 @@ class ControllerTable(Table):
     is_external: ClassVar[bool] = False  # commands come from Python code, not from a built-in law
     commands_tilts: ClassVar[bool] = False  # the tilt angles are inputs, not planned by a gait
 
-    allow_unstable: bool = Field(False, description="accept gains that fail the Routh condition")
+    allow_unstable: bool = Field(
+        False, description="accept gains that fail the Routh-Hurwitz criterion of stability"
+    )
     law: str
 
     def resolve_gains(self) -> tuple[float, ...]:

@@ -8,49 +8,73 @@ from pydantic import Field, model_validator
 
 from tiltsim.scenario.messages import choose
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS, METRICS
-from tiltsim.scenario.table import NonNegative, Range, Table
+from tiltsim.scenario.table import NonNegative, Range, Table, example
 
 
 class Expectation(Table):
     """A bound on a metric, evaluated after the flight."""
 
+    model_config = example(min=-0.4, max=-0.36)
     table_name = "expect"
 
     # An editor completes the names; the message on an unknown one is ours.
-    metric: str = Field(json_schema_extra={"enum": list(METRICS)})
+    metric: str = Field(
+        description="a number that summarizes the flight; docs/metrics.md defines them all",
+        json_schema_extra={"enum": list(METRICS)},
+    )
     claim: str = Field(
-        "", description="name of the [claim.NAME] table with the thesis's statement, or a sentence"
+        "",
+        description="name of the [claim.NAME] table with the thesis's statement, or a sentence",
+        examples=["your-name"],
     )
     case: str = Field(
-        "", description="label among the claim's rows, if a flight has several; default: its title"
+        "",
+        description="label among the claim's rows, if a flight has several; default: its title",
+        examples=["along x"],
     )
     published: float | bool | None = Field(
         None,
         description="the thesis's value, shown beside the measured one; true or false: whether the "
-        "metric, or the statement that it lies within holds, is true in the thesis",
+        "metric, or the statement that it lies within holds, is true in the thesis [the metric's]",
+        examples=[-0.38],
     )
     holds: Range | None = Field(
         None,
         description="where the thesis's statement is true; default: from min to max, which are "
-        "narrower bounds around our own value",
+        "narrower bounds around our own value [the metric's]",
+        examples=[[-0.5, 0.0]],
     )
     published_tolerance: NonNegative | None = Field(
         None,
         description="largest deviation that counts as reproduced; default: half a unit of "
-        "the last digit",
+        "the last digit [the metric's]",
+        examples=[0.005],
     )
     in_kind: Range | None = Field(
-        None, description="range in which the claim holds qualitatively although the number differs"
+        None,
+        description="range in which the claim holds qualitatively although the number differs "
+        "[the metric's]",
+        examples=[[-0.5, -0.3]],
     )
     wrong: bool = Field(
         False, description="the claim is refuted, not merely not reproduced; needs why"
     )
-    why: str = Field("", description="the reason why the claim is not reproduced")
-    min: float | None = None
-    max: float | None = None
-    equals: bool | None = Field(None, description="for metrics that are true or false")
+    why: str = Field(
+        "",
+        description="the reason why the claim is not reproduced",
+        examples=["the thesis gives no mass"],
+    )
+    min: float | None = Field(
+        None, description="smallest value that holds [the metric's]", examples=[-0.4]
+    )
+    max: float | None = Field(
+        None, description="largest value that holds [the metric's]", examples=[0.1]
+    )
+    equals: bool | None = Field(
+        None, description="for metrics that are true or false", examples=[False]
+    )
     plant: Literal["mujoco", "thesis"] | None = Field(
-        None, description="evaluate on this plant only; default: on both"
+        None, description="evaluate on this plant only; default: on both", examples=["thesis"]
     )
 
     @model_validator(mode="after")

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from tiltsim.scenario.table import Angle, Angles2, Angles4, Factor, Period, Positive, Table
+from tiltsim.scenario.table import Angle, Angles2, Angles4, Factor, Period, Positive, Table, example
 from tiltsim_controllers.analysis.two_color_planner import (
     Circle,
     Leg,
@@ -22,6 +22,19 @@ from tiltsim_controllers.gaits.plans import Gait as PlannedGait
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, turn_per_tilt
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
+SIGN: Final = (
+    "positive turns the rotor counterclockwise, seen from outside along its arm, so that rotor 1, "
+    "on +x, pushes to -y"
+)
+"""The sign of a tilt angle, for descriptions."""
+
+COLOR: Final = (
+    "red: opposite rotors have equal angles, and the force at zero torque is vertical; blue: "
+    "alpha_3 = 2 delta - alpha_1, alpha_4 = -2 delta - alpha_2, where the thesis claims the same "
+    "and the matrix is singular"
+)
+"""The two colours of ch. 6, for descriptions."""
+
 
 class GaitTable(Table, ABC):
     """The keys of every gait: a common scale, and a bias on the two rear angles."""
@@ -30,9 +43,11 @@ class GaitTable(Table, ABC):
     size_key: ClassVar[str]
 
     scale: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(
-        1.0, description="multiplies all angles (ch. 5: 1/n)"
+        1.0, description="multiplies all tilt angles (ch. 5: 1/n) [-]", examples=[0.5]
     )
-    bias: Factor = Field(1.0, description="eta, multiplies alpha_3 and alpha_4 (ch. 6)")
+    bias: Factor = Field(
+        1.0, description="eta, multiplies alpha_3 and alpha_4 (ch. 6) [-]", examples=[0.8]
+    )
 
     def plan(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         """The gait for a vehicle. Raises ValueError if the numbers do not define one."""
@@ -51,10 +66,15 @@ class GaitTable(Table, ABC):
 class FixedGait(GaitTable):
     """Constant tilt angles."""
 
+    model_config = example(type="fixed", angles=[-0.65, -0.65, 0.65, 0.65])
     size_key = "angles"
 
-    type: Literal["fixed"] = "fixed"
-    angles: Angles4 = Field((0.0, 0.0, 0.0, 0.0), description="alpha_1..4, rad")
+    type: Literal["fixed"] = Field("fixed", description="angles that never change")
+    angles: Angles4 = Field(
+        (0.0, 0.0, 0.0, 0.0),
+        description=f"alpha_1..4; {SIGN} [rad]",
+        examples=[[-0.65, -0.65, 0.65, 0.65]],
+    )
 
     def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         return plans.fixed(self.angles)
@@ -65,9 +85,12 @@ class TrotGait(GaitTable):
 
     size_key = "amplitude"
 
-    type: Literal["trot_instant", "trot_continuous"]
-    amplitude: Angle = Field(description="rho, rad")
-    period: Period = Field(description="T, s")
+    type: Literal["trot_instant", "trot_continuous"] = Field(
+        description="a trot: rotors 1 and 2 tilt by -rho, 3 and 4 by rho, so that diagonal legs "
+        "move together, and rho changes its sign twice a period: at once, or at a constant rate"
+    )
+    amplitude: Angle = Field(description=f"largest rho; {SIGN} [rad]", examples=[0.65])
+    period: Period = Field(description="T, of the whole cycle [s]", examples=[2.0])
 
     def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         trot = plans.instant_trot if self.type == "trot_instant" else plans.continuous_trot
@@ -79,10 +102,17 @@ class CatGait(GaitTable):
 
     size_key = "amplitude"
 
-    type: Literal["walk", "run", "transverse_gallop", "rotary_gallop"]
-    amplitude: Angle = Field(description="of a leg about its lean, rad")
-    lean: Angle = Field(0.0, description="mean angle of the legs, forward, rad")
-    period: Period = Field(description="T, s")
+    type: Literal["walk", "run", "transverse_gallop", "rotary_gallop"] = Field(
+        description="how a cat moves its legs; a rotor is a leg: 1 right fore, 2 left fore, 3 left "
+        "hind, 4 right hind"
+    )
+    amplitude: Angle = Field(
+        description="swing of a leg to either side of its lean [rad]", examples=[0.5]
+    )
+    lean: Angle = Field(
+        0.0, description="mean angle of the legs, forward, towards +x and +y [rad]", examples=[0.5]
+    )
+    period: Period = Field(description="T, of one stride [s]", examples=[1.0])
 
     def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         return plans.cat(self.type, self.amplitude, self.period, self.lean)
@@ -93,15 +123,17 @@ class WaypointGait(GaitTable):
 
     size_key = "angles"
 
-    type: Literal["waypoints"]
+    type: Literal["waypoints"] = Field(description="your own gait")
     angles: Annotated[tuple[Angles4, ...], Field(min_length=2, strict=False)] = Field(
-        description="alpha_1..4 of each waypoint, rad"
+        description=f"alpha_1..4 of each waypoint; {SIGN} [rad]",
+        examples=[[[-0.3, -0.1, 0.1, 0.3], [-0.1, -0.3, 0.3, 0.1]]],
     )
-    period: Period = Field(description="s")
+    period: Period = Field(description="time to return to the first waypoint [s]", examples=[2.0])
     phases: Annotated[tuple[float, ...], Field(strict=False)] | None = Field(
         None,
-        description="phase of each waypoint as a fraction of the period, from 0; default: "
-        "evenly spaced",
+        description="time of each waypoint as a fraction of the period, from 0; default: evenly "
+        "spaced [-]",
+        examples=[[0.0, 0.4]],
     )
 
     def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
@@ -111,28 +143,41 @@ class WaypointGait(GaitTable):
 class TwoColorLeg(Table):
     """A part of a two-colour path: line segments in one colour."""
 
-    color: Literal["red", "blue"]
+    color: Literal["red", "blue"] = Field(description=COLOR)
     vertices: Annotated[tuple[Angles2, ...], Field(min_length=2, strict=False)] = Field(
-        description="points (alpha_1, alpha_2), rad"
+        description="points (alpha_1, alpha_2) [rad]", examples=[[[-0.2, 0.2], [-0.1, 0.3]]]
     )
 
 
 class TwoColorGait(GaitTable):
     """A path on the Two Color Map (ch. 6 to 8): a rectangle, a circle, or a path of legs.
 
-    The colour gives alpha_3 and alpha_4, on the exact lines of the scenario's vehicle.
+    The colour gives alpha_3 and alpha_4, on the exact lines of the scenario's vehicle;
+    delta = atan(K_m / (L K_f)).
     """
 
-    type: Literal["two_color"]
-    period: Period = Field(description="s")
-    color: Literal["red", "blue"] = "red"
-    rectangle: Annotated[tuple[Angles2, Angles2], Field(strict=False)] | None = Field(
-        None, description="ranges of alpha_1 and of alpha_2, rad"
+    model_config = example(rectangle=[[-0.3, -0.1], [0.1, 0.3]])
+
+    type: Literal["two_color"] = Field(
+        description="a closed curve of alpha_1 and alpha_2; its colour gives the other two angles"
     )
-    centre: Angles2 | None = Field(None, description="of a circle, rad; needs radius")
-    radius: Positive | None = Field(None, description="rad")
+    period: Period = Field(description="time once around [s]", examples=[4.0])
+    color: Literal["red", "blue"] = Field("red", description=COLOR)
+    rectangle: Annotated[tuple[Angles2, Angles2], Field(strict=False)] | None = Field(
+        None,
+        description="the curve is a rectangle: ranges of alpha_1 and of alpha_2 [rad]",
+        examples=[[[-0.3, -0.1], [0.1, 0.3]]],
+    )
+    centre: Angles2 | None = Field(
+        None,
+        description="the curve is a circle about this point; needs radius [rad]",
+        examples=[[-0.2, 0.2]],
+    )
+    radius: Positive | None = Field(None, description="of the circle [rad]", examples=[0.1])
     path: Annotated[tuple[TwoColorLeg, ...], Field(strict=False)] = Field(
-        (), description="closed path of legs, each in one colour; colours switch at P"
+        (),
+        description="the curve consists of legs, each in one colour; colours may change where the "
+        "two meet, at the point P = (delta, -delta)",
     )
 
     @model_validator(mode="after")
@@ -187,11 +232,16 @@ class PenguinGait(TiltCarGait):
 
     size_key = "amplitude"
 
-    type: Literal["penguin_small", "penguin_large"]
-    amplitude: Angle | None = Field(
-        None, description="of the thrusts' direction, rad; default: pi/8 (small), pi/3 (large)"
+    type: Literal["penguin_small", "penguin_large"] = Field(
+        description="a penguin's waddle: the thrusts jump between two directions"
     )
-    period: Period = Field(2.0, description="T, s")
+    amplitude: Angle | None = Field(
+        None,
+        description="either direction, from straight ahead; default: pi/8 (small), pi/3 (large) "
+        "[rad]",
+        examples=[0.4],
+    )
+    period: Period = Field(2.0, description="T, of the whole cycle [s]")
 
     def _tilt(self, per_direction: float) -> PlannedGait:
         swing = PENGUIN_SWINGS[self.type] if self.amplitude is None else self.amplitude
@@ -203,11 +253,11 @@ class RotatingGait(TiltCarGait):
 
     size_key = "rate"
 
-    type: Literal["rotating"]
+    type: Literal["rotating"] = Field(description="the thrusts turn without end")
     rate: Annotated[float, Field(ge=-1e3, le=1e3)] = Field(
-        description="of the thrusts' direction, rad/s"
+        description="of the thrusts' direction [rad/s]", examples=[1.0]
     )
-    start: Angle = Field(0.0, description="direction at time zero, rad")
+    start: Angle = Field(0.0, description="the thrusts' direction at time zero [rad]")
 
     def _tilt(self, per_direction: float) -> PlannedGait:
         return plans.rotating(self.start * per_direction, self.rate * per_direction)

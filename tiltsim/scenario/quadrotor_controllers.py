@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 import tiltsim_controllers.laws.quadrotor_attitude_altitude as quadrotor_attitude_altitude
 import tiltsim_controllers.laws.yaw_position as yaw_position
 from tiltsim.scenario.controller_table import ControllerTable, NamedGains, linear_loops
-from tiltsim.scenario.table import Gains2, Gains4, Positive, Table
+from tiltsim.scenario.table import Gains2, Gains4, Positive, Table, example
 from tiltsim_controllers.analysis.stability import ErrorLoop
 from tiltsim_controllers.laws.switching import PUBLISHED_ZONE
 from tiltsim_controllers.vehicle.parameters import Vehicle
@@ -17,12 +17,23 @@ from tiltsim_controllers.vehicle.parameters import Vehicle
 _YAW_POSITION_LOOPS: Final = (("position", 4), ("yaw", 2))
 _ATTITUDE_LOOPS: Final = (("altitude", 2), ("attitude", 2))
 
+YAW_POSITION_GAINS: Final = (
+    "stable, or ch02 as the thesis prints them, which are unstable, or a table of gains"
+)
+"""The choices of gains of the yaw-position law, for descriptions."""
+
 
 class YawPositionGainTable(Table):
     """Explicit gains of yaw-position control."""
 
-    position: Gains4 = Field(description="k_1 to k_4, on jerk, acceleration, velocity and position")
-    yaw: Gains2 = Field((5.0, 5.0), description="on the rate and on yaw")
+    position: Gains4 = Field(
+        description="k_1 to k_4, on the errors of jerk, acceleration, velocity and position "
+        "[1/s, 1/s^2, 1/s^3, 1/s^4]",
+        examples=[[10.0, 37.5, 62.5, 39.0625]],
+    )
+    yaw: Gains2 = Field(
+        (5.0, 5.0), description="on the errors of the yaw rate and of yaw [1/s, 1/s^2]"
+    )
 
 
 YawPositionGains = NamedGains[Literal["ch02", "stable"], YawPositionGainTable]
@@ -35,8 +46,10 @@ class YawPositionController(ControllerTable):
     reference_kinds = ("position",)
     loop_gains = _YAW_POSITION_LOOPS
 
-    law: Literal["yaw_position"]
-    gains: YawPositionGains = "stable"
+    law: Literal["yaw_position"] = Field(
+        description="the quadrotor's thrust and three torques control position and yaw"
+    )
+    gains: YawPositionGains = Field("stable", description=YAW_POSITION_GAINS)
 
     def resolve_gains(self) -> yaw_position.Gains:
         return _yaw_position_gains(self.gains)
@@ -45,8 +58,14 @@ class YawPositionController(ControllerTable):
 class QuadrotorAttitudeGainTable(Table):
     """Explicit gains of the quadrotor's attitude-altitude control."""
 
-    altitude: Gains2 = Field(description="on the rate and on the altitude")
-    attitude: Gains2 = Field(description="on the rates and on roll, pitch and yaw")
+    altitude: Gains2 = Field(
+        description="on the errors of vertical velocity and altitude [1/s, 1/s^2]",
+        examples=[[10.0, 10.0]],
+    )
+    attitude: Gains2 = Field(
+        description="on the errors of the rates and of roll, pitch and yaw [1/s, 1/s^2]",
+        examples=[[10.0, 10.0]],
+    )
 
 
 QuadrotorAttitudeGains = NamedGains[Literal["ch02"], QuadrotorAttitudeGainTable]
@@ -59,8 +78,12 @@ class QuadrotorAttitudeAltitudeController(ControllerTable):
     reference_kinds = ("attitude_altitude",)
     loop_gains = _ATTITUDE_LOOPS
 
-    law: Literal["quadrotor_attitude_altitude"]
-    gains: QuadrotorAttitudeGains = "ch02"
+    law: Literal["quadrotor_attitude_altitude"] = Field(
+        description="the quadrotor's thrust and three torques control attitude and altitude"
+    )
+    gains: QuadrotorAttitudeGains = Field(
+        "ch02", description="the thesis's set, or a table of gains"
+    )
 
     def resolve_gains(self) -> quadrotor_attitude_altitude.Gains:
         return _attitude_gains(self.gains)
@@ -69,10 +92,18 @@ class QuadrotorAttitudeAltitudeController(ControllerTable):
 class ZoneTable(Table):
     """Attitudes at which attitude-altitude control is active, edges included; Eq. (47)."""
 
+    model_config = example(roll=[-1.57, 0.2])
     table_name = "controller.zone"
 
-    roll: Gains2 = Field((PUBLISHED_ZONE.roll_min, PUBLISHED_ZONE.roll_max), description="rad")
-    pitch: Gains2 = Field((PUBLISHED_ZONE.pitch_min, PUBLISHED_ZONE.pitch_max), description="rad")
+    roll: Gains2 = Field(
+        (PUBLISHED_ZONE.roll_min, PUBLISHED_ZONE.roll_max),
+        description="smallest and largest roll [rad]",
+        examples=[[-1.57, 0.2]],
+    )
+    pitch: Gains2 = Field(
+        (PUBLISHED_ZONE.pitch_min, PUBLISHED_ZONE.pitch_max),
+        description="smallest and largest pitch [rad]",
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -90,17 +121,25 @@ class SwitchingController(ControllerTable):
     reference_kinds = ("pose",)
     loop_gains = (*_YAW_POSITION_LOOPS, *_ATTITUDE_LOOPS)
 
-    law: Literal["switching"]
-    gains: YawPositionGains = Field("stable", description="gains of the yaw-position law")
-    attitude_gains: QuadrotorAttitudeGains = "ch02"
-    zone: ZoneTable = ZoneTable()
+    law: Literal["switching"] = Field(
+        description="yaw_position, and quadrotor_attitude_altitude while the attitude is in a zone"
+    )
+    gains: YawPositionGains = Field(
+        "stable", description=f"of the yaw-position law: {YAW_POSITION_GAINS}"
+    )
+    attitude_gains: QuadrotorAttitudeGains = Field(
+        "ch02", description="of the attitude-altitude law: the thesis's set, or a table of gains"
+    )
+    zone: ZoneTable = Field(
+        ZoneTable(), description="the attitudes at which the attitude-altitude law is active"
+    )
     extension: Literal["bumpless", "held", "running"] = Field(
         "bumpless",
-        description="states of the yaw-position law while the other law is active: following the "
-        "thrust, held, or running on",
+        description="the yaw-position law's own states, thrust and its rate, while the other law "
+        "is active: bumpless follows the actual thrust, held stops them, running goes on",
     )
     extension_rate: Positive = Field(
-        100.0, description="rate at which bumpless states converge to the actual thrust, 1/s"
+        100.0, description="rate at which bumpless states converge to the actual thrust [1/s]"
     )
 
     def resolve_gains(self) -> yaw_position.Gains:

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from tiltsim.scenario.controller_table import ReferenceKind
-from tiltsim.scenario.table import Angle, Angles3, Positive, Table, Vector3
+from tiltsim.scenario.table import Angle, Angles3, Positive, Table, Vector3, example
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.mathematics.scalar import Triple, Values
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
@@ -54,11 +54,17 @@ class _Reference(Table, ABC):
 class _PositionReference(_Reference):
     """A position, and the attitude at it."""
 
-    roll: Tilt = Field(0.0, description="rad; needs a law that tracks the full pose, or switching")
-    pitch: Tilt = Field(0.0, description="rad; as roll")
-    yaw: Angle = 0.0
+    roll: Tilt = Field(
+        0.0,
+        description="angle to hold; for controller.law full_pose, switching or python [rad]",
+        examples=[0.2],
+    )
+    pitch: Tilt = Field(0.0, description="as roll [rad]", examples=[0.2])
+    yaw: Angle = Field(0.0, description="heading to hold [rad]", examples=[0.5])
     acceleration_feedforward: bool = Field(
-        False, description="ch. 4 omits it; laws of higher order always include it"
+        False,
+        description="demand the reference's acceleration, too; ch. 4 omits it, laws of higher "
+        "order always include it",
     )
     type: str
 
@@ -89,8 +95,12 @@ class _PositionReference(_Reference):
 class SetpointReference(_PositionReference):
     """A point to hold."""
 
-    type: Literal["setpoint"] = "setpoint"
-    position: Vector3 = Field((0.0, 0.0, 0.0), description="m")
+    model_config = example(type="setpoint", position=[1.0, 0.0, 0.5])
+
+    type: Literal["setpoint"] = Field("setpoint", description="a point to hold")
+    position: Vector3 = Field(
+        (0.0, 0.0, 0.0), description="the point, z up [m]", examples=[[1.0, 0.0, 0.5]]
+    )
 
     def _motion(self) -> dict[str, float]:
         return _axes("", self.position)
@@ -99,10 +109,14 @@ class SetpointReference(_PositionReference):
 class LineReference(_PositionReference):
     """Motion along a line, uniform or at a constant acceleration."""
 
-    type: Literal["line"]
-    position: Vector3 = Field((0.0, 0.0, 0.0), description="m, at time zero")
-    velocity: Vector3 = Field(description="m/s, at time zero")
-    acceleration: Vector3 = Field((0.0, 0.0, 0.0), description="m/s^2")
+    type: Literal["line"] = Field(description="a straight line")
+    position: Vector3 = Field(
+        (0.0, 0.0, 0.0), description="at time zero [m]", examples=[[0.0, 0.0, 1.0]]
+    )
+    velocity: Vector3 = Field(description="at time zero [m/s]", examples=[[0.5, 0.0, 0.0]])
+    acceleration: Vector3 = Field(
+        (0.0, 0.0, 0.0), description="constant [m/s^2]", examples=[[0.1, 0.0, 0.0]]
+    )
 
     def _motion(self) -> dict[str, float]:
         moving = _axes("velocity_", self.velocity) | _axes("acceleration_", self.acceleration)
@@ -112,10 +126,14 @@ class LineReference(_PositionReference):
 class CircleReference(_PositionReference):
     """Uniform motion on a horizontal circle, from +x towards +y; from -x where radius < 0."""
 
-    type: Literal["circle"]
-    position: Vector3 = Field((0.0, 0.0, 0.0), description="the centre, m")
-    radius: float = Field(description="m; negative to start on the other side")
-    angular_frequency: float = Field(description="rad/s")
+    type: Literal["circle"] = Field(description="a horizontal circle")
+    position: Vector3 = Field(
+        (0.0, 0.0, 0.0), description="the centre [m]", examples=[[0.0, 0.0, 1.0]]
+    )
+    radius: float = Field(description="negative to start on the other side [m]", examples=[5.0])
+    angular_frequency: float = Field(
+        description="positive is counterclockwise seen from above [rad/s]", examples=[0.1]
+    )
 
     def _motion(self) -> dict[str, float]:
         turning = {"radius": self.radius, "angular_frequency": self.angular_frequency}
@@ -131,11 +149,17 @@ class CircleReference(_PositionReference):
 class LissajousReference(_PositionReference):
     """A sine along each axis: ``position + amplitude sin(angular_frequency t + phase)``."""
 
-    type: Literal["lissajous"]
-    position: Vector3 = Field((0.0, 0.0, 0.0), description="the centre, m")
-    amplitude: Vector3 = Field(description="m")
-    angular_frequency: Vector3 = Field(description="rad/s")
-    phase: Angles3 = Field((0.0, 0.0, 0.0), description="rad")
+    type: Literal["lissajous"] = Field(description="a sine along each axis")
+    position: Vector3 = Field(
+        (0.0, 0.0, 0.0), description="the centre [m]", examples=[[0.0, 0.0, 1.0]]
+    )
+    amplitude: Vector3 = Field(description="along x, y and z [m]", examples=[[2.0, 1.0, 0.0]])
+    angular_frequency: Vector3 = Field(
+        description="along x, y and z [rad/s]", examples=[[0.5, 1.0, 0.0]]
+    )
+    phase: Angles3 = Field(
+        (0.0, 0.0, 0.0), description="at time zero [rad]", examples=[[1.5708, 0.0, 0.0]]
+    )
 
     def _motion(self) -> dict[str, float]:
         sine = _axes("amplitude_", self.amplitude) | _axes("phase_", self.phase)
@@ -145,11 +169,15 @@ class LissajousReference(_PositionReference):
 class FigureEightReference(_PositionReference):
     """A horizontal figure eight, from its crossing towards +x and +y; a 1:2 lissajous."""
 
-    type: Literal["figure_eight"]
-    position: Vector3 = Field((0.0, 0.0, 0.0), description="where it crosses itself, m")
-    length: Positive = Field(description="m, along x")
-    width: Positive = Field(description="m, along y")
-    angular_frequency: Positive = Field(description="rad/s, once around")
+    type: Literal["figure_eight"] = Field(description="a horizontal figure eight")
+    position: Vector3 = Field(
+        (0.0, 0.0, 0.0), description="where it crosses itself [m]", examples=[[0.0, 0.0, 1.0]]
+    )
+    length: Positive = Field(description="along x [m]", examples=[4.0])
+    width: Positive = Field(description="along y [m]", examples=[2.0])
+    angular_frequency: Positive = Field(
+        description="2 pi over the time once around [rad/s]", examples=[0.5]
+    )
 
     def _motion(self) -> dict[str, float]:
         once = self.angular_frequency
@@ -160,12 +188,16 @@ class FigureEightReference(_PositionReference):
 class WaypointReference(_PositionReference):
     """Minimum-snap motion from rest to rest through points at given times."""
 
-    type: Literal["waypoints"]
+    type: Literal["waypoints"] = Field(description="a smooth motion through given points")
     positions: Annotated[tuple[Vector3, ...], Field(min_length=2, max_length=50, strict=False)] = (
-        Field(description="m; the first is the start")
+        Field(
+            description="the points; the first is the start [m]",
+            examples=[[[0.0, 0.0, 0.0], [1.0, 0.0, 0.5]]],
+        )
     )
     times: Annotated[tuple[float, ...], Field(strict=False)] = Field(
-        description="s, one per point, from 0; after the last the reference rests"
+        description="one per point, from 0; after the last the reference rests [s]",
+        examples=[[0.0, 5.0]],
     )
 
     def _motion(self) -> dict[str, float]:
@@ -199,11 +231,13 @@ class AttitudeAltitudeReference(_Reference):
     full_pose law has six outputs and controls it.
     """
 
-    type: Literal["attitude_altitude"]
-    roll: Tilt = Field(0.0, description="rad")
-    pitch: Tilt = Field(0.0, description="rad")
-    yaw: Angle = Field(0.0, description="rad")
-    altitude: float = Field(0.0, description="m")
+    model_config = example(altitude=1.0, yaw=0.1)
+
+    type: Literal["attitude_altitude"] = Field(description="an attitude, and an altitude")
+    roll: Tilt = Field(0.0, description="turn about x [rad]", examples=[0.1])
+    pitch: Tilt = Field(0.0, description="turn about y [rad]", examples=[0.1])
+    yaw: Angle = Field(0.0, description="turn about z [rad]", examples=[0.1])
+    altitude: float = Field(0.0, description="z in the world [m]", examples=[1.0])
 
     @property
     def kind(self) -> ReferenceKind:

@@ -34,7 +34,9 @@ class Variant(Table):
 
     model_config = ConfigDict(extra="allow")
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$")]
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$")] = Field(
+        description="address of the variant: tiltsim run 'FILE#NAME'", examples=["slow"]
+    )
 
 
 @dataclass(frozen=True, eq=False)

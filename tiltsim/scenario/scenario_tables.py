@@ -31,30 +31,55 @@ DESCRIPTIVE: Final = ("title", "source", "without", "ours", "claim", "expect")
 class ScenarioTables(Table):
     """One flight, fully specified; `tiltsim.scenario.scenario.Scenario` adds the checks."""
 
-    title: str = ""
-    source: str = ""
+    title: str = Field("", description="one line about the flight", examples=["My first flight"])
+    source: str = Field(
+        "", description="where the experiment is described", examples=["ch. 4, Sec. 7, Fig. 4"]
+    )
     without: str = Field(
         "",
         description="address of the same flight without the feature that this one shows, #NAME in "
         "the same file: tiltsim report compares the two",
+        examples=["#plain"],
+    )
+    vehicle: VehicleUnion = Field(
+        VehicleTable(), description="the vehicle that the controller assumes and that flies"
+    )
+    model_error: ModelErrorTable = Field(
+        ModelErrorTable(), description="what the controller has wrong about the vehicle"
+    )
+    simulation: SimulationTable = Field(
+        SimulationTable(), description="duration, time steps, plant and engine"
+    )
+    initial: InitialTable = Field(InitialTable(), description="the state at time zero")
+    controller: Controller = Field(
+        AttitudeAltitudeController(), description="the control law and its gains"
+    )
+    gait: Gait = Field(
+        FixedGait(),
+        description="the plan of the tilt angles over time: the rotors tilt to a rhythm, as the "
+        "legs of an animal swing",
+    )
+    reference: Reference = Field(SetpointReference(), description="the motion to track")
+    ground: GroundTable | None = Field(
+        None, description="ground to take off from and land on; default: none"
+    )
+    disturbance: Annotated[tuple[Disturbance, ...], Field(strict=False)] = Field(
+        (), description="constant accelerations that the controller does not know of"
+    )
+    air: AirTable = Field(AirTable(), description="wind, gusts, drag and ground effect")
+    sensors: SensorTable = Field(SensorTable(), description="errors of the measurements")
+    fault: Annotated[tuple[Fault, ...], Field(strict=False)] = Field(
+        (), description="rotors and servos that fail during the flight"
+    )
+    expect: Annotated[tuple[Expectation, ...], Field(strict=False)] = Field(
+        (), description="bounds on metrics, by which the flight is judged"
     )
     ours: Annotated[tuple[Origin, ...], Field(strict=False)] = Field(
-        (), description="what of this flight is not given in its source, for tiltsim report"
+        (),
+        description="what of this flight is not given in its source, for tiltsim report",
+        examples=[["gains"]],
     )
     claim: dict[ClaimName, ClaimTable] = Field({}, description="statements of the source")
-    vehicle: VehicleUnion = VehicleTable()
-    model_error: ModelErrorTable = ModelErrorTable()
-    simulation: SimulationTable = SimulationTable()
-    initial: InitialTable = InitialTable()
-    controller: Controller = AttitudeAltitudeController()
-    gait: Gait = FixedGait()
-    reference: Reference = SetpointReference()
-    ground: GroundTable | None = None
-    disturbance: Annotated[tuple[Disturbance, ...], Field(strict=False)] = ()
-    air: AirTable = AirTable()
-    sensors: SensorTable = SensorTable()
-    fault: Annotated[tuple[Fault, ...], Field(strict=False)] = ()
-    expect: Annotated[tuple[Expectation, ...], Field(strict=False)] = ()
 
     _address: str = PrivateAttr("")
 

@@ -14,6 +14,7 @@ from tiltsim.scenario.table import (
     Positive4,
     Table,
     Vector3,
+    example,
 )
 
 MAX_STEPS: Final = 100_000_000
@@ -26,26 +27,45 @@ MAX_LATENCY_STEPS: Final = 20
 class SimulationTable(Table):
     """How the flight is integrated."""
 
+    model_config = example(duration=20.0, plant="thesis")
     table_name = "simulation"
 
-    duration: Positive = Field(40.0, description="s")
-    timestep: Annotated[float, Field(ge=1e-6, le=0.1)] = Field(0.001, description="s, physics")
+    duration: Positive = Field(40.0, description="length of the flight [s]")
+    timestep: Annotated[float, Field(ge=1e-6, le=0.1)] = Field(
+        0.001, description="time step of the physics [s]"
+    )
     control_timestep: NonNegative = Field(
         0.0,
-        description="s; 0 evaluates the law at every integrator stage, other values sample "
-        "and hold",
+        description="time between evaluations of the control law, a multiple of timestep; 0 "
+        "evaluates it at every stage of the integrator, as if it were continuous [s]",
+        examples=[0.004],
     )
     control_latency: NonNegative = Field(
-        0.0, description="s from a measurement to its command; a multiple of control_timestep"
+        0.0,
+        description="time from a measurement to its command, a multiple of control_timestep [s]",
+        examples=[0.008],
     )
     record_timestep: Positive | None = Field(
         None,
-        description="s between recorded samples; default: the multiple of timestep closest to 0.01",
+        description="time between recorded samples; default: the multiple of timestep closest to "
+        "0.01 [s]",
+        examples=[0.02],
     )
-    engine: Literal["auto", "python", "native"] = "auto"
-    plant: Literal["mujoco", "thesis"] = "mujoco"
-    integrator: Literal["RK4", "implicitfast", "implicit", "Euler"] = "RK4"
-    seed: Annotated[int, Field(ge=0)] = 0
+    engine: Literal["auto", "python", "native"] = Field(
+        "auto",
+        description="evaluates the control law as Python or as compiled code, with bit-identical "
+        "flights; auto compiles for long flights",
+    )
+    plant: Literal["mujoco", "thesis"] = Field(
+        "mujoco",
+        description="what is simulated: the MuJoCo model, or the thesis's equations of motion",
+    )
+    integrator: Literal["RK4", "implicitfast", "implicit", "Euler"] = Field(
+        "RK4", description="MuJoCo's integrator; the thesis plant always uses ode3"
+    )
+    seed: Annotated[int, Field(ge=0)] = Field(
+        0, description="seed of sensor noise and turbulence", examples=[1]
+    )
 
     @property
     def steps(self) -> int:
@@ -103,12 +123,28 @@ class SimulationTable(Table):
 class InitialTable(Table):
     """The state at time zero; the tilt angles and their rates are the gait's."""
 
-    position: Vector3 = Field((0.0, 0.0, 0.0), description="m, world")
-    velocity: Vector3 = Field((0.0, 0.0, 0.0), description="m/s, world")
-    attitude: Angles3 = Field((0.0, 0.0, 0.0), description="roll, pitch, yaw, rad")
-    angular_velocity: Vector3 = Field((0.0, 0.0, 0.0), description="p, q, r, rad/s, body")
+    model_config = example(position=[0.0, 0.0, 1.0])
+
+    position: Vector3 = Field(
+        (0.0, 0.0, 0.0),
+        description="of the centre of mass in the world, z up [m]",
+        examples=[[0.0, 0.0, 1.0]],
+    )
+    velocity: Vector3 = Field(
+        (0.0, 0.0, 0.0), description="in the world [m/s]", examples=[[1.0, 0.0, 0.0]]
+    )
+    attitude: Angles3 = Field(
+        (0.0, 0.0, 0.0),
+        description="roll, pitch and yaw: turns about x, y and z, yaw first [rad]",
+        examples=[[0.1, 0.0, 0.0]],
+    )
+    angular_velocity: Vector3 = Field(
+        (0.0, 0.0, 0.0), description="p, q, r about the body axes [rad/s]", examples=[[0, 0, 0.5]]
+    )
     rotor_speed: Positive | Positive4 | Positive2 = Field(
-        300.0, description="absolute value, rad/s; one for all rotors, or one per rotor"
+        300.0,
+        description="absolute value, one for all rotors or one per rotor; rotors 1 and 3 turn "
+        "clockwise seen from above, 2 and 4 counterclockwise [rad/s]",
     )
 
     def rotor_speeds(self, rotors: int) -> tuple[float, ...]:

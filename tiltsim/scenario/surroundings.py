@@ -8,21 +8,26 @@ from pydantic import Field, model_validator
 
 from tiltsim.models.parts import Ground
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.table import Angle, Coordinate, NonNegative, Positive, Table, Vector3
+from tiltsim.scenario.table import Angle, Coordinate, NonNegative, Positive, Table, Vector3, example
 
 
 class GroundTable(Table):
     """Ground to take off from and land on; without this table there are no contacts."""
 
-    height: float = Field(Ground.height, description="m, world")
-    friction: Positive = Field(Ground.friction, description="coefficient of sliding friction")
+    model_config = example(height=0.0)
+
+    height: float = Field(Ground.height, description="z of the surface in the world [m]")
+    friction: Positive = Field(Ground.friction, description="coefficient of sliding friction [-]")
 
 
 class Disturbance(Table):
     """A constant acceleration that the controller does not know of."""
 
-    type: Literal["acceleration"]
-    value: Vector3 = Field(description="m/s^2, world; acts on every mass, as gravity does")
+    type: Literal["acceleration"] = Field(description="the only kind")
+    value: Vector3 = Field(
+        description="in the world; acts on every mass, as gravity does [m/s^2]",
+        examples=[[1.0, 0.0, 0.0]],
+    )
 
 
 class SensorTable(Table):
@@ -33,16 +38,38 @@ class SensorTable(Table):
     exact.
     """
 
-    position_noise: NonNegative = Field(0.0, description="m")
-    position_bias: Vector3 = Field((0.0, 0.0, 0.0), description="m, world")
-    velocity_noise: NonNegative = Field(0.0, description="m/s")
-    velocity_bias: Vector3 = Field((0.0, 0.0, 0.0), description="m/s, world")
-    attitude_noise: NonNegative = Field(0.0, description="rad, about each body axis")
-    attitude_bias: Vector3 = Field((0.0, 0.0, 0.0), description="rad, about the body axes")
-    body_rates_noise: NonNegative = Field(0.0, description="rad/s")
-    body_rates_bias: Vector3 = Field((0.0, 0.0, 0.0), description="rad/s, body")
+    model_config = example(position_noise=0.01, attitude_noise=0.01)
+
+    position_noise: NonNegative = Field(
+        0.0, description="standard deviation along each axis [m]", examples=[0.01]
+    )
+    position_bias: Vector3 = Field(
+        (0.0, 0.0, 0.0), description="constant error, world axes [m]", examples=[[0.1, 0.0, 0.0]]
+    )
+    velocity_noise: NonNegative = Field(
+        0.0, description="standard deviation along each axis [m/s]", examples=[0.02]
+    )
+    velocity_bias: Vector3 = Field(
+        (0.0, 0.0, 0.0), description="constant error, world axes [m/s]", examples=[[0.05, 0, 0]]
+    )
+    attitude_noise: NonNegative = Field(
+        0.0, description="standard deviation about each body axis [rad]", examples=[0.01]
+    )
+    attitude_bias: Vector3 = Field(
+        (0.0, 0.0, 0.0),
+        description="constant turn about the body axes [rad]",
+        examples=[[0.02, 0, 0]],
+    )
+    body_rates_noise: NonNegative = Field(
+        0.0, description="standard deviation about each body axis [rad/s]", examples=[0.05]
+    )
+    body_rates_bias: Vector3 = Field(
+        (0.0, 0.0, 0.0), description="constant error, body axes [rad/s]", examples=[[0.01, 0, 0]]
+    )
     sample_time: Positive | None = Field(
-        None, description="s between measurements; default: control_timestep, 0.01 if continuous"
+        None,
+        description="time between measurements; default: control_timestep, 0.01 if continuous [s]",
+        examples=[0.02],
     )
 
     @property
@@ -51,35 +78,43 @@ class SensorTable(Table):
         return self.model_copy(update={"sample_time": None}) != SensorTable()
 
 
-Rotor = Annotated[int, Field(ge=1, le=4)]
+Rotor = Annotated[
+    int,
+    Field(ge=1, le=4, description="1 on +x of the body, 2 on +y, 3 on -x, 4 on -y", examples=[2]),
+]
+FaultTime = Annotated[NonNegative, Field(description="when it fails [s]", examples=[10.0])]
 
 
 class RotorLoss(Table):
     """A rotor that stops producing thrust and torque while its motor keeps turning."""
 
-    type: Literal["rotor_loss"]
+    type: Literal["rotor_loss"] = Field(description="what fails")
     rotor: Rotor
-    time: NonNegative = Field(description="s")
+    time: FaultTime
 
 
 class PartialThrust(Table):
     """A rotor that produces only a fraction of its thrust and drag torque."""
 
-    type: Literal["partial_thrust"]
+    type: Literal["partial_thrust"] = Field(description="what fails")
     rotor: Rotor
-    time: NonNegative = Field(description="s")
+    time: FaultTime
     factor: Annotated[float, Field(ge=0.0, le=2.0)] = Field(
-        description="remaining fraction, 1 for all"
+        description="remaining fraction, 1 for all [-]", examples=[0.7]
     )
 
 
 class StuckServo(Table):
     """A tilt servo that holds one angle regardless of its command."""
 
-    type: Literal["stuck_servo"]
+    type: Literal["stuck_servo"] = Field(description="what fails")
     rotor: Rotor
-    time: NonNegative = Field(description="s")
-    angle: Angle | None = Field(None, description="rad; default: the gait's angle at that time")
+    time: FaultTime
+    angle: Angle | None = Field(
+        None,
+        description="tilt angle that it holds; default: the gait's at that time [rad]",
+        examples=[0.3],
+    )
 
 
 Fault = Annotated[RotorLoss | PartialThrust | StuckServo, Field(discriminator="type")]
@@ -91,9 +126,16 @@ NonNegative3 = Annotated[tuple[NonNegative, NonNegative, NonNegative], Field(str
 class DragTable(Table):
     """Drag against the motion through the air, along each body axis."""
 
-    linear: NonNegative3 = Field((0.0, 0.0, 0.0), description="N s/m")
+    model_config = example(linear=[0.1, 0.1, 0.2])
+
+    linear: NonNegative3 = Field(
+        (0.0, 0.0, 0.0), description="force per airspeed [N s/m]", examples=[[0.1, 0.1, 0.2]]
+    )
     area: NonNegative3 = Field(
-        (0.0, 0.0, 0.0), description="m^2, drag coefficient times the area projected along the axis"
+        (0.0, 0.0, 0.0),
+        description="drag coefficient times the area projected along the axis; the force grows "
+        "with the square of the airspeed [m^2]",
+        examples=[[0.01, 0.01, 0.02]],
     )
 
 
@@ -102,10 +144,16 @@ class GustTable(Table):
 
     table_name = "air.gust"
 
-    velocity: Vector3 = Field(description="m/s, world, at its peak")
-    start: NonNegative = Field(0.0, description="s")
-    rise: Positive = Field(description="time to reach the peak, and to decay from it, s")
-    duration: NonNegative = Field(0.0, description="s, from start to end; 0 for a gust that lasts")
+    velocity: Vector3 = Field(
+        description="of the air at the peak, world axes [m/s]", examples=[[4.0, 0.0, 0.0]]
+    )
+    start: NonNegative = Field(0.0, description="when it begins [s]", examples=[10.0])
+    rise: Positive = Field(
+        description="time to reach the peak, and to decay from it [s]", examples=[2.0]
+    )
+    duration: NonNegative = Field(
+        0.0, description="from start to end; 0 for a gust that lasts [s]", examples=[8.0]
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -117,29 +165,40 @@ class GustTable(Table):
 class TurbulenceTable(Table):
     """Dryden turbulence, low-altitude model (MIL-F-8785C), drawn from ``simulation.seed``."""
 
-    wind_at_6m: Positive = Field(description="m/s, mean wind 20 ft above the ground")
-    height: Annotated[float, Field(ge=3.048, le=304.8)] = Field(
-        10.0, description="m above the ground, for intensity and scale"
+    wind_at_6m: Positive = Field(
+        description="mean wind 20 ft above the ground, which sets the intensity [m/s]",
+        examples=[5.0],
     )
-    sample_time: Positive = Field(0.01, description="time for which a noise sample is held, s")
+    height: Annotated[float, Field(ge=3.048, le=304.8)] = Field(
+        10.0, description="above the ground, for intensity and scale [m]"
+    )
+    sample_time: Positive = Field(0.01, description="time for which a noise sample is held [s]")
 
 
 class GroundEffectTable(Table):
     """Ground effect on each rotor (Cheeseman and Bennett)."""
 
-    rotor_radius: Positive = Field(0.1, description="m")
-    height: Coordinate = Field(description="m, z of the ground in the world")
+    rotor_radius: Positive = Field(0.1, description="radius of each rotor [m]")
+    height: Coordinate = Field(description="z of the ground in the world [m]", examples=[0.0])
 
 
 class AirTable(Table):
     """The air around the vehicle; none by default."""
 
-    density: Positive = Field(1.225, description="kg/m^3")
-    wind: Vector3 = Field((0.0, 0.0, 0.0), description="velocity of the air, m/s, world")
-    drag: DragTable = DragTable()
-    gust: GustTable | None = None
-    turbulence: TurbulenceTable | None = None
-    ground_effect: GroundEffectTable | None = None
+    model_config = example(wind=[5.0, 0.0, 0.0], drag={"linear": [0.1, 0.1, 0.2]})
+
+    density: Positive = Field(1.225, description="of the air [kg/m^3]")
+    wind: Vector3 = Field(
+        (0.0, 0.0, 0.0),
+        description="velocity of the air in the world; acts through drag [m/s]",
+        examples=[[5.0, 0.0, 0.0]],
+    )
+    drag: DragTable = Field(DragTable(), description="through which wind and gusts act")
+    gust: GustTable | None = Field(None, description="one gust on top of the wind; default: none")
+    turbulence: TurbulenceTable | None = Field(None, description="random gusts; default: none")
+    ground_effect: GroundEffectTable | None = Field(
+        None, description="more thrust near the ground; default: none"
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Self:

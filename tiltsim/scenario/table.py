@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from math import pi
 from operator import attrgetter
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -15,10 +15,10 @@ from tiltsim.scenario.messages import InvalidValueError
 Positive = Annotated[float, Field(gt=0.0, le=1e9)]
 NotTiny = Annotated[float, Field(ge=1e-12, le=1e9)]  # for divisors
 NonNegative = Annotated[float, Field(ge=0.0, le=1e9)]
-Period = Annotated[float, Field(ge=1e-3, le=1e9, description="s")]
+Period = Annotated[float, Field(ge=1e-3, le=1e9)]
 Factor = Annotated[float, Field(ge=-1e3, le=1e3)]
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
-Angle = Annotated[float, Field(ge=-pi, le=pi, description="rad")]
+Angle = Annotated[float, Field(ge=-pi, le=pi)]
 Vector3 = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(strict=False)]
 Angles2 = Annotated[tuple[Angle, Angle], Field(strict=False)]
 Angles3 = Annotated[tuple[Angle, Angle, Angle], Field(strict=False)]
@@ -31,8 +31,16 @@ Limit = Annotated[float, Field(allow_inf_nan=True)]
 Range = Annotated[tuple[Limit, Limit], Field(strict=False)]
 
 
+def example(**keys: Any) -> ConfigDict:
+    """The configuration of a table with an example, for tables without required keys."""
+    return ConfigDict(json_schema_extra={"examples": [keys]})
+
+
 class Table(BaseModel):
-    """A table of the scenario file: unknown keys, NaN and loose types are errors."""
+    """A table of the scenario file: unknown keys, NaN and loose types are errors.
+
+    The description of a key with numbers ends with their unit, ``[m/s]``, or ``[-]`` without one.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
     table_name: ClassVar[str] = ""  # before its keys in messages; empty for the whole document

@@ -14,7 +14,7 @@ from tiltsim.scenario.controller_table import (
     SupervisorTable,
     gain_kind,
 )
-from tiltsim.scenario.table import Gains2, NonNegative, Positive, Table, Vector3
+from tiltsim.scenario.table import Gains2, NonNegative, Positive, Table, Vector3, example
 from tiltsim_controllers.analysis.stability import ErrorLoop, error_loops, feedforward_loops
 from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS, Gains
 from tiltsim_controllers.laws.gains import (
@@ -40,17 +40,26 @@ class GainTable(Table):
     """Explicit gains; see `tiltsim_controllers.laws.gains.gains_from_rows`."""
 
     attitude: Annotated[tuple[Vector3, Vector3, Vector3], Field(strict=False)] = Field(
-        description="diagonals of K_P1, K_P2, K_P3, each roll, pitch, yaw"
+        description="diagonals of K_P1, K_P2 and K_P3, each roll, pitch, yaw: on the errors of "
+        "angular acceleration, rate and angle [1/s, 1/s^2, 1/s^3]",
+        examples=[[[40, 40, 40], [600, 600, 600], [4000, 4000, 4000]]],
     )
-    altitude: Vector3 = Field(description="K_PZ1, K_PZ2, K_PZ3")
-    position: Gains2 = Field((1.0, 1.0), description="K_X1, K_X2")
+    altitude: Vector3 = Field(
+        description="K_PZ1, K_PZ2, K_PZ3: on the errors of vertical acceleration, velocity and "
+        "altitude [1/s, 1/s^2, 1/s^3]",
+        examples=[[10.0, 15.0, 10.0]],
+    )
+    position: Gains2 = Field(
+        (1.0, 1.0),
+        description="K_X1, K_X2: on the errors of horizontal velocity and position [1/s, 1/s^2]",
+    )
 
 
 class PoleTable(Table):
     """The poles of one closed loop: a pair, and for third order a real one at its bandwidth."""
 
-    bandwidth: Positive = Field(description="natural frequency, rad/s")
-    damping: Positive = Field(1.0, description="damping ratio of the pair")
+    bandwidth: Positive = Field(description="natural frequency [rad/s]", examples=[10.0])
+    damping: Positive = Field(1.0, description="damping ratio of the pair [-]", examples=[0.7])
 
     @property
     def poles(self) -> Poles:
@@ -63,7 +72,8 @@ class IntegralPoleTable(PoleTable):
 
     integral: NonNegative = Field(
         0.0,
-        description="pole of integral action, rad/s; 0 disables it; needs gait_rate_feedforward",
+        description="pole of integral action; 0 disables it; needs gait_rate_feedforward [rad/s]",
+        examples=[0.5],
     )
 
     @property
@@ -74,10 +84,14 @@ class IntegralPoleTable(PoleTable):
 class PolePlacementTable(Table):
     """Gains by pole placement; see `tiltsim_controllers.laws.gains.gains_from_poles`."""
 
-    attitude: PoleTable = Field(description="roll and pitch")
-    yaw: PoleTable | None = Field(None, description="default: as attitude")
-    altitude: IntegralPoleTable
-    position: IntegralPoleTable = IntegralPoleTable(bandwidth=1.0, damping=0.5)
+    model_config = example(attitude={"bandwidth": 25.0}, altitude={"bandwidth": 10.0})
+
+    attitude: PoleTable = Field(description="the loops of roll and pitch")
+    yaw: PoleTable | None = Field(None, description="the loop of yaw; default: as attitude")
+    altitude: IntegralPoleTable = Field(description="the loop of the altitude")
+    position: IntegralPoleTable = Field(
+        IntegralPoleTable(bandwidth=1.0, damping=0.5), description="the loops of x and y"
+    )
 
     def resolve(self) -> tuple[Gains, IntegralGains]:
         """The gains of the control law and of its integrals."""
@@ -100,12 +114,30 @@ FeedforwardTerm = Literal[
 class AttitudeAltitudeController(ControllerTable):
     """Attitude-altitude control of the tiltrotor under a planned gait (ch. 3 to 9)."""
 
+    model_config = example(law="attitude_altitude", decoupler="modified")
+
     vehicle_models = ("tiltrotor",)
     reference_kinds = ("position", "attitude_altitude")
 
-    law: Literal["attitude_altitude"] = "attitude_altitude"
-    decoupling: Literal["published", "exact"] = "published"
-    decoupler: Literal["none", "conventional", "modified", "exact"] = "modified"
+    law: Literal["attitude_altitude"] = Field(
+        "attitude_altitude",
+        description="the four rotor speeds control roll, pitch, yaw and altitude by feedback "
+        "linearization; the tilt angles follow the gait",
+    )
+    decoupling: Literal["published", "exact"] = Field(
+        "published",
+        description="form of the decoupling matrix, which relates rotor accelerations to the third "
+        "derivatives of attitude and altitude: as the thesis prints it, without the factor "
+        "2 |rotor speed| in its attitude rows, or exact; the gains belong to one of the two",
+    )
+    decoupler: Literal["none", "conventional", "modified", "exact"] = Field(
+        "modified",
+        description="how the vehicle leans to control its horizontal position, for which no rotor "
+        "speed is left: conventional leans as a quadrotor does, as if no rotor tilted; modified "
+        "adds the lean that balances the tilted rotors' side force at hover, to first order; exact "
+        "points their whole torque-free force along the desired acceleration; none leaves the "
+        "position free, for reference.type attitude_altitude",
+    )
     gains: Annotated[
         Annotated[Literal["ch03", "ch04", "exact", "feedforward"], Tag("named")]
         | Annotated[GainTable, Tag("table")]
@@ -113,18 +145,21 @@ class AttitudeAltitudeController(ControllerTable):
         Discriminator(_attitude_altitude_gain_kind),
     ] = Field(
         "ch04",
-        description="a named set, gains, or poles; yaw torque is small, and the set exact stops a "
-        "rotor at a yaw step of 0.39 rad: see docs/beyond.md",
+        description="a named set, or a table of gains or of poles: ch03 and ch04 are the thesis's, "
+        "for decoupling published; exact and feedforward are for decoupling exact; with the set "
+        "exact a yaw step of 0.39 rad stops a rotor",
     )
     allocation: Literal["inversion", "prioritized"] = Field(
         "inversion",
-        description="at rotor limits: each rotor saturates alone, or attitude has priority",
+        description="at rotor limits: inversion saturates each rotor alone, prioritized gives up "
+        "altitude first, then yaw, then roll and pitch",
     )
     allocation_horizon: Positive = Field(
-        0.02, description="time for which prioritized allocation keeps within the limits, s"
+        0.02, description="time for which prioritized allocation keeps within the limits [s]"
     )
     supervisor: SupervisorTable | None = Field(
-        None, description="acts on the gait before its decoupling matrix becomes singular"
+        None,
+        description="acts on the gait before the decoupling matrix becomes singular; default: none",
     )
     angular_acceleration: Literal["model", "measured"] = Field(
         "model",
@@ -132,25 +167,29 @@ class AttitudeAltitudeController(ControllerTable):
         "model, I^-1 tau w, or the simulated vehicle's, as ch. 4, Eq. (26), is written",
     )
     gait_rate_feedforward: bool = Field(
-        False, description="feed the tilt rates forward: the exact law with integral action"
+        False,
+        description="use the planned tilt rates as well as the angles; needs decoupling and "
+        "decoupler exact, and allows integral action",
     )
     max_acceleration: Positive = Field(
         3.0,
         description="limit on the horizontal acceleration of the position feedback, at which its "
-        "integrators stop, m/s^2; needs gait_rate_feedforward",
+        "integrators stop; needs gait_rate_feedforward [m/s^2]",
     )
     max_angular_acceleration: Positive = Field(
         60.0,
-        description="limit on the demanded angular acceleration of each axis, rad/s^2; needs "
-        "gait_rate_feedforward",
+        description="limit on the demanded angular acceleration of each axis; needs "
+        "gait_rate_feedforward [rad/s^2]",
     )
     anticipation: NonNegative = Field(
         0.12,
-        description="time before and after a corner of the gait in which the body turns, s, at "
-        "most half of the gait's shortest segment; needs gait_rate_feedforward",
+        description="time before and after a corner of the gait in which the body turns, at most "
+        "half of the gait's shortest segment; needs gait_rate_feedforward [s]",
     )
     leave_out: Annotated[tuple[FeedforwardTerm, ...], Field(strict=False)] = Field(
-        (), description="terms of gait_rate_feedforward to omit, for comparison"
+        (),
+        description="terms of gait_rate_feedforward to omit, for comparison",
+        examples=[["integral_action"]],
     )
 
     @model_validator(mode="after")
@@ -230,8 +269,15 @@ _RATE_KEYS: Final = ("leave_out", "anticipation", "max_acceleration", "max_angul
 class FullPoseGainTable(Table):
     """Explicit gains of full-pose control."""
 
-    position: Vector3 = Field(description="on acceleration, velocity and position")
-    attitude: Vector3 = Field(description="on angular acceleration, body rates and attitude")
+    position: Vector3 = Field(
+        description="on the errors of acceleration, velocity and position [1/s, 1/s^2, 1/s^3]",
+        examples=[[750.0, 1875.0, 1562.0]],
+    )
+    attitude: Vector3 = Field(
+        description="on the errors of angular acceleration, body rates and attitude "
+        "[1/s, 1/s^2, 1/s^3]",
+        examples=[[750.0, 1500.0, 2577.0]],
+    )
 
 
 class FullPoseController(ControllerTable):
@@ -242,22 +288,30 @@ class FullPoseController(ControllerTable):
     loop_gains = (("position", 3), ("attitude", 3))
     commands_tilts = True
 
-    law: Literal["full_pose"]
-    gains: NamedGains[Literal["ch03"], FullPoseGainTable] = "ch03"
+    law: Literal["full_pose"] = Field(
+        description="position and attitude independently: the law commands the tilt angles as well"
+    )
+    gains: NamedGains[Literal["ch03"], FullPoseGainTable] = Field(
+        "ch03", description="a set by name, or a table of gains; ch03 is the thesis's author's"
+    )
     tilt_weight: Literal["even", "published"] = Field(
         "even",
-        description="weight of tilt rates in the norm: by the force that they change, or as "
-        "published, by number",
+        description="how tilt rates count against rotor accelerations in the least-norm solution: "
+        "even by the force that they change, published by number, which turns the rotors fast",
     )
     failed_rotor: Annotated[int, Field(ge=1, le=4)] | None = Field(
-        None, description="a rotor that the law knows to have failed and does not use"
+        None,
+        description="a rotor that the law knows to have failed and does not use; default: none",
+        examples=[2],
     )
     failure_known_from: NonNegative = Field(
-        0.0, description="time from which failed_rotor is known, s"
+        0.0, description="time from which failed_rotor is known [s]", examples=[10.0]
     )
-    max_tilt_rate: Positive | None = Field(None, description="limit enforced by the law, rad/s")
+    max_tilt_rate: Positive | None = Field(
+        None, description="limit enforced by the law; default: none [rad/s]", examples=[5.0]
+    )
     max_tilt_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
-        None, description="limit enforced by the law, rad"
+        None, description="limit enforced by the law; default: none [rad]", examples=[1.0]
     )
 
     def resolve_gains(self) -> full_pose.Gains:

@@ -10,7 +10,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from tiltsim.models.parts import Pod, TiltServo
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.table import NonNegative, NotTiny, Positive, Table
+from tiltsim.scenario.table import NonNegative, NotTiny, Positive, Table, example
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, TiltCar
 from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle
 
@@ -25,8 +25,14 @@ MOMENTS: Final = ("inertia_xx", "inertia_yy", "inertia_zz")
 class ServoTable(Table):
     """A position servo of second order, ideal except for the given keys."""
 
-    natural_frequency: Positive = Field(TiltServo.natural_frequency, description="rad/s")
-    damping_ratio: Positive = TiltServo.damping_ratio
+    model_config = example(natural_frequency=30.0)
+
+    natural_frequency: Positive = Field(
+        TiltServo.natural_frequency, description="bandwidth of the servo [rad/s]", examples=[30.0]
+    )
+    damping_ratio: Positive = Field(
+        TiltServo.damping_ratio, description="1 is critically damped [-]"
+    )
 
     @property
     def angle_limit(self) -> float | None:
@@ -37,9 +43,16 @@ class ServoTable(Table):
 class TiltServoTable(ServoTable):
     """The servos that tilt the pods."""
 
-    max_rate: Positive | None = Field(None, description="rad/s")
+    model_config = example(natural_frequency=30.0, max_rate=2.0)
+
+    max_rate: Positive | None = Field(
+        None, description="largest tilt rate; default: unlimited [rad/s]", examples=[2.0]
+    )
     max_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
-        None, description="rad; the gait must stay within"
+        None,
+        description="mechanical stop to either side, within which the gait must stay; default: "
+        "none [rad]",
+        examples=[1.0],
     )
 
     @property
@@ -50,10 +63,14 @@ class TiltServoTable(ServoTable):
 class PodTable(Table):
     """Mass properties of one rotor pod; nearly massless by default, as in the thesis."""
 
+    model_config = example(mass=0.02, inertia=1e-5)
+
     # MuJoCo refuses moving bodies below a tenth of these bounds.
-    mass: Annotated[float, Field(ge=1e-14)] = Field(Pod.mass, description="kg")
+    mass: Annotated[float, Field(ge=1e-14)] = Field(
+        Pod.mass, description="of one pod [kg]", examples=[0.02]
+    )
     inertia: Annotated[float, Field(ge=1e-14)] = Field(
-        Pod.inertia, description="kg m^2, about each axis of the pod"
+        Pod.inertia, description="about each axis of the pod [kg m^2]", examples=[1e-5]
     )
 
 
@@ -90,32 +107,73 @@ class AnyVehicleTable(Table, ABC):
 class VehicleTable(AnyVehicleTable):
     """A rotorcraft: a preset, and the parameters that differ from it."""
 
+    model_config = example(model="tiltrotor", mass=0.5)
+
     rotor_count = 4
 
-    model: Literal["tiltrotor", "quadrotor"] = "tiltrotor"
-    preset: Literal["ar_drone_2", "ar_drone_2_unrounded", "luukkonen"] = "ar_drone_2"
+    model: Literal["tiltrotor", "quadrotor"] = Field(
+        "tiltrotor",
+        description="tiltrotor: each of the four rotors tilts about its arm; quadrotor: none does",
+    )
+    preset: Literal["ar_drone_2", "ar_drone_2_unrounded", "luukkonen"] = Field(
+        "ar_drone_2",
+        description="parameters that are not given: ch. 3's vehicle, ch. 2's (the same with its "
+        "inertia unrounded), or ch. 12's",
+    )
     mjcf: str | None = Field(
         None,
         description="an MJCF file, relative to the scenario's folder, in place of the shipped "
         "one; parameters that are not given here are the file's instead of the preset's",
+        examples=["my_tiltrotor.xml"],
     )
-    mass: Positive | None = Field(None, description="kg, pods included")
+    mass: Positive | None = Field(
+        None, description="pods included; default: the preset's [kg]", examples=[0.5]
+    )
     inertia: Annotated[tuple[Positive, Positive, Positive], Field(strict=False)] | None = Field(
-        None, description="principal moments about the centre of mass, kg m^2, pods included"
+        None,
+        description="principal moments about the centre of mass, along the body axes, pods "
+        "included; default: the preset's [kg m^2]",
+        examples=[[2e-3, 3e-3, 5e-3]],
     )
-    arm_length: NotTiny | None = Field(None, description="m")
-    thrust_coefficient: NotTiny | None = Field(None, description="N s^2/rad^2")
-    drag_coefficient: NotTiny | None = Field(None, description="N m s^2/rad^2")
-    gravity: Positive | None = Field(None, description="m/s^2")
+    arm_length: NotTiny | None = Field(
+        None,
+        description="from the centre of mass to a rotor; default: the preset's [m]",
+        examples=[0.2],
+    )
+    thrust_coefficient: NotTiny | None = Field(
+        None,
+        description="K_f, thrust per square of the rotor speed; default: the preset's "
+        "[N s^2/rad^2]",
+        examples=[8e-6],
+    )
+    drag_coefficient: NotTiny | None = Field(
+        None,
+        description="K_m, torque about the rotor's axis per square of its speed; default: the "
+        "preset's [N m s^2/rad^2]",
+        examples=[2.4e-7],
+    )
+    gravity: Positive | None = Field(
+        None, description="default: the preset's [m/s^2]", examples=[9.81]
+    )
     min_rotor_speed: NonNegative | None = Field(
-        None, description="rad/s, absolute value; at 0 a rotor may stop but not reverse"
+        None,
+        description="smallest absolute value; at 0 a rotor may stop but not reverse; default: "
+        "unlimited [rad/s]",
+        examples=[200.0],
     )
-    max_rotor_speed: Positive | None = Field(None, description="rad/s, absolute value")
+    max_rotor_speed: Positive | None = Field(
+        None, description="largest absolute value; default: unlimited [rad/s]", examples=[390.0]
+    )
     rotor_time_constant: Positive | None = Field(
-        None, description="time constant of the lag between commanded and actual rotor speed, s"
+        None,
+        description="time constant of the lag between commanded and actual rotor speed; default: "
+        "no lag [s]",
+        examples=[0.04],
     )
-    tilt_servo: TiltServoTable = TiltServoTable()
-    pod: PodTable = PodTable()
+    tilt_servo: TiltServoTable = Field(
+        TiltServoTable(), description="the servos that tilt the rotors"
+    )
+    pod: PodTable = Field(PodTable(), description="mass properties of the tilting part of an arm")
 
     def resolve(self) -> Vehicle:
         """The physical parameters: the preset's or the file's, overridden by the keys given."""
@@ -169,23 +227,27 @@ class TiltCarTable(AnyVehicleTable):
     rotor_count = 2
     is_planar = True
 
-    model: Literal["tilt_car"]
-    mass: Positive = Field(THESIS_CAR.mass, description="kg; the thesis does not give it")
+    model: Literal["tilt_car"] = Field(
+        description="two discs on one axis that slide on a plane: the top one carries two rotors "
+        "and turns against the bottom one"
+    )
+    mass: Positive = Field(THESIS_CAR.mass, description="the thesis does not give it [kg]")
     top_inertia: Positive = Field(
-        THESIS_CAR.top_inertia, description="I_T, of the top disc about the axis, kg m^2"
+        THESIS_CAR.top_inertia, description="I_T, of the top disc about the axis [kg m^2]"
     )
     bottom_inertia: Positive = Field(
         THESIS_CAR.bottom_inertia,
-        description="of the bottom disc alone about the axis, kg m^2; I_B is that of both discs",
+        description="of the bottom disc alone about the axis; I_B is that of both discs [kg m^2]",
     )
     half_angle: Annotated[float, Field(gt=0.0, lt=pi / 2)] = Field(
         THESIS_CAR.half_angle,
-        description="theta, between the mean thrust direction and either thrust, rad",
+        description="theta, between the mean thrust direction and either thrust [rad]",
     )
     thrust_coefficient: Positive = Field(
-        THESIS_CAR.thrust_coefficient, description="K_F, N s^2/rad^2"
+        THESIS_CAR.thrust_coefficient,
+        description="K_F, thrust per square of the rotor speed [N s^2/rad^2]",
     )
-    tilt_servo: ServoTable = ServoTable()
+    tilt_servo: ServoTable = Field(ServoTable(), description="the servo that turns the top disc")
 
     def resolve(self) -> TiltCar:
         return TiltCar(**self.model_dump(include={*TiltCar._fields}))
@@ -213,13 +275,25 @@ ScaleFactor = Annotated[float, Field(ge=0.01, le=100.0)]
 class ModelErrorTable(Table):
     """Factors between the simulated vehicle and the ``[vehicle]`` that the controller assumes."""
 
-    mass: ScaleFactor = 1.0
-    inertia: Annotated[tuple[ScaleFactor, ScaleFactor, ScaleFactor], Field(strict=False)] = Field(
-        (1.0, 1.0, 1.0), description="one factor per principal moment"
+    model_config = example(mass=1.1)
+
+    mass: ScaleFactor = Field(
+        1.0, description="factor on the mass; 1.1 is 10 % heavier than assumed [-]", examples=[1.1]
     )
-    arm_length: ScaleFactor = 1.0
-    thrust_coefficient: ScaleFactor = 1.0
-    drag_coefficient: ScaleFactor = 1.0
+    inertia: Annotated[tuple[ScaleFactor, ScaleFactor, ScaleFactor], Field(strict=False)] = Field(
+        (1.0, 1.0, 1.0),
+        description="one factor per principal moment [-]",
+        examples=[[1.1, 1.1, 1.0]],
+    )
+    arm_length: ScaleFactor = Field(
+        1.0, description="factor on the arms' length [-]", examples=[1.02]
+    )
+    thrust_coefficient: ScaleFactor = Field(
+        1.0, description="factor on every rotor's thrust [-]", examples=[0.9]
+    )
+    drag_coefficient: ScaleFactor = Field(
+        1.0, description="factor on every rotor's torque [-]", examples=[0.9]
+    )
 
     def apply(self, vehicle: Vehicle) -> Vehicle:
         """The simulated vehicle, where the controller assumes ``vehicle``."""

@@ -1,0 +1,108 @@
+"""What ``tiltsim schema`` says about each key, and the page made of it."""
+
+import tomllib
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import ConfigDict, TypeAdapter
+
+from tiltsim.cli import main
+from tiltsim.commands.key_tables import UNIT, key_tables
+from tiltsim.commands.schema import scenario_schema
+from tiltsim.scenario.scenario_tables import ScenarioTables
+from tiltsim.scenario.table import Table
+
+SCHEMA = scenario_schema()
+TABLES = key_tables(SCHEMA)
+PAGE = Path(__file__).parents[2] / "docs" / "scenario.md"
+DEFINITIONS = {"": SCHEMA} | SCHEMA["$defs"]
+PROPERTIES = [
+    (name, key, value)
+    for name, table in DEFINITIONS.items()
+    for key, value in table["properties"].items()
+]
+
+
+def has_numbers(value):
+    """Whether a key takes numbers that may have a unit; whole numbers count or name something."""
+    parts = [*value.get("anyOf", ()), *value.get("oneOf", ()), *value.get("prefixItems", ())]
+    parts += [value["items"]] if "items" in value else []
+    return value.get("type") == "number" or any(map(has_numbers, parts))
+
+
+def test_every_key_is_described():
+    missing = [f"{name}.{key}" for name, key, value in PROPERTIES if not value.get("description")]
+    assert not missing, "add Field(description=...) to these keys"
+
+
+def test_every_number_has_a_unit():
+    missing = [
+        f"{name}.{key}"
+        for name, key, value in PROPERTIES
+        if has_numbers(value) and not UNIT.fullmatch(value["description"])
+    ]
+    assert not missing, "end these descriptions with the unit in brackets, or with [-]"
+
+
+def test_page_is_current(capsys):
+    assert main(["schema", "--markdown"]) == 0
+    current = capsys.readouterr().out == PAGE.read_text(encoding="utf-8")
+    assert current, "run tiltsim schema --markdown > docs/scenario.md"
+
+
+def test_page_has_every_key_with_its_unit():
+    text = PAGE.read_text(encoding="utf-8")
+    assert {table.name for table in TABLES} == {*DEFINITIONS}
+    for table in TABLES:
+        assert {key.name for key in table.keys} == {*DEFINITIONS[table.name]["properties"]}
+        section = text.partition(f"```toml\n{table.toml}```")[2].partition("```toml")[0]
+        for key in table.keys if table.toml else ():
+            row = section.partition(f"\n| `{key.name}` |")[2].partition("\n")[0]
+            assert f" {key.meaning}".replace("|", "\\|") in row
+            assert not key.unit or f"[{key.unit}] |" in row
+
+
+def classes(table):
+    """Every table of the scenario file by the name of its class."""
+    children = table.__subclasses__()
+    return {table.__name__: table} | {k: v for child in children for k, v in classes(child).items()}
+
+
+def test_every_example_of_a_key_is_valid():
+    named, tried = classes(Table), 0
+    for name, key, value in PROPERTIES:
+        field = named[name].model_fields.get(key) if name in named else None
+        for example in value.get("examples", ()) if field else ():
+            kind = Annotated[(field.annotation, None, *field.metadata)]
+            TypeAdapter(kind, config=ConfigDict(strict=True)).validate_python(example)
+            tried += 1
+    assert tried > 100
+    bare = [
+        (t.name, k.name) for t in TABLES for k in t.keys if not (k.example or "table" in k.values)
+    ]
+    assert not bare, "add Field(examples=[...]) to these keys"
+
+
+def test_every_example_of_a_table_is_valid():
+    for table in TABLES[1:]:
+        document = tomllib.loads(table.toml)
+        document.pop("variant", None)
+        ScenarioTables.model_validate(document)
+
+
+def test_keys_of_one_table(capsys):
+    assert main(["schema", "gait.walk"]) == 0
+    text = capsys.readouterr().out
+    assert "  amplitude: number, -pi to pi; rad; required\n      swing of a leg" in text
+    assert '  [gait]\n  type = "walk"\n' in text
+    assert main(["schema", "[gait]"]) == 0
+    kinds = capsys.readouterr().out
+    assert "gait.fixed\n" in kinds
+    assert "gait.trot_instant, gait.trot_continuous\n" in kinds
+    assert "amplitude" not in kinds
+    assert main(["schema", "gait.amplitude"]) == 0
+    assert capsys.readouterr().out.count("  amplitude: ") == 3
+    assert main(["schema", "title"]) == 0
+    assert "title: text" in capsys.readouterr().out
+    assert main(["schema", "gait.wlk"]) == 2
+    assert "did you mean gait.walk?" in capsys.readouterr().err
