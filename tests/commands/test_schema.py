@@ -59,7 +59,7 @@ def test_page_has_every_key_with_its_unit():
         for key in table.keys if table.toml else ():
             row = section.partition(f"\n| `{key.name}` |")[2].partition("\n")[0]
             assert f" {key.meaning}".replace("|", "\\|") in row
-            assert not key.unit or f"[{key.unit}] |" in row
+            assert not key.unit or f" [{key.unit}]" in row
 
 
 def classes(table):

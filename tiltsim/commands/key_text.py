@@ -100,14 +100,15 @@ def _narrow(table: KeyTable) -> str:
 
 
 def _key_grid(keys: Iterable[Key]) -> list[str]:
-    return _grid(("key", "value", "default", "meaning and example"), map(_row, keys))
+    return _grid(("key", "value and default", "meaning and example"), map(_row, keys))
 
 
-def _row(key: Key) -> tuple[str, str, str, str]:
+def _row(key: Key) -> tuple[str, str, str]:
     unit = f" [{key.unit}]" if key.unit else ""
-    default = f"`{key.default}`" if key.default not in ("", "required") else key.default
+    required = key.default == "required"
+    default = "<br>required" if required else f"<br>default `{key.default}`" if key.default else ""
     example = f"<br>`{key.name} = {key.example}`" if key.example else ""
-    return f"`{key.name}`", key.values + unit, default, key.meaning + example
+    return f"`{key.name}`", key.values + unit + default, key.meaning + example
 
 
 def _grid(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:

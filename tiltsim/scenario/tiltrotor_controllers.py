@@ -137,6 +137,7 @@ class AttitudeAltitudeController(ControllerTable):
         "adds the lean that balances the tilted rotors' side force at hover, to first order; exact "
         "points their whole torque-free force along the desired acceleration; none leaves the "
         "position free, for reference.type attitude_altitude",
+        examples=["exact"],
     )
     gains: Annotated[
         Annotated[Literal["ch03", "ch04", "exact", "feedforward"], Tag("named")]
