@@ -447,6 +447,7 @@ def test_bench_prints_ratios_for_every_engine_and_integrator():
     assert all(row["ratio"] == 1.0 for row in rows if row["engine"] == "bare")
 
 
+@pytest.mark.slow
 def test_bench_of_many_flights_prints_time_and_memory():
     done = tiltsim("bench", "--vehicles", "3", "--duration", "0.05", "--json")
     assert done.returncode == 0, done.stderr

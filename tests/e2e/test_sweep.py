@@ -349,7 +349,7 @@ def test_axes_of_layers_fly_as_their_rows_say(tmp_path, engine):
     assert len(set(found)) == 12
 
 
-def test_a_user_controller_can_be_a_case_beside_built_in_controllers(tmp_path):
+def test_a_user_controller_can_be_a_case_beside_built_in_controllers(tmp_path, monkeypatch):
     (tmp_path / "mine.py").write_text(
         "import numpy as np\nimport tiltsim\n\n\n"
         "def law(observation):\n    return tiltsim.Command(thrusts=np.full(4, 1.2))\n",
@@ -377,6 +377,7 @@ count = 2
 """,
         encoding="utf-8",
     )
+    monkeypatch.setenv("TILTSIM_TRUST", "1")
     rows = pq.read_table(swept(tmp_path / "sweep.toml", tmp_path / "out") / "sweep.parquet")
     assert rows["law"].to_pylist() == ["mine", "mine", "exact", "exact"]
     assert set(rows["end"].to_pylist()) == {"completed"}

@@ -73,6 +73,7 @@ def test_on_a_smooth_gait_the_error_dies_out(plant):
     assert metrics["min_rotor_speed"] > 200.0
 
 
+@pytest.mark.slow
 def test_the_rotors_never_come_near_a_stop_from_a_rough_start():
     changes = {
         "simulation.duration": 1.5,

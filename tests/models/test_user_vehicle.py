@@ -67,6 +67,7 @@ def total_inertia(model):
     return mass, full[3:6, 3:6] - mass * (center @ center * np.eye(3) - np.outer(center, center))
 
 
+@pytest.mark.slow
 def test_the_documented_example_flies_and_meets_its_expectation(write, tmp_path, capsys):
     write()
     (tmp_path / "my_flight.toml").write_text(block("toml"), encoding="utf-8")

@@ -660,7 +660,7 @@ def test_a_class_in_a_file_beside_the_scenario(hover_file, monkeypatch, tmp_path
     )
     monkeypatch.chdir(tmp_path)
     assert main(["run", str(scenario_file), "--quiet"]) == 0
-    assert main(["check", str(scenario_file)]) == 0
+    assert main(["check", "--trust", str(scenario_file)]) == 0
 
 
 def test_a_failing_controller_exits_3_and_leaves_its_log(tmp_path, capsys):
@@ -737,6 +737,7 @@ def python_blocks(name):
     return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
 
 
+@pytest.mark.slow
 def test_the_documented_examples_fly(capsys):
     names = {}
     for block in python_blocks("docs/own_controller.md"):

@@ -76,8 +76,18 @@ def three_ways(scenarios):
     return rows
 
 
-@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
-@pytest.mark.parametrize("law", LOOPS)
+# The equations are one for all laws of a vehicle; compiling each law into them takes seconds.
+ON_EQUATIONS = ("attitude_altitude", "full_pose", "tilt_car_planned_direction")
+
+
+@pytest.mark.parametrize(
+    ("law", "plant"),
+    [(law, "mujoco") for law in LOOPS]
+    + [
+        pytest.param(law, "thesis", marks=[] if law in ON_EQUATIONS else pytest.mark.slow)
+        for law in LOOPS
+    ],
+)
 def test_every_law_flies_the_same_three_ways_with_continuous_and_held_control(law, plant):
     tables = ALL_LAWS[law]
     rows = three_ways(
@@ -151,7 +161,13 @@ LIKE_BUT_FOR = {
 }
 
 
-@pytest.mark.parametrize("what", LIKE_BUT_FOR)
+@pytest.mark.parametrize(
+    "what",
+    [
+        pytest.param(what, marks=pytest.mark.slow if what == "layers" else ())
+        for what in LIKE_BUT_FOR
+    ],
+)
 def test_flights_that_differ_in_one_thing_do_not_share_what_depends_on_it(what):
     rows = three_ways([scenario(tables) for tables in LIKE_BUT_FOR[what]])
     assert len({row.flight.samples[:, 1:4].tobytes() for row in rows}) == len(rows), (
@@ -280,6 +296,7 @@ def test_layers_around_the_law_that_knows_its_gait_fly_the_same_three_ways():
     assert all(row.end.kind == "completed" for row in rows)
 
 
+@pytest.mark.slow
 def test_air_around_quadrotors_flies_the_same_three_ways():
     quadrotor = LAWS["yaw_position"]
     three_ways(

@@ -12,8 +12,7 @@ import pytest
 
 import tiltsim
 from tests.laws.layers.test_actuation import EVERYTHING
-from tests.laws.layers.test_air import STORM
-from tests.simulation.test_batch import ALL_LAWS, EXACT, scenario
+from tests.simulation.test_batch import ALL_LAWS, EXACT, LAYERED, STORMY, scenario
 from tiltsim.engines.callback import _ignore, control_callback
 from tiltsim.env.environment import TiltrotorEnv
 from tiltsim.plants.command import Command
@@ -84,7 +83,8 @@ def test_sixteen_threads_fly_what_each_flies_alone():
 
 @pytest.mark.slow
 def test_two_hundred_flights_of_all_kinds_are_the_same_in_threads():
-    tables = [*ALL_LAWS.values(), merge(ALL_LAWS["attitude_altitude"], EVERYTHING), STORM]
+    layers = [merge(LAYERED, EVERYTHING), merge(LAYERED, STORMY)]
+    tables = [*ALL_LAWS.values(), *layers]
     kinds = product(tables, ("python", "native"), ("mujoco", "thesis"), (0.0, 0.004))
     scenarios = [
         scenario(table, engine=engine, plant=plant, control_timestep=held, duration=0.2)

@@ -534,6 +534,7 @@ def test_mistakes_on_the_map(words, message) -> None:
 # --- figures -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_figures_are_written(tmp_path) -> None:
     walk = plans.cat("walk", 0.6, 1.0)
     figures = {

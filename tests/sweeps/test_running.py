@@ -81,6 +81,7 @@ def test_rows_hold_what_was_flown(tmp_path):
     assert "realtime_factor" not in table[7]
 
 
+@pytest.mark.slow
 def test_processes_make_the_same_dataset_bit_for_bit(tmp_path):
     definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
     one = run_sweep(definition, tmp_path / "one", jobs=1)
@@ -94,11 +95,11 @@ def test_a_sweep_continues_where_it_stopped(tmp_path, monkeypatch):
     flown = []
     original = chunks.fly_points
 
-    def fly_points(sweep, points, engine):
+    def fly_points(sweep, points, engine, **options):
         flown.append(list(points))
         if len(flown) == 3:
             raise KeyboardInterrupt
-        return original(sweep, points, engine)
+        return original(sweep, points, engine, **options)
 
     monkeypatch.setattr(chunks, "fly_points", fly_points)
     with pytest.raises(KeyboardInterrupt):

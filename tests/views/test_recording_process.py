@@ -76,6 +76,7 @@ def test_the_process_ends_with_its_parent(tmp_path):
     assert (done.returncode, done.stderr) == (-signal.SIGKILL, "")
 
 
+@pytest.mark.slow
 def test_recording_a_flight_does_not_import_rerun(tmp_path):
     path = tmp_path / "flight.rrd"
     options = ["--set", "simulation.duration=0.1", "--set", "expect=[]", "--quiet"]

@@ -7,7 +7,7 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tiltsim.commands.options import Subparsers, add_jobs, add_overrides
+from tiltsim.commands.options import Subparsers, add_jobs, add_overrides, add_trust
 from tiltsim.commands.progress import announce_compilation
 from tiltsim.commands.text import counted, tally
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INVALID_INPUT, VEHICLE_LOST
@@ -33,6 +33,7 @@ def add_parser(subparsers: Subparsers) -> None:
     add("paths", nargs="*", metavar="PATH", help="files, folders or library names; default: all")
     add_jobs(parser)
     add_overrides(parser, "every scenario", "simulation.plant=thesis")
+    add_trust(parser)
     add("--junit", type=Path, metavar="FILE", help="write JUnit XML")
     parser.set_defaults(run=run)
 
@@ -40,6 +41,7 @@ def add_parser(subparsers: Subparsers) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Check everything and print a table."""
     from tiltsim.errors import InputError
+    from tiltsim.plants.trust import is_trusted
     from tiltsim.resources import shipped_folder
     from tiltsim.scenario.loading import parse_override
     from tiltsim.studies.checking import check_all, collect, interrupted_result, write_junit
@@ -58,7 +60,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     try:
         with announce_compilation(shown=True):
-            results = check_all(addresses, arguments.jobs, overrides, report)
+            results = check_all(
+                addresses, arguments.jobs, overrides, report, trusted=is_trusted(arguments.trust)
+            )
     except KeyboardInterrupt:
         if junit is not None:
             with defer_interrupts():

@@ -41,6 +41,15 @@ def add_overrides(parser: argparse.ArgumentParser, target: str, example: str) ->
     )
 
 
+def add_trust(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--trust``, which `tiltsim.plants.trust` reads."""
+    parser.add_argument(
+        "--trust",
+        action="store_true",
+        help="execute the Python controllers that scenario files name; so does TILTSIM_TRUST=1",
+    )
+
+
 def add_json(parser: argparse.ArgumentParser) -> None:
     """Declare ``--json``."""
     parser.add_argument("--json", action="store_true", help="print JSON")

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tiltsim.commands.options import Subparsers, add_jobs, add_overrides, add_quiet
+from tiltsim.commands.options import Subparsers, add_jobs, add_overrides, add_quiet, add_trust
 from tiltsim.commands.progress import counting_bar
 from tiltsim.commands.text import counted, tally
 from tiltsim.exit_codes import INTERRUPTED
@@ -29,12 +29,14 @@ def add_parser(subparsers: Subparsers) -> None:
     add("--cluster", metavar="ADDRESS", help=cluster)
     add("--out", type=Path, metavar="DIR", help="the results (default: sweeps/NAME)")
     add_overrides(parser, "the base scenario", "simulation.plant=thesis")
+    add_trust(parser)
     add_quiet(parser)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Fly the points that are not yet finished, and print a summary."""
+    from tiltsim.plants.trust import is_trusted
     from tiltsim.scenario.loading import parse_override
     from tiltsim.sweeps.loading import load_sweep
     from tiltsim.sweeps.points import SweepPoints
@@ -58,7 +60,12 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         with counting_bar(len(points), units[1], shown=shown) as move:
             dataset = run_sweep(
-                definition, out, jobs=arguments.jobs, cluster=arguments.cluster, report=report
+                definition,
+                out,
+                jobs=arguments.jobs,
+                cluster=arguments.cluster,
+                report=report,
+                trusted=is_trusted(arguments.trust),
             )
     except KeyboardInterrupt:
         print(

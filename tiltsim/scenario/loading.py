@@ -47,19 +47,46 @@ def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) 
     elif names and not overrides:
         raise InputError(f"{address}: choose a variant with #: {', '.join(names)}")
     document.pop("variant", None)
-    locate_named_files(document, file.parent)
+    locate_named_files(document, file.parent, address)
     apply_overrides(document, overrides or {}, address)
     locate_named_files(document, Path())
     return parse_scenario(document, address)
 
 
-def locate_named_files(document: Mapping[str, Any], folder: Path) -> None:
-    """Make the file names in a document absolute, relative to a folder."""
+def locate_named_files(
+    document: Mapping[str, Any], folder: Path, address: str | None = None
+) -> None:
+    """Make the file names in a document absolute.
+
+    Args:
+        document: Changed in place.
+        folder: What they are relative to.
+        address: Name of the document in messages, if it is a file in that folder; the Python code
+            that it names must then lie there, too. None allows any place.
+
+    Raises:
+        InputError: If the code lies elsewhere.
+    """
     for table, key, mark in FILE_KEYS:
         keys = document.get(table)
         name = keys.get(key) if isinstance(keys, dict) else None
         if isinstance(keys, dict) and isinstance(name, str) and mark in name:
+            if address is not None and mark and not _lies_in(folder, name.rpartition(":")[0]):
+                raise InputError(
+                    f"{address}: {table}.{key} = {show(name)}: must lie in the folder of the "
+                    "scenario file, by a relative path; for other files use tiltsim run "
+                    "--controller FILE.py:NAME"
+                )
             keys[key] = str((folder / name).absolute())
+
+
+def _lies_in(folder: Path, name: str) -> bool:
+    """Whether a relative path stays in a folder, links followed."""
+    try:
+        inside = (folder / name).resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError):  # links in a circle, a NUL in the name
+        return False
+    return inside and not Path(name).is_absolute()
 
 
 def apply_overrides(document: dict[str, Any], overrides: Mapping[str, Any], address: str) -> None:

@@ -15,6 +15,7 @@ from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
 from tiltsim.flight.expectations import Verdict, check_expectations
 from tiltsim.plants.engine_choice import with_engine
+from tiltsim.plants.trust import require_trust
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.library import closest_in_library, library_name, read_toml, scenario_files
 from tiltsim.scenario.loading import load_scenario, variant_names
@@ -77,12 +78,24 @@ def _find(name: str) -> Path:
 
 
 def check_one(
-    address: str, overrides: Mapping[str, Any], engine: EngineName | None = None
+    address: str,
+    overrides: Mapping[str, Any],
+    engine: EngineName | None = None,
+    *,
+    trusted: bool = False,
 ) -> CheckResult:
-    """Fly one scenario and evaluate its expectations; errors become part of the result."""
+    """Fly one scenario and evaluate its expectations; errors become part of the result.
+
+    Args:
+        address: Of the scenario.
+        overrides: Values by dotted key.
+        engine: For a scenario whose engine is auto.
+        trusted: Whether to execute Python code that the scenario names.
+    """
     start = perf_counter()
     try:
         scenario = load_scenario(address, overrides)
+        require_trust(scenario, trusted)
         if engine is not None and scenario.simulation.engine == "auto":
             scenario = with_engine(scenario, engine)
         flight = simulate(scenario)
@@ -114,6 +127,8 @@ def check_all(
     jobs: int,
     overrides: Mapping[str, Any],
     report: Callable[[CheckResult], None],
+    *,
+    trusted: bool = False,
 ) -> list[CheckResult]:
     """Check scenarios on several processes.
 
@@ -125,6 +140,7 @@ def check_all(
         jobs: Number of processes.
         overrides: Values by dotted key, for every scenario.
         report: Called with each result as it becomes known.
+        trusted: Whether to execute Python code that scenarios name.
 
     Returns:
         In the order of the addresses.
@@ -134,11 +150,11 @@ def check_all(
     if jobs == 1 or len(addresses) == 1:
         results = []
         for address in addresses:
-            results.append(check_one(address, overrides, engine))
+            results.append(check_one(address, overrides, engine, trusted=trusted))
             report(results[-1])
         return results
     by_address: dict[str, CheckResult] = {}
-    work = partial(check_one, overrides=overrides, engine=engine)
+    work = partial(check_one, overrides=overrides, engine=engine, trusted=trusted)
     # The longest first, so that none of them is still running when all others have finished.
     steps = {address: scenario.simulation.steps for address, scenario in scenarios.items()}
     by_length = sorted(addresses, key=lambda address: -steps.get(address, 0))

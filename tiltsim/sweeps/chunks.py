@@ -12,6 +12,7 @@ from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
 from tiltsim.flight.expectations import Verdict
 from tiltsim.plants.engine_choice import with_engine
+from tiltsim.plants.trust import require_trust
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.sweeps.columns import installed_versions, make_row, rows_to_table
 from tiltsim.sweeps.definition import SweepDefinition
@@ -39,13 +40,14 @@ class ChunkWork:
 
     definition_json: str  # see `SweepDefinition.to_json`
     engine: EngineName | None  # for scenarios whose engine is auto; None lets each choose
+    trusted: bool = False  # whether to execute Python code that scenarios name
 
     def __call__(self, number: int) -> FinishedChunk:
         """Fly one chunk."""
         import pyarrow.parquet as pq
 
         points = _points(self.definition_json)
-        rows, flights = fly_points(points, points.chunk(number), self.engine)
+        rows, flights = fly_points(points, points.chunk(number), self.engine, trusted=self.trusted)
         buffer = BytesIO()
         pq.write_table(rows_to_table(points, rows), buffer, compression="zstd")
         return FinishedChunk(number, len(rows), buffer.getvalue(), flights, installed_versions())
@@ -57,17 +59,23 @@ def _points(definition_json: str) -> SweepPoints:
 
 
 def fly_points(
-    points: SweepPoints, indices: Iterable[int], engine: EngineName | None
+    points: SweepPoints, indices: Iterable[int], engine: EngineName | None, *, trusted: bool = False
 ) -> tuple[list[Row], dict[int, bytes]]:
     """Fly some points of a sweep; return their rows, in order, and the flights to keep.
 
     The searches of all points advance together, so that their flights come in batches.
+
+    Args:
+        points: The sweep's.
+        indices: Of the points to fly.
+        engine: For scenarios whose engine is auto.
+        trusted: Whether to execute Python code that scenarios name.
     """
     finished: dict[int, tuple[Row, ScenarioResult]] = {}
     searches = {index: _search(points, index) for index in indices}
     pending = {index: next(search) for index, search in searches.items()}
     while pending:
-        results = _fly_values(points, list(pending.values()), engine)
+        results = _fly_values(points, list(pending.values()), engine, trusted)
         for index, result in zip(list(pending), results, strict=True):
             try:
                 pending[index] = searches[index].send(result)
@@ -80,7 +88,7 @@ def fly_points(
 
 
 def _fly_values(
-    points: SweepPoints, batch: list[dict[str, Any]], engine: EngineName | None
+    points: SweepPoints, batch: list[dict[str, Any]], engine: EngineName | None, trusted: bool
 ) -> list[ScenarioResult]:
     """Results for values of the axes, "invalid" where they do not make a scenario."""
     results: dict[int, ScenarioResult] = {}
@@ -91,6 +99,7 @@ def _fly_values(
         except InputError as error:
             results[position] = ScenarioResult({}, "invalid", None, str(error))
             continue
+        require_trust(scenario, trusted)
         if engine is not None and scenario.simulation.engine == "auto":
             scenario = with_engine(scenario, engine)
         scenarios[position] = scenario

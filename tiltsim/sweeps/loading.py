@@ -51,7 +51,7 @@ def load_sweep(path: str | Path, overrides: dict[str, Any] | None = None) -> Swe
         raise InputError(f"{address}: {one_line_message(error, document, Sweep)}") from None
     for axis in sweep.axis:
         for tables in axis.cases.values() if isinstance(axis, CasesAxis) else ():
-            locate_named_files(tables, file.parent)
+            locate_named_files(tables, file.parent, address)
     base = _base(sweep, file.parent, address)
     definition = SweepDefinition(
         address,
@@ -75,7 +75,7 @@ def _base(sweep: Sweep, folder: Path, address: str) -> dict[str, Any]:
             raise InputError(f"{address}: scenario: {error}") from None
     else:
         document = deepcopy(sweep.scenario)
-        locate_named_files(document, folder)
+        locate_named_files(document, folder, f"{address}: scenario")
         apply_overrides(document, sweep.set, f"{address}: scenario")
         scenario = parse_scenario(document, f"{address}: scenario")
     base: dict[str, Any] = without_none(scenario.model_dump(mode="json", exclude=UNUSED))

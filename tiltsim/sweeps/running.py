@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from tiltsim.errors import InputError
+from tiltsim.plants.trust import require_trust
 from tiltsim.simulation.shared_engine import shared_engine
 from tiltsim.sweeps.checks import check_points
 from tiltsim.sweeps.chunks import ChunkWork, FinishedChunk
@@ -26,6 +27,7 @@ def run_sweep(
     jobs: int = 1,
     cluster: str | None = None,
     report: Callable[[int], None] = lambda rows: None,
+    trusted: bool = False,
 ) -> Path:
     """Fly the chunks of a sweep that are not yet finished.
 
@@ -35,6 +37,7 @@ def run_sweep(
         jobs: Processes on this machine.
         cluster: Address of a Dask scheduler whose workers fly instead.
         report: Called with the number of finished rows, at the start and after every chunk.
+        trusted: Whether to execute Python code that scenarios name.
 
     Returns:
         The finished dataset, which does not depend on interruptions or on the machines.
@@ -50,7 +53,7 @@ def run_sweep(
         report(rows)
         todo = [number for number in range(points.chunks) if number not in done]
         if todo:
-            for part in _fly(points, todo, jobs, cluster):
+            for part in _fly(points, todo, jobs, cluster, trusted):
                 folder.save(part)
                 rows += part.rows
                 report(rows)
@@ -60,14 +63,16 @@ def run_sweep(
 
 
 def _fly(
-    points: SweepPoints, numbers: list[int], jobs: int, cluster: str | None
+    points: SweepPoints, numbers: list[int], jobs: int, cluster: str | None, trusted: bool
 ) -> Iterator[FinishedChunk]:
     examples = check_points(points)
+    for example in examples:
+        require_trust(example, trusted)
     count = sum(len(points.chunk(number)) for number in numbers)
     steps = count * max(example.simulation.steps for example in examples)
     # A cluster's workers compile their own native code; nothing is compiled here.
     engine = shared_engine([] if cluster is not None else examples, steps)
-    work = ChunkWork(points.definition.to_json(), engine)
+    work = ChunkWork(points.definition.to_json(), engine, trusted)
     if cluster is not None:
         from tiltsim.sweeps.cluster import fly_on_cluster
 

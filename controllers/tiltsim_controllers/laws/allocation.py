@@ -2,14 +2,17 @@
 
 A rotor's speed must stay within its limits, so its acceleration is limited to what keeps it there
 for a horizon: ``(min - |varpi|) / horizon <= |varpi|' <= (max - |varpi|) / horizon``. The requested
-accelerations may lie outside this box. Limiting each rotor separately would produce an arbitrary
-torque. Here the requested accelerations are split into the part ``a`` that produces the third
-derivatives of roll and pitch, the part ``y`` that produces that of yaw, and the part along ``d``
-(`torque_free_inputs`), which changes lift and no torque. Of all ``kappa a + beta d`` in the box the
-largest ``kappa`` up to 1 is taken, then of ``kappa a + lambda y + beta d`` the largest ``lambda``,
-then the ``beta`` nearest to the requested one. The attitude's direction is preserved, and yaw, for
-which rotors have the least authority, has lower priority than roll and pitch. Each step is a small
-linear program with ``beta`` eliminated pair by pair.
+accelerations may lie outside this box, and limiting each rotor separately would produce an
+arbitrary torque. Instead, among all accelerations in the box, the allocation takes
+
+1. the largest fraction, up to 1, of the requested roll and pitch torque rates together, so that
+   their direction is preserved, whatever that costs in yaw and lift;
+2. of what is then left, the yaw torque rate nearest to the requested one;
+3. of what is then left, the lift rate nearest to the requested one.
+
+Yaw, for which rotors have the least authority, has lower priority than roll and pitch. Only rotors
+2 and 4 produce roll torque and only rotors 1 and 3 pitch torque, which makes each of the three
+linear programs one of a single variable.
 """
 
 from __future__ import annotations
@@ -18,8 +21,9 @@ from math import inf
 from typing import Final
 
 from tiltsim_controllers.mathematics.rotation import world_up_in_body
-from tiltsim_controllers.mathematics.scalar import Quad, scalar
+from tiltsim_controllers.mathematics.scalar import Octet, Pair, Quad, clipped, scalar
 from tiltsim_controllers.vehicle.decoupling_matrix import (
+    body_torque,
     sines_and_cosines,
     solve_by_pairs,
     torque_entries,
@@ -28,85 +32,69 @@ from tiltsim_controllers.vehicle.decoupling_matrix import (
 )
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
-ALIKE: Final = 1e-9
-"""Relative difference below which two rotors move alike, well above rounding.
+NEGLIGIBLE: Final = 1e-9
+"""Slope, relative to the largest, below which a rotor does not move: well above rounding.
 
-Without it rounding would decide between the requested yaw and none.
+Without it, rounding would decide whether a rotor at its limit limits the others.
 """
 
 
 @scalar
-def _pair_bound(
-    low: float, own: float, slope: float, high: float, other: float, other_slope: float
-) -> float:
-    """The largest ``kappa`` for which one rotor's minimum ``beta`` is below another's maximum.
-
-    ``beta >= (low - kappa own) / slope`` and ``beta <= (high - kappa other) / other_slope``. Two
-    rotors that ``kappa`` moves alike, as opposite ones with ``alpha_3 = -alpha_1`` in yaw, do not
-    bound it.
-    """
-    above, below = other / other_slope, own / slope
-    rise = above - below
-    room = high / other_slope - low / slope
-    return room / rise if rise > ALIKE * (abs(above) + abs(below)) else inf
+def _products(factor: float, range_: Pair) -> Pair:
+    """The range of ``factor x`` for ``x`` in a range, which may be infinite."""
+    if factor == 0.0:
+        return 0.0, 0.0
+    first, second = factor * range_[0], factor * range_[1]
+    return min(first, second), max(first, second)
 
 
 @scalar
-def largest_feasible_scale(attitude: Quad, direction: Quad, low: Quad, high: Quad) -> float:
-    """The largest ``kappa <= 1`` with some ``beta`` that puts ``kappa a + beta d`` into the box.
+def _feasible_steps(start: float, slope: float, range_: Pair) -> Pair:
+    """The steps ``x`` for which ``start + slope x`` is in a range."""
+    if abs(slope) <= NEGLIGIBLE:
+        return -inf, inf
+    first, second = (range_[0] - start) / slope, (range_[1] - start) / slope
+    return min(first, second), max(first, second)
 
-    For ``kappa = 0`` such a ``beta`` must exist. A rotor whose entry of ``d`` is zero bounds only
-    ``kappa``.
+
+@scalar
+def _feasible_fraction(entries: Pair, torque: float, range_i: Pair, range_j: Pair) -> float:
+    """The largest fraction, up to 1, of a pair's torque that inputs within their ranges produce."""
+    low_i, high_i = _products(entries[0], range_i)
+    low_j, high_j = _products(entries[1], range_j)
+    if torque > 0.0:
+        return min(1.0, (high_i + high_j) / torque)
+    return min(1.0, (low_i + low_j) / torque) if torque < 0.0 else 1.0
+
+
+@scalar
+def _yaw_range(
+    entries: Pair, yaw_entries: Pair, torque: float, range_i: Pair, range_j: Pair
+) -> Pair:
+    """The yaw torques of a pair whose roll or pitch torque is given.
 
     Args:
-        attitude: ``a``, rad/s^2
-        direction: ``d``, rad/s^2
-        low, high: the box, rad/s^2
+        entries, yaw_entries: roll or pitch torque, and yaw torque, by rotor
+        torque: the roll or pitch torque, which inputs within their ranges can produce
+        range_i, range_j: ranges of the two rotors' inputs
     """
-    scale = 1.0
-    for i in range(4):
-        if direction[i] == 0.0:
-            if attitude[i] > 0.0:
-                scale = min(scale, high[i] / attitude[i])
-            elif attitude[i] < 0.0:
-                scale = min(scale, low[i] / attitude[i])
-            continue
-        # Where d points down, the rotor's upper limit bounds beta from below.
-        low_end = low[i] if direction[i] > 0.0 else high[i]
-        for j in range(4):
-            if direction[j] == 0.0:
-                continue
-            high_end = high[j] if direction[j] > 0.0 else low[j]
-            scale = min(
-                scale,
-                _pair_bound(
-                    low_end, attitude[i], direction[i], high_end, attitude[j], direction[j]
-                ),
-            )
-    return max(0.0, scale)
+    first, second = entries
+    share = torque / (first * first + second * second)
+    start_i, start_j = share * first, share * second
+    steps_i = _feasible_steps(start_i, -second, range_i)
+    steps_j = _feasible_steps(start_j, first, range_j)
+    yaw_i, yaw_j = yaw_entries
+    start = yaw_i * start_i + yaw_j * start_j
+    low, high = _products(
+        yaw_j * first - yaw_i * second, (max(steps_i[0], steps_j[0]), min(steps_i[1], steps_j[1]))
+    )
+    return start + low, start + high
 
 
 @scalar
-def _nearest_lift(
-    attitude: Quad, direction: Quad, low: Quad, high: Quad, scale: float, requested: float
-) -> float:
-    """The ``beta`` nearest to the requested one that keeps ``scale a + beta d`` in the box."""
-    low_end, high_end = -inf, inf
-    for i in range(4):
-        if direction[i] == 0.0:
-            continue
-        first = (low[i] - scale * attitude[i]) / direction[i]
-        second = (high[i] - scale * attitude[i]) / direction[i]
-        low_end, high_end = max(low_end, min(first, second)), min(high_end, max(first, second))
-    return max(min(requested, high_end), low_end)
-
-
-@scalar
-def _subtract_scaled(a: Quad, factor: float, b: Quad) -> Quad:
-    """The vector ``a - factor b``."""
-    a1, a2, a3, a4 = a
-    b1, b2, b3, b4 = b
-    return a1 - factor * b1, a2 - factor * b2, a3 - factor * b3, a4 - factor * b4
+def _scaled(a: Quad, b: Quad) -> Quad:
+    """The products of two vectors' components."""
+    return a[0] * b[0], a[1] * b[1], a[2] * b[2], a[3] * b[3]
 
 
 @scalar
@@ -121,30 +109,56 @@ def _is_in_box(w: Quad, low: Quad, high: Quad) -> bool:
 
 
 @scalar
-def allocate_by_priority(
-    tilting: Quad, turning: Quad, direction: Quad, lift: float, low: Quad, high: Quad
-) -> Quad:
-    """The optimum of ``kappa tilting + lambda turning + beta direction`` in the box.
+def _nearest_lift(inputs: Quad, direction: Quad, low: Quad, high: Quad) -> Quad:
+    """The inputs nearest to the given ones, along a direction, that are within their limits."""
+    size = max(abs(direction[0]), abs(direction[1]), abs(direction[2]), abs(direction[3]))
+    least, most = -inf, inf
+    for i in range(4):
+        first, last = _feasible_steps(inputs[i], direction[i] / size, (low[i], high[i]))
+        least, most = max(least, first), min(most, last)
+    step = max(min(0.0, most), least) / size
+    # Rounding may take the sum past the active limit.
+    return (
+        clipped(inputs[0] + step * direction[0], low[0], high[0]),
+        clipped(inputs[1] + step * direction[1], low[1], high[1]),
+        clipped(inputs[2] + step * direction[2], low[2], high[2]),
+        clipped(inputs[3] + step * direction[3], low[3], high[3]),
+    )
 
-    Requested are ``kappa = lambda = 1`` and ``beta = lift``.
+
+@scalar
+def allocate_by_priority(
+    requested: Quad, torque: Octet, force: Quad, low: Quad, high: Quad
+) -> Quad:
+    """Rotor inputs within limits: roll and pitch first, then yaw, then lift.
+
+    The requested ones where the decoupling matrix is singular.
 
     Args:
-        tilting, turning, direction: the parts ``a``, ``y`` and ``d``, rad/s^2
-        lift: requested ``beta``
-        low, high: the box, which must contain zero, rad/s^2
+        requested: rates of the four rotor inputs, rad^2/s^3
+        torque: `torque_entries` of the tilt angles
+        force: the last row of the decoupling matrix, `vertical_force_entries`
+        low, high: limits, which must include zero, rad^2/s^3
     """
-    scale = largest_feasible_scale(tilting, direction, low, high)
-    low, high = _subtract_scaled(low, scale, tilting), _subtract_scaled(high, scale, tilting)
-    yaw_scale = largest_feasible_scale(turning, direction, low, high)
-    beta = _nearest_lift(turning, direction, low, high, yaw_scale, lift)
-    # Rounding may take the sum past the active limit.
-    inside = (
-        min(high[0], max(low[0], yaw_scale * turning[0] + beta * direction[0])),
-        min(high[1], max(low[1], yaw_scale * turning[1] + beta * direction[1])),
-        min(high[2], max(low[2], yaw_scale * turning[2] + beta * direction[2])),
-        min(high[3], max(low[3], yaw_scale * turning[3] + beta * direction[3])),
+    v1, v2, v3, v4 = requested
+    x2, x4, y1, y3, z1, z2, z3, z4 = torque
+    h1, h2, h3, h4 = force
+    roll, pitch, yaw = body_torque(torque, v1, v2, v3, v4)
+    range_1, range_2 = (low[0], high[0]), (low[1], high[1])
+    range_3, range_4 = (low[2], high[2]), (low[3], high[3])
+    fraction = min(
+        _feasible_fraction((x2, x4), roll, range_2, range_4),
+        _feasible_fraction((y1, y3), pitch, range_1, range_3),
     )
-    return _subtract_scaled(inside, -scale, tilting)
+    roll, pitch = fraction * roll, fraction * pitch
+    low_24, high_24 = _yaw_range((x2, x4), (z2, z4), roll, range_2, range_4)
+    low_13, high_13 = _yaw_range((y1, y3), (z1, z3), pitch, range_1, range_3)
+    yaw = clipped(yaw, low_24 + low_13, high_24 + high_13)
+    lift = h1 * v1 + h2 * v2 + h3 * v3 + h4 * v4
+    inputs = solve_by_pairs(torque, force, roll, pitch, yaw, lift)
+    if inputs[0] != inputs[0]:
+        return requested
+    return _nearest_lift(inputs, torque_free_inputs(torque), low, high)
 
 
 @scalar
@@ -155,7 +169,7 @@ def allocate_accelerations(
     roll: float,
     pitch: float,
     vehicle: Vehicle,
-    limits: tuple[float, float],
+    limits: Pair,
     horizon: float,
 ) -> Quad:
     """Rotor accelerations (rad/s^2) within the speed limits, attitude before altitude.
@@ -170,7 +184,6 @@ def allocate_accelerations(
         limits: minimum and maximum absolute rotor speed, rad/s
         horizon: time for which the limits must hold, s
     """
-    w1, w2, w3, w4 = requested
     s1, s2, s3, s4 = speeds
     slowest, fastest = limits
     # Along the spin, which is negative for rotors 1 and 3. Zero stays in the box beyond a limit.
@@ -186,25 +199,18 @@ def allocate_accelerations(
         max(0.0, -(slowest + s3) / horizon),
         max(0.0, (fastest - s4) / horizon),
     )
-    if _is_in_box(requested, low, high):
+    # Per rad/s^2 a rotor changes its input by 2 |varpi|.
+    gain = (2.0 * abs(s1), 2.0 * abs(s2), 2.0 * abs(s3), 2.0 * abs(s4))
+    if _is_in_box(requested, low, high) or min(gain[0], gain[1], gain[2], gain[3]) == 0.0:
         return requested
 
     trig = sines_and_cosines(tilts[0], tilts[1], tilts[2], tilts[3])
-    torque = torque_entries(trig, drag_ratio(vehicle))
-    _x2, _x4, _y1, _y3, z1, z2, z3, z4 = torque
-    f1, f2, f3, f4 = torque_free_inputs(torque)
     ux, uy, uz = world_up_in_body(roll, pitch)
-    force = vertical_force_entries(trig, ux, uy, uz)
-    h1, h2, h3, h4 = force
-    # Per rad/s^2 a rotor changes its w by 2 |varpi|.
-    k1, k2, k3, k4 = 2.0 * abs(s1), 2.0 * abs(s2), 2.0 * abs(s3), 2.0 * abs(s4)
-    lift_per_beta = h1 * f1 + h2 * f2 + h3 * f3 + h4 * f4
-    if lift_per_beta == 0.0 or k1 == 0.0 or k2 == 0.0 or k3 == 0.0 or k4 == 0.0:
-        return requested
-    direction = (f1 / k1, f2 / k2, f3 / k3, f4 / k4)
-    lift = (h1 * k1 * w1 + h2 * k2 * w2 + h3 * k3 * w3 + h4 * k4 * w4) / lift_per_beta
-    yaw = z1 * k1 * w1 + z2 * k2 * w2 + z3 * k3 * w3 + z4 * k4 * w4
-    y1, y2, y3, y4 = solve_by_pairs(torque, force, 0.0, 0.0, yaw, 0.0)
-    turning = (y1 / k1, y2 / k2, y3 / k3, y4 / k4)
-    tilting = _subtract_scaled(_subtract_scaled(requested, lift, direction), 1.0, turning)
-    return allocate_by_priority(tilting, turning, direction, lift, low, high)
+    v1, v2, v3, v4 = allocate_by_priority(
+        _scaled(requested, gain),
+        torque_entries(trig, drag_ratio(vehicle)),
+        vertical_force_entries(trig, ux, uy, uz),
+        _scaled(low, gain),
+        _scaled(high, gain),
+    )
+    return v1 / gain[0], v2 / gain[1], v3 / gain[2], v4 / gain[3]

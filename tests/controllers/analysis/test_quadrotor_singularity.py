@@ -93,6 +93,7 @@ def test_the_surface_is_the_determinant_of_eq_43_as_printed():
     np.testing.assert_allclose(published_determinant(roll, pitch), surface, rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slip", [True, False], ids=["as printed", "put right"])
 def test_the_slip_in_eq_31_does_not_touch_the_determinant(slip):
     assert sympy.simplify(printed_delta(slip).det() + C_PHI / C_THETA) == 0

@@ -31,6 +31,7 @@ FEEDFORWARD = {
 EXACT = {"decoupling": "exact", "gains": "exact"}
 
 
+@pytest.mark.slow
 def test_engines_fly_the_same_supervised_flight_and_show_what_passed():
     short = {"simulation.duration": 1.6}
     python, native = (
