@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from tests.damage import read_with_flipped_bits
 from tests.flights import SAMPLE_FIELDS
 from tiltsim.errors import InputError
 from tiltsim.flight import writing
@@ -55,22 +56,20 @@ def test_saving_again_replaces_all_three(tmp_path):
     assert after["flight.parquet"] != before["flight.parquet"]
 
 
-@pytest.mark.parametrize("writer", ["write_table", "metrics_json", "scenario_toml"])
-@pytest.mark.parametrize("failure", [OSError(28, "No space left on device"), KeyboardInterrupt()])
+@pytest.mark.parametrize("writer", ["parquet_bytes", "metrics_json", "scenario_toml"])
+@pytest.mark.parametrize("failure", [InputError("no disk"), KeyboardInterrupt()])
 def test_a_write_that_fails_leaves_the_old_file_whole(tmp_path, monkeypatch, writer, failure):
     flight(x=1.0).save(tmp_path)
     before = contents(tmp_path)
 
-    def half_written(_content, path=None, **_options):
-        if path is not None:
-            path.write_bytes(b"half")
+    def failing(_content):
         raise failure
 
-    monkeypatch.setattr(pq if writer == "write_table" else writing, writer, half_written)
+    monkeypatch.setattr(writing, writer, failing)
     with pytest.raises(type(failure)):
         flight(x=2.0).save(tmp_path)
     after = contents(tmp_path)
-    file = {"write_table": "flight.parquet", "metrics_json": "metrics.json"}
+    file = {"parquet_bytes": "flight.parquet", "metrics_json": "metrics.json"}
     failed = file.get(writer, "scenario.toml")
     assert after[failed] == before[failed]
     assert set(after) == NAMES, "no temporary file is left behind"
@@ -196,8 +195,21 @@ def test_a_file_that_is_no_parquet_is_an_input_error(tmp_path, content):
 def test_a_truncated_file_is_an_input_error(tmp_path):
     flight().save(tmp_path)
     file = tmp_path / "flight.parquet"
-    file.write_bytes(file.read_bytes()[:-100])
+    content = file.read_bytes()
+    file.write_bytes(content[:-100])
+    assert "damaged" in refused(file)
+    file.write_bytes(content[:1000])
     assert "not a readable Parquet file" in refused(file)
+
+
+@pytest.mark.parametrize("flips", [50, pytest.param(1000, marks=pytest.mark.slow)])
+def test_a_flipped_bit_is_refused_or_changes_nothing(tmp_path, flips):
+    flight().save(tmp_path)
+    file = tmp_path / "flight.parquet"
+    whole = load_flight(file)
+    for found in read_with_flipped_bits(file, lambda: load_flight(file), flips):
+        assert found.origin() == whole.origin()
+        np.testing.assert_array_equal(found.samples, whole.samples)
 
 
 def test_a_foreign_parquet_file_is_an_input_error(tmp_path):
@@ -210,6 +222,8 @@ def test_a_foreign_parquet_file_is_an_input_error(tmp_path):
     ("key", "value", "words"),
     [
         ("scenario", "{", "not a flight"),
+        ("scenario", "[3]", "not a flight"),
+        ("scenario", "[" * 100_000, "not a flight"),
         ("engine", "steam", "engine 'steam' is unknown"),
         ("end", "bored", "end 'bored' is unknown"),
         ("end_time", "late", "not a flight"),
@@ -228,3 +242,91 @@ def test_wrong_metadata_are_an_input_error(tmp_path, key, value, words):
 def test_a_missing_column_is_an_input_error(tmp_path):
     pq.write_table(flight().to_arrow().drop_columns(["vx"]), tmp_path / "flight.parquet")
     assert "no column vx" in refused(tmp_path / "flight.parquet")
+    twice = flight().to_arrow().append_column("vx", [[0.0, 0.0, 0.0]])
+    pq.write_table(twice, tmp_path / "flight.parquet")
+    assert "2 columns vx" in refused(tmp_path / "flight.parquet")
+
+
+# --- what is not replaced ------------------------------------------------------------------------
+
+
+OWN_SCENARIO = "# mine\n[controller]\nlaw = 'python'\nfunction = 'my_law.py:law'\n"
+
+
+def flown_with(file, folder):
+    """Write a flight as if a user's controller had flown it."""
+    own = {**SCENARIO, "controller": {"law": "python", "function": f"{file}:law"}}
+    writing.write_flight(folder, flight().to_arrow(), {}, parse_scenario(own))
+
+
+@pytest.fixture
+def law(tmp_path):
+    """The file of a user's controller."""
+    (tmp_path / "own").mkdir()
+    file = tmp_path / "own" / "my_law.py"
+    file.write_text("law = None\n")
+    return file
+
+
+@pytest.mark.parametrize("edit", ["", "# mine, too\n"])
+def test_a_scenario_that_somebody_wrote_or_edited_is_not_replaced(tmp_path, edit):
+    if edit:
+        flight().save(tmp_path)
+    with (tmp_path / "scenario.toml").open("a") as file:
+        file.write(edit or OWN_SCENARIO)
+    before = contents(tmp_path)
+    with pytest.raises(InputError, match=r"scenario.toml: not written by tiltsim, or edited since"):
+        flight(x=2.0).save(tmp_path)
+    assert contents(tmp_path) == before
+
+
+def test_a_copied_controller_is_replaced_by_a_later_version(tmp_path, law):
+    out = tmp_path / "out"
+    for text in ("law = None\n", "law = 3\n"):
+        law.write_text(text)
+        flown_with(law, out)
+        assert (out / "my_law.py").read_text() == text
+    resolved = tomllib.loads((out / "scenario.toml").read_text())
+    assert resolved["controller"]["function"] == "my_law.py:law"
+    flown_with(out / "my_law.py", out)  # the copy itself
+    assert (out / "my_law.py").read_text() == "law = 3\n"
+
+
+@pytest.mark.parametrize("flown_before", [False, True])
+def test_another_controller_is_not_replaced(tmp_path, law, flown_before):
+    out = tmp_path / "out"
+    out.mkdir()
+    if flown_before:
+        flown_with(law, out)
+    (out / "my_law.py").write_text("law = 'another'\n")
+    before = contents(out)
+    with pytest.raises(InputError, match=r"my_law.py: not written by tiltsim, or edited since"):
+        flown_with(law, out)
+    assert contents(out) == before
+
+
+@pytest.mark.parametrize("name", sorted(NAMES))
+def test_a_folder_in_the_place_of_a_file_is_noticed_before_anything_is_written(tmp_path, name):
+    (tmp_path / name).mkdir()
+    with pytest.raises(InputError, match=f"{name}: not a file"):
+        flight().save(tmp_path)
+    assert list(tmp_path.iterdir()) == [tmp_path / name]
+
+
+def test_text_that_is_not_unicode_does_not_lose_a_flight(tmp_path):
+    one = flight()
+    scenario = parse_scenario(SCENARIO, os.fsdecode(b"caf\xe9.toml"))
+    end = End("failed", 0.5, "the controller raised \ud800")
+    Flight.of_scenario(scenario, one.samples, end, "python", 0.1).save(tmp_path)
+    read = load_flight(tmp_path)
+    assert read.scenario.address == r"caf\udce9.toml"
+    assert read.end.cause == r"the controller raised \ud800"
+
+
+@pytest.mark.parametrize("table", ["title", "controller.function"])
+def test_a_scenario_with_text_that_is_not_unicode_is_refused(table):
+    document = {"title": "a\udcff"} if table == "title" else {}
+    if not document:
+        document = {"controller": {"law": "python", "function": "a\udcff.py:law"}}
+    with pytest.raises(InputError, match=rf'{table} = "a.*": not valid Unicode'):
+        parse_scenario(document)

@@ -288,7 +288,9 @@ def test_a_damaged_folder_is_reported_or_repaired(tmp_path):
     assert run_sweep(definition, tmp_path / "out").read_bytes() == whole
     part = next(iter((tmp_path / "out" / "parts").iterdir()))
     part.write_bytes(part.read_bytes()[:100])
-    with pytest.raises(InputError, match=f"{part.name}: not readable; delete it"):
+    with pytest.raises(
+        InputError, match=f"{part.name}: not a readable Parquet file: .*; delete it"
+    ):
         run_sweep(definition, tmp_path / "out")
 
 
@@ -307,11 +309,19 @@ def test_an_unreadable_definition_is_refused(tmp_path):
     definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
     run_sweep(definition, tmp_path / "out")
     file = tmp_path / "out" / "sweep.json"
+    whole = json.loads(file.read_text())
+    old = {key: value for key, value in whole.items() if key != "sha256"}
     for text, words in (
         ("{}", "keys are missing"),
         ("junk", "not the definition"),
-        (file.read_text().replace('"axis"', '"axes"'), "axes"),
+        ("[" * 100_000, "keys are missing"),
+        (json.dumps({**whole, "address": "other"}), "differs from its checksum"),
+        (json.dumps({**old, "versions": 3}), "versions = 3"),
+        (json.dumps({**old, "sweep": {**old["sweep"], "axes": []}}), "axes"),
     ):
         file.write_text(text)
-        with pytest.raises(InputError, match=words):
+        with pytest.raises(InputError, match=words) as caught:
             load_results(tmp_path / "out")
+        assert "\n" not in str(caught.value)
+    file.write_text(json.dumps(old))  # as an earlier version wrote it
+    assert len(load_results(tmp_path / "out")) == 12

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import os
+import re
+import resource
+from pathlib import Path
 
 import pytest
 
-from tiltsim.system.files import replacing
+from tiltsim.errors import InputError
+from tiltsim.system.files import remove_leftovers, replacing
+from tiltsim.system.locks import locked
 
 
 @pytest.mark.parametrize("durable", [False, True])
@@ -15,7 +20,8 @@ def test_a_file_appears_complete_or_keeps_its_content(tmp_path, durable):
     with replacing(path, durable=durable) as temporary:
         temporary.write_bytes(b"before")
         assert not path.exists()
-    with pytest.raises(FileNotFoundError), replacing(path, durable=durable):
+    words = "file: cannot be written: No such file"
+    with pytest.raises(InputError, match=words), replacing(path, durable=durable):
         pass  # nothing was written
     assert path.read_bytes() == b"before"
     assert list(tmp_path.iterdir()) == [path]
@@ -28,6 +34,49 @@ def test_a_durable_file_replaces_another_only_once_it_is_on_disk(tmp_path, monke
     path = tmp_path / "file"
     path.write_bytes(b"before")
     monkeypatch.setattr(os, "fsync", no_disk)
-    with pytest.raises(OSError, match="no disk"), replacing(path, durable=True) as temporary:
+    with pytest.raises(InputError, match="no disk"), replacing(path, durable=True) as temporary:
         temporary.write_bytes(b"after")
     assert path.read_bytes() == b"before"
+
+
+def test_a_full_disk_names_the_file_and_leaves_the_old_one(tmp_path):
+    path = tmp_path / "file"
+    path.write_bytes(b"before")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, before[1]))
+    try:
+        words = "file: cannot be written: File too large"
+        with pytest.raises(InputError, match=words), replacing(path) as temporary:
+            temporary.write_bytes(b"after" * 100)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert path.read_bytes() == b"before"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_device_is_written_and_stays_one():
+    with replacing(Path("/dev/null")) as path:
+        path.write_bytes(b"nothing")
+    assert Path("/dev/null").is_char_device()
+    words = "/dev/full: cannot be written: No space left on device"
+    with pytest.raises(InputError, match=words), replacing(Path("/dev/full")) as path:
+        path.write_bytes(b"nothing")
+
+
+def test_a_lock_changes_no_file_and_follows_no_link(tmp_path):
+    (tmp_path / "file").write_bytes(b"content")
+    with locked(tmp_path / "file", wait=False):
+        pass
+    assert (tmp_path / "file").read_bytes() == b"content"
+    (tmp_path / "link").symlink_to(tmp_path / "file")
+    with pytest.raises(OSError, match="link"), locked(tmp_path / "link", wait=False):
+        pass
+
+
+def test_only_what_killed_processes_left_is_removed(tmp_path):
+    left = {".part.new", ".part.123.new"}
+    for name in {*left, ".other.123.new", "part", ".part.old", ".my part.new"}:
+        (tmp_path / name).touch()
+    before = {file.name for file in tmp_path.iterdir()}
+    remove_leftovers(tmp_path, re.compile("part"))
+    assert {file.name for file in tmp_path.iterdir()} == before - left

@@ -40,15 +40,15 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Check everything and print a table."""
-    from tiltsim.errors import InputError
     from tiltsim.plants.trust import is_trusted
     from tiltsim.resources import shipped_folder
     from tiltsim.scenario.loading import parse_override
     from tiltsim.studies.checking import check_all, collect, interrupted_result, write_junit
+    from tiltsim.system.files import prepare_file
 
     junit: Path | None = arguments.junit
-    if junit is not None and (junit.is_dir() or not junit.absolute().parent.is_dir()):
-        raise InputError(f"--junit {junit}: must be a file in an existing folder")
+    if junit is not None:
+        prepare_file("--junit", junit)
     overrides = dict(parse_override(text) for text in arguments.overrides)
     addresses = collect(arguments.paths or [str(shipped_folder("scenarios"))])
     width = max(len(address) for address in addresses)

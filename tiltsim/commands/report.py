@@ -39,6 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.report.html_page import page
     from tiltsim.report.making import make_report
     from tiltsim.report.markdown import markdown
+    from tiltsim.report.store import store
     from tiltsim.system.files import prepare_file, prepare_folder
 
     out: Path = arguments.out
@@ -51,9 +52,9 @@ def run(arguments: argparse.Namespace) -> int:
         report = make_report(
             arguments.paths, out / "kept", arguments.jobs, lambda done, total: move(done / total)
         )
-    target.write_text(page(report), encoding="utf-8")
+    store(target, page(report).encode())
     if arguments.markdown is not None:
-        arguments.markdown.write_text(markdown(report), encoding="utf-8")
+        store(arguments.markdown, markdown(report).encode())
     counts = sorted(count(report.rows).items(), key=lambda item: item[0].rank)
     print(f"{len(report.rows)} claims: {tally({kind.value: number for kind, number in counts})}")
     for failure in report.failures:

@@ -48,15 +48,16 @@ def add_parser(subparsers: Subparsers) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Fly, save, evaluate."""
     from tiltsim.flight.expectations import check_expectations
+    from tiltsim.flight.writing import prepare_flight_folder
     from tiltsim.scenario.loading import load_scenario, parse_override
-    from tiltsim.system.files import prepare_file, prepare_folder
+    from tiltsim.system.files import prepare_file
 
     overrides = dict(parse_override(text) for text in arguments.overrides)
     if arguments.controller is not None:
         overrides |= {"controller.law": "python", "controller.function": arguments.controller}
     scenario = load_scenario(arguments.scenario, overrides)
     if arguments.out is not None:
-        prepare_folder(arguments.out)
+        prepare_flight_folder(arguments.out, scenario)
     if arguments.rerun is not None:
         prepare_file("--rerun", arguments.rerun, (".rrd",))
 

@@ -92,8 +92,9 @@ def _headline(points: SweepPoints, finished: int, units: tuple[str, str]) -> str
 def _summary(dataset: Path, units: tuple[str, str]) -> str:
     from collections import Counter
 
-    import pyarrow.parquet as pq
+    from tiltsim.system.parquet import open_parquet
 
-    ends = Counter(pq.read_table(dataset, columns=["end"])["end"].to_pylist())
+    with open_parquet(dataset) as opened:
+        ends = Counter(opened.read(columns=["end"])["end"].to_pylist())
     total = counted(sum(ends.values()), *units)
     return f"{total}: {tally(dict(ends.most_common()))}\nwritten to {dataset}"

@@ -18,7 +18,7 @@ import numpy as np
 from tiltsim.flight.metrics import compute_metrics
 from tiltsim.flight.writing import write_flight
 from tiltsim.laws.assembling import assemble
-from tiltsim.scenario.messages import did_you_mean
+from tiltsim.scenario.messages import did_you_mean, valid_unicode
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ class Flight:
 
     def origin(self) -> dict[str, str]:
         """The metadata of the file: scenario (JSON), versions, seed, engine, end, wall time (s)."""
-        return {
+        texts = {
             "scenario": self.scenario.model_dump_json(),
             "address": self.scenario.address,
             "seed": str(self.scenario.simulation.seed),
@@ -134,6 +134,7 @@ class Flight:
             "cause": self.end.cause,
             **{f"{name}_version": version(name) for name in ("tiltsim", "mujoco", "numpy")},
         }
+        return {key: valid_unicode(text) for key, text in texts.items()}
 
     def save(self, folder: str | Path) -> None:
         """Write metrics.json, flight.parquet and the resolved scenario.toml into a folder."""

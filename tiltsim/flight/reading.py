@@ -15,6 +15,7 @@ from tiltsim.flight.end import End, EndKind
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import parse_scenario, without_none
+from tiltsim.system.parquet import open_parquet
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
@@ -28,22 +29,18 @@ def load_flight(path: str | Path) -> Flight:
         path: A folder of results or a ``flight.parquet``.
 
     Raises:
-        InputError: If there is no such file, or it is not a complete flight of tiltsim.
+        InputError: If there is no such file, it is damaged, or it is not a flight of tiltsim.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     file = _flight_file(Path(path))
-    try:
-        table = pq.read_table(file)
-    except (OSError, pa.ArrowException) as error:
-        raise InputError(f"{file}: not a readable Parquet file: {_first_line(error)}") from error
+    with open_parquet(file) as opened:
+        table = opened.read()
+        table.validate(full=True)
     origin = _origin(file, table)
     try:
-        document = json.loads(origin["scenario"])
+        document = dict(json.loads(origin["scenario"]))
         engine, end = _engine_and_end(origin)
         wall_time = float(origin["wall_time"])
-    except (KeyError, ValueError, TypeError) as error:
+    except (KeyError, ValueError, TypeError, RecursionError) as error:
         raise InputError(f"{file}: not a flight of tiltsim: {_first_line(error)}") from error
     try:
         assembly = assemble(parse_scenario(without_none(document), origin.get("address", "")))
@@ -54,9 +51,10 @@ def load_flight(path: str | Path) -> Flight:
 
 
 def _samples(file: Path, table: pyarrow.Table, fields: Sequence[str]) -> Floats:
-    missing = [name for name in fields if name not in table.column_names]
-    if missing:
-        raise InputError(f"{file}: not a flight of tiltsim: no column {', '.join(missing)}")
+    for name in fields:
+        if (count := table.column_names.count(name)) != 1:
+            found = f"{count} columns" if count else "no column"
+            raise InputError(f"{file}: not a flight of tiltsim: {found} {name}")
     if len(table) == 0:
         raise InputError(f"{file}: the flight has no samples")
     try:
@@ -86,7 +84,7 @@ def _origin(file: Path, table: pyarrow.Table) -> dict[str, str]:
     metadata = table.schema.metadata or {}
     if b"scenario" not in metadata:
         raise InputError(f"{file}: not a flight of tiltsim: no scenario in its metadata")
-    return {key.decode(): value.decode(errors="replace") for key, value in metadata.items()}
+    return {k.decode(errors="replace"): v.decode(errors="replace") for k, v in metadata.items()}
 
 
 def _engine_and_end(origin: dict[str, str]) -> tuple[Any, End]:

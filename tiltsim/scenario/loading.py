@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from tiltsim.errors import InputError
 from tiltsim.scenario.controller import DEFAULT_LAW
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
-from tiltsim.scenario.messages import choose, did_you_mean, one_line_message, show
+from tiltsim.scenario.messages import choose, did_you_mean, one_line_message, show, valid_unicode
 from tiltsim.scenario.scenario import Scenario, Variant
 
 KIND_KEYS: Final = {"type": None, "law": DEFAULT_LAW}
@@ -118,7 +118,7 @@ def parse_scenario(document: Mapping[str, Any], address: str = "scenario") -> Sc
         scenario = Scenario.model_validate(document)
     except ValidationError as error:
         raise InputError(f"{address}: {one_line_message(error, document, Scenario)}") from None
-    scenario._address = address
+    scenario._address = valid_unicode(address)
     return scenario
 
 

@@ -43,6 +43,11 @@ def show(value: object) -> str:
     return text if len(text) <= 80 else text[:77] + "..."
 
 
+def valid_unicode(text: str) -> str:
+    """A text with what is no Unicode escaped, such as a byte of a file name that is not UTF-8."""
+    return text.encode(errors="backslashreplace").decode()
+
+
 def did_you_mean(name: object, names: Iterable[str]) -> str:
     """A suggestion of the closest of some names; empty if none is close."""
     close = get_close_matches(str(name), list(names), n=1)

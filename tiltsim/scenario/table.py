@@ -7,9 +7,9 @@ from math import pi
 from operator import attrgetter
 from typing import Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
-from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.messages import InvalidValueError, valid_unicode
 
 # The outer bounds keep arithmetic far from overflow, and far beyond any real vehicle.
 Positive = Annotated[float, Field(gt=0.0, le=1e9)]
@@ -44,6 +44,15 @@ class Table(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
     table_name: ClassVar[str] = ""  # before its keys in messages; empty for the whole document
+
+    @field_validator("*")
+    @classmethod
+    def _check_unicode(cls, value: Any, info: ValidationInfo) -> Any:
+        """Refuse text that no file could hold, as from a command line that is not UTF-8."""
+        if isinstance(value, str) and value != valid_unicode(value):
+            key = f"{cls.table_name}.{info.field_name}".removeprefix(".")
+            raise InvalidValueError(key, value, "not valid Unicode")
+        return value
 
     def mistake(self, key: str, allowed: str) -> InvalidValueError:
         """The error of the value of a dotted key that is not allowed; see `InvalidValueError`."""

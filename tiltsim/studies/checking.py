@@ -22,6 +22,7 @@ from tiltsim.scenario.loading import load_scenario, variant_names
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.shared_engine import shared_engine
 from tiltsim.simulation.simulate import simulate
+from tiltsim.system.files import replacing
 from tiltsim.system.processes import in_processes
 
 Status = Literal["passed", "failed", "lost", "invalid", "crashed", "interrupted"]
@@ -211,4 +212,5 @@ def write_junit(results: list[CheckResult], path: Path) -> None:
     root.append(suite)
     tree = ElementTree.ElementTree(root)
     ElementTree.indent(tree)
-    tree.write(path, encoding="utf-8", xml_declaration=True)
+    with replacing(path) as temporary:
+        tree.write(temporary, encoding="utf-8", xml_declaration=True)

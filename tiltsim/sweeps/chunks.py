@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Generator, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
-from io import BytesIO
 from typing import Any
 
 from tiltsim.engines.base import EngineName
@@ -19,6 +18,7 @@ from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.executing import ScenarioResult, fly_scenarios
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.search import boundary
+from tiltsim.system.parquet import parquet_bytes
 
 Row = dict[str, Any]
 
@@ -44,13 +44,10 @@ class ChunkWork:
 
     def __call__(self, number: int) -> FinishedChunk:
         """Fly one chunk."""
-        import pyarrow.parquet as pq
-
         points = _points(self.definition_json)
         rows, flights = fly_points(points, points.chunk(number), self.engine, trusted=self.trusted)
-        buffer = BytesIO()
-        pq.write_table(rows_to_table(points, rows), buffer, compression="zstd")
-        return FinishedChunk(number, len(rows), buffer.getvalue(), flights, installed_versions())
+        table = parquet_bytes(rows_to_table(points, rows))
+        return FinishedChunk(number, len(rows), table, flights, installed_versions())
 
 
 @lru_cache(maxsize=2)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import without_none
+from tiltsim.scenario.messages import valid_unicode
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS
 from tiltsim.sweeps.definition import VERSIONS
 from tiltsim.sweeps.executing import ScenarioResult
@@ -51,7 +52,7 @@ def make_row(
         **points.derived(values),
         "end": result.end,
         "end_time": result.end_time,
-        "cause": result.cause,
+        "cause": valid_unicode(result.cause),
         **{name: result.metrics.get(name) for name in points.metrics},
         "scenario": json.dumps(document),
     }

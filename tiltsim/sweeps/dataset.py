@@ -16,6 +16,7 @@ from tiltsim.scenario.messages import one_line_message, show
 from tiltsim.sweeps.expressions import evaluate
 from tiltsim.sweeps.folder import DATASET, DEFINITION, read_definition
 from tiltsim.sweeps.points import SweepPoints
+from tiltsim.sweeps.stored_rows import finished_parts, read_rows
 from tiltsim.sweeps.tables import Sweep
 
 Column = npt.NDArray[Any]
@@ -64,7 +65,6 @@ def load_results(folder: Path) -> SweepResults:
     Raises `InputError` if there is nothing yet, or it cannot be read.
     """
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     definition = read_definition(folder / DEFINITION)
     try:
@@ -72,16 +72,15 @@ def load_results(folder: Path) -> SweepResults:
     except ValidationError as error:
         mistake = one_line_message(error, definition.sweep, Sweep)
         raise InputError(f"{folder / DEFINITION}: {mistake}") from None
-    finished = folder / DATASET
-    files = [finished] if finished.exists() else sorted(folder.glob("parts/[0-9]*.parquet"))
+    files = {part: points.chunk(number) for number, part in finished_parts(folder, points).items()}
+    if (folder / DATASET).exists():
+        files = {folder / DATASET: range(len(points))}
     if not files:
         raise InputError(f"{folder}: no chunk of this sweep is finished yet")
-    try:
-        names = [name for name in pq.read_schema(files[0]).names if name != "scenario"]
-        tables = [pq.read_table(file, columns=names, partitioning=None) for file in files]
-    except (OSError, pa.ArrowException) as error:
-        reason = str(error).partition("\n")[0]
-        raise InputError(f"{folder}: not a readable Parquet file: {reason}") from error
+    tables = [read_rows(file, points, rows, scenarios=False) for file, rows in files.items()]
+    for file, part in zip(files, tables):
+        if part.schema != tables[0].schema:
+            raise InputError(f"{file}: has other columns than {next(iter(files)).name}; delete it")
     table = pa.concat_tables(tables)
     columns: dict[str, Column] = {}
     for name in table.column_names:

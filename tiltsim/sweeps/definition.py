@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from typing import Any, Final
 
 from pydantic import ValidationError
@@ -34,13 +35,30 @@ class SweepDefinition:
     versions: dict[str, str]  # installed versions of `VERSIONS`
 
     def to_json(self) -> str:
-        """The definition as text, for a file."""
-        return json.dumps(vars(self), indent=2) + "\n"
+        """The definition as text with a checksum, for a file."""
+        return json.dumps({"sha256": self._checksum(), **vars(self)}, indent=2) + "\n"
 
     @staticmethod
     def from_json(text: str) -> SweepDefinition:
-        """The inverse of `to_json`. Raises ValueError or TypeError for any other text."""
-        return SweepDefinition(**json.loads(text))
+        """The inverse of `to_json`. Raises ValueError for any other text.
+
+        Earlier versions wrote no checksum.
+        """
+        try:
+            document = dict(json.loads(text))
+            checksum = document.pop("sha256", None)
+            definition = SweepDefinition(**document)
+        except (TypeError, RecursionError):
+            raise ValueError("keys are missing or unknown") from None
+        for key, kind in (("address", str), ("sweep", dict), ("base", dict), ("versions", dict)):
+            if not isinstance(document[key], kind):
+                raise ValueError(f"{key} = {show(document[key])}")
+        if checksum not in {None, definition._checksum()}:
+            raise ValueError("its content differs from its checksum")
+        return definition
+
+    def _checksum(self) -> str:
+        return sha256(json.dumps(vars(self)).encode()).hexdigest()
 
     def mistake(self, key: str, value: object, allowed: str) -> InputError:
         """The error, to be raised by the caller, for a key of the sweep file."""
@@ -72,7 +90,7 @@ class SweepDefinition:
     def _decisive(self) -> dict[str, Any]:
         sweep = {key: value for key, value in self.sweep.items() if key not in COSMETIC}
         base = {key: value for key, value in self.base.items() if key not in COSMETIC}
-        sweep.pop("scenario")  # the scenario that it names is in the base
+        sweep.pop("scenario", None)  # the scenario that it names is in the base
         return {**sweep, "scenario": base, "versions": self.versions}
 
 

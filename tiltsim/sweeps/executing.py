@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from io import BytesIO
 from typing import TYPE_CHECKING
 
 from tiltsim.errors import InputError
 from tiltsim.simulation.batch import fly
+from tiltsim.system.parquet import parquet_bytes
 
 if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
@@ -63,11 +63,7 @@ def _fly_alone(scenario: Scenario, keep_flight: bool) -> ScenarioResult:
 
 
 def _flight_file(flight: Flight) -> bytes:
-    import pyarrow.parquet as pq
-
     table = flight.to_arrow()
     # Two equal flights make equal files.
     origin = {**table.schema.metadata, b"wall_time": b"0.0"}
-    buffer = BytesIO()
-    pq.write_table(table.replace_schema_metadata(origin), buffer, compression="zstd")
-    return buffer.getvalue()
+    return parquet_bytes(table.replace_schema_metadata(origin))

@@ -4,12 +4,15 @@
 - ``parts/000007.parquet``: one file per finished chunk
 - ``flights/0000123.parquet``: one file per flight, if the sweep keeps flights
 - ``sweep.parquet``: all rows in order, once every chunk is finished
+
+A folder that is not new or of the same sweep is refused before anything in it is touched.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
@@ -18,13 +21,22 @@ from tiltsim.sweeps.chunks import FinishedChunk
 from tiltsim.sweeps.columns import schema
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.points import SweepPoints
-from tiltsim.system.files import TEMPORARY_SUFFIX, prepare_folder, replacing
+from tiltsim.sweeps.stored_rows import finished_parts, part_file, read_rows
+from tiltsim.system.files import prepare_folder, remove_leftovers, replacing
 from tiltsim.system.locks import locked
+from tiltsim.system.parquet import UnreadableError, parquet_writer
 
 DEFINITION: Final = "sweep.json"
 DATASET: Final = "sweep.parquet"
+LOCK: Final = ".lock"
+PARTS: Final = "parts"
+FLIGHTS: Final = "flights"
+
 ROW_GROUP: Final = 4096
 """Rows held in memory while the parts are joined."""
+
+_TABLES: Final = re.compile(r"\d{6,}\.parquet")
+"""Names in the folders of parts and flights."""
 
 
 class SweepFolder:
@@ -32,7 +44,7 @@ class SweepFolder:
 
     def __init__(self, path: Path, points: SweepPoints) -> None:
         self.path, self._points = path, points
-        self._parts, self._flights = path / "parts", path / "flights"
+        self.is_joined = False  # whether the dataset is complete and readable
 
     @property
     def dataset(self) -> Path:
@@ -40,63 +52,52 @@ class SweepFolder:
         return self.path / DATASET
 
     def check(self) -> None:
-        """Raise `InputError` if a finished chunk cannot be read, or has other columns."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+        """Raise `InputError` if a file holds anything but rows of this sweep.
 
+        A damaged dataset is no mistake: it follows from the parts.
+        """
         expected = schema(self._points)
-        for file in sorted(self._parts.glob("[0-9]*.parquet")):
-            try:
-                found = pq.read_schema(file)
-            except (OSError, pa.ArrowException) as error:
-                reason = str(error).partition("\n")[0]
-                raise InputError(f"{file}: not readable; delete it: {reason}") from error
-            differing = {*found.names} ^ {*expected.names}
+        for number, file in finished_parts(self.path, self._points).items():
+            found = read_rows(file, self._points, self._points.chunk(number)).schema
+            differing = {field.name for field in {*found} ^ {*expected}}
             if differing:
                 raise InputError(
                     f"--out {self.path}: made by another version of tiltsim: {file.name} "
                     f"differs in column {min(differing)}; choose another folder, or delete this one"
                 )
+        self.is_joined = self._has_dataset()
+
+    def _has_dataset(self) -> bool:
+        if self.dataset.exists():
+            with suppress(UnreadableError):
+                read_rows(self.dataset, self._points, range(len(self._points)), scenarios=False)
+                return True
+        return False
 
     def finished(self) -> set[int]:
         """Numbers of the chunks on disk."""
-        return {int(file.stem) for file in self._parts.glob("[0-9]*.parquet")}
-
-    @property
-    def is_joined(self) -> bool:
-        """Whether the dataset is complete and readable."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        try:
-            pq.read_schema(self.dataset)
-        except (OSError, pa.ArrowException):
-            return False
-        return True
+        return {*finished_parts(self.path, self._points)}
 
     def save(self, part: FinishedChunk) -> None:
         """Save a finished chunk durably: after this returns, no crash can lose it."""
         for index, flight in part.flights.items():
-            _write(self._flights / f"{index:07d}.parquet", flight)
+            _write(self.path / FLIGHTS / f"{index:07d}.parquet", flight)
         # Last, because the part marks the chunk as finished.
-        _write(self._part(part.number), part.table)
-
-    def _part(self, number: int) -> Path:
-        return self._parts / f"{number:06d}.parquet"
+        _write(part_file(self.path, part.number), part.table)
 
     def join(self) -> None:
         """Write the whole dataset from the parts, a few thousand rows at a time."""
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
         columns = schema(self._points)
         waiting: list[pa.Table] = []
         with (
             replacing(self.dataset, durable=True) as temporary,
-            pq.ParquetWriter(temporary, columns, compression="zstd") as writer,
+            parquet_writer(temporary, columns) as writer,
         ):
             for number in range(self._points.chunks):
-                table = pq.read_table(self._part(number), partitioning=None)
+                file = part_file(self.path, number)
+                table = read_rows(file, self._points, self._points.chunk(number))
                 waiting.append(table.replace_schema_metadata(columns.metadata))
                 last = number == self._points.chunks - 1
                 if last or sum(map(len, waiting)) >= ROW_GROUP:
@@ -112,39 +113,53 @@ def open_sweep_folder(path: Path, points: SweepPoints) -> Iterator[SweepFolder]:
         InputError: If the folder cannot be written, is in use, or contains another sweep; the
             message names the difference.
     """
+    _require_new_or_same(path, points)
     prepare_folder(path)
     with ExitStack() as stack:
         try:
-            stack.enter_context(locked(path / ".lock", wait=False))
+            stack.enter_context(locked(path / LOCK, wait=False))
         except BlockingIOError:
             raise InputError(f"--out {path}: another tiltsim sweep is using it") from None
-        temporary = f".*{TEMPORARY_SUFFIX}"
-        for leftover in [*path.glob(temporary), *path.glob(f"*/{temporary}")]:
-            leftover.unlink()
-        definition = path / DEFINITION
-        if definition.exists():
-            difference = read_definition(definition).difference(points.definition)
-            if difference:
-                raise InputError(
-                    f"--out {path}: contains another sweep: {difference}; choose another folder, "
-                    "or delete this one"
-                )
-        elif any(path.glob("*.parquet")):
-            raise InputError(f"--out {path}: contains other results; choose another folder")
-        for folder in ("parts", *(["flights"] if points.sweep.keep_flights else [])):
-            (path / folder).mkdir(exist_ok=True)
+        _require_new_or_same(path, points)  # another sweep may have begun meanwhile
         opened = SweepFolder(path, points)
         opened.check()
-        _write(definition, points.definition.to_json().encode())
+        _write(path / DEFINITION, points.definition.to_json().encode())
+        remove_leftovers(path, re.compile(f"{DEFINITION}|{DATASET}"))
+        for folder in (PARTS, *([FLIGHTS] if points.sweep.keep_flights else [])):
+            (path / folder).mkdir(exist_ok=True)
+            remove_leftovers(path / folder, _TABLES)
         yield opened
+
+
+def _require_new_or_same(path: Path, points: SweepPoints) -> None:
+    """Raise `InputError` if a folder has files that this sweep has not written; change nothing."""
+    if not path.is_dir():
+        return
+    for name in (LOCK, DEFINITION, DATASET, PARTS, FLIGHTS):
+        if (path / name).is_symlink():
+            raise InputError(f"--out {path}: {name} is a link; choose another folder")
+    if (path / DEFINITION).exists():
+        difference = read_definition(path / DEFINITION).difference(points.definition)
+        if difference:
+            raise InputError(
+                f"--out {path}: contains another sweep: {difference}; choose another folder, "
+                "or delete this one"
+            )
+        return
+    foreign = {*path.glob("*.parquet"), *(path / name for name in (PARTS, FLIGHTS))}
+    if (path / LOCK).exists() and (path / LOCK).stat().st_size:
+        foreign.add(path / LOCK)  # a sweep's own is empty
+    for file in sorted(foreign):
+        if file.exists():
+            raise InputError(
+                f"--out {path}: contains other results: {file.name}; choose another folder"
+            )
 
 
 def read_definition(file: Path) -> SweepDefinition:
     """The definition in a folder. Raises `InputError` if it cannot be read."""
     try:
         return SweepDefinition.from_json(file.read_text(encoding="utf-8"))
-    except TypeError:
-        raise InputError(f"{file}: not the definition of a sweep: keys are missing") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{file}: not the definition of a sweep: {error}") from None
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import re
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
@@ -19,7 +21,7 @@ def prepare_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"--out {folder}: cannot be created: {error.strerror}") from error
+        raise InputError(f"--out {folder}: cannot be created: {reason(error)}") from error
     if not os.access(folder, os.W_OK):
         raise InputError(f"--out {folder}: not writable")
 
@@ -52,19 +54,28 @@ def prepare_file(option: str, file: Path, suffixes: Sequence[str] = ()) -> None:
 def replacing(path: Path, *, durable: bool = False) -> Iterator[Path]:
     """Yield a temporary path that replaces ``path`` atomically when the block succeeds.
 
-    A ``durable`` file is on disk after the block, so that no crash of the machine can lose it.
+    A ``durable`` file is on disk after the block, so that no crash of the machine can lose it. A
+    device or pipe is written itself.
+
+    Raises:
+        InputError: If the file cannot be written, as on a full disk.
     """
+    special = path.exists() and not path.is_file()
     # An ordinary file, unlike tempfile's, gets the permissions of the user's umask.
     temporary = path.with_name(f".{path.name}.{os.getpid()}{TEMPORARY_SUFFIX}")
     try:
-        yield temporary
-        if durable:
-            _flush(temporary)
-        temporary.replace(path)
-        if durable:
-            _flush(path.parent)
+        yield path if special else temporary
+        if not special:
+            if durable:
+                _flush(temporary)
+            temporary.replace(path)
+            if durable:
+                _flush(path.parent)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {reason(error)}") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def _flush(path: Path) -> None:
@@ -73,3 +84,17 @@ def _flush(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def remove_leftovers(folder: Path, names: re.Pattern[str]) -> None:
+    """Remove what killed processes left of files with matching names in a folder."""
+    left = re.compile(rf"\.({names.pattern})(\.\w+)?{re.escape(TEMPORARY_SUFFIX)}")
+    for file in folder.iterdir():
+        if left.fullmatch(file.name):
+            file.unlink()
+
+
+def reason(error: OSError) -> str:
+    """Why the operating system refused, in a few words."""
+    known = error.errno in errno.errorcode
+    return os.strerror(error.errno or 0) if known else str(error).partition("\n")[0]

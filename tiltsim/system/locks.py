@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
@@ -33,14 +34,15 @@ def one_thread_at_a_time(function: Callable[Parameters, Result]) -> Callable[Par
 def locked(path: Path, *, wait: bool) -> Iterator[None]:
     """Hold an exclusive lock during the block; it is released even if the process is killed.
 
-    ``path`` is the lock file, which is created and not removed. Raises BlockingIOError if another
-    process holds the lock, unless ``wait`` is true. Without ``fcntl`` this has no effect.
+    ``path`` is the lock file, which is created and not removed; the content of an existing one
+    stays, and links are refused. Raises BlockingIOError if another process holds the lock, unless
+    ``wait`` is true. Without ``fcntl`` this has no effect.
     """
     try:
         import fcntl
     except ImportError:
         yield
         return
-    with path.open("w", encoding="utf-8") as file:
+    with os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)) as file:
         fcntl.flock(file, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
         yield

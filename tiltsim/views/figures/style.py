@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import pi
 from typing import TYPE_CHECKING, Any, Final
 
-from tiltsim.errors import InputError
 from tiltsim.system.files import replacing
 
 if TYPE_CHECKING:
@@ -156,8 +156,7 @@ def save(figure: Figure, path: Path) -> None:
     """
     suffix = path.suffix.lower()
     undated = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
-    try:
-        with paper_style(), replacing(path) as temporary:
-            figure.savefig(temporary, format=suffix[1:], metadata=undated.get(suffix))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from error
+    with paper_style(), replacing(path) as temporary, warnings.catch_warnings():
+        # Text in scripts that the font lacks, such as Chinese, is drawn as boxes.
+        warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from font")
+        figure.savefig(temporary, format=suffix[1:], metadata=undated.get(suffix))

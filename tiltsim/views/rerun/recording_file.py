@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Final
 
 import rerun as rr
 
-from tiltsim.errors import InputError
 from tiltsim.system.files import replacing
 from tiltsim.views.rerun import palette
 from tiltsim.views.rerun.blueprint import flight_blueprint
@@ -59,11 +58,8 @@ class RecordingFile:
         write_flights(self._recorders, flights)
         content = self._content.drain_as_bytes()
         self._recording.disconnect()
-        try:
-            with replacing(path) as temporary:
-                temporary.write_bytes(content)
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+        with replacing(path) as temporary:
+            temporary.write_bytes(content)
 
 
 def save_recording(flights: Sequence[Flight], path: Path, names: Sequence[str] = ()) -> None:

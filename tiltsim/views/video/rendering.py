@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Final
 import mujoco
 import numpy as np
 
-from tiltsim.errors import InputError
 from tiltsim.system.files import replacing
 from tiltsim.views import replay
 from tiltsim.views.vehicle_views import views_of
@@ -59,20 +58,17 @@ def write_video(
     """
     import av
 
-    try:
-        with replacing(path) as temporary, av.open(str(temporary), "w", format="mp4") as file:
-            stream = file.add_stream("libx264", rate=video.fps)
-            stream.width, stream.height = video.width, video.height
-            stream.pix_fmt = "yuv420p"  # the format that every player supports
-            stream.options = {"crf": QUALITY, "preset": "medium"}
-            for time, image in frames(flight, video):
-                frame = av.VideoFrame.from_ndarray(image, format="rgb24")
-                file.mux(stream.encode(frame))
-                if progress is not None:
-                    progress(time)
-            file.mux(stream.encode(None))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+    with replacing(path) as temporary, av.open(str(temporary), "w", format="mp4") as file:
+        stream = file.add_stream("libx264", rate=video.fps)
+        stream.width, stream.height = video.width, video.height
+        stream.pix_fmt = "yuv420p"  # the format that every player supports
+        stream.options = {"crf": QUALITY, "preset": "medium"}
+        for time, image in frames(flight, video):
+            frame = av.VideoFrame.from_ndarray(image, format="rgb24")
+            file.mux(stream.encode(frame))
+            if progress is not None:
+                progress(time)
+        file.mux(stream.encode(None))
 
 
 def frame_times(flight: Flight, video: VideoFormat) -> Floats:

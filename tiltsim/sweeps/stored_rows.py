@@ -1,0 +1,72 @@
+"""Reading rows of a sweep back: of this sweep, of these points, and undamaged."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tiltsim.errors import InputError
+from tiltsim.sweeps.definition import SweepDefinition
+from tiltsim.sweeps.points import SweepPoints
+from tiltsim.system.parquet import UnreadableError, open_parquet
+
+if TYPE_CHECKING:
+    import pyarrow
+
+
+def part_file(folder: Path, number: int) -> Path:
+    """The file of a chunk in the folder of a sweep."""
+    return folder / "parts" / f"{number:06d}.parquet"
+
+
+def finished_parts(folder: Path, points: SweepPoints) -> dict[int, Path]:
+    """The files of the finished chunks by number; other files beside them are no parts."""
+    files = {number: part_file(folder, number) for number in range(points.chunks)}
+    return {number: file for number, file in files.items() if file.exists()}
+
+
+def read_rows(
+    file: Path, points: SweepPoints, indices: Sequence[int], *, scenarios: bool = True
+) -> pyarrow.Table:
+    """The rows in one file of a sweep.
+
+    Args:
+        file: A part, or the whole dataset.
+        points: The sweep's.
+        indices: The points whose rows the file must hold.
+        scenarios: Whether to read their scenarios, too.
+
+    Raises:
+        InputError: If the file is damaged, or holds anything else.
+    """
+    try:
+        with open_parquet(file) as opened:
+            schema = opened.schema_arrow
+            names = [name for name in schema.names if scenarios or name != "scenario"]
+            table = opened.read(columns=names)
+    except UnreadableError as error:
+        raise UnreadableError(f"{error}; delete it, and it is made again") from error
+    text = (schema.metadata or {}).get(b"sweep", b"").decode(errors="replace")
+    difference = _difference(text, points.definition.to_json())
+    if not difference:
+        found = table["index"].to_pylist() if table.column_names.count("index") == 1 else []
+        difference = "" if found == list(indices) else "holds the rows of other points"
+    if difference:
+        raise InputError(f"{file}: {difference}; delete it or move it away")
+    return table
+
+
+@lru_cache(maxsize=8)
+def _difference(found: str, expected: str) -> str:
+    """How the definition in a file differs from that of the sweep; empty if it gives equal rows."""
+    if found == expected:
+        return ""
+    try:
+        difference = SweepDefinition.from_json(found).difference(
+            SweepDefinition.from_json(expected)
+        )
+    except ValueError:
+        return "not of a sweep"
+    return f"of another sweep: {difference}" if difference else ""
