@@ -15,17 +15,10 @@ from typing import Final, NoReturn
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT, TERMINATED
 from tiltsim.system.interrupts import terminations_as_interrupts
+from tiltsim.system.text import printable
 
 FLIGHT_COMMANDS: Final = ("run", "check", "sweep", "list", "view", "plot", "video")
 OTHER_COMMANDS: Final = ("gait", "map", "singularity", "report", "bench", "schema")
-
-
-def printable(text: str) -> str:
-    """Text with line breaks and other control characters, as file names may have, escaped.
-
-    So a message is one line and cannot control the terminal.
-    """
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 class Parser(argparse.ArgumentParser):
@@ -94,7 +87,7 @@ def _run(arguments: list[str] | None) -> int:
         parsed = build_parser().parse_args(arguments)
         return int(parsed.run(parsed))
     except InputError as error:
-        print(f"tiltsim: {printable(str(error))}", file=sys.stderr)
+        print(f"tiltsim: {printable(error)}", file=sys.stderr)
         return INVALID_INPUT
     except KeyboardInterrupt:
         print("tiltsim: interrupted", file=sys.stderr)
@@ -104,8 +97,8 @@ def _run(arguments: list[str] | None) -> int:
         sys.stderr.close()
         return DONE
     except OSError as error:
-        place = printable(str(error.filename or "output"))
-        print(f"tiltsim: {place}: {error.strerror or error}", file=sys.stderr)
+        message = f"{error.filename or 'output'}: {error.strerror or error}"
+        print(f"tiltsim: {printable(message)}", file=sys.stderr)
         return INVALID_INPUT
     except Exception as error:
         if not (_raised_while_loading_mujoco(error) and "MUJOCO_GL" in os.environ):

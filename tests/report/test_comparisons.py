@@ -86,7 +86,7 @@ def test_values_are_compared_with_those_of_the_other_flight(pushed):
 def test_page_and_summary_have_them(pushed):
     text, html = markdown(pushed), page(pushed)
     assert "## Beyond the thesis" in text
-    assert "A push <from> the \\| left (compared with `" in text
+    assert "A push &lt;from> the \\| left (compared with `" in text
     assert '<section id="beyond">' in html
     assert "A push &lt;from&gt; the | left" in html
 

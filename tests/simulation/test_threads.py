@@ -13,11 +13,12 @@ import pytest
 import tiltsim
 from tests.laws.layers.test_actuation import EVERYTHING
 from tests.simulation.test_batch import ALL_LAWS, EXACT, LAYERED, STORMY, scenario
-from tiltsim.engines.callback import _ignore, control_callback
+from tiltsim.engines.callback import control_callback
 from tiltsim.env.environment import TiltrotorEnv
 from tiltsim.plants.command import Command
 from tiltsim.scenario.loading import merge
 from tiltsim.simulation.batch import fly
+from tiltsim.system.hooks import _ignore
 
 THREADS = 16
 HOVER = 0.429 * 9.8 / 4.0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from tiltsim.commands.options import Subparsers, add_jobs, add_overrides, add_trust
 from tiltsim.commands.progress import announce_compilation
-from tiltsim.commands.text import counted, tally
+from tiltsim.commands.text import counted, print_line, tally
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INVALID_INPUT, VEHICLE_LOST
 from tiltsim.system.interrupts import defer_interrupts
 
@@ -96,8 +96,6 @@ def _print_result(result: CheckResult, width: int) -> None:
     else:
         outcome = "no expectations" if _is_unchecked(result) else ""
     mark = "ok" if result.status == "passed" else result.status.upper()
-    print(
-        f"{mark:<8}{result.address:<{width}}  {outcome:<15}  {result.wall_time:6.1f} s", flush=True
-    )
+    print_line(f"{mark:<8}{result.address:<{width}}  {outcome:<15}  {result.wall_time:6.1f} s")
     if result.message:
-        print(f"        {result.message}")
+        print_line(f"        {result.message}")

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from tiltsim.commands.angles import vehicle_text
 from tiltsim.commands.text import aligned, number, numbers, table
+from tiltsim.system.text import printable
 
 CURVES: Final = {
     "graph": "one pitch for each roll",
@@ -60,7 +61,10 @@ def gait_text(report: dict[str, Any]) -> str:
     direction = report["torque_free_direction"]
     at_start = " at the gait's start" if "time" in report else ""
     rows = [
-        ("gait", report["gait"] + (f" ({report['source']})" if report["source"] else "")),
+        (
+            "gait",
+            printable(report["gait"] + (f" ({report['source']})" if report["source"] else "")),
+        ),
         ("vehicle", vehicle_text(report["vehicle"])),
         ("tilt angles", numbers(report["angles"]) + " rad"),
         ("rank of tau", str(report["rank"])),

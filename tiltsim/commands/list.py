@@ -8,6 +8,7 @@ import json
 from tiltsim.commands.options import Subparsers, add_json
 from tiltsim.commands.text import fitted
 from tiltsim.scenario.library import Entry, library_entries, library_families, library_sweeps
+from tiltsim.system.text import printable
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -46,4 +47,4 @@ def _print_families() -> None:
 
 def _line(entry: Entry, address: str) -> str:
     line = f"{address}  {entry.title}" + (f" ({entry.source})" if entry.source else "")
-    return fitted(line, len(address) + 2 if address.startswith(" ") else 4)
+    return fitted(printable(line), len(address) + 2 if address.startswith(" ") else 4)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tiltsim.commands.options import Subparsers, prepare_figure
+from tiltsim.commands.text import print_line
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.views.figures.style import save
 
     save(figure, out)
-    print(f"figure written to {out}")
+    print_line(f"figure written to {out}")
     return 0
 
 

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from tiltsim.commands.options import Subparsers, add_jobs
-from tiltsim.commands.text import tally
+from tiltsim.commands.text import print_line, tally
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
 
 
@@ -58,6 +58,6 @@ def run(arguments: argparse.Namespace) -> int:
     counts = sorted(count(report.rows).items(), key=lambda item: item[0].rank)
     print(f"{len(report.rows)} claims: {tally({kind.value: number for kind, number in counts})}")
     for failure in report.failures:
-        print(f"FAILED  {failure_text(failure)}")
-    print(f"report written to {target}")
+        print_line(f"FAILED  {failure_text(failure)}")
+    print_line(f"report written to {target}")
     return EXPECTATION_FAILED if report.failures else DONE

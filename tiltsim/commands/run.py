@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tiltsim.commands.options import Subparsers, add_overrides, add_quiet
 from tiltsim.commands.progress import progress_bar
-from tiltsim.commands.text import table
+from tiltsim.commands.text import print_line, table
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INTERRUPTED, VEHICLE_LOST
 from tiltsim.system.interrupts import defer_interrupts
+from tiltsim.system.text import printable
 
 if TYPE_CHECKING:
     from tiltsim.flight.expectations import Verdict
@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
     vehicle = scenario.vehicle.resolve()
     if not arguments.quiet and isinstance(vehicle, Vehicle):
         for warning in gait_warnings(scenario.gait.plan(vehicle), vehicle):
-            print(f"tiltsim: warning: gait: {warning}", file=sys.stderr)
+            print_line(f"tiltsim: warning: gait: {warning}", error=True)
         _warn_unmodeled_properties(scenario)
     if arguments.rerun is None:
         flight = fly(scenario, arguments)
@@ -83,33 +83,33 @@ def run(arguments: argparse.Namespace) -> int:
                 recording.finish()
     if flight.end.kind == "interrupted":
         kept = f"; the flight so far is in {arguments.out}" if arguments.out is not None else ""
-        print(f"tiltsim: interrupted at t = {flight.end.time:.3f} s{kept}", file=sys.stderr)
+        print_line(f"tiltsim: interrupted at t = {flight.end.time:.3f} s{kept}", error=True)
         return INTERRUPTED
     metrics = flight.metrics()
     reversed_rotor = flight.end.kind == "completed" and metrics["min_rotor_speed"] < 0.0
     if reversed_rotor and not arguments.quiet:
-        print(
+        print_line(
             "tiltsim: warning: a rotor stopped and reversed (min_rotor_speed = "
             f"{metrics['min_rotor_speed']:.4g} rad/s)",
-            file=sys.stderr,
+            error=True,
         )
     verdicts = check_expectations(scenario, metrics)
     if not arguments.quiet:
         print(summary(flight, verdicts))
         if arguments.out is not None:
-            print(f"written to {arguments.out}")
+            print_line(f"written to {arguments.out}")
         if arguments.rerun is not None:
-            print(f"recording written to {arguments.rerun}; open it with tiltsim view")
+            print_line(f"recording written to {arguments.rerun}; open it with tiltsim view")
     if flight.end.kind != "completed":
-        print(f"tiltsim: {flight.end.message}", file=sys.stderr)
+        print_line(f"tiltsim: {flight.end.message}", error=True)
         return VEHICLE_LOST
     failed = [verdict for verdict in verdicts if not verdict.holds]
     if arguments.quiet:
         for verdict in failed:
-            print(
+            print_line(
                 f"tiltsim: FAILED {verdict.expectation.metric}: measured {_measured(verdict)}, "
                 f"expected {verdict.bounds}",
-                file=sys.stderr,
+                error=True,
             )
     return EXPECTATION_FAILED if failed else DONE
 
@@ -118,11 +118,11 @@ def _warn_unmodeled_properties(scenario: Scenario) -> None:
     """Warn of properties of a user's vehicle that the built-in controllers do not model."""
     own = scenario.rotorcraft.user_vehicle
     if own is not None and own.unmodeled_properties and not scenario.controller.is_external:
-        print(
+        print_line(
             f"tiltsim: warning: vehicle.mjcf: the {scenario.controller.law} controller assumes the "
             "centre of mass at the body's origin and a diagonal inertia; not modeled: "
             f"{own.unmodeled_properties}",
-            file=sys.stderr,
+            error=True,
         )
 
 
@@ -161,11 +161,11 @@ def summary(flight: Flight, verdicts: list[Verdict]) -> str:
     from tiltsim.scenario.metric_names import unit_of
 
     scenario, metrics = flight.scenario, flight.metrics()
-    lines = [scenario.title or scenario.address or "scenario"]
+    lines = [printable(scenario.title or scenario.address or "scenario")]
     if scenario.title and "#" in scenario.address:  # the title may be the family's
-        lines.append(f"  {scenario.address}")
+        lines.append(f"  {printable(scenario.address)}")
     if scenario.source:
-        lines.append(f"  {scenario.source}")
+        lines.append(f"  {printable(scenario.source)}")
     simulation = scenario.simulation
     solver = simulation.integrator if simulation.plant == "mujoco" else "ode3"
     lines.append(

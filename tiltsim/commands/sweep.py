@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tiltsim.commands.options import Subparsers, add_jobs, add_overrides, add_quiet, add_trust
 from tiltsim.commands.progress import counting_bar
-from tiltsim.commands.text import counted, tally
+from tiltsim.commands.text import counted, print_line, tally
 from tiltsim.exit_codes import INTERRUPTED
 
 if TYPE_CHECKING:
@@ -53,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
     def report(rows: int) -> None:
         nonlocal begun
         if shown and not begun:
-            print(_headline(points, rows, units), file=sys.stderr)
+            print_line(_headline(points, rows, units), error=True)
         begun = True
         move(rows)
 
@@ -68,13 +67,14 @@ def run(arguments: argparse.Namespace) -> int:
                 trusted=is_trusted(arguments.trust),
             )
     except KeyboardInterrupt:
-        print(
+        print_line(
             f"tiltsim: interrupted; finished flights are in {out}; the same command continues",
-            file=sys.stderr,
+            error=True,
         )
         return INTERRUPTED
     if shown:
-        print(_summary(dataset, units))
+        print_line(_summary(dataset, units))
+        print_line(f"written to {dataset}")
     return 0
 
 
@@ -97,4 +97,4 @@ def _summary(dataset: Path, units: tuple[str, str]) -> str:
     with open_parquet(dataset) as opened:
         ends = Counter(opened.read(columns=["end"])["end"].to_pylist())
     total = counted(sum(ends.values()), *units)
-    return f"{total}: {tally(dict(ends.most_common()))}\nwritten to {dataset}"
+    return f"{total}: {tally(dict(ends.most_common()))}"

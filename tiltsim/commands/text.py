@@ -10,6 +10,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from textwrap import fill
 from typing import Any
 
+from tiltsim.system.text import printable
+
 
 def number(value: float, form: str = ".6g") -> str:
     """A number as text; a value that prints as zero has no sign."""
@@ -32,10 +34,15 @@ def tally(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{count} {name}" for name, count in counts.items())
 
 
+def print_line(text: str, *, error: bool = False) -> None:
+    """Print one line; text of files and names in it cannot control the terminal."""
+    print(printable(text), file=sys.stderr if error else sys.stdout, flush=True)
+
+
 def print_figure_path(arguments: argparse.Namespace) -> None:
     """Print the path of the ``--plot`` figure, unless the output is JSON."""
     if arguments.plot is not None and not arguments.json:
-        print(f"figure written to {arguments.plot}")
+        print_line(f"figure written to {arguments.plot}")
 
 
 def json_text(report: Any) -> str:

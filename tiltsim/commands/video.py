@@ -9,6 +9,7 @@ from typing import Final
 
 from tiltsim.commands.options import Subparsers, add_quiet
 from tiltsim.commands.progress import counting_bar
+from tiltsim.commands.text import print_line
 
 MANY_FRAMES: Final = 100
 """Frames from which on the expected duration is printed."""
@@ -86,5 +87,5 @@ def run(arguments: argparse.Namespace) -> int:
         drawn = iter(range(1, count + 1))
         write_video(flight, out, video, lambda _time: move(next(drawn)))
     if not arguments.quiet:
-        print(f"video written to {out}")
+        print_line(f"video written to {out}")
     return 0

@@ -17,6 +17,8 @@ from typing import Any, Final, NamedTuple
 import mujoco
 import numpy as np
 
+from tiltsim.system.hooks import mujoco_hooks
+
 _PROBE: Final = """
 <mujoco>
   <size nuserdata="40503"/>
@@ -55,7 +57,8 @@ def mjdata_layout() -> Layout:
     Raises:
         RuntimeError: If a field is not found in the search range.
     """
-    model = mujoco.MjModel.from_xml_string(_PROBE)
+    with mujoco_hooks():
+        model = mujoco.MjModel.from_xml_string(_PROBE)
     data = mujoco.MjData(model)
     data.time = _TIME
     size = _first(model._address, _MODEL_BYTES, ctypes.c_int32, model.nuserdata)

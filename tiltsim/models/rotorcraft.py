@@ -33,6 +33,7 @@ from tiltsim.models.parts import (
 )
 from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.resources import shipped_folder
+from tiltsim.system.hooks import mujoco_hooks
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
 from tiltsim_controllers.vehicle.states import ROTORS
@@ -119,7 +120,8 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
     if key in _compiled:
         return _with_parameters(*_compiled[key], spec)
     complete, bare, assets = _compose(spec)
-    compiled = mujoco.MjModel.from_xml_string(complete if visuals else bare, assets)
+    with mujoco_hooks():
+        compiled = mujoco.MjModel.from_xml_string(complete if visuals else bare, assets)
     if spec.user_vehicle is None and not spec.has_stops:
         if len(_compiled) >= MODEL_CACHE_SIZE:
             _compiled.clear()
@@ -158,7 +160,8 @@ def _with_parameters(
     model.key_act[hover, :4] = [spin * speed for spin in SPIN]
     thrusts = model.actuator("thrust_1").id
     model.key_ctrl[hover, thrusts : thrusts + 4] = speed**2
-    mujoco.mj_setConst(model, data)
+    with mujoco_hooks():
+        mujoco.mj_setConst(model, data)
     return model
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from tiltsim.models.mjcf_editing import add_states, parse_mjcf, remove_visuals, set_servo_gains
 from tiltsim.models.parts import ModelSpec, TiltServo, require_positive
 from tiltsim.resources import shipped_folder
+from tiltsim.system.hooks import mujoco_hooks
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.tilt_car.vehicle import TiltCar
 
@@ -45,7 +46,8 @@ def compile_tilt_car(spec: TiltCarSpec, *, visuals: bool = True) -> mujoco.MjMod
     import mujoco
 
     complete, bare = _compose(spec)
-    return mujoco.MjModel.from_xml_string(complete if visuals else bare)
+    with mujoco_hooks():
+        return mujoco.MjModel.from_xml_string(complete if visuals else bare)
 
 
 @lru_cache(maxsize=16)

@@ -16,6 +16,7 @@ import numpy as np
 
 from tiltsim.models.mjcf_editing import set_servo_gains, set_stop
 from tiltsim.models.parts import TiltServo
+from tiltsim.system.hooks import mujoco_hooks
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
@@ -165,11 +166,12 @@ def _read(path: str, model: str, modified: int) -> UserVehicle:
     import mujoco
 
     try:
-        compiled = mujoco.MjModel.from_xml_path(path)
+        with mujoco_hooks():
+            compiled = mujoco.MjModel.from_xml_path(path)
     except ValueError as error:
         raise ValueError(f"MuJoCo says: {' '.join(str(error).split())}") from None
     data = mujoco.MjData(compiled)
-    mujoco.mj_forward(compiled, data)
+    mujoco.mj_kinematics(compiled, data)
     _check_names(compiled, model)
     _check_joints(compiled)
     _check_thrusts(compiled)

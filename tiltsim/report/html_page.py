@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from base64 import b64encode
 from collections.abc import Iterable, Iterator
-from html import escape
 from importlib.metadata import version
 from itertools import groupby
 from pathlib import Path
@@ -31,6 +30,7 @@ from tiltsim.report.content import (
 from tiltsim.report.drawing import DPI, Drawing
 from tiltsim.report.findings import Finding
 from tiltsim.report.flights import PLANTS
+from tiltsim.system.text import printable_html as escape
 
 _CLASSES: Final = {
     ClaimVerdict.REPRODUCED: "reproduced",
@@ -273,4 +273,4 @@ def _mark(verdict: ClaimVerdict) -> str:
 
 def _prose(text: str) -> str:
     """Text with `code` between backticks."""
-    return re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text, quote=False))
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text))

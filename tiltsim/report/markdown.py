@@ -21,6 +21,7 @@ from tiltsim.report.content import (
     why_of,
 )
 from tiltsim.report.flights import PLANTS
+from tiltsim.system.text import printable_markdown
 
 
 def markdown(report: Report) -> str:
@@ -87,7 +88,7 @@ def _counts(name: str, rows: list[Row]) -> str:
 def _group(group: Group) -> Iterator[str]:
     single = len(group.rows) == 1
     if not single:
-        note = f"<br>{group.shared_why}" if group.shared_why else ""
+        note = f"\n{group.shared_why}" if group.shared_why else ""
         yield _cells([f"**{group.statement.text}** ({group.sources}){note}", "", "", "", ""])
     for row in group.rows:
         claim = row.claim
@@ -107,4 +108,10 @@ def _measured(row: Row) -> list[str]:
 
 
 def _cells(cells: list[str]) -> str:
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+    return "| " + " | ".join(map(_cell, cells)) + " |"
+
+
+def _cell(text: str) -> str:
+    """Text in a cell of a table, whose lines are separated there."""
+    lines = (printable_markdown(line) for line in text.split("\n"))
+    return "<br>".join(lines).replace("|", "\\|")

@@ -24,6 +24,7 @@ from tiltsim.simulation.shared_engine import shared_engine
 from tiltsim.simulation.simulate import simulate
 from tiltsim.system.files import replacing
 from tiltsim.system.processes import in_processes
+from tiltsim.system.text import printable
 
 Status = Literal["passed", "failed", "lost", "invalid", "crashed", "interrupted"]
 
@@ -200,14 +201,15 @@ def write_junit(results: list[CheckResult], path: Path) -> None:
         time=f"{sum(result.wall_time for result in results):.3f}",
     )
     for result in results:
-        folder, _, name = result.address.rpartition("/")
+        folder, _, name = printable(result.address).rpartition("/")
+        message = printable(result.message)
         case = ElementTree.SubElement(
             suite, "testcase", classname=folder, name=name, time=f"{result.wall_time:.3f}"
         )
         if result.status in {"failed", "lost"}:
-            ElementTree.SubElement(case, "failure", type=result.status, message=result.message)
+            ElementTree.SubElement(case, "failure", type=result.status, message=message)
         elif result.status != "passed":
-            ElementTree.SubElement(case, "error", type=result.status, message=result.message)
+            ElementTree.SubElement(case, "error", type=result.status, message=message)
     root = ElementTree.Element("testsuites")
     root.append(suite)
     tree = ElementTree.ElementTree(root)

@@ -13,6 +13,7 @@ import numpy as np
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
+from tiltsim.system.text import printable
 from tiltsim.views.rerun.requirements import require_viewer
 from tiltsim.views.rerun.viewer import attach_viewer
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -86,7 +87,7 @@ class LiveStream:
                 self._recorder.finish(self._end)
             self._recording.disconnect()
         except Exception as error:  # the flight continues regardless of viewer errors
-            sys.stderr.write(f"tiltsim: live view ended: {error}\n")
+            sys.stderr.write(f"tiltsim: live view ended: {printable(error)}\n")
 
     def _send_queued(self) -> None:
         """Send all queued samples as one piece of the flight."""
