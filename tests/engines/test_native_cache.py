@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+import resource
 import subprocess
 import sys
 
-import tiltsim.engines.compiling as compiling
+import pytest
+
+from tiltsim.engines import cache, compiling
 from tiltsim.engines.cache import native_code_folder
 
 ENTRIES = 150
@@ -73,3 +76,80 @@ def test_compiled_code_of_others_is_cached_where_numba_puts_it(tmp_path):
     )
     assert done.returncode == 0
     assert list((tmp_path / "__pycache__").glob("foreign.twice-*.nbi"))
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """An empty folder of compiled code."""
+    folder = tmp_path / "tiltsim" / "digest"
+    for module in (cache, compiling):
+        monkeypatch.setattr(module, "native_code_folder", lambda: folder)
+    monkeypatch.setattr(cache, "failed_saves", [])
+    monkeypatch.setattr(compiling, "failed_saves", cache.failed_saves)
+    return folder
+
+
+def code_files(folder):
+    return sorted(folder.rglob("*clipped*.nb[ic]"))
+
+
+def clip():
+    """Load or compile the native code of a function, and call it."""
+    function = compiling.compiled(named("clipped"))
+    assert function(2.0, -1.0, 1.0) == 1.0
+    return function.stats
+
+
+@pytest.mark.parametrize("place", [0, 1])
+@pytest.mark.parametrize("damage", ["truncated", "empty", "garbled"])
+def test_damaged_code_is_compiled_again(folder, damage, place):
+    index = compiling.NativeCodeCache(named("clipped"))._cache_file
+    compiling.NativeCodeCache(named("clipped"))._impl.locator.ensure_cache_path()
+    index.save("key", "code")
+    file = code_files(folder)[place]
+    content = file.read_bytes()
+    flipped = bytes([*content[:-3], content[-3] ^ 1, *content[-2:]])
+    file.write_bytes({"truncated": content[:-9], "empty": b"", "garbled": flipped}[damage])
+    assert index.load("key") is None
+    index.save("key", "code")
+    assert index.load("key") == "code"
+
+
+def test_code_is_loaded_or_compiled_again_with_the_same_result(folder):
+    assert clip().cache_misses
+    assert clip().cache_hits
+    for file in code_files(folder):
+        file.write_bytes(file.read_bytes()[:-1])
+    assert clip().cache_misses
+    assert clip().cache_hits
+
+
+def test_code_that_cannot_be_saved_is_used_all_the_same(folder):
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10, before[1]))
+    try:
+        assert clip().cache_misses
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    cache.mark_native_code_compiled("clipped")
+    assert not cache.native_code_is_cached("clipped")
+
+
+def test_the_folder_of_code_is_private_whatever_the_umask(folder):
+    folder.parent.mkdir()
+    folder.parent.chmod(0o777)  # by an earlier version
+    previous = os.umask(0)
+    try:
+        assert cache.native_code_is_cacheable()
+    finally:
+        os.umask(previous)
+    assert [path.stat().st_mode & 0o777 for path in (folder.parent, folder)] == [0o700, 0o700]
+
+
+def test_a_folder_of_somebody_else_is_not_trusted(folder, monkeypatch):
+    cache.mark_native_code_compiled("clipped")
+    assert cache.native_code_is_cached("clipped")
+    monkeypatch.setattr(os, "getuid", lambda: 12345)
+    assert not cache.native_code_is_cached("clipped")
+    assert not clip().cache_hits
+    assert not code_files(folder)

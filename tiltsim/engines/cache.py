@@ -6,6 +6,7 @@ import hashlib
 import os
 import platform
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -35,7 +36,7 @@ def native_code_folder() -> Path:
 
 def native_code_is_cached(name: str) -> bool:
     """Whether native code of this name would be loaded rather than compiled."""
-    return _mark(name).exists()
+    return native_code_is_cacheable() and _mark(name).exists()
 
 
 before_compiling: Final[list[Callable[[str], None]]] = []
@@ -50,9 +51,14 @@ def announce_native_code(name: str) -> None:
 
 
 def mark_native_code_compiled(name: str) -> None:
-    """Mark native code of this name as cached, if the folder is writable."""
-    if native_code_is_cacheable():
-        _mark(name).touch()
+    """Mark native code of this name as cached, if all of it could be saved."""
+    if native_code_is_cacheable() and not failed_saves:
+        with suppress(OSError):
+            _mark(name).touch()
+
+
+failed_saves: Final[list[OSError]] = []
+"""Errors of saving compiled code, as on a full disk; it is then compiled by every process."""
 
 
 def _mark(name: str) -> Path:
@@ -61,10 +67,27 @@ def _mark(name: str) -> Path:
 
 
 def native_code_is_cacheable() -> bool:
-    """Whether the folder of compiled code is writable."""
+    """Whether compiled code may be kept and loaded: its folder is writable, and by nobody else.
+
+    Whoever can write there decides what a flight executes.
+    """
     folder = native_code_folder()
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        return _is_private(folder.parent) and _is_private(folder) and os.access(folder, os.W_OK)
     except OSError:
         return False
-    return os.access(folder, os.W_OK)
+
+
+def _is_private(folder: Path) -> bool:
+    """Whether a folder is this user's alone; it is created so, whatever the umask."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with suppress(FileExistsError):
+        folder.mkdir(mode=0o700)
+    if os.name == "nt":
+        return True
+    found = folder.stat()
+    if found.st_uid != os.getuid():
+        return False
+    if found.st_mode & 0o077:
+        folder.chmod(0o700)
+    return True

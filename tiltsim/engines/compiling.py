@@ -6,7 +6,9 @@ compiled with a cache object that has its own folder and lock.
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,7 +23,7 @@ from numba.core.caching import (
 from numba.core.ccallback import CFunc
 from numba.core.typing.templates import infer, infer_global, make_overload_template
 
-from tiltsim.engines.cache import native_code_folder, native_code_is_cacheable
+from tiltsim.engines.cache import failed_saves, native_code_folder, native_code_is_cacheable
 from tiltsim.system.locks import locked, one_thread_at_a_time
 from tiltsim_controllers.mathematics.scalar import scalar_functions
 
@@ -48,31 +50,64 @@ class _CacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
     _locator_classes = (_Locator,)
 
 
-class _LockedIndex(IndexDataCacheFile):  # type: ignore[misc]
-    """An index that processes extend one after the other.
+class _SafeIndex(IndexDataCacheFile):  # type: ignore[misc]
+    """An index that processes extend one after the other, of files with checksums.
 
     Numba reads, extends and writes it as if there were no other process: of two that compile at
-    once, both could take the same file name, and each load the other's code.
+    once, both could take the same file name, and each load the other's code. It would also load
+    whatever a damaged file holds; here that file counts as missing, and its code is compiled again.
     """
 
     def save(self, key: Any, data: Any) -> None:
         with locked(Path(f"{self._index_path}.lock"), wait=True):
             super().save(key, data)
 
+    def _save_index(self, overloads: Any) -> None:
+        with self._open_for_write(self._index_path) as file:
+            file.write(self._dump((self._source_stamp, overloads)))
+
+    def _load_index(self) -> Any:
+        stamp, overloads = self._read(self._index_path) or (None, {})
+        return overloads if stamp == self._source_stamp else {}
+
+    def _load_data(self, name: str) -> Any:
+        return self._read(self._data_path(name))
+
+    def _dump(self, content: Any) -> bytes:
+        data: bytes = super()._dump(content)
+        return sha256(data).digest() + data
+
+    def _read(self, path: str) -> Any:
+        """The content of a file; None if it is missing or damaged."""
+        try:
+            data = Path(path).read_bytes()
+        except OSError:
+            return None
+        size = sha256().digest_size
+        intact = sha256(data[size:]).digest() == data[:size]
+        return pickle.loads(data[size:]) if intact else None
+
 
 class NativeCodeCache(FunctionCache):  # type: ignore[misc]
-    """Numba's cache of a function's compiled code, in our folder and locked."""
+    """Numba's cache of a function's compiled code, in our folder."""
 
     _impl_class = _CacheImpl
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
         stamp = self._impl.locator.get_source_stamp()
-        self._cache_file = _LockedIndex(self._cache_path, self._impl.filename_base, stamp)
+        self._cache_file = _SafeIndex(self._cache_path, self._impl.filename_base, stamp)
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        """Save compiled code; without space for it, it is used without being saved."""
+        try:
+            super().save_overload(signature, compiled)
+        except OSError as error:
+            failed_saves.append(error)
 
 
 def _cached(compiled: Any, function: Callable[..., Any]) -> Any:
-    """Give a dispatcher or C callback our cache, if the folder is writable."""
+    """Give a dispatcher or C callback our cache, if its folder may be used."""
     if native_code_is_cacheable():
         compiled._cache = NativeCodeCache(function)
     return compiled
