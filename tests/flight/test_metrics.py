@@ -67,7 +67,8 @@ def test_all_metrics_are_declared_and_in_this_order():
     of_switching = {"switches", "first_switch_time"}
     of_circles = {"max_orbit_radius_after_20s", "min_orbit_radius_after_20s"}
     of_the_car = {"max_abs_error_x", "max_abs_error_y", "max_lyapunov", "final_input_split"}
-    others = of_the_quadrotor | of_switching | of_circles | of_the_car
+    of_limits = {"first_saturation_time", "last_saturation_time"}
+    others = of_the_quadrotor | of_switching | of_circles | of_the_car | of_limits
     assert set(METRICS) - set(metrics) == others
     assert list(metrics) == [name for name in METRICS if name in metrics]
 
@@ -248,7 +249,7 @@ def test_decoupling_condition_is_the_worst_ratio_of_singular_values():
     assert metrics["min_decoupling_condition"] == pytest.approx(values[3] / values[0], rel=1e-12)
 
 
-def test_saturated_fraction_is_the_share_of_samples_with_a_rotor_at_its_limit():
+def test_saturation_is_measured_in_samples_with_a_rotor_at_its_limit():
     scenario = {
         "vehicle": {"min_rotor_speed": 100.0, "max_rotor_speed": 400.0},
         "simulation": {"duration": 1.0},
@@ -259,11 +260,15 @@ def test_saturated_fraction_is_the_share_of_samples_with_a_rotor_at_its_limit():
         rotor_speed_1=-np.array([400.0, 400.0, 399.0, 300, 300, 300, 300, 300, 300, 300]),
         rotor_speed_2=np.array([400.0, 300.0, 300, 300, 101, 100, 300, 300, 300, 300]),
     )
-    assert flight.metrics()["saturated_fraction"] == 0.3
+    metrics = flight.metrics()
+    assert metrics["saturated_fraction"] == 0.3
+    assert (metrics["first_saturation_time"], metrics["last_saturation_time"]) == (0.0, 5.0 / 8.0)
 
 
 def test_rotors_without_limits_saturate_never():
-    assert fly(rotor_speed_1=0.0, rotor_speed_2=9e4).metrics()["saturated_fraction"] == 0.0
+    metrics = fly(rotor_speed_1=0.0, rotor_speed_2=9e4).metrics()
+    assert metrics["saturated_fraction"] == 0.0
+    assert not {"first_saturation_time", "last_saturation_time"} & set(metrics)
 
 
 @pytest.mark.parametrize(

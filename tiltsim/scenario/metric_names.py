@@ -34,6 +34,8 @@ METRICS: Final = {
     "min_singularity_margin": "smallest rotation to a singular attitude, negative beyond it, rad",
     "min_decoupling_condition": "smallest over largest singular value of [tau/(L Kf); r3 F/Kf]",
     "saturated_fraction": "fraction of samples with a rotor at its speed limit",
+    "first_saturation_time": "first sample with a rotor at its speed limit, s",
+    "last_saturation_time": "last sample with a rotor at its speed limit, s",
     "diverged": "true if the vehicle was lost: divergence, singular matrix, failed controller",
     "duration": "time flown, s",
     "realtime_factor": "time flown over wall time of the integration",

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.vehicles.saturation import at_lower_limit, at_upper_limit
+from tiltsim.vehicles.saturation import at_lower_limit, at_upper_limit, saturation_metrics
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
@@ -39,7 +39,7 @@ def rotorcraft_metrics(
         "max_tilt_rate": float(max(rates)),
         "min_singularity_margin": float(columns["singularity_margin"].min()),
         "min_decoupling_condition": _min_decoupling_condition(columns, vehicle),
-        "saturated_fraction": float(saturated.any(axis=0).mean()),
+        **saturation_metrics(time, saturated),
     }
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.rotorcraft.metrics import SETTLED
-from tiltsim.vehicles.saturation import at_lower_limit
+from tiltsim.vehicles.saturation import at_lower_limit, saturation_metrics
 from tiltsim_controllers.mathematics.scalar import Floats
 
 
@@ -25,6 +25,7 @@ def tilt_car_metrics(
     if settled.any():
         horizontal = np.hypot(errors["x"], errors["y"])
         metrics["sup_position_error_after_20s"] = float(horizontal[settled].max())
+        metrics["least_position_error_after_20s"] = float(horizontal[settled].min())
     for axis, error in errors.items():
         metrics[f"max_abs_error_{axis}"] = float(np.abs(error).max())
     if "lyapunov" in columns:
@@ -35,5 +36,4 @@ def tilt_car_metrics(
     metrics["max_rotor_speed"] = float(speeds.max())
     metrics["max_tilt_rate"] = float(np.abs(columns["alpha_rate"]).max())
     # A thrust cannot pull: at rest a rotor is at its limit.
-    metrics["saturated_fraction"] = float(at_lower_limit(speeds, 0.0).any(axis=0).mean())
-    return metrics
+    return metrics | saturation_metrics(time, at_lower_limit(speeds, 0.0))
