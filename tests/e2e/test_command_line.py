@@ -25,6 +25,7 @@ from tiltsim.commands.progress import announce_compilation
 from tiltsim.engines.cache import before_compiling
 from tiltsim.engines.native_engine import compile_control
 from tiltsim.laws.attitude_altitude import TILTROTOR
+from tiltsim.scenario.loading import is_changed_from_library, load_scenario
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.vehicles.rotorcraft import COLUMN_UNITS
 
@@ -115,6 +116,48 @@ def test_run_exit_code_reports_whether_expectations_hold(expecting, capsys, boun
 def test_run_quiet_prints_nothing(capsys):
     assert main(["run", SETPOINT, *SHORT, "--set", "expect=[]", "--quiet"]) == 0
     assert capsys.readouterr() == ("", "")
+
+
+def test_a_changed_flight_of_the_library_is_not_judged(tmp_path, capsys):
+    assert main(["run", SETPOINT, *SHORT, "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    assert tomllib.loads((tmp_path / "scenario.toml").read_text())["expect"] == []
+    assert "no verdict" in printed
+    assert re.search(r"final_position_error_x +0\.\d+ +-0\.38 ", printed)
+    assert main(["run", SETPOINT, *SHORT, "--quiet"]) == 0
+    assert capsys.readouterr().err == ""
+    assert main(["run", SETPOINT, *SHORT, "--judge"]) == 1
+    assert "FAILED" in capsys.readouterr().out
+    own_bound = ["--set", 'expect=[{metric="duration", max=0.1}]']
+    assert main(["run", SETPOINT, *SHORT, *own_bound]) == 1
+
+
+def test_no_judge_forbids_the_verdict(expecting, capsys):
+    assert main(["run", str(expecting(-1.0)), "--no-judge"]) == 0
+    printed = capsys.readouterr().out
+    assert "FAILED" not in printed
+    assert "no verdict" in printed
+
+
+@pytest.mark.parametrize(
+    ("path", "overrides", "changed"),
+    [
+        (SETPOINT, {}, False),
+        (SETPOINT, {"simulation.plant": "thesis", "simulation.engine": "python"}, False),
+        (SETPOINT, {"controller.decoupler": "modified", "title": "Mine"}, False),
+        (SETPOINT, {"controller.decoupler": "exact"}, True),
+        (SETPOINT, {"simulation.duration": 20.0}, True),
+        (SETPOINT.partition("#")[0], {"simulation.plant": "thesis"}, True),
+    ],
+)
+def test_a_flight_of_the_library_is_as_shipped_on_any_plant(path, overrides, changed):
+    assert is_changed_from_library(path, load_scenario(path, overrides)) is changed
+
+
+def test_a_flight_of_ones_own_is_always_judged(expecting):
+    path = expecting(1.0)
+    changed = load_scenario(path, {"simulation.duration": 0.1})
+    assert not is_changed_from_library(path, changed)
 
 
 def test_run_quiet_prints_failed_expectations(expecting, capsys):

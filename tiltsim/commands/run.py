@@ -25,7 +25,9 @@ if TYPE_CHECKING:
 
 def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
-    description = "Fly one scenario, write its files and check its expectations."
+    description = """Fly one scenario, write its files and check its expectations. Those of the
+    library are of the flight as it is there, on any plant: if you change anything else, the
+    measured values are shown beside the published ones without a verdict."""
     parser = subparsers.add_parser("run", help="fly one scenario", description=description)
     add = parser.add_argument
     scenario = """a TOML file or a name from the library, with #VARIANT for a member of a family
@@ -37,6 +39,10 @@ def add_parser(subparsers: Subparsers) -> None:
     out = "write metrics.json, flight.parquet, scenario.toml"
     add("--out", type=Path, metavar="DIR", help=out)
     add("--rerun", type=Path, metavar="FILE.rrd", help="save a recording for the Rerun viewer")
+    judge = parser.add_mutually_exclusive_group().add_argument
+    judge("--judge", action="store_true", default=None, help="check the expectations in any case")
+    no_judge = "show the measured values without a verdict in any case"
+    judge("--no-judge", dest="judge", action="store_false", default=None, help=no_judge)
     live = parser.add_mutually_exclusive_group().add_argument
     live("--live", action="store_true", help="watch the flight in the Rerun viewer")
     live("--connect", metavar="URL", help="stream to a Rerun viewer that is already open")
@@ -49,13 +55,19 @@ def run(arguments: argparse.Namespace) -> int:
     """Fly, save, evaluate."""
     from tiltsim.flight.expectations import check_expectations
     from tiltsim.flight.writing import prepare_flight_folder
-    from tiltsim.scenario.loading import load_scenario, parse_override
+    from tiltsim.scenario.loading import is_changed_from_library, load_scenario, parse_override
     from tiltsim.system.files import prepare_file
 
     overrides = dict(parse_override(text) for text in arguments.overrides)
     if arguments.controller is not None:
         overrides |= {"controller.law": "python", "controller.function": arguments.controller}
     scenario = load_scenario(arguments.scenario, overrides)
+    expecting, judged = scenario, arguments.judge
+    if judged is None:
+        own_bounds = any(key.startswith("expect") for key in overrides)
+        judged = own_bounds or not is_changed_from_library(arguments.scenario, scenario)
+        if not judged:  # the files do not claim them for this flight
+            scenario = scenario.model_copy(update={"expect": ()})
     if arguments.out is not None:
         prepare_flight_folder(arguments.out, scenario)
     if arguments.rerun is not None:
@@ -93,9 +105,9 @@ def run(arguments: argparse.Namespace) -> int:
             f"{metrics['min_rotor_speed']:.4g} rad/s)",
             error=True,
         )
-    verdicts = check_expectations(scenario, metrics)
+    verdicts = check_expectations(expecting, metrics)
     if not arguments.quiet:
-        print(summary(flight, verdicts))
+        print(summary(flight, verdicts, judged=judged))
         if arguments.out is not None:
             print_line(f"written to {arguments.out}")
         if arguments.rerun is not None:
@@ -103,7 +115,7 @@ def run(arguments: argparse.Namespace) -> int:
     if flight.end.kind != "completed":
         print_line(f"tiltsim: {flight.end.message}", error=True)
         return VEHICLE_LOST
-    failed = [verdict for verdict in verdicts if not verdict.holds]
+    failed = [verdict for verdict in verdicts if judged and not verdict.holds]
     if arguments.quiet:
         for verdict in failed:
             print_line(
@@ -156,8 +168,8 @@ def fly(scenario: Scenario, arguments: argparse.Namespace) -> Flight:
     return flight
 
 
-def summary(flight: Flight, verdicts: list[Verdict]) -> str:
-    """The flight in a few aligned lines."""
+def summary(flight: Flight, verdicts: list[Verdict], *, judged: bool) -> str:
+    """The flight in a few aligned lines, with or without a verdict on its expectations."""
     from tiltsim.scenario.metric_names import unit_of
 
     scenario, metrics = flight.scenario, flight.metrics()
@@ -175,13 +187,18 @@ def summary(flight: Flight, verdicts: list[Verdict]) -> str:
     )
     shown = [name for name in metrics if name not in _IN_HEADER]
     width = max(map(len, shown))
+    if verdicts:
+        lines += ["", *(expectation_lines(verdicts) if judged else _comparison_lines(verdicts))]
     lines.append("")
     lines += [
-        f"  {name:<{width}}  {metrics[name]:>12.6g} {unit_of(name)}".rstrip() for name in shown
+        f"  {name:<{width}}  {_shown(metrics[name]):>12} {unit_of(name)}".rstrip() for name in shown
     ]
-    if verdicts:
-        lines += ["", *expectation_lines(verdicts)]
     return "\n".join(lines)
+
+
+def _shown(value: float) -> str:
+    """A metric without rounding errors of quantities of order one."""
+    return f"{value if abs(value) > 1e-12 else 0.0:.6g}"
 
 
 _IN_HEADER = ("duration", "realtime_factor", "diverged")
@@ -221,3 +238,13 @@ def expectation_lines(verdicts: list[Verdict]) -> list[str]:
     ]
     text = table(("", "expected", "measured", "published", "bounds"), rows, frozenset())
     return [f"  {line}" for line in text.splitlines()]
+
+
+def _comparison_lines(verdicts: list[Verdict]) -> list[str]:
+    """A table of expectations that are not judged: metric, measured, published, bounds."""
+    rows = [
+        (v.expectation.metric, _measured(v), _published(v.expectation), v.bounds) for v in verdicts
+    ]
+    text = table(("compared", "measured", "published", "bounds"), rows, frozenset())
+    note = "no verdict: the bounds are those of the unchanged flight; --judge applies them"
+    return [f"  {line}" for line in (*text.splitlines(), note)]

@@ -15,6 +15,7 @@ from tiltsim.scenario.controller import DEFAULT_LAW
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.messages import choose, did_you_mean, one_line_message, show, valid_unicode
 from tiltsim.scenario.scenario import Scenario, Variant
+from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 
 KIND_KEYS: Final = {"type": None, "law": DEFAULT_LAW}
 """Keys that decide which other keys a table may have, with their defaults."""
@@ -51,6 +52,27 @@ def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) 
     apply_overrides(document, overrides or {}, address)
     locate_named_files(document, Path())
     return parse_scenario(document, address)
+
+
+def is_changed_from_library(path: str | Path, scenario: Scenario) -> bool:
+    """Whether a scenario read from a path is one of the library, but not flown as it is there.
+
+    Plant and engine may differ, and what only describes and judges the flight.
+    """
+    file = find_scenario_file(str(path).partition("#")[0])
+    if library_name(file) == str(file):
+        return False
+    try:
+        shipped = load_scenario(path)
+    except InputError:  # the base of a family, which is no flight of the library
+        return True
+    return _flown(scenario) != _flown(shipped)
+
+
+def _flown(scenario: Scenario) -> dict[str, Any]:
+    """What decides a flight on any plant and engine."""
+    document = scenario.model_dump(exclude={*DESCRIPTIVE})
+    return document | {"simulation": document["simulation"] | {"plant": None, "engine": None}}
 
 
 def locate_named_files(
