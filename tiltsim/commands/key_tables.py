@@ -201,7 +201,7 @@ def _values(value: dict[str, Any]) -> str:
     """Type and allowed values of a key in words."""
     if "const" in value or "enum" in value:
         names = [f'"{choice}"' for choice in _choices(value)]
-        return ", ".join(names) if len(names) <= 12 else f"one of {len(names)} names"
+        return ", ".join(names if len(names) <= 12 else [*names[:2], "..."])
     if "$ref" in value:
         return "table"
     if options := dict.fromkeys(filter(None, map(_values, _options(value)))):
