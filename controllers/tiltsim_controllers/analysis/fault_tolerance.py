@@ -24,8 +24,9 @@ the vehicle, and mirror it for rotors 2 and 4):
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from math import asin, atan, atan2, cos, hypot, pi, sin, sqrt
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -42,6 +43,8 @@ if TYPE_CHECKING:
 
 BALANCED: Final = 1e-9
 """Torque, in units of ``L m g``, that counts as zero."""
+POLYGON: Final = 24
+"""Corners of the polygon that stands for a disk; a local search takes away its error."""
 
 
 @dataclass(frozen=True)
@@ -180,20 +183,25 @@ def minimum_hover_speed(
     *,
     factors: Quad = (1.0, 1.0, 1.0, 1.0),
     stuck: tuple[int, float] | None = None,
+    upright: bool = False,
 ) -> float:
     """The minimum over all tilts of the largest rotor speed (rad/s) in hover after a fault.
+
+    Hovers upside down count, unless excluded: half a turn of all four pods reverses force and
+    torque, so a servo stuck at an angle is worth one stuck at the opposite angle, the body turned
+    over.
 
     Args:
         vehicle: the tiltrotor
         factors: remaining fraction of each rotor's thrust and drag torque; 0 for a failed one
         stuck: A rotor, 1 to 4, and the angle (rad) its servo holds.
+        upright: Whether the body's z axis must point up, or to the side.
 
     Returns:
-        With a lower speed limit no hover is possible, at any attitude.
+        With a lower speed limit no hover is possible; infinite where no speed is enough.
     """
     from scipy.optimize import minimize
 
-    weight = vehicle.mass * vehicle.gravity / vehicle.thrust_coefficient
     scale = np.array(factors) * SPIN
 
     def tilts_of(x: Floats) -> Floats:
@@ -202,42 +210,86 @@ def minimum_hover_speed(
             tilts[stuck[0] - 1] = stuck[1]
         return tilts
 
-    def balance(x: Floats) -> Floats:
-        tilts, w = tilts_of(x), x[4:8] * scale
-        force = force_matrix(tilts) @ w
-        return np.array([*(torque_matrix(tilts, vehicle) @ w), force @ force - 1.0])
+    def force(x: Floats) -> Floats:
+        return np.asarray(force_matrix(tilts_of(x)) @ (x[4:8] * scale))
 
-    delta = atan(drag_ratio(vehicle))
-    best = np.inf
-    starts = [
-        [0.0, 0.0, 0.0, 0.0, 0.25, 0.25, 0.25, 0.25],  # all four, and each pair alone
-        [0.0, -delta, 0.0, -delta, 0.0, 0.5, 0.0, 0.5],
-        [delta, 0.0, delta, 0.0, 0.5, 0.0, 0.5, 0.0],
+    def balance(x: Floats) -> Floats:
+        torque = torque_matrix(tilts_of(x), vehicle) @ (x[4:8] * scale)
+        return np.array([*torque, force(x) @ force(x) - 1.0])
+
+    constraints: list[dict[str, Any]] = [
+        {"type": "eq", "fun": balance},
+        {"type": "ineq", "fun": lambda x: x[8] - x[4:8]},
     ]
-    weak = stuck[0] if stuck is not None else 1 + int(np.argmin(factors))
-    for speed in (0.5, 0.8):  # without the faulty one
-        three = three_rotor_hover(weak, vehicle, opposite_speed=speed * vehicle.hover_rotor_speed)
-        starts.append([*three.tilts, *(np.array(three.rotor_speeds) ** 2 / weight)])
-    if stuck is not None:  # with the opposite pod tilted alike, or mirrored
-        for angle in (stuck[1], -stuck[1]):
-            alike = [0.0, 0.0, 0.0, 0.0, 0.25, 0.25, 0.25, 0.25]
-            alike[(stuck[0] + 1) % 4] = angle
-            starts.append(alike)
-    for start in starts:
+    if upright:
+        constraints.append({"type": "ineq", "fun": lambda x: force(x)[2]})
+    best = np.inf
+    for start in _strong_hovers(vehicle, scale, stuck, upright):
         found = minimize(
             lambda x: float(x[8]),
-            np.array([*start, 0.6]),
+            start,
             method="SLSQP",
-            bounds=[(-pi, pi)] * 4 + [(0.0, None)] * 5,
-            constraints=[
-                {"type": "eq", "fun": balance},
-                {"type": "ineq", "fun": lambda x: x[8] - x[4:8]},
-            ],
+            bounds=[(None, None)] * 4 + [(0.0, None)] * 5,
+            constraints=constraints,
             options={"ftol": 1e-12, "maxiter": 300},
         )
         if np.abs(balance(found.x)).max() < 1e-8:
             best = min(best, float(found.x[4:8].max()))
-    return sqrt(weight * best)
+    return sqrt(vehicle.mass * vehicle.gravity / vehicle.thrust_coefficient * best)
+
+
+def _strong_hovers(
+    vehicle: Vehicle, scale: Floats, stuck: tuple[int, float] | None, upright: bool
+) -> Floats:
+    """Hovers near the least rotor speed, found globally.
+
+    A free pod makes any thrust in a disk spanned by the directions across its arm and up, a stuck
+    one any on a segment, so that forces without torque form a convex set. The strongest of them is
+    the strongest along its own direction. Along a direction, with disks replaced by polygons, it
+    is the optimum of a linear program; the force found gives the next direction.
+
+    Args:
+        vehicle: the tiltrotor
+        scale: spin times remaining fraction of thrust, by rotor
+        stuck: A rotor, 1 to 4, and the angle (rad) its servo holds.
+        upright: Whether the force must not point down in the body.
+
+    Returns:
+        Tilts (rad), rotor inputs and their bound, in units of the weight, shape (hovers, 9).
+    """
+    from scipy.optimize import linprog
+    from scipy.sparse import block_diag
+
+    tilts = np.repeat(np.linspace(-pi, pi, POLYGON, endpoint=False)[:, None], 4, axis=1)
+    if stuck is not None:
+        tilts[:, stuck[0] - 1] = stuck[1]
+    # One column for each corner of each polygon.
+    torque = np.swapaxes(torque_matrix(tilts, vehicle) * scale, 0, 1).reshape(3, -1)
+    force = np.swapaxes(force_matrix(tilts) * scale, 0, 1).reshape(3, -1)
+    limited, limits = np.tile(np.eye(4), POLYGON), [1.0] * 4
+    if upright:
+        limited, limits = np.vstack([limited, -force[2]]), [*limits, 0.0]
+
+    directions = np.array([axis for axis in product((-1.0, 0.0, 1.0), repeat=3) if any(axis)])
+    for _ in range(3):
+        count = len(directions)  # programs without a common variable, solved as one
+        found = linprog(
+            -(directions @ force).ravel(),
+            *(block_diag([limited] * count), np.tile(limits, count)),
+            *(block_diag([torque] * count), np.zeros(3 * count)),
+        ).x.reshape(count, -1)
+        strength = np.linalg.norm(found @ force.T, axis=1)
+        best = np.argsort(-strength)[: max(3, count // 2)]
+        best = best[strength[best] > BALANCED]
+        if best.size == 0:
+            return np.empty((0, 9))
+        found, strength = found[best], strength[best]
+        directions = found @ force.T / strength[:, None]
+
+    thrusts = found.reshape(-1, POLYGON, 4)
+    across, up = (thrusts * np.sin(tilts)).sum(axis=1), (thrusts * np.cos(tilts)).sum(axis=1)
+    inputs = np.hypot(across, up) / strength[:, None]
+    return np.column_stack([np.arctan2(across, up), inputs, 1.0 / strength])
 
 
 def _quad(values: object) -> Quad:

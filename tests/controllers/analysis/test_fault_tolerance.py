@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan, cos, pi
+from math import atan, cos, inf, pi
 
 import numpy as np
 import pytest
@@ -158,10 +158,25 @@ def test_more_thrust_never_needs_more_speed():
     assert sorted(speeds, reverse=True) == speeds
 
 
-@pytest.mark.parametrize("angle", [-pi / 2, 1.0, 3.0])
-def test_a_stuck_servo_is_never_worse_than_a_lost_rotor(angle):
+@pytest.mark.parametrize(
+    ("angle", "any_attitude", "upright"),
+    [(-1.6, 413.93, 437.00), (3.1, 361.54, 480.11), (0.8, 373.31, 373.31)],
+)
+def test_a_stuck_servo_needs_the_globally_least_speed(angle, any_attitude, upright):
+    """Against a search from 300 directions, and at most that of a lost rotor."""
     least = minimum_hover_speed(VEHICLE, stuck=(1, angle))
-    assert HOVER < least < 1.3286 * HOVER
+    assert least == pytest.approx(any_attitude, abs=0.01)
+    assert minimum_hover_speed(VEHICLE, stuck=(1, angle), upright=True) == pytest.approx(
+        upright, abs=0.01
+    )
+    # Half a turn of every pod, and of the body.
+    opposite = minimum_hover_speed(VEHICLE, stuck=(1, angle - pi))
+    assert opposite == pytest.approx(least, rel=1e-6)
+    assert HOVER < least < upright + 0.01 < 1.3287 * HOVER
+
+
+def test_one_rotor_alone_does_not_hover():
+    assert minimum_hover_speed(VEHICLE, factors=(0.0, 1.0, 0.0, 0.0)) == inf
 
 
 def test_a_servo_stuck_upright_costs_nothing_and_all_rotors_are_alike():

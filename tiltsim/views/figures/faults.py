@@ -29,17 +29,26 @@ def fault_figure(vehicle: Vehicle) -> Figure:
 
 
 def _draw_stuck(axes: Axes, vehicle: Vehicle) -> None:
-    angles = np.linspace(-pi / 2, pi / 2, 41)
-    axes.plot(angles, [minimum_hover_speed(vehicle, stuck=(1, angle)) for angle in angles.tolist()])
+    angles = np.linspace(-pi, pi, 49)
+    for upright, line, place, text in (
+        (False, "-", (-3.0, 395.0), "at any\nattitude"),
+        (True, "--", (-1.75, 465.0), "upright"),
+    ):
+        speeds = [
+            minimum_hover_speed(vehicle, stuck=(1, angle), upright=upright)
+            for angle in angles.tolist()
+        ]
+        (drawn,) = axes.plot(angles, speeds, line)
+        axes.text(*place, text, color=drawn.get_color(), fontsize=8)
     intact = vehicle.hover_rotor_speed
     axes.axhline(intact, color=GREY, linewidth=0.8)
     axes.annotate(
         f"intact vehicle, {intact:.0f}",
-        (-pi / 2, intact),
+        (-0.8 * pi, intact),
         xytext=(3, 2),
         textcoords="offset points",
         color=GREY,
-        fontsize=8,
+        fontsize=7,
     )
     limit = 2.0 * atan(drag_ratio(vehicle))
     axes.axvline(limit, color=AMBER, linestyle="--", linewidth=1.0)
@@ -52,7 +61,7 @@ def _draw_stuck(axes: Axes, vehicle: Vehicle) -> None:
         fontsize=8,
         verticalalignment="top",
     )
-    angle_axis(axes, "x", pi / 2)
+    angle_axis(axes, "x", pi)
     axes.set_xlabel("angle at which servo 1 is stuck (rad)")
     axes.set_ylabel("maximum rotor speed needed (rad/s)")
     axes.set_title("Stuck servo, other tilts free")

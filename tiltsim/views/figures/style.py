@@ -117,9 +117,10 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def angle_axis(axes: Axes, axis: str, limit: float) -> None:
-    """Ticks at multiples of pi/4 up to ``limit`` (rad) on axis "x" or "y"."""
-    labels = {-2: "−π/2", -1: "−π/4", 0: "0", 1: "π/4", 2: "π/2"}
-    steps = [step for step in labels if abs(step) * pi / 4 <= limit + 1e-9]
+    """Ticks at four fractions of ``limit`` (rad), up to pi, on axis "x" or "y"."""
+    labels = {-4: "−π", -2: "−π/2", -1: "−π/4", 0: "0", 1: "π/4", 2: "π/2", 4: "π"}
+    every = 2 if limit > 0.75 * pi else 1
+    steps = [step for step in labels if abs(step) * pi / 4 <= limit + 1e-9 and step % every == 0]
     set_ticks: Any = getattr(axes, f"set_{axis}ticks")
     set_ticks([step * pi / 4 for step in steps], [labels[step] for step in steps])
     set_limits: Any = getattr(axes, f"set_{axis}lim")
