@@ -21,12 +21,21 @@ FLIGHT_COMMANDS: Final = ("run", "check", "sweep", "list", "view", "plot", "vide
 OTHER_COMMANDS: Final = ("gait", "map", "singularity", "report", "bench", "schema")
 
 
+LONGEST_MESSAGE: Final = 1000
+"""Characters of a message, which may show a name or value of any length."""
+
+
+def _one_line(message: object) -> str:
+    text = printable(str(message)[:LONGEST_MESSAGE])
+    return text if len(text) < LONGEST_MESSAGE else f"{text[:LONGEST_MESSAGE]}..."
+
+
 class Parser(argparse.ArgumentParser):
     """Reports a mistake in one line, like every other mistake."""
 
     def error(self, message: str) -> NoReturn:
         """Print the line and exit."""
-        self.exit(INVALID_INPUT, f"tiltsim: {printable(message)} (see {self.prog} --help)\n")
+        self.exit(INVALID_INPUT, f"tiltsim: {_one_line(message)} (see {self.prog} --help)\n")
 
 
 class _Version(argparse.Action):
@@ -87,7 +96,7 @@ def _run(arguments: list[str] | None) -> int:
         parsed = build_parser().parse_args(arguments)
         return int(parsed.run(parsed))
     except InputError as error:
-        print(f"tiltsim: {printable(error)}", file=sys.stderr)
+        print(f"tiltsim: {_one_line(error)}", file=sys.stderr)
         return INVALID_INPUT
     except KeyboardInterrupt:
         print("tiltsim: interrupted", file=sys.stderr)
@@ -98,7 +107,7 @@ def _run(arguments: list[str] | None) -> int:
         return DONE
     except OSError as error:
         message = f"{error.filename or 'output'}: {error.strerror or error}"
-        print(f"tiltsim: {printable(message)}", file=sys.stderr)
+        print(f"tiltsim: {_one_line(message)}", file=sys.stderr)
         return INVALID_INPUT
     except Exception as error:
         if not (_raised_while_loading_mujoco(error) and "MUJOCO_GL" in os.environ):

@@ -54,6 +54,16 @@ def test_a_full_disk_names_the_file_and_leaves_the_old_one(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_nobody_can_guess_the_temporary_name_and_make_a_link_of_it(tmp_path):
+    names = set()
+    for _ in range(3):
+        with replacing(tmp_path / "file") as temporary:
+            temporary.touch()
+            names.add(temporary.name)
+    assert len(names) == 3
+    assert all(re.fullmatch(r"\.file\.[0-9a-f]{16}\.new", name) for name in names)
+
+
 def test_a_device_is_written_and_stays_one():
     with replacing(Path("/dev/null")) as path:
         path.write_bytes(b"nothing")

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import signal
+import socket
 import subprocess
 import sys
 
 import pytest
 
+import tiltsim.views.rerun.viewer as viewer_module
 from tests.flights import flight
 from tests.views.viewer_shot import (
     client_of,
@@ -71,3 +73,27 @@ def test_closing_the_viewer_does_not_affect_the_flight(stop, tmp_path):
     this = load_flight(tmp_path)
     assert (this.end.kind, len(this)) == ("completed", 3001)
     assert (tmp_path / "metrics.json").is_file()
+
+
+def test_the_opened_viewer_listens_to_this_machine_only(monkeypatch):
+    port, started, received = free_port(), [], []
+    url = f"rerun+http://127.0.0.1:{port}/proxy"
+    listener = socket.socket()
+
+    def start(command, **_options):
+        started.append(command[1:])
+        listener.bind(("127.0.0.1", port))
+        listener.listen()
+
+    class Recording:
+        def connect_grpc(self, url, default_blueprint):
+            received.append((url, default_blueprint))
+
+    monkeypatch.setattr(viewer_module, "DEFAULT_URL", url)
+    monkeypatch.setattr(viewer_module.subprocess, "Popen", start)
+    with listener:
+        for blueprint in ("first", "second"):  # a viewer that is open is not opened again
+            viewer_module.attach_viewer(Recording(), None, blueprint)
+    assert len(started) == 1
+    assert started[0][:2] == ["--bind", "127.0.0.1"]
+    assert received == [(url, "first"), (url, "second")]

@@ -14,6 +14,7 @@ from tiltsim.errors import InputError
 from tiltsim.flight.end import End, EndKind
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
+from tiltsim.scenario.limits import check_limits
 from tiltsim.scenario.loading import parse_scenario, without_none
 from tiltsim.system.parquet import open_parquet
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -38,6 +39,7 @@ def load_flight(path: str | Path) -> Flight:
     origin = _origin(file, table)
     try:
         document = dict(json.loads(origin["scenario"]))
+        check_limits(document, f"{file}: not a flight of tiltsim: its scenario")
         engine, end = _engine_and_end(origin)
         wall_time = float(origin["wall_time"])
     except (KeyError, ValueError, TypeError, RecursionError) as error:

@@ -10,6 +10,7 @@ from typing import Any, Final, NamedTuple
 
 from tiltsim.errors import InputError
 from tiltsim.resources import shipped_folder
+from tiltsim.scenario.limits import check_limits, read_text
 from tiltsim.scenario.messages import did_you_mean
 
 _SWEEP: Final = re.compile(r"^\s*\[\[?\s*(axis|bisect)\s*\]", re.MULTILINE)
@@ -50,13 +51,11 @@ def closest_in_library(path: str | Path) -> str:
 def read_toml(path: Path) -> dict[str, Any]:
     """The document in a TOML file. Raises `InputError` with the file and the reason."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not UTF-8 text (byte {error.start}: {error.reason})") from error
+        document = tomllib.loads(read_text(path))
     except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError
         raise InputError(f"{path}: not valid TOML: {error}") from error
+    check_limits(document, str(path))
+    return document
 
 
 def scenario_files(path: Path) -> list[Path]:
@@ -71,8 +70,8 @@ def scenario_files(path: Path) -> list[Path]:
 def is_sweep(file: Path) -> bool:
     """Whether a TOML file defines a sweep: it has ``[[axis]]`` or ``[bisect]`` tables."""
     try:
-        return _SWEEP.search(file.read_text(encoding="utf-8-sig")) is not None
-    except (OSError, UnicodeDecodeError):
+        return _SWEEP.search(read_text(file)) is not None
+    except InputError:
         return False  # reading it will report the error
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,6 +14,7 @@ from pydantic import ValidationError
 from tiltsim.errors import InputError
 from tiltsim.scenario.controller import DEFAULT_LAW
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
+from tiltsim.scenario.limits import MAX_DEPTH, check_limits
 from tiltsim.scenario.messages import choose, did_you_mean, one_line_message, show, valid_unicode
 from tiltsim.scenario.scenario import Scenario, Variant
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
@@ -136,6 +138,7 @@ def parse_scenario(document: Mapping[str, Any], address: str = "scenario") -> Sc
     Raises:
         InputError: As `load_scenario` does.
     """
+    check_limits(document, address)
     try:
         scenario = Scenario.model_validate(document)
     except ValidationError as error:
@@ -238,12 +241,13 @@ def _enter(target: object, step: str | int) -> object:
 def split_key(key: str) -> list[str | int]:
     """A dotted key as names and positions: ``gait.angles[1]`` is ``gait``, ``angles``, ``1``."""
     steps: list[str | int] = []
+    if key.count(".") + key.count("[") > MAX_DEPTH:
+        raise InputError(f"{key[:60]}...: a key of more than {MAX_DEPTH} names and positions")
     for name in key.split("."):
         plain, *positions = name.split("[")
         steps.append(plain)
         for position in positions:
-            closed = position.endswith("]") and position[:-1].isdecimal()
-            if not closed:
+            if re.fullmatch(r"[0-9]{1,9}\]", position) is None:
                 raise InputError(f"{key}: entries of lists are written NAME[0], NAME[1], ...")
             steps.append(int(position[:-1]))
     return steps
@@ -259,9 +263,13 @@ def parse_override(text: str) -> tuple[str, Any]:
     if not equals or not key:
         raise InputError(f"--set {text}: write KEY=VALUE, for example controller.decoupler=exact")
     try:
-        return key, tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
+        parsed = tomllib.loads(f"value = {value}")["value"]
+    except ValueError:  # TOMLDecodeError, or an integer with too many digits
         return key, value
+    except RecursionError:
+        raise InputError(f"--set {key}: lists and tables nest too deep") from None
+    check_limits(parsed, f"--set {key}")
+    return key, parsed
 
 
 def scenario_toml(scenario: Scenario) -> str:

@@ -10,6 +10,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from tiltsim.errors import InputError
+from tiltsim.scenario.limits import check_limits
 from tiltsim.scenario.loading import parse_scenario, without_none
 from tiltsim.scenario.messages import show
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
@@ -46,9 +47,10 @@ class SweepDefinition:
         """
         try:
             document = dict(json.loads(text))
+            check_limits(document, "definition")
             checksum = document.pop("sha256", None)
             definition = SweepDefinition(**document)
-        except (TypeError, RecursionError):
+        except (TypeError, RecursionError, InputError):
             raise ValueError("keys are missing or unknown") from None
         for key, kind in (("address", str), ("sweep", dict), ("base", dict), ("versions", dict)):
             if not isinstance(document[key], kind):

@@ -32,6 +32,9 @@ FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
     "sqrt": math.sqrt,
     "tan": math.tan,
 }
+MAX_DEPTH: Final = 200
+"""Operations in one another in an expression."""
+
 CONSTANTS: Final = {"pi": math.pi}
 
 
@@ -70,9 +73,15 @@ def names(expression: str) -> set[str]:
 @lru_cache(maxsize=1024)
 def _parse(expression: str) -> ast.expr:
     try:
-        return ast.parse(expression.strip(), mode="eval").body
+        parsed = ast.parse(expression.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise ValueError("is not an arithmetic expression") from None
+    level: list[ast.AST] = [parsed]
+    for _ in range(MAX_DEPTH):
+        level = [child for node in level for child in ast.iter_child_nodes(node)]
+        if not level:
+            return parsed
+    raise ValueError(f"nests more than {MAX_DEPTH} deep; a + b + c nests 2 deep")
 
 
 def _is_name(node: ast.expr) -> bool:

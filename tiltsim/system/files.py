@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from secrets import token_hex
 from typing import Final
 
 from tiltsim.errors import InputError
@@ -61,8 +62,8 @@ def replacing(path: Path, *, durable: bool = False) -> Iterator[Path]:
         InputError: If the file cannot be written, as on a full disk.
     """
     special = path.exists() and not path.is_file()
-    # An ordinary file, unlike tempfile's, gets the permissions of the user's umask.
-    temporary = path.with_name(f".{path.name}.{os.getpid()}{TEMPORARY_SUFFIX}")
+    # A name that nobody can guess and make a link of; unlike tempfile's file it gets the permissions of the umask.
+    temporary = path.with_name(f".{path.name}.{token_hex(8)}{TEMPORARY_SUFFIX}")
     try:
         yield path if special else temporary
         if not special:

@@ -35,18 +35,26 @@ def require_viewer(url: str | None) -> None:
         )
 
 
+def viewer_listens(url: str) -> bool:
+    """Whether something accepts connections at a viewer's address."""
+    parts = urlsplit(url)
+    try:
+        socket.create_connection((str(parts.hostname), parts.port or 9876), CONNECT_TIMEOUT).close()
+    except (OSError, UnicodeError):  # the latter for a host with a label that is too long
+        return False
+    return True
+
+
 def _require_listener(url: str) -> None:
     parts = urlsplit(url)
     try:
-        valid = parts.scheme in {"rerun+http", "rerun+https", "rerun"} and parts.hostname
-        port = parts.port or 9876
+        known = parts.scheme in {"rerun+http", "rerun+https", "rerun"} and parts.path == "/proxy"
+        valid = known and bool(parts.hostname) and parts.port != 0
     except ValueError:
-        valid, port = None, 0
-    if not valid or parts.path != "/proxy":
+        valid = False
+    if not valid:
         raise InputError(f"--connect {url}: not a viewer's address; expected, e.g., {DEFAULT_URL}")
-    try:
-        socket.create_connection((str(parts.hostname), port), CONNECT_TIMEOUT).close()
-    except OSError as error:
+    if not viewer_listens(url):
         raise InputError(
             f"--connect {url}: no viewer listens there; start one with the command rerun"
-        ) from error
+        )

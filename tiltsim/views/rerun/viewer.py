@@ -7,10 +7,11 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from time import monotonic, sleep
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.errors import InputError
-from tiltsim.views.rerun.requirements import require_viewer
+from tiltsim.views.rerun.requirements import DEFAULT_URL, require_viewer, viewer_listens
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 
 RECORDING_START: Final = b"RRF"
 """First bytes of every recording; the version follows."""
+
+START_TIME: Final = 20.0
+"""Time (s) that the viewer may take to start."""
 
 
 def view_flights(
@@ -51,19 +55,27 @@ def view_recordings(paths: Sequence[Path]) -> None:
     Raises:
         InputError: If a file cannot be read or is not a recording, or there is no screen.
     """
-    import rerun_cli
-
     for path in paths:
         _require_recording(path)
     require_viewer(None)
+    _open_viewer(*(str(path.absolute()) for path in paths))
+
+
+def _open_viewer(*arguments: str) -> None:
+    """Start the viewer in a process of its own; it listens to programs of this machine only."""
+    import rerun_cli
+
     program = Path(rerun_cli.__file__).with_name("rerun")
     program = program.with_suffix(".exe") if sys.platform == "win32" else program
-    subprocess.Popen(
-        [str(program), *(str(path) for path in paths)],
-        env={**os.environ, "RERUN_APP_ONLY": "true"},
-        stdout=subprocess.DEVNULL,
-        start_new_session=True,
-    )
+    try:
+        subprocess.Popen(
+            [str(program), "--bind", "127.0.0.1", *arguments],
+            env={**os.environ, "RERUN_APP_ONLY": "true"},
+            stdout=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+    except OSError as error:
+        raise InputError(f"the Rerun viewer did not start: {error.strerror}") from error
 
 
 def _require_recording(path: Path) -> None:
@@ -78,11 +90,18 @@ def _require_recording(path: Path) -> None:
 
 
 def attach_viewer(recording: rr.RecordingStream, url: str | None, blueprint: rrb.Blueprint) -> None:
-    """Send a recording to the viewer at a URL, or else to a local one, opened if necessary."""
-    if url is not None:
-        recording.connect_grpc(url, default_blueprint=blueprint)
-        return
-    try:
-        recording.spawn(hide_welcome_screen=True, default_blueprint=blueprint)
-    except (OSError, RuntimeError) as error:
-        raise InputError(f"the Rerun viewer did not start: {error}") from error
+    """Send a recording to the viewer at a URL, or else to the local one, opened if necessary."""
+    if url is None:
+        url = DEFAULT_URL
+        if not viewer_listens(url):
+            _open_viewer("--hide-welcome-screen", "--expect-data-soon")
+            _wait_for_viewer(url)
+    recording.connect_grpc(url, default_blueprint=blueprint)
+
+
+def _wait_for_viewer(url: str) -> None:
+    deadline = monotonic() + START_TIME
+    while not viewer_listens(url):
+        if monotonic() > deadline:
+            raise InputError(f"the Rerun viewer did not start within {START_TIME:g} s")
+        sleep(0.05)
