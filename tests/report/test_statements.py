@@ -17,7 +17,7 @@ from tiltsim.scenario.library import library_entries
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.metric_names import METRICS
 
-PENDING = {*range(6, 13)}
+PENDING = {*range(7, 13)}
 """Chapters whose statements still lack the thesis's words and criteria."""
 
 RAW = re.compile("|".join([*METRICS, *(name.replace("_", " ") for name in METRICS)]), re.I)

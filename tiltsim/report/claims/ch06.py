@@ -11,15 +11,8 @@ import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim
 from tiltsim.report.claims.ch03 import EQ_17, EQ_19
-from tiltsim.report.draft import draft
-from tiltsim.report.measures import robustness_claim, terms, terms_hold
-from tiltsim_controllers.analysis.published_gaits import (
-    PUBLISHED_GAITS,
-    Robustness,
-    robustness,
-    smallest_margin,
-)
-from tiltsim_controllers.analysis.singularity import residuals
+from tiltsim.report.measures import terms, terms_hold
+from tiltsim.report.statement import Statement
 from tiltsim_controllers.analysis.two_color_map import (
     Root,
     delta,
@@ -32,8 +25,6 @@ from tiltsim_controllers.vehicle.parameters import PRESETS
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
 _ZERO: Final = 1e-9
-_NEAR_RIGHT_ANGLE: Final = 1.55
-"""rad: with such a margin the singular attitudes are within 0.02 rad of a right angle."""
 
 EQ_4: Final = terms(
     "1.000 ccsc - 1.000 sccc - 1.000 csss + 1.000 sscs + 2.880 ccss + 2.880 cssc "
@@ -104,136 +95,224 @@ def _triangle_is_the_published() -> bool:
     return _positive_points() == published
 
 
-def _signs(key: str) -> float:
-    """1, -1, or 0 where R is zero or changes sign over the gait on the exact lines."""
-    published = PUBLISHED_GAITS[key]
-    gait = published.exact or published.gait
-    R = residuals(gait.angles(gait.sample_times(401)), _VEHICLE).R
-    if np.abs(R).min() < _ZERO:
-        return 0.0
-    return float(np.sign(R[0])) if np.ptp(np.sign(R)) == 0.0 else 0.0
-
-
-def _robustness(key: str) -> Robustness:
-    return robustness(PUBLISHED_GAITS[key])
-
-
-def _nearly_all(key: str) -> bool:
-    return _robustness(key).margin > _NEAR_RIGHT_ANGLE
-
-
-def _greater_advantage_over_99() -> bool:
-    """Whether the margin of printed Gait 2 exceeds that of the 99 % gait by more than the 80 %."""
-    gait = PUBLISHED_GAITS["ch06_gait_2"].gait
-    own, near, far = (smallest_margin(gait.biased(eta), _VEHICLE) for eta in (1.0, 0.99, 0.8))
-    return own > near and own - near > own - far
-
-
-def _red_beats_blue() -> bool:
-    margins = {key: _robustness(key).margin_exact for key in ("ch06_gait_2", "ch06_gait_3")}
-    return margins["ch06_gait_3"] > margins["ch06_gait_2"]
-
-
-def _partial_scaling_can_harm() -> bool:
-    return any(
-        (row := _robustness(key)).margin_biased is not None and row.margin_biased < row.margin
-        for key in ("ch06_gait_3", "ch06_gait_4")
-    )
-
-
-def _angles_on_lines(key: str) -> bool:
-    """Whether the printed angles lie on the lines of their color, to half their last digit."""
-    published = PUBLISHED_GAITS[key]
-    first, second, third, fourth = published.gait.angles(np.arange(4) / 4.0).T
-    if published.color == "blue":
-        offset = 2.0 * delta(_VEHICLE)
-        first, second = offset - first, -offset - second
-    return bool(np.abs(np.stack([third - first, fourth - second])).max() < 0.0005)
+def _upper_triangle_is_blue_only() -> bool:
+    """Whether no point with a red root of R > 0 has another red root, so only (-,-) is left."""
+    for row in _grid()[1:-1]:
+        for cell in row[1:-1]:
+            classes = {f"({root.plane_3},{root.plane_4})" for root in cell if root.R <= _ZERO}
+            positive = any(root.R > _ZERO for root in cell)
+            if positive and not classes <= {"(-,-)", "(-,?)", "(?,-)", "(?,?)"}:
+                return False
+    return True
 
 
 def _one_color_is_accepted(color: str) -> bool:
     return check_path(rectangle((0.2, 0.8), (-0.8, -0.2), color), _VEHICLE).accepted
 
 
-_GAITS: Final = {f"ch06_gait_{i}": f"Gait {i}" for i in (1, 2, 3, 4)}
-_FIGURES: Final = dict(zip(_GAITS, (21, 23, 25, 27), strict=True))
-_SIGN: Final = dict(zip(_GAITS, (-1.0, -1.0, -1.0, 1.0), strict=True))
-_BLUE: Final = ("ch06_gait_1", "ch06_gait_2")
+_EVERY_TERM: Final = (
+    "Every product of sines and cosines has the printed coefficient, to 0.001, and none is missing"
+)
+
+
+def _printed(part: str, source: str, text: str, thesis: str) -> Statement:
+    return Statement(
+        id=f"ch6-{part}", source=source, text=text, thesis=thesis, criterion=_EVERY_TERM
+    )
+
+
+EQ_1 = Statement(
+    id="ch6-eq-1",
+    source="ch. 6, Sec. 2, Eq. (1)",
+    text="Eq. (1), term by term, is the determinant at any attitude",
+    thesis="“… the necessary condition [22] to receive an invertible decoupling matrix in our "
+    "tilt-rotor is given by” Eq. (1).",
+    criterion=_EVERY_TERM,
+    finding="slips",
+)
+PARTS: Final = (
+    (
+        _printed(
+            "eq-2",
+            "ch. 6, Sec. 2, Eq. (2)",
+            "R at level attitude is printed correctly, term by term",
+            "“… substituting φ = 0 and θ = 0 into Formula (1) yields” Eq. (2).",
+        ),
+        "R",
+        EQ_19,
+    ),
+    (
+        _printed(
+            "eq-4",
+            "ch. 6, Sec. 3, Eq. (4)",
+            "R_φ is printed correctly, term by term",
+            "Eq. (4), the coefficient of φ in Formula (3).",
+        ),
+        "R_phi",
+        EQ_4,
+    ),
+    (
+        _printed(
+            "eq-5",
+            "ch. 6, Sec. 3, Eq. (5)",
+            "R_θ is printed correctly, term by term",
+            "Eq. (5), the coefficient of θ in Formula (3).",
+        ),
+        "R_theta",
+        EQ_17.R_theta,
+    ),
+    (
+        _printed(
+            "eq-6",
+            "ch. 6, Sec. 3, Eq. (6)",
+            "R is printed correctly, term by term",
+            "Eq. (6), the part of Formula (3) without φ and θ.",
+        ),
+        "R",
+        EQ_19,
+    ),
+)
+COUNTS = Statement(
+    id="ch6-roots",
+    source="ch. 6, Sec. 3, Fig. 4",
+    text="Roots (α₃, α₄) for a grid point inside, on a side, in a corner",
+    thesis="“… the number of roots of (α₃, α₄) is 2 in the middle”; “Each corner … returns 5 "
+    "roots”; “the rest (α₁, α₂) on the side returns 3 roots”.",
+    criterion="The closed form gives these numbers at every one of the 17 x 17 grid points",
+    finding="map",
+    pictures=("map",),
+)
+PLANES = Statement(
+    id="ch6-planes",
+    source="ch. 6, Sec. 3, Figs. 5-10",
+    text="α₃ lies on two planes, and so does α₄",
+    thesis="“Figure 9 shows that both α₃ lie on the two planes”; “Figure 10 shows that both α₄ "
+    "also lie on another two planes.”",
+    criterion="Every root inside the grid has α₃ = α₁ or 2δ - α₁, and α₄ = α₂ or -2δ - α₂, to 1e-9",
+    finding="map",
+    pictures=("map",),
+)
+CLASSES = Statement(
+    id="ch6-classes",
+    source="ch. 6, Sec. 3",
+    text="Classes of roots by their planes",
+    thesis="“… there are only 7 categories of the roots of (α₃, α₄).”",
+    criterion="Seven classes occur, if planes closer than half a grid step count as intersecting "
+    "(“?”)",
+)
+NO_MIXED = Statement(
+    id="ch6-no-mixed",
+    source="ch. 6, Sec. 3",
+    text="Some root mixes the planes: (+,-) or (-,+)",
+    thesis="“Note that no roots of (α₃, α₄) belong to (+,-) or (-,+).”",
+    criterion="Neither class occurs inside the grid",
+)
+POSITIVE_CLASSES = Statement(
+    id="ch6-positive-classes",
+    source="ch. 6, Sec. 3, Figs. 11-14",
+    text="Roots with R > 0 lie on no minus plane: (+,+), (+,?) and (?,+)",
+    thesis="“Note that both roots of (α₃, α₄) receiving positive R … belong to (+,+), (+,?), and "
+    "(?,+) types.”",
+    criterion="No root with R > 0 has a minus plane",
+    note="Three grid points next to P, where both pairs of planes meet within half a grid step, "
+    "are (?,?) by the reading of “?” with which ch6-classes finds the seven categories.",
+)
+ONE_POSITIVE = Statement(
+    id="ch6-one-positive",
+    source="ch. 6, Sec. 3, Figs. 11-14",
+    text="At most one root with R > 0",
+    thesis="“… there is only one root of (α₃, α₄) meeting R > 0 for each (α₁, α₂) in the "
+    "triangular area.”",
+    criterion="No grid point has two roots with R > 0",
+)
+TRIANGLE_OF_R = Statement(
+    id="ch6-triangle",
+    source="ch. 6, Sec. 3",
+    text="The points with R > 0 fill the triangle (-7, 7), (-7, -5), (5, 7) in π/16",
+    thesis="“This triangular area is governed by three vertices: (-7π/16, 7π/16), (-7π/16, "
+    "-5π/16), (5π/16, 7π/16).”",
+    criterion="The grid points with a root of R > 0 are exactly those of the printed triangle",
+    finding="triangle",
+    pictures=("map",),
+)
+NEGATIVE_CLASSES = Statement(
+    id="ch6-negative-classes",
+    source="ch. 6, Sec. 3, Figs. 15-16",
+    text="Roots with R < 0 cover all seven classes",
+    thesis="“Both roots of (α₃, α₄) receiving negative R …, Figures 15 and 16, covers all seven "
+    "types.”",
+    criterion="All seven classes occur among the roots with R < -1e-9",
+    finding="blue",
+)
+TWO_USABLE = Statement(
+    id="ch6-two-usable",
+    source="ch. 6, Sec. 3",
+    text="For an (α₁, α₂) with R < 0 there may be two usable roots, red and blue",
+    thesis="“… the number of the roots of (α₃, α₄) receiving negative R … is 1 or 2.”",
+    criterion="Some grid point has two roots with R < -1e-9",
+    finding="blue",
+)
+TOP_TRIANGLE = Statement(
+    id="ch6-top-triangle",
+    source="ch. 6, Sec. 4, Fig. 18",
+    text="In the triangular region on the top only (-,-) has no positive R",
+    thesis="“While (α₁, α₂) in the triangular region on the top, receive one applicable (α₃, α₄) "
+    "only, the type of which is (-,-).”",
+    criterion="Where one root has R > 0, the other lies on no plus plane",
+    note="That it is applicable is refuted with the other statements on blue (ch6-two-usable).",
+)
+EQUAL_PAIRS = Statement(
+    id="ch6-equal-pairs",
+    source="ch. 6, Sec. 6",
+    text="On (+,+) α₁ = α₃ and α₂ = α₄",
+    thesis="“The tilting angles on the (+,+) surface satisfy α₁ = α₃, α₂ = α₄.”",
+    criterion="To 1e-9 for every root of this class",
+)
+CONTINUOUS = Statement(
+    id="ch6-theorem-1",
+    source="ch. 6, Sec. 4, Theorem 1",
+    text="A closed path in one color gives a continuous gait",
+    thesis="“The planned gait is continuous if … The adjacent (α₁, α₂) are in the same color or "
+    "do not violate the rule in Figure 17.”",
+    criterion="The planner accepts a rectangle in this color as continuous",
+)
 
 CLAIMS = (
     AnalysisClaim(
-        draft(
-            "ch. 6, Sec. 2, Eq. (1)", "Eq. (1), term by term, is the determinant at any attitude"
-        ),
+        EQ_1,
         partial(terms_hold, "R_phi", EQ_1_ROLL, _VEHICLE),
-        case="terms with sin φ",
         refuted="-2.880 s1 c2 s3 s4 sin φ cos θ should be s1 c2 c3 s4, as in Eq. (4).",
     ),
     *(
-        AnalysisClaim(
-            draft(f"ch. 6, Sec. {section}", f"{name} is printed correctly, term by term"),
-            partial(terms_hold, part, printed, _VEHICLE),
-        )
-        for section, name, part, printed in (
-            ("2, Eq. (2)", "R at level attitude", "R", EQ_19),
-            ("3, Eq. (4)", "R_φ", "R_phi", EQ_4),
-            ("3, Eq. (5)", "R_θ", "R_theta", EQ_17.R_theta),
-            ("3, Eq. (6)", "R", "R", EQ_19),
-        )
+        AnalysisClaim(statement, partial(terms_hold, part, printed, _VEHICLE))
+        for statement, part, printed in PARTS
+    ),
+    AnalysisClaim(COUNTS, _counts, published=("2", "3", "5")),
+    AnalysisClaim(PLANES, _on_two_planes),
+    AnalysisClaim(CLASSES, lambda: float(len(root_classes(_grid()))), published="7"),
+    AnalysisClaim(
+        NO_MIXED, lambda: bool(_classes(lambda root: True) & {"(+,-)", "(-,+)"}), published=False
     ),
     AnalysisClaim(
-        draft(
-            "ch. 6, Sec. 3, Fig. 4",
-            "Roots (α₃, α₄) for a grid point inside, on a side, in a corner",
-        ),
-        _counts,
-        published=("2", "3", "5"),
+        POSITIVE_CLASSES,
+        lambda: not any("-" in name for name in _classes(lambda root: root.R > _ZERO)),
     ),
     AnalysisClaim(
-        draft("ch. 6, Sec. 3, Figs. 5-10", "α₃ lies on two planes, and so does α₄"), _on_two_planes
+        ONE_POSITIVE, lambda: sum(root.R > _ZERO for root in _inside()) == len(_positive_points())
     ),
     AnalysisClaim(
-        draft("ch. 6, Sec. 3", "Classes of roots by their planes"),
-        lambda: float(len(root_classes(_grid()))),
-        published="7",
-    ),
-    AnalysisClaim(
-        draft("ch. 6, Sec. 3", "Some root mixes the planes: (+,-) or (-,+)"),
-        lambda: bool(_classes(lambda root: True) & {"(+,-)", "(-,+)"}),
-        published=False,
-    ),
-    AnalysisClaim(
-        draft(
-            "ch. 6, Sec. 3, Figs. 11-14",
-            "Roots with R > 0 are of the classes (+,+), (+,?) and (?,+) only",
-        ),
-        lambda: _classes(lambda root: root.R > _ZERO) <= {"(+,+)", "(+,?)", "(?,+)"},
-        why="Where both pairs of planes meet within half a grid step there are also (?,?): "
-        "three grid points next to P.",
-    ),
-    AnalysisClaim(
-        draft("ch. 6, Sec. 3, Figs. 11-14", "At most one root with R > 0"),
-        lambda: sum(root.R > _ZERO for root in _inside()) == len(_positive_points()),
-    ),
-    AnalysisClaim(
-        draft(
-            "ch. 6, Sec. 3",
-            "The points with R > 0 fill the triangle (-7, 7), (-7, -5), (5, 7) in π/16",
-        ),
+        TRIANGLE_OF_R,
         _triangle_is_the_published,
         refuted="They reach (-7, -7) and (7, 7), and include the untilted vehicle, whose R is 4.",
     ),
     AnalysisClaim(
-        draft("ch. 6, Sec. 3, Figs. 15-16", "Roots with R < 0 cover all seven classes"),
+        NEGATIVE_CLASSES,
         lambda: len(_classes(lambda root: root.R < -_ZERO)) == 7,
         refuted="Blue roots, those with a minus, have R = 0 exactly; with the printed coefficients "
         "the sign of R there is rounding.",
     ),
     AnalysisClaim(
-        draft(
-            "ch. 6, Sec. 3",
-            "For an (α₁, α₂) with R < 0 there may be two usable roots, red and blue",
-        ),
+        TWO_USABLE,
         lambda: any(
             sum(root.R < -_ZERO for root in cell) == 2
             for row in _grid()[1:-1]
@@ -241,8 +320,9 @@ CLAIMS = (
         ),
         refuted="Only red ones are usable: " + RANK,
     ),
+    AnalysisClaim(TOP_TRIANGLE, _upper_triangle_is_blue_only),
     AnalysisClaim(
-        draft("ch. 6, Sec. 6", "On (+,+) α₁ = α₃ and α₂ = α₄"),
+        EQUAL_PAIRS,
         lambda: all(
             abs(root.alpha_3 - root.alpha_1) + abs(root.alpha_4 - root.alpha_2) < _ZERO
             for root in _inside()
@@ -250,64 +330,7 @@ CLAIMS = (
         ),
     ),
     *(
-        AnalysisClaim(
-            draft("ch. 6, Sec. 4, Theorem 1", "A closed path in one color gives a continuous gait"),
-            partial(_one_color_is_accepted, color),
-            case=color,
-        )
+        AnalysisClaim(CONTINUOUS, partial(_one_color_is_accepted, color), case=color)
         for color in ("red", "blue")
-    ),
-    *(
-        AnalysisClaim(
-            draft("ch. 6, Sec. 5", "The printed angles lie on the surface"),
-            partial(_angles_on_lines, key),
-            case=name,
-        )
-        for key, name in _GAITS.items()
-    ),
-    *(
-        AnalysisClaim(
-            draft("ch. 6, Sec. 5", "Sign of R along the whole gait, on the exact lines"),
-            partial(_signs, key),
-            case=name,
-            published=_SIGN[key],
-            refuted=RANK + " R is 0." if key in _BLUE else "",
-        )
-        for key, name in _GAITS.items()
-    ),
-    *(
-        robustness_claim(
-            f"ch. 6, Sec. 5, Fig. {_FIGURES[key]}", key, name, RANK if key in _BLUE else ""
-        )
-        for key, name in _GAITS.items()
-    ),
-    *(
-        AnalysisClaim(
-            draft(
-                f"ch. 6, Sec. 5, Fig. {_FIGURES[key]}",
-                "Nearly all attitudes within 90 degrees are admissible",
-            ),
-            partial(_nearly_all, key),
-            case=_GAITS[key],
-        )
-        for key in ("ch06_gait_3", "ch06_gait_4")
-    ),
-    AnalysisClaim(
-        draft(
-            "ch. 6, Sec. 6, Figs. 23, 28",
-            "Gait 2, as printed, has a greater advantage over the gait with a bias of 99 % "
-            "than over that of 80 %",
-        ),
-        _greater_advantage_over_99,
-        why="By the margin the printed Gait 2 has none over either: 0.7251 rad compared with "
-        "0.7285 and 0.7851. The diagrams compare rounding.",
-    ),
-    AnalysisClaim(
-        draft("ch. 6, Sec. 6", "Gaits on (+,+) have more acceptable attitudes than those on (-,-)"),
-        _red_beats_blue,
-    ),
-    AnalysisClaim(
-        draft("ch. 6, Sec. 6", "Scaling only α₃ and α₄ may make a gait less robust"),
-        _partial_scaling_can_harm,
     ),
 )
