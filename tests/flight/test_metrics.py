@@ -17,6 +17,7 @@ from tiltsim.flight.flight import Flight
 from tiltsim.scenario.loading import parse_scenario
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS, METRICS, unit_of
 from tiltsim.vehicles.rotorcraft import COLUMN_UNITS
+from tiltsim.vehicles.spans import in_last_second, when_settled
 
 R = 2.423e-7 / (0.1785 * 8.048e-6)  # K_m / (L K_f), ch. 3
 HOVER = {f"rotor_speed_{i}": sign * 360.0 for i, sign in zip((1, 2, 3, 4), (-1, 1, -1, 1))}
@@ -354,3 +355,14 @@ def test_units_are_those_of_the_metrics():
 def test_diverged_means_the_same_for_the_tilt_car(kind, diverged):
     ended = replace(flight("tilt_car"), end=End(kind, 1.2, "of a test"))
     assert ended.metrics()["diverged"] is diverged
+
+
+@pytest.mark.parametrize("timestep", [0.0005, 0.001, 0.002, 0.004])
+def test_spans_count_steps_and_not_their_sums(timestep):
+    steps = round(20.0 / timestep)
+    summed = np.cumsum(np.full(steps, timestep))  # as MuJoCo adds them up
+    for times in (np.arange(1, steps + 1) * timestep, summed):
+        assert in_last_second(times, timestep).sum() == round(1.0 / timestep) + 1
+        assert list(np.flatnonzero(when_settled(times, timestep))) == [steps - 1]
+    metrics = fly({"simulation": {"timestep": 0.0005}}, times=[0.0, 10.0, summed[-1]], x=2.0)
+    assert metrics.metrics()["sup_position_error_after_20s"] == 2.0

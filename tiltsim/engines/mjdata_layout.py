@@ -32,7 +32,7 @@ _ARRAYS: Final = ("qpos", "qvel", "act", "ctrl", "userdata")
 
 _MODEL_BYTES: Final = 2048
 _DATA_BYTES: Final = 1 << 20
-"""Search ranges of the sizes in mjModel and the time in mjData, which precede the arrays."""
+"""Search ranges of the sizes in mjModel and of the time in mjData, which precedes the arrays."""
 
 _ARRAY_BYTES: Final = 512
 """Search range of the arrays behind the time; they are the first of some hundred."""
@@ -42,7 +42,6 @@ class Layout(NamedTuple):
     """Offsets in bytes."""
 
     model_userdata_size: int  # in mjModel, a 32-bit integer at least
-    time: int  # in mjData, a float
     qpos: int  # in mjData, as all below: the address of an array of floats
     qvel: int
     act: int
@@ -73,7 +72,7 @@ def mjdata_layout() -> Layout:
             raise _not_found(f"mjData.{name}")
         # An empty array in front of this one has the same address.
         offsets[name] = time + 8 * int(found[-1])
-    return Layout(size, time, **offsets)
+    return Layout(size, **offsets)
 
 
 def _first(address: int, reach: int, kind: Any, value: float) -> int:

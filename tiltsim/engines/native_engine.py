@@ -17,12 +17,20 @@ from numba import carray, types
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.closed_loop.userdata import CONTROL_PERIOD, EVALUATIONS, HEADER_SIZE, RECORDER
+from tiltsim.closed_loop.userdata import (
+    CONTROL_PERIOD,
+    EVALUATIONS,
+    EVALUATIONS_PER_STEP,
+    HEADER_SIZE,
+    RECORDER,
+    TIMESTEP,
+    evaluation_time,
+)
 from tiltsim.engines.base import Engine, EngineName, check_model
 from tiltsim.engines.cache import announce_native_code, mark_native_code_compiled
 from tiltsim.engines.compiling import compiled_callback, register_scalar_functions
 from tiltsim.engines.mjdata_layout import mjdata_layout
-from tiltsim.engines.native_memory import addresses_at, array_at, bytes_at, floats_at, integers_at
+from tiltsim.engines.native_memory import addresses_at, array_at, bytes_at, integers_at
 from tiltsim.engines.recorder import record_sample, recording_is_over, sample_is_due
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.records import record_dtype
@@ -57,7 +65,9 @@ def compile_control(loop: ClosedLoop) -> Any:
         userdata = array_at(data + at.userdata, size)
         if userdata[HEADER_SIZE] != signature:
             return
-        time = floats_at(data + at.time)[0]
+        count, per_step = userdata[EVALUATIONS], userdata[EVALUATIONS_PER_STEP]
+        userdata[EVALUATIONS] = count + 1.0
+        time = evaluation_time(count, per_step, userdata[TIMESTEP])
         positions = to_fixed_tuple(array_at(data + at.qpos, nq), nq)
         velocities = to_fixed_tuple(array_at(data + at.qvel, nv), nv)
         activations = to_fixed_tuple(array_at(data + at.act, na), na)
@@ -65,22 +75,21 @@ def compile_control(loop: ClosedLoop) -> Any:
         record = addresses_at(data + at.userdata)[0] + 8 * HEADER_SIZE
         parameters = carray(bytes_at(record), (1,), layout)[0]
         knots = userdata[head:]
-        if userdata[EVALUATIONS] == 0.0:
+        period = userdata[CONTROL_PERIOD]
+        if period == 0.0 or count % period == 0.0:
             values = controls(time, positions, velocities, activations, parameters, knots)
         else:
             held = to_fixed_tuple(ctrl, nu)
             values = hold(time, positions, velocities, activations, held, parameters)
         for index in range(nu):
             ctrl[index] = values[index]
-        if userdata[CONTROL_PERIOD] != 0.0:
-            count = userdata[EVALUATIONS] + 1.0
-            userdata[EVALUATIONS] = count if count < userdata[CONTROL_PERIOD] else 0.0
         if userdata[RECORDER] != 0.0:
             recorder = int(userdata[RECORDER])
-            if sample_is_due(recorder):
+            if sample_is_due(recorder):  # at the first evaluation of a step
+                start = count / per_step * userdata[TIMESTEP]
                 sample = observe(positions, velocities, activations, values)
                 checked = watch(sample, parameters)
-                record_sample(recorder, time, sample, checked, limit_exceeded, knots)
+                record_sample(recorder, start, sample, checked, limit_exceeded, knots)
             if recording_is_over(recorder):
                 for index in range(nu):
                     ctrl[index] = nan

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from math import nan
 from struct import Struct
+from typing import Any
 
 import mujoco
 
 from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.closed_loop.userdata import CONTROL_PERIOD, EVALUATIONS, HEADER_SIZE
+from tiltsim.closed_loop.userdata import (
+    CONTROL_PERIOD,
+    EVALUATIONS,
+    EVALUATIONS_PER_STEP,
+    HEADER_SIZE,
+    TIMESTEP,
+    evaluation_time,
+)
 from tiltsim.engines.base import Callback, Engine, EngineName, check_model
 from tiltsim_controllers.mathematics.records import slotted, unflatten
 
@@ -28,38 +36,30 @@ class PythonEngine(Engine):
         # Views of MuJoCo's memory; a look-up at every call would take a tenth of the callback.
         vectors = data.qpos, data.qvel, data.act, data.ctrl
         qpos, qvel, act, ctrl = (memoryview(vector) for vector in vectors)
-        header = data.userdata[:HEADER_SIZE]
+        header: Any = memoryview(data.userdata[:HEADER_SIZE])
+        timestep, per_step, period = (
+            header[index] for index in (TIMESTEP, EVALUATIONS_PER_STEP, CONTROL_PERIOD)
+        )
         write_controls = Struct(f"{len(ctrl)}d").pack_into
 
-        def sample(_model: mujoco.MjModel, called: mujoco.MjData) -> None:
+        def evaluate(_model: mujoco.MjModel, called: mujoco.MjData) -> None:
             if called is not data:
                 return  # another model of this process
+            count = header[EVALUATIONS]
+            header[EVALUATIONS] = count + 1.0
+            time = evaluation_time(count, per_step, timestep)
+            state = time, qpos.tolist(), qvel.tolist(), act.tolist()
             try:
-                positions, velocities = qpos.tolist(), qvel.tolist()
-                values = controls(data.time, positions, velocities, act.tolist(), parameters, knots)
-                write_controls(ctrl, 0, *values)
+                if period == 0.0 or count % period == 0.0:
+                    values = controls(*state, parameters, knots)
+                else:
+                    values = hold(*state, ctrl.tolist(), parameters)
             except (ArithmeticError, ValueError):
                 # Where floats raise (sin of infinity), native code has NaN; MuJoCo reports both.
-                write_controls(ctrl, 0, *(nan,) * len(ctrl))
+                values = (nan,) * len(ctrl)
+            write_controls(ctrl, 0, *values)
 
-        def between_samples() -> tuple[float, ...]:
-            try:
-                state = data.time, qpos.tolist(), qvel.tolist(), act.tolist()
-                return hold(*state, ctrl.tolist(), parameters)
-            except (ArithmeticError, ValueError):
-                return (nan,) * len(ctrl)
-
-        def sample_and_hold(model: mujoco.MjModel, called: mujoco.MjData) -> None:
-            if called is not data:
-                return
-            period, evaluations, _ = header.tolist()
-            if evaluations == 0.0:
-                sample(model, called)
-            else:
-                write_controls(ctrl, 0, *between_samples())
-            header[EVALUATIONS] = evaluations + 1.0 if evaluations + 1.0 < period else 0.0
-
-        self._callback = sample_and_hold if header[CONTROL_PERIOD] > 0.0 else sample
+        self._callback = evaluate
 
     def callback(self) -> Callback:
         return self._callback

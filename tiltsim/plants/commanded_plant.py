@@ -15,12 +15,14 @@ import mujoco
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.closed_loop.userdata import EVALUATIONS
 from tiltsim.engines.callback import control_callback
 from tiltsim.laws.commanded import COMMANDED_LOOPS, HeldCommand, commanded_parameters, with_command
 from tiltsim.laws.layers.delay_line import EXTERNAL_COMMANDS
 from tiltsim.laws.layers.sensing import measured_qpos, measured_qvel, sensor_parameters
 from tiltsim.laws.tiltrotor import gait_servo_commands
 from tiltsim.plants.command import CheckedCommand, ControllerError, Observation, Reference
+from tiltsim.plants.flight_model import evaluations_per_step
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.vehicles.rotorcraft.layout import ROTOR_STATES
 from tiltsim_controllers.gaits.tilts import tilt_reference
@@ -88,7 +90,9 @@ class CommandedPlant(MujocoPlant):
         state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
         parameters = with_command(self._setup.parameters, command)
         try:
-            data.ctrl[:] = self._loop.sampling.controls(float(data.time), *state, parameters, knots)
+            data.ctrl[:] = self._loop.sampling.controls(
+                self.evaluation_time, *state, parameters, knots
+            )
         except (ArithmeticError, ValueError):
             data.ctrl[:] = nan  # as the engines do; MuJoCo reports it
 
@@ -126,24 +130,23 @@ class CommandedPlant(MujocoPlant):
 
     def advance(self, steps: int) -> None:
         moving = self._layered or self.data.ctrl[self._rates].any()
+        end = (self.steps_taken + steps) * evaluations_per_step(self.model)
         with control_callback(self._hold if moving else None):
             mujoco.mj_step(self.model, self.data, nstep=steps)
+        self.data.userdata[EVALUATIONS] = end
 
     def _hold(self, _model: mujoco.MjModel, called: mujoco.MjData) -> None:
         """Between commands, let the thrusts follow the rotor speeds and the layers act."""
         data = self.data
         if called is not data:
             return
-        state = float(data.time), data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
+        time = self.evaluation_time
+        data.userdata[EVALUATIONS] += 1.0
+        state = time, data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
         try:
             data.ctrl[:] = self._loop.sampling.hold(*state, data.ctrl.tolist(), self._slotted)
         except (ArithmeticError, ValueError):
             data.ctrl[:] = nan
-
-    @property
-    def steps_taken(self) -> int:
-        """Physics steps since time zero."""
-        return round(self.time / float(self.model.opt.timestep))
 
     def observation(self) -> Observation:
         """The present state as a controller sees it, through the scenario's sensors."""

@@ -10,7 +10,16 @@ import mujoco
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.closed_loop.userdata import EVALUATIONS, HEADER_SIZE, RECORDER, Header
+from tiltsim.closed_loop.userdata import (
+    CONTROL_PERIOD,
+    EVALUATIONS,
+    HEADER_SIZE,
+    RECORDER,
+    TIMESTEP,
+    Header,
+    evaluation_time,
+    steps_taken,
+)
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.callback import control_callback
 from tiltsim.engines.factory import make_engine
@@ -47,9 +56,12 @@ class MujocoPlant(Plant):
 
     def _set_initial_state(self) -> None:
         assembly, data = self._assembly, self.data
-        control_steps = assembly.scenario.simulation.control_steps
-        period = evaluations_per_step(self.model) * control_steps
-        data.userdata[:HEADER_SIZE] = Header(control_period=period)
+        simulation, per_step = assembly.scenario.simulation, evaluations_per_step(self.model)
+        data.userdata[:HEADER_SIZE] = Header(
+            timestep=simulation.timestep,
+            evaluations_per_step=per_step,
+            control_period=per_step * simulation.control_steps,
+        )
         parameters = self._setup.userdata  # a shared model may have room for more
         data.userdata[HEADER_SIZE : HEADER_SIZE + len(parameters)] = parameters
         data.qpos[:], data.qvel[:] = self._loop.kind.initial_motion(assembly)
@@ -59,7 +71,12 @@ class MujocoPlant(Plant):
 
     @property
     def time(self) -> float:
-        return float(self.data.time)
+        return self.steps_taken * float(self.data.userdata[TIMESTEP])
+
+    @property
+    def steps_taken(self) -> int:
+        """Physics steps since time zero."""
+        return steps_taken(self.data.userdata[:HEADER_SIZE])
 
     @property
     def state(self) -> Floats:
@@ -86,6 +103,12 @@ class MujocoPlant(Plant):
         if self.engine == "native":
             return self._record_natively(samples, steps)
         return super().record(samples, steps)
+
+    @property
+    def evaluation_time(self) -> float:
+        """Time (s) for the next evaluation of the control step."""
+        timestep, per_step, _, evaluations, _ = self.data.userdata[:HEADER_SIZE].tolist()
+        return evaluation_time(evaluations, per_step, timestep)
 
     @property
     def callback(self) -> Any:
@@ -131,8 +154,10 @@ class MujocoPlant(Plant):
         data = self.data
         state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
         # MuJoCo keeps the controls of its last integrator stage.
-        stale = data.userdata[EVALUATIONS] == 0.0 and self._loop.columns.observe_reads_controls
-        ctrl = self.controls(*state) if stale else data.ctrl.tolist()
+        period = data.userdata[CONTROL_PERIOD]
+        stale = period == 0.0 or data.userdata[EVALUATIONS] % period == 0.0
+        reads_controls = self._loop.columns.observe_reads_controls
+        ctrl = self.controls(*state) if reads_controls and stale else data.ctrl.tolist()
         return self._loop.columns.observe(*state, ctrl)
 
     def controls(
@@ -142,7 +167,7 @@ class MujocoPlant(Plant):
         setup = self._setup
         try:
             return self._loop.sampling.controls(
-                self.data.time, qpos, qvel, act, setup.parameters, setup.knots
+                self.evaluation_time, qpos, qvel, act, setup.parameters, setup.knots
             )
         except (ArithmeticError, ValueError):
             return [nan] * len(self.data.ctrl)

@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.closed_loop.userdata import RECORDER
+from tiltsim.closed_loop.userdata import RECORDER, steps_taken
 from tiltsim.engines.callback import control_callback
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
@@ -59,9 +59,8 @@ class _Row:
 
     def save(self, state: Floats) -> None:
         """Save the state at the start of a call."""
-        time, timestep = float(state[0]), self.assembly.scenario.simulation.timestep
-        state = state.copy()
-        self.saved = [self.saved[-1], (round(time / timestep), state)]
+        steps = steps_taken(state[self.plant.header_offset :])
+        self.saved = [self.saved[-1], (steps, state.copy())]
 
     def finish(self) -> Flight:
         """The flight; an early end is located step by step, as for a single flight."""

@@ -9,13 +9,13 @@ import numpy as np
 
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.saturation import at_lower_limit, at_upper_limit, saturation_metrics
+from tiltsim.vehicles.spans import in_last_second, when_settled
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 from tiltsim_controllers.vehicle.states import ROTORS, TILT_FIELDS
 
 SETTLED_ALTITUDE: Final = 0.005  # m
-SETTLED: Final = 20.0  # s, from when on the supremum of the position error is taken
 
 
 def rotorcraft_metrics(
@@ -31,7 +31,7 @@ def rotorcraft_metrics(
     vehicle = limits.resolve()
     return {
         **_position_metrics(columns, scenario, follows_position),
-        **_attitude_metrics(columns),
+        **_attitude_metrics(columns, scenario.simulation.timestep),
         "min_rotor_speed": float(spins.min()),
         "max_rotor_speed": float(spins.max()),
         **_altitude_metrics(time, columns["z_ref"] - columns["z"]),
@@ -46,8 +46,8 @@ def rotorcraft_metrics(
 def _position_metrics(
     columns: Mapping[str, Floats], scenario: Scenario, follows_position: bool
 ) -> dict[str, float | bool]:
-    time, metrics = columns["time"], {}
-    last_second, settled = time >= time[-1] - 1.0, time >= SETTLED
+    clock, metrics = (columns["time"], scenario.simulation.timestep), {}
+    last_second, settled = in_last_second(*clock), when_settled(*clock)
     errors = {axis: columns[f"{axis}_ref"] - columns[axis] for axis in ("x", "y", "z")}
     for axis, error in errors.items():
         if follows_position or axis == "z":
@@ -65,9 +65,9 @@ def _position_metrics(
     return metrics
 
 
-def _attitude_metrics(columns: Mapping[str, Floats]) -> dict[str, float | bool]:
-    time, angles, metrics = columns["time"], ("roll", "pitch", "yaw"), {}
-    last_second = time >= time[-1] - 1.0
+def _attitude_metrics(columns: Mapping[str, Floats], timestep: float) -> dict[str, float | bool]:
+    angles, metrics = ("roll", "pitch", "yaw"), {}
+    last_second = in_last_second(columns["time"], timestep)
     for angle in angles:
         # Near half a revolution samples of one direction have both signs.
         metrics[f"final_{angle}"] = float(np.mean(np.unwrap(columns[angle][last_second])))

@@ -7,17 +7,17 @@ from collections.abc import Mapping
 import numpy as np
 
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.vehicles.rotorcraft.metrics import SETTLED
 from tiltsim.vehicles.saturation import at_lower_limit, saturation_metrics
+from tiltsim.vehicles.spans import in_last_second, when_settled
 from tiltsim_controllers.mathematics.scalar import Floats
 
 
 def tilt_car_metrics(
-    columns: Mapping[str, Floats], _scenario: Scenario, _follows_position: bool
+    columns: Mapping[str, Floats], scenario: Scenario, _follows_position: bool
 ) -> dict[str, float | bool]:
     """See `tiltsim.closed_loop.vehicle_kind.VehicleKind.metrics`."""
-    time, metrics = columns["time"], {}
-    last_second, settled = time >= time[-1] - 1.0, time >= SETTLED
+    clock, metrics = (columns["time"], scenario.simulation.timestep), {}
+    last_second, settled = in_last_second(*clock), when_settled(*clock)
     errors = {axis: columns[f"{axis}_ref"] - columns[axis] for axis in ("x", "y")}
     speeds = np.array([columns["rotor_speed_1"], columns["rotor_speed_2"]])
     for axis, error in errors.items():
@@ -36,4 +36,4 @@ def tilt_car_metrics(
     metrics["max_rotor_speed"] = float(speeds.max())
     metrics["max_tilt_rate"] = float(np.abs(columns["alpha_rate"]).max())
     # A thrust cannot pull: at rest a rotor is at its limit.
-    return metrics | saturation_metrics(time, at_lower_limit(speeds, 0.0))
+    return metrics | saturation_metrics(columns["time"], at_lower_limit(speeds, 0.0))
