@@ -18,6 +18,15 @@ VEHICLE = PRESETS["ar_drone_2"]
 WEIGHT = VEHICLE.mass * VEHICLE.gravity
 ON_SKIDS = 0.0785  # m, from the skids to the centre of mass
 LANDING = "beyond/take_off_and_landing#landing"
+DIRECTIONS = np.array([[1.0, 0.0], [0.6, 0.8], [0.5**0.5, 0.5**0.5]])
+
+
+def standing(model):
+    """A vehicle that has come to rest on its skids."""
+    data = mujoco.MjData(model)
+    data.qpos[2] = ON_SKIDS
+    mujoco.mj_step(model, data, 300)
+    return data
 
 
 def normal_force(model, data):
@@ -55,20 +64,42 @@ def test_friction_holds_up_to_its_share_of_the_weight(friction):
     model = flight_model(assemble(scenario))
     share = 0.8 if friction is None else friction
 
-    def acceleration(push):
+    def acceleration(push, along):
         """In g, of a vehicle that stands and is then pushed at the height of its skids."""
-        data = mujoco.MjData(model)
-        data.qpos[2] = ON_SKIDS
-        mujoco.mj_step(model, data, 300)
-        data.body("vehicle").xfrc_applied[0] = push * WEIGHT
-        data.body("vehicle").xfrc_applied[4] = -push * WEIGHT * ON_SKIDS
+        data = standing(model)
+        x, y = push * WEIGHT * along
+        data.body("vehicle").xfrc_applied[:] = x, y, 0.0, y * ON_SKIDS, -x * ON_SKIDS, 0.0
         mujoco.mj_step(model, data, 50)
-        before = data.qvel[0]
+        before = data.qvel[:2] @ along
         mujoco.mj_step(model, data, 100)
-        return (data.qvel[0] - before) / (100 * model.opt.timestep * VEHICLE.gravity)
+        return (data.qvel[:2] @ along - before) / (100 * model.opt.timestep * VEHICLE.gravity)
 
-    assert abs(acceleration(0.95 * share)) < 0.005
-    assert acceleration(1.2 * share) == pytest.approx(0.2 * share, rel=0.3)
+    # Above that the skids, closer together than they are long, tip sideways first.
+    for along in DIRECTIONS if share <= 1.0 else DIRECTIONS[:1]:
+        assert abs(acceleration(0.95 * share, along)) < 0.005
+        assert acceleration(1.2 * share, along) == pytest.approx(0.2 * share, rel=0.3)
+
+
+@pytest.mark.parametrize("along", DIRECTIONS)
+def test_a_slide_ends_where_coulomb_says_in_all_directions(along):
+    """``v^2 / (2 mu g)``; while the skids share the load anew, a few percent more."""
+    friction = 0.5
+    model = compile_model(RotorcraftSpec("quadrotor", VEHICLE, ground=Ground(0.0, friction)))
+    data = standing(model)
+    start, data.qvel[:2] = data.qpos[:2].copy(), along
+    mujoco.mj_step(model, data, 300)
+    assert np.hypot(*data.qvel[:2]) < 1e-3
+    way = np.hypot(*(data.qpos[:2] - start))
+    assert way == pytest.approx(1.0 / (2.0 * friction * VEHICLE.gravity), rel=0.03)
+
+
+def test_at_half_of_its_friction_the_vehicle_creeps_by_less_than_a_tenth_of_a_millimeter_a_second():
+    model = compile_model(RotorcraftSpec("quadrotor", VEHICLE, ground=Ground(0.0, 0.5)))
+    data = standing(model)
+    data.body("vehicle").xfrc_applied[0] = 0.25 * WEIGHT
+    data.body("vehicle").xfrc_applied[4] = -0.25 * WEIGHT * ON_SKIDS
+    mujoco.mj_step(model, data, 500)
+    assert 0.0 < data.qvel[0] < 1e-4
 
 
 def test_without_ground_nothing_touches():

@@ -291,6 +291,8 @@ def _set_servos(root: Any, servo: TiltServo, pod: Pod) -> None:
 
 def _set_ground(root: Any, ground: Ground) -> None:
     """Let the vehicle's collision shapes touch the ground, and nothing else."""
+    root.option.cone = "elliptic"  # a pyramid holds 29 % less along its diagonals
+    root.option.impratio = 10.0  # friction ten times as stiff as the contact: it creeps less
     plane = root.find("geom", "ground")
     plane.pos = (0.0, 0.0, ground.height)
     plane.friction = (ground.friction, 0.005, 0.0001)
