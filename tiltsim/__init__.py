@@ -10,10 +10,10 @@ Importing the package is cheap; MuJoCo is loaded when the first scenario is simu
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
+TYPE_CHECKING = False  # as in typing, whose import takes longer than all else here
 if TYPE_CHECKING:
+    from typing import Any
+
     from tiltsim.errors import InputError, TiltsimError
     from tiltsim.flight.end import End
     from tiltsim.flight.flight import Flight
@@ -59,6 +59,8 @@ def __getattr__(name: str) -> Any:
     """Load a public name on first use."""
     if name not in _HOMES:
         raise AttributeError(f"module 'tiltsim' has no attribute {name!r}")
+    from importlib import import_module
+
     return getattr(import_module(f"tiltsim.{_HOMES[name]}"), name)
 
 

@@ -1,7 +1,22 @@
-"""``python -m tiltsim``, the same as the console script."""
+"""The console script, and ``python -m tiltsim``."""
+
+from __future__ import annotations
 
 import sys
 
-from tiltsim.cli import main
 
-sys.exit(main())
+def main() -> int:
+    """Run the command line; an interrupt is one line from the first import on."""
+    try:
+        from tiltsim.cli import main as command_line
+
+        return command_line()
+    except KeyboardInterrupt:
+        from tiltsim.exit_codes import INTERRUPTED
+
+        print("tiltsim: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+if __name__ == "__main__":
+    sys.exit(main())

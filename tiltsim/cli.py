@@ -15,7 +15,7 @@ from typing import Final, NoReturn
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT, TERMINATED
 from tiltsim.system.interrupts import terminations_as_interrupts
-from tiltsim.system.text import printable
+from tiltsim.system.text import printable, without_long_words
 
 FLIGHT_COMMANDS: Final = ("run", "check", "sweep", "list", "view", "plot", "video")
 OTHER_COMMANDS: Final = ("gait", "map", "singularity", "report", "bench", "schema")
@@ -26,7 +26,7 @@ LONGEST_MESSAGE: Final = 1000
 
 
 def _one_line(message: object) -> str:
-    text = printable(str(message)[:LONGEST_MESSAGE])
+    text = printable(without_long_words(str(message))[:LONGEST_MESSAGE])
     return text if len(text) < LONGEST_MESSAGE else f"{text[:LONGEST_MESSAGE]}..."
 
 
@@ -96,29 +96,46 @@ def _run(arguments: list[str] | None) -> int:
         parsed = build_parser().parse_args(arguments)
         return int(parsed.run(parsed))
     except InputError as error:
-        print(f"tiltsim: {_one_line(error)}", file=sys.stderr)
-        return INVALID_INPUT
+        return _refuse(error)
     except KeyboardInterrupt:
-        print("tiltsim: interrupted", file=sys.stderr)
-        return INTERRUPTED
+        return _end_interrupted()
     except BrokenPipeError:
         # The reader (head, less) has ended: discard the rest of the output.
         sys.stderr.close()
         return DONE
     except OSError as error:
-        message = f"{error.filename or 'output'}: {error.strerror or error}"
-        print(f"tiltsim: {_one_line(message)}", file=sys.stderr)
-        return INVALID_INPUT
+        from tiltsim.system.files import reason
+
+        place = "." if isinstance(error, FileNotFoundError) else "output"
+        return _refuse(f"{error.filename or place}: {reason(error)}")
     except Exception as error:
+        if _comes_from_interrupt(error):
+            return _end_interrupted()
         if not (_raised_while_loading_mujoco(error) and "MUJOCO_GL" in os.environ):
             raise
-        library, reason = os.environ["MUJOCO_GL"], str(error).strip().partition("\n")[0]
-        print(
-            f"tiltsim: MUJOCO_GL = {library!r}: MuJoCo cannot be loaded with it ({reason}); choose "
-            "an installed one of egl, osmesa and glfw, or unset it",
-            file=sys.stderr,
+        library, line = os.environ["MUJOCO_GL"], str(error).strip().partition("\n")[0]
+        return _refuse(
+            f"MUJOCO_GL = {library!r}: MuJoCo cannot be loaded with it ({line}); choose an "
+            "installed one of egl, osmesa and glfw, or unset it"
         )
-        return INVALID_INPUT
+
+
+def _refuse(mistake: object) -> int:
+    """Report invalid input in one line."""
+    print(f"tiltsim: {_one_line(mistake)}", file=sys.stderr)
+    return INVALID_INPUT
+
+
+def _end_interrupted() -> int:
+    print("tiltsim: interrupted", file=sys.stderr)
+    return INTERRUPTED
+
+
+def _comes_from_interrupt(error: BaseException | None) -> bool:
+    """Whether an interrupt became another error on its way, as in the import of compiled code."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def _raised_while_loading_mujoco(error: Exception) -> bool:
@@ -127,7 +144,3 @@ def _raised_while_loading_mujoco(error: Exception) -> bool:
         frame.f_code.co_name == "<module>" and frame.f_globals["__name__"] in OPENGL_USERS
         for frame, _ in walk_tb(error.__traceback__)
     )
-
-
-if __name__ == "__main__":
-    sys.exit(main())

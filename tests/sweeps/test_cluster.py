@@ -14,6 +14,8 @@ import pytest
 
 from tests.sweeps.files import short_sweep
 from tiltsim.cli import main
+from tiltsim.errors import InputError
+from tiltsim.sweeps.cluster import _connect
 from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.running import run_sweep
 
@@ -97,6 +99,46 @@ def test_an_invalid_address_is_refused_immediately(tmp_path, capsys, address):
     options = ["--cluster", address, "--out", str(tmp_path / "out"), "--quiet"]
     assert main(["sweep", str(file), *options]) == 2
     assert capsys.readouterr().err.endswith("such as tcp://192.168.0.1:8786\n")
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_scheduler_that_is_killed_is_one_line(tmp_path, capfd):
+    file = short_sweep(tmp_path / "sweep.toml", count=300, chunk_size=3)
+    port = free_port()
+    address = f"tcp://127.0.0.1:{port}"
+    scheduler = ["--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
+    worker = [address, "--nthreads", "1", "--no-dashboard", "--local-directory", str(tmp_path)]
+    with dask("scheduler", *scheduler) as process, dask("worker", *worker):
+        wait_for_workers(address, 1)
+
+        def report(rows):
+            if rows >= 12:
+                process.kill()
+
+        with pytest.raises(InputError) as caught:
+            run_sweep(load_sweep(file), tmp_path / "out", cluster=address, report=report)
+    assert str(caught.value).startswith(f"--cluster {address}: the scheduler no longer answers; ")
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (ModuleNotFoundError("No module named 'distributed'", name="distributed"), "needs Dask"),
+        (ImportError("cannot import name 'X' from 'tornado'", name="tornado"), "cannot import nam"),
+    ],
+)
+def test_only_a_missing_dask_is_called_so(monkeypatch, error, words):
+    class Broken:
+        def find_spec(self, name, *_):
+            if name == "distributed":
+                raise error
+
+    monkeypatch.delitem(sys.modules, "distributed")
+    monkeypatch.setattr(sys, "meta_path", [Broken(), *sys.meta_path])
+    with pytest.raises(InputError, match=words):
+        _connect("tcp://127.0.0.1:1")
 
 
 def test_without_dask_the_extra_is_named(tmp_path, capsys, monkeypatch):

@@ -43,6 +43,8 @@ def test_names_are_found_with_dots_and_positions():
         ("(-1) ** 0.5", "not a real number"),
         ("1e300 * 1e300", "not a real number"),
         ("9 ** 9 ** 9", "too large"),
+        ("sqrt(u - 2)", "has no value: sqrt(-1) is not defined"),
+        ("sin(1e400)", "has no value: sin(inf) is not defined"),
         ("sin(1, 2)", "wrong type of argument"),
         ("min(u)", "wrong type of argument"),
     ],

@@ -251,3 +251,10 @@ def test_a_vehicle_without_a_margin_is_not_compared(tmp_path, capsys):
     assert main(["plot", *folders]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "the tilt_car has no singularity margin to compare" in line
+
+
+def test_text_in_any_script_is_drawn_without_a_warning(tmp_path):
+    figure = style.new_figure(2.0, 1.0)
+    figure.suptitle("四旋翼 🚁")
+    style.save(figure, tmp_path / "figure.png")  # any warning is an error
+    assert (tmp_path / "figure.png").is_file()

@@ -18,7 +18,8 @@ import numpy as np
 from tiltsim.flight.metrics import compute_metrics
 from tiltsim.flight.writing import write_flight
 from tiltsim.laws.assembling import assemble
-from tiltsim.scenario.messages import did_you_mean, valid_unicode
+from tiltsim.scenario.messages import did_you_mean
+from tiltsim.system.text import valid_unicode
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:

@@ -15,9 +15,10 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.controller import DEFAULT_LAW
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.limits import MAX_DEPTH, check_limits
-from tiltsim.scenario.messages import choose, did_you_mean, one_line_message, show, valid_unicode
+from tiltsim.scenario.messages import choose, did_you_mean, one_line_message, show
 from tiltsim.scenario.scenario import Scenario, Variant
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
+from tiltsim.system.text import shortened, valid_unicode
 
 KIND_KEYS: Final = {"type": None, "law": DEFAULT_LAW}
 """Keys that decide which other keys a table may have, with their defaults."""
@@ -169,7 +170,7 @@ def _select_variant(file: Path, document: dict[str, Any], name: str) -> dict[str
     names = variant_names(file, document)
     if name not in names:
         allowed = choose(name, names) if names else "the file has no variants"
-        raise InputError(f"{library_name(file)}#{name}: no such variant; {allowed}")
+        raise InputError(f"{library_name(file)}#{shortened(name)}: no such variant; {allowed}")
     base = {key: value for key, value in document.items() if key != "variant"}
     chosen = dict(document["variant"][names.index(name)])
     del chosen["name"]

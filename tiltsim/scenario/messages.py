@@ -8,6 +8,8 @@ from difflib import get_close_matches
 from math import pi
 from typing import TYPE_CHECKING, Any, Final, get_args
 
+from tiltsim.system.text import shortened
+
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
 
@@ -39,18 +41,12 @@ _PLAIN_TYPES: Final = {
 
 def show(value: object) -> str:
     """A value as the user wrote it, shortened to 80 characters."""
-    text = json.dumps(value, default=str)
-    return text if len(text) <= 80 else text[:77] + "..."
-
-
-def valid_unicode(text: str) -> str:
-    """A text with what is no Unicode escaped, such as a byte of a file name that is not UTF-8."""
-    return text.encode(errors="backslashreplace").decode()
+    return shortened(json.dumps(value, default=str))
 
 
 def did_you_mean(name: object, names: Iterable[str]) -> str:
     """A suggestion of the closest of some names; empty if none is close."""
-    close = get_close_matches(str(name), list(names), n=1)
+    close = get_close_matches(shortened(str(name)), list(names), n=1)
     return f"did you mean {close[0]}? " if close else ""
 
 
@@ -152,7 +148,8 @@ def _locate(
         elif not (keep_last and position == len(location) - 1):
             continue
         keys.append(str(part))
-    return ".".join(keys).encode("unicode_escape").decode() or "scenario", value
+    key = ".".join(keys).encode("unicode_escape").decode()
+    return shortened(key) or "scenario", value
 
 
 def _tags(schema: Any, location: tuple[Any, ...]) -> tuple[str, list[str]]:

@@ -9,7 +9,8 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
-from tiltsim.scenario.messages import InvalidValueError, valid_unicode
+from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.system.text import valid_unicode
 
 # The outer bounds keep arithmetic far from overflow, and far beyond any real vehicle.
 Positive = Annotated[float, Field(gt=0.0, le=1e9)]

@@ -6,7 +6,8 @@ import hashlib
 import logging
 import re
 from collections.abc import Iterator
-from typing import Any, Final
+from concurrent.futures import CancelledError
+from typing import Any, Final, cast
 
 from tiltsim.errors import InputError
 from tiltsim.sweeps.chunks import ChunkWork, FinishedChunk
@@ -33,11 +34,13 @@ def _connect(address: str) -> Any:
         )
     try:
         from distributed import Client
-    except ImportError:
-        raise InputError(
-            f"--cluster {address}: needs Dask; install it with: pip install 'tiltsim[cluster]'"
-        ) from None
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    except ImportError as error:
+        reason = f"cannot load Dask: {str(error).partition(chr(10))[0]}"
+        if error.name in {"distributed", "dask"}:
+            reason = "needs Dask; install it with: pip install 'tiltsim[cluster]'"
+        raise InputError(f"--cluster {address}: {reason}") from error
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client = Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
@@ -53,6 +56,7 @@ def _connect(address: str) -> Any:
 
 def _fly(client: Any, work: ChunkWork, numbers: list[int], address: str) -> Iterator[FinishedChunk]:
     from distributed import as_completed
+    from distributed.comm import CommClosedError
 
     digest = hashlib.sha256(work.definition_json.encode()).hexdigest()[:16]
     waiting = list(reversed(numbers))
@@ -62,21 +66,36 @@ def _fly(client: Any, work: ChunkWork, numbers: list[int], address: str) -> Iter
         key = f"tiltsim-{digest}-{number}"
         return client.submit(work, number, key=key)
 
-    first = [submit() for _ in range(min(len(waiting), _window(client)))]
-    submitted = as_completed(first, loop=client.loop)
-    for future in submitted:
-        try:
-            part = future.result()
-        except Exception as error:
-            raise InputError(
-                f"--cluster {address}: a worker failed: {type(error).__name__}: "
-                f"{str(error).partition(chr(10))[0]}"
-            ) from error
-        _compare_versions(part, address)
-        future.release()
-        while waiting and submitted.count() < _window(client):
-            submitted.add(submit())
-        yield part
+    try:
+        first = [submit() for _ in range(min(len(waiting), _window(client)))]
+        submitted = as_completed(first, loop=client.loop)
+        for future in submitted:
+            part = _result(future, address)
+            _compare_versions(part, address)
+            future.release()
+            while waiting and submitted.count() < _window(client):
+                submitted.add(submit())
+            yield part
+    except (CancelledError, CommClosedError) as error:
+        raise InputError(
+            f"--cluster {address}: the scheduler no longer answers; finished flights are kept, and "
+            "the same command continues"
+        ) from error
+
+
+def _result(future: Any, address: str) -> FinishedChunk:
+    """The result of a chunk; without the scheduler, Dask's errors of a lost connection."""
+    from distributed.comm import CommClosedError
+
+    try:
+        return cast("FinishedChunk", future.result())
+    except (CancelledError, CommClosedError):
+        raise
+    except Exception as error:
+        raise InputError(
+            f"--cluster {address}: a worker failed: {type(error).__name__}: "
+            f"{str(error).partition(chr(10))[0]}"
+        ) from error
 
 
 def _window(client: Any) -> int:

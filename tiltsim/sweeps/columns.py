@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import without_none
-from tiltsim.scenario.messages import valid_unicode
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS
 from tiltsim.sweeps.definition import VERSIONS
 from tiltsim.sweeps.executing import ScenarioResult
 from tiltsim.sweeps.points import SweepPoints
+from tiltsim.system.text import valid_unicode
 
 if TYPE_CHECKING:
     import pyarrow

@@ -123,6 +123,11 @@ def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
         function = FUNCTIONS.get(node.func.id)
         if function is not None:
-            return function(*(_value(argument, values) for argument in node.args))
+            arguments = [_value(argument, values) for argument in node.args]
+            try:
+                return function(*arguments)
+            except ValueError:
+                shown = ", ".join(f"{argument:.6g}" for argument in arguments)
+                raise ValueError(f"has no value: {node.func.id}({shown}) is not defined") from None
         raise ValueError(f"{node.func.id}() is unknown; known: {', '.join(FUNCTIONS)}")
     raise ValueError(f"{ast.unparse(node)} is not allowed, only arithmetic")

@@ -62,7 +62,8 @@ def replacing(path: Path, *, durable: bool = False) -> Iterator[Path]:
         InputError: If the file cannot be written, as on a full disk.
     """
     special = path.exists() and not path.is_file()
-    # A name that nobody can guess and make a link of; unlike tempfile's file it gets the permissions of the umask.
+    # A name that nobody can guess and make a link of. Unlike tempfile's, the file gets the
+    # permissions of the umask.
     temporary = path.with_name(f".{path.name}.{token_hex(8)}{TEMPORARY_SUFFIX}")
     try:
         yield path if special else temporary
@@ -97,5 +98,15 @@ def remove_leftovers(folder: Path, names: re.Pattern[str]) -> None:
 
 def reason(error: OSError) -> str:
     """Why the operating system refused, in a few words."""
+    if error.errno == errno.ENOENT and _is_without_folder():
+        return "the working folder no longer exists"
     known = error.errno in errno.errorcode
     return os.strerror(error.errno or 0) if known else str(error).partition("\n")[0]
+
+
+def _is_without_folder() -> bool:
+    try:
+        Path.cwd()
+    except FileNotFoundError:
+        return True
+    return False

@@ -5,6 +5,10 @@ from __future__ import annotations
 import re
 import unicodedata
 from html import escape
+from typing import Final
+
+LONGEST_WORD: Final = 300
+"""Longer than any ordinary path."""
 
 
 def printable(text: object) -> str:
@@ -16,6 +20,21 @@ def printable(text: object) -> str:
     return "".join(
         c if c.isprintable() or unicodedata.category(c) == "Zs" else _escaped(c) for c in str(text)
     )
+
+
+def valid_unicode(text: str) -> str:
+    """Text with what is no Unicode escaped, such as a byte of a file name that is not UTF-8."""
+    return text.encode(errors="backslashreplace").decode()
+
+
+def shortened(text: str, length: int = 80) -> str:
+    """Text of at most so many characters; what is cut off is shown as dots."""
+    return text if len(text) <= length else text[: length - 3] + "..."
+
+
+def without_long_words(text: str) -> str:
+    """Text whose words, such as unknown names, have at most `LONGEST_WORD` characters."""
+    return re.sub(r"\S+", lambda word: shortened(word[0], LONGEST_WORD), text)
 
 
 def _escaped(character: str) -> str:
