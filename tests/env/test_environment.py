@@ -498,6 +498,26 @@ def test_gymnasium_refuses_steps_outside_of_an_episode_and_actions_of_other_shap
     env.step(np.full(8, 5.0))  # clipped
 
 
+def test_gymnasium_draws_by_the_constructor_s_seed():
+    pytest.importorskip("gymnasium")
+    from tiltsim.env.gymnasium import GymnasiumEnv
+
+    def starts(env, **first):
+        for arguments in (first, {}):
+            env.reset(**arguments)
+            yield env.env.scenario.initial.position[0]
+
+    def made(**seed):
+        return GymnasiumEnv(scenario=scenario(), domain=AXES[1:2], **seed)
+
+    plain = TiltrotorEnv(scenario(), domain=AXES[1:2], seed=7)
+    drawn = [plain.scenario.initial.position[0] for _ in range(2) if plain.reset()]
+    adapted = GymnasiumEnv(TiltrotorEnv(scenario(), domain=AXES[1:2], seed=7))
+    for env, first in ((made(seed=7), {}), (adapted, {}), (made(seed=8), {"seed": 7})):
+        assert list(starts(env, **first)) == drawn
+    assert len({*drawn, *starts(made(seed=8)), *starts(made())}) == 6
+
+
 def test_zeros_hover_under_gymnasium():
     pytest.importorskip("gymnasium")
     from tiltsim.env.gymnasium import GymnasiumEnv

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from math import ceil, log2
+from math import ceil, log2, pi
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from tiltsim.sweeps.checks import VALUES_TRIED, check_points
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.points import SweepPoints
+from tiltsim.sweeps.tables import LinspaceAxis
 
 HEAD = """
 scenario = "ch04_tracking/circle#continuous_t2_modified"
@@ -155,6 +156,16 @@ count = 3
     scenario = sweep.scenario(sweep.point(4))
     assert scenario.gait.angles == pytest.approx((0.1, 0.1, -0.1, 0.2))
     assert scenario.initial.position == (0.0, 0.0, 0.1)
+
+
+def test_an_axis_has_its_ends_exactly_and_passes_neither():
+    for count, start, stop in ((14, pi, 0.0), (14, 0.0, pi), (14, pi, pi), (2, 0.1, 0.3)):
+        ends = {"start": start, "stop": stop, "count": count}
+        axis = LinspaceAxis(type="linspace", key="reference.yaw", **ends)
+        values = [value for (value,) in axis.rows()]
+        assert (len(values), values[0], values[-1]) == (count, start, stop)
+        assert min(start, stop) <= min(values) <= max(values) <= max(start, stop)
+        np.testing.assert_allclose(values, np.linspace(start, stop, count), rtol=1e-15, atol=1e-15)
 
 
 def test_values_of_set_survive_a_change_of_type(points_of):

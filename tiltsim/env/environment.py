@@ -122,6 +122,11 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
         )
 
     @property
+    def generator(self) -> np.random.Generator:
+        """What the scenarios of later episodes are drawn with."""
+        return self._generator
+
+    @property
     def scenario(self) -> Scenario:
         """The scenario of the present episode."""
         return self._scenario

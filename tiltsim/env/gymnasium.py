@@ -34,13 +34,16 @@ class GymnasiumEnv(gymnasium.Env):  # type: ignore[misc]
 
     Args:
         env: The environment to adapt; default: a `TiltrotorEnv` with the other arguments.
-        **arguments: Those of `TiltrotorEnv`.
+        **arguments: Those of `TiltrotorEnv`. Without ``seed``, and without one in `reset`, episodes
+            are drawn anew in every process, as Gymnasium has it; those of an ``env`` by its own.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
 
     def __init__(self, env: Environment | None = None, **arguments: Any) -> None:
         self.env: Environment = TiltrotorEnv(**arguments) if env is None else env
+        if env is not None or arguments.get("seed") is not None:
+            self.np_random = self.env.generator
         self.render_mode = None
         self._flying = False
         spec = self.env.action_spec()
@@ -54,7 +57,12 @@ class GymnasiumEnv(gymnasium.Env):  # type: ignore[misc]
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Floats], dict[str, Any]]:
-        """Begin an episode; a seed restarts the random draws. There are no options."""
+        """Begin an episode; a seed restarts the random draws. There are no options.
+
+        Args:
+            seed: Default: go on with the draws, from the constructor's seed if it had one.
+            options: Not used.
+        """
         super().reset(seed=seed)
         self.env.reseed(self.np_random)
         observation = dict(self.env.reset().observation)

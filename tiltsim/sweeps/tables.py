@@ -12,6 +12,7 @@ from tiltsim.scenario.expectation import Expectation
 from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
 from tiltsim.scenario.table import Positive, Table
+from tiltsim_controllers.mathematics.scalar import clipped
 
 Keys = Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
 Names = Annotated[tuple[str, ...], Field(strict=False)]
@@ -105,12 +106,14 @@ class LinspaceAxis(AxisTable):
 
     def rows(self) -> list[tuple[Any, ...]]:
         """The values of all keys, point by point."""
-        last = self.count - 1
-        # Weighted from both ends, so that both are exact.
-        values = [
-            (self.start * (last - step) + self.stop * step) / last for step in range(self.count)
+        last, start, stop = self.count - 1, self.start, self.stop
+        low, high = sorted((start, stop))
+        # Weighted from both ends; rounding must not carry a value past the last one allowed.
+        between = [
+            clipped((start * (last - step) + stop * step) / last, low, high)
+            for step in range(1, last)
         ]
-        return [(value,) * len(self.targets) for value in values]
+        return [(value,) * len(self.targets) for value in (start, *between, stop)]
 
 
 class UniformAxis(AxisTable):
