@@ -445,6 +445,20 @@ def test_compilation_is_announced_on_a_terminal(capsys, monkeypatch):
     )
 
 
+def test_list_of_what_contains_a_word(capsys):
+    assert main(["list", "ch02_singular_zone"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert all(line.startswith(("ch02_singular_zone", "  #")) for line in lines)
+    assert main(["list", "Fig. 4", "--json"]) == 0
+    entries = json.loads(capsys.readouterr().out)
+    assert {SETPOINT} <= {entry["scenario"] for entry in entries}
+    assert all("Fig. 4" in entry["source"] + entry["title"] for entry in entries)
+    assert main(["list", "zebra"]) == 2
+    assert (
+        capsys.readouterr().err == "tiltsim: zebra: in no address, title or source of the library\n"
+    )
+
+
 def test_schema_knows_every_table_and_the_variants(capsys):
     assert main(["schema"]) == 0
     schema = json.loads(capsys.readouterr().out)

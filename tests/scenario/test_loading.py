@@ -113,7 +113,7 @@ MISTAKES = {
     ),
     "unknown key in an expectation": (
         '[[expect]]\nmetric = "duration"\nmaxi = 3.0',
-        "expect.0.maxi = 3.0",
+        "expect[0].maxi = 3.0",
         "did you mean max?",
     ),
     "key that is two lines": ('"a\\nb" = 3', "= 3", "unknown key"),
@@ -143,7 +143,7 @@ MISTAKES = {
     "number for a list": ("[initial]\nposition = 3.0", "initial.position = 3.0", "must be a list"),
     "string in a list of numbers": (
         '[initial]\nposition = [0, 0, "up"]',
-        'initial.position.2 = "up"',
+        'initial.position[2] = "up"',
         "must be a number",
     ),
     "string for a rotor speed": (
@@ -159,7 +159,7 @@ MISTAKES = {
     "negative mass": ("[vehicle]\nmass = -0.4", "vehicle.mass = -0.4", "greater than 0"),
     "NaN": ("[vehicle]\nmass = nan", "vehicle.mass = NaN", "finite"),
     "infinity": ("[simulation]\nduration = inf", "simulation.duration = Infinity", "finite"),
-    "NaN in a list": ("[initial]\nposition = [0, nan, 0]", "initial.position.1 = NaN", "finite"),
+    "NaN in a list": ("[initial]\nposition = [0, nan, 0]", "initial.position[1] = NaN", "finite"),
     "inertia of no body": (
         "[vehicle]\ninertia = [1.0, 3.0, 1.0]",
         "vehicle.inertia = ",
@@ -180,7 +180,7 @@ MISTAKES = {
         "gait.angles = [0.1, -0.6, 0.0, 0.0]",
         "vehicle.tilt_servo.max_angle = 0.5",
     ),
-    "angles in degrees": (fixed("[0.0, -45.0, 0.0, 0.0]"), "gait.angles.1 = -45.0", "-3.14159"),
+    "angles in degrees": (fixed("[0.0, -45.0, 0.0, 0.0]"), "gait.angles[1] = -45.0", "-3.14159"),
     "amplitude in degrees": (trot("37.0"), "gait.amplitude = 37.0", "3.14159"),
     "three angles": (
         fixed("[0.1, 0.2, 0.3]"),
@@ -308,11 +308,35 @@ def test_a_mistake_is_one_line_with_file_key_value_and_what_is_allowed(write, mi
     assert allowed in rest.partition(shown)[2]
 
 
-def test_the_number_of_further_mistakes_is_told(write):
+def test_further_mistakes_are_named(write):
     line = refusal(write("[vehicle]\nmass = -1.0\narm_length = -1.0\ngravity = -1.0"))
-    assert line.endswith("vehicle.mass = -1.0: must be greater than 0 (and 2 more mistakes)")
+    assert line.endswith("be greater than 0 (also wrong: vehicle.arm_length, vehicle.gravity)")
     line = refusal(write('[gait]\ntype = "fixed"\nangels = [0, 0, 0, 0]\nbiass = 1.0'))
-    assert line.endswith("known: angles, bias, scale, type (and 1 more mistake)")
+    assert line.endswith("known: angles, bias, scale, type (also wrong: gait.biass)")
+    line = refusal(write("\n".join(f"foo_{i} = 1" for i in range(8))))
+    assert line.endswith("(also wrong: foo_1, foo_2, foo_3, foo_4, foo_5 and 2 more)")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("wind = [5, 0, 0]", "wind = [5, 0, 0]: unknown key; did you mean air.wind? known: air,"),
+        ("duration = 5", "did you mean simulation.duration or air.gust.duration? known"),
+        (
+            '[gait]\ntype = "fixed"\namplitude = 1',
+            "unknown key; only for type trot_instant, trot_continuous, walk, run, ",
+        ),
+        ('[controller]\ntilt_weight = "even"', "unknown key; only for law full_pose; known"),
+        ("[air]\nwind = 5", "air.wind = 5: must be a list of 3 numbers"),
+        ("[air.gust]\nrise = 1\nvelocity = 5", "velocity = 5: must be a list of 3 numbers"),
+        ("[vehicle]\ninertia = 5", "vehicle.inertia = 5: must be a list of 3 numbers"),
+        ('[gait]\ntype = "waypoints"\nperiod = 1\nangles = 5', "must be a list of lists"),
+        ("[controller]\nleave_out = 5", "leave_out = 5: must be a list of names"),
+        ("[vehicle]\nmass = 500", "vehicle.mass = 500.0: is in kg; to hover its rotors would"),
+    ],
+)
+def test_a_mistake_says_what_to_write(write, text, words):
+    assert words in refusal(write(text))
 
 
 def test_a_long_value_is_cut(write):

@@ -71,6 +71,47 @@ def test_axes_are_crossed_the_last_one_fastest(points_of):
     assert sorted(i for n in range(sweep.chunks) for i in sweep.chunk(n)) == list(range(25))
 
 
+TROT = """
+scenario = "ch04_tracking/circle#fixed_modified"
+[set]
+gait.type = "trot_continuous"
+"""
+"""A base that lacks the amplitude and the period of its gait."""
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "first"),
+    [
+        (AMPLITUDES, 0.1),
+        (SEARCH, 0.1),
+        ('[[axis]]\ntype = "uniform"\nkey = "gait.amplitude"\nlow = 0.3\nhigh = 0.5\n', 0.3),
+        (
+            '[[axis]]\ntype = "normal"\nkey = "gait.amplitude"\nmean = 0.4\n'
+            "standard_deviation = 0.01\n",
+            0.4,
+        ),
+    ],
+)
+def test_axes_give_the_keys_that_the_base_lacks(points_of, amplitudes, first):
+    drawn = "uniform" in amplitudes or "normal" in amplitudes
+    sample = "[sample]\ncount = 2\n" if drawn else ""
+    sweep = points_of(TROT + PERIODS + amplitudes + sample)
+    assert (
+        sweep.definition.base["gait"] | {"amplitude": first, "period": 1.0}
+        == (sweep.definition.base["gait"])
+    )
+    values = sweep.point(0)
+    assert sweep.scenario(values | {"gait.amplitude": 0.25}).gait.amplitude == 0.25
+    with pytest.raises(InputError, match=r"gait.amplitude: missing, and required"):
+        points_of(TROT + PERIODS)
+
+
+def test_a_relative_axis_multiplies_a_value_that_is_set(points_of):
+    text = AMPLITUDES.replace("values = [0.1,", "relative = true\nvalues = [0.1,")
+    sweep = points_of("[set]\ngait.amplitude = 0.5\n" + text)
+    assert sweep.scenario(sweep.point(1)).gait.amplitude == 0.1
+
+
 def test_a_table_is_not_a_value_of_an_axis(points_of):
     axis = """
 [[axis]]
@@ -276,10 +317,10 @@ def test_huge_axes_are_refused_or_tried_in_a_few_places(points_of, count):
     ("text", "words"),
     [
         ("", ["needs at least one [[axis]]"]),
-        (PERIODS + "colour = 1", ["axis.0.colour", "unknown key"]),
-        (PERIODS.replace("linspace", "lin"), ["axis.0.type", "list, linspace, cases, uniform"]),
+        (PERIODS + "colour = 1", ["axis[0].colour", "unknown key"]),
+        (PERIODS.replace("linspace", "lin"), ["axis[0].type", "list, linspace, cases, uniform"]),
         (SEED, ["axis.type", "seed", "[sample]"]),
-        (SEED + "relative = true\n[sample]\ncount = 1", ["axis.0.relative"]),
+        (SEED + "relative = true\n[sample]\ncount = 1", ["axis[0].relative"]),
         (CASES.replace('"stack"', '"gait.stack"'), ["gait.stack", "without a dot"]),
         (CASES.replace("decoupler =", "decuopler ="), ["decuopler", "did you mean decoupler"]),
         (CASES + PERIODS.replace("period", "amplitude"), ["axis.cases.walk.gait.amplitude = 0.1"]),

@@ -7,6 +7,7 @@ import json
 
 from tiltsim.commands.options import Subparsers, add_json
 from tiltsim.commands.text import fitted
+from tiltsim.errors import InputError
 from tiltsim.scenario.library import Entry, library_entries, library_families, library_sweeps
 from tiltsim.system.text import printable
 
@@ -17,6 +18,9 @@ def add_parser(subparsers: Subparsers) -> None:
     begins with # is a variant of the file above it: tiltsim run 'FILE#VARIANT'."""
     summary = "list the scenario library"
     parser = subparsers.add_parser("list", help=summary, description=description)
+    parser.add_argument(
+        "word", nargs="?", default="", metavar="WORD", help="list only what contains this"
+    )
     parser.add_argument("--sweeps", action="store_true", help="list only the sweeps")
     add_json(parser)
     parser.set_defaults(run=run)
@@ -24,25 +28,40 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print one line per file, with one per variant below it; sweeps at the end."""
+    word = arguments.word.lower()
+    sweeps = [sweep for sweep in library_sweeps() if _contains(sweep, word)]
     if arguments.json:
-        entries = library_sweeps() if arguments.sweeps else library_entries()
+        entries = sweeps if arguments.sweeps else library_entries()
         keys = ("sweep" if arguments.sweeps else "scenario", "title", "source")
-        print(json.dumps([dict(zip(keys, entry)) for entry in entries], indent=2))
+        found = [dict(zip(keys, entry)) for entry in entries if _contains(entry, word)]
+        print(json.dumps(found, indent=2))
         return 0
-    if not arguments.sweeps:
-        _print_families()
-        print("\nsweeps, for tiltsim sweep:")
-    for sweep in library_sweeps():
-        print(_line(sweep, sweep.address))
+    lines = [] if arguments.sweeps else _family_lines(word)
+    if lines and sweeps:
+        lines.append("\nsweeps, for tiltsim sweep:")
+    lines += [_line(sweep, sweep.address) for sweep in sweeps]
+    if not lines:
+        raise InputError(f"{arguments.word}: in no address, title or source of the library")
+    print("\n".join(lines))
     return 0
 
 
-def _print_families() -> None:
+def _contains(entry: Entry, word: str) -> bool:
+    """Whether a word in lower case is in the address, the title or the source."""
+    return word in " ".join(entry).lower()
+
+
+def _family_lines(word: str) -> list[str]:
+    """The files that contain a word, with all variants, and other files' variants with it."""
+    lines = []
     for family in library_families():
-        print(_line(family.entry, family.entry.address))
-        width = max((len(member.address) for member in family.members), default=0)
-        for member in family.members:
-            print(_line(member, f"  {member.address:<{width}}"))
+        whole = _contains(family.entry, word)
+        members = [member for member in family.members if whole or _contains(member, word)]
+        width = max((len(member.address) for member in members), default=0)
+        if whole or members:
+            lines.append(_line(family.entry, family.entry.address))
+        lines += [_line(member, f"  {member.address:<{width}}") for member in members]
+    return lines
 
 
 def _line(entry: Entry, address: str) -> str:

@@ -58,5 +58,5 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.views.rerun.recording_file import save_recording
 
     save_recording(flights, arguments.rerun, names)
-    print_line(f"recording written to {arguments.rerun}; open it with: rerun {arguments.rerun}")
+    print_line(f"recording written to {arguments.rerun}; open it with tiltsim view")
     return 0

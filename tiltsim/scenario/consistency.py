@@ -24,12 +24,16 @@ from tiltsim.scenario.vehicle import (
 )
 from tiltsim_controllers.analysis.stability import ErrorLoop
 from tiltsim_controllers.laws.supervisor import LAG
+from tiltsim_controllers.vehicle.parameters import Vehicle
 
 MAX_KNOTS: Final = 1500
 """Numbers of a gait and a reference together, which every evaluation of the law reads."""
 
 MAX_LOOP_STEP: Final = 2.5
 """Largest product of timestep and closed-loop pole; RK4 turns unstable at 2.78, ode3 at 2.51."""
+
+MAX_HOVER_SPEED: Final = 5000.0
+"""Rotor speed (rad/s) in hover beyond that of any rotor: tips at 7 cm would be supersonic."""
 
 MAX_HELD_STEP: Final = 2.0
 """Largest product of control timestep and pole, where a held third derivative turns unstable."""
@@ -361,6 +365,7 @@ def _check_speed(scenario: ScenarioTables, loop: ErrorLoop) -> None:
     for key, limit in limits.items():
         step = getattr(scenario.simulation, key)
         if fastest * step > limit:
+            _check_weight(scenario)
             raise scenario.mistake(
                 f"simulation.{key}",
                 f"too long for the {loop.name} loop under "
@@ -368,6 +373,18 @@ def _check_speed(scenario: ScenarioTables, loop: ErrorLoop) -> None:
                 f"rad/s; at most {limit / fastest:.3g} s, or slower gains, or "
                 "controller.allow_unstable = true",
             )
+
+
+def _check_weight(scenario: ScenarioTables) -> None:
+    """Refuse a mass, such as one in grams, that no rotors carry; loops are as fast as rotors."""
+    vehicle = scenario.vehicle.resolve()
+    if isinstance(vehicle, Vehicle) and vehicle.hover_rotor_speed > MAX_HOVER_SPEED:
+        raise InvalidValueError(
+            "vehicle.mass",
+            vehicle.mass,
+            f"is in kg; to hover its rotors would have to turn at {vehicle.hover_rotor_speed:.4g} "
+            "rad/s; check mass and thrust_coefficient",
+        )
 
 
 def _check_claims(scenario: ScenarioTables) -> None:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from math import pi
-from typing import TYPE_CHECKING, Any, Final, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args, get_origin
 
 from tiltsim.system.text import shortened
 
@@ -26,12 +26,14 @@ class InvalidValueError(ValueError):
         super().__init__(f"{key} = {show(value)}: {allowed}")
 
 
+MAX_OTHERS: Final = 5
+"""So many keys with further mistakes are named."""
+
 _PLAIN_TYPES: Final = {
     "float_type": "must be a number",
     "int_type": "must be a whole number",
     "bool_type": "must be true or false",
     "string_type": "must be a string",
-    "tuple_type": "must be a list",
     "finite_number": "must be a finite number",
     "model_type": "must be a table",
     "model_attributes_type": "must be a table",
@@ -59,7 +61,7 @@ def choose(name: object, names: Iterable[str]) -> str:
 def one_line_message(
     error: ValidationError, document: Mapping[str, Any], schema: type[BaseModel]
 ) -> str:
-    """The first mistake in one line, and the number of others.
+    """The first mistake in one line, and the keys of others.
 
     Args:
         error: What pydantic found.
@@ -71,8 +73,11 @@ def one_line_message(
     details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
     line = _short_list(details, document) or _describe(details[0], document, schema)
     # Missing entries of one list, and the options of one union, are one mistake each.
-    more = len({_mistake(detail, document) for detail in details}) - 1
-    return f"{line} (and {more} more mistake{'s' if more > 1 else ''})" if more else line
+    _, *others = dict.fromkeys(_mistake(detail, document) for detail in details)
+    if not others:
+        return line
+    more = f" and {len(others) - MAX_OTHERS} more" if len(others) > MAX_OTHERS else ""
+    return f"{line} (also wrong: {', '.join(others[:MAX_OTHERS])}{more})"
 
 
 def _mistake(detail: Any, document: Mapping[str, Any]) -> str:
@@ -114,7 +119,8 @@ def _describe(detail: Any, document: Mapping[str, Any], schema: type[BaseModel])
             return f"{key}.{tag}: missing; choose {allowed}"
         return f"{key}.{tag} = {show(value[tag])}: {choose(value[tag], tags)}"
     if kind == "literal_error":
-        return f"{key} = {show(value)}: choose {context['expected'].replace(chr(39), '')}"
+        expected = context["expected"].replace("'", "")
+        return f"{key} = {show(value)}: choose {'false' if expected == 'False' else expected}"
     if kind in {"too_short", "too_long"}:
         length = context.get("min_length", context.get("max_length"))
         return f"{key} = {show(value)}: must have {length} entries"
@@ -122,6 +128,8 @@ def _describe(detail: Any, document: Mapping[str, Any], schema: type[BaseModel])
         return f"{key}: must be a list of tables; write [[{key}]]"
     if kind in {"less_than_equal", "greater_than_equal"} and abs(_bound(context)) == pi:
         return f"{key} = {show(value)}: angles are in rad, from -3.14159 to 3.14159"
+    if kind == "tuple_type":
+        return f"{key} = {show(value)}: must be a list{_entries(schema, detail['loc'])}"
     if kind in _PLAIN_TYPES:
         return f"{key} = {show(value)}: {_PLAIN_TYPES[kind]}"
     return f"{key} = {show(value)}: {detail['msg'].replace('Input should', 'must')}"
@@ -147,8 +155,8 @@ def _locate(
             value = value[part]
         elif not (keep_last and position == len(location) - 1):
             continue
-        keys.append(str(part))
-    key = ".".join(keys).encode("unicode_escape").decode()
+        keys.append(f"[{part}]" if isinstance(part, int) else f".{part}")
+    key = "".join(keys).removeprefix(".").encode("unicode_escape").decode()
     return shortened(key) or "scenario", value
 
 
@@ -169,11 +177,56 @@ def _tag_key(fields: Mapping[str, Any]) -> str:
 
 
 def _known_keys(schema: Any, location: tuple[Any, ...], key: str) -> str:
-    """The keys allowed instead of an unknown one, after the closest if one is close."""
+    """The keys allowed instead of an unknown one, after a hint where it may belong."""
+    union, table, name = schema, schema, key.rpartition(".")[2]
     for part in location[:-1]:
+        union, table = table, _member(table, part)
+    names = sorted(table.model_fields) if hasattr(table, "model_fields") else []
+    kinds = dict.fromkeys(kind for option in _options(union) for kind in _kinds_with(option, name))
+    elsewhere = [found for found in _dotted_keys(schema) if found.rpartition(".")[2] == name]
+    if kinds:
+        hint = f"only for {_tag_key(table.model_fields)} {', '.join(kinds)}; "
+    elif elsewhere:
+        hint = f"did you mean {' or '.join(elsewhere[:3])}? "
+    else:
+        hint = did_you_mean(name, names)
+    return f"{hint}known: {', '.join(names)}"
+
+
+def _kinds_with(table: Any, name: str) -> tuple[str, ...]:
+    """The tags of a table of a union, if it has a key."""
+    fields = getattr(table, "model_fields", {})
+    tag = _tag_key(fields)
+    return get_args(fields[tag].annotation) if tag and name in fields else ()
+
+
+def _dotted_keys(schema: Any) -> list[str]:
+    """Every key in a table and the tables in it, dotted, once."""
+    keys = []
+    for table in (schema, *_options(schema)):
+        for name, field in getattr(table, "model_fields", {}).items():
+            keys += [name, *(f"{name}.{key}" for key in _dotted_keys(field.annotation))]
+    return list(dict.fromkeys(keys))
+
+
+def _entries(schema: Any, location: tuple[Any, ...]) -> str:
+    """What a list must contain, such as `` of 3 numbers``; empty if that is not plain."""
+    for part in location:
         schema = _member(schema, part)
-    names = sorted(schema.model_fields) if hasattr(schema, "model_fields") else []
-    return f"{did_you_mean(key.rpartition('.')[2], names)}known: {', '.join(names)}"
+    kinds = {float: "numbers", int: "whole numbers", tuple: "lists", Literal: "names"}
+    for option in (schema, *map(_bare, get_args(schema))):
+        entries = [_bare(entry) for entry in get_args(option)]
+        kind = (
+            kinds.get(get_origin(entries[0]) or entries[0]) if get_origin(option) is tuple else None
+        )
+        if kind:
+            return f" of {kind}" if Ellipsis in entries else f" of {len(entries)} {kind}"
+    return ""
+
+
+def _bare(kind: Any) -> Any:
+    """A type without its annotations."""
+    return get_args(kind)[0] if get_origin(kind) is Annotated else kind
 
 
 def _member(schema: Any, part: object) -> Any:
@@ -188,6 +241,8 @@ def _member(schema: Any, part: object) -> Any:
         tags = get_args(fields[tag].annotation) if tag else ("table",)
         if fields and part in tags:
             return option
+        if not tag and part in fields:
+            return fields[part].annotation
     return schema
 
 

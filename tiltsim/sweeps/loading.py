@@ -23,7 +23,17 @@ from tiltsim.scenario.messages import one_line_message
 from tiltsim.sweeps.checks import check_points
 from tiltsim.sweeps.definition import UNUSED, VERSIONS, SweepDefinition
 from tiltsim.sweeps.points import SweepPoints
-from tiltsim.sweeps.tables import CasesAxis, Sweep, dotted
+from tiltsim.sweeps.tables import (
+    AxisTable,
+    CasesAxis,
+    LinspaceAxis,
+    ListAxis,
+    NormalAxis,
+    SeedAxis,
+    Sweep,
+    UniformAxis,
+    dotted,
+)
 
 
 def load_sweep(path: str | Path, overrides: dict[str, Any] | None = None) -> SweepDefinition:
@@ -64,19 +74,51 @@ def load_sweep(path: str | Path, overrides: dict[str, Any] | None = None) -> Swe
 
 
 def _base(sweep: Sweep, folder: Path, address: str) -> dict[str, Any]:
-    """The base scenario with ``[set]`` and all defaults, without its expectations."""
+    """The base scenario with ``[set]`` and all defaults, without its expectations.
+
+    If it lacks a key that an axis gives, with the first values of the axes.
+    """
+    try:
+        return _scenario(sweep, sweep.set, folder, address)
+    except InputError as error:
+        first = _first_values(sweep)
+        if not any(f"{key}: missing" in str(error) for key in first):
+            raise
+        return _scenario(sweep, sweep.set | first, folder, address)
+
+
+def _first_values(sweep: Sweep) -> dict[str, Any]:
+    """A value of each axis and of the search, by key of the scenario; none of relative axes."""
+    first: dict[str, Any] = {} if sweep.bisect is None else {sweep.bisect.key: sweep.bisect.start}
+    for axis in sweep.axis:
+        match axis:
+            case CasesAxis() | AxisTable(relative=True):
+                continue
+            case ListAxis():
+                first |= zip(axis.targets, axis.rows()[0])
+            case UniformAxis():
+                first |= dict.fromkeys(axis.targets, axis.low)
+            case NormalAxis():
+                first |= dict.fromkeys(axis.targets, axis.mean)
+            case LinspaceAxis() | SeedAxis():
+                first |= dict.fromkeys(axis.targets, axis.start)
+    return {key: value for key, value in first.items() if "." in key}
+
+
+def _scenario(sweep: Sweep, values: dict[str, Any], folder: Path, address: str) -> dict[str, Any]:
+    """The scenario that a sweep names or contains, with values by dotted key."""
     if isinstance(sweep.scenario, str):
         name, _, variant = sweep.scenario.partition("#")
         beside = (folder / name) if name else folder
         path = str(beside) if beside.is_file() else name
         try:
-            scenario = load_scenario(path + (f"#{variant}" if variant else ""), sweep.set or None)
+            scenario = load_scenario(path + (f"#{variant}" if variant else ""), values or None)
         except InputError as error:
             raise InputError(f"{address}: scenario: {error}") from None
     else:
         document = deepcopy(sweep.scenario)
         locate_named_files(document, folder, f"{address}: scenario")
-        apply_overrides(document, sweep.set, f"{address}: scenario")
+        apply_overrides(document, values, f"{address}: scenario")
         scenario = parse_scenario(document, f"{address}: scenario")
     base: dict[str, Any] = without_none(scenario.model_dump(mode="json", exclude=UNUSED))
     return base

@@ -298,9 +298,12 @@ class Sweep(Table):
         twice = next((key for key in targets if targets.count(key) > 1), None)
         if twice is not None:
             raise InvalidValueError("axis.key", twice, "set twice")
-        fixed = next((key for key in targets if key in self.set), None)
+        scaled = [key for axis in self.axis if axis.relative for key in axis.targets]
+        fixed = next((key for key in targets if key in self.set and key not in scaled), None)
         if fixed is not None:
-            raise InvalidValueError(f"set.{fixed}", self.set[fixed], "also set by an axis")
+            raise InvalidValueError(
+                f"set.{fixed}", self.set[fixed], "also set by an axis; remove it"
+            )
         for axis in self.axis:
             if isinstance(axis, CasesAxis):
                 self._check_cases(axis, [key for key in (*targets, *self.set) if "." in key])
