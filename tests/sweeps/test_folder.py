@@ -166,7 +166,19 @@ def change_a_columns_type(folder, _other):
     place = table.column_names.index("max_abs_roll")
     texts = pa.array(["1"] * len(table))
     pq.write_table(table.set_column(place, "max_abs_roll", texts), part(folder, 0))
-    return part(folder, 0), "max_abs_roll"
+    return part(folder, 0), "column max_abs_roll holds string instead of double"
+
+
+def repeat_a_column(folder, _other):
+    table = plain_table(part(folder, 0))
+    pq.write_table(table.append_column("end", table["end"]), part(folder, 0))
+    return part(folder, 0), "two columns end"
+
+
+def drop_a_column(folder, _other):
+    table = plain_table(folder / "sweep.parquet")
+    pq.write_table(table.drop_columns(["initial.attitude[0]"]), folder / "sweep.parquet")
+    return folder / "sweep.parquet", "no column initial.attitude[0]"
 
 
 def make_a_folder_of_a_part(folder, _other):
@@ -182,6 +194,8 @@ DAMAGES = (
     replace_the_dataset,
     put_a_flight_in_place_of_the_dataset,
     change_a_columns_type,
+    repeat_a_column,
+    drop_a_column,
     make_a_folder_of_a_part,
 )
 
@@ -227,3 +241,13 @@ def test_a_flipped_bit_is_refused_or_changes_nothing(copy, name, flips):
     whole = read()
     for found in read_with_flipped_bits(folder / name, read, flips):
         assert found == whole
+
+
+def test_an_old_definition_may_no_longer_be_valid(copy):
+    """Only what decides the rows is compared: the base, not the scenario that it was made from."""
+    definition, folder = copy
+    document = json.loads((folder / "sweep.json").read_text())
+    del document["sha256"]  # as of an earlier version
+    document["sweep"]["scenario"]["gait"]["type"] = "\ud800"
+    (folder / "sweep.json").write_text(json.dumps(document))
+    run_sweep(definition, folder)

@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from typing import Any, Final
 
-from pydantic import ValidationError
-
 from tiltsim.errors import InputError
 from tiltsim.scenario.limits import check_limits
 from tiltsim.scenario.loading import parse_scenario, without_none
@@ -85,7 +83,7 @@ class SweepDefinition:
             sweep = Sweep.model_validate(self.sweep).model_dump_json(exclude_none=True)
             scenario = parse_scenario(self.base)
             base = without_none(scenario.model_dump(mode="json", exclude=UNUSED))
-        except (ValidationError, InputError):
+        except (ValueError, InputError):
             return self
         return replace(self, sweep=json.loads(sweep), base=base)
 

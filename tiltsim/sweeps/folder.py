@@ -98,6 +98,7 @@ class SweepFolder:
             for number in range(self._points.chunks):
                 file = part_file(self.path, number)
                 table = read_rows(file, self._points, self._points.chunk(number))
+                table = table.select(columns.names)
                 waiting.append(table.replace_schema_metadata(columns.metadata))
                 last = number == self._points.chunks - 1
                 if last or sum(map(len, waiting)) >= ROW_GROUP:

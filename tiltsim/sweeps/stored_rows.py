@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tiltsim.errors import InputError
+from tiltsim.sweeps.columns import schema
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.system.parquet import UnreadableError, open_parquet
@@ -43,16 +44,16 @@ def read_rows(
     """
     try:
         with open_parquet(file) as opened:
-            schema = opened.schema_arrow
-            names = [name for name in schema.names if scenarios or name != "scenario"]
+            found = opened.schema_arrow
+            names = [name for name in found.names if scenarios or name != "scenario"]
             table = opened.read(columns=names)
     except UnreadableError as error:
         raise UnreadableError(f"{error}; delete it, and it is made again") from error
-    text = (schema.metadata or {}).get(b"sweep", b"").decode(errors="replace")
+    text = (found.metadata or {}).get(b"sweep", b"").decode(errors="replace")
     difference = _difference(text, points.definition.to_json())
-    if not difference:
-        found = table["index"].to_pylist() if table.column_names.count("index") == 1 else []
-        difference = "" if found == list(indices) else "holds the rows of other points"
+    difference = difference or _wrong_column(found, points)
+    if not difference and table["index"].to_pylist() != list(indices):
+        difference = "holds the rows of other points"
     if difference:
         raise InputError(f"{file}: {difference}; delete it or move it away")
     return table
@@ -70,3 +71,21 @@ def _difference(found: str, expected: str) -> str:
     except ValueError:
         return "not of a sweep"
     return f"of another sweep: {difference}" if difference else ""
+
+
+def _wrong_column(found: pyarrow.Schema, points: SweepPoints) -> str:
+    """The first column that is there twice, has another type, or is missing.
+
+    Versions differ in their metrics, which are optional here.
+    """
+    for name in found.names:
+        if found.names.count(name) > 1:
+            return f"has two columns {name}"
+    for field in schema(points):
+        if field.name in found.names:
+            kind = found.field(field.name).type
+            if kind != field.type:
+                return f"column {field.name} holds {kind} instead of {field.type}"
+        elif field.name not in points.metrics:
+            return f"has no column {field.name}"
+    return ""
