@@ -298,7 +298,7 @@ def rename(name):
         ),
         (lambda: changed('dyntype="integrator"', 'dyntype="none"'), ["dyntype integrator"]),
         (lambda: changed('gravity="0 0 -9.81"', 'gravity="1 0 -9.81"'), ["must point down z"]),
-        (lambda: "<mujoco", ["MuJoCo says"]),
+        (lambda: "<mujoco", ["not XML"]),
         (lambda: "<mujoco><worldbody/></mujoco>", ["no body 'vehicle'"]),
         (lambda: changed('pos="0 0.2 0"', 'pos="0 0.25 0"'), ["'rotor_2' lies at (0, 0.25, 0)"]),
         (lambda: changed('axis="0 1 0"', 'axis="0 -1 0"'), ["'tilt_2' turns about (0, -1, 0)"]),

@@ -10,12 +10,15 @@ from tiltsim.models.parts import TiltServo
 
 
 def parse_mjcf(path: Path) -> Any:
-    """An MJCF file as dm_control's tree."""
+    """An MJCF file as dm_control's tree. Raises ValueError, in one line, where it has none."""
     with warnings.catch_warnings():
         # dm_control tries its window systems on import; without a screen GLFW complains.
         warnings.filterwarnings("ignore", module="glfw")
         from dm_control import mjcf
-    return mjcf.from_path(str(path))
+    try:
+        return mjcf.from_path(str(path))
+    except Exception as error:  # of many kinds, for what MuJoCo reads and dm_control does not
+        raise ValueError(f"dm_control says: {' '.join(str(error).split())}") from error
 
 
 def remove_visuals(root: Any, *, contacts: bool) -> None:

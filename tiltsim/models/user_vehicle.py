@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from tiltsim.models.mjcf_editing import set_servo_gains, set_stop
+from tiltsim.models.mjcf_limits import check_mjcf
 from tiltsim.models.parts import TiltServo
 from tiltsim.system.hooks import mujoco_hooks
 from tiltsim.system.locks import one_thread_at_a_time
@@ -165,10 +166,11 @@ def read_user_vehicle(path: str, model: str) -> UserVehicle:
 def _read(path: str, model: str, modified: int) -> UserVehicle:
     import mujoco
 
+    check_mjcf(Path(path))
     try:
         with mujoco_hooks():
             compiled = mujoco.MjModel.from_xml_path(path)
-    except ValueError as error:
+    except (ValueError, RuntimeError) as error:  # the latter where it lacks memory
         raise ValueError(f"MuJoCo says: {' '.join(str(error).split())}") from None
     data = mujoco.MjData(compiled)
     mujoco.mj_kinematics(compiled, data)

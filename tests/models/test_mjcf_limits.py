@@ -1,0 +1,56 @@
+"""MJCF that is too large or no MJCF is refused in a line, at once."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+import tiltsim
+from tiltsim.errors import InputError
+from tiltsim.models.mjcf_editing import parse_mjcf
+from tiltsim.models.mjcf_limits import check_mjcf
+from tiltsim.resources import shipped_folder
+
+SHIPPED = sorted(shipped_folder("mjcf").glob("*.xml"))
+MANY = "<geom size='1'/>" * 6_000
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_shipped_vehicles_are_within_the_limits(path):
+    check_mjcf(path)
+
+
+@pytest.mark.parametrize(
+    ("inside", "words"),
+    [
+        (MANY, "more than 5000 elements"),
+        ("<replicate count='99'><replicate count='99'><a/></replicate></replicate>", "more than 5"),
+        ("<composite count='20 20 20'/>", "more than 5000 elements"),
+        ("<include file='own.xml'/>", "more than"),
+        ("<hfield nrow='60000' ncol='60000'/>", "hfield nrow x ncol: more than"),
+        ("<texture width='60000' height='60000'/>", "texture width x height: more than"),
+        ("<size nuser_body='100000000'/>", "size nuser_body = 100000000: at most"),
+        ("<body pos='0 nan 0'/>", "body pos = '0 nan 0': must be finite"),
+        ("<body pos='0 1e999 0'/>", "must be finite"),
+        ("<!-- \x01 -->", "not XML"),
+        ("<body>" * 300 + "</body>" * 300, "not XML: Excessive depth"),
+        ("<body>", "not XML"),
+    ],
+)
+def test_what_exceeds_a_limit_is_refused(inside, words, tmp_path):
+    file = tmp_path / "own.xml"
+    file.write_text(f"<mujoco>{inside}</mujoco>")
+    with pytest.raises(ValueError, match=words) as caught:
+        check_mjcf(file)
+    assert "\n" not in str(caught.value)
+    with pytest.raises(InputError, match=re.escape(str(caught.value))):
+        tiltsim.parse_scenario({"vehicle": {"mjcf": str(file)}})
+
+
+def test_what_dm_control_cannot_read_is_refused_in_a_line(tmp_path):
+    file = tmp_path / "own.xml"
+    file.write_text("<mujoco><worldbody><nothing/></worldbody></mujoco>")
+    with pytest.raises(ValueError, match="dm_control says: ") as caught:
+        parse_mjcf(file)
+    assert "\n" not in str(caught.value)
