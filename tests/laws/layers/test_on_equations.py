@@ -133,7 +133,7 @@ FLIGHTS = {
     "full pose, storm": (3, (FULL_POSE, STORM)),
     "full pose, lag": (3, (FULL_POSE, {"vehicle": {"rotor_time_constant": 0.005}})),
     "quadrotor, storm": (3, (QUADROTOR, STORM)),
-    "weak rotor": (1, (TILTROTOR, WEAK)),
+    "weak rotor": (3, (TILTROTOR, WEAK)),
     "allocation": (2, (TILTROTOR, LIMITS, CLIMB)),
 }
 
