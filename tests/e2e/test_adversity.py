@@ -130,6 +130,7 @@ def test_an_interrupt_that_became_another_error_stays_one(capsys, monkeypatch):
 def test_a_scenario_whose_file_name_is_not_utf_8_is_flown_and_saved(tmp_path, capsys):
     file = tmp_path / os.fsdecode(b"caf\xe9.toml")
     file.write_text('title = "one"\n[simulation]\nduration = 0.1\n')
-    assert main(["run", str(file), "--quiet", "--out", str(tmp_path / "out")]) == 0
+    out = tmp_path / os.fsdecode(b"\xe9")
+    assert main(["run", str(file), "--quiet", "--out", str(out)]) == 0
     assert capsys.readouterr() == ("", "")
-    assert load_flight(tmp_path / "out").scenario.address == rf"{tmp_path}/caf\udce9.toml"
+    assert load_flight(out).scenario.address == rf"{tmp_path}/caf\udce9.toml"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 
 import pyarrow as pa
@@ -251,3 +252,12 @@ def test_an_old_definition_may_no_longer_be_valid(copy):
     document["sweep"]["scenario"]["gait"]["type"] = "\ud800"
     (folder / "sweep.json").write_text(json.dumps(document))
     run_sweep(definition, folder)
+
+
+def test_a_sweep_whose_file_name_is_not_utf_8_is_flown_and_read(tmp_path):
+    folder = tmp_path / os.fsdecode(b"\xff")
+    folder.mkdir()
+    run_sweep(load_sweep(short_sweep(folder / "sweep.toml", count=1)), folder / "out")
+    results = load_results(folder / "out")
+    assert len(results) == 2
+    assert results.points.definition.address == rf"{tmp_path}/\udcff/sweep.toml"

@@ -31,6 +31,7 @@ SAME = ("g2.toml", "g2.toml")
         (SAME, ("f/mod.parquet", "f/conv.parquet"), ["mod", "conv"]),
         (SAME, ("old/f/mod", "new/f/mod"), ["old/f/mod", "new/f/mod"]),
         (SAME, ("/mod", "/f/mod"), ["/mod", "f/mod"]),
+        (SAME, ("f/mod", "f/\udcff"), ["mod", r"\udcff"]),
         (SAME, ("f/mod", "f/mod"), ["g2_1", "g2_2"]),
         (SAME, (), ["g2_1", "g2_2"]),
         (("walk", "walk", "walk_1"), (), ["walk_1", "walk_2", "walk_1_3"]),

@@ -34,6 +34,7 @@ from tiltsim.sweeps.tables import (
     UniformAxis,
     dotted,
 )
+from tiltsim.system.text import valid_unicode
 
 
 def load_sweep(path: str | Path, overrides: dict[str, Any] | None = None) -> SweepDefinition:
@@ -48,7 +49,7 @@ def load_sweep(path: str | Path, overrides: dict[str, Any] | None = None) -> Swe
             and every value of every axis are tried.
     """
     file = find_scenario_file(path)
-    address = library_name(file)
+    address = valid_unicode(library_name(file))
     document = read_toml(file)
     fixed = document.setdefault("set", {})
     if overrides and isinstance(fixed, dict):

@@ -7,12 +7,13 @@ flight keeps its scenario, would go unnoticed.
 from __future__ import annotations
 
 import mmap
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, BinaryIO, Final
 
 from tiltsim.errors import InputError
 
@@ -33,9 +34,10 @@ class UnreadableError(InputError):
 @contextmanager
 def parquet_writer(path: Path, schema: pyarrow.Schema) -> Iterator[Any]:
     """Yield a `pyarrow.parquet.ParquetWriter`; the file is complete and sealed after the block."""
-    with _unsealed_writer(path, schema) as writer:
-        yield writer
-    with path.open("r+b") as file:
+    with path.open("w+b") as file:
+        with _unsealed_writer(file, schema) as writer:
+            yield writer
+        file.flush()
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
             place, digest = _checksum(content)
         file.seek(place)
@@ -70,17 +72,18 @@ def open_parquet(file: Path) -> Iterator[Any]:
     if not file.is_file():
         raise UnreadableError(f"{file}: {'not a file' if file.exists() else 'no such file'}")
     try:
-        if not _is_intact(file):
-            raise UnreadableError(f"{file}: damaged: its content differs from its checksum")
-        with pq.ParquetFile(file) as opened:
-            yield opened
+        with file.open("rb") as content:  # Arrow itself opens no path that is not UTF-8
+            if not _is_intact(content):
+                raise UnreadableError(f"{file}: damaged: its content differs from its checksum")
+            with pq.ParquetFile(content) as opened:
+                yield opened
     except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
         line = str(error).partition("\n")[0]
         raise UnreadableError(f"{file}: not a readable Parquet file: {line}") from error
 
 
 @contextmanager
-def _unsealed_writer(sink: Path | BytesIO, schema: pyarrow.Schema) -> Iterator[Any]:
+def _unsealed_writer(sink: BinaryIO, schema: pyarrow.Schema) -> Iterator[Any]:
     import pyarrow.parquet as pq
 
     with pq.ParquetWriter(sink, schema, compression="zstd") as writer:
@@ -88,13 +91,12 @@ def _unsealed_writer(sink: Path | BytesIO, schema: pyarrow.Schema) -> Iterator[A
         writer.add_key_value_metadata({CHECKSUM: _ZEROS.decode()})
 
 
-def _is_intact(file: Path) -> bool:
-    with file.open("rb") as opened:
-        if not opened.seek(0, 2):
-            return True  # an empty file cannot be mapped; it is no Parquet file either
-        with mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as content:
-            place, digest = _checksum(content)
-            return place < 0 or content[place : place + len(digest)] == digest
+def _is_intact(file: BinaryIO) -> bool:
+    if not file.seek(0, os.SEEK_END):
+        return True  # an empty file cannot be mapped; it is no Parquet file either
+    with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        place, digest = _checksum(content)
+        return place < 0 or content[place : place + len(digest)] == digest
 
 
 def _checksum(content: bytes | mmap.mmap) -> tuple[int, bytes]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
+from tiltsim.system.text import valid_unicode
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -50,7 +51,7 @@ def _folder(path: Path) -> str:
     whole = path.resolve() if ".." in path.parts else path.absolute()
     if whole.name == "flight.parquet":
         whole = whole.parent
-    return whole.as_posix().removesuffix(".parquet")
+    return valid_unicode(whole.as_posix()).removesuffix(".parquet")
 
 
 def _endings(names: Sequence[str]) -> Iterator[list[str]]:
