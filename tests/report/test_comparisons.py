@@ -6,6 +6,7 @@ import pytest
 
 from tiltsim.report.comparisons import other_address
 from tiltsim.report.html_page import page
+from tiltsim.report.made import Made
 from tiltsim.report.making import make_report
 from tiltsim.report.markdown import markdown
 from tiltsim.scenario.library import library_entries
@@ -84,7 +85,7 @@ def test_values_are_compared_with_those_of_the_other_flight(pushed):
 
 
 def test_page_and_summary_have_them(pushed):
-    text, html = markdown(pushed), page(pushed)
+    text, html = markdown(pushed), page(pushed, Made.now())
     assert "## Beyond the thesis" in text
     assert "A push &lt;from> the \\| left (compared with `" in text
     assert '<section id="beyond">' in html
@@ -92,7 +93,7 @@ def test_page_and_summary_have_them(pushed):
 
 
 def test_the_page_names_a_flight_once_for_all_its_metrics(pushed):
-    html = page(pushed)
+    html = page(pushed, Made.now())
     assert html.count("A push &lt;from&gt; the | left") == 1
     row = html[html.index('rowspan="2">A push') :]
     row = row[: row.index("Thrown")]

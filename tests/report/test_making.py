@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from html import escape
 from html.parser import HTMLParser
 from io import BytesIO
 
@@ -16,17 +17,28 @@ from tiltsim.exit_codes import EXPECTATION_FAILED, INVALID_INPUT
 from tiltsim.report import flights, store
 from tiltsim.report.claim import ClaimVerdict
 from tiltsim.report.claim_rows import count
-from tiltsim.report.content import failure_text, measured_text, published_text
+from tiltsim.report.content import (
+    criterion_text,
+    failure_text,
+    flights_of,
+    measured_text,
+    published_text,
+)
 from tiltsim.report.drawing import DPI, Drawing, png
 from tiltsim.report.findings import FINDINGS
 from tiltsim.report.flights import FlightRecord, Unsupported, fly, report_entries
 from tiltsim.report.html_page import page
+from tiltsim.report.made import Made
 from tiltsim.report.making import make_report
 from tiltsim.report.markdown import markdown
 from tiltsim.report.pictures import Picture
 from tiltsim.report.store import flight_key
 from tiltsim.studies.checking import collect
 from tiltsim.views.figures.style import CYCLE, new_figure
+
+MADE = Made(
+    date="2026-01-31", commit="0123456789ab", versions={"tiltsim": "1.2"}, machine="a <machine>"
+)
 
 
 def rows_of(report, statement):
@@ -94,7 +106,7 @@ def test_a_second_report_flies_nothing(library, kept, report, monkeypatch):
     again = make_report([str(library)], kept, 1)
     assert again.flights == report.flights
     assert again.rows == report.rows
-    assert page(again) == page(report)
+    assert page(again, MADE) == page(report, MADE)
 
 
 def test_an_interrupted_report_goes_on(library, report, tmp_path, monkeypatch):
@@ -179,7 +191,7 @@ class Page(HTMLParser):
     def handle_starttag(self, tag, attributes):
         values = dict(attributes)
         self.fetched += [values[key] for key in ("src", "srcset", "data") if key in values]
-        if tag in {"link", "script", "iframe"}:
+        if tag in {"link", "iframe"}:
             self.fetched.append(tag)
         if "href" in values:
             self.links.append(values["href"])
@@ -199,12 +211,13 @@ def full(report):
 
     figure = Figure(figsize=(2.0, 1.0))
     figure.subplots().plot([0.0, 1.0])
-    picture = Picture(4, "line", "A <line>", lambda _: figure)
+    flight = report.rows[-1].claim.address
+    picture = Picture(4, "line", "A <line>", lambda _: figure, ((flight, "mujoco"),))
     return dataclasses.replace(report, findings=FINDINGS, drawings=[Drawing(picture, png(figure))])
 
 
 def test_the_page_is_self_contained(full):
-    text = page(full)
+    text = page(full, MADE)
     parser = Page()
     parser.feed(text)
     parser.close()
@@ -214,19 +227,43 @@ def test_the_page_is_self_contained(full):
     assert all(link.startswith("#") for link in parser.links)
     assert {link[1:] for link in parser.links} <= set(parser.ids)
     assert len(set(parser.ids)) == len(parser.ids)
-    assert not re.search(r"https?://|@import|url\(", text)
+    assert not re.search(r"https?://|@import|url\((?!data:)", text)
 
 
 def test_the_page_contains_the_findings(full):
-    text = page(full)
+    text = page(full, MADE)
     assert "It does <code>not</code> end &lt;early&gt;." in text
     assert "A &lt;line&gt;" in text
-    assert text.count("<tbody>") >= len(full.chapters)
+    assert text.count('<article class="claim"') >= len(full.chapters)
     for finding in FINDINGS:
         assert f'id="{finding.key}"' in text
     for verdict in ClaimVerdict:
         assert f">{verdict.value}</span>" in text
-    assert "{" not in re.sub(r"<style>.*?</style>", "", text, flags=re.DOTALL)
+    assert '<a class="thumb thumb-line" href="#figure-line"' in text
+    code = r"<style>.*?</style>|<script>.*?</script>|<pre.*?</pre>"
+    assert "{" not in re.sub(code, "", text, flags=re.DOTALL)
+
+
+def test_the_page_tells_what_made_it_and_how_to_cite_it(full):
+    text = page(full, MADE)
+    assert (
+        "Made on 2026-01-31 with tiltsim 1.2 at commit 0123456789ab on a &lt;machine&gt;." in text
+    )
+    assert "note = {Version 1.2, commit 0123456789ab, made on 2026-01-31;" in text
+    now = Made.now()
+    assert now.versions["mujoco"]
+    assert re.fullmatch(r"([0-9a-f]{12}\+?)?", now.commit)
+
+
+def test_every_row_can_be_linked_to_and_checked(full):
+    text = page(full, MADE)
+    for row in full.rows:
+        assert f'id="{row.claim.id}"' in text
+        assert f'id="{row.statement.id}"' in text
+        assert escape(criterion_text(row.claim), quote=False) in text.replace("<code>", "`")
+        for address in flights_of(row.claim):
+            assert escape(f"tiltsim run '{address}'") in text
+    assert text.count('<details class="row"') == len(full.rows)
 
 
 def test_drawings_have_a_palette():
@@ -266,7 +303,7 @@ def test_the_command_writes_both_and_tells_of_bounds(library, tmp_path, capsys):
     code = main([*arguments, "--out", str(out), "--markdown", str(summary)])
     shown = capsys.readouterr().out
     assert code == EXPECTATION_FAILED
-    assert "3 claims: 2 reproduced, 1 not reproduced" in shown
+    assert "3 rows: 2 reproduced, 1 not reproduced" in shown
     assert "FAILED  " in shown
     assert "max_rotor_speed" in shown
     assert (out / "report.html").read_text(encoding="utf-8").startswith("<!doctype html>")

@@ -37,6 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.report.claim_rows import count
     from tiltsim.report.content import failure_text
     from tiltsim.report.html_page import page
+    from tiltsim.report.made import Made
     from tiltsim.report.making import make_report
     from tiltsim.report.markdown import markdown
     from tiltsim.report.store import store
@@ -52,11 +53,11 @@ def run(arguments: argparse.Namespace) -> int:
         report = make_report(
             arguments.paths, out / "kept", arguments.jobs, lambda done, total: move(done / total)
         )
-    store(target, page(report).encode())
+    store(target, page(report, Made.now()).encode())
     if arguments.markdown is not None:
         store(arguments.markdown, markdown(report).encode())
     counts = sorted(count(report.rows).items(), key=lambda item: item[0].rank)
-    print(f"{len(report.rows)} claims: {tally({kind.value: number for kind, number in counts})}")
+    print(f"{len(report.rows)} rows: {tally({kind.value: number for kind, number in counts})}")
     for failure in report.failures:
         print_line(f"FAILED  {failure_text(failure)}")
     print_line(f"report written to {target}")

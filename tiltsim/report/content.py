@@ -9,8 +9,8 @@ from itertools import groupby
 from math import floor, inf, isfinite, log10
 from typing import TYPE_CHECKING, Final
 
-from tiltsim.report.claim import Claim, ClaimVerdict, ExpectationClaim
-from tiltsim.report.claim_rows import Cell, Failure, Row
+from tiltsim.report.claim import Claim, ClaimVerdict, ExpectationClaim, FlightClaim
+from tiltsim.report.claim_rows import Cell, Failure, Row, count, count_statements, errors
 from tiltsim.report.comparisons import Comparison
 from tiltsim.report.drawing import Drawing
 from tiltsim.report.findings import FINDINGS, Finding
@@ -52,11 +52,15 @@ METHOD: Final = (
     "Every scenario is simulated on two plants with the same controller. The thesis plant "
     "integrates the printed equations, which have no gyroscopic torque, with a fixed-step "
     "third-order method. MuJoCo integrates a multibody model with a fourth-order method. Claims "
-    "that need no flight are computed. A claim gets the worse of its two verdicts.",
-    "A number is reproduced if it rounds to the printed digits, unless the claim states another "
+    "that need no flight are computed. A row gets the worse of its two verdicts.",
+    "A number is reproduced if it rounds to the printed digits, unless the row states another "
     "tolerance. All values and verdicts are computed from the scenario library and cached only "
     "until a source or a version changes.",
 )
+
+_TESTS: Final = "tests/report/test_claims.py"
+_COMPUTED: Final = "test_computed_claims_have_verdicts_and_reasons"
+_FLOWN: Final = "test_a_comparison_of_flights_can_come_out_either_way"
 
 
 @dataclass(frozen=True)
@@ -108,7 +112,7 @@ class Group:
 
     @property
     def shared_why(self) -> str:
-        """The reason, if all rows that fail have the same one."""
+        """The reason, if several rows that fail have the same one."""
         reasons = [reason for row in self.rows if (reason := why_of(row))]
         return reasons[0] if len(reasons) > 1 and len(set(reasons)) == 1 else ""
 
@@ -116,6 +120,24 @@ class Group:
 def why_of(row: Row) -> str:
     """The reason of a row that is not reproduced."""
     return "" if row.verdict is ClaimVerdict.REPRODUCED else row.claim.refuted or row.claim.why
+
+
+def flights_of(claim: Claim) -> tuple[str, ...]:
+    """Addresses of the flights that a row rests on."""
+    if isinstance(claim, ExpectationClaim):
+        return (claim.address,)
+    return claim.flights if isinstance(claim, FlightClaim) else ()
+
+
+def test_of(claim: Claim) -> str:
+    """The commands that check a row, in a checkout."""
+    if isinstance(claim, ExpectationClaim):
+        lines = [f"tiltsim check '{claim.address}'"]
+    elif isinstance(claim, FlightClaim):
+        lines = [f"pytest -n 0 '{_TESTS}::{_FLOWN}[{claim.id}]'"]
+    else:
+        lines = [f"pytest -n 0 '{_TESTS}::{_COMPUTED}[{claim.id}]'"]
+    return "\n".join([*lines, *(f"pytest -n 0 tests/{test}" for test in claim.statement.tests)])
 
 
 def criterion_text(claim: Claim) -> str:
@@ -220,6 +242,26 @@ def failure_text(failure: Failure) -> str:
     return (
         f"{failure.address} on the {failure.plant} plant: {verdict.expectation.metric} = {shown}, "
         f"expected {verdict.bounds}"
+    )
+
+
+def lead_text(rows: list[Row]) -> str:
+    """The first sentences of the summary."""
+    counts, statements = count(rows), count_statements(rows)
+    alone = sum(row.on_the_thesis_alone for row in rows)
+    whole: dict[str, bool] = {}
+    for row in rows:
+        whole[row.statement.id] = whole.get(row.statement.id, True) and row.on_the_thesis_alone
+    return (
+        f"{alone} rows are reproduced on the thesis's own numbers alone: nothing in their tests "
+        f"is ours. They complete {sum(whole.values())} of {len(whole)} distinct statements. Of all "
+        f"{len(rows)} rows, {counts[ClaimVerdict.REPRODUCED]} are reproduced, "
+        f"{counts[ClaimVerdict.QUALITATIVE]} qualitatively, {counts[ClaimVerdict.FITTED]} are "
+        "consistent with a fit and show nothing, "
+        f"{counts[ClaimVerdict.NOT_REPRODUCED]} are not reproduced "
+        f"({statements[ClaimVerdict.NOT_REPRODUCED]} statements), and in "
+        f"{counts[ClaimVerdict.WRONG]} the published claim is wrong "
+        f"({len(errors(rows))} distinct errors)."
     )
 
 
