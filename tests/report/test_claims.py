@@ -130,7 +130,8 @@ class RandomMetrics(dict):
         # A rotor may rest and nothing saturate; other metrics are never exactly zero.
         can_be_zero = name in {"min_rotor_speed", "saturated_fraction"}
         zero = can_be_zero and self._is_bad()
-        value = 0.0 if zero else 10.0 ** self.random.uniform(-3.0, 1.0)
+        largest = 4.0 if name == "final_input_split" else 1.0  # a difference of squares
+        value = 0.0 if zero else 10.0 ** self.random.uniform(-3.0, largest)
         below = name == "min_published_determinant" or (name.startswith("min") and self._is_bad())
         self[name] = -value if below else value
         return self[name]

@@ -11,11 +11,14 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim, Metrics
-from tiltsim.report.draft import draft
+from tiltsim.report.statement import Statement
 from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS, robustness
-from tiltsim_controllers.analysis.singularity import residuals
+from tiltsim_controllers.analysis.singularity import margin_over_gait, residuals
 from tiltsim_controllers.analysis.stability import third_order_loop
+from tiltsim_controllers.analysis.two_color_map import delta
 from tiltsim_controllers.laws.gains import GAIN_SETS
+from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.vehicle.parameters import PRESETS
 
 if TYPE_CHECKING:
     from tiltsim_controllers.vehicle.parameters import Vehicle
@@ -23,6 +26,15 @@ if TYPE_CHECKING:
 
 PRINTED: Final = 1e-3
 """Accuracy to which the coefficients of the determinant are printed."""
+
+PRINTED_OFFSET: Final = 0.334198
+"""α₁ + α₃ on blue as ch. 8 prints it (rad), 1e-5 beside the exact 2δ; twice α₁ of its point P."""
+
+DIGITS: Final = (
+    "Both equations for blue hold exactly where tan 2δ = 2 r / (1 - r²), r = K_m / (L K_f). The "
+    "chapter's digits are those of the printed coefficients, tan 2δ = {}."
+)
+"""Note on an angle of the map; the chapter's printed ratio goes into it."""
 
 Quantity: TypeAlias = "str | Callable[[Metrics], float]"
 """A metric by name, or a number computed from several."""
@@ -78,19 +90,71 @@ def terms_hold(
     )
 
 
-def robustness_claim(source: str, key: str, case: str, refuted: str = "") -> AnalysisClaim:
-    """The claim that a published gait is more robust than its biased twin.
+def exact_and_printed(
+    statement: Statement, exact: float, rounded: float, published: str
+) -> tuple[AnalysisClaim, AnalysisClaim]:
+    """Rows of an angle of the map: in closed form, and with the printed coefficients (rad).
 
     Args:
-        source, case, refuted: Of the claim.
-        key: Of the gait in `PUBLISHED_GAITS`.
+        statement: Whose rows.
+        exact: In closed form.
+        rounded: With the printed coefficients.
+        published: As printed, to six digits.
     """
+    near = (float(published) - 1e-4, float(published) + 1e-4)
+    return (
+        AnalysisClaim(
+            statement,
+            lambda: exact,
+            case="in closed form",
+            published=published,
+            unit="rad",
+            in_kind=near,
+            why="The printed digits are those of rounded coefficients.",
+        ),
+        AnalysisClaim(
+            statement,
+            lambda: rounded,
+            case="with the printed coefficients of R_φ and R_θ",
+            published=published,
+            unit="rad",
+        ),
+    )
 
-    def measure() -> bool:
-        return bool(robustness(PUBLISHED_GAITS[key]).claim_holds)
 
-    statement = "The gait is more robust than its biased twin"
-    return AnalysisClaim(draft(source, statement), measure, case=case, refuted=refuted)
+def beats_its_biased_twin(key: str) -> bool:
+    """Whether a published gait, on the exact lines, is more robust than its biased twin.
+
+    ``key`` of the gait in `PUBLISHED_GAITS`.
+    """
+    return bool(robustness(PUBLISHED_GAITS[key]).claim_holds)
+
+
+def angles_as_printed(key: str) -> Floats:
+    """A gait of `PUBLISHED_GAITS` with the printed P and offset, over a period, shape (N, 4)."""
+    vehicle = PRESETS["ar_drone_2"]
+    gait = PUBLISHED_GAITS[key].gait
+    first, second, third, _ = gait.angles(gait.sample_times(401)).T
+    blue = np.abs(third - first) > 1e-12
+    aside = 0.5 * PRINTED_OFFSET - delta(vehicle)  # so that a path through P passes the printed one
+    first, second = first + aside, second - aside
+    return np.stack(
+        [
+            first,
+            second,
+            np.where(blue, PRINTED_OFFSET - first, first),
+            np.where(blue, -PRINTED_OFFSET - second, second),
+        ],
+        axis=-1,
+    )
+
+
+def margins_as_printed(key: str) -> tuple[float, float]:
+    """Smallest margins (rad) of `angles_as_printed` and of its twin with a bias of 80 %."""
+    angles = angles_as_printed(key)
+    biased = angles * (1.0, 1.0, 0.8, 0.8)
+    own, twin = (margin_over_gait(a, PRESETS["ar_drone_2"]).min() for a in (angles, biased))
+    return float(own), float(twin)
 
 
 def routh_holds(rows: Sequence[str]) -> bool:

@@ -3,58 +3,143 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Final
+
+import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
 from tiltsim.report.claims.ch06 import RANK
-from tiltsim.report.draft import draft
-from tiltsim.report.measures import no_rotor_stops, robustness_claim, tracking_error
+from tiltsim.report.measures import beats_its_biased_twin, margins_as_printed
+from tiltsim.report.statement import Origin, Statement
 from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS, robustness
+from tiltsim_controllers.analysis.two_color_map import delta, find_roots
+from tiltsim_controllers.vehicle.parameters import PRESETS
 
-_SHAPES: Final = "The figures are not available: place and color as described, size ours. "
-_CIRCLE: Final = "ch07_robust_gaits/circle#"
+_VEHICLE: Final = PRESETS["ar_drone_2"]
+_BLUE_ROUNDED: Final = "ch07_robust_gaits/circle#gait_1_blue_rounded"
+_GAITS: Final = {f"ch07_gait_{number}": f"Gait {number}" for number in (1, 2, 3)}
+_FIGURES: Final = dict(zip(_GAITS, (5, 6, 7), strict=True))
+_SENSITIVE: Final = 0.2  # rad
+
+
+def _one_root_of_each_color() -> bool:
+    """At 200 random (α₁, α₂) off the lines through P: the roots are one red, one blue."""
+    rng, offset = np.random.default_rng(7), 2.0 * delta(_VEHICLE)
+    for first, second in rng.uniform(-1.5, 1.5, (200, 2)).tolist():
+        lines = [(first, second), (offset - first, -offset - second)]
+        roots = [(r.alpha_3, r.alpha_4) for r in find_roots(first, second, _VEHICLE)]
+        apart = np.array(roots)[:, np.newaxis] - np.array(lines)  # angles up to a multiple of pi
+        same = np.abs(np.sin(apart)).max(axis=-1) < 1e-6
+        if len(roots) != 2 or not same.any(axis=0).all():
+            return False
+    return True
+
+
+def _red_is_more_robust() -> bool:
+    """Whether both red gaits have a larger margin than Gait 1 with the printed offset."""
+    blue, _ = margins_as_printed("ch07_gait_1")
+    return all(robustness(PUBLISHED_GAITS[f"ch07_gait_{i}"]).margin > blue for i in (2, 3))
 
 
 def _is_sensitive() -> bool:
-    """Whether less than 0.2 rad of roll or pitch make the biased gait singular."""
     margin = robustness(PUBLISHED_GAITS["ch07_gait_2"]).margin_biased
-    return margin is not None and margin < 0.2
+    return margin is not None and margin < _SENSITIVE
 
 
-def _some_gait_tracks(flights: Mapping[str, Metrics]) -> bool:
-    return any(
-        not metrics["diverged"] and tracking_error(metrics) < 0.1 for metrics in flights.values()
-    )
+def _rotors_keep_turning(flights: Mapping[str, Metrics]) -> bool:
+    metrics = flights[_BLUE_ROUNDED]
+    return not metrics["diverged"] and float(metrics["min_rotor_speed"]) > 0.0
 
+
+TWO_ROOTS = Statement(
+    id="ch7-two-roots",
+    source="ch. 7, Sec. 3.1, Figs. 2-3",
+    text="The complete map: to every (α₁, α₂) belong two (α₃, α₄), one of each color's planes",
+    thesis="“… there are two (α₃(t₁), α₄(t₁)) corresponding to a defined (α₁(t₁), α₂(t₁)), in "
+    "general, to design a robust gait. … Fig. 2 and Fig. 3 display the entire map for the first "
+    "time.”",
+    criterion="At each of 200 random points, R_φ = R_θ = 0 has two roots within a quarter turn, "
+    "one on the red and one on the blue lines",
+    finding="map",
+    pictures=("map",),
+)
+MORE_ROBUST = Statement(
+    id="ch7-more-robust",
+    source="ch. 7, Sec. 3.2, Figs. 5-7",
+    text="The gait is more robust than its biased twin",
+    thesis="“In general, the acceptable attitude region enlarges if the gait following Two Color "
+    "Map Theorem” (Figs. 5-7: red curves of the gait, blue ones of its twin with α₃ and α₄ at "
+    "80 %).",
+    criterion="The gait's smallest singularity margin at level attitude exceeds its twin's, and "
+    "is not zero",
+    note="The rectangles of Fig. 4 have the described color; place and size are ours.",
+    origins=(Origin.PATH,),
+)
+RED_ESPECIALLY = Statement(
+    id="ch7-red-especially",
+    source="ch. 7, Sec. 3.2",
+    text="The advantage is greatest for the red gaits",
+    thesis="“… the acceptable attitude region enlarges …, especially for the gaits with the red "
+    "(α₃, α₄).”",
+    criterion="Both red gaits have larger singularity margins than the blue one with the printed "
+    "offset",
+    origins=(Origin.PATH,),
+    finding="red",
+)
+SENSITIVE = Statement(
+    id="ch7-biased-2-sensitive",
+    source="ch. 7, Sec. 3.2, Fig. 6",
+    text="The biased Gait 2 is very sensitive to the attitude",
+    thesis="“The decoupling matrix introduced by the biased Gait 2 is very sensitive to the "
+    "attitude.”",
+    criterion=f"Its singularity margin at level attitude is below {_SENSITIVE} rad; ours, larger "
+    "or not, would not refute the thesis, whose rectangle we do not have",
+    origins=(Origin.PATH,),
+)
+NO_SATURATION = Statement(
+    id="ch7-no-saturation",
+    source="ch. 7, Sec. 5, Fig. 9",
+    text="No rotor reaches zero speed while Gait 1 tracks",
+    thesis="“No saturations or negative constraints of the angular velocities of the propeller "
+    "are activated in the simulation.”",
+    criterion="The flight with Gait 1 and the printed offset completes, and no rotor stops or "
+    "reverses",
+    finding="blue",
+)
 
 CLAIMS = (
-    robustness_claim("ch. 7, Sec. 3.2, Fig. 5", "ch07_gait_1", "Gait 1", RANK),
-    robustness_claim("ch. 7, Sec. 3.2, Fig. 6", "ch07_gait_2", "Gait 2"),
-    robustness_claim("ch. 7, Sec. 3.2, Fig. 7", "ch07_gait_3", "Gait 3"),
+    AnalysisClaim(TWO_ROOTS, _one_root_of_each_color),
+    *(
+        AnalysisClaim(
+            MORE_ROBUST,
+            partial(beats_its_biased_twin, key),
+            case=name + (", on the exact lines" if key == "ch07_gait_1" else ""),
+            where=f"ch. 7, Sec. 3.2, Fig. {_FIGURES[key]}",
+            refuted=RANK if key == "ch07_gait_1" else "",
+            finding="blue" if key == "ch07_gait_1" else "red",
+        )
+        for key, name in _GAITS.items()
+    ),
     AnalysisClaim(
-        draft(
-            "ch. 7, Sec. 3.2, Fig. 6",
-            "The biased Gait 2 is very sensitive to the attitude (margin below 0.2 rad)",
-        ),
+        MORE_ROBUST,
+        lambda: margins_as_printed("ch07_gait_1")[0] > margins_as_printed("ch07_gait_1")[1],
+        case="Gait 1, with the printed offset",
+        where="ch. 7, Sec. 3.2, Fig. 5",
+        note="The margin is that of a matrix singular up to the sixth digit of the offset.",
+    ),
+    AnalysisClaim(RED_ESPECIALLY, _red_is_more_robust),
+    AnalysisClaim(
+        SENSITIVE,
         _is_sensitive,
-        why=_SHAPES
-        + "The biased gait keeps 1.45 rad. A larger rectangle reduces it: 0.25 rad with a "
-        "corner at (-1.40, 1.40) rad, beyond which the red gait itself is singular.",
+        why="Our rectangle's biased twin keeps most of a right angle. A larger rectangle would "
+        "leave it less.",
     ),
     FlightClaim(
-        draft(
-            "ch. 7, Sec. 4.2, Figs. 10-11",
-            "A gait on the map tracks the circle with little error (0.1 m)",
-        ),
-        tuple(_CIRCLE + name for name in ("gait_1_blue", "gait_2", "gait_3")),
-        _some_gait_tracks,
-    ),
-    FlightClaim(
-        draft(
-            "ch. 7, Sec. 5, Fig. 9",
-            "No rotor reaches zero speed while tracking (the red gaits, which track)",
-        ),
-        tuple(_CIRCLE + name for name in ("gait_2", "gait_3")),
-        no_rotor_stops,
+        NO_SATURATION,
+        (_BLUE_ROUNDED,),
+        _rotors_keep_turning,
+        why="The flight is lost at the first attitude error: a matrix that the sixth digit of an "
+        "angle keeps regular requires rotor speeds that no rotor has.",
     ),
 )

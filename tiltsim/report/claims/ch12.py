@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from functools import partial
+from math import atan
 from typing import Final
 
 import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim
-from tiltsim.report.claims.ch08 import DIGITS
-from tiltsim.report.draft import draft
-from tiltsim.report.measures import coefficient, determinant_coefficients, terms, terms_hold
+from tiltsim.report.measures import (
+    DIGITS,
+    coefficient,
+    determinant_coefficients,
+    exact_and_printed,
+    terms,
+    terms_hold,
+)
+from tiltsim.report.statement import Statement
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.analysis.two_color_map import (
     curve_l,
-    delta,
     grid_roots,
     point_p,
     region,
@@ -54,13 +60,19 @@ def _coefficients_differ_greatly() -> bool:
     return False
 
 
+def _l_apart() -> float:
+    """Largest distance (rad) of L from that of ch. 8 along the second angle."""
+    axis = np.linspace(-1.0, 1.0, 41)
+    return float(np.abs(curve_l(axis, _VEHICLE) - curve_l(axis, _FORMER)).max())
+
+
 def _maps_are_similar() -> bool:
     """The same counts of roots, P within 0.01 rad and L within 0.02 rad."""
     own, former = (root_counts(grid_roots(vehicle)) for vehicle in (_VEHICLE, _FORMER))
-    axis = np.linspace(-1.0, 1.0, 41)
-    apart = np.abs(curve_l(axis, _VEHICLE) - curve_l(axis, _FORMER)).max()
     return bool(
-        np.array_equal(own, former) and abs(_P[0] - point_p(_FORMER)[0]) < 0.01 and apart < 0.02
+        np.array_equal(own, former)
+        and abs(_P[0] - point_p(_FORMER)[0]) < 0.01
+        and _l_apart() < 0.02
     )
 
 
@@ -84,28 +96,120 @@ def _two_vehicles_can_share_a_map() -> bool:
     return all(np.allclose(own, changed, rtol=1e-9, atol=1e-12) for own, changed in same)
 
 
+COEFFICIENTS = Statement(
+    id="ch12-coefficients",
+    source="ch. 12, Eq. (4)",
+    text="Coefficients of the determinant, times 1.025",
+    thesis="Condition (4) prints them with four digits.",
+    criterion="The coefficient rounds to the printed digits, scaled so that the smallest of R_φ "
+    "is 1.025",
+)
+TERMS = Statement(
+    id="ch12-terms",
+    source="ch. 12, Eqs. (4)-(10)",
+    text="The condition is printed correctly, term by term",
+    thesis="Eqs. (6), (7), (8) and (10) print R_φ, R_θ and R.",
+    criterion="Every product of sines and cosines has the printed coefficient, to 0.001, and none "
+    "is missing",
+)
+DIFFER = Statement(
+    id="ch12-coefficients-differ",
+    source="ch. 12",
+    text="The coefficients differ greatly from those of ch. 3",
+    thesis="“In comparison, the coefficients in Equation (4) in this chapter differ greatly from "
+    "the ones in Equation (17) in Chapter 3.”",
+    criterion="Some coefficient differs by a tenth or more, up to a common factor, which does not "
+    "move a zero of the determinant",
+)
+PARAMETERS = Statement(
+    id="ch12-three-parameters",
+    source="ch. 12",
+    text="L, K_f and K_m are the only parameters that the map depends on",
+    thesis="“… there are three parameters (…, L, …, K_f, …, K_m) of the tiltrotor model that "
+    "influences the result of the Two Color Map.”",
+    criterion="Other masses, inertias and gravity leave R, R_φ and R_θ of 50 random gaits bit for "
+    "bit the same",
+    finding="map",
+)
+UNIQUE = Statement(
+    id="ch12-unique-map",
+    source="ch. 12",
+    text="Every set of L, K_f and K_m has its own map",
+    thesis="“… the differences in these three parameters … result in different decoupling "
+    "matrices, which consequentially lead to the unique corresponding Two Color Map.”",
+    criterion="Another set with the same ratio K_m / (L K_f) has another map",
+    finding="map",
+)
+SIMILAR = Statement(
+    id="ch12-similar-map",
+    source="ch. 12, Fig. 1",
+    text="The map is very similar to that of ch. 8",
+    thesis="“Note that these results are highly resemble to the ones reported in Chapter 8.”",
+    criterion="The grid has the same numbers of roots, P moves by less than 0.01 rad, L by less "
+    "than 0.02 rad",
+    pictures=("map-luukkonen",),
+)
+SHIFTS = Statement(
+    id="ch12-shifts",
+    source="ch. 12, Fig. 1",
+    text="P and L move",
+    thesis="“Firstly, the orange point (α₁, α₂) in Figure 1 slightly changes its location. "
+    "Secondly, L … shifts its shape in Two Color Map.”",
+    criterion="The point, or the curve somewhere on the square, moves by more than 0.001 rad",
+    pictures=("map-luukkonen",),
+)
+P = Statement(
+    id="ch12-p",
+    source="ch. 12, Fig. 1",
+    text="The colors meet at P = (p, -p) with p",
+    thesis="“The orange point is at (α₁, α₂) = (0.168421, -0.168421).”",
+    criterion="p rounds to the printed digits; within 1e-4 rad it is the same point",
+    note="In closed form p is δ = atan(K_m / (L K_f)), half the offset. "
+    + DIGITS.format("1.025 / 2.927"),
+    finding="map",
+)
+P_BELOW = Statement(
+    id="ch12-p-below",
+    source="ch. 12, Fig. 1",
+    text="P lies below L, in S_D",
+    thesis="“Note that this point is a little below L rather than on L.”",
+    criterion="R at P, in closed form, is below zero by more than rounding",
+    finding="red",
+)
+OFFSET = Statement(
+    id="ch12-offset",
+    source="ch. 12, Eq. (12)",
+    text="On blue α₁ + α₃ = -(α₂ + α₄) is",
+    thesis="Eq. (12): α₃ = -α₁ + 0.336842, α₄ = -α₂ - 0.336842.",
+    criterion="The sum rounds to the printed digits; within 1e-4 rad it is the same plane",
+    note="In closed form it is 2δ. " + DIGITS.format("1.025 / 2.927"),
+    finding="map",
+)
+
 CLAIMS = (
     *(
         AnalysisClaim(
-            draft("ch. 12, Eq. (4)", "Coefficients of the determinant, times 1.025"),
+            COEFFICIENTS,
             partial(coefficient, part, name, _VEHICLE, SCALE),
-            case=f"{part}, {name}",
+            case=" ".join(map("{}{}".format, name, (1, 2, 3, 4))) + factors,
             published=published,
         )
-        for published, part, name in (
-            ("4.100", "R", "cccc"),
-            ("5.680", "R", "cccs"),
-            ("0.9954", "R", "ccss"),
-            ("2.050", "R", "cscs"),
-            ("0.1743", "R", "csss"),
-            ("1.025", "R_phi", "ccsc"),
-            ("2.927", "R_phi", "ccss"),
+        for published, part, name, factors in (
+            ("4.100", "R", "cccc", ", cos φ cos θ"),
+            ("5.680", "R", "cccs", ", cos φ cos θ"),
+            ("0.9954", "R", "ccss", ", cos φ cos θ"),
+            ("2.050", "R", "cscs", ", cos φ cos θ"),
+            ("0.1743", "R", "csss", ", cos φ cos θ"),
+            ("1.025", "R_phi", "ccsc", ", sin φ cos θ"),
+            ("2.927", "R_phi", "ccss", ", sin φ cos θ"),
         )
     ),
     *(
         AnalysisClaim(
-            draft(f"ch. 12, {equations}", f"{name} is printed correctly, term by term"),
+            TERMS,
             partial(terms_hold, part, printed, _VEHICLE, SCALE),
+            case=name,
+            where=f"ch. 12, {equations}",
         )
         for equations, name, part, printed in (
             ("Eqs. (4), (6)", "R_φ", "R_phi", EQ_6),
@@ -114,42 +218,23 @@ CLAIMS = (
         )
     ),
     AnalysisClaim(
-        draft("ch. 12", "The coefficients differ greatly from those of ch. 3"),
+        DIFFER,
         _coefficients_differ_greatly,
         refuted="Up to the common factor 1.025 they are those of ch. 3 within 1 %: K_m / (L K_f) "
         "is 0.1700 instead of 0.1687.",
     ),
+    AnalysisClaim(PARAMETERS, _only_three_parameters_matter),
     AnalysisClaim(
-        draft("ch. 12", "L, K_f and K_m are the only parameters that the map depends on"),
-        _only_three_parameters_matter,
-    ),
-    AnalysisClaim(
-        draft("ch. 12", "Every set of L, K_f and K_m has its own map"),
+        UNIQUE,
         lambda: not _two_vehicles_can_share_a_map(),
         refuted="The map depends only on the ratio K_m / (L K_f).",
     ),
+    AnalysisClaim(SIMILAR, _maps_are_similar),
+    AnalysisClaim(SHIFTS, lambda: abs(_P[0] - point_p(_FORMER)[0]) > 1e-3, case="point P"),
+    AnalysisClaim(SHIFTS, lambda: _l_apart() > 1e-3, case="curve L"),
+    *exact_and_printed(P, _P[0], 0.5 * atan(1.025 / 2.927), "0.168421"),
     AnalysisClaim(
-        draft("ch. 12, Fig. 1", "The map is very similar to that of ch. 8"), _maps_are_similar
+        P_BELOW, lambda: region(*_P, _VEHICLE) == "S_D", refuted="As in ch. 8: P lies on L exactly."
     ),
-    AnalysisClaim(
-        draft("ch. 12, Fig. 1", "The colors meet at P = (p, -p) with p"),
-        lambda: _P[0],
-        published="0.168421",
-        unit="rad",
-        in_kind=(0.1684, 0.1685),
-        why=DIGITS,
-    ),
-    AnalysisClaim(
-        draft("ch. 12, Fig. 1", "P lies below L, in S_D"),
-        lambda: region(*_P, _VEHICLE) == "S_D",
-        refuted="As in ch. 8: P lies on L exactly.",
-    ),
-    AnalysisClaim(
-        draft("ch. 12, Eq. (12)", "On blue α₁ + α₃ = -(α₂ + α₄) is"),
-        lambda: 2.0 * delta(_VEHICLE),
-        published="0.336842",
-        unit="rad",
-        in_kind=(0.3368, 0.3369),
-        why=DIGITS,
-    ),
+    *exact_and_printed(OFFSET, 2.0 * _P[0], atan(1.025 / 2.927), "0.336842"),
 )
