@@ -273,6 +273,17 @@ def test_the_fourth_derivative_fails_for_want_of_anti_windup(plant):
     assert error[stop] < 1e-3 < 1.0 < error[-1]
 
 
+def test_with_the_exact_tilt_column_no_rotor_stops():
+    """Eq. (27) lacks 1 - I_T / I_B; with it the inputs drift, too, at less than half the pace."""
+    failure, exact = (
+        fly(f"ch10_state_drift/fourth_derivative#{name}", "thesis") for name in ("failure", "exact")
+    )
+    assert failure["rotor_speed_2"].min() == 0.0 < 50.0 < exact["rotor_speed_2"].min()
+    before = (failure["time"] > 10.0) & (failure["time"] < 25.0)
+    drifts = [abs(np.ptp(flight["input_split"][before])) for flight in (failure, exact)]
+    assert 0.0 < drifts[1] < 0.5 * drifts[0]
+
+
 # --- on screen, and from the command line ------------------------------------------------------
 
 

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from tiltsim.report.findings import FINDINGS
+from tiltsim.report.pictures import PICTURES
+from tiltsim.scenario.library import library_entries
 
 ROOT = Path(__file__).parents[2]
 
@@ -25,10 +27,19 @@ def test_the_tests_behind_a_finding_exist(finding):
 
 @pytest.mark.parametrize("finding", FINDINGS, ids=lambda finding: finding.key)
 def test_the_numbers_of_a_finding_are_computed_and_all_used(finding):
-    template = " ".join(finding.text)
+    template = " ".join((*finding.text, finding.proof))
     names = set(re.findall(r"{(\w+)}", template))
     assert set(finding.numbers()) == names
     assert not re.search(r"[{}]", " ".join(finding.paragraphs))
+
+
+def test_flights_and_pictures_of_findings_exist():
+    library = {address for address, _, _ in library_entries()}
+    pictures = {picture.name for picture in PICTURES}
+    for finding in FINDINGS:
+        assert finding.proof, finding.key
+        assert set(finding.flights) <= library, finding.key
+        assert set(finding.pictures) <= pictures, finding.key
 
 
 def test_keys_are_unique():

@@ -69,6 +69,16 @@ def test_red_residual_factors_and_vanishes_on_l(first, second, ratio) -> None:
     assert sides == {"S_U", "S_D"} or not inside
 
 
+@pytest.mark.parametrize("edge", [1, 2])
+def test_red_is_also_singular_on_two_lines_near_the_edge(vehicle, edge) -> None:
+    angle = delta(vehicle) - np.pi / 2
+    for other in (-0.9, 0.2, 0.7):
+        first, second = (angle, other) if edge == 1 else (other, -angle)
+        np.testing.assert_allclose(residuals((first, second) * 2, vehicle), 0.0, atol=1e-13)
+        aside = (first + 0.01, second) if edge == 1 else (first, second - 0.01)
+        assert abs(float(residuals(aside * 2, vehicle).R)) > 1e-3
+
+
 def test_p_lies_on_l_and_both_colors_meet_there(vehicle) -> None:
     """Ch. 8 and 12 place P a little below L; it is on it, and tau has rank 2 there."""
     first, second = point_p(vehicle)
@@ -144,6 +154,7 @@ def test_positive_residual_needs_red_and_fills_a_triangle(vehicle) -> None:
     assert {(-7, 7), (-7, -7), (7, 7), (0, 0)} <= positive
     assert all(j >= i - 2 for i, j in positive)
     assert {(i, j) for i in range(-7, 8) for j in range(i, 8)} <= positive
+    assert (len(positive), sum(j < i for i, j in positive)) == (128, 8)
 
 
 def test_no_grid_point_lies_exactly_on_a_crossing_of_planes() -> None:

@@ -93,6 +93,11 @@ def _colors_apart(first: float, second: float, offset: float) -> float:
     return max(abs(offset - 2.0 * first), abs(offset + 2.0 * second))
 
 
+def _colors_meet(p: float, offset: float) -> bool:
+    """Whether at (p, -p) both colors have the same angles, to half of the last printed digit."""
+    return _colors_apart(p, -p, offset) < 5e-7
+
+
 def _colors_meet_nowhere_else() -> bool:
     """On the square, in steps of 0.01 rad, the colors' angles differ by their distance from P."""
     axis = np.linspace(-1.0, 1.0, 201).tolist()
@@ -307,9 +312,7 @@ CLAIMS = (
         for name in PATHS
     ),
     *(
-        AnalysisClaim(
-            MEET, lambda p=p, offset=offset: _colors_apart(p, -p, offset) < 5e-7, case=case
-        )
+        AnalysisClaim(MEET, partial(_colors_meet, p, offset), case=case)
         for case, p, offset in (
             ("in closed form", _P[0], 2.0 * delta(_VEHICLE)),
             ("with the printed digits", 0.5 * PRINTED_OFFSET, PRINTED_OFFSET),

@@ -1,78 +1,23 @@
-"""Our own findings, each with the tests that support it.
-
-The texts contain no measured number: functions compute them when the report is made.
-"""
+"""Findings about where the decoupling matrix is singular."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from tiltsim_controllers.analysis.attainable import (
-    attainable_accelerations,
-    attainable_torque_thrust,
-    published_speed_limits,
-)
+from tiltsim.report.findings.finding import Finding
 from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS
 from tiltsim_controllers.analysis.quadrotor_singularity import (
     normalized_determinant,
     published_singular_curve,
 )
 from tiltsim_controllers.analysis.singularity import residuals, singular_values
-from tiltsim_controllers.analysis.stability import third_order_loop
-from tiltsim_controllers.analysis.two_color_map import delta
-from tiltsim_controllers.laws import gains, yaw_position
+from tiltsim_controllers.analysis.two_color_map import delta, grid_roots
+from tiltsim_controllers.laws import yaw_position
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
-
-@dataclass(frozen=True, kw_only=True)
-class Finding:
-    """A result beyond the thesis."""
-
-    key: str
-    title: str
-    chapters: str
-    text: tuple[str, ...]
-    """Paragraphs with ``{names}`` of ``numbers``; text between backticks is code."""
-    tests: Mapping[str, tuple[str, ...]]
-    """Names of tests by their file in the folder of the tests."""
-    numbers: Callable[[], dict[str, str]] = dict
-
-    @property
-    def paragraphs(self) -> list[str]:
-        """The text with its numbers."""
-        numbers = self.numbers()
-        return [paragraph.format(**numbers) for paragraph in self.text]
-
-    @property
-    def nodes(self) -> list[str]:
-        """Its tests, as pytest addresses them."""
-        return [f"tests/{file}::{name}" for file, names in self.tests.items() for name in names]
-
-    @property
-    def command(self) -> str:
-        """The command that runs its tests."""
-        return " \\\n  ".join(("pytest -n 0", *self.nodes))
-
-
 _VEHICLE: Final = PRESETS["ar_drone_2"]
-
-
-def _matrix_gain() -> dict[str, str]:
-    """Routh's numbers for ch. 4's roll gains, and the loop gain that the printed matrix adds."""
-    roll = gains.GAIN_SETS["ch04"]
-    factor = 2.0 * _VEHICLE.hover_rotor_speed
-    loop = third_order_loop("roll", (roll.roll_1, roll.roll_2, roll.roll_3), 1.0)
-    worst = max(root.real for root in np.roots(loop.polynomial))
-    return {
-        "factor": f"{factor:.0f}",
-        "product": f"{roll.roll_1 * roll.roll_2:g}",
-        "third": f"{roll.roll_3:g}",
-        "root": f"{worst:+.2f}",
-    }
 
 
 def _map_numbers() -> dict[str, str]:
@@ -100,6 +45,19 @@ def _blue_numbers() -> dict[str, str]:
     }
 
 
+def _triangle_numbers() -> dict[str, str]:
+    """Grid points of ch. 6 that have a root with R > 0, and those of them below the diagonal."""
+    positive = {
+        (i, j)
+        for i, row in enumerate(grid_roots(_VEHICLE)[1:-1])
+        for j, cell in enumerate(row[1:-1])
+        for root in cell
+        if root.R > 1e-9
+    }
+    below = sum(j < i for i, j in positive)
+    return {"points": str(len(positive)), "below": str(below)}
+
+
 def _quadrotor_numbers() -> dict[str, str]:
     """The exact determinant on ch. 2's published curve, and the unstable root of its gains."""
     vehicle = PRESETS["ar_drone_2_unrounded"]
@@ -114,26 +72,9 @@ def _quadrotor_numbers() -> dict[str, str]:
     }
 
 
-def _attainable_numbers() -> dict[str, str]:
-    """Rotor limits of ch. 9, and what gait 2 attains within them."""
-    limits = published_speed_limits(_VEHICLE)
-    angles = PUBLISHED_GAITS["ch09_gait_2"].gait.angles(0.0)
-    found = attainable_torque_thrust(angles, _VEHICLE, limits)
-    sideways = attainable_accelerations(angles, _VEHICLE, limits)
-    return {
-        "slow": f"{limits[0]:.2f}",
-        "fast": f"{limits[1]:.2f}",
-        "low": f"{found.lower[2]:.2f}",
-        "high": f"{found.upper[2]:.2f}",
-        "sideways": f"{sideways.upper[0]:.2f}",
-    }
-
-
 _SINGULARITY: Final = "controllers/analysis/test_singularity.py"
 _MAP: Final = "controllers/analysis/test_two_color_map.py"
 _CLAIMS: Final = "report/test_claims.py"
-_ATTAINABLE: Final = "controllers/analysis/test_attainable.py"
-_FLIGHTS: Final = "simulation/test_simulate.py"
 
 FINDINGS: Final = (
     Finding(
@@ -141,20 +82,54 @@ FINDINGS: Final = (
         title="The singular attitudes of a gait are a great circle, in closed form",
         chapters="ch. 3, 5, 6",
         text=(
-            "With the torque-free force `n = (-R_θ, R_φ, R)` and world up in body axes, `r₃`, the "
-            "determinant is `n · r₃` for every vehicle. It vanishes where world up is "
-            "perpendicular to `n`: the curve of singular attitudes needs no root finding, and the "
-            "smallest rotation to a singular attitude is `asin(n · r₃ / |n|)`, the singularity "
-            "margin that tiltsim records in flight.",
+            "The determinant of the decoupling matrix `[τ; r₃ᵀF]` is `2 L² K_f³ K_m (R cos φ cos θ "
+            "+ R_φ sin φ cos θ + R_θ sin θ)` for every vehicle: ch. 3 drops the constant, and R, "
+            "R_φ and R_θ, functions of the tilt angles, are the coefficients that ch. 6 names so. "
+            "With the vector `n = (-R_θ, R_φ, R)` in body axes, the force that the rotors make at "
+            "zero torque, and world up in body axes, `r₃`, the bracket is `n · r₃`. It vanishes "
+            "where world up is perpendicular to `n`: the curve of singular attitudes needs no root "
+            "finding, and the smallest rotation to a singular attitude is `asin(n · r₃ / |n|)`, "
+            "the singularity margin that tiltsim records in flight.",
         ),
+        proof="Proof: the first three rows are τ, so the determinant is the scalar product of the "
+        "last row, r₃ᵀF, with the minors of τ, which span τ's kernel; F times them is n.",
         tests={
             "controllers/vehicle/test_decoupling_matrix.py": (
                 "test_determinant_has_the_closed_form",
             ),
-            _SINGULARITY: ("test_margin_is_the_smallest_rotation_to_a_singular_attitude",),
+            _SINGULARITY: (
+                "test_determinant_matches_lapack_for_any_vehicle",
+                "test_torque_free_inputs_are_the_minors_of_tau",
+                "test_margin_is_the_smallest_rotation_to_a_singular_attitude",
+            ),
             "controllers/analysis/test_unacceptable_attitudes.py": (
                 "test_the_closed_form_is_singular_and_agrees_with_the_great_circle",
             ),
+        },
+        pictures=("determinant",),
+    ),
+    Finding(
+        key="rank",
+        title="For any number of rotors the torque-free forces decide what is singular",
+        chapters="beyond ch. 3",
+        text=(
+            "Let N rotors have the effectiveness F and τ (3 × N each), and let V be the space of "
+            "forces that they make at zero torque, F times the kernel of τ. The matrix `[τ; r₃ᵀF]` "
+            "has rank 4 exactly if τ has rank 3 and world up, r₃, is not perpendicular to V. So "
+            "the singular attitudes are a great circle if V is a line (every four-rotor vehicle, "
+            "and parallel rotors of any number), two opposite directions of world up if it is a "
+            "plane, none if it is the whole space, and all if it is zero or τ has lost rank. The "
+            "singularity margin is `asin |P r₃|`, P projecting on V; for four rotors it is the one "
+            "above.",
+        ),
+        proof="Proof: with B = [τ; r₃ᵀF] and K an orthonormal basis of τ's kernel, det(B Bᵀ) = "
+        "det(τ τᵀ) |Kᵀ Fᵀ r₃|², as the last row counts only with its share in the kernel. The "
+        "second factor is zero exactly where r₃ is perpendicular to V = range(F K).",
+        tests={
+            "controllers/analysis/test_any_number_of_rotors.py": (
+                "test_what_is_singular_follows_from_the_torque_free_forces",
+                "test_four_rotors_have_the_margin_of_the_library",
+            )
         },
     ),
     Finding(
@@ -166,6 +141,8 @@ FINDINGS: Final = (
             "`s1 s2 c3 c4`, as ch. 5 and 6 have it, and `-2.880 s1 c2 s3 s4 sφ cθ` must be `s1 c2 "
             "c3 s4`. All other printed coefficients are correct to their last digit.",
         ),
+        proof="At tilt angles of 0 and 90 degrees one product of sines and cosines is 1 and the "
+        "others are 0: the exact determinant gives its coefficients one by one.",
         tests={
             _SINGULARITY: (
                 "test_the_slips_of_the_pen_are_slips",
@@ -175,29 +152,6 @@ FINDINGS: Final = (
         },
     ),
     Finding(
-        key="gains",
-        title="The printed attitude gains are unstable; a missing factor in the matrix helps",
-        chapters="ch. 3, Eq. (12); ch. 4, Prop. 4",
-        text=(
-            "Ch. 4's gains (1, 10, 50) fail the thesis's own Routh condition: K₁K₂ = {product} "
-            "does not exceed K₃ = {third}, and the rightmost root of the loop has the real part "
-            "{root}. Yet the flights agree with the published ones if the decoupling matrix is "
-            "used as printed, without the factor 2|ϖ| in its three attitude rows: the attitude "
-            "loops then have a gain about {factor} times higher, and are stable.",
-            'Both forms are available: `decoupling = "published"` and `"exact"`, the latter with '
-            "gains that satisfy the condition. A scenario whose gains fail is rejected with the "
-            "numbers.",
-        ),
-        tests={
-            "controllers/analysis/test_stability.py": (
-                "test_published_attitude_gains_fail_under_the_exact_matrix",
-                "test_published_gains_pass_under_the_published_matrix",
-                "test_published_matrix_multiplies_the_attitude_loops_by_twice_the_hover_speed",
-            )
-        },
-        numbers=_matrix_gain,
-    ),
-    Finding(
         key="map",
         title="The Two Color Map has a closed form for every vehicle",
         chapters="ch. 6-8, 12",
@@ -205,31 +159,46 @@ FINDINGS: Final = (
             "With `tan δ = K_m / (L K_f)` the equations R_φ = R_θ = 0 factor, and their roots are "
             "two families of lines: red, α₃ = α₁ and α₄ = α₂; blue, α₃ = 2δ - α₁ and α₄ = -2δ - "
             "α₂. 2δ is {ar} rad for the vehicle of ch. 3 and {luukkonen} rad for that of ch. 12. "
-            "The printed 0.334198 comes from searching with coefficients of four digits. This "
-            "removes the limitation that ch. 12 names, a map known only by numerical search.",
+            "The printed offsets 0.334198 and 0.336842 are, to all digits, atan(1.000/2.880) and "
+            "atan(1.025/2.927), the ratios of the printed coefficients. This removes the "
+            "limitation that ch. 12 names, a map known only by numerical search.",
         ),
+        proof="Proof: R_θ = k sin(α₁ + α₃ - 2δ) sin(α₂ - α₄) and R_φ = k sin(α₂ + α₄ + 2δ) "
+        "sin(α₃ - α₁) with k = (tan δ + cot δ) / 2.",
         tests={
             _MAP: (
                 "test_residuals_factor",
                 "test_roots_are_roots_and_lie_on_the_lines",
+                "test_offsets_round_to_the_published_ones",
                 "test_printed_coefficients_explain_the_published_offset",
             )
         },
+        pictures=("map", "map-luukkonen"),
         numbers=_map_numbers,
     ),
     Finding(
         key="red",
-        title="Red gaits have no singular attitude at all",
+        title="Red gaits have no singular attitude at all, except where R vanishes",
         chapters="ch. 6, 8",
         text=(
             "On red the torque-free force is exactly vertical: R_φ = R_θ = 0, and the margin is a "
-            "right angle everywhere except on the curve L, where R vanishes, too. P lies exactly "
-            "on L, not slightly below it; switching colors there passes through a singular point.",
+            "right angle wherever R is not zero, too. It is zero on the curve L, tan α₂ = tan α₁ - "
+            "2 tan δ, and on two lines near the edge of the map, α₁ = δ - π/2 and α₂ = π/2 - δ. P "
+            "lies exactly on L, not slightly below it; switching colors there passes through a "
+            "singular point.",
         ),
+        proof="Proof: on red R is a product whose factors vanish on L and on the two lines; at P = "
+        "(δ, -δ) the first one is 2 tan δ - tan δ - tan δ.",
         tests={
             _SINGULARITY: ("test_blue_gaits_lose_rank_and_red_gaits_are_vertical",),
-            _MAP: ("test_p_lies_on_l_and_both_colors_meet_there",),
+            _MAP: (
+                "test_red_residual_factors_and_vanishes_on_l",
+                "test_red_is_also_singular_on_two_lines_near_the_edge",
+                "test_p_lies_on_l_and_both_colors_meet_there",
+            ),
         },
+        flights=("ch08_generalized_map/stabilization#E1", "ch07_robust_gaits/circle#gait_2"),
+        pictures=("red-and-biased", "red-circle"),
     ),
     Finding(
         key="blue",
@@ -240,15 +209,31 @@ FINDINGS: Final = (
             " the second. So τ has rank 2, and R, R_φ and R_θ vanish together ({zero} on gait 1 of"
             " ch. 6, set on the exact lines). The results of ch. 6 to 8 for blue gaits depend on "
             "rounded angles, which leave the smallest singular value of τ at {printed} of the "
-            "largest. The torques that ch. 9 calls linearly coupled are this loss of rank. In "
-            "simulation every flight with a blue gait ends as singular immediately.",
+            "largest. The torques that ch. 9 calls linearly coupled are this loss of rank.",
+            "A blue gait on the exact lines ends every flight at once. With the printed, rounded "
+            "offset a hover survives as long as nothing disturbs it; on a circle the first "
+            "attitude error demands rotor speeds that no rotor has, and the vehicle is lost.",
         ),
+        proof="Proof: with ρ = √(L² K_f² + K_m²) the columns of τ are ρ (0, cos(α₁-δ), sin(α₁-δ)), "
+        "ρ (cos(α₂+δ), 0, -sin(α₂+δ)), ρ (0, -cos(α₃-δ), sin(α₃-δ)) and ρ (-cos(α₄+δ), 0, "
+        "-sin(α₄+δ)). On blue α₃ - δ = -(α₁ - δ) and α₄ + δ = -(α₂ + δ).",
         tests={
             _MAP: ("test_blue_has_no_margin_and_red_all_of_it",),
-            _ATTAINABLE: ("test_linear_coupling_of_blue_gaits_is_their_loss_of_rank",),
+            "controllers/analysis/test_attainable.py": (
+                "test_linear_coupling_of_blue_gaits_is_their_loss_of_rank",
+            ),
             _SINGULARITY: ("test_thesis_rounding_of_the_blue_offset_leaves_a_trace_of_rank",),
-            _FLIGHTS: ("test_blue_gait_is_singular_from_the_start",),
+            "simulation/test_simulate.py": ("test_blue_gait_is_singular_from_the_start",),
+            "report/test_flown_findings.py": (
+                "test_a_rounded_blue_gait_hovers_undisturbed_and_is_lost_on_a_circle",
+            ),
         },
+        flights=(
+            "ch07_robust_gaits/circle#gait_1_blue",
+            "ch07_robust_gaits/circle#gait_1_blue_rounded",
+            "ch08_generalized_map/stabilization#gait_3_rounded",
+        ),
+        pictures=("blue-and-biased",),
         numbers=_blue_numbers,
     ),
     Finding(
@@ -258,9 +243,14 @@ FINDINGS: Final = (
         text=(
             "Ch. 6 gives the grid points with R > 0 as a triangle with vertices (-7, 7), (-7, -5) "
             "and (5, 7), in units of π/16. It excludes the untilted vehicle, for which R = 4. "
-            "Computed, it reaches (-7, -7) and (7, 7).",
+            "Computed, there are {points} points: all of the triangle (-7, 7), (-7, -7), (7, 7) "
+            "with its diagonal, and {below} points below it.",
         ),
+        proof="R > 0 needs red, and on red R is positive above the curve L, which lies below the "
+        "diagonal by at most 2δ.",
         tests={_MAP: ("test_positive_residual_needs_red_and_fills_a_triangle",)},
+        pictures=("map",),
+        numbers=_triangle_numbers,
     ),
     Finding(
         key="switching",
@@ -269,48 +259,12 @@ FINDINGS: Final = (
         text=(
             "Ch. 3 says that a gait going from (α₂, α₄) = (1, 1) to (-1, -1) must cross a singular"
             " gait in all cases. For α₁ = -α₃ = ±1.4 it need not: both ends are in the same "
-            "region.",
+            "region. Sec. 7 of the chapter itself takes the sentence back: “this is not always "
+            "true”.",
         ),
+        proof="R, computed along the straight way, keeps its sign for these two pairs.",
         tests={_CLAIMS: ("test_one_pair_of_chapter_3_can_switch_without_a_crossing",)},
-    ),
-    Finding(
-        key="statics",
-        title="Steady-state errors follow from statics, and can be removed",
-        chapters="ch. 4",
-        text=(
-            "The position at which a vehicle comes to rest follows from the direction of its "
-            "torque-free force, without simulation; both plants agree with it, and with Fig. 4 to "
-            "its last digit. (Its text swaps the labels: A is the conventional decoupler, B the "
-            "modified one.) Choosing roll and pitch so that the torque-free force itself points "
-            "along the desired one gives an exact decoupler in closed form, which leaves no "
-            "steady-state error.",
-        ),
-        tests={
-            _FLIGHTS: (
-                "test_setpoint_flights_come_to_rest_where_statics_say",
-                "test_setpoint_error_is_the_published_one",
-                "test_exact_decoupler_leaves_no_steady_error",
-            ),
-            "controllers/laws/test_attitude_altitude.py": (
-                "test_exact_decoupler_points_the_torque_free_force_along_the_wanted_one",
-            ),
-        },
-    ),
-    Finding(
-        key="gyroscopic",
-        title="The gyroscopic torque omitted by the thesis can make the vehicle lose control",
-        chapters="ch. 4",
-        text=(
-            "The two plants differ only by the gyroscopic torque of the rotating body. It hardly "
-            "affects most flights. The instant trot with T = 3 s and the conventional decoupler is"
-            " an exception: it completes on the thesis's equations and loses control in MuJoCo.",
-        ),
-        tests={
-            _FLIGHTS: (
-                "test_plants_differ_by_the_gyroscopic_torque_once_the_body_rolls_and_yaws",
-                "test_plants_agree_where_they_model_the_same",
-            )
-        },
+        pictures=("determinant",),
     ),
     Finding(
         key="quadrotor",
@@ -326,6 +280,8 @@ FINDINGS: Final = (
             " 500` has roots at {root}. With stable gains the same control law crosses the curve "
             "without any effect.",
         ),
+        proof="S is not symmetric under a reversal of roll, which alone refutes it for a vehicle "
+        "that is its own mirror image.",
         tests={
             "controllers/laws/test_yaw_position.py": (
                 "test_the_determinant_is_the_exact_one",
@@ -337,6 +293,7 @@ FINDINGS: Final = (
                 "test_the_slip_in_eq_31_does_not_touch_the_determinant",
             ),
         },
+        pictures=("singular-surface", "through-the-curve"),
         numbers=_quadrotor_numbers,
     ),
     Finding(
@@ -349,6 +306,7 @@ FINDINGS: Final = (
             "diverges. With the printed reference it does not: that is a corner of the closed "
             "zone, where the attitude comes to rest.",
         ),
+        proof="Shown by flights.",
         tests={
             "controllers/laws/test_switching.py": (
                 "test_experiment_2_is_lost_after_switches",
@@ -356,25 +314,5 @@ FINDINGS: Final = (
             )
         },
     ),
-    Finding(
-        key="limits",
-        title="Rotor limits leave little acceleration",
-        chapters="ch. 9",
-        text=(
-            "With rotor speeds from {slow} to {fast} rad/s and no yaw torque, gaits 1 and 4 have "
-            "no solution, as published. Gait 2 reaches thrusts from {low} to {high} N; at 4.2 N "
-            "the body accelerations span ±{sideways} m/s², by exact polytopes and by linear "
-            "programs alike, where ch. 9 prints ±2 m/s².",
-        ),
-        tests={
-            _ATTAINABLE: (
-                "test_published_speed_limits",
-                "test_gaits_1_and_4_cannot_free_themselves_of_yaw",
-                "test_gaits_2_and_3",
-                "test_support_function_is_that_of_a_linear_program",
-            )
-        },
-        numbers=_attainable_numbers,
-    ),
 )
-"""All findings, in the order of the report."""
+"""In the order of the report."""

@@ -1,0 +1,66 @@
+"""Findings that only flights show."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+
+import tiltsim
+
+pytestmark = pytest.mark.slow  # more laws to compile than to fly
+
+
+@cache
+def fly(address, plant="thesis", duration=32.0):
+    """A flight of the library, without its end; 12 s after the transient are whole periods."""
+    changes = {
+        "simulation.plant": plant,
+        "simulation.engine": "native",
+        "simulation.duration": duration,
+    }
+    return tiltsim.simulate(tiltsim.load_scenario(address, changes))
+
+
+def error(address):
+    return fly(address).metrics()["sup_position_error_after_20s"]
+
+
+@pytest.mark.parametrize("form", ["instant", "continuous"])
+def test_the_modified_decoupler_is_worse_at_short_periods_only(form):
+    for period, worse in ((1, True), (3, False)):
+        conventional, modified = (
+            error(f"ch04_tracking/line#{form}_t{period}_{name}")
+            for name in ("conventional", "modified")
+        )
+        assert (modified > 1.1 * conventional) == worse
+        assert (modified < 0.9 * conventional) != worse
+
+
+@pytest.mark.parametrize("decoupler", ["modified", "conventional"])
+def test_gallops_beat_the_walk_with_the_modified_decoupler(decoupler):
+    walk, *gallops = (
+        error(f"ch05_gaits/line#{gait}_third_t1_{decoupler}")
+        for gait in ("walk", "transverse_gallop", "rotary_gallop")
+    )
+    if decoupler == "modified":
+        assert max(gallops) < 0.8 * walk
+    else:
+        assert min(gallops) > 1.2 * walk
+
+
+def test_the_measured_acceleration_saves_the_flight_that_the_modelled_loses():
+    completed = {
+        address: fly(f"ch04_tracking/{address}_t3_conventional", "mujoco").end.kind == "completed"
+        for address in ("line#instant", "measured_acceleration#line")
+    }
+    assert completed == {"line#instant": False, "measured_acceleration#line": True}
+
+
+def test_a_rounded_blue_gait_hovers_undisturbed_and_is_lost_on_a_circle():
+    hover = fly("ch08_generalized_map/stabilization#gait_3_rounded", duration=3.0)
+    assert hover.end.kind == "completed"
+    assert hover.metrics()["min_decoupling_condition"] < 1e-5
+    circle = fly("ch07_robust_gaits/circle#gait_1_blue_rounded", duration=3.0)
+    assert circle.end.kind != "completed"
+    assert circle.end.time < 0.01

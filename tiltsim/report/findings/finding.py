@@ -1,0 +1,42 @@
+"""A finding: what it says, why it is true, and what would fail if it were false."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """A result beyond the thesis."""
+
+    key: str
+    title: str
+    chapters: str
+    text: tuple[str, ...]
+    """Paragraphs with ``{names}`` of ``numbers``; text between backticks is code."""
+    proof: str
+    """Why it is true, or where that is derived; also with ``{names}``."""
+    tests: Mapping[str, tuple[str, ...]]
+    """Names of tests by their file in the folder of the tests."""
+    flights: tuple[str, ...] = ()
+    """Addresses in the scenario library that show it."""
+    pictures: tuple[str, ...] = ()
+    """Names of pictures of the report that show it."""
+    numbers: Callable[[], dict[str, str]] = dict
+
+    @property
+    def paragraphs(self) -> list[str]:
+        """The text and the proof with their numbers."""
+        numbers = self.numbers()
+        return [paragraph.format(**numbers) for paragraph in (*self.text, self.proof)]
+
+    @property
+    def nodes(self) -> list[str]:
+        """Its tests, as pytest addresses them."""
+        return [f"tests/{file}::{name}" for file, names in self.tests.items() for name in names]
+
+    @property
+    def command(self) -> str:
+        """The command that runs its tests."""
+        return " \\\n  ".join(("pytest -n 0", *self.nodes))
