@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import tiltsim
+from tests.views.recordings import entities
 from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
@@ -17,6 +18,9 @@ from tiltsim.models.user_vehicle import read_user_vehicle
 from tiltsim.plants.command import Command
 from tiltsim.plants.flight_model import build_model
 from tiltsim.resources import shipped_folder
+from tiltsim.vehicles.rotorcraft import COLUMN_UNITS
+from tiltsim.views.rerun.recording_file import save_recording
+from tiltsim.views.vehicle_views import flight_figure, views_of
 
 DOCS = Path(__file__).parents[2] / "docs"
 TETRAHEDRON = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -356,9 +360,11 @@ def test_a_mass_that_no_body_makes_up_for_is_refused(write, vehicle, words):
         build_model(assemble(scenario(write(), vehicle=vehicle)))
 
 
-def test_ones_own_controller_flies_any_layout(write):
+@pytest.fixture
+def other_layout(write):
+    """A hovering tiltrotor with one rotor higher than the others."""
     text = changed('pos="0 0.2 0"', 'pos="0 0.2 0.05"')
-    flight = tiltsim.simulate(
+    return tiltsim.simulate(
         scenario(
             write(text),
             controller={"law": "python", "function": "test"},
@@ -366,8 +372,35 @@ def test_ones_own_controller_flies_any_layout(write):
         ),
         controller=lambda seen: Command(thrusts=[seen.vehicle.mass * 9.81 / 4.0] * 4),
     )
-    assert flight.end.kind == "completed"
-    assert abs(flight["z"][-1]) < 1e-6
+
+
+def test_ones_own_controller_flies_any_layout(other_layout):
+    assert other_layout.end.kind == "completed"
+    assert abs(other_layout["z"][-1]) < 1e-6
+
+
+def test_numbers_of_another_layout_are_left_out(other_layout, tmp_path, capsys):
+    flight = other_layout
+    assert {*COLUMN_UNITS} - {*flight.units} == {"singularity_margin", "determinant"}
+    assert not {"min_singularity_margin", "min_decoupling_condition"} & {*flight.metrics()}
+    titles = " ".join(axes.get_title("left") for axes in flight_figure(flight).axes)
+    assert "Position error" in titles
+    assert "margin" not in titles
+    assert "Attitudes flown" not in titles
+    save_recording([flight], tmp_path / "flight.rrd")
+    drawn = " ".join(entities(tmp_path / "flight.rrd"))
+    assert "position_error" in drawn
+    assert "singularity" not in drawn
+    assert "/plane/" not in drawn
+    film = views_of(flight.assembly).overlay(flight, 240)
+    assert film.rows(0) == {"roll, pitch": "+0.00, +0.00 rad"}
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        '[vehicle]\nmodel = "tiltrotor"\nmjcf = "my_tiltrotor.xml"\n'
+        '[controller]\nlaw = "python"\nfunction = "mine.py:law"\n'
+    )
+    assert main(["gait", str(path)]) == 2
+    assert "not on four equal arms at right angles" in capsys.readouterr().err
 
 
 def test_a_ground_needs_geoms_to_touch_it(write):

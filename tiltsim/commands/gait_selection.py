@@ -61,6 +61,11 @@ def _gait_of_scenario(address: str) -> SelectedGait:
             f"{address}: vehicle.model = {scenario.vehicle.model!r}: does not have a gait of four "
             "tilt angles"
         )
+    if not scenario.rotorcraft.has_standard_layout:
+        raise InputError(
+            f"{address}: vehicle.mjcf = {scenario.rotorcraft.mjcf!r}: its rotors are not on four "
+            "equal arms at right angles, of which the analysis is"
+        )
     gait = replace(scenario.gait.plan(vehicle), source=scenario.source)
     if scenario.gait.bias == 1.0:
         return SelectedGait(gait, vehicle, gait.name)

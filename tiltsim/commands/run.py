@@ -78,7 +78,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     vehicle = scenario.vehicle.resolve()
     if not arguments.quiet and isinstance(vehicle, Vehicle):
-        for warning in gait_warnings(scenario.gait.plan(vehicle), vehicle):
+        standard = scenario.rotorcraft.has_standard_layout
+        gait = scenario.gait.plan(vehicle)
+        for warning in gait_warnings(gait, vehicle) if standard else ():
             print_line(f"tiltsim: warning: gait: {warning}", error=True)
         _warn_unmodeled_properties(scenario)
     if arguments.rerun is None:

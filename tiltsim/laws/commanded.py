@@ -7,6 +7,7 @@ speeds of both vehicles are states here, so that commands may be speeds, thrusts
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -26,7 +27,7 @@ from tiltsim.laws.tiltrotor import (
     singularity_columns,
     tiltrotor_dynamics,
 )
-from tiltsim.vehicles.rotorcraft import ROTORCRAFT
+from tiltsim.vehicles.rotorcraft import OTHER_LAYOUT, ROTORCRAFT
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters
@@ -192,3 +193,8 @@ QUADROTOR: Final = ClosedLoop(
 
 COMMANDED_LOOPS: Final[dict[str, ClosedLoop]] = {"tiltrotor": TILTROTOR, "quadrotor": QUADROTOR}
 """Loops under commands, by the vehicle's model."""
+
+OTHER_LAYOUT_LOOPS: Final = {
+    model: replace(loop, kind=OTHER_LAYOUT) for model, loop in COMMANDED_LOOPS.items()
+}
+"""Those of a user's vehicle with another layout."""

@@ -209,6 +209,11 @@ class VehicleTable(AnyVehicleTable):
         except ValueError as error:
             raise self.mistake("mjcf", str(error)) from None
 
+    @property
+    def has_standard_layout(self) -> bool:
+        """Whether the rotors are at the ends of four equal arms at right angles."""
+        return self.user_vehicle is None or not self.user_vehicle.layout_mismatch
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.mjcf is not None:

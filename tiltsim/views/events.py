@@ -109,8 +109,9 @@ def rotorcraft_conditions(piece: Flight) -> Iterator[Condition]:
     """The conditions to report for a rotorcraft."""
     time, scenario = piece["time"], piece.scenario
     threshold = margin_threshold(scenario)
-    near = np.abs(piece["singularity_margin"]) < threshold
-    yield f"singularity margin below {threshold:g} rad", time, near
+    if "singularity_margin" in piece.columns:
+        near = np.abs(piece["singularity_margin"]) < threshold
+        yield f"singularity margin below {threshold:g} rad", time, near
     supervisor = scenario.controller.supervision
     if supervisor is not None:
         active = piece[SUPERVISION] > SUPERVISION_THRESHOLD

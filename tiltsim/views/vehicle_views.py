@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, Protocol
 
-from tiltsim.vehicles.rotorcraft import ROTORCRAFT
+from tiltsim.vehicles.rotorcraft import OTHER_LAYOUT, ROTORCRAFT
 from tiltsim.vehicles.tilt_car import TILT_CAR
 
 if TYPE_CHECKING:
@@ -49,6 +49,20 @@ class RotorcraftViews(VehicleViews):
         return ROTORCRAFT_DISPLAY
 
 
+class OtherLayoutViews(RotorcraftViews):
+    """Views of a rotorcraft whose singular attitudes are not known; its page leaves them out."""
+
+    def overlay(self, flight: Flight, height: int) -> Overlay:
+        from tiltsim.views.video.overlay import AttitudeOverlay
+
+        return AttitudeOverlay(flight, height)
+
+    def display(self) -> VehicleDisplay:
+        from tiltsim.views.rerun.rotorcraft_display import OTHER_LAYOUT_DISPLAY
+
+        return OTHER_LAYOUT_DISPLAY
+
+
 class TiltCarViews(VehicleViews):
     """Views of the tilt-car."""
 
@@ -70,6 +84,7 @@ class TiltCarViews(VehicleViews):
 
 VIEWS: Final[dict[VehicleKind, VehicleViews]] = {
     ROTORCRAFT: RotorcraftViews(),
+    OTHER_LAYOUT: OtherLayoutViews(),
     TILT_CAR: TiltCarViews(),
 }
 

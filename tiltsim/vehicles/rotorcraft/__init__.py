@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from math import inf
 from typing import TYPE_CHECKING, Final
 
@@ -175,3 +176,11 @@ ROTORCRAFT: Final = VehicleKind(
     metrics=rotorcraft_metrics,
 )
 """Tiltrotor and quadrotor."""
+
+SINGULARITY_COLUMNS: Final = ("singularity_margin", "determinant")
+
+OTHER_LAYOUT: Final = replace(
+    ROTORCRAFT,
+    columns={name: unit for name, unit in COLUMN_UNITS.items() if name not in SINGULARITY_COLUMNS},
+)
+"""A user's rotorcraft without four equal arms at right angles, of which those columns speak."""

@@ -37,8 +37,7 @@ def rotorcraft_metrics(
         **_altitude_metrics(time, columns["z_ref"] - columns["z"]),
         **_singular_zone_metrics(columns),
         "max_tilt_rate": float(max(rates)),
-        "min_singularity_margin": float(columns["singularity_margin"].min()),
-        "min_decoupling_condition": _min_decoupling_condition(columns, vehicle),
+        **_singularity_metrics(columns, vehicle),
         **saturation_metrics(time, saturated),
     }
 
@@ -105,6 +104,16 @@ def _singular_zone_metrics(columns: Mapping[str, Floats]) -> dict[str, float | b
         if switches.size:
             metrics["first_switch_time"] = float(columns["time"][switches[0] + 1])
     return metrics
+
+
+def _singularity_metrics(columns: Mapping[str, Floats], vehicle: Vehicle) -> dict[str, float]:
+    """How close the decoupling matrix came to a singular one, where a flight has such columns."""
+    if "singularity_margin" not in columns:
+        return {}
+    return {
+        "min_singularity_margin": float(columns["singularity_margin"].min()),
+        "min_decoupling_condition": _min_decoupling_condition(columns, vehicle),
+    }
 
 
 def _min_decoupling_condition(columns: Mapping[str, Floats], vehicle: Vehicle) -> float:

@@ -56,19 +56,28 @@ def rotorcraft_figure(flight: Flight) -> Figure:
         add_headings(figure, flight)
         halves: Any = figure.subfigures(1, 2, width_ratios=[2.1, 1.0])
         left, right = halves
-        panels = (_attitude, _tilt_angles, _altitude, _rotor_speeds, _position_error, _margin)
+        panels = [_attitude, _tilt_angles, _altitude, _rotor_speeds, _position_error]
+        has_margin = "singularity_margin" in flight.units
+        panels += [_margin] if has_margin else []
         series: Any = left.subplots(3, 2)
-        for axes, panel in zip(series.flat, panels, strict=True):
+        lowest = series[-1]
+        if not has_margin:
+            lowest = [series[-1, 0], series[-2, 1]]
+            series[-1, -1].remove()
+        for axes, panel in zip(series.flat, panels):
             style.time_axis(axes, flight["time"][-1])
-            axes.tick_params(labelbottom=axes in series[-1])
+            axes.tick_params(labelbottom=axes in lowest)
             panel(axes, flight)
             if panel is not _margin:
                 exclude_divergence_from_scale(axes, flight)
-        for axes in series[-1]:
+        for axes in lowest:
             axes.set_xlabel("time (s)")
         above, below = right.subplots(2, 1)
         plan_view(above, flight)
-        _roll_pitch_plane(below, flight)
+        if has_margin:
+            _roll_pitch_plane(below, flight)
+        else:
+            below.remove()
         return figure
 
 

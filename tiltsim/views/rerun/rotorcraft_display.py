@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Final
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import numpy as np
 
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
     from tiltsim.views.rerun.palette import Color
     from tiltsim_controllers.mathematics.scalar import Floats
+
+_Plotted = TypeVar("_Plotted", Series, Level)
 
 _ROTOR_COLORS: Final = (AMBER, SKY, PINK, GREEN)
 # Lines of equal angles and speeds would cover each other: later ones are thinner.
@@ -146,3 +149,16 @@ ROTORCRAFT_DISPLAY: Final = VehicleDisplay(
     up=(0.0, 0.0, 1.0),
     overview=False,
 )
+
+OTHER_LAYOUT_DISPLAY: Final = replace(
+    ROTORCRAFT_DISPLAY,
+    panels=lambda assembly: tuple(p for p in panels(assembly) if p.path != "singularity"),
+    series=lambda assembly: _without_margin(rotorcraft_series(assembly)),
+    levels=lambda assembly: _without_margin(rotorcraft_levels(assembly)),
+    plane=None,
+)
+"""For a layout whose singular attitudes are not known."""
+
+
+def _without_margin(entities: list[_Plotted]) -> list[_Plotted]:
+    return [entity for entity in entities if not entity.path.startswith("singularity/")]

@@ -42,13 +42,28 @@ class Overlay(Protocol):
         """Paint over the frame of a sample, in place."""
 
 
-class RotorcraftOverlay(Overlay):
-    """Singularity margin, attitude, and the roll-pitch plane in the corner."""
+class AttitudeOverlay(Overlay):
+    """The attitude of a rotorcraft."""
 
     camera = CameraPose(7.5, 130.0, -24.0)
+    caption = Caption("", 0, 0)
+
+    def __init__(self, flight: Flight, _height: int) -> None:
+        self._flight = flight
+
+    def rows(self, sample: int) -> dict[str, str]:
+        roll, pitch = (self._flight[name][sample] for name in ("roll", "pitch"))
+        return {"roll, pitch": f"{roll:+.2f}, {pitch:+.2f} rad"}
+
+    def paint(self, image: Image, sample: int) -> None:
+        """Paint nothing: without singular attitudes there is no inset."""
+
+
+class RotorcraftOverlay(AttitudeOverlay):
+    """Singularity margin, attitude, and the roll-pitch plane in the corner."""
 
     def __init__(self, flight: Flight, height: int) -> None:
-        self._flight = flight
+        super().__init__(flight, height)
         self._n = torque_free_directions(flight.columns, flight.scenario.rotorcraft.resolve())
         self._attitude = np.stack([flight["roll"], flight["pitch"]], axis=1)
         side = float(np.sign(flight["singularity_margin"][0])) or 1.0
@@ -58,11 +73,8 @@ class RotorcraftOverlay(Overlay):
         self.caption = Caption("shaded: unreachable attitudes", gap, self._inset.size + gap)
 
     def rows(self, sample: int) -> dict[str, str]:
-        flight = self._flight
-        return {
-            "singularity margin": f"{abs(flight['singularity_margin'][sample]):.2f} rad",
-            "roll, pitch": f"{flight['roll'][sample]:+.2f}, {flight['pitch'][sample]:+.2f} rad",
-        }
+        margin = abs(self._flight["singularity_margin"][sample])
+        return {"singularity margin": f"{margin:.2f} rad", **super().rows(sample)}
 
     def paint(self, image: Image, sample: int) -> None:
         trail = self._attitude[self._trail_start(sample) : sample + 1 : 2]
