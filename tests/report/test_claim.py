@@ -240,7 +240,7 @@ def test_a_flight_published_as_flown_and_lost_here_is_not_reproduced():
         ({"published": 0.1, "holds": [0.0, 1.0]}, "expect.holds"),
         ({"published": True, "holds": [1.0, 0.0]}, "expect.holds"),
         ({"published": 0.1, "claim": "ch4-no-such"}, "expect.claim"),
-        ({"published": inf}, rr"expect\[0\].published"),
+        ({"published": inf}, r"expect\[0\].published"),
         ({"metric": "diverged", "equals": True, "min": None, "published": 1.0}, "expect.published"),
     ],
 )
