@@ -1,0 +1,1 @@
+"""Seeded random inputs, generated from the schemas and parsers themselves."""

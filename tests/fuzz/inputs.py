@@ -1,0 +1,229 @@
+"""Kinds of inputs: each writes what it needs into a folder and returns what to run."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+from functools import cache
+from random import Random
+
+from tests.fuzz.documents import STRANGE, Documents, damaged, dotted, toml_document, toml_text
+from tiltsim.cli import build_parser, main
+from tiltsim.commands.schema import scenario_schema, sweep_schema
+from tiltsim.flight.reading import load_flight
+from tiltsim.resources import shipped_folder
+from tiltsim.scenario.loading import load_scenario, parse_override, parse_scenario
+from tiltsim.sweeps.loading import load_sweep
+
+SHORT = ["--quiet"]
+for _key in ("duration=0.004", "timestep=0.002", "record_timestep=0.002", 'engine="python"'):
+    SHORT += ["--set", f"simulation.{_key}"]
+SETPOINT = "ch04_tracking/setpoint#rho_0_modified"
+SWEEP = """
+[scenario.simulation]
+duration = 0.004
+timestep = 0.002
+engine = "python"
+[[axis]]
+type = "list"
+key = "initial.position[0]"
+values = [0.0, 0.1]
+"""
+
+schemas = cache(lambda: {"scenario": scenario_schema(), "sweep": sweep_schema()})
+
+
+@cache
+def known_values():
+    """Values by dotted key of scenarios, drawn until all tables of the schema had their turn."""
+    documents = Documents(schemas()["scenario"], Random(1), strange=0.0)
+    found = {}
+    for _ in range(300):
+        found |= dotted(documents.draw())
+    found = {key: value for key, value in found.items() if "[" not in key or key[-2] in "03"}
+    return sorted(found.items())
+
+
+@cache
+def options_of(command):
+    """A command's own options, but those that name files to write."""
+    (subparsers,) = (
+        action
+        for action in build_parser()._actions
+        if isinstance(action, argparse._SubParsersAction)
+    )
+    actions = subparsers.choices[command]._actions
+    return [a for a in actions if a.metavar != "FILE" and "--help" not in a.option_strings]
+
+
+def scenario_file(random, folder):
+    """A scenario file: read, and flown for a moment if it is valid."""
+    document = Documents(schemas()["scenario"], random).draw()
+    content = toml_document(document).encode(errors="surrogatepass")
+    if random.random() < 0.3:
+        library = sorted((shipped_folder("scenarios")).rglob("*.toml"))
+        content = damaged(random.choice(library).read_bytes(), random)
+    file = folder / random.choice(("a.toml", "b\x1b[2J.toml", "ü b.toml"))
+    file.write_bytes(content)
+    if random.random() < 0.9:
+        return lambda: load_scenario(file)
+    return lambda: main(["run", str(file), *SHORT])
+
+
+def sweep_file(random, folder):
+    """A sweep file."""
+    file = folder / "sweep.toml"
+    document = Documents(schemas()["sweep"], random).draw()
+    if random.random() < 0.8:
+        document["scenario"] = SETPOINT
+        document.setdefault("set", {})
+        document["axis"] = document.get("axis") or [{"type": "list"}]
+        for axis in document["axis"]:
+            if isinstance(axis, dict):
+                axis["key"], value = random.choice(known_values())
+                axis.pop("keys", None)
+                if axis.get("type") == "list":
+                    axis["values"] = [value, random.choice((value, value, *STRANGE))]
+    content = toml_document(document).encode(errors="surrogatepass")
+    if random.random() < 0.2:
+        content = damaged(SWEEP.encode(), random)
+    file.write_bytes(content)
+    return lambda: load_sweep(file)
+
+
+def override(random, _folder):
+    """One to three ``--set``."""
+    texts = []
+    for _ in range(random.choice((1, 1, 2, 3))):
+        key, value = random.choice(known_values())
+        value = toml_text(random.choice((value, value, *STRANGE[: random.randrange(1, 30)])))
+        if random.random() < 0.2:
+            key, value = (
+                damaged(text.encode(errors="replace"), random).decode(errors="replace")
+                for text in (key, value)
+            )
+        texts.append(f"{key}={value}")
+    if random.random() < 0.1:
+        given = [part for text in texts for part in ("--set", text)]
+        return lambda: main(["run", SETPOINT, *given, *SHORT])
+    return lambda: load_scenario(SETPOINT, dict(map(parse_override, texts)))
+
+
+def arguments(random, folder):
+    """Arguments of the commands that analyse gaits."""
+    command = random.choice(("gait", "gait", "map", "singularity"))
+    given = ["quadrotor"] if command == "singularity" else []
+    if command == "gait":
+        key, values = random.choice(
+            (
+                ("--angles", ("0.2,0.2,-0.3,0.1", "0,0,0,0", "1,1,1,1", _word(random, None))),
+                ("--published", ("ch03_trot", "walk", _word(random, None))),
+                ("--balance", ("1,0,0", "0,0,-9.8", "1e9,0,0", _word(random, None))),
+                ("--", (SETPOINT, "ch04_tracking/circle#instant_t1_modified", "")),
+            )
+        )
+        given += [key, random.choice(values)] if key != "--" else [random.choice(values)]
+    for action in options_of(command):
+        if action.option_strings and random.random() < 1.5 / len(options_of(command)):
+            count = {None: 1, "+": 2, "?": 1}.get(action.nargs, action.nargs)
+            given += [action.option_strings[0], *(_word(random, action) for _ in range(count))]
+    return lambda: main([command, *given])
+
+
+def _word(random, action):
+    """A value of an option; None for a list of numbers or a name."""
+    if action is not None and action.choices and random.random() < 0.8:
+        return random.choice(list(action.choices))
+    numbers = ("0.3", "-0.2", "0", "1e-9", "3.15", "nan", "1e999", "", "x")
+    several = ["0.2", "0.2", "-0.3", "0.1"][: random.choice((2, 3, 4))]
+    if random.random() < 0.5:
+        several[random.randrange(len(several))] = random.choice(numbers)
+    words = (
+        ",".join(several),
+        random.choice(numbers),
+        f"mass={random.choice(numbers)}",
+        "ar_drone_2,drag_coefficient=1e-7",
+        random.choice(("red", "blue", "fixed", SETPOINT)),
+        str(random.choice(STRANGE))[:200].replace("\0", ""),
+    )
+    return random.choice(words)
+
+
+@cache
+def _model_texts():
+    return [file.read_bytes() for file in sorted(shipped_folder("mjcf").glob("*rotor.xml"))]
+
+
+def mjcf_file(random, folder):
+    """A vehicle's MJCF: an attribute changed, a tag removed, bytes damaged."""
+    shutil.copy(shipped_folder("mjcf") / "scene.xml", folder)
+    file, content = folder / "own.xml", random.choice(_model_texts())
+    for _ in range(random.choice((1, 1, 3))):
+        parts = content.split(b'"')
+        place = random.randrange(1, len(parts) - 1, 2)
+        new = random.choice((b"nan", b"1e300", b"-1", b"0 0 0", b"x", b"", b"\x01", b"9" * 400))
+        parts[place] = new if random.random() < 0.5 else damaged(parts[place], random)
+        content = b'"'.join(parts)
+    file.write_bytes(content)
+    model = random.choice(("tiltrotor", "quadrotor"))
+    return lambda: parse_scenario({"vehicle": {"model": model, "mjcf": str(file)}})
+
+
+def damaged_flight(random, folder):
+    """A ``flight.parquet``."""
+    (folder / "flight.parquet").write_bytes(damaged(_results(folder)["flight.parquet"], random))
+    return lambda: load_flight(folder)
+
+
+def damaged_sweep(random, folder):
+    """A finished sweep with a damaged file, continued."""
+    results = _results(folder)
+    chosen = random.choice([name for name in results if name.startswith("sweep/")])
+    for name, content in results.items():
+        if name.startswith("sweep"):
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(damaged(content, random) if name == chosen else content)
+    command = ["sweep", str(folder / "sweep.toml"), "--out", str(folder / "sweep")]
+    return lambda: main([*command, "--jobs", "1", "--quiet"])
+
+
+def damaged_cache(random, folder):
+    """A file of the cache of compiled code, which counts as missing."""
+    from tiltsim.engines.compiling import _SafeIndex
+
+    files = _SafeIndex(str(folder), "code", "stamp")
+    content = {"index": list(range(random.randrange(50)))}
+    whole = files._dump(content)
+    file = folder / "code"
+    file.write_bytes(damaged(whole, random))
+
+    def read():
+        assert files._read(str(file)) is None or file.read_bytes() == whole
+
+    return read
+
+
+_kept = {}
+
+
+def _results(folder):
+    """The files of a flight and of a finished sweep, made once."""
+    if not _kept:
+        place = folder / "made"
+        place.mkdir()
+        (place / "sweep.toml").write_text(SWEEP)
+        sweep = ["sweep", str(place / "sweep.toml"), "--out", str(place / "sweep"), "--quiet"]
+        assert main(["run", SETPOINT, *SHORT, "--set", "expect=[]", "--out", str(place)]) == 0
+        assert main([*sweep, "--jobs", "1"]) == 0
+        for file in place.rglob("*"):
+            if file.is_file() and file.suffix in {".parquet", ".json", ".toml"}:
+                _kept[file.relative_to(place).as_posix()] = file.read_bytes()
+        shutil.rmtree(place)
+    return _kept
+
+
+KINDS = (
+    *(scenario_file, scenario_file, scenario_file, sweep_file, sweep_file, override, override),
+    *(arguments, mjcf_file, damaged_flight, damaged_sweep, damaged_cache),
+)
+"""Kinds of inputs, by turns; those that matter most more often."""

@@ -1,0 +1,99 @@
+"""Run random inputs one after the other and report what is not refused as it should be."""
+
+from __future__ import annotations
+
+import io
+import resource
+import shutil
+import signal
+import warnings
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from random import Random
+from tempfile import mkdtemp
+from time import perf_counter
+from traceback import format_exception
+
+from tests.fuzz.inputs import KINDS
+from tiltsim.errors import InputError
+
+TIME_LIMIT = 30
+"""Seconds per input."""
+
+MEMORY_LIMIT = 2**30
+"""Bytes of the process."""
+
+
+class HangError(Exception):
+    """An input that takes longer than `TIME_LIMIT`."""
+
+
+def fuzz(count, seed, report=lambda done: None):
+    """Run ``count`` inputs of a seed; return the mistakes, a text each.
+
+    Input number n of a seed is always the same, however many are run.
+    """
+    mistakes = []
+    folder = Path(mkdtemp(prefix="fuzz"))
+    handler = signal.signal(signal.SIGALRM, _hang)
+    try:
+        for number in range(count):
+            mistake = run_one(number, seed, folder)
+            if mistake:
+                mistakes.append(f"seed {seed}, input {number} ({_kind(number)}): {mistake}")
+            report(number + 1)
+    finally:
+        signal.signal(signal.SIGALRM, handler)
+        shutil.rmtree(folder)
+    return mistakes
+
+
+def _kind(number):
+    return KINDS[number % len(KINDS)].__name__
+
+
+def _hang(_number, _frame):
+    raise HangError
+
+
+def run_one(number, seed, folder):
+    """Run one input; what is wrong, or an empty text."""
+    random = Random(f"{seed}:{number}")
+    place = folder / str(number)
+    place.mkdir()
+    run = KINDS[number % len(KINDS)](random, place)
+    out, err = io.StringIO(), io.StringIO()
+    start = perf_counter()
+    try:
+        with redirect_stdout(out), redirect_stderr(err), warnings.catch_warnings():
+            warnings.simplefilter("error")
+            signal.alarm(TIME_LIMIT)
+            run()
+    except SystemExit:
+        pass
+    except InputError as error:  # as `tiltsim.cli` prints it
+        from tiltsim.cli import _one_line
+
+        print(_one_line(error), file=err)
+        if "\n" in str(error):
+            return f"message of several lines: {str(error)!r}"
+    except HangError:
+        return f"takes longer than {TIME_LIMIT} s"
+    except BaseException as error:
+        return "".join(format_exception(error))
+    finally:
+        signal.alarm(0)
+        shutil.rmtree(place)
+    return _wrong_output(out.getvalue(), err.getvalue(), perf_counter() - start)
+
+
+def _wrong_output(out, err, seconds):
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    if memory > MEMORY_LIMIT:
+        return f"{memory / 2**20:.0f} MiB of memory"
+    if err.count("\n") > 1:
+        return f"{err.count(chr(10))} lines: {err[:500]!r}"
+    raw = {c for c in (out + err) if not (c.isprintable() or c in "\n\u00a0")}
+    if raw:
+        return f"control characters {raw!r} in {(out + err)[:500]!r}"
+    return f"{seconds:.0f} s" if seconds > TIME_LIMIT else ""
