@@ -67,7 +67,7 @@ def summary(report: Report) -> Iterator[str]:
 
 
 def _table(report: Report) -> Iterator[str]:
-    yield '<table class="counts"><thead><tr><th>Chapter</th>'
+    yield '<table class="counts"><thead><tr><th>Chapter</th><th class="n">thesis alone</th>'
     for verdict in ClaimVerdict:
         name = f'<span class="mark {CLASSES[verdict]}"><b>{verdict.value}</b></span>'
         yield f'<th class="n">{name}</th>'
@@ -83,7 +83,8 @@ def _table(report: Report) -> Iterator[str]:
 def _counts(name: str, rows: list[Row]) -> str:
     counts = count(rows)
     statements = sum(count_statements(rows).values())
-    cells = [*(counts[verdict] or "" for verdict in ClaimVerdict), len(rows), statements]
+    alone = sum(row.on_the_thesis_alone for row in rows)
+    cells = [alone, *(counts[verdict] or "" for verdict in ClaimVerdict), len(rows), statements]
     numbers = "".join(f'<td class="n">{cell}</td>' for cell in cells)
     return f"<tr><th>{name}</th>{numbers}</tr>"
 
