@@ -297,6 +297,22 @@ def test_layers_around_the_law_that_knows_its_gait_fly_the_same_three_ways():
 
 
 @pytest.mark.slow
+def test_rotors_with_inertia_fly_the_same_three_ways():
+    spinning = {"vehicle": {"rotor_inertia": 1e-5}}
+    rows = three_ways(
+        [
+            layered(spinning),
+            layered({"vehicle": {"rotor_inertia": 2e-5}}),
+            layered(spinning, STORMY, EVERYTHING, **LATE),
+            layered(spinning, plant="thesis"),
+            layered(spinning, LAWS["full_pose"], plant="thesis"),
+            layered(spinning, STORMY, EVERYTHING, plant="thesis", **LATE),
+        ]
+    )
+    assert all(row.end.kind == "completed" for row in rows)
+
+
+@pytest.mark.slow
 def test_air_around_quadrotors_flies_the_same_three_ways():
     quadrotor = LAWS["yaw_position"]
     three_ways(

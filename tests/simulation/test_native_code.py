@@ -20,6 +20,7 @@ from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.air import with_air
 from tiltsim.laws.layers.on_equations import on_equations
+from tiltsim.laws.layers.rotor_inertia import with_rotor_inertia
 from tiltsim.laws.layers.supervision import with_supervisor
 from tiltsim.plants.factory import make_plant
 
@@ -150,8 +151,10 @@ def test_no_two_control_steps_share_a_name_of_native_code(plant):
     tiltrotors = [loop for loop in laws if loop.dynamics.model == "tiltrotor"]
     real = [with_actuation(loop, steps) for loop in tiltrotors for steps in (0, 2)]
     aired = [with_air(loop) for loop in [*laws, *real] if loop.dynamics.model != "tilt_car"]
-    loops = [*laws, *real, *aired]
+    spinning = [with_rotor_inertia(loop) for loop in [*tiltrotors, *real]]
+    loops = [*laws, *real, *aired, *spinning]
     if plant == "thesis":
-        loops = [*laws[: len(LOOPS)], *map(on_equations, [*laws[len(LOOPS) :], *real, *aired])]
+        moved = [loop for loop in loops[len(LOOPS) :] if loop.equations is None]
+        loops = [*laws[: len(LOOPS)], *spinning[: len(tiltrotors) - 2], *map(on_equations, moved)]
     names = [loop.native_name(plant) for loop in loops]
     assert len(set(names)) == len(names) == len(loops) > 30

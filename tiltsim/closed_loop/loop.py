@@ -17,7 +17,7 @@ import numpy as np
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.parts import ExtraActuators
 from tiltsim_controllers.mathematics.records import flatten, record_dtype, record_size
-from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Quad, Values, Vector, scalar
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan, Scenario
@@ -142,6 +142,8 @@ class Equations:
             loop's `sample_fields` after the time; ``inputs`` are those in force.
         project_onto_limits: Scalar function ``(state, parameters) -> state`` for the end of each
             step: puts back what has passed a limit. None where there are no limits.
+        tilts: Scalar function ``(time, state, parameters, knots) -> tilt angles`` (rad) of the
+            tiltrotor.
     """
 
     inputs: Callable[..., Values]
@@ -150,6 +152,7 @@ class Equations:
     initial: Callable[[FlightPlan, ControlSetup], Vector]
     observe: Callable[..., Values]
     project_onto_limits: Callable[..., list[float]] | None = None
+    tilts: Callable[..., Quad] | None = None
 
 
 class SupervisedLaw(NamedTuple):

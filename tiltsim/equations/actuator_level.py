@@ -23,14 +23,14 @@ from tiltsim_controllers.mathematics.rotation import (
     rotation_from_euler,
     to_world,
 )
-from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, clipped, scalar
+from tiltsim_controllers.mathematics.scalar import Quad, Triple, Values, Vector, clipped, scalar
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
 
-Wrench = tuple[float, float, float, float, float, float]
-"""Force (N) and torque (N m) on the body, body axes."""
+Loads = tuple[float, float, float, float, float, float, float, float, float, float]
+"""Force (N) and torque (N m) on the body, body axes, and torques (N m) about the four hinges."""
 
 
 class Mechanics(NamedTuple):
@@ -39,6 +39,10 @@ class Mechanics(NamedTuple):
     vehicle: Vehicle  # the true one, not the controller's
     servo_frequency: float  # rad/s, natural
     servo_damping: float  # ratio
+    hinge_inertia_1: float  # kg m^2, of servo and pod
+    hinge_inertia_2: float
+    hinge_inertia_3: float
+    hinge_inertia_4: float
     max_tilt: float  # rad, at the stops of the servos
     min_speed: float  # rad/s, along a rotor's spin
     max_speed: float
@@ -52,6 +56,7 @@ def mechanics(plan: FlightPlan) -> Mechanics:
         plan.scenario.true_rotorcraft,
         servo.natural_frequency,
         servo.damping_ratio,
+        *rotorcraft.hinge_inertias,
         inf if servo.max_angle is None else servo.max_angle,
         *rotorcraft.speeds_along_spin,
     )
@@ -59,17 +64,17 @@ def mechanics(plan: FlightPlan) -> Mechanics:
 
 @scalar
 def external_acceleration(
-    rotation: Vector, wrench: Wrench, mass: float, disturbance: Triple
+    rotation: Vector, loads: Loads, mass: float, disturbance: Triple
 ) -> Triple:
     """Acceleration (m/s^2, world axes) without rotors and weight.
 
     Args:
         rotation: Body to world, rows first.
-        wrench: Force (N) and torque (N m), body axes.
+        loads: Of all but rotors and weight.
         mass: kg.
         disturbance: m/s^2, world axes.
     """
-    force_x, force_y, force_z = to_world(rotation, (wrench[0], wrench[1], wrench[2]))
+    force_x, force_y, force_z = to_world(rotation, (loads[0], loads[1], loads[2]))
     gust_x, gust_y, gust_z = disturbance
     return gust_x + force_x / mass, gust_y + force_y / mass, gust_z + force_z / mass
 
@@ -81,8 +86,8 @@ class ActuatorPlant(NamedTuple):
     rotor_states: int  # index of the first control that an activation integrates
     qpos: Callable[[Vector], Values]  # MuJoCo's, from the state
     qvel: Callable[[Vector], Values]
-    rates: Callable[[Vector, Vector, Wrench, Mechanics, Triple], Values]
-    """Time derivative of the motion: state, controls, wrench, mechanics, disturbance (m/s^2)."""
+    rates: Callable[[Vector, Vector, Loads, Mechanics, Triple], Values]
+    """Time derivative of the motion: state, controls, loads, mechanics, disturbance (m/s^2)."""
     project_onto_limits: Callable[[list[float], Mechanics], list[float]]
     """See `tiltsim.closed_loop.loop.Equations`."""
     initial: Callable[[FlightPlan], Values]  # motion
@@ -124,20 +129,32 @@ def servo_acceleration(command: float, angle: float, rate: float, mechanics: Mec
 
 
 @scalar
+def accelerations_by_hinge_torques(loads: Loads, mechanics: Mechanics) -> Quad:
+    """What the loads' torques about the hinges add to the servos' accelerations, rad/s^2."""
+    return (
+        loads[6] / mechanics.hinge_inertia_1,
+        loads[7] / mechanics.hinge_inertia_2,
+        loads[8] / mechanics.hinge_inertia_3,
+        loads[9] / mechanics.hinge_inertia_4,
+    )
+
+
+@scalar
 def _tiltrotor_rates(
-    state: Vector, ctrl: Vector, wrench: Wrench, mechanics: Mechanics, disturbance: Triple
+    state: Vector, ctrl: Vector, loads: Loads, mechanics: Mechanics, disturbance: Triple
 ) -> Values:
-    """Chapter 3's rigid body under thrusts, servos and a wrench; see `ActuatorPlant.rates`."""
+    """Chapter 3's rigid body under thrusts, servos and loads; see `ActuatorPlant.rates`."""
     vehicle = mechanics.vehicle
     a1, a2, a3, a4 = state[TILT_1], state[TILT_2], state[TILT_3], state[TILT_4]
     rate_1, rate_2, rate_3, rate_4 = state[RATE_1], state[RATE_2], state[RATE_3], state[RATE_4]
-    _, _, _, torque_x, torque_y, torque_z = wrench
-    acceleration = external_acceleration(rotation_of(state), wrench, vehicle.mass, disturbance)
+    torque_x, torque_y, torque_z = loads[3], loads[4], loads[5]
+    acceleration = external_acceleration(rotation_of(state), loads, vehicle.mass, disturbance)
     angular_acceleration = (
         torque_x / vehicle.inertia_xx,
         torque_y / vehicle.inertia_yy,
         torque_z / vehicle.inertia_zz,
     )
+    push_1, push_2, push_3, push_4 = accelerations_by_hinge_torques(loads, mechanics)
     # The controls are s varpi |varpi| with s = (-1, 1, -1, 1), the equations' are without s.
     squares = (-ctrl[4], ctrl[5], -ctrl[6], ctrl[7])
     return (
@@ -146,10 +163,10 @@ def _tiltrotor_rates(
         rate_2,
         rate_3,
         rate_4,
-        servo_acceleration(ctrl[0], a1, rate_1, mechanics),
-        servo_acceleration(ctrl[1], a2, rate_2, mechanics),
-        servo_acceleration(ctrl[2], a3, rate_3, mechanics),
-        servo_acceleration(ctrl[3], a4, rate_4, mechanics),
+        servo_acceleration(ctrl[0], a1, rate_1, mechanics) + push_1,
+        servo_acceleration(ctrl[1], a2, rate_2, mechanics) + push_2,
+        servo_acceleration(ctrl[2], a3, rate_3, mechanics) + push_3,
+        servo_acceleration(ctrl[3], a4, rate_4, mechanics) + push_4,
     )
 
 
@@ -207,14 +224,14 @@ def quadrotor_qvel(state: Vector) -> Values:
 
 @scalar
 def _quadrotor_rates(
-    state: Vector, ctrl: Vector, wrench: Wrench, mechanics: Mechanics, disturbance: Triple
+    state: Vector, ctrl: Vector, loads: Loads, mechanics: Mechanics, disturbance: Triple
 ) -> Values:
-    """Chapter 2's rigid body under thrusts and a wrench; see `ActuatorPlant.rates`."""
+    """Chapter 2's rigid body under thrusts and loads; see `ActuatorPlant.rates`."""
     vehicle = mechanics.vehicle
-    _, _, _, torque_x, torque_y, torque_z = wrench
+    torque_x, torque_y, torque_z = loads[3], loads[4], loads[5]
     _, _, _, _, _, _, roll, pitch, yaw, _, _, _ = quadrotor_body(state)
     rotation = rotation_from_euler(roll, pitch, yaw)
-    acceleration = external_acceleration(rotation, wrench, vehicle.mass, disturbance)
+    acceleration = external_acceleration(rotation, loads, vehicle.mass, disturbance)
     lever = vehicle.arm_length * vehicle.thrust_coefficient
     inputs = (
         vehicle.thrust_coefficient * (ctrl[0] + ctrl[1] + ctrl[2] + ctrl[3]),

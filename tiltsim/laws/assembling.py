@@ -13,6 +13,7 @@ from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.air import with_air
 from tiltsim.laws.layers.measured_acceleration import with_measured_acceleration
 from tiltsim.laws.layers.on_equations import on_equations
+from tiltsim.laws.layers.rotor_inertia import with_rotor_inertia
 from tiltsim.laws.layers.supervision import with_supervisor
 from tiltsim.laws.quadrotor_attitude_altitude import QUADROTOR_ATTITUDE_ALTITUDE
 from tiltsim.laws.switching import SWITCHING
@@ -69,6 +70,8 @@ def loop_of(scenario: Scenario) -> ClosedLoop:
         loop = with_actuation(loop, scenario.simulation.latency_steps, external)
     if scenario.has_air:
         loop = with_air(loop)
+    if scenario.has_rotor_inertia:
+        loop = with_rotor_inertia(loop)
     if measured:
         loop = with_measured_acceleration(loop)
     return on_equations(loop) if by_controls else loop

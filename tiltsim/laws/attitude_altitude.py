@@ -21,6 +21,7 @@ from tiltsim.laws.tiltrotor import (
     four,
     gait_equation_rates,
     gait_servo_commands,
+    gait_tilts,
     initial_equation_state,
     measured_acceleration,
     observe_gait_equations,
@@ -168,9 +169,8 @@ def sign_check_values(values: Vector, parameters: LoopParameters) -> Values:
 @scalar
 def _equation_inputs(time: float, state: Vector, parameters: LoopParameters, knots: Vector) -> Quad:
     """Rotor accelerations (rad/s^2) on the thesis's equations."""
-    law = parameters.law
-    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, knots)
-    return rotor_accelerations(time, law_state(state, (a1, a2, a3, a4)), law, knots)
+    tilts = gait_tilts(time, state, parameters, knots)
+    return rotor_accelerations(time, law_state(state, tilts), parameters.law, knots)
 
 
 def follows_position(scenario: Scenario) -> bool:
@@ -194,6 +194,7 @@ TILTROTOR: Final = ClosedLoop(
         rates=gait_equation_rates,
         initial=lambda plan, _setup: initial_equation_state(plan),
         observe=observe_gait_equations,
+        tilts=gait_tilts,
     ),
     supervised=SupervisedLaw(_supervised_controls, _supervised_reference_values, TILTROTOR_FIELDS),
     follows_position=follows_position,

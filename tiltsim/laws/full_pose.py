@@ -118,6 +118,12 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 
 
 @scalar
+def tilt_states(time: float, state: Vector, parameters: LoopParameters, knots: Vector) -> Quad:
+    """The tilt angles (rad) on the thesis's equations: states of their own."""
+    return four(state, FURTHER)
+
+
+@scalar
 def _equation_inputs(
     time: float, state: Vector, parameters: LoopParameters, knots: Vector
 ) -> Values:
@@ -166,6 +172,7 @@ FULL_POSE: Final = ClosedLoop(
         rates=equation_rates,
         initial=lambda plan, _setup: (*initial_equation_state(plan), *initial_tilts(plan)[0]),
         observe=observe_equations,
+        tilts=tilt_states,
     ),
 )
 """Full-pose control of the tiltrotor."""

@@ -137,14 +137,19 @@ def servo_lead(servo: ServoTable) -> float:
 
 
 @scalar
+def gait_tilts(time: float, state: Vector, parameters: Any, knots: Vector) -> Quad:
+    """Tilt angles (rad) that follow the gait exactly."""
+    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, parameters.law.gait, knots)
+    return a1, a2, a3, a4
+
+
+@scalar
 def gait_equation_rates(
     time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector, disturbance: Triple
 ) -> Values:
     """The thesis's equations with tilt angles that follow the gait exactly."""
-    law = parameters.law
-    a1, a2, a3, a4, _, _, _, _ = tilt_reference(time, law.gait, knots)
-    accelerations = four(inputs, 0)
-    return equations_of_motion(state, (a1, a2, a3, a4), accelerations, law.vehicle, disturbance)
+    tilts, vehicle = gait_tilts(time, state, parameters, knots), parameters.law.vehicle
+    return equations_of_motion(state, tilts, four(inputs, 0), vehicle, disturbance)
 
 
 @scalar

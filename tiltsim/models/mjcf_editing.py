@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tiltsim.models.parts import TiltServo
+from tiltsim_controllers.vehicle.states import ROTORS
 
 
 def parse_mjcf(path: Path) -> Any:
@@ -90,6 +91,13 @@ def add_wrench(root: Any, name: str) -> None:
         gear[index] = 1.0
         root.actuator.add("general", name=f"{name}_{axis}", site="imu", gear=gear)
     _extend_keyframes(root, ctrl=6)
+
+
+def add_hinge_torques(root: Any, name: str) -> None:
+    """Append a torque about each of the tilt hinges."""
+    for i in ROTORS:
+        root.actuator.add("general", name=f"{name}_hinge_{i}", joint=f"tilt_{i}")
+    _extend_keyframes(root, ctrl=len(ROTORS))
 
 
 def _extend_keyframes(root: Any, act: int = 0, ctrl: int = 0) -> None:

@@ -21,13 +21,24 @@ def require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
         raise ValueError(f"{name} = {value!r}: unknown; choose {', '.join(choices)}")
 
 
+WRENCH_SIZE: Final = 6
+HINGES: Final = 4
+
+
 class ExtraActuators(NamedTuple):
     """Actuators that a layer around a control law appends to the vehicle's, in this order."""
 
     states: int = 0  # integrators that act on nothing: ctrl is the rate of an activation
     memories: int = 0  # act on nothing and have no state: a held ctrl is all there is
     wrench: bool = False  # force (N) and torque (N m) on the body, six, in body axes
+    hinge_torques: bool = False  # N m about the tilt hinges, four
     begins_with_rotor_speeds: bool = False  # the first four states keep within the rotors' limits
+
+    @property
+    def controls(self) -> int:
+        """Their number of controls."""
+        loads = WRENCH_SIZE * self.wrench + HINGES * self.hinge_torques
+        return self.states + self.memories + loads
 
 
 @dataclass(frozen=True)
@@ -47,6 +58,13 @@ class TiltServo:
     natural_frequency: float = 300.0
     damping_ratio: float = 1.0
     max_angle: float | None = None
+
+
+SERVO_ARMATURE: Final = 1e-6
+"""Inertia (kg m^2) of a tilt servo behind its gear, as felt at the hinge.
+
+It loads the servo but, other than the pod's own inertia, turns no body in reaction.
+"""
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.models.mjcf_editing import (
+    add_hinge_torques,
     add_memories,
     add_states,
     add_wrench,
@@ -22,6 +23,7 @@ from tiltsim.models.mjcf_editing import (
     set_stop,
 )
 from tiltsim.models.parts import (
+    SERVO_ARMATURE,
     ExtraActuators,
     Ground,
     ModelSpec,
@@ -42,12 +44,6 @@ if TYPE_CHECKING:
     import mujoco
 
 MODELS: Final = ("tiltrotor", "quadrotor")
-
-SERVO_ARMATURE: Final = 1e-6
-"""Inertia (kg m^2) of a tilt servo behind its gear, as felt at the hinge.
-
-It loads the servo but, other than the pod's own inertia, turns no body in reaction.
-"""
 
 START_SPEED: Final = 300.0
 """Rotor speed (rad/s) of the keyframe ``start``."""
@@ -205,6 +201,8 @@ def _compose(spec: RotorcraftSpec) -> tuple[str, str, dict[str, bytes]]:
         add_memories(root, f"layer_{index}_memory", extra.memories)
         if extra.wrench:
             add_wrench(root, f"layer_{index}")
+        if extra.hinge_torques:
+            add_hinge_torques(root, f"layer_{index}")
     if spec.ground is not None:
         _set_ground(root, spec.ground)
     complete = str(root.to_xml_string())

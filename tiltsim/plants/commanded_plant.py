@@ -24,13 +24,15 @@ from tiltsim.laws.tiltrotor import gait_servo_commands
 from tiltsim.plants.command import CheckedCommand, ControllerError, Observation, Reference
 from tiltsim.plants.flight_model import evaluations_per_step
 from tiltsim.plants.mujoco_plant import MujocoPlant
-from tiltsim.vehicles.rotorcraft.layout import ROTOR_STATES
+from tiltsim.vehicles.rotorcraft.layout import ROTOR_STATES, TILT_1
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.mathematics.records import slotted
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, clipped
 from tiltsim_controllers.references.trajectories import reference_derivatives
+from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines
 from tiltsim_controllers.vehicle.parameters import SPIN
+from tiltsim_controllers.vehicle.rotor_inertia import sum_along_thrust_axes
 
 _NONE: Final = (0.0, 0.0, 0.0, 0.0)
 
@@ -55,7 +57,9 @@ class CommandedPlant(MujocoPlant):
         self._rates = slice(first, first + 4)
         # The activations that a commanded speed is written to: where rotors lag behind it, the one
         # that the layer keeps after the four rotor speeds.
-        first = 0 if vehicle.rotor_time_constant is None else 4
+        self._lagging = vehicle.rotor_time_constant is not None
+        self._rotor_inertia = vehicle.rotor_inertia
+        first = 4 if self._lagging else 0
         self._speeds = slice(first, first + 4)
         # The delay line in ``act``, the newest command first; without latency it is empty.
         steps, first = assembly.scenario.simulation.latency_steps, 2 * ROTOR_STATES
@@ -72,9 +76,22 @@ class CommandedPlant(MujocoPlant):
         self._line[:] = line[:-1]
         *arrived, are_speeds = line[-1].tolist()
         if are_speeds:
-            self.data.act[self._speeds] = arrived[4:]
+            self._set_speeds(np.array(arrived[4:]))
             arrived[4:] = _NONE
         self._hold_command(HeldCommand(*arrived))
+
+    def _set_speeds(self, speeds: Floats) -> None:
+        """Command signed rotor speeds (rad/s). A jump of the rotors' momentum turns the body."""
+        model, data = self.model, self.data
+        if self._rotor_inertia > 0.0 and not self._lagging:
+            tilts = data.qpos[TILT_1 : TILT_1 + 4].tolist() if self.tilting else _NONE
+            trig, jump = sines_and_cosines(*tilts), (speeds - data.act[:4]).tolist()
+            impulse, turned = np.zeros((1, model.nv)), np.empty((1, model.nv))
+            impulse[0, 3:6] = sum_along_thrust_axes(trig, jump)
+            mujoco.mj_forward(model, data)  # the mass matrix of the present tilts
+            mujoco.mj_solveM(model, data, turned, impulse)
+            data.qvel[:] -= self._rotor_inertia * turned[0]
+        data.act[self._speeds] = speeds
 
     def _external_command(self, command: CheckedCommand) -> Floats:
         """The `EXTERNAL_COMMANDS` that a command amounts to."""

@@ -81,10 +81,10 @@ def _check_law(scenario: ScenarioTables) -> None:
     if vehicle.is_planar:
         _check_plane(scenario)
         _check_planar_gait(scenario)
-    elif controller.is_external:
-        _check_external(scenario)
     else:
         _check_layout(scenario)
+        if controller.is_external:
+            _check_external(scenario)
     if not vehicle.has_tilting_rotors:
         _check_fixed_rotors(scenario)
 
@@ -94,6 +94,7 @@ def _check_fixed_rotors(scenario: ScenarioTables) -> None:
     keys |= {"vehicle.tilt_servo": TiltServoTable(), "vehicle.pod": PodTable()}
     if not scenario.controller.is_external:  # external commands act on rotors with a speed
         keys |= {"vehicle.min_rotor_speed": None, "vehicle.max_rotor_speed": None}
+        keys["vehicle.rotor_inertia"] = 0.0
         keys["initial.rotor_speed"] = InitialTable().rotor_speed
     for key, default in keys.items():
         scenario.require(
@@ -123,6 +124,12 @@ def _check_actuators(scenario: ScenarioTables) -> None:
         reason = 'not supported with controller.angular_acceleration = "measured"; remove it'
         scenario.require("ground", None, reason)
         scenario.require("vehicle.mjcf", None, reason)
+        if scenario.rotorcraft.rotor_time_constant is None:
+            reason = (
+                'not supported with controller.angular_acceleration = "measured" without lag; '
+                "set vehicle.rotor_time_constant or remove it"
+            )
+            scenario.require("vehicle.rotor_inertia", 0.0, reason)
     if scenario.controller.prioritizes_attitude and not scenario.rotorcraft.has_rotor_limits:
         raise scenario.mistake(
             "controller.allocation",
@@ -131,13 +138,17 @@ def _check_actuators(scenario: ScenarioTables) -> None:
 
 
 def _check_layout(scenario: ScenarioTables) -> None:
-    user_vehicle = scenario.rotorcraft.user_vehicle
-    if user_vehicle is not None and user_vehicle.layout_mismatch:
+    user_vehicle, external = scenario.rotorcraft.user_vehicle, scenario.controller.is_external
+    if user_vehicle is None or not user_vehicle.layout_mismatch:
+        return
+    if not external:
         raise scenario.mistake(
             "vehicle.mjcf",
             f"{user_vehicle.layout_mismatch}; the {scenario.controller.law} law needs four equal "
             'arms at right angles, law = "python" supports any layout',
         )
+    reason = f"{user_vehicle.layout_mismatch}; needs four equal arms at right angles"
+    scenario.require("vehicle.rotor_inertia", 0.0, reason)
 
 
 def _check_external(scenario: ScenarioTables) -> None:

@@ -117,6 +117,11 @@ class ScenarioTables(Table):
         return self.air != AirTable()
 
     @property
+    def has_rotor_inertia(self) -> bool:
+        """Whether the rotors have spin inertia."""
+        return isinstance(self.vehicle, VehicleTable) and self.vehicle.rotor_inertia > 0.0
+
+    @property
     def has_ideal_actuators_in_still_air(self) -> bool:
         """Whether pods and rotors follow their commands exactly and no air acts, as in the thesis.
 

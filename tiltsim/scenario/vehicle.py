@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from tiltsim.models.parts import Pod, TiltServo
+from tiltsim.models.parts import SERVO_ARMATURE, Pod, TiltServo
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import NonNegative, NotTiny, Positive, Table, example
+from tiltsim_controllers.mathematics.scalar import Quad
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, TiltCar
 from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle
 
@@ -170,6 +171,12 @@ class VehicleTable(AnyVehicleTable):
         "no lag [s]",
         examples=[0.04],
     )
+    rotor_inertia: NonNegative = Field(
+        0.0,
+        description="spin inertia of one rotor about its axis: reaction to its acceleration and "
+        "gyroscopic torque [kg m^2]",
+        examples=[1e-5],
+    )
     tilt_servo: TiltServoTable = Field(
         TiltServoTable(), description="the servos that tilt the rotors"
     )
@@ -191,6 +198,14 @@ class VehicleTable(AnyVehicleTable):
         low, high = self.min_rotor_speed, self.max_rotor_speed
         highest = inf if high is None else high
         return -highest if low is None else low, highest
+
+    @property
+    def hinge_inertias(self) -> Quad:
+        """Inertia (kg m^2) of servo and pod about each tilt hinge."""
+        user_vehicle, shipped = self.user_vehicle, SERVO_ARMATURE + self.pod.inertia
+        of_file = () if user_vehicle is None else user_vehicle.hinge_inertias
+        first, second, third, fourth = of_file or (shipped,) * 4
+        return first, second, third, fourth
 
     @property
     def has_rotor_limits(self) -> bool:
@@ -220,6 +235,9 @@ class VehicleTable(AnyVehicleTable):
             self.require_defaults(("arm_length", "pod"), "defined by vehicle.mjcf; remove it")
         moments = self.resolve()[1:4]
         require_physical_inertia("vehicle.inertia", sorted(moments), moments)
+        if 4.0 * self.rotor_inertia >= moments[2]:
+            reason = f"must be below {moments[2] / 4.0:g}: vehicle.inertia includes the four rotors"
+            raise self.mistake("rotor_inertia", reason)
         low, high = self.min_rotor_speed, self.max_rotor_speed
         if low is not None and high is not None and low >= high:
             raise self.mistake("min_rotor_speed", f"must be below max_rotor_speed = {high}")

@@ -50,7 +50,7 @@ from tiltsim_controllers.laws.supervisor import (
 )
 from tiltsim_controllers.mathematics.jets import Jet, Jets3, jet_sum
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler, to_world, wrap_angle
-from tiltsim_controllers.mathematics.scalar import Octet, Pair, Quad, Triple, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Pair, Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     body_force,
@@ -58,6 +58,7 @@ from tiltsim_controllers.vehicle.decoupling_matrix import (
     sines_and_cosines,
     solve_by_pairs,
     torque_entries,
+    trigonometric_rates,
     vertical_force_entries,
 )
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
@@ -121,15 +122,6 @@ def _planned_force(
     return torque_free_force_jet(
         supervised_tilts(tilts, scale, supervisor_motion, supervisor, ratio), ratio
     )
-
-
-@scalar
-def _trigonometric_rates(trig: Octet, rates: Quad, factor: float) -> Octet:
-    """Rates (1/s) of the `sines_and_cosines` at ``factor`` times the tilt rates (rad/s)."""
-    s1, c1, s2, c2, s3, c3, s4, c4 = trig
-    v1, v2, v3, v4 = rates
-    v1, v2, v3, v4 = factor * v1, factor * v2, factor * v3, factor * v4
-    return c1 * v1, -s1 * v1, c2 * v2, -s2 * v2, c3 * v3, -s3 * v3, c4 * v4, -s4 * v4
 
 
 # --- steps of the control law ------------------------------------------------------------------
@@ -265,7 +257,9 @@ def tracking_inputs(
 
     # Force and torque, and their rates as the pods turn at constant rotor speeds.
     trig = sines_and_cosines(a1, a2, a3, a4)
-    turning = _trigonometric_rates(trig, tilt_rates, terms.gait_rates)
+    r1, r2, r3, r4 = tilt_rates
+    known = terms.gait_rates
+    turning = trigonometric_rates(trig, (known * r1, known * r2, known * r3, known * r4))
     w1, w2, w3, w4 = s1 * abs(s1), s2 * abs(s2), s3 * abs(s3), s4 * abs(s4)
     entries = torque_entries(trig, ratio)
     tx, ty, tz = body_torque(entries, w1, w2, w3, w4)

@@ -34,6 +34,14 @@ def sines_and_cosines(a1: float, a2: float, a3: float, a4: float) -> Octet:
 
 
 @scalar
+def trigonometric_rates(trig: Octet, rates: Quad) -> Octet:
+    """Rates (1/s) of the `sines_and_cosines` at tilt rates (rad/s)."""
+    s1, c1, s2, c2, s3, c3, s4, c4 = trig
+    v1, v2, v3, v4 = rates
+    return c1 * v1, -s1 * v1, c2 * v2, -s2 * v2, c3 * v3, -s3 * v3, c4 * v4, -s4 * v4
+
+
+@scalar
 def torque_entries(trig: Octet, drag_ratio: float) -> Octet:
     """The eight non-zero entries of ``tau(alpha) / (L K_f)`` (ch. 3, Eq. 5).
 

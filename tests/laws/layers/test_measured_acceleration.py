@@ -38,7 +38,12 @@ FILE = str(shipped_folder("mjcf") / "tiltrotor.xml")
 EVERYTHING = (TILTROTOR, TROT, SPINNING, STORM, LATE, SENSORS, SLOW, WEAK, WRONG, LIMITED)
 
 
-@pytest.mark.parametrize("changes", [(TILTROTOR, TROT, SPINNING), EVERYTHING])
+HEAVY_ROTORS = {"vehicle": {"rotor_inertia": 1e-5}}
+
+
+@pytest.mark.parametrize(
+    "changes", [(TILTROTOR, TROT, SPINNING), EVERYTHING, (*EVERYTHING, HEAVY_ROTORS)]
+)
 def test_it_is_the_acceleration_that_mujoco_integrates(changes):
     plant = make_plant(assemble(scenario(*changes, HEAVY, MEASURED)))
     loop, parameters = plant._loop, plant._setup.parameters
@@ -106,7 +111,9 @@ def test_it_flies_the_same_three_ways(plant):
     assert {row.end.kind for row in rows} == {"completed"}
 
 
-@pytest.mark.parametrize("changes", [{"ground": {}}, {"vehicle": {"mjcf": FILE}}])
+@pytest.mark.parametrize(
+    "changes", [{"ground": {}}, {"vehicle": {"mjcf": FILE}}, {"vehicle": {"rotor_inertia": 1e-5}}]
+)
 def test_what_it_does_not_include_is_refused(changes):
     (table,) = changes
     with pytest.raises(InputError, match=f'{table}.*not supported with .* = "measured"'):

@@ -56,6 +56,7 @@ SLOW = {
 WEAK = {"fault": [{"type": "partial_thrust", "rotor": 1, "time": 0.1, "factor": 0.97}]}
 WRONG = {"model_error": {"mass": 1.05, "inertia": [1.1, 0.9, 1.0]}}
 CLIMB = {"controller": {"allocation": "prioritized"}, "initial": {"velocity": [0.0, 0.0, -2.0]}}
+SPINNING = {"vehicle": {"rotor_inertia": 1e-5, "tilt_servo": {"natural_frequency": 150.0}}}
 WATCHED = {"controller": {"supervisor": {"min_margin": 0.3, "min_determinant": 3.5}}}
 
 
@@ -133,6 +134,8 @@ FLIGHTS = {
     "full pose, storm": (3, (FULL_POSE, STORM)),
     "full pose, lag": (3, (FULL_POSE, {"vehicle": {"rotor_time_constant": 0.005}})),
     "quadrotor, storm": (3, (QUADROTOR, STORM)),
+    "spinning rotors": (3, (TILTROTOR, TROT, SPINNING)),
+    "spinning, lagging": (3, (TILTROTOR, SPINNING, {"vehicle": {"rotor_time_constant": 0.02}})),
     "weak rotor": (3, (TILTROTOR, WEAK)),
     "allocation": (2, (TILTROTOR, LIMITS, CLIMB)),
 }

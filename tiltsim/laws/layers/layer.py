@@ -19,7 +19,6 @@ from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scala
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
 
-WRENCH_SIZE: Final = 6
 _NO_ACTUATORS: Final = ExtraActuators()
 
 Samples = Mapping[str, Floats]
@@ -81,8 +80,7 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
     )
     dynamics, added = inner.dynamics, layer.actuators
     sizes = dynamics.sizes._replace(
-        act=dynamics.sizes.act + added.states,
-        ctrl=dynamics.sizes.ctrl + added.states + added.memories + WRENCH_SIZE * added.wrench,
+        act=dynamics.sizes.act + added.states, ctrl=dynamics.sizes.ctrl + added.controls
     )
     controls, hold, observe, sign_check_values = _functions_within(inner, len(layer.fields))
     controls = layer.controls or controls

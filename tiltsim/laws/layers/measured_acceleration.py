@@ -1,8 +1,8 @@
 """The plant's angular acceleration, measured for a controller of the tiltrotor that feeds it back.
 
-Thrusts, servos and air depend on the state and not on the rotor accelerations that a controller
-commands, so the angular acceleration is known at the instant of a control step: the controls are
-computed once to find it, and once more with it.
+Thrusts, servos, air and lagging rotors depend on the state and not on the rotor accelerations that
+a controller commands, so the angular acceleration is known at the instant of a control step: the
+controls are computed once to find it, and once more with it.
 """
 
 from __future__ import annotations
@@ -12,11 +12,17 @@ from math import inf
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.equations.actuator_level import Mechanics, Wrench, mechanics, servo_acceleration
+from tiltsim.equations.actuator_level import (
+    Loads,
+    Mechanics,
+    accelerations_by_hinge_torques,
+    mechanics,
+    servo_acceleration,
+)
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.laws.tiltrotor import four
-from tiltsim.models.rotorcraft import SERVO_ARMATURE
+from tiltsim.models.parts import SERVO_ARMATURE
 from tiltsim.vehicles.rotorcraft import rotor_limits
 from tiltsim.vehicles.rotorcraft.layout import TILT_1, TILT_RATE_1, TILTROTOR_THRUSTS
 from tiltsim_controllers.mathematics.scalar import Quad, Triple, Values, Vector, clipped, scalar
@@ -44,21 +50,24 @@ class Motion(NamedTuple):
 
 
 @scalar
-def _servo_accelerations(qpos: Vector, qvel: Vector, ctrl: Vector, mechanics: Mechanics) -> Quad:
-    """What the four servos' torques add to the tilts on a body at rest, rad/s^2."""
+def _servo_accelerations(
+    qpos: Vector, qvel: Vector, ctrl: Vector, loads: Loads, mechanics: Mechanics
+) -> Quad:
+    """What the torques about the four hinges add to the tilts on a body at rest, rad/s^2."""
+    load_1, load_2, load_3, load_4 = accelerations_by_hinge_torques(loads, mechanics)
     a1, a2, a3, a4 = four(qpos, TILT_1)
     rate_1, rate_2, rate_3, rate_4 = four(qvel, TILT_RATE_1)
     return (
-        servo_acceleration(ctrl[0], a1, rate_1, mechanics),
-        servo_acceleration(ctrl[1], a2, rate_2, mechanics),
-        servo_acceleration(ctrl[2], a3, rate_3, mechanics),
-        servo_acceleration(ctrl[3], a4, rate_4, mechanics),
+        servo_acceleration(ctrl[0], a1, rate_1, mechanics) + load_1,
+        servo_acceleration(ctrl[1], a2, rate_2, mechanics) + load_2,
+        servo_acceleration(ctrl[2], a3, rate_3, mechanics) + load_3,
+        servo_acceleration(ctrl[3], a4, rate_4, mechanics) + load_4,
     )
 
 
 @scalar
 def plant_angular_acceleration(
-    qpos: Vector, qvel: Vector, ctrl: Vector, wrench: Wrench, motion: Motion
+    qpos: Vector, qvel: Vector, ctrl: Vector, loads: Loads, motion: Motion
 ) -> Triple:
     """Angular acceleration (rad/s^2, body axes) of the simulated tiltrotor.
 
@@ -68,7 +77,7 @@ def plant_angular_acceleration(
 
     Args:
         qpos, qvel, ctrl: MuJoCo's.
-        wrench: Of the air, N and N m, body axes.
+        loads: Of air and spinning rotors.
         motion: The parameters.
     """
     vehicle, pod, share = motion.mechanics.vehicle, motion.pod_inertia, motion.pod_share
@@ -88,19 +97,21 @@ def plant_angular_acceleration(
 
     # The hinges lie along x, y, -x and -y.
     omega = (qvel[3], qvel[4], qvel[5])
-    servo_1, servo_2, servo_3, servo_4 = _servo_accelerations(qpos, qvel, ctrl, motion.mechanics)
+    servo_1, servo_2, servo_3, servo_4 = _servo_accelerations(
+        qpos, qvel, ctrl, loads, motion.mechanics
+    )
     momentum = (
         ixx * omega[0] + pod * (rates[0] - rates[2]),
         iyy * omega[1] + pod * (rates[1] - rates[3]),
         izz * omega[2],
     )
     gx, gy, gz = cross(omega, momentum)
-    _, _, _, air_x, air_y, air_z = wrench
+    x, y, z = loads[3], loads[4], loads[5]
     gyroscopic, carried = motion.gyroscopic, 2.0 * pod * share
     return (
-        (per_torque * tx + air_x - gyroscopic * gx - pod * (servo_1 - servo_3)) / (ixx - carried),
-        (per_torque * ty + air_y - gyroscopic * gy - pod * (servo_2 - servo_4)) / (iyy - carried),
-        (per_torque * tz + air_z - gyroscopic * gz) / izz,
+        (per_torque * tx + x - gyroscopic * gx - pod * (servo_1 - servo_3)) / (ixx - carried),
+        (per_torque * ty + y - gyroscopic * gy - pod * (servo_2 - servo_4)) / (iyy - carried),
+        (per_torque * tz + z - gyroscopic * gz) / izz,
     )
 
 
@@ -126,7 +137,7 @@ def with_measured_acceleration(loop: ClosedLoop) -> ClosedLoop:
     It goes around all other layers, whose controls move the plant.
     """
     inner_controls = loop.sampling.controls
-    _, wrench = read_actuators(loop.dynamics)
+    _, loads = read_actuators(loop.dynamics)
 
     @scalar
     def controls(
@@ -135,7 +146,7 @@ def with_measured_acceleration(loop: ClosedLoop) -> ClosedLoop:
         inner = parameters.inner
         ctrl = inner_controls(time, qpos, (*qvel, 0.0, 0.0, 0.0), act, inner, knots)
         p_rate, q_rate, r_rate = plant_angular_acceleration(
-            qpos, qvel, ctrl, wrench(ctrl), parameters.layer
+            qpos, qvel, ctrl, loads(ctrl), parameters.layer
         )
         return inner_controls(time, qpos, (*qvel, p_rate, q_rate, r_rate), act, inner, knots)
 

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Equations
 from tiltsim.equations.actuator_level import (
     ACTUATOR_PLANTS,
+    Loads,
     Mechanics,
-    Wrench,
     limit_speeds,
     mechanics,
 )
-from tiltsim.laws.layers.layer import WRENCH_SIZE, Layer, wrap_loop
-from tiltsim.models.parts import ExtraActuators
+from tiltsim.laws.layers.layer import Layer, wrap_loop
+from tiltsim.models.parts import WRENCH_SIZE, ExtraActuators
 from tiltsim.vehicles.rotorcraft.layout import ROTOR_STATES
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 
@@ -28,10 +28,10 @@ if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
 
 
-def read_actuators(dynamics: Dynamics) -> tuple[Callable[..., Values], Callable[..., Wrench]]:
+def read_actuators(dynamics: Dynamics) -> tuple[Callable[..., Values], Callable[..., Loads]]:
     """Scalar code that reads what a model's controls do besides thrusts and servos.
 
-    Returns ``rates(ctrl)`` of the activations, in their order, and ``wrench(ctrl)``.
+    Returns ``rates(ctrl)`` of the activations, in their order, and ``loads(ctrl)``.
     """
     own = ExtraActuators(states=ROTOR_STATES + dynamics.controller_states)
     first = ACTUATOR_PLANTS[dynamics.model].rotor_states
@@ -41,7 +41,7 @@ def read_actuators(dynamics: Dynamics) -> tuple[Callable[..., Values], Callable[
 @cache
 def _read_actuators(
     actuators: tuple[ExtraActuators, ...], first: int
-) -> tuple[Callable[..., Values], Callable[..., Wrench]]:
+) -> tuple[Callable[..., Values], Callable[..., Loads]]:
     """`read_actuators` of these, whose controls begin at an index."""
     if not actuators:
 
@@ -50,37 +50,37 @@ def _read_actuators(
             return ()
 
         @scalar
-        def no_wrench(ctrl: Vector) -> Wrench:
-            return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        def no_loads(ctrl: Vector) -> Loads:
+            return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 
-        return no_rates, no_wrench
+        return no_rates, no_loads
 
     this = actuators[0]
     memories = first + this.states
     force = memories + this.memories
-    end = force + WRENCH_SIZE * this.wrench
-    further_rates, further_wrench = _read_actuators(actuators[1:], end)
+    hinge = force + WRENCH_SIZE * this.wrench
+    further_rates, further_loads = _read_actuators(actuators[1:], first + this.controls)
+    wrench, on_hinges = this.wrench, this.hinge_torques
 
     @scalar
     def rates(ctrl: Vector) -> Values:
         return (*ctrl[first:memories], *further_rates(ctrl))
 
-    if not this.wrench:
-        return rates, further_wrench
+    if not (wrench or on_hinges):
+        return rates, further_loads
 
     @scalar
-    def wrench(ctrl: Vector) -> Wrench:
-        fx, fy, fz, tx, ty, tz = further_wrench(ctrl)
-        return (
-            fx + ctrl[force],
-            fy + ctrl[force + 1],
-            fz + ctrl[force + 2],
-            tx + ctrl[force + 3],
-            ty + ctrl[force + 4],
-            tz + ctrl[force + 5],
-        )
+    def loads(ctrl: Vector) -> Loads:
+        fx, fy, fz, tx, ty, tz, t1, t2, t3, t4 = further_loads(ctrl)
+        if wrench:
+            fx, fy, fz = fx + ctrl[force], fy + ctrl[force + 1], fz + ctrl[force + 2]
+            tx, ty, tz = tx + ctrl[force + 3], ty + ctrl[force + 4], tz + ctrl[force + 5]
+        if on_hinges:
+            t1, t2 = t1 + ctrl[hinge], t2 + ctrl[hinge + 1]
+            t3, t4 = t3 + ctrl[hinge + 2], t4 + ctrl[hinge + 3]
+        return fx, fy, fz, tx, ty, tz, t1, t2, t3, t4
 
-    return rates, wrench
+    return rates, loads
 
 
 def _projection(
@@ -116,7 +116,7 @@ def on_equations(loop: ClosedLoop) -> ClosedLoop:
     motion_rates = plant.rates
     controls, held = loop.sampling.controls, loop.sampling.hold
     observe = loop.columns.observe
-    activation_rates, wrench = read_actuators(dynamics)
+    activation_rates, loads = read_actuators(dynamics)
     further = first + ROTOR_STATES + dynamics.controller_states
     project_motion = _projection(plant.project_onto_limits, further, dynamics.extra_actuators)
 
@@ -143,7 +143,7 @@ def on_equations(loop: ClosedLoop) -> ClosedLoop:
         state = project_motion(state, parameters.layer)
         ctrl = controls_in_force(time, state, inputs, parameters)
         return (
-            *motion_rates(state, ctrl, wrench(ctrl), parameters.layer, disturbance),
+            *motion_rates(state, ctrl, loads(ctrl), parameters.layer, disturbance),
             *activation_rates(ctrl),
         )
 
