@@ -111,7 +111,7 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
     scenario, gait = plan.scenario, plan.gait
     controller = scenario.controller
     assert isinstance(controller, AttitudeAltitudeController)
-    vehicle = scenario.rotorcraft.resolve()
+    vehicle, spin_inertia = scenario.rotorcraft.resolve(), scenario.rotorcraft.rotor_inertia
     law = Parameters(
         vehicle=vehicle,
         gains=controller.resolve_gains(),
@@ -127,6 +127,7 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
         reference=plan.reference,
         decoupler=DECOUPLERS[controller.decoupler],
         supervisor=controller.resolve_supervisor(vehicle),
+        rotor_inertia=spin_inertia if controller.rotor_inertia_feedforward else 0.0,
     )
     lead = servo_lead(scenario.rotorcraft.tilt_servo)
     return ControlSetup(LoopParameters(signature, lead, law), plan.knots)

@@ -193,6 +193,12 @@ class AttitudeAltitudeController(ControllerTable):
         examples=[["integral_action"]],
     )
 
+    rotor_inertia_feedforward: bool = Field(
+        False,
+        description="include the gyroscopic torque of the rotors' vehicle.rotor_inertia; needs "
+        "gait_rate_feedforward",
+    )
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         if not self.gait_rate_feedforward:
@@ -263,7 +269,13 @@ class AttitudeAltitudeController(ControllerTable):
         return self.allocation_horizon
 
 
-_RATE_KEYS: Final = ("leave_out", "anticipation", "max_acceleration", "max_angular_acceleration")
+_RATE_KEYS: Final = (
+    "leave_out",
+    "anticipation",
+    "max_acceleration",
+    "max_angular_acceleration",
+    "rotor_inertia_feedforward",
+)
 """Keys of `AttitudeAltitudeController` that only gait_rate_feedforward reads."""
 
 

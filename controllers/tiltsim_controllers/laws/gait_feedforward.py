@@ -50,7 +50,7 @@ from tiltsim_controllers.laws.supervisor import (
 )
 from tiltsim_controllers.mathematics.jets import Jet, Jets3, jet_sum
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler, to_world, wrap_angle
-from tiltsim_controllers.mathematics.scalar import Pair, Quad, Triple, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Octet, Pair, Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     body_force,
@@ -68,6 +68,7 @@ from tiltsim_controllers.vehicle.rigid_body import (
     cross,
     torque_rate,
 )
+from tiltsim_controllers.vehicle.rotor_inertia import sum_along_thrust_axes
 
 
 class FeedforwardTerms(NamedTuple):
@@ -95,6 +96,7 @@ class Parameters(NamedTuple):
     reference: ReferenceParameters
     decoupler: float  # NONE or EXACT
     supervisor: Supervisor = Supervisor()
+    rotor_inertia: float = 0.0  # kg m^2, of a rotor about its axis, as far as it is known
 
 
 INTEGRAL_FIELDS: Final = ("integral_x", "integral_y", "integral_z")
@@ -221,6 +223,54 @@ def _attitude_control(
     return angular_jerk(roll, pitch, yaw, jerk)
 
 
+@scalar
+def spin_momentum(trig: Octet, tilt_rates: Quad, speeds: Quad, inertia: float) -> Jets3:
+    """Angular momentum (N m s, body axes) of the rotors' spin, with its derivatives.
+
+    Only the pods' motion at constant rates counts. The rotors' acceleration is what the controller
+    computes, so its reaction is not known before.
+
+    Args:
+        trig: `sines_and_cosines` of the tilt angles
+        tilt_rates: rad/s
+        speeds: of the rotors, rad/s, signed
+        inertia: of a rotor about its axis, kg m^2
+    """
+    if inertia == 0.0:
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    turning = trigonometric_rates(trig, tilt_rates)
+    x, y, z = sum_along_thrust_axes(trig, speeds)
+    x_rate, y_rate, z_rate = sum_along_thrust_axes(turning, speeds)
+    xx, yy, zz = sum_along_thrust_axes(trigonometric_rates(turning, tilt_rates), speeds)
+    return (
+        (inertia * x, inertia * x_rate, inertia * xx),
+        (inertia * y, inertia * y_rate, inertia * yy),
+        (inertia * z, inertia * z_rate, inertia * zz),
+    )
+
+
+@scalar
+def _momentum_rate(momentum: Triple, rate: Triple, omega: Triple) -> Triple:
+    """Rate of a momentum that rotates with the body, from its rate in body axes."""
+    x, y, z = cross(omega, momentum)
+    return rate[0] + x, rate[1] + y, rate[2] + z
+
+
+@scalar
+def spin_torques(spin: Jets3, omega: Triple, omega_rate: Triple) -> tuple[Triple, Triple]:
+    """Torque (N m) that the rotors' spin takes, and its rate (N m/s), body axes.
+
+    Args:
+        spin: their angular momentum
+        omega, omega_rate: body rates (rad/s) and their rates (rad/s^2)
+    """
+    x, y, z = spin
+    momentum, rate = (x[0], y[0], z[0]), (x[1], y[1], z[1])
+    swept = cross(omega_rate, momentum)
+    second = (x[2] + swept[0], y[2] + swept[1], z[2] + swept[2])
+    return _momentum_rate(momentum, rate, omega), _momentum_rate(rate, second, omega)
+
+
 # --- the control law ---------------------------------------------------------------------------
 
 
@@ -259,7 +309,9 @@ def tracking_inputs(
     trig = sines_and_cosines(a1, a2, a3, a4)
     r1, r2, r3, r4 = tilt_rates
     known = terms.gait_rates
-    turning = trigonometric_rates(trig, (known * r1, known * r2, known * r3, known * r4))
+    rates = (known * r1, known * r2, known * r3, known * r4)
+    turning = trigonometric_rates(trig, rates)
+    spin = spin_momentum(trig, rates, (s1, s2, s3, s4), parameters.rotor_inertia)
     w1, w2, w3, w4 = s1 * abs(s1), s2 * abs(s2), s3 * abs(s3), s4 * abs(s4)
     entries = torque_entries(trig, ratio)
     tx, ty, tz = body_torque(entries, w1, w2, w3, w4)
@@ -268,7 +320,9 @@ def tracking_inputs(
     gx, gy, gz = body_force(turning, w1, w2, w3, w4)
 
     # Newton and Euler: accelerations of the body and of its Euler angles.
-    omega, torque = (p, q, r), (per_torque * tx, per_torque * ty, per_torque * tz)
+    omega = (p, q, r)
+    (kx, ky, kz), _ = spin_torques(spin, omega, (0.0, 0.0, 0.0))
+    torque = (per_torque * tx - kx, per_torque * ty - ky, per_torque * tz - kz)
     if measured is None:
         omega_rate = angular_acceleration(torque, omega, inertia, terms.gyroscopic_torque)
     else:
@@ -294,15 +348,16 @@ def tracking_inputs(
 
     # Rates of torque and lift that remain for the rotors.
     mx, my, mz = torque_rate(omega, omega_rate, desired, inertia, terms.gyroscopic_torque)
+    _, (kx, ky, kz) = spin_torques(spin, omega, omega_rate)
     up_x, up_y, up_z = rotation[6], rotation[7], rotation[8]
     sweep_x, sweep_y, sweep_z = cross(omega, (fx, fy, fz))
     swept_lift = up_x * (sweep_x + gx) + up_y * (sweep_y + gy) + up_z * (sweep_z + gz)
     v1, v2, v3, v4 = solve_by_pairs(
         entries,
         vertical_force_entries(trig, up_x, up_y, up_z),
-        (mx - per_torque * hx) / per_torque,
-        (my - per_torque * hy) / per_torque,
-        (mz - per_torque * hz) / per_torque,
+        (mx + kx - per_torque * hx) / per_torque,
+        (my + ky - per_torque * hy) / per_torque,
+        (mz + kz - per_torque * hz) / per_torque,
         lift_jerk / per_force - swept_lift,
     )
     if s1 == 0.0 or s2 == 0.0 or s3 == 0.0 or s4 == 0.0:

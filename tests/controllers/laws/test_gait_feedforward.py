@@ -31,7 +31,13 @@ from tiltsim_controllers.laws.gains import (
     second_order_gains,
     third_order_gains,
 )
-from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms, Parameters, tracking_inputs
+from tiltsim_controllers.laws.gait_feedforward import (
+    FeedforwardTerms,
+    Parameters,
+    spin_momentum,
+    spin_torques,
+    tracking_inputs,
+)
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     sines_and_cosines,
@@ -479,3 +485,29 @@ def test_the_jerk_is_that_of_a_force_that_turns_with_the_body_and_with_its_direc
             turned = [tuple(side * value for value in jet) for jet in jets]
             found = jerk_along(tuple(turned), tuple(now.tolist()), tuple(omega.tolist()), counted)
             np.testing.assert_allclose(found, rate, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_torques_of_the_rotors_spin_are_rates_of_its_momentum(seed):
+    """While pods turn at constant rates, the body at a constant angular acceleration."""
+    random = np.random.default_rng(seed)
+    alpha, rates = random.uniform(-0.6, 0.6, 4), random.uniform(-2.0, 2.0, 4)
+    omega, omega_rate = random.uniform(-2.0, 2.0, 3), random.uniform(-5.0, 5.0, 3)
+    speeds, inertia = SPIN * random.uniform(200.0, 450.0, 4), 1e-5
+
+    def momentum(t):
+        s, c = np.sin(alpha + rates * t), np.cos(alpha + rates * t)
+        axes = [[0, -s[0], c[0]], [s[1], 0, c[1]], [0, s[2], c[2]], [-s[3], 0, c[3]]]
+        return inertia * speeds @ axes
+
+    def torque(t):
+        _, first, _ = differences(lambda s: momentum(t + s))
+        return first + np.cross(omega + omega_rate * t, momentum(t))
+
+    trig = sines_and_cosines(*alpha)
+    spin = spin_momentum(trig, tuple(rates), tuple(speeds), inertia)
+    found = spin_torques(spin, tuple(omega), tuple(omega_rate))
+    np.testing.assert_allclose(found[0], torque(0.0), rtol=1e-7, atol=1e-12)
+    np.testing.assert_allclose(found[1], differences(torque)[1], rtol=1e-5, atol=1e-7)
+    unknown = spin_momentum(trig, tuple(rates), tuple(speeds), 0.0)
+    assert not np.any(spin_torques(unknown, tuple(omega), tuple(omega_rate)))

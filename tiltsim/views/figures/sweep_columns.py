@@ -27,6 +27,7 @@ _KEY_UNITS: Final = {
     "sensors.attitude_noise": "rad",
     "vehicle.mass": "kg",
     "vehicle.rotor_time_constant": "s",
+    "vehicle.rotor_inertia": "kg m^2",
     "vehicle.tilt_servo.natural_frequency": "rad/s",
     "vehicle.tilt_servo.max_rate": "rad/s",
     "wind": "m/s",
