@@ -28,10 +28,6 @@ def test_what_can_be_left_out_is_what_the_law_counts_in():
         ({"controller.gains.attitude.bandwidth": 0.0}, "bandwidth = 0.0"),
         ({"controller.gains.attitude.bandwidth": 5000.0}, "too long for the roll loop"),
         ({"controller.gait_rate_feedforward": False}, "needs controller.gait_rate_feedforward"),
-        (
-            {"controller.gait_rate_feedforward": False, "controller.rotor_inertia_feedforward": True},
-            "needs controller.gait_rate_feedforward",
-        ),
     ],
 )
 def test_mistakes_are_one_line(changes, message):

@@ -258,3 +258,25 @@ def test_what_has_no_such_rotors_is_refused(tables, message):
     tables = merged({"vehicle": {"rotor_inertia": INERTIA}}, tables)
     with pytest.raises(InputError, match=message):
         tiltsim.parse_scenario(tables)
+
+
+def test_a_users_file_gets_the_same_rotors():
+    """Rotors do not turn in a file: it has the inertia with which they tilt, the key adds spin."""
+    file = {"mjcf": str(shipped_folder("mjcf") / "tiltrotor.xml")}
+    short = {"duration": 0.1}
+    own, shipped = fly(simulation=short, vehicle=file), fly(simulation=short)
+    assert furthest(own, shipped) < 1e-9
+    still = fly(simulation=short, vehicle=file | {"rotor_inertia": 0.0})
+    assert furthest(own, still) > 1e-3
+
+
+def test_the_feedforward_law_knows_the_inertia_where_asked():
+    fed_forward = {"controller": {"gait_rate_feedforward": True, "gains": "feedforward"}}
+    known = {"controller": {"rotor_inertia_feedforward": True}}
+    plain, knowing = (fly(THESIS, fed_forward, change) for change in ({}, known))
+    assert 1e-6 < furthest(plain, knowing) < 0.2
+    light = {"vehicle": {"rotor_inertia": 0.0}}
+    plain, knowing = (fly(THESIS, fed_forward, light, change) for change in ({}, known))
+    np.testing.assert_array_equal(plain.samples, knowing.samples)
+    with pytest.raises(InputError, match=r"rotor_inertia_feedforward.*needs controller.gait_rate"):
+        scenario(known)
