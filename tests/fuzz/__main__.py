@@ -15,11 +15,15 @@ options = parser.parse_args()
 faulthandler.enable()
 
 
-def report(done):
+def report(done, mistake):
+    """Show each mistake at once, and the progress."""
+    if mistake:
+        sys.stdout.write(f"{mistake}\n")
+        sys.stdout.flush()
     if done % 500 == 0:
         sys.stderr.write(f"{done} of {options.count}\n")
 
 
 mistakes = fuzz(options.count, options.seed, report)
-sys.stdout.write("\n".join([*mistakes, f"{len(mistakes)} mistakes in {options.count} inputs\n"]))
+sys.stdout.write(f"{len(mistakes)} mistakes in {options.count} inputs\n")
 sys.exit(bool(mistakes))

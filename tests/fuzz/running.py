@@ -28,7 +28,7 @@ class HangError(Exception):
     """An input that takes longer than `TIME_LIMIT`."""
 
 
-def fuzz(count, seed, report=lambda done: None):
+def fuzz(count, seed, report=lambda done, mistake: None):
     """Run ``count`` inputs of a seed; return the mistakes, a text each.
 
     Input number n of a seed is always the same, however many are run.
@@ -40,8 +40,9 @@ def fuzz(count, seed, report=lambda done: None):
         for number in range(count):
             mistake = run_one(number, seed, folder)
             if mistake:
-                mistakes.append(f"seed {seed}, input {number} ({_kind(number)}): {mistake}")
-            report(number + 1)
+                mistake = f"seed {seed}, input {number} ({_kind(number)}): {mistake}"
+                mistakes.append(mistake)
+            report(number + 1, mistake)
     finally:
         signal.signal(signal.SIGALRM, handler)
         shutil.rmtree(folder)
