@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from tiltsim.commands.options import Subparsers, add_jobs
@@ -50,9 +52,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.markdown is not None:
         prepare_file("--markdown", arguments.markdown)
     with progress_bar(1.0, "of all flights", shown=True) as move:
-        report = make_report(
-            arguments.paths, out / "kept", arguments.jobs, lambda done, total: move(done / total)
-        )
+        tell = move_and_tell(move)
+        report = make_report(arguments.paths, out / "kept", arguments.jobs, tell)
     store(target, page(report, Made.now()).encode())
     if arguments.markdown is not None:
         store(arguments.markdown, markdown(report).encode())
@@ -62,3 +63,17 @@ def run(arguments: argparse.Namespace) -> int:
         print_line(f"FAILED  {failure_text(failure)}")
     print_line(f"report written to {target}")
     return EXPECTATION_FAILED if report.failures else DONE
+
+
+def move_and_tell(move: Callable[[float], None]) -> Callable[[int, int], None]:
+    """Progress of the flights: a bar on a terminal, elsewhere a line for every tenth of them."""
+    told = -1
+
+    def tell(done: int, total: int) -> None:
+        nonlocal told
+        move(done / total)
+        if 10 * done // total > told and not sys.stderr.isatty():
+            told = 10 * done // total
+            print(f"{done} of {total} flights", file=sys.stderr, flush=True)
+
+    return tell

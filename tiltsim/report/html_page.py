@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from html import escape
 from itertools import groupby
 from pathlib import Path
@@ -15,7 +15,7 @@ from tiltsim.report.findings import Finding
 from tiltsim.report.flights import PLANTS
 from tiltsim.report.html_claims import chapter_claims
 from tiltsim.report.html_summary import citation, controls, header, summary
-from tiltsim.report.html_text import anchor, png_data, prose, thumbnail_styles
+from tiltsim.report.html_text import anchor, png_data, prose, thumbnail, thumbnail_styles
 from tiltsim.report.made import Made
 
 _SHOWN_DPI: Final = 108
@@ -41,7 +41,7 @@ def page(report: Report, made: Made) -> str:
             "<main>",
             *summary(report),
             *_alarm(report),
-            *_findings(report.findings),
+            *_findings(report),
             *controls(report),
             *(line for chapter in report.chapters for line in _chapter(report, chapter)),
             *_beyond(report.comparisons),
@@ -64,20 +64,35 @@ def _alarm(report: Report) -> Iterator[str]:
     yield "</ul></section>"
 
 
-def _findings(findings: Iterable[Finding]) -> Iterator[str]:
-    findings = list(findings)
-    if not findings:
+def _findings(report: Report) -> Iterator[str]:
+    if not report.findings:
         return
     yield '<section id="findings"><h2>Our findings</h2>'
     yield "<p>Tests support each result; the command runs them in a checkout.</p>"
-    for finding in findings:
-        yield f'<article id="{finding.key}"><h3>{escape(finding.title)} {anchor(finding.key)}</h3>'
-        yield f'<p class="where">{escape(finding.chapters)}</p>'
-        yield from (f"<p>{prose(paragraph)}</p>" for paragraph in finding.paragraphs)
-        tests = f"{len(finding.nodes)} tests" if len(finding.nodes) > 1 else "1 test"
-        yield f"<details><summary>{tests}</summary><pre>{escape(finding.command)}</pre></details>"
-        yield "</article>"
+    for finding in report.findings:
+        yield from _finding(finding, report)
     yield "</section>"
+
+
+def _finding(finding: Finding, report: Report) -> Iterator[str]:
+    yield f'<article class="finding" id="{finding.key}">'
+    shown = [d for d in report.drawings if d.picture.name in finding.pictures]
+    if shown:
+        yield f'<p class="thumbs">{"".join(map(thumbnail, shown))}</p>'
+    yield f"<h3>{escape(finding.title)} {anchor(finding.key)}</h3>"
+    yield f'<p class="where">{escape(finding.chapters)}</p>'
+    *text, proof = finding.paragraphs
+    yield from (f"<p>{prose(paragraph)}</p>" for paragraph in text)
+    yield f'<p class="proof"><b>Proof.</b> {prose(proof)}</p>'
+    settled = [row.statement.id for row in report.rows if row.claim.settled_by == finding.key]
+    if settled:
+        links = ", ".join(f'<a href="#{name}">{name}</a>' for name in dict.fromkeys(settled))
+        yield f'<p class="where">Settles {links}.</p>'
+    tests = f"{len(finding.nodes)} tests" if len(finding.nodes) > 1 else "1 test"
+    flights = "".join(f"tiltsim run '{address}'\n" for address in finding.flights)
+    commands = escape(flights + finding.command)
+    count = f", {len(finding.flights)} flights" if finding.flights else ""
+    yield f"<details><summary>{tests}{count}</summary><pre>{commands}</pre></details></article>"
 
 
 def _chapter(report: Report, chapter: int) -> Iterator[str]:

@@ -51,7 +51,8 @@ def _lines(report: Report) -> Iterator[str]:
         for finding in report.findings:
             yield f"### {finding.title}"
             yield from ("", f"*{finding.chapters}*", "")
-            for paragraph in finding.paragraphs:
+            *text, proof = finding.paragraphs
+            for paragraph in (*text, f"**Proof.** {proof}"):
                 yield from (paragraph, "")
             yield from ("```sh", finding.command, "```", "")
     for chapter in report.chapters:
