@@ -78,7 +78,8 @@ def sweep_file(random, folder):
         document["scenario"] = SETPOINT
         document.setdefault("set", {})
         document["axis"] = document.get("axis") or [{"type": "list"}]
-        for axis in document["axis"]:
+        axes = document["axis"] if isinstance(document["axis"], list) else []
+        for axis in axes:
             if isinstance(axis, dict):
                 axis["key"], value = random.choice(known_values())
                 axis.pop("keys", None)

@@ -343,6 +343,10 @@ def test_huge_axes_are_refused_or_tried_in_a_few_places(points_of, count):
         (PERIODS + '[derive]\n"gait.amplitude" = true', ["derive.gait.amplitude", "expression"]),
         (PERIODS + '[derive]\n"gait.amplitude" = "1 / 0"', ["divides by zero"]),
         (
+            PERIODS.replace("gait.period", "p") + f'[derive]\n"gait.period" = "{"p+" * 300}p"',
+            ["derive.gait.period", "nests more than 200 deep"],
+        ),
+        (
             PERIODS + 'relative = true\n[[axis]]\ntype = "list"\nkey = "gait.scale"\n'
             'relative = true\nvalues = ["x"]',
             ["axis.values", "relative values are numbers"],

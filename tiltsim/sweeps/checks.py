@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any, Final
 
 from tiltsim.scenario.metric_names import METRICS
@@ -65,9 +66,17 @@ def _check_search(points: SweepPoints, values: Mapping[str, Any]) -> None:
 def _check_names(points: SweepPoints) -> None:
     """Refuse keys that no result could hold, or that nothing reads."""
     sweep, definition = points.sweep, points.definition
-    rules = [*sweep.derive.values(), *([sweep.bisect.stop] if sweep.bisect else [])]
-    rules += [sweep.plot.x, sweep.plot.y, sweep.plot.lines, sweep.plot.panels]
-    read = {name for rule in rules for name in _names_in(rule)}
+    read: set[str] = set()
+    for column in (sweep.plot.x, sweep.plot.y, sweep.plot.lines, sweep.plot.panels):
+        with suppress(ValueError):  # the name of a metric, or of no column
+            read |= _names_in(column)
+    rules: dict[str, Any] = {f"derive.{key}": rule for key, rule in sweep.derive.items()}
+    rules |= {} if sweep.bisect is None else {"bisect.stop": sweep.bisect.stop}
+    for key, rule in rules.items():
+        try:
+            read |= _names_in(rule)
+        except ValueError as error:
+            raise definition.mistake(key, rule, str(error)) from None
     targets = [key for axis in sweep.axis for key in axis.targets]
     targets += [sweep.bisect.key] if sweep.bisect is not None else []
     taken = {*RESERVED, *METRICS, *(f"{name}_version" for name in VERSIONS)}
@@ -91,7 +100,4 @@ def _check_names(points: SweepPoints) -> None:
 def _names_in(rule: Any) -> set[str]:
     if isinstance(rule, list | tuple):
         return {name for entry in rule for name in _names_in(entry)}
-    try:
-        return names(rule) if isinstance(rule, str) else set()
-    except ValueError:
-        return set()  # evaluating the rule reports the mistake
+    return names(rule) if isinstance(rule, str) else set()
