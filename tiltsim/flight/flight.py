@@ -138,5 +138,9 @@ class Flight:
         return {key: valid_unicode(text) for key, text in texts.items()}
 
     def save(self, folder: str | Path) -> None:
-        """Write metrics.json, flight.parquet and the resolved scenario.toml into a folder."""
+        """Write metrics.json, flight.parquet and the resolved scenario.toml into a folder.
+
+        Raises `InputError` if that is impossible, or would replace a scenario or a controller that
+        tiltsim did not write.
+        """
         write_flight(Path(folder), self.to_arrow(), self.metrics(), self.scenario)
