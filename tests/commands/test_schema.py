@@ -7,8 +7,8 @@ from typing import Annotated
 from pydantic import ConfigDict, TypeAdapter
 
 from tiltsim.cli import main
-from tiltsim.commands.key_tables import UNIT, key_tables
-from tiltsim.commands.schema import scenario_schema
+from tiltsim.commands.key_tables import UNIT, has_numbers, key_tables
+from tiltsim.commands.schema import scenario_schema, sweep_schema
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.table import Table
 
@@ -18,16 +18,9 @@ PAGE = Path(__file__).parents[2] / "docs" / "scenario.md"
 DEFINITIONS = {"": SCHEMA} | SCHEMA["$defs"]
 PROPERTIES = [
     (name, key, value)
-    for name, table in DEFINITIONS.items()
+    for name, table in {**sweep_schema()["$defs"], "Sweep": sweep_schema(), **DEFINITIONS}.items()
     for key, value in table["properties"].items()
 ]
-
-
-def has_numbers(value):
-    """Whether a key takes numbers that may have a unit; whole numbers count or name something."""
-    parts = [*value.get("anyOf", ()), *value.get("oneOf", ()), *value.get("prefixItems", ())]
-    parts += [value["items"]] if "items" in value else []
-    return value.get("type") == "number" or any(map(has_numbers, parts))
 
 
 def test_every_key_is_described():

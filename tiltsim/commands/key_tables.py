@@ -111,12 +111,19 @@ def _contents(table: dict[str, Any]) -> tuple[str, tuple[Key, ...]]:
 
 def _key(name: str, value: dict[str, Any], required: bool) -> Key:
     meaning, unit = value.get("description", ""), ""
-    if match := UNIT.fullmatch(meaning):
+    if has_numbers(value) and (match := UNIT.fullmatch(meaning)):
         meaning, unit = match.groups()
     default = value.get("default")
     shown = "" if isinstance(default, dict) else _written(default)
     example = _written(_example(value))
     return Key(name, _values(value), unit, "required" if required else shown, example, meaning)
+
+
+def has_numbers(value: dict[str, Any]) -> bool:
+    """Whether a key takes numbers that may have a unit; whole numbers count or name something."""
+    parts = [*_options(value), *value.get("prefixItems", ())]
+    parts += [value["items"]] if "items" in value else []
+    return value.get("type") == "number" or any(map(has_numbers, parts))
 
 
 def _references(value: dict[str, Any]) -> Iterator[str]:

@@ -11,26 +11,35 @@ from pydantic import Field, field_validator, model_validator
 from tiltsim.scenario.expectation import Expectation
 from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
-from tiltsim.scenario.table import Positive, Table
+from tiltsim.scenario.table import Positive, Table, example
 from tiltsim_controllers.mathematics.scalar import clipped
 
 Keys = Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
 Names = Annotated[tuple[str, ...], Field(strict=False)]
 Count = Annotated[int, Field(ge=1, le=10_000_000)]
-Group = Annotated[str | None, Field(description="axes of one group advance together, not crossed")]
+Group = Annotated[
+    str | None,
+    Field(description="axes of one group advance together, not crossed", examples=["diagonal"]),
+]
 
 
 class AxisTable(Table):
     """The keys that every axis has: one key, or several that move together."""
 
+    model_config = example(key="gait.period")
     table_name = "axis"
 
     key: str | None = Field(
         None,
         description="a key of the scenario such as gait.period or gait.angles[0], or a name "
         "without a dot for use in [derive]",
+        examples=["gait.period"],
     )
-    keys: Keys | None = Field(None, description="several keys that move together, in place of key")
+    keys: Keys | None = Field(
+        None,
+        description="several keys that move together, in place of key",
+        examples=[["gait.angles[0]", "gait.angles[1]"]],
+    )
     relative: bool = Field(False, description="the values multiply the base scenario's own")
 
     @property
@@ -64,8 +73,10 @@ def _leaves(value: Any) -> Iterator[Any]:
 class ListAxis(AxisTable):
     """A list of values; for several keys, a list of rows of values."""
 
-    type: Literal["list"]
-    values: Annotated[tuple[Any, ...], Field(strict=False, min_length=1)]
+    type: Literal["list"] = Field(description="given values")
+    values: Annotated[tuple[Any, ...], Field(strict=False, min_length=1)] = Field(
+        description="of any kind that the key takes", examples=[[1.0, 2.0, 3.0]]
+    )
     group: Group = None
 
     @model_validator(mode="after")
@@ -93,10 +104,12 @@ class ListAxis(AxisTable):
 class LinspaceAxis(AxisTable):
     """Evenly spaced values, both ends included; several keys get the same value."""
 
-    type: Literal["linspace"]
-    start: float
-    stop: float
-    count: Annotated[int, Field(ge=2, le=10_000_000)]
+    type: Literal["linspace"] = Field(description="evenly spaced values")
+    start: float = Field(description="the first value [the key's]", examples=[1.0])
+    stop: float = Field(description="the last value [the key's]", examples=[3.0])
+    count: Annotated[int, Field(ge=2, le=10_000_000)] = Field(
+        description="number of values", examples=[9]
+    )
     group: Group = None
 
     @property
@@ -119,9 +132,9 @@ class LinspaceAxis(AxisTable):
 class UniformAxis(AxisTable):
     """A number drawn from a uniform distribution; several keys get the same draw."""
 
-    type: Literal["uniform"]
-    low: float
-    high: float
+    type: Literal["uniform"] = Field(description="drawn evenly between two bounds")
+    low: float = Field(description="the lower bound [the key's]", examples=[1.0])
+    high: float = Field(description="the upper bound [the key's]", examples=[3.0])
 
     @model_validator(mode="after")
     def _check_range(self) -> Self:
@@ -133,28 +146,35 @@ class UniformAxis(AxisTable):
 class NormalAxis(AxisTable):
     """A number drawn from a normal distribution; several keys get the same draw."""
 
-    type: Literal["normal"]
-    mean: float
-    standard_deviation: Positive
+    type: Literal["normal"] = Field(description="drawn from a bell curve")
+    mean: float = Field(description="of the values [the key's]", examples=[2.0])
+    standard_deviation: Positive = Field(description="of the values [the key's]", examples=[0.1])
 
 
 class SeedAxis(AxisTable):
     """A different integer for each sample, for ``simulation.seed``; other axes do not change it."""
 
-    type: Literal["seed"]
-    start: Annotated[int, Field(ge=0)] = Field(0, description="the first sample's")
-    relative: Literal[False] = False
+    model_config = example(key="simulation.seed")
+
+    type: Literal["seed"] = Field(description="a number of its own for each sample")
+    start: Annotated[int, Field(ge=0)] = Field(0, description="the first sample's", examples=[100])
+    relative: Literal[False] = Field(False, description="always false")
 
 
 class CasesAxis(AxisTable):
     """Named sets of tables that override the base, as a ``[[variant]]`` does."""
 
-    type: Literal["cases"]
-    key: str = Field(description="a name without a dot: the column with the name of the case")
-    keys: None = None
-    relative: Literal[False] = False
+    model_config = example(key="law")
+
+    type: Literal["cases"] = Field(description="named sets of tables")
+    key: str = Field(
+        description="a name without a dot: the column with the name of the case", examples=["law"]
+    )
+    keys: None = Field(None, description="not for cases")
+    relative: Literal[False] = Field(False, description="always false")
     cases: Annotated[dict[str, dict[str, Any]], Field(min_length=1)] = Field(
-        description="tables of the scenario by the name of the case"
+        description="tables of the scenario by the name of the case",
+        examples=[{"exact": {"controller": {"decoupler": "exact"}}}],
     )
     group: Group = None
 
@@ -191,9 +211,14 @@ class SampleTable(Table):
 
     table_name = "sample"
 
-    method: Literal["random", "latin_hypercube", "sobol"] = "random"
-    count: Count
-    seed: Annotated[int, Field(ge=0)] = 0
+    method: Literal["random", "latin_hypercube", "sobol"] = Field(
+        "random", description="independent draws, or draws that cover the ranges more evenly"
+    )
+    count: Count = Field(
+        description="number of samples at each point of the other axes; a power of two for sobol",
+        examples=[64],
+    )
+    seed: Annotated[int, Field(ge=0)] = Field(0, description="of the draws", examples=[1])
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -209,27 +234,51 @@ class BisectTable(Table):
     on the boundary.
     """
 
-    key: str
-    start: float
-    stop: float | str = Field(description="a number, or an expression over the axes' names")
-    step: Positive
-    tolerance: Positive = Field(description="maximum width of the bracket at the end of the search")
+    key: str = Field(description="the key that is searched", examples=["gait.amplitude"])
+    start: float = Field(
+        description="where the search begins and the condition holds [the key's]", examples=[0.1]
+    )
+    stop: float | str = Field(
+        description="a number, or an expression over the axes' names [the key's]", examples=[1.0]
+    )
+    step: Positive = Field(
+        description="of the walk that finds a value at which it fails [the key's]", examples=[0.1]
+    )
+    tolerance: Positive = Field(
+        description="maximum width of the bracket at the end of the search [the key's]",
+        examples=[0.01],
+    )
     holds: Annotated[tuple[Expectation, ...], Field(strict=False, min_length=1)] = Field(
-        description="bounds on metrics, as in [[expect]]; they fail if the flight terminates early"
+        description="bounds on metrics, as in [[expect]]; they fail if the flight terminates early",
+        examples=[[{"metric": "diverged", "equals": False}]],
     )
 
 
 class PlotTable(Table):
     """How ``tiltsim plot`` draws the sweep; by default the axes decide."""
 
-    kind: Literal["lines", "map", "quantiles", "boundary", "plane"] | None = None
-    x: str | None = Field(None, description="a column, or an expression over columns")
-    y: str | None = Field(None, description="likewise; for map and plane")
-    metrics: Names = ()
-    lines: str | None = Field(None, description="a column; one line per value")
-    panels: str | None = Field(None, description="a column; one panel per value")
+    model_config = example(kind="lines", x="gait.period")
+
+    kind: Literal["lines", "map", "quantiles", "boundary", "plane"] | None = Field(
+        None, description="of figure; default: what suits the axes", examples=["map"]
+    )
+    x: str | None = Field(
+        None, description="a column, or an expression over columns", examples=["gait.period"]
+    )
+    y: str | None = Field(
+        None, description="likewise; for map and plane", examples=["gait.amplitude"]
+    )
+    metrics: Names = Field(
+        (), description="one row of panels each; default: a choice", examples=[["max_abs_roll"]]
+    )
+    lines: str | None = Field(
+        None, description="a column; one line per value", examples=["gait.amplitude"]
+    )
+    panels: str | None = Field(
+        None, description="a column; one panel per value", examples=["gait.scale"]
+    )
     log: Annotated[tuple[Literal["x", "y"], ...], Field(strict=False)] = Field(
-        (), description="axes of lines with a logarithmic scale"
+        (), description="axes of lines with a logarithmic scale", examples=[["y"]]
     )
 
 
@@ -247,24 +296,43 @@ def dotted(tables: dict[str, Any], head: str = "") -> dict[str, Any]:
 class Sweep(Table):
     """One sweep, fully specified."""
 
-    title: str = ""
-    source: str = ""
+    title: str = Field("", description="one line about the sweep", examples=["My first sweep"])
+    source: str = Field(
+        "", description="where the experiment is described", examples=["ch. 4, Sec. 6.3"]
+    )
     scenario: str | dict[str, Any] = Field(
-        description="the base: a file or an address of the library, or a scenario's tables"
+        description="the base: a file or an address of the library, or a scenario's tables",
+        examples=["ch04_tracking/circle#continuous_t2_modified"],
     )
-    set: dict[str, Any] = Field({}, description="values by dotted key, the same for all flights")
-    axis: Annotated[tuple[Axis, ...], Field(strict=False)] = ()
-    sample: SampleTable | None = None
+    set: dict[str, Any] = Field(
+        {},
+        description="values by dotted key, the same for all flights",
+        examples=[{"simulation.duration": 85.0}],
+    )
+    axis: Annotated[tuple[Axis, ...], Field(strict=False)] = Field(
+        (), description="what varies; axes are crossed, the last one fastest"
+    )
+    sample: SampleTable | None = Field(
+        None, description="how often and how uniform and normal axes are drawn"
+    )
     derive: dict[str, Any] = Field(
-        {}, description="keys that follow from the axes: expressions, or lists of expressions"
+        {},
+        description="keys that follow from the axes: expressions, or lists of expressions",
+        examples=[{"gait.lean": "0.5 * scale"}],
     )
-    bisect: BisectTable | None = None
-    metrics: Names | None = Field(None, description="metrics in the dataset; default: all")
+    bisect: BisectTable | None = Field(
+        None, description="a search for a stability boundary at each point"
+    )
+    metrics: Names | None = Field(
+        None, description="metrics in the dataset; default: all", examples=[["max_abs_roll"]]
+    )
     keep_flights: bool = Field(False, description="also keep every flight.parquet")
     chunk_size: Count | None = Field(
-        None, description="number of points that are flown and saved together"
+        None,
+        description="number of points that are flown and saved together; default: 1/64 of all",
+        examples=[100],
     )
-    plot: PlotTable = PlotTable()
+    plot: PlotTable = Field(PlotTable(), description="how tiltsim plot draws the sweep")
 
     @field_validator("set", "derive", mode="before")
     @classmethod
