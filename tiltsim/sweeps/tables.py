@@ -146,7 +146,7 @@ class UniformAxis(AxisTable):
 class NormalAxis(AxisTable):
     """A number drawn from a normal distribution; several keys get the same draw."""
 
-    type: Literal["normal"] = Field(description="drawn from a bell curve")
+    type: Literal["normal"] = Field(description="drawn from a normal distribution")
     mean: float = Field(description="of the values [the key's]", examples=[2.0])
     standard_deviation: Positive = Field(description="of the values [the key's]", examples=[0.1])
 
