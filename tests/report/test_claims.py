@@ -77,8 +77,8 @@ def test_flights_of_claims_are_in_the_library():
             assert set(claim.flights) <= library, claim.id
 
 
-def test_chapter_5_is_flown_with_the_swings_that_its_claims_use():
-    flown = [load_scenario(address) for address, _, _ in library_entries() if "ch05" in address]
+def test_chapter_5_is_flown_with_the_swings_that_its_claims_use(scenarios):
+    flown = [scenario for scenario in scenarios if "ch05" in scenario.address]
     assert {scenario.gait.type for scenario in flown} == set(SWINGS)
     for scenario in flown:
         gait = scenario.gait
@@ -98,9 +98,8 @@ def test_nothing_that_rests_on_our_keyframes_counts_as_reproduced():
     assert verdict_on(claim, 0.3) is ClaimVerdict.NOT_REPRODUCED
 
 
-def test_every_chapter_has_claims():
-    entries = [load_scenario(address) for address, _, _ in library_entries()]
-    chapters = {claim.chapter for scenario in entries for claim in scenario_claims(scenario)}
+def test_every_chapter_has_claims(scenarios):
+    chapters = {claim.chapter for scenario in scenarios for claim in scenario_claims(scenario)}
     assert chapters | {claim.chapter for claim in CLAIMS} >= {*range(1, 13)}
 
 

@@ -8,8 +8,6 @@ from tiltsim.report.comparisons import other_address
 from tiltsim.report.html_page import page
 from tiltsim.report.made import Made
 from tiltsim.report.making import make_report
-from tiltsim.scenario.library import library_entries
-from tiltsim.scenario.loading import load_scenario
 
 PUSHED = """
 title = "Pushed"
@@ -97,9 +95,9 @@ def test_the_page_names_a_flight_once_for_all_its_metrics(pushed):
     assert [row.count(f"<td>{name}") for name in ("final position error x", "diverged")] == [1, 1]
 
 
-def test_the_library_compares_flights_with_flights_of_the_library():
-    addresses = {address for address, _, _ in library_entries()}
-    pairs = {a: other_address(a, load_scenario(a).without) for a in addresses}
+def test_the_library_compares_flights_with_flights_of_the_library(scenarios):
+    addresses = {scenario.address for scenario in scenarios}
+    pairs = {s.address: other_address(s.address, s.without) for s in scenarios}
     named = {without for without in pairs.values() if without}
     assert len(named) > 10
     assert named <= addresses

@@ -12,17 +12,10 @@ from tiltsim.report.claims import registered_claims
 from tiltsim.report.findings import FINDINGS
 from tiltsim.report.pictures import PICTURES
 from tiltsim.report.statement import ID
-from tiltsim.scenario.library import library_entries
-from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.metric_names import METRICS
 
 RAW = re.compile("|".join([*METRICS, *(name.replace("_", " ") for name in METRICS)]), re.I)
 PLAIN_WORDS = {"duration", "switches", "diverged"}
-
-
-@pytest.fixture(scope="module")
-def scenarios():
-    return [load_scenario(address) for address, _, _ in library_entries()]
 
 
 @pytest.fixture(scope="module")

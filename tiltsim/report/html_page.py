@@ -83,7 +83,7 @@ def _finding(finding: Finding, report: Report) -> Iterator[str]:
     yield f'<p class="where">{escape(finding.chapters)}</p>'
     *text, proof = finding.paragraphs
     yield from (f"<p>{prose(paragraph)}</p>" for paragraph in text)
-    yield f'<p class="proof"><b>Proof.</b> {prose(proof)}</p>'
+    yield f'<p class="proof"><b>Why.</b> {prose(proof)}</p>'
     settled = [row.statement.id for row in report.rows if row.claim.settled_by == finding.key]
     if settled:
         links = ", ".join(f'<a href="#{name}">{name}</a>' for name in dict.fromkeys(settled))

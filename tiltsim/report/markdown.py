@@ -52,7 +52,7 @@ def _lines(report: Report) -> Iterator[str]:
             yield f"### {finding.title}"
             yield from ("", f"*{finding.chapters}*", "")
             *text, proof = finding.paragraphs
-            for paragraph in (*text, f"**Proof.** {proof}"):
+            for paragraph in (*text, f"**Why.** {proof}"):
                 yield from (paragraph, "")
             yield from ("```sh", finding.command, "```", "")
     for chapter in report.chapters:

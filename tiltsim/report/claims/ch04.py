@@ -186,6 +186,7 @@ SHORT_PERIOD = Statement(
     "continuous switch.”",
     criterion="The largest errors after 20 s differ by less than a quarter of the larger one",
     note="At T = 1 s the modified decoupler is the worse one in all four cases.",
+    finding="short-period",
     pictures=("trot-errors",),
 )
 CONTINUOUS = Statement(

@@ -184,6 +184,7 @@ WALK_LEAST = Statement(
     "four",
     note="The scale and the lean of our gaits are fitted, and “the dynamic state error may also be "
     "influenced by the maximum tilting angle of each gait” (Sec. 7).",
+    finding="gallops",
     fitted=True,
 )
 RUN_LARGEST = Statement(

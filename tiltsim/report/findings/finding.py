@@ -27,7 +27,7 @@ class Finding:
 
     @property
     def paragraphs(self) -> list[str]:
-        """The text and the proof with their numbers."""
+        """The text, then the proof, with their numbers."""
         numbers = self.numbers()
         return [paragraph.format(**numbers) for paragraph in (*self.text, self.proof)]
 

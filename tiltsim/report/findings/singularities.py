@@ -91,7 +91,7 @@ FINDINGS: Final = (
             "finding, and the smallest rotation to a singular attitude is `asin(n · r₃ / |n|)`, "
             "the singularity margin that tiltsim records in flight.",
         ),
-        proof="Proof: the first three rows are τ, so the determinant is the scalar product of the "
+        proof="The first three rows are τ, so the determinant is the scalar product of the "
         "last row, r₃ᵀF, with the minors of τ, which span τ's kernel; F times them is n.",
         tests={
             "controllers/vehicle/test_decoupling_matrix.py": (
@@ -122,7 +122,7 @@ FINDINGS: Final = (
             "singularity margin is `asin |P r₃|`, P projecting on V; for four rotors it is the one "
             "above.",
         ),
-        proof="Proof: with B = [τ; r₃ᵀF] and K an orthonormal basis of τ's kernel, det(B Bᵀ) = "
+        proof="With B = [τ; r₃ᵀF] and K an orthonormal basis of τ's kernel, det(B Bᵀ) = "
         "det(τ τᵀ) |Kᵀ Fᵀ r₃|², as the last row counts only with its share in the kernel. The "
         "second factor is zero exactly where r₃ is perpendicular to V = range(F K).",
         tests={
@@ -163,7 +163,7 @@ FINDINGS: Final = (
             "atan(1.025/2.927), the ratios of the printed coefficients. This removes the "
             "limitation that ch. 12 names, a map known only by numerical search.",
         ),
-        proof="Proof: R_θ = k sin(α₁ + α₃ - 2δ) sin(α₂ - α₄) and R_φ = k sin(α₂ + α₄ + 2δ) "
+        proof="R_θ = k sin(α₁ + α₃ - 2δ) sin(α₂ - α₄) and R_φ = k sin(α₂ + α₄ + 2δ) "
         "sin(α₃ - α₁) with k = (tan δ + cot δ) / 2.",
         tests={
             _MAP: (
@@ -187,7 +187,7 @@ FINDINGS: Final = (
             "lies exactly on L, not slightly below it; switching colors there passes through a "
             "singular point.",
         ),
-        proof="Proof: on red R is a product whose factors vanish on L and on the two lines; at P = "
+        proof="On red R is a product whose factors vanish on L and on the two lines; at P = "
         "(δ, -δ) the first one is 2 tan δ - tan δ - tan δ.",
         tests={
             _SINGULARITY: ("test_blue_gaits_lose_rank_and_red_gaits_are_vertical",),
@@ -214,7 +214,7 @@ FINDINGS: Final = (
             "offset a hover survives as long as nothing disturbs it; on a circle the first "
             "attitude error demands rotor speeds that no rotor has, and the vehicle is lost.",
         ),
-        proof="Proof: with ρ = √(L² K_f² + K_m²) the columns of τ are ρ (0, cos(α₁-δ), sin(α₁-δ)), "
+        proof="With ρ = √(L² K_f² + K_m²) the columns of τ are ρ (0, cos(α₁-δ), sin(α₁-δ)), "
         "ρ (cos(α₂+δ), 0, -sin(α₂+δ)), ρ (0, -cos(α₃-δ), sin(α₃-δ)) and ρ (-cos(α₄+δ), 0, "
         "-sin(α₄+δ)). On blue α₃ - δ = -(α₁ - δ) and α₄ + δ = -(α₂ + δ).",
         tests={

@@ -40,7 +40,7 @@ FINDINGS: Final = (
             "by the same path flown back. A restoring rate in the null space of the inputs holds "
             "the lean without touching the position.",
         ),
-        proof="Proof: minimize W β'² + α'² under β' + κ α' = Ω. By Frobenius the planes would be "
+        proof="Minimize W β'² + α'² under β' + κ α' = Ω. By Frobenius the planes would be "
         "tangent to surfaces only if n · curl n of the null direction n were zero; it is not.",
         tests={
             _DRIFT: (
@@ -75,7 +75,7 @@ FINDINGS: Final = (
             "the controller's own rotor speeds stop at zero with it: the other rotor and the tilt "
             "suffice.",
         ),
-        proof="Proof: α'' enters the fourth derivative of the position as α does the second, "
+        proof="Α'' enters the fourth derivative of the position as α does the second, "
         "Eq. (3), in which the thrusts have the direction ψ + α = (1 - I_T/I_B) α.",
         tests={
             _CAR: (
