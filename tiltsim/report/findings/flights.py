@@ -72,8 +72,8 @@ FINDINGS: Final = (
             "gains that satisfy the condition. A scenario whose gains fail is rejected with the "
             "numbers.",
         ),
-        proof="The polynomial s³ + K₁s² + K₂s + K₃ is stable if and only if K₁K₂ > K₃; a loop gain g "
-        "multiplies all three, and the condition becomes g K₁K₂ > K₃.",
+        proof="The polynomial s³ + K₁s² + K₂s + K₃ is stable if and only if K₁K₂ > K₃; a loop gain "
+        "g multiplies all three, and the condition becomes g K₁K₂ > K₃.",
         tests={
             "controllers/analysis/test_stability.py": (
                 "test_published_attitude_gains_fail_under_the_exact_matrix",
