@@ -1,5 +1,6 @@
 """What ``tiltsim schema`` says about each key, and the page made of it."""
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Annotated
@@ -59,6 +60,12 @@ def classes(table):
     """Every table of the scenario file by the name of its class."""
     children = table.__subclasses__()
     return {table.__name__: table} | {k: v for child in children for k, v in classes(child).items()}
+
+
+def test_links_of_the_page_lead_to_its_chapters():
+    text = PAGE.read_text(encoding="utf-8")
+    headings = {re.sub(r"[^\w-]", "", line) for line in re.findall(r"^## (.*)$", text, re.M)}
+    assert {*re.findall(r"\(#(.*?)\)", text)} <= headings
 
 
 def test_every_example_of_a_key_is_valid():

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from textwrap import fill, indent
 from typing import Final
 
-from tiltsim.commands.key_tables import Key, KeyTable, head_of
+from tiltsim.commands.key_tables import Key, KeyTable, Place, head_of
 from tiltsim.errors import InputError
 from tiltsim.scenario.messages import did_you_mean
 
@@ -37,7 +38,8 @@ def page(tables: Sequence[KeyTable]) -> str:
     chapters = {table.places[0][0].name: table.places[0][:1] for table in others}
     meanings = {key.name: _sentence(key.meaning) for key in document.keys}
     overview = [
-        (f"[`{head_of(place)}`](#{name})", meanings[name]) for name, place in chapters.items()
+        (f"[`{head_of(place)}`](#{_anchor(place)})", meanings[name])
+        for name, place in chapters.items()
     ]
     parts = [INTRODUCTION, *_grid(("table", "meaning"), overview)]
     parts += ["", "## Keys before all tables", ""]
@@ -75,6 +77,11 @@ def description(tables: Sequence[KeyTable], address: str) -> str:
         hint = did_you_mean(wanted, known) + "tiltsim schema --markdown prints them all"
         raise InputError(f"{address}: no such table or key; {hint}")
     return "\n".join(keys)
+
+
+def _anchor(place: Place) -> str:
+    """The anchor that a chapter's heading gets."""
+    return re.sub(r"[^\w-]", "", head_of(place))
 
 
 def _section(table: KeyTable) -> list[str]:
