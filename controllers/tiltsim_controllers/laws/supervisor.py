@@ -57,7 +57,11 @@ LOOKAHEAD_SAMPLES: Final = 8
 """Instants ahead at which the gait is checked, evenly spaced up to the horizon."""
 
 BAND: Final = 0.1
-"""`threshold_clearance` below which the supervisor acts."""
+"""`threshold_clearance` from which the clock of ``HOLD`` slows down, to stop at zero.
+
+As much below zero ``RETURN_TO_RED`` has full speed: it undershoots a threshold by up to this, times
+the share of the maximum tilt rate that the gait requires.
+"""
 
 LAG: Final = 0.025
 """Time constant of the supervisor's rate, s."""

@@ -15,7 +15,7 @@ from tiltsim_controllers.analysis.singularity import (
 )
 from tiltsim_controllers.gaits.plans import fixed, waypoints
 from tiltsim_controllers.gaits.plans import instant_trot as trot_instant
-from tiltsim_controllers.gaits.tilts import tilt_reference
+from tiltsim_controllers.gaits.tilts import planned_jets, tilt_reference
 from tiltsim_controllers.laws.decouplers import exact_decoupler
 from tiltsim_controllers.laws.supervisor import (
     BAND,
@@ -229,6 +229,25 @@ def test_on_the_way_to_red_the_tilt_with_the_longest_way_has_the_maximum_rate(ro
     # Far from both ends and from rest the state is driven to that rate, with the lag.
     rate = demand(0.0, 0.4, 0.0, 0.5, 0.0, supervisor, gait) * LAG
     assert abs(rate) == pytest.approx(0.2 / half)
+
+
+def test_the_way_to_red_undershoots_a_threshold_by_less_than_the_band():
+    """From red (at 0 s) towards blue (at 2 s) and back, level, as in beyond/supervisor_blue."""
+    angles = ((-0.3, 0.3, -0.3, 0.3), (-0.3, 0.3, 0.634, -0.634))
+    plan = waypoints(angles, 4.0)
+    supervisor = watch("return_to_red", min_determinant=1.5, max_rate=1.0)
+    state = rate = 0.0
+    step, smallest = 0.005, 4.0
+    for time in np.arange(0.8, 2.6, step).tolist():
+        planned = planned_jets(time, plan.parameters, plan.knots)
+        tilts = np.array(supervised_tilts(planned, 1.0, (state, 0.0, 0.0), supervisor, RATIO))[:, 0]
+        smallest = min(smallest, determinant(tilts, 0.0, 0.0, VEHICLE))
+        _, rate_now, change = supervised_derivative(
+            time, 0.0, 0.0, state, rate, plan.parameters, plan.knots, supervisor, RATIO
+        )
+        state, rate = state + step * rate_now, rate + step * change
+    assert 1.5 - BAND * (4.0 - 1.5) < smallest < 1.5
+    assert smallest == pytest.approx(1.464, abs=0.01)  # docs/supervisor.md
 
 
 def test_what_meets_its_threshold_exactly_is_allowed():
