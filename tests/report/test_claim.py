@@ -154,6 +154,12 @@ def test_the_source_splits_into_chapter_and_section():
     assert statement(id="ch12-so", source="ch. 12, Eq. (4)").chapter == 12
 
 
+def test_statements_are_ordered_by_section():
+    sources = ("Abstract", "Sec. 3", "Secs. 3.1-3.2", "Sec. 10, Fig. 2", "App. B, Eq. (A1)")
+    places = [statement(source=f"ch. 3, {source}").place for source in sources]
+    assert places == sorted(places) == [(), (3,), (3, 1), (10,), (99,)]
+
+
 def scenario(expect, source="ch. 4, Sec. 6.1", **more):
     document = {"title": "A flight", "source": source, "expect": expect}
     return parse_scenario(document | more)

@@ -70,6 +70,8 @@ def test_an_unsupported_plant_has_no_cell(report):
     [row] = rows_of(report, "Rotors are slow")
     assert row.cell("thesis") is None
     assert row.cell("mujoco").measured is False
+    speed = report.flights[row.claim.address, "mujoco"].metrics["max_rotor_speed"]
+    assert measured_text(row.claim, row.cell("mujoco")) == f"no ({speed:.4g} rad/s)"
     assert row.verdict is ClaimVerdict.REPRODUCED
 
 

@@ -38,6 +38,7 @@ class Cell:
     measured: Value | None
     verdict: ClaimVerdict
     note: str = ""  # why there is no value, or when the flight terminated
+    behind: float | None = None  # the metric behind a yes or no
 
 
 @dataclass(frozen=True)
@@ -170,7 +171,9 @@ def _expectation_rows(entries: list[ReportEntry], flights: Flights) -> list[Row]
 
 def _expectation_cell(claim: ExpectationClaim, record: FlightRecord) -> Cell:
     measured = claim.measure(record.metrics)
-    return Cell(measured, verdict_on(claim, measured), _ending(record))
+    value = record.metrics.get(claim.expectation.metric)
+    behind = value if isinstance(measured, bool) and not isinstance(value, bool) else None
+    return Cell(measured, verdict_on(claim, measured), _ending(record), behind)
 
 
 def _ending(record: FlightRecord) -> str:

@@ -81,10 +81,10 @@ class Report:
         return sorted({row.claim.chapter for row in self.rows})
 
     def chapter_groups(self, chapter: int) -> list[Group]:
-        """The rows of a chapter grouped by statement, in order of first appearance."""
+        """The rows of a chapter grouped by statement, section by section."""
         rows = [row for row in self.rows if row.claim.chapter == chapter]
         order = list(dict.fromkeys(row.statement.id for row in rows))
-        rows.sort(key=lambda row: order.index(row.statement.id))
+        rows.sort(key=lambda row: (row.statement.place, order.index(row.statement.id)))
         return [Group(list(group)) for _, group in groupby(rows, lambda row: row.statement.id)]
 
 
@@ -187,6 +187,8 @@ def measured_text(claim: Claim, cell: Cell) -> str:
         return cell.note or "no value"
     if isinstance(value, bool):
         text = _yes_or_no(value, claim)
+        if cell.behind is not None:
+            return f"{text} ({_sign(f'{cell.behind:.4g}')} {claim.unit}".rstrip() + ")"
         return cell.note if cell.note and text == "terminated" else text
     numbers = value if isinstance(value, tuple) else (value,)
     shown = [_measured_number(one, claim) for one in numbers]

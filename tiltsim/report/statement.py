@@ -88,6 +88,14 @@ class Statement:
         assert found is not None
         return int(found[1])
 
+    @property
+    def place(self) -> tuple[int, ...]:
+        """Numbers of its first section, for the order of the text; an appendix comes last."""
+        if "App." in self.source:
+            return (99,)
+        section = re.search(r"Secs?\. ([\d.]*\d)", self.source)
+        return tuple(map(int, section[1].split("."))) if section else ()
+
 
 def slug(text: str) -> str:
     """A text as part of an address: "ρ = -0.65, circle" is "rho-minus-0-65-circle"."""
