@@ -32,7 +32,7 @@ class PythonController(ControllerTable):
 
     law: Literal["python"] = Field(description="your own controller")
     function: str = Field(
-        description="FILE.py:NAME of a function or class; FILE relative to the scenario's folder",
+        description="FILE.py:NAME of a function or class; FILE in the scenario's folder",
         examples=["my_controller.py:hover"],
     )
 
