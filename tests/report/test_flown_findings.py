@@ -12,9 +12,10 @@ pytestmark = pytest.mark.slow  # more laws to compile than to fly
 
 
 @cache
-def fly(address, plant="thesis", duration=32.0):
+def fly(address, plant="thesis", duration=32.0, inertia=0.0):
     """A flight of the library, without its end; 12 s after the transient are whole periods."""
     changes = {
+        "vehicle.rotor_inertia": inertia,
         "simulation.plant": plant,
         "simulation.engine": "native",
         "simulation.duration": duration,
@@ -22,8 +23,8 @@ def fly(address, plant="thesis", duration=32.0):
     return tiltsim.simulate(tiltsim.load_scenario(address, changes))
 
 
-def error(address):
-    return fly(address).metrics()["sup_position_error_after_20s"]
+def error(address, *conditions):
+    return fly(address, *conditions).metrics()["sup_position_error_after_20s"]
 
 
 @pytest.mark.parametrize("form", ["instant", "continuous"])
@@ -55,6 +56,16 @@ def test_the_measured_acceleration_saves_the_flight_that_the_modelled_loses():
         for address in ("line#instant", "measured_acceleration#line")
     }
     assert completed == {"line#instant": False, "measured_acceleration#line": True}
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_rotor_inertia_changes_trots_but_no_fixed_gait(plant):
+    fixed, trot = (f"ch04_tracking/circle#{name}_modified" for name in ("fixed", "continuous_t2"))
+    without, heavy = (error(fixed, plant, 32.0, inertia) for inertia in (0.0, 1e-5))
+    assert heavy == pytest.approx(without, rel=0.01)
+    without, heavy = (error(trot, plant, 32.0, inertia) for inertia in (0.0, 1e-5))
+    assert heavy < 0.75 * without
+    assert (fly(trot, plant, 32.0, 3e-5).end.kind == "completed") == (plant == "thesis")
 
 
 def test_a_rounded_blue_gait_hovers_undisturbed_and_is_lost_on_a_circle():
