@@ -188,10 +188,10 @@ FINDINGS: Final = (
             "Propellers of this vehicle's size have a spin inertia of 1e-6 to 3e-5 kg m². Their "
             "reaction and gyroscopic torques, off in every flight of the thesis, leave a fixed "
             "gait as it is. A trot turns the rotors' angular momentum with its pods: with "
-            "1e-5 kg m² the error of the continuous trot at T = 2 s, modified decoupler, is smaller "
-            "by more than a quarter on both plants, and with 3e-5 kg m² the same flight is lost in "
-            "MuJoCo, though not on the thesis's equations. The published errors of moving gaits "
-            "hold for rotors without inertia.",
+            "1e-5 kg m² the error of the continuous trot at T = 2 s, modified decoupler, is "
+            "smaller by more than a quarter on both plants, and with 3e-5 kg m² the same flight is "
+            "lost in MuJoCo, though not on the thesis's equations. The published errors of moving "
+            "gaits hold for rotors without inertia.",
         ),
         proof="A rotor of inertia J on the unit axis d adds the torque -d/dt (J ϖ d) - ω × J ϖ d. "
         "It vanishes for pods at rest, constant speeds and a body that does not turn.",
