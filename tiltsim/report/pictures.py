@@ -161,7 +161,9 @@ PICTURES: Final[tuple[Picture, ...]] = (
     Picture(
         4,
         "trot-errors",
-        "Largest error after 20 s against the period of the trot (ch. 4, Figs. 8, 9, 13, 14).",
+        "Largest error after 20 s against the period of the trot (ch. 4, Figs. 8, 9, 13, 14), with "
+        "the angular acceleration of the law's model: the crossed flights are lost in MuJoCo, and "
+        "complete with the measured one.",
         _trot_errors,
         tuple(product(_TROTS, PLANTS)),
     ),
