@@ -304,7 +304,7 @@ def test_keys_that_came_after_a_definition_was_written_have_their_defaults(point
     assert "no_longer_known was 1" in old.difference(now)
 
 
-@pytest.mark.parametrize("count", [10_000_000, 20_000])
+@pytest.mark.parametrize("count", [200_000, 20_000])
 def test_huge_axes_are_refused_or_tried_in_a_few_places(points_of, count):
     axis = PERIODS.replace("5", str(count))
     if count == 20_000:
@@ -329,6 +329,7 @@ def test_huge_axes_are_refused_or_tried_in_a_few_places(points_of, count):
         (PERIODS.replace("gait.period", "period"), ["period", "[derive]"]),
         (PERIODS.replace("start = 1", "start = -1"), ["gait.period = -1", "greater"]),
         (PERIODS.replace("gait.period", "gait.angles[0]"), ["gait.angles[0]", "no such entry"]),
+        (PERIODS.replace("count = ", "count = 1000000"), ["axis[0].count", "200000"]),
         (AMPLITUDES.replace("0.5", "nan"), ["axis.values = NaN", "must be finite"]),
         (PERIODS.replace('key = "gait.period"', ""), ["axis.key", "key or keys"]),
         (PERIODS + PERIODS, ["gait.period", "set twice"]),

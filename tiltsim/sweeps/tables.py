@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from tiltsim.scenario.expectation import Expectation
+from tiltsim.scenario.limits import MAX_VALUES
 from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
 from tiltsim.scenario.table import Positive, Table, example
@@ -107,7 +108,7 @@ class LinspaceAxis(AxisTable):
     type: Literal["linspace"] = Field(description="evenly spaced values")
     start: float = Field(description="the first value [the key's]", examples=[1.0])
     stop: float = Field(description="the last value [the key's]", examples=[3.0])
-    count: Annotated[int, Field(ge=2, le=10_000_000)] = Field(
+    count: Annotated[int, Field(ge=2, le=MAX_VALUES)] = Field(
         description="number of values", examples=[9]
     )
     group: Group = None
