@@ -358,7 +358,7 @@ MISTAKES = {
     "unknown law": ({"controller": {"law": "pid"}}, 'controller.law = "pid": choose attitude'),
     "key of another law": (
         {"vehicle": QUADROTOR, "controller": {"law": "yaw_position", "decoupler": "exact"}},
-        'controller.decoupler = "exact": unknown key; known: allow_unstable, gains, law',
+        'controller.decoupler = "exact": unknown key; only for law attitude_altitude; known: ',
     ),
     "unstable gains": (
         {"vehicle": QUADROTOR, "controller": {"law": "yaw_position", "gains": "ch02"}},
@@ -391,11 +391,11 @@ MISTAKES = {
     ),
     "rotorcraft's key for a tilt-car": (
         {"vehicle": {"model": "tilt_car", "arm_length": 0.2}},
-        "vehicle.arm_length = 0.2: unknown key; known: bottom_inertia, half_angle, mass, model",
+        "vehicle.arm_length = 0.2: unknown key; only for model tiltrotor, quadrotor; known: ",
     ),
     "tilt-car's key for a rotorcraft": (
         {"vehicle": {"model": "quadrotor", "top_inertia": 0.1}},
-        "vehicle.top_inertia = 0.1: unknown key; did you mean inertia? known: arm_length",
+        "vehicle.top_inertia = 0.1: unknown key; only for model tilt_car; known: arm_length",
     ),
     "unknown vehicle": (
         {"vehicle": {"model": "boat"}},
@@ -446,7 +446,7 @@ MISTAKES = {
     ),
     "unknown disturbance": (
         {"disturbance": [{"type": "earthquake", "value": [1.0, 0.0, 0.0]}]},
-        'disturbance.0.type = "earthquake": choose acceleration',
+        'disturbance[0].type = "earthquake": choose acceleration',
     ),
     "zone turned round": (
         {**LAWS["switching"], "controller": {"law": "switching", "zone": {"roll": [0.2, -0.2]}}},
