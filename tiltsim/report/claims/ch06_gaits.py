@@ -11,6 +11,7 @@ import numpy as np
 from tiltsim.report.claim import AnalysisClaim
 from tiltsim.report.claims.ch03 import EQ_17, EQ_19
 from tiltsim.report.claims.ch06 import EQ_4, RANK
+from tiltsim.report.measures import PRINTED_OFFSET
 from tiltsim.report.statement import Statement
 from tiltsim_controllers.analysis.published_gaits import (
     PUBLISHED_GAITS,
@@ -25,7 +26,6 @@ from tiltsim_controllers.vehicle.parameters import PRESETS
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
 _ZERO: Final = 1e-9
-_OFFSET: Final = 0.334198  # rad, α₁ + α₃ on blue as printed in ch. 8
 _NEAR_RIGHT_ANGLE: Final = 1.55
 """rad: with such a margin the singular attitudes are within 0.02 rad of a right angle."""
 _GAITS: Final = {f"ch06_gait_{i}": f"Gait {i}" for i in (1, 2, 3, 4)}
@@ -62,7 +62,7 @@ def _as_published(key: str, bias: float = 1.0) -> tuple[float, float]:
     """
     gait = PUBLISHED_GAITS[key].gait
     angles = gait.angles(gait.sample_times(401))
-    angles[:, 2], angles[:, 3] = _OFFSET - angles[:, 0], -_OFFSET - angles[:, 1]
+    angles[:, 2], angles[:, 3] = PRINTED_OFFSET - angles[:, 0], -PRINTED_OFFSET - angles[:, 1]
     angles[:, 2:] *= bias
     sines, cosines = np.sin(angles), np.cos(angles)
 
