@@ -1,11 +1,9 @@
-"""Checks between the tables of a scenario, each valid alone, and of its time steps."""
+"""Checks between the tables of a scenario, each valid alone."""
 
 from __future__ import annotations
 
 import re
-from typing import Any, Final
-
-import numpy as np
+from typing import Final
 
 from tiltsim.scenario.claim import NAME
 from tiltsim.scenario.controller import laws_for
@@ -22,31 +20,9 @@ from tiltsim.scenario.vehicle import (
     VehicleTable,
     require_physical_inertia,
 )
-from tiltsim_controllers.analysis.stability import ErrorLoop
-from tiltsim_controllers.laws.supervisor import LAG
-from tiltsim_controllers.vehicle.parameters import Vehicle
 
 MAX_KNOTS: Final = 1500
 """Numbers of a gait and a reference together, which every evaluation of the law reads."""
-
-MAX_LOOP_STEP: Final = 2.5
-"""Largest product of timestep and closed-loop pole; RK4 turns unstable at 2.78, ode3 at 2.51."""
-
-MAX_HOVER_SPEED: Final = 5000.0
-"""Rotor speed (rad/s) in hover beyond that of any rotor: tips at 7 cm would be supersonic."""
-
-MAX_HELD_STEP: Final = 2.0
-"""Largest product of control timestep and pole, where a held third derivative turns unstable."""
-
-MAX_SERVO_STEP: Final = {"mujoco": 2.6, "thesis": 2.45}
-"""Largest product of timestep and servo pole, by plant.
-
-On the real axis RK4 turns unstable at 2.78 and ode3 at 2.51; at a damping ratio of 0.3 or more both
-are stable at these. With less, ode3 is stable up to `MAX_UNDAMPED_SERVO_STEP`.
-"""
-
-MAX_UNDAMPED_SERVO_STEP: Final = 1.7
-"""On the thesis plant: ode3 turns unstable at 1.73 on the imaginary axis."""
 
 
 def check_consistency(scenario: ScenarioTables) -> None:
@@ -304,98 +280,6 @@ def _check_rotor_limits(scenario: ScenarioTables) -> None:
                 speed,
                 f"must lie within the rotor limits, {low or 0} to {high or 'any'} rad/s",
             )
-
-
-def check_time_steps(scenario: ScenarioTables) -> None:
-    """Refuse servos, supervisors and laws that a scenario's time steps make unstable.
-
-    Raises `InvalidValueError`, also for gains that are unstable at any step.
-    """
-    _check_servo(scenario)
-    _check_supervisor(scenario)
-    _check_stability(scenario)
-
-
-def _check_servo(scenario: ScenarioTables) -> None:
-    servo, timestep = scenario.vehicle.tilt_servo, scenario.simulation.timestep
-    # The fastest pole of the servo must stay where explicit integration is stable.
-    fastest = servo.natural_frequency * max(1.0, 2.0 * servo.damping_ratio)
-    plant = scenario.simulation.plant
-    limit = MAX_SERVO_STEP[plant]
-    if plant == "thesis" and servo.damping_ratio < 0.3:
-        limit = MAX_UNDAMPED_SERVO_STEP
-    # On the thesis plant ideal pods follow the gait exactly.
-    moves = plant == "mujoco" or not scenario.has_ideal_actuators_in_still_air
-    if scenario.vehicle.has_tilting_rotors and moves and fastest * timestep > limit:
-        raise scenario.mistake(
-            "simulation.timestep",
-            f"too long for a tilt servo at {servo.natural_frequency:g} rad/s; at most "
-            f"{limit / fastest:.3g} s, or a slower vehicle.tilt_servo",
-        )
-
-
-def _check_supervisor(scenario: ScenarioTables) -> None:
-    """Refuse a supervisor that cannot keep its thresholds, or is sampled too slowly for its lag."""
-    supervisor = scenario.controller.supervision
-    if supervisor is None:
-        return
-    supervisor.resolve(scenario.rotorcraft.resolve())
-    longest = MAX_HELD_STEP * LAG
-    step, strategy = scenario.simulation.control_timestep, supervisor.strategy
-    if strategy != "scale" and step >= longest:
-        raise scenario.mistake(
-            "simulation.control_timestep",
-            f"too long for controller.supervisor.strategy = {strategy}, which moves with a lag "
-            f"of {LAG:g} s; below {longest:g} s",
-        )
-
-
-def _check_stability(scenario: ScenarioTables) -> None:
-    controller = scenario.controller
-    if controller.allow_unstable:
-        return
-    vehicle: Any = scenario.vehicle.resolve()  # each controller's table takes its own vehicle
-    for loop in controller.error_loops(vehicle):
-        if not loop.stable:
-            raise scenario.mistake(
-                "controller.gains",
-                f"fails the Routh-Hurwitz criterion under {controller.linearization}: "
-                f"{loop.condition}; change the gains or set controller.allow_unstable = true",
-            )
-        _check_speed(scenario, loop)
-
-
-def _check_speed(scenario: ScenarioTables, loop: ErrorLoop) -> None:
-    """Refuse a loop whose fastest pole the time steps cannot follow.
-
-    The published decoupling matrix speeds the attitude loops up some 700 times, so that
-    harmless-looking gains can outrun the integrator within a few steps.
-    """
-    fastest = float(np.abs(np.roots(loop.polynomial)).max())
-    limits = {"timestep": MAX_LOOP_STEP, "control_timestep": MAX_HELD_STEP}
-    for key, limit in limits.items():
-        step = getattr(scenario.simulation, key)
-        if fastest * step > limit:
-            _check_weight(scenario)
-            raise scenario.mistake(
-                f"simulation.{key}",
-                f"too long for the {loop.name} loop under "
-                f"{scenario.controller.linearization}, with its fastest pole at {fastest:.4g} "
-                f"rad/s; at most {limit / fastest:.3g} s, or slower gains, or "
-                "controller.allow_unstable = true",
-            )
-
-
-def _check_weight(scenario: ScenarioTables) -> None:
-    """Refuse a mass, such as one in grams, that no rotors carry; loops are as fast as rotors."""
-    vehicle = scenario.vehicle.resolve()
-    if isinstance(vehicle, Vehicle) and vehicle.hover_rotor_speed > MAX_HOVER_SPEED:
-        raise InvalidValueError(
-            "vehicle.mass",
-            vehicle.mass,
-            f"is in kg; to hover its rotors would have to turn at {vehicle.hover_rotor_speed:.4g} "
-            "rad/s; check mass and thrust_coefficient",
-        )
 
 
 def _check_claims(scenario: ScenarioTables) -> None:

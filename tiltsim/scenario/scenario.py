@@ -11,9 +11,10 @@ from typing import Annotated, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
-from tiltsim.scenario.consistency import check_consistency, check_time_steps
+from tiltsim.scenario.consistency import check_consistency
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.table import Table
+from tiltsim.scenario.time_steps import check_time_steps
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.references.trajectories import ReferenceParameters
