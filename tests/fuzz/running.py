@@ -76,8 +76,6 @@ def run_one(number, seed, folder):
         from tiltsim.cli import _one_line
 
         print(_one_line(error), file=err)
-        if "\n" in str(error):
-            return f"message of several lines: {str(error)!r}"
     except HangError:
         return f"takes longer than {TIME_LIMIT} s"
     except BaseException as error:

@@ -327,6 +327,10 @@ def test_further_mistakes_are_named(write):
             "unknown key; only for type trot_instant, trot_continuous, walk, run, ",
         ),
         ('[controller]\ntilt_weight = "even"', "unknown key; only for law full_pose; known"),
+        (
+            "[controller.supervisor]\nsupervisor = 1",
+            "unknown key; did you mean controller.supervisor? known: clear",
+        ),
         ("[air]\nwind = 5", "air.wind = 5: must be a list of 3 numbers"),
         ("[air.gust]\nrise = 1\nvelocity = 5", "velocity = 5: must be a list of 3 numbers"),
         ("[vehicle]\ninertia = 5", "vehicle.inertia = 5: must be a list of 3 numbers"),

@@ -181,10 +181,13 @@ def _known_keys(schema: Any, location: tuple[Any, ...], key: str) -> str:
     union, table, name = schema, schema, key.rpartition(".")[2]
     for part in location[:-1]:
         union, table = table, _member(table, part)
+    tables = [option for option in _options(table) if hasattr(option, "model_fields")]
+    if len(tables) == 1 and not hasattr(table, "model_fields"):  # it may be None
+        union, (table,) = table, tables
     names = sorted(table.model_fields) if hasattr(table, "model_fields") else []
     kinds = dict.fromkeys(kind for option in _options(union) for kind in _kinds_with(option, name))
     elsewhere = [found for found in _dotted_keys(schema) if found.rpartition(".")[2] == name]
-    if kinds:
+    if kinds and names:
         hint = f"only for {_tag_key(table.model_fields)} {', '.join(kinds)}; "
     elif elsewhere:
         hint = f"did you mean {' or '.join(elsewhere[:3])}? "
