@@ -15,6 +15,7 @@ import pytest
 
 import tiltsim
 from tiltsim.cli import main
+from tiltsim.closed_loop.userdata import evaluation_time
 from tiltsim.errors import InputError
 from tiltsim.flight.reading import load_flight
 from tiltsim.laws.assembling import assemble, loop_of
@@ -179,7 +180,7 @@ def test_a_shipped_law_flown_as_a_users_own_flies_the_same_flight(layers):
     }
     ideal = tiltsim.parse_scenario(tables)
     shipped = tiltsim.parse_scenario(merged(tables, *LAYERS[layers]))
-    parameters = assemble(shipped).setup.parameters
+    parameters, timestep = assemble(shipped).setup.parameters, shipped.simulation.timestep
     while not isinstance(parameters, Parameters):
         parameters = getattr(parameters, "inner", None) or parameters.law
 
@@ -189,7 +190,9 @@ def test_a_shipped_law_flown_as_a_users_own_flies_the_same_flight(layers):
             [*observation.velocity, *observation.body_rates, *observation.tilt_rates],
             np.array(SPIN) * observation.rotor_speeds,
         )
-        rates = rotor_accelerations(observation.time, tuple(map(float, state)), parameters)
+        # A shipped law sees the instant just after the one that it is given.
+        time = evaluation_time(round(observation.time / timestep), 1.0, timestep)
+        rates = rotor_accelerations(time, tuple(map(float, state)), parameters)
         return Command(rotor_accelerations=np.array(SPIN) * rates)
 
     ours, theirs = tiltsim.simulate(shipped), tiltsim.simulate(shipped, controller=own)

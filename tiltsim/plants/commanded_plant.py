@@ -129,7 +129,7 @@ class CommandedPlant(MujocoPlant):
 
     def _gait_servo_commands(self) -> Quad:
         lead, gait = self._commanded.servo_lead, self._commanded.gait
-        return gait_servo_commands(self.time, lead, gait, self._setup.knots)
+        return gait_servo_commands(self.evaluation_time, lead, gait, self._setup.knots)
 
     def _limited_speeds(self, command: CheckedCommand) -> Quad:
         """Commanded speeds along the spin (rad/s), within the rotors' limits."""
@@ -167,13 +167,13 @@ class CommandedPlant(MujocoPlant):
 
     def observation(self) -> Observation:
         """The present state as a controller sees it, through the scenario's sensors."""
-        time, qpos, qvel = self.time, self.data.qpos, self.data.qvel
+        time, qpos, qvel = self.evaluation_time, self.data.qpos, self.data.qvel
         if self._sensors.active:
             qpos = np.array(measured_qpos(time, qpos.tolist(), self._sensors))
             qvel = np.array(measured_qvel(time, qvel.tolist(), self._sensors))
         tilts, tilt_rates = qpos[7:11], qvel[6:10]
         return Observation(
-            time=time,
+            time=self.time,
             position=qpos[:3].copy(),
             velocity=qvel[:3].copy(),
             attitude=np.array(euler_from_quaternion(*qpos[3:7].tolist())),
@@ -187,7 +187,7 @@ class CommandedPlant(MujocoPlant):
         )
 
     def _reference(self) -> Reference:
-        time, knots, reference = self.time, self._setup.knots, self._commanded.reference
+        time, knots, reference = self.evaluation_time, self._setup.knots, self._commanded.reference
         motion = np.array(reference_derivatives(time, reference, knots)[:9])
         planned = np.zeros(8)
         if self.tilting:
