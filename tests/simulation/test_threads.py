@@ -34,11 +34,13 @@ def samples(flown):
 
 
 def own_controller(observation):
-    return Command(thrusts=[HOVER - 0.1 * observation.body_rates[0]] * 4)
+    first = HOVER - 0.1 * observation.body_rates[0] + observation.time
+    return Command(thrusts=[first, HOVER, HOVER, HOVER])
 
 
 def flown_by_own_controller():
-    flown = scenario({"vehicle": {"mass": 0.45}}, engine="python", duration=0.05)
+    vehicle = {"mass": 0.45, "rotor_inertia": 1e-6}  # each new speed turns the body
+    flown = scenario({"vehicle": vehicle}, engine="python", duration=0.05)
     return tiltsim.simulate(flown, controller=own_controller).samples
 
 

@@ -88,7 +88,7 @@ class CommandedPlant(MujocoPlant):
             trig, jump = sines_and_cosines(*tilts), (speeds - data.act[:4]).tolist()
             impulse, turned = np.zeros((1, model.nv)), np.empty((1, model.nv))
             impulse[0, 3:6] = sum_along_thrust_axes(trig, jump)
-            mujoco.mj_forward(model, data)  # the mass matrix of the present tilts
+            mujoco.mj_fwdPosition(model, data)  # the mass matrix of the present tilts
             mujoco.mj_solveM(model, data, turned, impulse)
             data.qvel[:] -= self._rotor_inertia * turned[0]
         data.act[self._speeds] = speeds
