@@ -612,7 +612,10 @@ def test_a_controller_must_be_callable():
     [
         ({"simulation": {"plant": "thesis"}}, ["simulation.plant", "mujoco plant only"]),
         ({"simulation": {"engine": "native"}}, ["simulation.engine", "python engine only"]),
-        ({"controller": {"law": "python"}}, ["controller.function: missing"]),
+        (
+            {"controller": {"law": "python"}},
+            ["needs controller.function = FILE.py:NAME", "controller="],
+        ),
         (
             {
                 "vehicle": {"model": "quadrotor"},

@@ -14,7 +14,6 @@ from tiltsim.errors import InputError
 from tiltsim.flight.end import End
 from tiltsim.plants.command import CheckedCommand
 from tiltsim.plants.commanded_plant import CommandedPlant
-from tiltsim.plants.user_controller import with_external_commands
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -53,8 +52,8 @@ class Task:
         reward: Reward = hover_reward,
         max_position_error: float = 10.0,
     ) -> None:
-        self._simulation = (
-            None if control_timestep is None else {"control_timestep": control_timestep}
+        self._timing = (
+            {} if control_timestep is None else {"simulation.control_timestep": control_timestep}
         )
         self.scenario = self._commanded(scenario)
         self._domain = domain if isinstance(domain, Domain) else None
@@ -69,7 +68,8 @@ class Task:
         self._max_position_error = max_position_error
 
     def _commanded(self, scenario: Scenario) -> Scenario:
-        return with_external_commands(scenario, ENVIRONMENT, self._simulation)
+        commanded = {"controller.law": "python", "controller.function": ENVIRONMENT}
+        return scenario.replace({**commanded, **self._timing})
 
     def action_spec(self) -> specs.BoundedArray:
         """Shape and bounds of an action, N and rad."""

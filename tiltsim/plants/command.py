@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tiltsim.errors import TiltsimError
+from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats, Quad
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
@@ -121,12 +122,3 @@ def _four(name: str, value: Any) -> Quad:
         if not isfinite(number):
             raise ControllerError(f"returned {name}[{index}] = {number}; must be finite")
     return first, second, third, fourth
-
-
-def short_repr(value: object) -> str:
-    """A value in at most 60 characters of one line, even if its ``repr`` raises."""
-    try:
-        text = " ".join(repr(value).split())
-    except Exception:
-        text = f"a {type(value).__name__}"
-    return text if len(text) <= 60 else text[:57] + "..."

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.engines.base import EngineName
-from tiltsim.plants.command import Controller
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.plant import Plant
 from tiltsim.plants.thesis_plant import ThesisPlant
@@ -12,24 +11,18 @@ from tiltsim.plants.user_controller import UserControlledPlant
 from tiltsim.system.interrupts import reraise_swallowed_interrupts
 
 
-def make_plant(
-    assembly: Assembly,
-    controller: Controller | type | None = None,
-    engine: EngineName | None = None,
-) -> Plant:
+def make_plant(assembly: Assembly, engine: EngineName | None = None) -> Plant:
     """The plant that a scenario requests, at its initial state.
 
     Args:
         assembly: The flight.
-        controller: A user's own, for scenarios whose law is ``python``; default: the one that it
-            names.
         engine: In place of the scenario's.
 
     Raises:
         InputError: If MuJoCo cannot compile the vehicle, or the user's controller cannot be loaded.
     """
     if assembly.scenario.controller.is_external:
-        return UserControlledPlant(assembly, controller)
+        return UserControlledPlant(assembly)
     with reraise_swallowed_interrupts():  # it may compile
         if assembly.scenario.simulation.plant == "thesis":
             return ThesisPlant(assembly, engine)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import importlib.util
 import sys
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,6 @@ from tiltsim.plants.command import (
     ControllerError,
     Observation,
     check_command,
-    short_repr,
 )
 from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.scenario.controller import PythonController
@@ -76,49 +75,12 @@ def _place(error: BaseException) -> str:
     return f" ({Path(last.filename).name}, line {last.lineno})"
 
 
-def with_controller(scenario: Scenario, controller: object) -> Scenario:
-    """The scenario with a controller given in Python in place of its own.
+def load_controller(scenario: Scenario) -> UserController:
+    """The controller of a scenario under the law ``python``: given in Python, or in a file.
 
-    Raises `InputError` if it is not callable, or the scenario does not support one.
+    A class makes one without arguments. Raises `InputError` if it cannot be loaded or made.
     """
-    if not callable(controller):
-        raise InputError(f"controller = {short_repr(controller)}: must be callable")
-    return with_external_commands(scenario, _name_of(controller))
-
-
-def with_external_commands(
-    scenario: Scenario, name: str, simulation: Mapping[str, Any] | None = None
-) -> Scenario:
-    """The scenario with commands from outside in place of its controller.
-
-    ``name`` is their source, for ``controller.function``; ``simulation`` has keys to replace in
-    that table. Raises `InputError` if the scenario does not support them.
-    """
-    from tiltsim.scenario.loading import parse_scenario, without_none
-
-    table = scenario.controller
-    if isinstance(table, PythonController) and table.function == name and not simulation:
-        return scenario
-    document = without_none(scenario.model_dump(mode="json"))
-    document["controller"] = {"law": "python", "function": name}
-    document["simulation"] |= simulation or {}
-    return parse_scenario(document, scenario.address or "scenario")
-
-
-def _name_of(controller: object) -> str:
-    named = controller if hasattr(controller, "__qualname__") else type(controller)
-    return f"{named.__module__}.{named.__qualname__}"
-
-
-def load_controller(
-    scenario: Scenario, controller: Controller | type | None = None
-) -> UserController:
-    """The controller of a scenario under the law ``python``.
-
-    ``controller`` is one, or a class that makes one without arguments; default: what the scenario
-    names. Raises `InputError` if it cannot be loaded or made.
-    """
-    table = scenario.controller
+    table, controller = scenario.controller, scenario.own_controller
     assert isinstance(table, PythonController)
     name = table.function
     if controller is None:
@@ -139,8 +101,8 @@ def _load(address: str, table: PythonController) -> Any:
     start = f'{address}: controller.function = "{table.function}"'
     if table.file is None:
         raise InputError(
-            f"{start}: does not name a file; write FILE.py:NAME, or pass "
-            "controller= to tiltsim.simulate"
+            f"{start}: a controller that was given in Python, which no file holds; give it again "
+            "as controller= to tiltsim.load_scenario or simulate, or write FILE.py:NAME"
         )
     if not table.file.is_file():
         raise InputError(f"{start}: no such file")
@@ -180,14 +142,11 @@ class UserControlledPlant(CommandedPlant):
     An interval may be repeated from a saved state, to find the step on which a flight ended. The
     commands are kept for that, so that a controller with a memory is called once per sample.
 
-    Args:
-        assembly: The flight.
-        controller: Default: the one that the scenario names.
     """
 
-    def __init__(self, assembly: Assembly, controller: Controller | type | None = None) -> None:
+    def __init__(self, assembly: Assembly) -> None:
         super().__init__(assembly)
-        self._controller = load_controller(assembly.scenario, controller)
+        self._controller = load_controller(assembly.scenario)
         self._scenario = assembly.scenario
         self._was_reset = False
         self._every = max(1, assembly.scenario.simulation.control_steps)

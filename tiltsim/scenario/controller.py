@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, get_args
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from tiltsim.scenario.controller_table import ControllerTable
+from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.quadrotor_controllers import (
     QuadrotorAttitudeAltitudeController,
     SwitchingController,
@@ -35,6 +36,18 @@ class PythonController(ControllerTable):
         description="FILE.py:NAME of a function or class; FILE in the scenario's folder",
         examples=["my_controller.py:hover"],
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _require_function(cls, value: Any) -> Any:
+        if isinstance(value, dict) and "function" not in value:
+            raise InvalidValueError(
+                "controller.law",
+                "python",
+                "needs controller.function = FILE.py:NAME; a controller of your own in Python is "
+                "the argument controller= of tiltsim.load_scenario and simulate",
+            )
+        return value
 
     @property
     def file(self) -> Path | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping
+from os import PathLike, fsdecode
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,13 +13,14 @@ import tomli_w
 from pydantic import ValidationError
 
 from tiltsim.errors import InputError
+from tiltsim.scenario.arguments import check_keys, controller_name, plain
 from tiltsim.scenario.controller import DEFAULT_LAW
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.limits import MAX_DEPTH, check_limits
 from tiltsim.scenario.messages import choose, did_you_mean, one_line_message, show
 from tiltsim.scenario.scenario import Scenario, Variant
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
-from tiltsim.system.text import shortened, valid_unicode
+from tiltsim.system.text import short_repr, shortened, valid_unicode
 
 KIND_KEYS: Final = {"type": None, "law": DEFAULT_LAW}
 """Keys that decide which other keys a table may have, with their defaults."""
@@ -27,19 +29,66 @@ FILE_KEYS: Final = (("controller", "function", ".py:"), ("vehicle", "mjcf", ""))
 """Keys that name files: table, key, and a string that marks the value as a file name."""
 
 
-def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Scenario:
+def load_scenario(
+    source: Scenario | str | PathLike[str] | Mapping[str, Any],
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    controller: object = None,
+) -> Scenario:
     """Read a scenario.
 
     Args:
-        path: A TOML file or the name of a scenario in the library, with ``#variant`` for a member
-            of a family; for example ``ch04_tracking/setpoint#rho_065_modified``.
-        overrides: Values by dotted key, for example ``{"controller.decoupler": "exact"}``. For a
-            family without ``#variant`` they are required and change its base.
+        source: The name of a scenario in the library or a TOML file, with ``#variant`` for a member
+            of a family, for example ``"ch04_tracking/setpoint#rho_065_modified"``; or the tables of
+            a file as a dict; or a scenario, to change it.
+        overrides: Values by dotted key in the units of docs/scenario.md, for example
+            ``{"gait.period": 2.0, "gait.angles[0]": 0.1}``. For a family without ``#variant`` they
+            are required and change its base. Arrays are taken as lists, here and in a dict.
+        controller: A controller of your own, which replaces the scenario's before anything is
+            checked: a function from `tiltsim.Observation` to `tiltsim.Command`, an object with
+            ``__call__`` and, if it has a memory, ``reset(scenario)``, a class of such objects, or
+            ``"FILE.py:NAME"``.
 
     Raises:
         InputError: In one line: the file, the key, the value and what is allowed.
     """
-    name, _, variant = str(path).partition("#")
+    if overrides is not None:
+        check_keys("overrides", overrides)
+    document, address = _document(source, with_base=bool(overrides))
+    if controller is not None:
+        document["controller"] = {"law": "python", "function": controller_name(controller)}
+    apply_overrides(document, overrides or {}, address)
+    locate_named_files(document, Path())
+    scenario = parse_scenario(document, address)
+    if controller is None and isinstance(source, Scenario):
+        controller = source.own_controller if source.controller == scenario.controller else None
+    scenario._own_controller = None if isinstance(controller, str) else controller
+    return scenario
+
+
+def as_scenario(source: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Scenario:
+    """A scenario itself, or what `load_scenario` reads."""
+    return source if isinstance(source, Scenario) else load_scenario(source)
+
+
+def _document(source: object, *, with_base: bool) -> tuple[dict[str, Any], str]:
+    """The tables of a `load_scenario` source, which may be changed, and its name in messages.
+
+    ``with_base`` allows a family without ``#variant``, whose base it is then.
+    """
+    if isinstance(source, Scenario):
+        # Without defaults, as a change of one key may change the default of another.
+        given = source.model_dump(mode="json", exclude_unset=True)
+        return without_none(given), source.address or "scenario"
+    if isinstance(source, Mapping):
+        check_keys("scenario", source)
+        return plain(source), "scenario"
+    if not isinstance(source, str | PathLike):
+        raise InputError(
+            f"scenario = {short_repr(source)}: must be a name of the library, a TOML file, a dict "
+            "or a tiltsim.Scenario"
+        )
+    name, _, variant = fsdecode(source).partition("#")
     file = find_scenario_file(name)
     document = read_toml(file)
     address = library_name(file) + (f"#{variant}" if variant else "")
@@ -48,13 +97,11 @@ def load_scenario(path: str | Path, overrides: Mapping[str, Any] | None = None) 
     names = variant_names(file, document)
     if variant:
         document = _select_variant(file, document, variant)
-    elif names and not overrides:
+    elif names and not with_base:
         raise InputError(f"{address}: choose a variant with #: {', '.join(names)}")
     document.pop("variant", None)
     locate_named_files(document, file.parent, address)
-    apply_overrides(document, overrides or {}, address)
-    locate_named_files(document, Path())
-    return parse_scenario(document, address)
+    return document, address
 
 
 def is_changed_from_library(path: str | Path, scenario: Scenario) -> bool:
@@ -139,6 +186,9 @@ def parse_scenario(document: Mapping[str, Any], address: str = "scenario") -> Sc
     Raises:
         InputError: As `load_scenario` does.
     """
+    if not isinstance(document, Mapping):
+        raise InputError(f"scenario = {short_repr(document)}: must be a dict")
+    document = plain(document)
     check_limits(document, address)
     try:
         scenario = Scenario.model_validate(document)

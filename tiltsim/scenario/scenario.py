@@ -6,15 +6,19 @@ else. `tiltsim.scenario.loading` reads the files, `tiltsim.scenario.messages` wo
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
 from tiltsim.scenario.consistency import check_consistency
-from tiltsim.scenario.scenario_tables import ScenarioTables
+from tiltsim.scenario.scenario_tables import DESCRIPTIVE, ScenarioTables
 from tiltsim.scenario.table import Table
 from tiltsim.scenario.time_steps import check_time_steps
+from tiltsim.system.public import public
+from tiltsim.system.text import html_table
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.references.trajectories import ReferenceParameters
@@ -28,6 +32,36 @@ class Scenario(ScenarioTables):
         check_consistency(self)
         check_time_steps(self)
         return self
+
+    def replace(self, changes: Mapping[str, Any]) -> Scenario:
+        """This scenario with other values.
+
+        Args:
+            changes: Values by dotted key, for example ``{"gait.amplitude": 0.3}``. Another
+                ``gait.type``, ``controller.law`` or the like empties its table first.
+
+        Raises:
+            InputError: In one line: the key, the value and what is allowed.
+        """
+        changed: Scenario = public("load_scenario")(self, changes)
+        return changed
+
+    def _repr_html_(self) -> str:
+        """What is not left at its default, as a table for notebooks."""
+        given = self.model_dump(mode="json", exclude_unset=True, exclude={*DESCRIPTIVE})
+        rows = [(key, json.dumps(value)) for key, value in _leaves(given)]
+        return html_table(
+            self.title or self.address or "Scenario", [self.address, self.source], rows
+        )
+
+
+def _leaves(tables: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """The values of nested tables by dotted key, without those that are None."""
+    for name, value in tables.items():
+        if isinstance(value, dict):
+            yield from _leaves(value, f"{before}{name}.")
+        elif value is not None:
+            yield before + name, value
 
 
 class Variant(Table):

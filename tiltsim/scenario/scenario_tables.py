@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 from pydantic import Field, PrivateAttr
 
@@ -82,11 +82,23 @@ class ScenarioTables(Table):
     claim: dict[ClaimName, ClaimTable] = Field({}, description="statements of the source")
 
     _address: str = PrivateAttr("")
+    _own_controller: Any = PrivateAttr(None)
 
     @property
     def address(self) -> str:
         """The scenario's address on the command line; empty if it was built in Python."""
         return self._address
+
+    @property
+    def own_controller(self) -> Any:
+        """The controller given in Python; None for a built-in one and for one in a file."""
+        return self._own_controller
+
+    def __getstate__(self) -> dict[Any, Any]:
+        """Without the controller: other processes need not be able to import a notebook's."""
+        state = super().__getstate__()
+        private = {**(state["__pydantic_private__"] or {}), "_own_controller": None}
+        return {**state, "__pydantic_private__": private}
 
     @property
     def actuator_options(self) -> list[tuple[str, object, object]]:

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Final
+from os import PathLike
+from typing import Any, Final
 
 from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.errors import InputError
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.engine_choice import native_pays_off
 from tiltsim.plants.factory import make_plant
+from tiltsim.scenario.loading import as_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.simulation.native_batch import NativeBatch
 from tiltsim.simulation.simulate import simulate_assembly
+from tiltsim.system.text import short_repr
 
 WINDOW: Final = 512
 """How many scenarios are grouped together into those that share a batch."""
@@ -42,14 +46,17 @@ class FlightResult:
 
 
 def fly(
-    scenarios: Sequence[Scenario], *, threads: int | None = None, keep_samples: bool = False
+    scenarios: Iterable[Scenario | str | PathLike[str] | Mapping[str, Any]],
+    *,
+    threads: int | None = None,
+    keep_samples: bool = False,
 ) -> Iterator[FlightResult]:
     """Fly scenarios and yield their results, in their order, as they become available.
 
     Args:
-        scenarios: What to fly; they may differ in anything. Those with one closed loop in MuJoCo
-            that do not request the Python engine are flown in batches if they are long enough
-            together.
+        scenarios: What to fly, each anything that `tiltsim.load_scenario` takes; they may differ in
+            anything. Those with one closed loop in MuJoCo that do not request the Python engine are
+            flown in batches if they are long enough together.
         threads: Maximum number of threads; None takes all cores.
         keep_samples: Whether results hold their flights. Without them memory does not grow with the
             number of scenarios.
@@ -59,9 +66,19 @@ def fly(
         computed from the time that the flight took of all threads together.
 
     Raises:
+        InputError: At once, if an argument or a scenario is invalid; later, if a vehicle cannot be
+            built or a controller of your own cannot be used.
         KeyboardInterrupt: If interrupted; results yielded before are complete.
     """
-    threads = threads or os.cpu_count() or 1
+    if isinstance(scenarios, str | Mapping | Scenario) or not isinstance(scenarios, Iterable):
+        raise InputError(f"scenarios = {short_repr(scenarios)}: must be a list of scenarios")
+    threads = (os.cpu_count() or 1) if threads is None else threads
+    if not isinstance(threads, int) or threads < 1:
+        raise InputError(f"threads = {short_repr(threads)}: must be a whole number from 1")
+    return _fly([as_scenario(scenario) for scenario in scenarios], threads, keep_samples)
+
+
+def _fly(scenarios: Sequence[Scenario], threads: int, keep_samples: bool) -> Iterator[FlightResult]:
     native = native_pays_off(scenarios)
     with ThreadPoolExecutor(threads) as pool:
         for start in range(0, len(scenarios), WINDOW):

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from os import PathLike
 from time import perf_counter
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.engines.base import EngineName
+from tiltsim.errors import InputError
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.command import Controller, ControllerError
 from tiltsim.plants.factory import make_plant
 from tiltsim.plants.plant import Plant, take_sample
-from tiltsim.plants.user_controller import with_controller
+from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.monitor import TerminationMonitor
 from tiltsim.system.interrupts import reraise_swallowed_interrupts
+from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 
 CHUNK_TIME: Final = 0.1
@@ -32,10 +35,11 @@ Observer = Callable[[Floats], None]
 
 
 def simulate(
-    scenario: Scenario,
+    scenario: Scenario | str | PathLike[str] | Mapping[str, Any],
     observer: Observer | None = None,
     *,
-    controller: Controller | type | None = None,
+    controller: Controller | type | str | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Flight:
     """Fly a scenario from start to end.
 
@@ -44,12 +48,12 @@ def simulate(
     other flights in MuJoCo take turns, after each recorded sample or up to 0.1 s of native code.
 
     Args:
-        scenario: What to fly; see `tiltsim.load_scenario`.
+        scenario: What to fly: anything that `tiltsim.load_scenario` takes.
         observer: Called with every sample (floats in the order of `ClosedLoop.sample_fields`) as it
             is recorded.
-        controller: A controller of your own in place of the scenario's: a function from
-            `tiltsim.Observation` to `tiltsim.Command`, an object with ``__call__`` and, if it has a
-            memory, ``reset(scenario)``, or a class of such objects, which threads do not share.
+        controller: A controller of your own in place of the scenario's; see
+            `tiltsim.load_scenario`. Threads do not share one that is a class.
+        progress: Called with the simulated time (s) from time to time, for example ``print``.
 
     Returns:
         All samples up to the end. A flight that diverges or reaches a singular decoupling matrix is
@@ -58,30 +62,34 @@ def simulate(
         whose controller of your own raises an exception or returns an invalid command.
 
     Raises:
-        InputError: If the vehicle cannot be built, or your controller cannot be used.
+        InputError: If the scenario or an argument is invalid, the vehicle cannot be built, or your
+            controller cannot be used.
         KeyboardInterrupt: If interrupted before the first sample.
     """
-    if controller is not None:
-        scenario = with_controller(scenario, controller)
-    return simulate_assembly(assemble(scenario), observer, controller=controller)
+    for name, given in (("observer", observer), ("progress", progress)):
+        if given is not None and not callable(given):
+            raise InputError(f"{name} = {short_repr(given)}: must be callable")
+    if controller is not None or not isinstance(scenario, Scenario):
+        scenario = load_scenario(scenario, controller=controller)
+    return simulate_assembly(assemble(scenario), observer, progress=progress)
 
 
 def simulate_assembly(
     assembly: Assembly,
     observer: Observer | None = None,
     *,
-    controller: Controller | type | None = None,
     engine: EngineName | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Flight:
     """As `simulate`, for a flight that is assembled already.
 
     Args:
-        assembly: The flight; under a ``controller`` of the user's its scenario's law is ``python``.
-        observer, controller: See `simulate`.
+        assembly: The flight.
+        observer, progress: See `simulate`.
         engine: In place of the scenario's.
     """
     simulation = assembly.scenario.simulation
-    plant = make_plant(assembly, controller, engine)
+    plant = make_plant(assembly, engine)
     monitor = TerminationMonitor(assembly)
     samples: list[Floats] = []
 
@@ -103,6 +111,8 @@ def simulate_assembly(
                 flown, end = fly_chunk(plant, monitor, count, steps)
             for sample in flown:
                 record(sample)
+            if progress is not None:
+                progress(float(samples[-1][0]))
             steps_left -= count * steps
             if plant.engine == "native":
                 pace = CHUNK_TIME / max(perf_counter() - began, 1e-9)

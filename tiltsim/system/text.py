@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Final
 
@@ -32,6 +33,15 @@ def shortened(text: str, length: int = 80) -> str:
     return text if len(text) <= length else text[: length - 3] + "..."
 
 
+def short_repr(value: object) -> str:
+    """A value in at most 60 characters of one line, even if its ``repr`` raises."""
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:
+        text = f"a {type(value).__name__}"
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
 def without_long_words(text: str) -> str:
     """Text whose words, such as unknown names, have at most `LONGEST_WORD` characters."""
     return re.sub(r"\S+", lambda word: shortened(word[0], LONGEST_WORD), text)
@@ -49,3 +59,27 @@ def printable_html(text: object) -> str:
 def printable_markdown(text: object) -> str:
     """`printable` text for Markdown, where it begins no HTML tag; ``<=`` stays as it is."""
     return re.sub(r"<(?=[A-Za-z/!?])", "&lt;", printable(text))
+
+
+def html_table(
+    heading: str,
+    lines: Iterable[object],
+    rows: Iterable[Sequence[object]],
+    columns: Sequence[str] = (),
+) -> str:
+    """A small table for notebooks.
+
+    Args:
+        heading: Above it, in bold.
+        lines: Below the heading, one line each; empty ones are left out.
+        rows: Cells of each row, as text.
+        columns: Headings of the columns, if they have any.
+    """
+    title = [f"<b>{printable_html(heading)}</b>", *(printable_html(line) for line in lines if line)]
+    head = "".join(f"<th>{printable_html(name)}</th>" for name in columns)
+    body = [
+        "".join(f'<td style="text-align:left">{printable_html(cell)}</td>' for cell in row)
+        for row in rows
+    ]
+    table = "".join(f"<tr>{cells}</tr>" for cells in [head, *body] if cells)
+    return f"<div>{'<br>'.join(title)}<table>{table}</table></div>"

@@ -1,0 +1,48 @@
+"""Arguments given in Python, as the values that a scenario file would have."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike, fsdecode
+from typing import Any
+
+from tiltsim.errors import InputError
+from tiltsim.scenario.limits import MAX_DEPTH
+from tiltsim.system.text import short_repr
+
+
+def check_keys(name: str, mapping: object) -> None:
+    """Raise `InputError` unless an argument is a dict whose keys are text."""
+    if not isinstance(mapping, Mapping):
+        raise InputError(f"{name} = {short_repr(mapping)}: must be a dict")
+    for key in mapping:
+        if not isinstance(key, str):
+            raise InputError(f"{name}: key {short_repr(key)}: must be text, as 'gait.period'")
+
+
+def controller_name(controller: object) -> str:
+    """The name that a controller given in Python has in the scenario, or ``FILE.py:NAME`` as it is.
+
+    Raises `InputError` if it can be no controller.
+    """
+    if isinstance(controller, str):
+        return controller
+    if not callable(controller):
+        raise InputError(
+            f"controller = {short_repr(controller)}: must be callable, or a text FILE.py:NAME"
+        )
+    named = controller if hasattr(controller, "__qualname__") else type(controller)
+    return f"{named.__module__}.{named.__qualname__}"
+
+
+def plain(value: Any, depth: int = 0) -> Any:
+    """A copy of a document with arrays and their entries as lists and numbers, paths as text."""
+    if depth > MAX_DEPTH:
+        raise InputError(f"scenario: tables and lists nest more than {MAX_DEPTH} deep")
+    if isinstance(value, Mapping):
+        return {key: plain(item, depth + 1) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item, depth + 1) for item in value]
+    if isinstance(value, PathLike):
+        return fsdecode(value)
+    return value.tolist() if hasattr(value, "tolist") else value
