@@ -133,7 +133,26 @@ def test_threads_with_one_callback_step_at_the_same_time_and_others_in_turn():
 
 def test_a_block_that_an_interrupt_kept_from_leaving_is_left_by_the_next():
     abandoned = control_callback(lambda _model, _data: None)
-    abandoned.__enter__()
+
+    def interrupted():
+        abandoned.__enter__()
+
+    interrupted()
     with control_callback(None):
         assert mujoco.get_mjcb_control() is None
+    assert no_hooks()
+
+
+def test_a_block_in_another_is_refused_and_changes_nothing():
+    def outer(_model, _data):
+        """Stands for a control callback."""
+
+    def inner():
+        with control_callback(None):
+            pytest.fail("the outer block's callback is lost")
+
+    with control_callback(outer):
+        with pytest.raises(RuntimeError, match="must not contain another"):
+            inner()
+        assert mujoco.get_mjcb_control() is outer
     assert no_hooks()

@@ -2,11 +2,29 @@
 
 from __future__ import annotations
 
+import sys
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from threading import Condition, get_ident
+from types import FrameType
 from typing import Any, Final
+
+
+@dataclass(eq=False)
+class _Block:
+    """A ``with`` block that waits for its turn or has it."""
+
+    control: Any
+    function: FrameType | None  # whose block it is; None once it is over
+
+    def contains_this_call(self) -> bool:
+        """Whether the calling thread is still in the block; if abandoned, its function ended."""
+        frame: FrameType | None = sys._getframe()
+        while frame is not None and frame is not self.function:
+            frame = frame.f_back
+        return frame is not None
 
 
 @contextmanager
@@ -14,44 +32,52 @@ def mujoco_hooks(control: Any = None, clock: Any = None) -> Iterator[None]:
     """Install a control callback, or none, and a clock for the length of a ``with`` block.
 
     Threads whose callbacks differ take turns, in the order in which they arrive; those with the
-    same one run at the same time. A block must therefore be short, and must not contain another.
-    MuJoCo's compiler calls the callback, too.
+    same one run at the same time. A block must therefore be short. MuJoCo's compiler calls the
+    callback, too.
 
     In the block MuJoCo's warnings are neither printed nor logged to a file.
+
+    Raises:
+        RuntimeError: In a block of the same thread.
     """
-    thread, ticket = get_ident(), object()
+    thread, block = get_ident(), _Block(control, sys._getframe(2))  # past contextlib's own frame
+    outer = _inside.get(thread)
+    if outer is not None and outer.contains_this_call():
+        raise RuntimeError("a block with MuJoCo's hooks must not contain another")
     try:
         with _turns:
             # An interrupt may have kept an earlier block of this thread from leaving.
             _inside.pop(thread, None)
-            _waiting.append(ticket)
-            while _waiting[0] is not ticket or any(control != it for it in _inside.values()):
+            _waiting.append(block)
+            while _waiting[0] is not block or any(control != it.control for it in _inside.values()):
                 _turns.wait()
             if not _inside:
                 _install(control, clock)
-            _inside[thread] = control
-            _leave_queue(ticket)
+            _inside[thread] = block
+            _leave_queue(block)
         yield
     finally:
+        block.function = None
         with _turns:
-            _inside.pop(thread, None)
+            if _inside.get(thread) is block:
+                del _inside[thread]
             if not _inside and _replaced:
                 _restore()
-            _leave_queue(ticket)
+            _leave_queue(block)
 
 
 _turns: Final = Condition()
-_waiting: Final[deque[object]] = deque()
-_inside: Final[dict[int, Any]] = {}
-"""Callbacks of the blocks that threads are in, by thread."""
+_waiting: Final[deque[_Block]] = deque()
+_inside: Final[dict[int, _Block]] = {}
+"""The blocks that threads are in, by thread."""
 
 _replaced: Final[list[tuple[Any, Any, Any]]] = []
 """Callback, clock and handler of warnings as they were before the first of those blocks."""
 
 
-def _leave_queue(ticket: object) -> None:
-    if ticket in _waiting:
-        _waiting.remove(ticket)
+def _leave_queue(block: _Block) -> None:
+    if block in _waiting:
+        _waiting.remove(block)
     if _waiting:
         _turns.notify_all()
 
