@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import ctypes
 import io
+import os
 import resource
 import shutil
 import signal
+import sys
 import warnings
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import ExitStack, chdir, contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from random import Random
-from tempfile import mkdtemp
+from tempfile import TemporaryFile, mkdtemp
 from time import perf_counter
 from traceback import format_exception
 
@@ -34,19 +37,28 @@ def fuzz(count, seed, report=lambda done, mistake: None):
     Input number n of a seed is always the same, however many are run.
     """
     mistakes = []
-    folder = Path(mkdtemp(prefix="fuzz"))
-    handler = signal.signal(signal.SIGALRM, _hang)
-    try:
+    with ExitStack() as stack:
+        folder = Path(mkdtemp(prefix="fuzz"))
+        stack.callback(shutil.rmtree, folder)
+        working = folder / "working"
+        working.mkdir()
+        stack.enter_context(chdir(working))
+        stack.callback(signal.signal, signal.SIGALRM, signal.signal(signal.SIGALRM, _hang))
         for number in range(count):
-            mistake = run_one(number, seed, folder)
+            mistake = run_one(number, seed, folder) or _remove_what_is_in(working)
             if mistake:
                 mistake = f"seed {seed}, input {number} ({_kind(number)}): {mistake}"
                 mistakes.append(mistake)
             report(number + 1, mistake)
-    finally:
-        signal.signal(signal.SIGALRM, handler)
-        shutil.rmtree(folder)
     return mistakes
+
+
+def _remove_what_is_in(working):
+    """What was written where no option points, such as MuJoCo's MUJOCO_LOG.TXT; or nothing."""
+    written = sorted(working.iterdir())
+    for path in written:
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+    return f"wrote {', '.join(path.name for path in written)}" if written else ""
 
 
 def _kind(number):
@@ -63,10 +75,15 @@ def run_one(number, seed, folder):
     place = folder / str(number)
     place.mkdir()
     run = KINDS[number % len(KINDS)](random, place)
-    out, err = io.StringIO(), io.StringIO()
+    out, err, native = io.StringIO(), io.StringIO(), []
     start = perf_counter()
     try:
-        with redirect_stdout(out), redirect_stderr(err), warnings.catch_warnings():
+        with (
+            _native_output(native),
+            redirect_stdout(out),
+            redirect_stderr(err),
+            warnings.catch_warnings(),
+        ):
             warnings.simplefilter("error")
             signal.alarm(TIME_LIMIT)
             run()
@@ -83,7 +100,30 @@ def run_one(number, seed, folder):
     finally:
         signal.alarm(0)
         shutil.rmtree(place)
+    if any(native):
+        return f"native code prints {native[0][:500]!r}"
     return _wrong_output(out.getvalue(), err.getvalue(), perf_counter() - start)
+
+
+@contextmanager
+def _native_output(found):
+    """Append what compiled code, such as MuJoCo's, prints past Python in the block."""
+    flush = ctypes.CDLL(None).fflush
+    with TemporaryFile() as file:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        saved = [(number, os.dup(number)) for number in (1, 2)]
+        try:
+            for number, _ in saved:
+                os.dup2(file.fileno(), number)
+            yield
+        finally:
+            flush(None)
+            for number, copy in saved:
+                os.dup2(copy, number)
+                os.close(copy)
+            file.seek(0)
+            found.append(file.read().decode(errors="replace"))
 
 
 def _wrong_output(out, err, seconds):
