@@ -12,11 +12,12 @@ import pytest
 
 from tests.damage import read_with_flipped_bits
 from tests.sweeps.files import short_sweep
+from tests.system.test_files import HEX
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import parse_scenario
 from tiltsim.simulation.simulate import simulate
 from tiltsim.sweeps.dataset import load_results
-from tiltsim.sweeps.folder import read_definition
+from tiltsim.sweeps.folder import open_sweep_folder, read_definition
 from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.running import run_sweep
@@ -110,9 +111,11 @@ def test_links_are_not_followed(copy, tmp_path, name):
 
 def test_only_a_sweeps_own_leftovers_are_removed(copy):
     definition, folder = copy
-    own = {folder / ".sweep.parquet.12.new", folder / "parts" / ".000002.parquet.12.new"}
+    own = {folder / f".sweep.parquet.{HEX}.new", folder / "parts" / f".000002.parquet.{HEX}.new"}
     others = {
         folder / ".notes.new",
+        folder / ".sweep.parquet.new",
+        folder / "parts" / ".000002.parquet.12.new",
         folder / "parts" / ".a.new",
         folder / "parts" / "5 copy.parquet",
     }
@@ -122,6 +125,14 @@ def test_only_a_sweeps_own_leftovers_are_removed(copy):
     run_sweep(definition, folder)
     assert {*folder.rglob("*")} == before - own
     assert len(load_results(folder)) == 12
+
+
+def test_nothing_is_removed_from_a_folder_that_holds_no_sweep_yet(flown, tmp_path):
+    file = tmp_path / f".sweep.json.{HEX}.new"
+    file.write_bytes(b"x")
+    for exists in (True, False):
+        with open_sweep_folder(tmp_path, SweepPoints(flown[0])):
+            assert file.exists() == exists
 
 
 def part(folder, number):

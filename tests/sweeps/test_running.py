@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.sweeps.files import boundary_sweep, short_sweep
+from tests.system.test_files import HEX
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import parse_scenario
 from tiltsim.scenario.metric_names import METRICS
@@ -104,7 +105,7 @@ def test_a_sweep_continues_where_it_stopped(tmp_path, monkeypatch):
     monkeypatch.setattr(chunks, "fly_points", fly_points)
     with pytest.raises(KeyboardInterrupt):
         run_sweep(definition, tmp_path / "parts")
-    leftover = tmp_path / "parts" / "parts" / ".000003.parquet.new"
+    leftover = tmp_path / "parts" / "parts" / f".000003.parquet.{HEX}.new"
     leftover.write_bytes(b"half")
     reports = []
     continued = run_sweep(definition, tmp_path / "parts", report=reports.append)

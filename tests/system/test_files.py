@@ -13,6 +13,9 @@ from tiltsim.errors import InputError
 from tiltsim.system.files import remove_leftovers, replacing
 from tiltsim.system.locks import locked
 
+HEX = "0123456789abcdef"
+"""As in the names of files that are being written."""
+
 
 @pytest.mark.parametrize("durable", [False, True])
 def test_a_file_appears_complete_or_keeps_its_content(tmp_path, durable):
@@ -84,9 +87,11 @@ def test_a_lock_changes_no_file_and_follows_no_link(tmp_path):
 
 
 def test_only_what_killed_processes_left_is_removed(tmp_path):
-    left = {".part.new", ".part.123.new"}
-    for name in {*left, ".other.123.new", "part", ".part.old", ".my part.new"}:
+    left = f".part.{HEX}.new"
+    others = {".part.new", ".part.123.new", f".part.{HEX}0.new", f".part.{HEX.upper()}.new"}
+    for name in {left, *others, f".other.{HEX}.new", f".part.{HEX}.old", "part", ".my part.new"}:
         (tmp_path / name).touch()
+    (tmp_path / f".part.{HEX[::-1]}.new").mkdir()
     before = {file.name for file in tmp_path.iterdir()}
     remove_leftovers(tmp_path, re.compile("part"))
-    assert {file.name for file in tmp_path.iterdir()} == before - left
+    assert {file.name for file in tmp_path.iterdir()} == before - {left}

@@ -124,11 +124,15 @@ def open_sweep_folder(path: Path, points: SweepPoints) -> Iterator[SweepFolder]:
         _require_new_or_same(path, points)  # another sweep may have begun meanwhile
         opened = SweepFolder(path, points)
         opened.check()
+        folders = {path: re.compile(f"{DEFINITION}|{DATASET}"), path / PARTS: _TABLES}
+        folders |= {path / FLIGHTS: _TABLES} if points.sweep.keep_flights else {}
+        if (path / DEFINITION).exists():
+            for folder, names in folders.items():
+                if folder.exists():
+                    remove_leftovers(folder, names)
         _write(path / DEFINITION, points.definition.to_json().encode())
-        remove_leftovers(path, re.compile(f"{DEFINITION}|{DATASET}"))
-        for folder in (PARTS, *([FLIGHTS] if points.sweep.keep_flights else [])):
-            (path / folder).mkdir(exist_ok=True)
-            remove_leftovers(path / folder, _TABLES)
+        for folder in folders:
+            folder.mkdir(exist_ok=True)
         yield opened
 
 

@@ -7,6 +7,7 @@ import os
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from hashlib import sha256
 from pathlib import Path
 from secrets import token_hex
 from typing import Final
@@ -15,6 +16,14 @@ from tiltsim.errors import InputError
 
 TEMPORARY_SUFFIX: Final = ".new"
 """Of files that are being written, whose names begin with a dot; a killed process leaves them."""
+
+_RANDOM_BYTES: Final = 8
+"""In the name of such a file, in hexadecimal digits."""
+
+
+def digest(content: bytes) -> str:
+    """The SHA-256 of the content of a file, in hexadecimal digits."""
+    return sha256(content).hexdigest()
 
 
 def prepare_folder(folder: Path) -> None:
@@ -64,7 +73,7 @@ def replacing(path: Path, *, durable: bool = False) -> Iterator[Path]:
     special = path.exists() and not path.is_file()
     # A name that nobody can guess and make a link of. Unlike tempfile's, the file gets the
     # permissions of the umask.
-    temporary = path.with_name(f".{path.name}.{token_hex(8)}{TEMPORARY_SUFFIX}")
+    temporary = path.with_name(f".{path.name}.{token_hex(_RANDOM_BYTES)}{TEMPORARY_SUFFIX}")
     try:
         yield path if special else temporary
         if not special:
@@ -89,10 +98,11 @@ def _flush(path: Path) -> None:
 
 
 def remove_leftovers(folder: Path, names: re.Pattern[str]) -> None:
-    """Remove what killed processes left of files with matching names in a folder."""
-    left = re.compile(rf"\.({names.pattern})(\.\w+)?{re.escape(TEMPORARY_SUFFIX)}")
+    """Remove what killed processes left of `replacing` files with matching names in a folder."""
+    random = rf"[0-9a-f]{{{2 * _RANDOM_BYTES}}}"
+    left = re.compile(rf"\.({names.pattern})\.{random}{re.escape(TEMPORARY_SUFFIX)}")
     for file in folder.iterdir():
-        if left.fullmatch(file.name):
+        if left.fullmatch(file.name) and file.is_file():
             file.unlink()
 
 
