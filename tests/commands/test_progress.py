@@ -19,7 +19,7 @@ from tests.flights import saved
 from tests.sweeps.files import short_sweep
 from tiltsim.cli import main
 from tiltsim.commands import progress
-from tiltsim.commands.progress import counting_bar, progress_bar
+from tiltsim.commands.progress import show_progress
 
 pty = pytest.importorskip("pty")
 
@@ -54,33 +54,66 @@ def terminal_as_stderr(monkeypatch):
 
 
 def test_a_count_is_shown_from_the_start_with_rate_and_time_left(monkeypatch):
-    with terminal_as_stderr(monkeypatch) as shown, counting_bar(5, "flights", shown=True) as move:
-        move(1)
+    with terminal_as_stderr(monkeypatch) as shown, show_progress(shown=True) as progress:
+        progress.begin("flights", 5, done=1)
         for count in (2, 3):
             time.sleep(0.11)
-            move(count)
-    assert re.search(r"\| 1/5 flights \[\d\d:\d\d<\?, \? flights/s\]", shown.text)
-    rate = r" +\d\.\d\d( flights/s|s/ flights)"  # the latter on a machine that is very busy
-    assert re.search(rf"\| 3/5 flights \[\d\d:\d\d<\d\d:\d\d,{rate}\]", shown.text)
+            progress.move(count)
+    assert re.search(r"flights:  20%\|.*\| 1/5 \[\d\d:\d\d<\?, \?/s\]", shown.text)
+    rate = r" +\d\.\d\d(/s|s/)"  # the latter on a machine that is very busy
+    assert re.search(rf"\| 3/5 \[\d\d:\d\d<\d\d:\d\d,{rate}\]", shown.text)
 
 
 def test_the_clock_moves_while_nothing_is_finished(monkeypatch):
-    monkeypatch.setattr(progress, "TICK", 0.02)
-    with terminal_as_stderr(monkeypatch) as shown, counting_bar(5, "flights", shown=True) as move:
-        move(0)
+    monkeypatch.setattr(progress.Progress, "interval", 0.02)
+    with terminal_as_stderr(monkeypatch) as shown, show_progress(shown=True) as moving:
+        moving.begin("flights", 5)
         time.sleep(1.0)
-    assert shown.text.count("| 0/5 flights") > 5
+    assert shown.text.count("| 0/5 [") > 5
 
 
 def test_time_is_shown_on_a_terminal_of_unknown_size(monkeypatch):
-    with terminal_as_stderr(monkeypatch) as shown, progress_bar(2.0, "s", shown=True) as move:
-        move(0.0)
+    with terminal_as_stderr(monkeypatch) as shown, show_progress(shown=True) as progress:
+        progress.begin("flight", 2.0)
+        progress.begin("writing")
     assert "| 0.0/2 s [00:00<?]" in shown.text
+    assert "writing [00:00]" in shown.text
+
+
+def test_lines_of_results_and_bars_do_not_mix(monkeypatch, capsys):
+    with terminal_as_stderr(monkeypatch) as shown, show_progress(shown=True) as progress:
+        progress.tell("flights", 1, 2)
+        progress.print("ok a\x1b[2J")
+        progress.print("warning", error=True)
+    assert capsys.readouterr().out == "ok a\\x1b[2J\n"
+    assert "\rwarning\r\n" in shown.text
+
+
+def test_without_a_terminal_a_line_tells_every_few_seconds_how_far_it_is(monkeypatch, capsys):
+    monkeypatch.setattr(progress._Lines, "interval", 0.05)
+    clock = iter(range(0, 10_000, 30))
+    monkeypatch.setattr(progress, "monotonic", lambda: next(clock))
+    with show_progress(shown=True) as lines:
+        time.sleep(0.12)
+        lines.tell("flights", 10, 100)
+        lines.move(20)
+        time.sleep(0.12)
+    shown = capsys.readouterr().err.splitlines()
+    assert shown[0] == "tiltsim: starting, 0:30"
+    assert "tiltsim: flights: 20 of 100, 0:30, about 4:00 left" in shown
+    assert 2 <= len(shown) <= 5
+
+
+def test_the_silence_is_below_ten_seconds_and_short_work_says_nothing(capsys):
+    assert 5.0 < progress._Lines.interval < 10.0
+    with show_progress(shown=True) as lines:
+        lines.begin("flights", 5)
+    assert capsys.readouterr().err == ""
 
 
 def test_quiet_shows_nothing(monkeypatch):
-    with terminal_as_stderr(monkeypatch) as shown, counting_bar(2, "flights", shown=False) as move:
-        move(1)
+    with terminal_as_stderr(monkeypatch) as shown, show_progress(shown=False) as progress:
+        progress.tell("flights", 1, 2)
     assert shown.text == ""
 
 
@@ -88,8 +121,9 @@ def test_a_sweep_shows_how_far_it_is(tmp_path, monkeypatch):
     file = short_sweep(tmp_path / "sweep.toml")
     with terminal_as_stderr(monkeypatch) as shown:
         assert main(["sweep", str(file), "--out", str(tmp_path / "out"), "--jobs", "1"]) == 0
-    assert shown.text.startswith("short flights: 12 flights\r\n")
-    assert "| 0/12 flights [" in shown.text
+    assert "checking the sweep [00:00]" in shown.text
+    assert "\rshort flights: 12 flights\r\n" in shown.text
+    assert re.search(r"flights: +0%\|.*\| 0/12 \[", shown.text)
 
 
 def test_a_video_counts_its_frames(tmp_path, monkeypatch):
@@ -102,5 +136,5 @@ def test_a_video_counts_its_frames(tmp_path, monkeypatch):
     monkeypatch.setattr(tiltsim.views.video.rendering, "FlightRenderer", lambda *_: stage)
     with terminal_as_stderr(monkeypatch) as shown:
         assert main(["video", str(saved("fixed", tmp_path)), "--size", "64x64", "--fps", "10"]) == 0
-    assert "| 0/13 frames [00:00<?, ? frames/s]" in shown.text
-    assert re.search(r"\| [1-9]\d*/13 frames \[", shown.text)
+    assert re.search(r"frames: +0%\|.*\| 0/13 \[00:00<\?, \?/s\]", shown.text)
+    assert re.search(r"\| [1-9]\d*/13 \[", shown.text)

@@ -21,7 +21,7 @@ import pytest
 
 from tiltsim.cli import main
 from tiltsim.commands import run as run_command
-from tiltsim.commands.progress import announce_compilation
+from tiltsim.commands.progress import Progress, announce_compilation
 from tiltsim.engines.cache import before_compiling
 from tiltsim.engines.native_engine import compile_control
 from tiltsim.laws.attitude_altitude import TILTROTOR
@@ -360,18 +360,18 @@ def test_interrupted_run_keeps_its_files_and_says_so(tmp_path, capsys, monkeypat
     compile_control(TILTROTOR)  # so that the interrupt falls into the flight
 
     @contextmanager
-    def no_bar(*_arguments, **_options):
-        begun = False
+    def no_bar(**_options):
+        class Interrupting(Progress):
+            begun = False
 
-        def advance_to(time):
-            nonlocal begun
-            if time > 0.0 and not begun:  # native code flies, a second at a time
-                Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
-                begun = True
+            def move(self, time):
+                if time > 0.0 and not self.begun:  # native code flies, a second at a time
+                    Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+                    self.begun = True
 
-        yield advance_to
+        yield Interrupting()
 
-    monkeypatch.setattr(run_command, "progress_bar", no_bar)
+    monkeypatch.setattr(run_command, "show_progress", no_bar)
     # So few samples that none of what follows from them is worth compiling either.
     long = ["--set", "simulation.duration=2000.0", "--set", "simulation.record_timestep=1.0"]
     assert main(["run", SETPOINT, "--out", str(tmp_path), *long]) == 130

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
+from functools import partial
 from typing import Any
 
-from tiltsim.commands.options import Subparsers, add_json
-from tiltsim.commands.progress import announce_compilation
+from tiltsim.commands.options import Subparsers, add_json, add_quiet
+from tiltsim.commands.progress import show_progress
 from tiltsim.errors import InputError
 
 
@@ -28,6 +29,7 @@ def add_parser(subparsers: Subparsers) -> None:
     add("--timestep", type=float, default=0.001, help="with --vehicles, s")
     integrators = ("RK4", "implicitfast", "implicit", "Euler")
     add("--integrator", choices=integrators, default="implicitfast", help="with --vehicles")
+    add_quiet(parser, "print only the results")
     parser.set_defaults(run=run)
 
 
@@ -36,9 +38,10 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.vehicles is not None and arguments.vehicles < 1:
         raise InputError(f"--vehicles {arguments.vehicles}: must be at least 1")
 
-    from tiltsim.studies.benchmark import bench_accuracy, bench_flights, run_benchmark
+    with show_progress(shown=not arguments.quiet) as progress:
+        from tiltsim.studies.benchmark import bench_accuracy, bench_flights, run_benchmark
 
-    with announce_compilation(shown=True):
+        progress.begin("measuring")
         if arguments.vehicles is not None:
             rows = bench_flights(
                 arguments.vehicles, arguments.duration, arguments.integrator, arguments.timestep
@@ -46,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
         elif arguments.accuracy:
             rows = bench_accuracy()
         else:
-            rows = run_benchmark()
+            rows = run_benchmark(partial(progress.tell, "comparisons"))
     if arguments.json:
         print(json.dumps(rows, indent=2))
         return 0

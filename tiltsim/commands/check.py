@@ -7,9 +7,9 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tiltsim.commands.options import Subparsers, add_jobs, add_overrides, add_trust
-from tiltsim.commands.progress import announce_compilation
-from tiltsim.commands.text import counted, print_line, tally
+from tiltsim.commands.options import Subparsers, add_jobs, add_overrides, add_quiet, add_trust
+from tiltsim.commands.progress import Progress, show_progress
+from tiltsim.commands.text import counted, tally
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INVALID_INPUT, VEHICLE_LOST
 from tiltsim.system.interrupts import defer_interrupts
 
@@ -35,6 +35,7 @@ def add_parser(subparsers: Subparsers) -> None:
     add_overrides(parser, "every scenario", "simulation.plant=thesis")
     add_trust(parser)
     add("--junit", type=Path, metavar="FILE", help="write JUnit XML")
+    add_quiet(parser, "print only what did not pass")
     parser.set_defaults(run=run)
 
 
@@ -51,31 +52,35 @@ def run(arguments: argparse.Namespace) -> int:
         prepare_file("--junit", junit)
     overrides = dict(parse_override(text) for text in arguments.overrides)
     addresses = collect(arguments.paths or [str(shipped_folder("scenarios"))])
-    width = max(len(address) for address in addresses)
     finished: dict[str, CheckResult] = {}
 
     def report(result: CheckResult) -> None:
         finished[result.address] = result
-        _print_result(result, width)
+        progress.tell("scenarios", len(finished), len(addresses))
+        if result.status != "passed" or not arguments.quiet:
+            _print_result(result, max(map(len, addresses)), progress)
 
-    try:
-        with announce_compilation(shown=True):
+    with show_progress(shown=not arguments.quiet) as progress:
+        progress.begin("scenarios", len(addresses))
+        try:
             results = check_all(
                 addresses, arguments.jobs, overrides, report, trusted=is_trusted(arguments.trust)
             )
-    except KeyboardInterrupt:
-        if junit is not None:
-            with defer_interrupts():
-                write_junit(
-                    [finished.get(name) or interrupted_result(name) for name in addresses], junit
-                )
-        raise
+        except KeyboardInterrupt:
+            if junit is not None:
+                with defer_interrupts():
+                    write_junit(
+                        [finished.get(name) or interrupted_result(name) for name in addresses],
+                        junit,
+                    )
+            raise
     if junit is not None:
         write_junit(results, junit)
     labels = Counter(
         "without expectations" if _is_unchecked(result) else result.status for result in results
     )
-    print(f"\n{counted(len(results), 'scenario', 'scenarios')}: {tally(labels)}")
+    if not arguments.quiet:
+        print(f"\n{counted(len(results), 'scenario', 'scenarios')}: {tally(labels)}")
     counts = Counter(result.status for result in results)
     if counts["invalid"] or counts["crashed"]:
         return INVALID_INPUT
@@ -89,13 +94,13 @@ def _is_unchecked(result: CheckResult) -> bool:
     return result.status == "passed" and not result.verdicts
 
 
-def _print_result(result: CheckResult, width: int) -> None:
+def _print_result(result: CheckResult, width: int, progress: Progress) -> None:
     if result.verdicts:
         held = sum(verdict.holds for verdict in result.verdicts)
         outcome = f"{held}/{len(result.verdicts)} hold"
     else:
         outcome = "no expectations" if _is_unchecked(result) else ""
     mark = "ok" if result.status == "passed" else result.status.upper()
-    print_line(f"{mark:<8}{result.address:<{width}}  {outcome:<15}  {result.wall_time:6.1f} s")
+    progress.print(f"{mark:<8}{result.address:<{width}}  {outcome:<15}  {result.wall_time:6.1f} s")
     if result.message:
-        print_line(f"        {result.message}")
+        progress.print(f"        {result.message}")

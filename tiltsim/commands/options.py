@@ -55,9 +55,9 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
-def add_quiet(parser: argparse.ArgumentParser) -> None:
-    """Declare ``--quiet``."""
-    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+def add_quiet(parser: argparse.ArgumentParser, text: str = "print nothing but errors") -> None:
+    """Declare ``--quiet``, with another help text where it still prints results."""
+    parser.add_argument("--quiet", action="store_true", help=text)
 
 
 def add_plot(parser: argparse.ArgumentParser, figure: str) -> None:

@@ -1,19 +1,26 @@
-"""Progress on a terminal."""
+"""Progress of a command: a bar on a terminal, elsewhere a line every few seconds."""
 
 from __future__ import annotations
 
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
+from time import monotonic
 from typing import TYPE_CHECKING, Final
+
+from tiltsim.commands.text import print_line
+from tiltsim.system.text import printable
 
 if TYPE_CHECKING:
     from tqdm import tqdm
 
 TICK: Final = 1.0
-"""Interval (s) at which the clock of a counting bar moves while nothing is finished."""
+"""Interval (s) at which the clock of a bar moves while nothing is finished."""
+
+LINE_INTERVAL: Final = 9.0
+"""Interval (s) of the lines where there is no terminal: CI services end a job that is silent."""
 
 
 @contextmanager
@@ -41,61 +48,138 @@ def announce_compilation(*, shown: bool) -> Iterator[None]:
         before_compiling.remove(announce)
 
 
+class Progress:
+    """The stages of a command, one after the other; this class shows nothing."""
+
+    interval = TICK
+
+    def __init__(self) -> None:
+        self._stage = ""
+
+    def begin(self, stage: str, total: float = 0, done: float = 0) -> None:
+        """Begin a stage.
+
+        Args:
+            stage: Its name; if it counts, what it counts, as in ``flights``.
+            total: How many there are, or seconds if it is a float; 0 if that is not known.
+            done: How many an earlier run has finished, which the rate leaves out.
+        """
+        self._stage = stage
+
+    def move(self, done: float) -> None:
+        """Tell how much of the stage is done."""
+
+    def tell(self, stage: str, done: int, total: int) -> None:
+        """Tell how much of a stage is done, which begins when it is first told of."""
+        if stage != self._stage:
+            self.begin(stage, total, done)
+        self.move(done)
+
+    def print(self, line: str, *, error: bool = False) -> None:
+        """Print a line, of results or to standard error."""
+        print_line(line, error=error)
+
+    def tick(self) -> None:
+        """Called every ``interval``, from another thread."""
+
+    def end(self) -> None:
+        """Remove what is shown."""
+
+
+class _Bars(Progress):
+    """A bar per stage."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._bar: tqdm | None = None
+
+    def begin(self, stage: str, total: float = 0, done: float = 0) -> None:
+        super().begin(stage)
+        self.end()
+        if isinstance(total, float):
+            values = "{n:.1f}/{total:g} s [{elapsed}<{remaining}]"
+        else:
+            values = "{n}/{total} [{elapsed}<{remaining}, {rate_noinv_fmt}]"
+        shown = ": {percentage:3.0f}%|{bar}| " + values if total else " [{elapsed}]"
+        self._bar = _bar(total, stage + shown, done)
+
+    def move(self, done: float) -> None:
+        if self._bar is not None:
+            self._bar.update(done - self._bar.n)
+
+    def print(self, line: str, *, error: bool = False) -> None:
+        from tqdm import tqdm
+
+        tqdm.write(printable(line), file=sys.stderr if error else sys.stdout)
+
+    def tick(self) -> None:
+        if self._bar is not None:
+            self._bar.refresh()
+
+    def end(self) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+
+class _Lines(Progress):
+    """A line per interval, none in the first one."""
+
+    interval = LINE_INTERVAL
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.begin("starting")
+
+    def begin(self, stage: str, total: float = 0, done: float = 0) -> None:
+        super().begin(stage)
+        self._total, self._done, self._initial = total, done, done
+        self._start = monotonic()
+
+    def move(self, done: float) -> None:
+        self._done = done
+
+    def tick(self) -> None:
+        elapsed, done, total = monotonic() - self._start, self._done, self._total
+        line = f"tiltsim: {self._stage}"
+        if total:
+            line += f": {done:.0f} of {total:g}{' s' if isinstance(total, float) else ''}"
+        line += f", {_clock(elapsed)}"
+        if done > self._initial:
+            left = elapsed * (total - done) / (done - self._initial)
+            line += f", about {_clock(left)} left"
+        print_line(line, error=True)
+
+
 @contextmanager
-def progress_bar(total: float, unit: str, *, shown: bool) -> Iterator[Callable[[float], None]]:
-    """A progress bar on standard error, when that is a terminal and ``shown`` is true.
-
-    Yields the function that moves the bar to a value between 0 and ``total``.
-    """
-    if not shown or not sys.stderr.isatty():
-        yield lambda value: None
+def show_progress(*, shown: bool) -> Iterator[Progress]:
+    """Show the progress of a command on standard error, so that it is never silent for long."""
+    if not shown:
+        yield Progress()
         return
-    layout = "{l_bar}{bar}| {n:.1f}/{total:g} {unit} [{elapsed}<{remaining}]"
-    with _bar(total, unit, layout) as bar, announce_compilation(shown=True):
-
-        def move(value: float) -> None:
-            bar.update(value - bar.n)
-
-        yield move
-
-
-@contextmanager
-def counting_bar(total: int, unit: str, *, shown: bool) -> Iterator[Callable[[int], None]]:
-    """A progress bar for countable things, with their rate and the remaining time.
-
-    Like `progress_bar`; the bar appears with the first call, whose value is the number that an
-    earlier run finished, which the rate leaves out.
-    """
-    if not shown or not sys.stderr.isatty():
-        yield lambda value: None
-        return
-    layout = "{l_bar}{bar}| {n}/{total}{unit} [{elapsed}<{remaining}, {rate_noinv_fmt}]"
-    bars: list[tqdm] = []
+    progress = _Bars() if sys.stderr.isatty() else _Lines()
     finished = threading.Event()
 
     def tick() -> None:
-        while not finished.wait(TICK):
-            bars[0].refresh()
+        while not finished.wait(progress.interval):
+            progress.tick()
 
     ticking = threading.Thread(target=tick, daemon=True)
-
-    def move(value: int) -> None:
-        if not bars:
-            bars.append(_bar(total, f" {unit}", layout, value))
-            ticking.start()
-        bars[0].update(value - bars[0].n)
-
+    ticking.start()
     with announce_compilation(shown=True):
         try:
-            yield move
+            yield progress
         finally:
             finished.set()
-            for bar in bars:
-                ticking.join()
-                bar.close()
+            ticking.join()
+            progress.end()
 
 
-def _bar(total: float, unit: str, layout: str, initial: float = 0) -> tqdm:
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes}:{rest:02d}"
+
+
+def _bar(total: float, layout: str, initial: float) -> tqdm:
     """A bar as wide as the terminal, or 80 columns if that reports no size."""
     from tqdm import tqdm
 
@@ -107,7 +191,7 @@ def _bar(total: float, unit: str, layout: str, initial: float = 0) -> tqdm:
     return tqdm(
         total=total,
         initial=initial,
-        unit=unit,
+        unit="",
         leave=False,
         bar_format=layout,
         ncols=size.columns or 80,

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Callable
 from pathlib import Path
 
-from tiltsim.commands.options import Subparsers, add_jobs
+from tiltsim.commands.options import Subparsers, add_jobs, add_quiet
+from tiltsim.commands.progress import show_progress
 from tiltsim.commands.text import print_line, tally
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
 
@@ -30,12 +29,12 @@ def add_parser(subparsers: Subparsers) -> None:
     add("--out", type=Path, default=Path("report"), metavar="DIR", help=out)
     add("--markdown", type=Path, metavar="FILE", help="also write a summary")
     add_jobs(parser)
+    add_quiet(parser, "print only what failed")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Fly, evaluate, write."""
-    from tiltsim.commands.progress import progress_bar
     from tiltsim.report.claim_rows import count
     from tiltsim.report.content import failure_text
     from tiltsim.report.html_page import page
@@ -51,29 +50,17 @@ def run(arguments: argparse.Namespace) -> int:
     prepare_file("--out", target)
     if arguments.markdown is not None:
         prepare_file("--markdown", arguments.markdown)
-    with progress_bar(1.0, "of all flights", shown=True) as move:
-        tell = move_and_tell(move)
-        report = make_report(arguments.paths, out / "kept", arguments.jobs, tell)
-    store(target, page(report, Made.now()).encode())
-    if arguments.markdown is not None:
-        store(arguments.markdown, markdown(report).encode())
+    with show_progress(shown=not arguments.quiet) as progress:
+        report = make_report(arguments.paths, out / "kept", arguments.jobs, progress.tell)
+        progress.begin("writing the page")
+        store(target, page(report, Made.now()).encode())
+        if arguments.markdown is not None:
+            store(arguments.markdown, markdown(report).encode())
     counts = sorted(count(report.rows).items(), key=lambda item: item[0].rank)
-    print(f"{len(report.rows)} rows: {tally({kind.value: number for kind, number in counts})}")
+    if not arguments.quiet:
+        print(f"{len(report.rows)} rows: {tally({kind.value: number for kind, number in counts})}")
     for failure in report.failures:
         print_line(f"FAILED  {failure_text(failure)}")
-    print_line(f"report written to {target}")
+    if not arguments.quiet:
+        print_line(f"report written to {target}")
     return EXPECTATION_FAILED if report.failures else DONE
-
-
-def move_and_tell(move: Callable[[float], None]) -> Callable[[int, int], None]:
-    """Progress of the flights: a bar on a terminal, elsewhere a line for every tenth of them."""
-    told = -1
-
-    def tell(done: int, total: int) -> None:
-        nonlocal told
-        move(done / total)
-        if 10 * done // total > told and not sys.stderr.isatty():
-            told = 10 * done // total
-            print(f"{done} of {total} flights", file=sys.stderr, flush=True)
-
-    return tell

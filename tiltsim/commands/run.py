@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tiltsim.commands.options import Subparsers, add_overrides, add_quiet
-from tiltsim.commands.progress import progress_bar
+from tiltsim.commands.progress import show_progress
 from tiltsim.commands.text import print_line, table
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INTERRUPTED, VEHICLE_LOST
 from tiltsim.system.interrupts import defer_interrupts
@@ -147,7 +147,7 @@ def _save(flight: Flight, arguments: argparse.Namespace) -> None:
 
 
 def fly(scenario: Scenario, arguments: argparse.Namespace) -> Flight:
-    """Simulate, with a progress bar and, if requested, a live view."""
+    """Simulate, showing the progress and, if requested, a live view."""
     from tiltsim.simulation.simulate import simulate
 
     with ExitStack() as stack:
@@ -156,11 +156,11 @@ def fly(scenario: Scenario, arguments: argparse.Namespace) -> Flight:
             from tiltsim.views.rerun.live import LiveStream
 
             live = stack.enter_context(LiveStream(scenario, arguments.connect))
-        bar = progress_bar(scenario.simulation.duration, "s", shown=not arguments.quiet)
-        advance_to = stack.enter_context(bar)
+        progress = stack.enter_context(show_progress(shown=not arguments.quiet))
+        progress.begin("flight", scenario.simulation.duration)
 
         def observe(sample: Floats) -> None:
-            advance_to(float(sample[0]))
+            progress.move(float(sample[0]))
             if live is not None:
                 live(sample)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tiltsim.commands.options import Subparsers, add_jobs, add_overrides, add_quiet, add_trust
-from tiltsim.commands.progress import counting_bar
+from tiltsim.commands.progress import show_progress
 from tiltsim.commands.text import counted, print_line, tally
 from tiltsim.exit_codes import INTERRUPTED
 
@@ -42,22 +42,23 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.sweeps.running import run_sweep
 
     overrides = dict(parse_override(text) for text in arguments.overrides)
-    definition = load_sweep(arguments.sweep, overrides)
-    points = SweepPoints(definition)
-    out = arguments.out or Path("sweeps") / Path(definition.address).stem
     shown = not arguments.quiet
-    units = ("flight", "flights") if points.sweep.bisect is None else ("boundary", "boundaries")
-    begun = False
+    with show_progress(shown=shown) as progress:
+        progress.begin("checking the sweep")
+        definition = load_sweep(arguments.sweep, overrides)
+        points = SweepPoints(definition)
+        out = arguments.out or Path("sweeps") / Path(definition.address).stem
+        units = ("flight", "flights") if points.sweep.bisect is None else ("boundary", "boundaries")
+        begun = False
 
-    def report(rows: int) -> None:
-        nonlocal begun
-        if shown and not begun:
-            print_line(_headline(points, rows, units), error=True)
-        begun = True
-        move(rows)
+        def report(rows: int) -> None:
+            nonlocal begun
+            if shown and not begun:
+                progress.print(_headline(points, rows, units), error=True)
+            begun = True
+            progress.tell(units[1], rows, len(points))
 
-    try:
-        with counting_bar(len(points), units[1], shown=shown) as move:
+        try:
             dataset = run_sweep(
                 definition,
                 out,
@@ -66,12 +67,12 @@ def run(arguments: argparse.Namespace) -> int:
                 report=report,
                 trusted=is_trusted(arguments.trust),
             )
-    except KeyboardInterrupt:
-        print_line(
-            f"tiltsim: interrupted; finished flights are in {out}; the same command continues",
-            error=True,
-        )
-        return INTERRUPTED
+        except KeyboardInterrupt:
+            progress.print(
+                f"tiltsim: interrupted; finished flights are in {out}; the same command continues",
+                error=True,
+            )
+            return INTERRUPTED
     if shown:
         print_line(_summary(dataset, units))
         print_line(f"written to {dataset}")

@@ -28,7 +28,7 @@ from tiltsim.report.store import code_digest, results, sources_digest, store
 from tiltsim.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
 
 @dataclass(frozen=True)
@@ -85,10 +85,13 @@ class Failure:
     verdict: Verdict
 
 
-def analyze(folder: Path, jobs: int) -> dict[str, Value]:
+def analyze(
+    folder: Path, jobs: int, progress: Callable[[int, int], None] = lambda done, total: None
+) -> dict[str, Value]:
     """The measured values of all computed claims, by `Claim.id`.
 
-    They are stored in the folder until the core or the report changes.
+    They are stored in the folder until the core or the report changes. ``progress`` is called with
+    the number of computed claims and of those to compute.
 
     Raises:
         InputError: If a claim cannot be computed or a process dies.
@@ -104,7 +107,10 @@ def analyze(folder: Path, jobs: int) -> dict[str, Value]:
     }
     missing = [key for key in _computed() if key not in values]
     if missing:
-        values |= dict(results(_measure, missing, jobs, str))
+        progress(0, len(missing))
+        for done, (key, value) in enumerate(results(_measure, missing, jobs, str), start=1):
+            values[key] = value
+            progress(done, len(missing))
         folder.mkdir(parents=True, exist_ok=True)
         store(path, json.dumps(values, indent=1).encode())
     return values

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from io import BytesIO
@@ -31,7 +32,13 @@ class Drawing:
 
 
 def draw_all(
-    entries: list[ReportEntry], flights: Flights, folder: Path, jobs: int, *, whole: bool
+    entries: list[ReportEntry],
+    flights: Flights,
+    folder: Path,
+    jobs: int,
+    progress: Callable[[int, int], None],
+    *,
+    whole: bool,
 ) -> list[Drawing]:
     """Draw the pictures whose flights are available; drawings are stored in the folder.
 
@@ -39,6 +46,7 @@ def draw_all(
         entries, flights: The scenarios and their records.
         folder: Where drawings are stored.
         jobs: Processes.
+        progress: Called with the number of drawn figures and of those to draw.
         whole: Whether to include pictures that need no flight.
 
     Raises:
@@ -64,10 +72,11 @@ def draw_all(
             digest = hashlib.sha256(style + "".join(content).encode()).hexdigest()
             files[picture.name] = folder / f"{digest[:24]}.png"
     missing = [(name, file) for name, file in files.items() if not file.is_file()]
-    for _ in results(
-        partial(_draw_one, metrics=metrics), missing, jobs, lambda task: f"figure {task[0]}"
-    ):
-        pass
+    progress(0, len(missing))
+    work = partial(_draw_one, metrics=metrics)
+    drawn = results(work, missing, jobs, lambda task: f"figure {task[0]}")
+    for done, _ in enumerate(drawn, start=1):
+        progress(done, len(missing))
     return [
         Drawing(picture, files[picture.name].read_bytes())
         for picture in PICTURES

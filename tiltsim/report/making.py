@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from tiltsim.report.claim_rows import analyze, failures, make_rows
@@ -19,7 +20,7 @@ def make_report(
     paths: list[str],
     folder: Path,
     jobs: int,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    progress: Callable[[str, int, int], None] = lambda stage, done, total: None,
 ) -> Report:
     """Fly, compute and draw everything that a report shows.
 
@@ -28,22 +29,23 @@ def make_report(
             the report is complete: all scenarios, all claims, and the findings.
         folder: Where flights, computed values and drawings are stored.
         jobs: Processes.
-        progress: Called with the number of finished flights and the total.
+        progress: Called with what is counted, how many of it are done, and the total.
 
     Raises:
         InputError: If a scenario is invalid, or a process dies.
     """
     whole = not paths
     entries = report_entries(collect(paths or [str(shipped_folder("scenarios"))]))
-    flights = fly(entries, folder, jobs, progress)
-    values = analyze(folder, jobs) if whole else {}
+    flights = fly(entries, folder, jobs, partial(progress, "flights"))
+    values = analyze(folder, jobs, partial(progress, "computed claims")) if whole else {}
     rows = make_rows(entries, flights, values, whole=whole)
+    drawing = partial(progress, "figures")
     return Report(
         entries=entries,
         flights=flights,
         rows=rows,
         failures=failures(entries, flights),
         comparisons=compare(entries, flights),
-        drawings=draw_all(entries, flights, folder, jobs, whole=whole),
+        drawings=draw_all(entries, flights, folder, jobs, drawing, whole=whole),
         findings=FINDINGS if whole else (),
     )

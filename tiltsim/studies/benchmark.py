@@ -11,6 +11,7 @@ import os
 import resource
 import sys
 from collections.abc import Callable
+from functools import partial
 from statistics import median
 from time import perf_counter
 from typing import Any, Final
@@ -239,10 +240,13 @@ def _compare(variants: Variants, rounds: int, timestep: float, shared: dict[str,
     ]
 
 
-def run_benchmark() -> Rows:
-    """All rows of ``tiltsim bench``."""
-    rows = [row for integrator in INTEGRATORS for row in bench_single(integrator)]
-    for integrator in INTEGRATORS:
-        for threads in sorted({1, os.cpu_count() or 1}):
-            rows += bench_batch(integrator, threads)
+def run_benchmark(progress: Callable[[int, int], None] = lambda done, total: None) -> Rows:
+    """All rows of ``tiltsim bench``; ``progress`` is called with finished and all comparisons."""
+    threads = sorted({1, os.cpu_count() or 1})
+    comparisons = [partial(bench_single, integrator) for integrator in INTEGRATORS]
+    comparisons += [partial(bench_batch, one, number) for one in INTEGRATORS for number in threads]
+    rows: Rows = []
+    for done, compare in enumerate(comparisons):
+        progress(done, len(comparisons))
+        rows += compare()
     return rows
