@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import subprocess
 import sys
@@ -11,16 +12,19 @@ from ctypes.util import find_library
 import mujoco
 import numpy as np
 import pytest
+from PIL import Image
+from PIL.ImageSequence import Iterator
 
 from tests.flights import flight, saved
 from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, torque_free_directions
-from tiltsim.views.video import has_display, inset, offscreen, overlay
+from tiltsim.views.video import encoding, has_display, inset, offscreen, overlay
+from tiltsim.views.video.encoding import write_video
 from tiltsim.views.video.inset import PlaneInset, overlay_inset
 from tiltsim.views.video.offscreen import make_contexts
 from tiltsim.views.video.overlay import RotorcraftOverlay
-from tiltsim.views.video.rendering import FlightRenderer, VideoFormat, frames, write_video
+from tiltsim.views.video.rendering import FlightRenderer, VideoFormat, frame_times, frames
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 SMALL = VideoFormat(width=320, height=180, fps=10, speed=2.0)
@@ -120,8 +124,14 @@ def test_a_video_faster_or_slower_than_the_flight_says_so(speed, clock):
 @needs_gl
 def test_every_flight_can_be_rendered():
     for name in ("fixed", "limited", "free"):
-        _, image = next(frames(flight(name), SMALL))
-        assert image.std() > 10.0
+        stage = FlightRenderer(flight(name), SMALL)
+        with stage.canvas as canvas:
+            assert stage.frame(len(flight(name)) - 1).std() > 10.0
+            geoms = canvas.scene.geoms[: canvas.scene.ngeom]
+        own = {geom.type for geom in geoms if geom.objtype != mujoco.mjtObj.mjOBJ_GEOM}
+        # Cylinders have a hundred times as many triangles: without a GPU, most of a frame's time.
+        assert mujoco.mjtGeom.mjGEOM_BOX in own
+        assert not own & {mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER}
 
 
 @needs_gl
@@ -150,16 +160,43 @@ def test_the_video_plays(tmp_path):
     import av
 
     path = tmp_path / "flight.mp4"
-    times = []
-    write_video(flight("fixed"), path, SMALL, times.append)
+    counts = []
+    write_video(flight("fixed"), path, SMALL, counts.append)
     assert [file.name for file in tmp_path.iterdir()] == ["flight.mp4"]
     with av.open(str(path)) as video:
         stream = video.streams.video[0]
         pictures = [frame.to_ndarray(format="rgb24") for frame in video.decode(stream)]
         assert (stream.width, stream.height, stream.average_rate) == (320, 180, 10)
         assert stream.codec_context.name == "h264"
-    assert len(pictures) == len(times) == 7
+    assert len(pictures) == 7
+    assert counts == list(range(1, 8))
     assert pictures[-1].std() > 10.0
+
+
+def test_a_gif_repeats_at_the_videos_speed_in_the_frames_colors(tmp_path, monkeypatch):
+    """One palette for all frames: many pixels of gray shades, few of the vehicle's orange."""
+    video = dataclasses.replace(SMALL, fps=7, speed=1.4)
+    rendered = []
+    for number in range(7):
+        image = np.repeat(np.linspace(90, 160, 64).astype(np.uint8), 64 * 3).reshape(64, 64, 3)
+        image[8 * number : 8 * number + 4, :4] = (213, 94, 0)
+        rendered.append((0.2 * number, image))
+    monkeypatch.setattr(encoding, "frames", lambda *_: rendered)
+    write_video(flight("fixed"), tmp_path / "flight.gif", video)
+    with Image.open(tmp_path / "flight.gif") as gif:
+        assert (gif.size, gif.info["loop"], gif.n_frames) == ((64, 64), 0, 7)
+        frames = [(f.info["duration"], np.array(f.convert("RGB"))) for f in Iterator(gif)]
+    assert sum(delay for delay, _ in frames) == 1000  # ms; 1000 / 7 is no delay of a GIF
+    assert {delay for delay, _ in frames} == {140, 150}
+    for (_, image), (_, original) in zip(frames, rendered):
+        assert np.abs(image.astype(int) - original).max() <= 8
+
+
+def test_a_video_may_show_a_part_of_the_flight():
+    this = flight("trot")  # 1.2 s
+    video = dataclasses.replace(SMALL, start=0.3, end=0.75, speed=1.0)
+    np.testing.assert_allclose(frame_times(this, video), [0.3, 0.4, 0.5, 0.6, 0.7])
+    np.testing.assert_allclose(frame_times(this, dataclasses.replace(video, end=9.0))[-1], 1.2)
 
 
 @needs_gl
@@ -231,17 +268,34 @@ def test_an_invalid_mujoco_gl_is_an_error_of_one_line(way, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("out", "words"), [("x.avi", "unknown format '.avi'"), ("no/x.mp4", "does not exist")]
+    ("out", "options", "words"),
+    [
+        ("x.avi", [], "unknown format '.avi'"),
+        ("no/x.mp4", [], "does not exist"),
+        ("x.mp4", ["--start", "2"], "--start 2: is not in it; the flight ends at 1.2 s"),
+        ("x.mp4", ["--start", "0.5", "--end", "0.5"], "--start 0.5: is not before --end 0.5"),
+        ("x.gif", ["--fps", "60"], "--fps 60: a GIF has at most 50 frames per second"),
+    ],
 )
-def test_a_bad_target_is_one_line_and_exit_code_2(out, words, tmp_path, capsys):
+def test_a_video_that_cannot_be_is_one_line_and_exit_code_2(out, options, words, tmp_path, capsys):
     folder = saved("fixed", tmp_path)
-    assert main(["video", str(folder), "--out", str(tmp_path / out)]) == 2
+    assert main(["video", str(folder), "--out", str(tmp_path / out), *options]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert words in line
 
 
 @pytest.mark.parametrize(
-    "option", [["--size", "161x120"], ["--size", "a"], ["--fps", "0"], ["--speed", "0"]]
+    "option",
+    [
+        ["--size", "161x120"],
+        ["--size", "a"],
+        ["--fps", "0"],
+        ["--speed", "0"],
+        ["--start", "-1"],
+        ["--end", "nan"],
+        ["--camera", "1,2"],
+        ["--camera", "7.5,130,91"],
+    ],
 )
 def test_options_out_of_range_are_refused(option, capsys):
     with pytest.raises(SystemExit) as caught:

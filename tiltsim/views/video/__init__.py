@@ -1,6 +1,6 @@
-"""Videos of flights: rendered by MuJoCo with a camera that follows, encoded by PyAV.
+"""Videos of flights, MP4 or GIF: rendered by MuJoCo with a camera that follows the vehicle.
 
-`tiltsim.views.video.rendering.write_video` writes a video; no display is needed.
+`tiltsim.views.video.encoding.write_video` writes a video; no display is needed.
 """
 
 from __future__ import annotations

@@ -21,7 +21,8 @@ Image = npt.NDArray[np.uint8]
 MODULES: Final = {"egl": "mujoco.egl", "osmesa": "mujoco.osmesa", "glfw": "mujoco.glfw"}
 """OpenGL modules by the values of MUJOCO_GL."""
 
-FONT_SIZE: Final = mujoco.mjtFontScale.mjFONTSCALE_100
+SMALL_HEIGHT: Final = 320
+"""Frames lower than this (pixels) have small text."""
 
 
 def make_contexts(model: mujoco.MjModel, width: int, height: int) -> tuple[Any, mujoco.MjrContext]:
@@ -34,6 +35,8 @@ def make_contexts(model: mujoco.MjModel, width: int, height: int) -> tuple[Any, 
         InputError: If no implementation works.
     """
     failures = []
+    small, normal = mujoco.mjtFontScale.mjFONTSCALE_50, mujoco.mjtFontScale.mjFONTSCALE_100
+    font = small if height < SMALL_HEIGHT else normal
     for name, make in _implementations().items():
         # GLFW only warns, and only MuJoCo detects that there is no context.
         with warnings.catch_warnings(record=True) as caught:
@@ -41,7 +44,7 @@ def make_contexts(model: mujoco.MjModel, width: int, height: int) -> tuple[Any, 
             try:
                 context = make(width, height)
                 context.make_current()
-                return context, mujoco.MjrContext(model, FONT_SIZE.value)
+                return context, mujoco.MjrContext(model, font.value)
             except Exception as error:  # every library has errors of its own
                 message = str(caught[0].message if caught else error)
                 reason = message.strip().partition("\n")[0] or type(error).__name__
@@ -75,13 +78,24 @@ class Caption(NamedTuple):
 
 
 class Canvas:
-    """Renders frames of one model, of a size in pixels; use it as a context manager.
+    """Renders frames of one model; use it as a context manager.
+
+    Args:
+        model: The model, whose settings for rendering are changed.
+        width, height: Of the frames, pixels.
+        samples: Per pixel, against jagged edges; 0 for none.
+        shadows: Whether to render shadows and reflections, which without a GPU takes twice the
+            time.
 
     Raises:
         InputError: If no OpenGL implementation works.
     """
 
-    def __init__(self, model: mujoco.MjModel, width: int, height: int) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, width: int, height: int, *, samples: int, shadows: bool
+    ) -> None:
+        model.vis.quality.offsamples = samples
+        model.vis.quality.numquads = 1  # per side of a box: lines are boxes
         model.vis.global_.offwidth = max(width, model.vis.global_.offwidth)
         model.vis.global_.offheight = max(height, model.vis.global_.offheight)
         self._model = model
@@ -90,9 +104,8 @@ class Canvas:
         self._frame = mujoco.MjrRect(0, 0, width, height)
         self._options = mujoco.MjvOption()
         self.scene = mujoco.MjvScene(model, maxgeom=5000)
-        # With software rendering, shadows and reflections would take half of the time.
         for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
-            self.scene.flags[flag] = 0
+            self.scene.flags[flag] = shadows
 
     def __enter__(self) -> Self:
         """Return the canvas, whose constructor made the context."""
