@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
     from tiltsim.simulation.batch import fly
     from tiltsim.simulation.simulate import simulate
+    from tiltsim.simulation.stepwise import Simulation
+    from tiltsim.views.rerun.viewer import view
 
 _HOMES = {
     "Command": "plants.command",
@@ -31,12 +33,14 @@ _HOMES = {
     "InputError": "errors",
     "Observation": "plants.command",
     "Scenario": "scenario.scenario",
+    "Simulation": "simulation.stepwise",
     "TiltsimError": "errors",
     "fly": "simulation.batch",
     "load_flight": "flight.reading",
     "load_scenario": "scenario.loading",
     "parse_scenario": "scenario.loading",
     "simulate": "simulation.simulate",
+    "view": "views.rerun.viewer",
 }
 
 __all__ = [
@@ -46,12 +50,14 @@ __all__ = [
     "InputError",
     "Observation",
     "Scenario",
+    "Simulation",
     "TiltsimError",
     "fly",
     "load_flight",
     "load_scenario",
     "parse_scenario",
     "simulate",
+    "view",
 ]
 
 

@@ -185,6 +185,8 @@ class ClosedLoop:
         follows_position: Whether a scenario has the controller follow the reference's horizontal
             position.
         uses_gait: Whether the scenario's gait has a part in the flight.
+        within: The loop that a layer of `tiltsim.laws.layers` goes around; None for a controller
+            itself, its supervisor included.
     """
 
     kind: VehicleKind
@@ -198,6 +200,7 @@ class ClosedLoop:
     supervised: SupervisedLaw | None = None
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
     uses_gait: bool = True
+    within: ClosedLoop | None = None
 
     @cached_property
     def signature(self) -> float:

@@ -10,25 +10,39 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
+from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from tiltsim.errors import InputError
 from tiltsim.flight.metrics import compute_metrics
+from tiltsim.flight.vectors import VECTORS, components
 from tiltsim.flight.writing import write_flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.messages import did_you_mean
-from tiltsim.system.text import valid_unicode
+from tiltsim.scenario.metric_names import unit_of
+from tiltsim.system.optional import optional_package
+from tiltsim.system.public import public
+from tiltsim.system.text import html_table, short_repr, valid_unicode
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pyarrow
 
     from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.engines.base import EngineName
     from tiltsim.flight.end import End
     from tiltsim.scenario.scenario import Scenario
+
+
+class UnknownColumnError(InputError, KeyError):
+    """A flight has no column or vector of a name."""
+
+    __str__ = Exception.__str__  # a KeyError shows its message in quotes
 
 
 def _overflow_ignored() -> np.errstate:
@@ -80,12 +94,27 @@ class Flight:
         """Number of samples."""
         return len(self.samples)
 
-    def __getitem__(self, column: str) -> Floats:
-        """A column by name, shape (N,); see `units`."""
-        if column not in self.units:
-            hint = did_you_mean(column, self.units)
-            raise KeyError(f"{column!r}: no column of this flight; {hint}see Flight.units")
-        return self.columns[column]
+    def __getitem__(self, name: str) -> Floats:
+        """A column by name, shape (N,); or a vector of `VECTORS`, shape (N, components).
+
+        ``flight["x"]`` and ``flight["position"]``, both in the units of `units`. Raises
+        `UnknownColumnError` for other names.
+        """
+        known = isinstance(name, str)
+        if known and name in self.units:
+            return self.columns[name]
+        columns = components(name, self.units) if known else []
+        if not columns:
+            hint = did_you_mean(name, [*self.units, *VECTORS])
+            raise UnknownColumnError(
+                f"{short_repr(name)}: no column of this flight; {hint}see Flight.units, or the "
+                f"vectors {', '.join(v for v in VECTORS if components(v, self.units))}"
+            )
+        return np.stack([self.columns[column] for column in columns], axis=-1)
+
+    def __contains__(self, name: object) -> bool:
+        """Whether there is a column or vector of this name."""
+        return isinstance(name, str) and (name in self.units or bool(components(name, self.units)))
 
     @cached_property
     def units(self) -> dict[str, str]:
@@ -110,6 +139,29 @@ class Flight:
     def metrics(self) -> dict[str, float | bool]:
         """The metrics of the flight by name; see `tiltsim.scenario.metric_names.METRICS`."""
         return dict(self._metrics)
+
+    def view(self, *, url: str | None = None) -> Any:
+        """Show this flight in Rerun: in the notebook if it runs in one; see `tiltsim.view`."""
+        return public("view")([self], url=url)
+
+    def _repr_html_(self) -> str:
+        """How the flight ended and its metrics, as a table for notebooks."""
+        scenario, end = self.scenario, self.end
+        how = f"{end.kind} at {end.time:g} s" + (f": {end.cause}" if end.cause else "")
+        size = f"{len(self)} samples of {len(self.units)} columns"
+        rows = [(name, f"{value:.6g}", unit_of(name)) for name, value in self.metrics().items()]
+        lines = [scenario.address, how, size]
+        return html_table(scenario.title or "Flight", lines, rows, ("metric", "value", "unit"))
+
+    def to_pandas(self) -> Any:
+        """The columns as a pandas DataFrame, whose ``attrs["units"]`` are `units`.
+
+        Raises `InputError` if pandas is not installed.
+        """
+        pandas = optional_package("pandas", "Flight.to_pandas")
+        frame = pandas.DataFrame(dict(self.columns))
+        frame.attrs["units"] = dict(self.units)
+        return frame
 
     def to_arrow(self) -> pyarrow.Table:
         """The columns as an Arrow table; units and `origin` are its metadata."""
@@ -137,10 +189,22 @@ class Flight:
         }
         return {key: valid_unicode(text) for key, text in texts.items()}
 
-    def save(self, folder: str | Path) -> None:
+    def save(self, folder: str | PathLike[str]) -> None:
         """Write metrics.json, flight.parquet and the resolved scenario.toml into a folder.
 
         Raises `InputError` if that is impossible, or would replace a scenario or a controller that
         tiltsim did not write.
         """
+        if not isinstance(folder, str | PathLike):
+            raise InputError(f"folder = {short_repr(folder)}: must be the name of a folder")
         write_flight(Path(folder), self.to_arrow(), self.metrics(), self.scenario)
+
+
+def as_flights(flights: Flight | Sequence[Flight], name: str = "flights") -> list[Flight]:
+    """An argument that is one flight or several as a list. Raises `InputError` if it is neither."""
+    several = [flights] if isinstance(flights, Flight) else flights
+    known = isinstance(several, list | tuple) and all(isinstance(f, Flight) for f in several)
+    if not known or not several:
+        allowed = "must be a tiltsim.Flight or a list of them"
+        raise InputError(f"{name} = {short_repr(flights)}: {allowed}")
+    return [*several]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -17,13 +18,14 @@ from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.limits import check_limits
 from tiltsim.scenario.loading import parse_scenario, without_none
 from tiltsim.system.parquet import open_parquet
+from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     import pyarrow
 
 
-def load_flight(path: str | Path) -> Flight:
+def load_flight(path: str | PathLike[str]) -> Flight:
     """Read a flight back: samples, scenario, engine, end and wall time.
 
     Args:
@@ -32,7 +34,7 @@ def load_flight(path: str | Path) -> Flight:
     Raises:
         InputError: If there is no such file, it is damaged, or it is not a flight of tiltsim.
     """
-    file = _flight_file(Path(path))
+    file = _flight_file(path)
     with open_parquet(file) as opened:
         table = opened.read()
         table.validate(full=True)
@@ -71,8 +73,11 @@ def _samples(file: Path, table: pyarrow.Table, fields: Sequence[str]) -> Floats:
     return np.column_stack(columns)
 
 
-def _flight_file(path: Path) -> Path:
+def _flight_file(given: str | PathLike[str]) -> Path:
     """The Parquet file of a path, which may be its folder."""
+    if not isinstance(given, str | PathLike):
+        raise InputError(f"path = {short_repr(given)}: must be the name of a folder or file")
+    path = Path(given)
     file = path / "flight.parquet" if path.is_dir() else path
     if file.is_file():
         return file

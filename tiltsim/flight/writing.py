@@ -19,6 +19,7 @@ from tiltsim.scenario.loading import scenario_toml
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.files import prepare_folder, replacing
 from tiltsim.system.parquet import parquet_bytes
+from tiltsim.system.text import printable
 
 if TYPE_CHECKING:
     import pyarrow
@@ -29,6 +30,10 @@ SCENARIO: Final = "scenario.toml"
 
 _WRITTEN: Final = "# written by tiltsim: sha256 {}\n"
 _COPIED: Final = "# its controller: sha256 {}\n"
+_UNWRITTEN: Final = (
+    "# Not to be flown from this file: its controller, {}, was given in Python. Give it again:\n"
+    '# tiltsim.simulate("scenario.toml", controller=...)\n'
+)
 
 
 def prepare_flight_folder(folder: Path, scenario: Scenario) -> None:
@@ -90,6 +95,8 @@ def resolved_text(scenario: Scenario, folder: Path) -> str:
         named = table.model_copy(update={"function": f"{copy.name}:{table.attribute}"})
         scenario = scenario.model_copy(update={"controller": named})
         copied = _COPIED.format(_digest(content))
+    elif isinstance(table, PythonController):
+        copied = _UNWRITTEN.format(printable(table.function))
     text = copied + scenario_toml(scenario)
     return _WRITTEN.format(_digest(text.encode())) + text
 

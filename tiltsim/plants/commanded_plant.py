@@ -19,19 +19,15 @@ from tiltsim.closed_loop.userdata import EVALUATIONS
 from tiltsim.engines.callback import control_callback
 from tiltsim.laws.commanded import COMMANDED_LOOPS, HeldCommand, commanded_parameters, with_command
 from tiltsim.laws.layers.delay_line import EXTERNAL_COMMANDS
-from tiltsim.laws.layers.sensing import measured_qpos, measured_qvel, sensor_parameters
 from tiltsim.laws.tiltrotor import gait_servo_commands
-from tiltsim.plants.command import CheckedCommand, ControllerError, Observation, Reference
+from tiltsim.plants.command import CheckedCommand, ControllerError, Observation
 from tiltsim.plants.flight_model import evaluations_per_step
 from tiltsim.plants.mujoco_plant import MujocoPlant
+from tiltsim.plants.observing import Observer, flip_by_spin
 from tiltsim.vehicles.rotorcraft.layout import ROTOR_STATES, TILT_1
-from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.mathematics.records import slotted
-from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, clipped
-from tiltsim_controllers.references.trajectories import reference_derivatives
 from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines
-from tiltsim_controllers.vehicle.parameters import SPIN
 from tiltsim_controllers.vehicle.rotor_inertia import sum_along_thrust_axes
 
 _NONE: Final = (0.0, 0.0, 0.0, 0.0)
@@ -50,7 +46,7 @@ class CommandedPlant(MujocoPlant):
         self.tilting = vehicle.has_tilting_rotors
         self._min_speed, self._max_speed = vehicle.speeds_along_spin
         self._commanded = commanded_parameters(self._setup.parameters)
-        self._sensors = sensor_parameters(assembly.scenario)
+        self._observer = Observer(assembly)
         self._slotted = slotted(self._setup.parameters)
         self._layered = self._loop is not COMMANDED_LOOPS[vehicle.model]
         first = 8 if self.tilting else 4  # after servos and thrusts
@@ -100,7 +96,7 @@ class CommandedPlant(MujocoPlant):
             tilts = self._gait_servo_commands() if self.tilting else _NONE
         are_speeds = command.kind != "rotor_accelerations"
         rotors = self._limited_speeds(command) if are_speeds else command.rotors
-        return np.array([*tilts, *_flip_by_spin(rotors), are_speeds])
+        return np.array([*tilts, *flip_by_spin(rotors), are_speeds])
 
     def _hold_command(self, command: HeldCommand) -> None:
         data, knots = self.data, self._setup.knots
@@ -167,42 +163,4 @@ class CommandedPlant(MujocoPlant):
 
     def observation(self) -> Observation:
         """The present state as a controller sees it, through the scenario's sensors."""
-        time, qpos, qvel = self.evaluation_time, self.data.qpos, self.data.qvel
-        if self._sensors.active:
-            qpos = np.array(measured_qpos(time, qpos.tolist(), self._sensors))
-            qvel = np.array(measured_qvel(time, qvel.tolist(), self._sensors))
-        tilts, tilt_rates = qpos[7:11], qvel[6:10]
-        return Observation(
-            time=self.time,
-            position=qpos[:3].copy(),
-            velocity=qvel[:3].copy(),
-            attitude=np.array(euler_from_quaternion(*qpos[3:7].tolist())),
-            quaternion=qpos[3:7].copy(),
-            body_rates=qvel[3:6].copy(),
-            tilt_angles=tilts.copy() if self.tilting else np.zeros(4),
-            tilt_rates=tilt_rates.copy() if self.tilting else np.zeros(4),
-            rotor_speeds=np.array(_flip_by_spin(self.data.act[:4].tolist())),
-            reference=self._reference(),
-            vehicle=self._commanded.vehicle,
-        )
-
-    def _reference(self) -> Reference:
-        time, knots, reference = self.evaluation_time, self._setup.knots, self._commanded.reference
-        motion = np.array(reference_derivatives(time, reference, knots)[:9])
-        planned = np.zeros(8)
-        if self.tilting:
-            planned[:] = tilt_reference(time, self._commanded.gait, knots)
-        return Reference(
-            position=motion[:3],
-            velocity=motion[3:6],
-            acceleration=motion[6:],
-            attitude=np.array((reference.roll, reference.pitch, reference.yaw)),
-            tilt_angles=planned[:4],
-            tilt_rates=planned[4:],
-        )
-
-
-def _flip_by_spin(values: Sequence[float]) -> Quad:
-    """Speeds along the spin from signed ones, and back."""
-    first, second, third, fourth = values
-    return SPIN[0] * first, SPIN[1] * second, SPIN[2] * third, SPIN[3] * fourth
+        return self._observer.observe(self, self.data.act[:4].tolist())

@@ -146,10 +146,14 @@ class UserControlledPlant(CommandedPlant):
 
     def __init__(self, assembly: Assembly) -> None:
         super().__init__(assembly)
-        self._controller = load_controller(assembly.scenario)
         self._scenario = assembly.scenario
-        self._was_reset = False
         self._every = max(1, assembly.scenario.simulation.control_steps)
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin a flight with a controller that remembers nothing."""
+        self._controller = load_controller(self._scenario)
+        self._was_reset = False
         self._commands: dict[int, CheckedCommand] = {}  # by step
 
     def advance(self, steps: int) -> None:

@@ -88,10 +88,16 @@ class Actuation(NamedTuple):
 
 
 @scalar
-def _allocated_accelerations(
+def allocated_accelerations(
     demanded: Quad, qpos: Vector, act: Vector, allocation: Allocation
 ) -> Quad:
-    """The demanded rotor accelerations (rad/s^2), within the speed limits if allocation is on."""
+    """The demanded rotor accelerations, within the speed limits if allocation is on.
+
+    Args:
+        demanded: By the controller, rad/s^2.
+        qpos, act: MuJoCo's state.
+        allocation: The parameters.
+    """
     if allocation.active == 0.0:
         return demanded
     roll, pitch, _yaw = euler_from_quaternion(qpos[QW], qpos[QX], qpos[QY], qpos[QZ])
@@ -181,7 +187,7 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
         seen_qpos = measured_qpos(time, qpos, actuation.sensors)
         seen_qvel = measured_qvel(time, qvel, actuation.sensors)
         ctrl = law_controls(time, seen_qpos, seen_qvel, act, parameters.inner, knots)
-        u1, u2, u3, u4 = _allocated_accelerations(
+        u1, u2, u3, u4 = allocated_accelerations(
             four(ctrl, ACCELERATION_1), seen_qpos, act, actuation.allocation
         )
         sent = (ctrl[0], ctrl[1], ctrl[2], ctrl[3], u1, u2, u3, u4)

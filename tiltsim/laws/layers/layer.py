@@ -122,6 +122,7 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
         monitoring=replace(inner.monitoring, sign_check_values=sign_check_values),
         equations=layer.equations,
         supervised=None,
+        within=inner,
     )
 
 

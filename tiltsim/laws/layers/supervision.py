@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
@@ -188,4 +189,5 @@ def _with_states(loop: ClosedLoop, units: tuple[str, ...]) -> Layer:
 def with_supervisor(loop: ClosedLoop, strategy: str) -> ClosedLoop:
     """A loop under a supervisor with one of `tiltsim_controllers.laws.supervisor.STRATEGIES`."""
     units = _STATE_UNITS.get(strategy)
-    return wrap_loop(loop, _scaling(loop) if units is None else _with_states(loop, units))
+    layer = _scaling(loop) if units is None else _with_states(loop, units)
+    return replace(wrap_loop(loop, layer), within=None)

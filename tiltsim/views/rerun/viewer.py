@@ -8,10 +8,18 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from time import monotonic, sleep
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.errors import InputError
-from tiltsim.views.rerun.requirements import DEFAULT_URL, require_viewer, viewer_listens
+from tiltsim.flight.flight import as_flights
+from tiltsim.system.optional import optional_package
+from tiltsim.system.text import short_repr
+from tiltsim.views.rerun.requirements import (
+    DEFAULT_URL,
+    require_rerun,
+    require_viewer,
+    viewer_listens,
+)
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -24,6 +32,55 @@ RECORDING_START: Final = b"RRF"
 
 START_TIME: Final = 20.0
 """Time (s) that the viewer may take to start."""
+
+
+def view(flights: Flight | Sequence[Flight], *, url: str | None = None) -> Any:
+    """Show a flight, or several in comparison, in Rerun.
+
+    Args:
+        flights: One or several.
+        url: Of a viewer that is open, such as ``"rerun+http://127.0.0.1:9876/proxy"``; default: in
+            a notebook the viewer is part of the cell, elsewhere one is opened.
+
+    Returns:
+        In a notebook, what the cell has to end with: Rerun's widget. Else None.
+
+    Raises:
+        InputError: If an argument is wrong, no viewer listens at the address, there is no screen to
+            open one on, or the notebook support of Rerun is not installed.
+    """
+    shown = as_flights(flights)
+    if url is None and _in_notebook():
+        return _inline_viewer(shown)
+    if url is not None and not isinstance(url, str):
+        raise InputError(f"url = {short_repr(url)}: must be text, such as {DEFAULT_URL}")
+    view_flights(shown, url)
+    return None
+
+
+def _in_notebook() -> bool:
+    """Whether this process is the kernel of a notebook, which displays widgets."""
+    ipython = sys.modules.get("IPython")
+    return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
+
+
+def _inline_viewer(flights: Sequence[Flight]) -> Any:
+    """Rerun's widget for notebooks, which has got the flights."""
+    optional_package("rerun_notebook", "Rerun in a notebook", "'rerun-sdk[notebook]'")
+    from rerun.notebook import Viewer
+
+    from tiltsim.views.rerun.blueprint import flight_blueprint
+    from tiltsim.views.rerun.recording_file import make_recorders, new_recording, write_flights
+
+    require_rerun()
+    recording = new_recording([flight.scenario for flight in flights])
+    recorders = make_recorders(recording, [flight.assembly for flight in flights])
+    widget = Viewer(recording=recording, blueprint=flight_blueprint(recorders), width="auto")
+    for recorder in recorders:
+        recorder.begin()
+    write_flights(recorders, flights)
+    recording.flush()
+    return widget
 
 
 def view_flights(

@@ -1,0 +1,136 @@
+"""Flights that are stepped by their caller."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+import tiltsim
+from tests.flights import TILT_CAR
+
+TROT = {
+    "simulation": {"duration": 0.02, "control_timestep": 0.002, "record_timestep": 0.01},
+    "gait": {"type": "trot_continuous", "amplitude": 0.3, "period": 2.0},
+    "controller": {"decoupling": "exact", "gains": "exact"},
+    "initial": {"attitude": [0.05, -0.05, 0.1]},
+}
+DRAG = {"wind": [3.0, 0.0, 0.0], "drag": {"linear": [0.1, 0.1, 0.1]}}
+LAYERS = {
+    "ideal": TROT,
+    "noisy": {**TROT, "sensors": {"attitude_noise": 0.01}},
+    "windy": {**TROT, "air": DRAG},
+    "measured": {
+        **TROT,
+        "controller": {**TROT["controller"], "angular_acceleration": "measured"},
+        "sensors": {"body_rates_bias": [0.01, 0.0, 0.0]},
+    },
+    "supervised": {
+        **TROT,
+        "controller": {**TROT["controller"], "supervisor": {"strategy": "scale"}},
+        "air": DRAG,
+    },
+}
+
+
+def test_steps_are_those_of_a_flight():
+    flight, simulation = tiltsim.simulate(TROT), tiltsim.Simulation(TROT)
+    for _ in range(2):
+        for _ in range(2):
+            simulation.step(10)
+        np.testing.assert_array_equal(simulation.flight().samples, flight.samples)
+        simulation.reset()
+        assert simulation.time == 0.0
+
+
+@pytest.mark.parametrize("layers", LAYERS)
+def test_the_built_in_command_as_a_controller_of_ones_own_flies_the_same_flight(layers):
+    shipped = tiltsim.load_scenario(LAYERS[layers])
+    steps = shipped.simulation.control_steps
+
+    class Shadow:
+        def reset(self, _scenario):
+            self.simulation = tiltsim.Simulation(shipped)
+
+        def __call__(self, observation):
+            if observation.time > 0.0:
+                self.simulation.step(steps)
+            np.testing.assert_array_equal(
+                observation.position, self.simulation.observation().position
+            )
+            np.testing.assert_array_equal(
+                observation.attitude, self.simulation.observation().attitude
+            )
+            return self.simulation.command()
+
+    ours, own = tiltsim.simulate(shipped), tiltsim.simulate(shipped, controller=Shadow())
+    assert own.end.kind == "completed", own.end.cause
+    for name in ("position", "attitude", "tilt_angles", "rotor_speeds"):
+        np.testing.assert_array_equal(own[name], ours[name])
+
+
+def test_the_quadrotors_command_is_its_thrusts():
+    simulation = tiltsim.Simulation(
+        {"vehicle": {"model": "quadrotor"}, "controller": {"law": "yaw_position"}}
+    )
+    simulation.step(5)
+    thrusts = simulation.flight()["thrusts"]
+    np.testing.assert_allclose(simulation.command().thrusts, thrusts[-1], rtol=1e-12)
+    assert (thrusts > 0.5).all()
+
+
+def test_mujoco_s_own_model_and_data_are_those_that_fly():
+    simulation = tiltsim.Simulation(TROT)
+    model, data = simulation.model, simulation.data
+    assert isinstance(model, mujoco.MjModel)
+    data.qpos[2] = 5.0
+    simulation.step()
+    assert simulation.observation().position[2] == pytest.approx(5.0, abs=1e-3)
+    simulation.reset()
+    assert simulation.data is data
+    assert data.qpos[2] == 0.0
+
+
+def test_an_own_controller_starts_anew_after_a_reset():
+    made = []
+
+    class Counting:
+        def __init__(self):
+            made.append(0)
+
+        def __call__(self, observation):
+            made[-1] += 1
+            return tiltsim.Command(thrusts=[1.05] * 4)
+
+    simulation = tiltsim.Simulation({"simulation": TROT["simulation"]}, controller=Counting)
+    simulation.step(4)
+    simulation.reset()
+    before = len(made)
+    simulation.step(10)
+    assert made[before - 1] == 5
+    with pytest.raises(tiltsim.TiltsimError, match="the controller is your own"):
+        simulation.command()
+
+
+def test_a_failing_controller_raises_at_once():
+    simulation = tiltsim.Simulation(
+        {"simulation": TROT["simulation"]}, controller=lambda observation: None
+    )
+    with pytest.raises(tiltsim.TiltsimError, match=r"expected a tiltsim\.Command"):
+        simulation.step()
+
+
+def test_a_simulation_ends_where_the_flight_does_and_says_so():
+    simulation = tiltsim.Simulation({"initial": {"angular_velocity": [0.0, 0.0, 1001.0]}})
+    assert simulation.end is not None
+    with pytest.raises(tiltsim.TiltsimError, match=r"diverged.*begin again with reset"):
+        simulation.step()
+
+
+def test_a_tilt_car_steps_without_observations():
+    simulation = tiltsim.Simulation(TILT_CAR)
+    simulation.step(10)
+    assert len(simulation.flight()) == 2
+    for method in (simulation.observation, simulation.command):
+        with pytest.raises(tiltsim.TiltsimError, match="not supported for the tilt_car"):
+            method()

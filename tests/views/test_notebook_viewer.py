@@ -1,0 +1,54 @@
+"""Rerun within a notebook."""
+
+from __future__ import annotations
+
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+import tiltsim
+from tests.flights import flight
+from tiltsim.views.rerun import viewer
+
+
+@pytest.fixture
+def in_a_notebook(monkeypatch):
+    kernel = SimpleNamespace(kernel=None)
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: kernel))
+
+
+@pytest.fixture
+def widgets(monkeypatch):
+    """What Rerun's widget for notebooks is made of, and the bytes that it gets."""
+    made = []
+
+    class Widget:
+        def __init__(self, *, recording, blueprint, width):
+            self.content, self.blueprint = recording.memory_recording(), blueprint
+            made.append(self)
+
+    monkeypatch.setitem(sys.modules, "rerun_notebook", SimpleNamespace())
+    monkeypatch.setattr("rerun.notebook.Viewer", Widget)
+    return made
+
+
+def test_a_notebook_shows_the_viewer_in_the_cell(in_a_notebook, widgets, monkeypatch):
+    monkeypatch.setattr(viewer, "view_flights", None)  # opens no window
+    assert flight("fixed").view() is widgets[0]
+    assert tiltsim.view([flight("fixed"), flight("trot")]) is widgets[1]
+    one, two = (len(widget.content.drain_as_bytes()) for widget in widgets)
+    assert 10_000 < one < two
+
+
+def test_an_address_is_that_of_an_open_viewer_in_a_notebook_too(in_a_notebook, monkeypatch):
+    shown = []
+    monkeypatch.setattr(viewer, "view_flights", lambda flights, url: shown.append((flights, url)))
+    assert flight("fixed").view(url="rerun+http://here:9876/proxy") is None
+    assert shown == [([flight("fixed")], "rerun+http://here:9876/proxy")]
+
+
+def test_without_rerun_s_widget_the_message_says_what_to_install(in_a_notebook, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rerun_notebook", None)
+    with pytest.raises(tiltsim.TiltsimError, match=r"pip install 'rerun-sdk\[notebook\]'"):
+        flight("fixed").view()

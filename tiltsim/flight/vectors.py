@@ -1,0 +1,32 @@
+"""Columns of a flight that are the components of one vector, under the names of `Observation`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+
+def _each_rotor(name: str) -> tuple[str, ...]:
+    return tuple(f"{name}_{rotor}" for rotor in range(1, 5))
+
+
+VECTORS: Final = {
+    "position": ("x", "y", "z"),
+    "velocity": ("vx", "vy", "vz"),
+    "attitude": ("roll", "pitch", "yaw"),
+    "body_rates": ("p", "q", "r"),
+    "tilt_angles": _each_rotor("alpha"),
+    "tilt_rates": _each_rotor("alpha_rate"),
+    "rotor_speeds": _each_rotor("rotor_speed"),
+    "thrusts": _each_rotor("thrust"),
+    "reference_position": ("x_ref", "y_ref", "z_ref"),
+    "reference_attitude": ("roll_ref", "pitch_ref", "yaw_ref"),
+    "reference_tilt_angles": _each_rotor("alpha_ref"),
+}
+"""Vectors by name and their components; a vehicle in a plane has some of them."""
+
+
+def components(name: str, columns: Iterable[str]) -> list[str]:
+    """Those of a flight's columns that make a vector, in its order; empty if there is none."""
+    present = {*columns}
+    return [column for column in VECTORS.get(name, ()) if column in present]

@@ -1,0 +1,75 @@
+"""Observations of a rotorcraft in MuJoCo, as a controller gets them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.laws.layers.sensing import measured_qpos, measured_qvel, sensor_parameters
+from tiltsim.plants.command import Observation, Reference
+from tiltsim.plants.mujoco_plant import MujocoPlant
+from tiltsim_controllers.gaits.tilts import tilt_reference
+from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
+from tiltsim_controllers.mathematics.scalar import Quad
+from tiltsim_controllers.references.trajectories import reference_derivatives
+from tiltsim_controllers.vehicle.parameters import SPIN
+
+
+class Observer:
+    """Makes the observations of one flight. Raises TypeError for a vehicle that is no rotorcraft.
+
+    Args:
+        assembly: The flight.
+    """
+
+    def __init__(self, assembly: Assembly) -> None:
+        vehicle = assembly.scenario.rotorcraft
+        self._vehicle, self._tilting = vehicle.resolve(), vehicle.has_tilting_rotors
+        self._assembly, self._sensors = assembly, sensor_parameters(assembly.scenario)
+
+    def observe(self, plant: MujocoPlant, rotor_speeds: Sequence[float]) -> Observation:
+        """The plant's present state as a controller sees it, through the scenario's sensors.
+
+        ``rotor_speeds`` are signed, shape (4,), rad/s.
+        """
+        time, qpos, qvel = plant.evaluation_time, plant.data.qpos, plant.data.qvel
+        if self._sensors.active:
+            qpos = np.array(measured_qpos(time, qpos.tolist(), self._sensors))
+            qvel = np.array(measured_qvel(time, qvel.tolist(), self._sensors))
+        tilts, tilt_rates = qpos[7:11], qvel[6:10]
+        return Observation(
+            time=plant.time,
+            position=qpos[:3].copy(),
+            velocity=qvel[:3].copy(),
+            attitude=np.array(euler_from_quaternion(*qpos[3:7].tolist())),
+            quaternion=qpos[3:7].copy(),
+            body_rates=qvel[3:6].copy(),
+            tilt_angles=tilts.copy() if self._tilting else np.zeros(4),
+            tilt_rates=tilt_rates.copy() if self._tilting else np.zeros(4),
+            rotor_speeds=np.array(flip_by_spin(rotor_speeds)),
+            reference=self._reference(time),
+            vehicle=self._vehicle,
+        )
+
+    def _reference(self, time: float) -> Reference:
+        knots, reference = self._assembly.knots, self._assembly.reference
+        motion = np.array(reference_derivatives(time, reference, knots)[:9])
+        planned = np.zeros(8)
+        if self._tilting:
+            planned[:] = tilt_reference(time, self._assembly.gait.parameters, knots)
+        return Reference(
+            position=motion[:3],
+            velocity=motion[3:6],
+            acceleration=motion[6:],
+            attitude=np.array((reference.roll, reference.pitch, reference.yaw)),
+            tilt_angles=planned[:4],
+            tilt_rates=planned[4:],
+        )
+
+
+def flip_by_spin(values: Sequence[float]) -> Quad:
+    """Speeds along the spin from signed ones, and back."""
+    first, second, third, fourth = values
+    return SPIN[0] * first, SPIN[1] * second, SPIN[2] * third, SPIN[3] * fourth

@@ -1,0 +1,151 @@
+"""A flight that is stepped by its caller, with MuJoCo's own model and data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike
+from time import perf_counter
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from tiltsim.errors import InputError
+from tiltsim.flight.end import End
+from tiltsim.flight.flight import Flight
+from tiltsim.laws.assembling import assemble
+from tiltsim.plants.built_in_command import built_in_command
+from tiltsim.plants.command import Command, Controller, Observation
+from tiltsim.plants.factory import make_plant
+from tiltsim.plants.mujoco_plant import MujocoPlant
+from tiltsim.plants.observing import Observer
+from tiltsim.plants.plant import take_sample
+from tiltsim.plants.user_controller import UserControlledPlant
+from tiltsim.scenario.loading import load_scenario
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.simulation.monitor import TerminationMonitor
+from tiltsim.simulation.simulate import fly_chunk
+from tiltsim.system.interrupts import reraise_swallowed_interrupts
+from tiltsim.system.text import short_repr
+
+
+class Simulation:
+    """A flight in MuJoCo, stepped by its caller.
+
+    Steps are bit for bit those of `tiltsim.simulate`, as long as you do not change `data`. It may
+    go on beyond ``simulation.duration``.
+
+    Args:
+        scenario: Anything that `tiltsim.load_scenario` takes.
+        controller: A controller of your own in place of the scenario's; see
+            `tiltsim.load_scenario`.
+
+    Raises:
+        InputError: If the scenario is invalid or not simulated by MuJoCo, the vehicle cannot be
+            built, or your controller cannot be used.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario | str | PathLike[str] | Mapping[str, Any],
+        *,
+        controller: Controller | type | str | None = None,
+    ) -> None:
+        self.scenario = load_scenario(scenario, controller=controller)
+        simulation = self.scenario.simulation
+        if simulation.plant != "mujoco":
+            raise InputError(
+                f'simulation.plant = "{simulation.plant}": stepwise simulation needs "mujoco"'
+            )
+        self._assembly = assemble(self.scenario)
+        native = simulation.engine == "native"
+        plant = make_plant(self._assembly, "native" if native else "python")
+        assert isinstance(plant, MujocoPlant)
+        self._plant, self._beginning = plant, plant.state
+        self.reset()
+
+    def __repr__(self) -> str:
+        """The scenario and the time, in one line."""
+        name = self.scenario.address or self.scenario.title
+        return f"<Simulation of {name}: {self.time:g} s{f', {self.end.kind}' if self.end else ''}>"
+
+    def reset(self) -> None:
+        """Go back to time zero, in the same `model` and `data`."""
+        self._plant.state = self._beginning
+        if isinstance(self._plant, UserControlledPlant):
+            self._plant.restart()
+        self._monitor = TerminationMonitor(self._assembly)
+        self._samples = [take_sample(self._plant)]
+        self._end = self._monitor.check(self._plant, self._samples[0])
+        self._wall_time = 0.0
+
+    def step(self, steps: int = 1) -> None:
+        """Take physics steps of ``simulation.timestep``, under the scenario's controller.
+
+        Args:
+            steps: How many; at least 1.
+
+        Raises:
+            InputError: If that is no such number, or the flight has ended (see `end`).
+            ControllerError: If a controller of your own fails.
+        """
+        if not isinstance(steps, int | np.integer) or isinstance(steps, bool) or steps < 1:
+            raise InputError(f"steps = {short_repr(steps)}: must be a whole number from 1")
+        if self._end is not None:
+            raise InputError(f"step: {self._end.message}; begin again with reset()")
+        start = perf_counter()
+        with reraise_swallowed_interrupts():
+            samples, self._end = fly_chunk(self._plant, self._monitor, 1, int(steps))
+        self._samples += samples
+        self._wall_time += perf_counter() - start
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self._plant.time
+
+    @property
+    def end(self) -> End | None:
+        """How, when and why the flight has ended early; None as long as it goes on."""
+        return self._end
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """MuJoCo's model."""
+        return self._plant.model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's data; what you write there, such as ``qpos``, is where the next step begins."""
+        return self._plant.data
+
+    def observation(self) -> Observation:
+        """The state as a controller sees it now, through the scenario's sensors.
+
+        Raises `InputError` for the tilt-car, which has none.
+        """
+        self._require_rotorcraft("observation")
+        values = dict(zip(self._assembly.loop.sample_fields[1:], self._plant.observe()))
+        speeds = [values[f"rotor_speed_{rotor}"] for rotor in (1, 2, 3, 4)]
+        return Observer(self._assembly).observe(self._plant, speeds)
+
+    def command(self) -> Command:
+        """What the built-in controller would command now, before latency, servos and motors.
+
+        Rotor accelerations and tilt angles of the tiltrotor, thrusts of the quadrotor. Raises
+        `InputError` for the tilt-car, and if the scenario's controller is your own.
+        """
+        self._require_rotorcraft("command")
+        if self.scenario.controller.is_external:
+            raise InputError("command: the controller is your own; call it with observation()")
+        return built_in_command(self._assembly, self._plant)
+
+    def flight(self) -> Flight:
+        """The flight so far, with one sample at the beginning and one after every `step`."""
+        end = self._end or End("interrupted", self.time, "the simulation has not ended")
+        samples = np.array(self._samples)
+        return Flight(self._assembly, samples, end, self._plant.engine, self._wall_time)
+
+    def _require_rotorcraft(self, name: str) -> None:
+        if self.scenario.vehicle.is_planar:
+            raise InputError(f"{name}: not supported for the {self.scenario.vehicle.model}")
