@@ -9,6 +9,7 @@ import math
 import pkgutil
 import subprocess
 import sys
+from functools import cache
 from importlib import import_module
 from types import CodeType, FunctionType
 
@@ -58,9 +59,9 @@ READS_GLOBAL = {"LOAD_GLOBAL", "LOAD_NAME"}
 READS_ATTRIBUTE = {"LOAD_ATTR", "LOAD_METHOD"}
 FORBIDDEN = {"IMPORT_NAME", "STORE_GLOBAL", "STORE_ATTR", "RAISE_VARARGS", "YIELD_VALUE"}
 
-by_function = pytest.mark.parametrize(
-    "function", FUNCTIONS, ids=lambda function: f"{function.__module__}.{function.__name__}"
-)
+
+def name_of(function):
+    return f"{function.__module__}.{function.__name__}"
 
 
 def instructions(code: CodeType):
@@ -71,8 +72,13 @@ def instructions(code: CodeType):
             yield from instructions(constant)
 
 
+@cache
+def code_of(function):
+    return tuple(instructions(function.__code__))
+
+
 def names_read(function, operations):
-    return {i.argval for i in instructions(function.__code__) if i.opname in operations}
+    return {i.argval for i in code_of(function) if i.opname in operations}
 
 
 def globals_read(function):
@@ -100,35 +106,45 @@ def test_nothing_is_registered_twice():
     assert len(set(FUNCTIONS)) == len(FUNCTIONS)
 
 
-@by_function
-def test_scalar_code_calls_only_arithmetic_math_and_scalar_code(function):
-    for name, value in globals_read(function).items():
-        plain = is_constant(value) or name in PLAIN_BUILTINS
-        assert plain or is_math(value) or value in FUNCTIONS, f"uses {name}"
+def test_scalar_code_calls_only_arithmetic_math_and_scalar_code():
+    used = [
+        (f"{name_of(function)} uses {name}", value)
+        for function in FUNCTIONS
+        for name, value in globals_read(function).items()
+        if name not in PLAIN_BUILTINS
+    ]
+    foreign = [
+        use
+        for use, value in used
+        if not (is_constant(value) or is_math(value) or value in FUNCTIONS)
+    ]
+    assert foreign == []
 
 
-@by_function
-def test_scalar_code_reads_no_attributes_but_fields_of_records(function):
-    assert names_read(function, READS_ATTRIBUTE) <= RECORD_FIELDS
+def test_scalar_code_reads_no_attributes_but_fields_of_records():
+    read = {function: names_read(function, READS_ATTRIBUTE) for function in FUNCTIONS}
+    assert [name_of(function) for function in FUNCTIONS if read[function] - RECORD_FIELDS] == []
 
 
-@by_function
-def test_scalar_code_has_no_side_effects(function):
-    assert not {i.opname for i in instructions(function.__code__)} & FORBIDDEN
+def test_scalar_code_has_no_side_effects():
+    assert [name_of(f) for f in FUNCTIONS if {i.opname for i in code_of(f)} & FORBIDDEN] == []
 
 
-@by_function
-def test_powers_are_written_as_products(function):
+def test_powers_are_written_as_products():
     """A power of Python's differs from the products of native code in the last bit."""
-    assert not {i.argrepr for i in instructions(function.__code__)} & {"**", "**="}
+    powers = {"**", "**="}
+    assert [name_of(f) for f in FUNCTIONS if {i.argrepr for i in code_of(f)} & powers] == []
 
 
-@by_function
-def test_callees_are_registered_before_their_callers(function):
-    position = FUNCTIONS.index(function)
-    for value in globals_read(function).values():
-        if isinstance(value, FunctionType):
-            assert FUNCTIONS.index(value) < position, value.__name__
+def test_callees_are_registered_before_their_callers():
+    position = {function: index for index, function in enumerate(FUNCTIONS)}
+    late = [
+        f"{name_of(function)} calls {value.__name__}"
+        for function in FUNCTIONS
+        for value in globals_read(function).values()
+        if isinstance(value, FunctionType) and position[value] >= position[function]
+    ]
+    assert late == []
 
 
 @pytest.mark.parametrize("decoupler", DECOUPLERS)

@@ -6,7 +6,6 @@ import ast
 import inspect
 import textwrap
 
-import pytest
 from numba.core.bytecode import ByteCode, FunctionIdentity
 from numba.core.interpreter import Interpreter
 
@@ -14,20 +13,16 @@ import tiltsim.laws.assembling  # noqa: F401  defines the scalar functions
 from tiltsim_controllers.mathematics.scalar import scalar_functions
 
 
-@pytest.mark.parametrize(
-    "function", scalar_functions(), ids=lambda f: f"{f.__module__}.{f.__qualname__}"
-)
-def test_every_scalar_function_is_translated(function):
-    identity = FunctionIdentity.from_function(function)
-    assert Interpreter(identity).interpret(ByteCode(identity)).blocks
+def test_every_scalar_function_is_translated():
+    for function in scalar_functions():
+        identity = FunctionIdentity.from_function(function)
+        assert Interpreter(identity).interpret(ByteCode(identity)).blocks, function
 
 
-@pytest.mark.parametrize(
-    "function", scalar_functions(), ids=lambda f: f"{f.__module__}.{f.__qualname__}"
-)
-def test_slices_of_tuples_have_constant_bounds(function):
+def test_slices_of_tuples_have_constant_bounds():
     """Numba types a slice of a tuple by its bounds, and does not evaluate them."""
-    tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
-    slices = [node for node in ast.walk(tree) if isinstance(node, ast.Slice)]
-    bounds = [bound for s in slices for bound in (s.lower, s.upper) if bound is not None]
-    assert all(isinstance(bound, ast.Constant | ast.Name) for bound in bounds)
+    for function in scalar_functions():
+        tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
+        slices = [node for node in ast.walk(tree) if isinstance(node, ast.Slice)]
+        bounds = [bound for s in slices for bound in (s.lower, s.upper) if bound is not None]
+        assert all(isinstance(bound, ast.Constant | ast.Name) for bound in bounds), function
