@@ -1,4 +1,4 @@
-"""Checks that the integrators can follow a scenario's servos, supervisor and law."""
+"""Checks that the integrators can follow a scenario's servos, rotors, supervisor and law."""
 
 from __future__ import annotations
 
@@ -8,7 +8,12 @@ import numpy as np
 
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.scenario_tables import ScenarioTables
+from tiltsim.scenario.simulation_table import SimulationTable
+from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
+from tiltsim.scenario.vehicle import VehicleTable
+from tiltsim_controllers.analysis.rotor_reaction import largest_held_gain, reaction_gains
 from tiltsim_controllers.analysis.stability import ErrorLoop
+from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS
 from tiltsim_controllers.laws.supervisor import LAG
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
@@ -31,6 +36,9 @@ are stable at these. With less, ode3 is stable up to `MAX_UNDAMPED_SERVO_STEP`.
 MAX_UNDAMPED_SERVO_STEP: Final = 1.7
 """On the thesis plant: ode3 turns unstable at 1.73 on the imaginary axis."""
 
+MAX_EULER_STEP: Final = 1.9
+"""Largest product of timestep and a rotor's pole where MuJoCo integrates activations by Euler."""
+
 
 def check_time_steps(scenario: ScenarioTables) -> None:
     """Refuse servos, supervisors and laws that a scenario's time steps make unstable.
@@ -38,6 +46,7 @@ def check_time_steps(scenario: ScenarioTables) -> None:
     Raises `InvalidValueError`, also for gains that are unstable at any step.
     """
     _check_servo(scenario)
+    _check_rotors(scenario)
     _check_supervisor(scenario)
     _check_stability(scenario)
 
@@ -57,6 +66,66 @@ def _check_servo(scenario: ScenarioTables) -> None:
             "simulation.timestep",
             f"too long for a tilt servo at {servo.natural_frequency:g} rad/s; at most "
             f"{limit / fastest:.3g} s, or a slower vehicle.tilt_servo",
+        )
+
+
+def _check_rotors(scenario: ScenarioTables) -> None:
+    """Refuse a lag of the rotors that is too short for the integrator."""
+    vehicle, simulation = scenario.vehicle, scenario.simulation
+    if not isinstance(vehicle, VehicleTable) or vehicle.rotor_time_constant is None:
+        return
+    longest = _largest_rotor_step(simulation) * vehicle.rotor_time_constant
+    if simulation.timestep > longest:
+        raise scenario.mistake(
+            "simulation.timestep",
+            f"too long for vehicle.rotor_time_constant = {vehicle.rotor_time_constant:g}; at most "
+            f"{longest:.3g} s",
+        )
+    if isinstance(scenario.controller, AttitudeAltitudeController):
+        _check_measured_reaction(scenario, vehicle, scenario.controller)
+
+
+def _largest_rotor_step(simulation: SimulationTable) -> float:
+    """Largest product of timestep and a pole of the rotors."""
+    by_euler = simulation.plant == "mujoco" and simulation.integrator != "RK4"
+    return MAX_EULER_STEP if by_euler else MAX_SERVO_STEP[simulation.plant]
+
+
+def _check_measured_reaction(
+    scenario: ScenarioTables, vehicle: VehicleTable, controller: AttitudeAltitudeController
+) -> None:
+    """Refuse rotors whose reaction, measured and fed back, makes a loop that is unstable."""
+    lag, simulation = vehicle.rotor_time_constant, scenario.simulation
+    measured = controller.measures_angular_acceleration and vehicle.rotor_inertia > 0.0
+    if lag is None or not measured or controller.allow_unstable:
+        return
+    assumed = vehicle.resolve()
+    gait = scenario.gait.plan(assumed)
+    gains = reaction_gains(
+        gait.angles(gait.sample_times()),
+        controller.resolve_gains(),
+        assumed,
+        vehicle.rotor_inertia,
+        DECOUPLINGS[controller.decoupling],
+    )
+    highest, against = gains.max(initial=0.0), -gains.min(initial=0.0)
+    if simulation.control_timestep:
+        held = simulation.control_timestep
+        step = f"control_timestep = {held:g}"
+        largest = largest_held_gain(held, lag, simulation.latency_steps)
+    else:
+        step = f"timestep = {simulation.timestep:g}"
+        largest = _largest_rotor_step(simulation) * lag / simulation.timestep - 1.0
+    excess = max(highest / largest, against)
+    if excess > 1.0:
+        cause = f"a pole at {(1.0 + highest) / lag:.4g} rad/s, too fast for simulation.{step}"
+        if excess == against:
+            cause = "instability at any time step, at tilt angles of the gait"
+        raise scenario.mistake(
+            "vehicle.rotor_inertia",
+            f'controller.angular_acceleration = "measured" feeds the reaction of the rotors back: '
+            f"{cause}; at most {vehicle.rotor_inertia / excess:.3g} kg m^2, or slower gains, or "
+            "controller.allow_unstable = true",
         )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import mujoco
 import numpy as np
 import pytest
@@ -27,6 +29,10 @@ from tiltsim.laws.layers.measured_acceleration import plant_angular_acceleration
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.plants.factory import make_plant
 from tiltsim.resources import shipped_folder
+from tiltsim_controllers.analysis.rotor_reaction import reaction_gains
+from tiltsim_controllers.analysis.statics import hover_rotor_speeds
+from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS
+from tiltsim_controllers.vehicle.parameters import SPIN
 
 MEASURED = {"controller": {"angular_acceleration": "measured"}}
 THESIS = {"simulation": {"plant": "thesis"}}
@@ -118,3 +124,132 @@ def test_what_it_does_not_include_is_refused(changes):
     (table,) = changes
     with pytest.raises(InputError, match=f'{table}.*not supported with .* = "measured"'):
         scenario(TILTROTOR, MEASURED, changes)
+
+
+# --- the reaction of the rotors, fed back ------------------------------------------------------
+
+LAG = 0.02  # s
+LAGGING = {
+    "simulation": {"duration": 0.2, "timestep": 0.001, "engine": "python"},
+    "vehicle": {"rotor_time_constant": LAG, "rotor_inertia": 1e-4},
+    "controller": {"angular_acceleration": "measured", "decoupler": "conventional"},
+    "gait": {"type": "fixed", "angles": [0.0, 0.0, 0.0, 0.0]},
+    "initial": {"rotor_speed": 361.0, "attitude": [0.01, 0.02, 0.03]},
+}
+EXACT = {"controller": {"decoupling": "exact", "gains": "exact"}}
+UNSTABLE = {"controller": {"allow_unstable": True}}
+HELD = {"simulation": {"control_timestep": 0.002}}
+LATER = {"simulation": {"control_timestep": 0.002, "control_latency": 0.004}}
+EULER = {"simulation": {"integrator": "Euler"}}
+WALK = {"gait": {"type": "walk", "amplitude": 0.4, "period": 2.0}}
+TWISTED = {"gait": {"type": "fixed", "angles": [0.65, -0.65, 0.65, -0.65]}}
+
+
+def poles_of_hover(desired):
+    """Poles of the closed loop in MuJoCo, linearized numerically about a level hover."""
+    plant = make_plant(assemble(desired))
+    model, data = plant.model, plant.data
+    speeds = hover_rotor_speeds(desired.gait.angles, desired.vehicle.resolve())
+    data.qpos[3:7], data.qvel[:] = (1.0, 0.0, 0.0, 0.0), 0.0
+    data.act[:] = np.tile(np.multiply(SPIN, speeds), 2)  # speeds, and their commands
+    hover, n = np.concatenate([data.qvel, data.qvel, data.act]), model.nv
+    pose = data.qpos.copy()
+
+    def rates(state):
+        data.qpos[:], data.qvel[:], data.act[:] = pose, state[n : 2 * n], state[2 * n :]
+        mujoco.mj_integratePos(model, data.qpos, state[:n], 1.0)
+        with control_callback(plant.callback):
+            mujoco.mj_forward(model, data)
+        return np.concatenate([data.qvel, data.qacc, data.act_dot])
+
+    steps = 1e-5 * np.eye(len(hover))
+    return np.linalg.eigvals([(rates(hover + h) - rates(hover - h)) / 2e-5 for h in steps])
+
+
+def gains_of_reaction(desired):
+    controller, vehicle = desired.controller, desired.vehicle
+    tilts, form = np.array([desired.gait.angles]), DECOUPLINGS[controller.decoupling]
+    gains = controller.resolve_gains()
+    return reaction_gains(tilts, gains, vehicle.resolve(), vehicle.rotor_inertia, form)[0]
+
+
+@pytest.mark.parametrize("form", [{}, EXACT], ids=["published", "exact"])
+def test_untilted_it_makes_a_fourth_order_loop_of_yaw(form):
+    """``T s^4 + s^3 + (N + K_rot s) (K1 s^2 + K2 s + K3) = 0``, the law's factor N is 2 varpi."""
+    desired = scenario(LAGGING, form, UNSTABLE)
+    vehicle, gains = desired.vehicle.resolve(), desired.controller.resolve_gains()
+    per_torque = 1.0 / vehicle.drag_coefficient
+    if form:
+        per_torque /= 2.0 * vehicle.hover_rotor_speed
+    reaction = desired.vehicle.rotor_inertia * per_torque
+    factor = 2.0 * vehicle.hover_rotor_speed * vehicle.drag_coefficient * per_torque
+    loop = np.polymul([reaction, factor], [gains.yaw_1, gains.yaw_2, gains.yaw_3])
+    poles = poles_of_hover(desired)
+    for expected in np.roots(np.polyadd([LAG, 1.0, 0.0, 0.0, 0.0], loop)):
+        assert np.abs(poles - expected).min() < 1e-5 * abs(expected)
+    assert gains_of_reaction(desired).max() == pytest.approx(gains.yaw_1 * reaction, rel=1e-12)
+
+
+@pytest.mark.parametrize("form", [{}, EXACT], ids=["published", "exact"])
+@pytest.mark.parametrize("angles", [[-0.65, -0.65, 0.65, 0.65], [0.3, 0.1, 0.0, -0.2]])
+def test_it_moves_the_pole_of_the_lag(form, angles):
+    desired = scenario(LAGGING, form, UNSTABLE, gait={"type": "fixed", "angles": angles})
+    fastest = -(1.0 + gains_of_reaction(desired).max()) / LAG
+    assert poles_of_hover(desired).real.min() == pytest.approx(fastest, rel=0.02)
+
+
+def test_at_some_tilts_it_is_unstable():
+    desired = scenario(LAGGING, TWISTED, UNSTABLE)
+    unstable = -(1.0 + gains_of_reaction(desired).min()) / LAG
+    assert poles_of_hover(desired).real.max() == pytest.approx(unstable, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("changes", "cause"),
+    [
+        ((), "a pole at 2.069e.04 rad/s, too fast for simulation.timestep = 0.001"),
+        ((EXACT, HELD), "too fast for simulation.control_timestep = 0.002"),
+        ((EXACT, LATER), "too fast for simulation.control_timestep = 0.002"),
+        ((EULER,), "too fast for simulation.timestep = 0.001"),
+        ((THESIS,), "too fast for simulation.timestep = 0.001"),
+        ((WALK,), "instability at any time step, at tilt angles of the gait"),
+        ((TWISTED,), "instability at any time step"),
+    ],
+)
+def test_rotors_too_heavy_for_the_step_are_refused(changes, cause):
+    with pytest.raises(InputError, match=cause) as caught:
+        scenario(LAGGING, *changes)
+    line = str(caught.value)
+    assert "\n" not in line
+    largest = float(re.search("at most (.*) kg m\\^2", line)[1])
+    scenario(LAGGING, *changes, vehicle={"rotor_inertia": 0.995 * largest})
+    with pytest.raises(InputError, match=r"vehicle\.rotor_inertia"):
+        scenario(LAGGING, *changes, vehicle={"rotor_inertia": 1.01 * largest})
+
+
+@pytest.mark.parametrize(
+    "changes", [(), (HELD,), pytest.param((EXACT, LATER), marks=pytest.mark.slow)]
+)
+def test_the_largest_inertia_is_the_one_that_flies(changes):
+    """RK4 is stable up to 2.78, the check allows 2.6; what is held is exact."""
+    with pytest.raises(InputError) as caught:
+        scenario(LAGGING, *changes)
+    largest = float(re.search("at most (.*) kg", str(caught.value))[1])
+    for inertia, flies in ((0.97 * largest, True), (1.1 * largest, False)):
+        heavy = {"rotor_inertia": inertia}
+        flight = tiltsim.simulate(scenario(LAGGING, *changes, UNSTABLE, vehicle=heavy))
+        swings = np.abs(np.diff(flight["rotor_speed_1"], 2))[-3:]
+        assert (swings.max() < 5.0) == flies
+
+
+def test_a_lag_too_short_for_the_integrator_is_refused():
+    for changes, shortest in (
+        ((), 0.001 / 2.6),
+        ((THESIS,), 0.001 / 2.45),
+        ((EULER,), 0.001 / 1.9),
+    ):
+        lag = {"rotor_time_constant": 1.01 * shortest, "rotor_inertia": 0.0}
+        scenario(LAGGING, *changes, vehicle=lag)
+        lag["rotor_time_constant"] = 0.99 * shortest
+        with pytest.raises(InputError, match=r"simulation\.timestep = 0\.001.*too long for"):
+            scenario(LAGGING, *changes, vehicle=lag)
