@@ -75,13 +75,14 @@ def expecting(tmp_path):
 
 
 def test_run_writes_the_three_files_and_prints_a_summary(tmp_path, capsys):
-    out = tmp_path / "new" / "folder"
+    out = tmp_path / "new" / "a folder"
     assert main(["run", SETPOINT, *SHORT, "--set", "expect=[]", "--out", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "Setpoint, trot angle fixed at rho = 0.65, modified decoupler" in printed
     assert f"  {SETPOINT}\n" in printed
     assert re.search(r"^  final_position_error_x  +-?[\d.e-]+ m$", printed, re.MULTILINE)
     assert re.search(r"^  min_decoupling_condition  +[\d.]+$", printed, re.MULTILINE)
+    assert printed.endswith(f"flight written to {out}; see it with tiltsim view '{out}'\n")
     assert sorted(path.name for path in out.iterdir()) == [
         "flight.parquet",
         "metrics.json",
@@ -94,6 +95,14 @@ def test_run_writes_the_three_files_and_prints_a_summary(tmp_path, capsys):
     assert table.column_names == list(COLUMN_UNITS)
     assert table.num_rows == 21
     assert table.schema.field("x").metadata == {b"unit": b"m"}
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(0.38123456, "0.381235"), (-8.123e-8, "-8e-08"), (-8.7e-16, "0"), (361.3829, "361.383")],
+)
+def test_run_shows_few_digits_of_what_is_zero_but_for_the_solver(value, shown):
+    assert run_command._shown(value) == shown
 
 
 def test_resolved_scenario_flies_the_same_flight_again(tmp_path):

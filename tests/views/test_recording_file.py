@@ -233,7 +233,8 @@ def test_run_and_view_write_equal_recordings(tmp_path, capsys):
     flown, viewed = tmp_path / "flown.rrd", tmp_path / "viewed.rrd"
     assert main(["run", name, *short, "--rerun", str(flown)]) in (0, 1)
     assert main(["view", str(tmp_path), "--rerun", str(viewed)]) == 0
-    assert f"recording written to {viewed}; open it with tiltsim view" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert printed.endswith(f"recording written to {viewed}; see it with tiltsim view {viewed}\n")
     done = rerun_rrd("compare", flown, viewed)
     assert done.returncode == 0, done.stderr
 

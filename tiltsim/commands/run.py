@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from tiltsim.commands.options import Subparsers, add_overrides, add_quiet
 from tiltsim.commands.progress import show_progress
-from tiltsim.commands.text import print_line, table
+from tiltsim.commands.text import print_line, table, viewing
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INTERRUPTED, VEHICLE_LOST
 from tiltsim.system.interrupts import defer_interrupts
 from tiltsim.system.text import printable
@@ -111,9 +111,9 @@ def run(arguments: argparse.Namespace) -> int:
     if not arguments.quiet:
         print(summary(flight, verdicts, judged=judged))
         if arguments.out is not None:
-            print_line(f"written to {arguments.out}")
+            print_line(f"flight written to {viewing(arguments.out)}")
         if arguments.rerun is not None:
-            print_line(f"recording written to {arguments.rerun}; open it with tiltsim view")
+            print_line(f"recording written to {viewing(arguments.rerun)}")
     if flight.end.kind != "completed":
         print_line(f"tiltsim: {flight.end.message}", error=True)
         return VEHICLE_LOST
@@ -199,9 +199,17 @@ def summary(flight: Flight, verdicts: list[Verdict], *, judged: bool) -> str:
 
 
 def _shown(value: float) -> str:
-    """A metric without rounding errors of quantities of order one."""
-    return f"{value if abs(value) > 1e-12 else 0.0:.6g}"
+    """A metric in few digits: of one that is zero but for the solver's error, one digit tells."""
+    if abs(value) <= ROUNDING:
+        return "0"
+    return f"{value:.6g}" if abs(value) >= SOLVER_ERROR else f"{value:.0e}"
 
+
+ROUNDING: Final = 1e-12
+"""Rounding errors of quantities of order one."""
+
+SOLVER_ERROR: Final = 1e-6
+"""What the solver's step may leave of such quantities (docs/performance.md)."""
 
 _IN_HEADER = ("duration", "realtime_factor", "diverged")
 

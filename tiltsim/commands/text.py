@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 import shutil
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from textwrap import fill
 from typing import Any
 
@@ -37,6 +39,11 @@ def tally(counts: Mapping[str, int]) -> str:
 def print_line(text: str, *, error: bool = False) -> None:
     """Print one line; text of files and names in it cannot control the terminal."""
     print(printable(text), file=sys.stderr if error else sys.stdout, flush=True)
+
+
+def viewing(path: Path) -> str:
+    """A flight's folder or a recording, and the command that shows it."""
+    return f"{path}; see it with tiltsim view {shlex.quote(str(path))}"
 
 
 def print_figure_path(arguments: argparse.Namespace) -> None:

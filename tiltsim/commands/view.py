@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from tiltsim.commands.options import Subparsers
-from tiltsim.commands.text import print_line
+from tiltsim.commands.text import print_line, viewing
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -58,5 +58,5 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.views.rerun.recording_file import save_recording
 
     save_recording(flights, arguments.rerun, names)
-    print_line(f"recording written to {arguments.rerun}; open it with tiltsim view")
+    print_line(f"recording written to {viewing(arguments.rerun)}")
     return 0
