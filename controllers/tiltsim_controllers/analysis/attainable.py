@@ -83,7 +83,7 @@ class AttainableSet:
 
 
 def input_box(speed_limits: tuple[float, float]) -> tuple[Floats, Floats]:
-    """Bounds of ``w`` (rad^2/s^2), each of shape (4,), under limits of |varpi| (rad/s; Eq. 11).
+    """Bounds of ``w`` (rad^2/s^2), each (4,), under limits of ``|varpi|`` (rad/s; Eq. 11).
 
     Raises:
         ValueError: If the limits are not ``0 <= minimum < maximum``.

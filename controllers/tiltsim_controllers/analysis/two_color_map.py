@@ -84,7 +84,7 @@ def red_residual(alpha_1: ArrayLike, alpha_2: ArrayLike, vehicle: Vehicle) -> Fl
 
 
 def curve_l(alpha_1: ArrayLike, vehicle: Vehicle) -> Floats:
-    """The curve L (ch. 8, Eq. 6): ``alpha_2 = atan(tan alpha_1 - 2 r)``, rad, |alpha_1| < pi/2."""
+    """The curve L (ch. 8, Eq. 6): ``alpha_2 = atan(tan alpha_1 - 2 r)``, rad, up to pi/2."""
     return np.asarray(np.arctan(np.tan(np.asarray(alpha_1, float)) - 2.0 * drag_ratio(vehicle)))
 
 

@@ -36,7 +36,7 @@ Point: TypeAlias = tuple[float, float]
 Theorem = Literal["two_color", "generalized"]
 
 GENERALIZED_LIMIT: Final = 1.0
-"""The generalized theorem is stated for |alpha_1|, |alpha_2| up to this (rad; ch. 8, Eq. 3)."""
+"""The generalized theorem holds for ``|alpha_1|, |alpha_2|`` up to this (rad; ch. 8, Eq. 3)."""
 
 BLUE_WARNING: Final = "blue: tau has rank 2, the decoupling matrix is singular at every attitude"
 SWITCH_WARNING: Final = (

@@ -1,0 +1,116 @@
+"""Settings of the documentation site; CONTRIBUTING.md says how to build it.
+
+Markdown, docstrings and comments stay as they read best in the sources; the functions below
+translate what Sphinx would read otherwise.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from importlib.metadata import version as installed_version
+
+from docutils import nodes
+from docutils.utils.math.latex2mathml import tex2mathml
+
+project = "tiltsim"
+author = project_copyright = "The tiltsim developers"
+release = installed_version("tiltsim")
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+suppress_warnings = ["ref.python"]  # a name of several modules, written without its module
+INCLUDED = {
+    "README.md": "index.md",
+    "CONTRIBUTING.md": "contributing.md",
+    "SECURITY.md": "security.md",
+}
+
+# Backticks in docstrings: a link where the name is on the site, else code.
+default_role = "py:obj"
+nitpick_ignore_regex = [("py:(class|obj)", ".*")]
+
+myst_heading_anchors = 4  # as GitHub has them
+myst_enable_extensions = ["dollarmath"]
+myst_fence_as_directive = ["math"]
+nb_execution_mode = "cache"  # until the notebook changes, or build is removed
+nb_execution_raise_on_error = True
+nb_execution_timeout = 60  # s, a cell
+
+add_module_names = False
+autodoc_member_order = "bysource"
+ALIASES = ("ArrayLike", "Floats", "Pair", "Triple", "Quad", "Octet", "Values", "Vector")
+autodoc_type_aliases = {"npt.ArrayLike": "ArrayLike"} | {name: name for name in ALIASES}
+napoleon_attr_annotations = False  # the signature has them
+napoleon_use_ivar = True
+python_maximum_signature_line_length = 88
+python_use_unqualified_type_names = True
+
+html_theme = "furo"
+pygments_style = "a11y-high-contrast-light"
+pygments_dark_style = "a11y-high-contrast-dark"
+html_title = "tiltsim"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
+html_math_renderer = "mathml"  # needs no script
+nb_execution_in_temp = True
+html_copy_source = False
+html_show_sphinx = False
+
+
+def link_pages_outside(app, docname, source):
+    """Lead links to pages outside of docs to the pages that include them."""
+    for page, including in INCLUDED.items():
+        source[0] = source[0].replace(f"](../{page}", f"]({including}")
+
+
+def describe_fields(app, what, name, obj, options, lines):
+    """List the fields of a record; the comments beside them tell shape, unit and axes."""
+    if what in ("attribute", "data"):
+        lines.insert(0, "")  # else napoleon takes what is before a colon for a type
+    if what != "class" or "Attributes:" in lines or not getattr(obj, "__annotations__", None):
+        return
+    fields = re.findall(r"^    (\w+): .*?  # (.*)$", inspect.getsource(obj), re.MULTILINE)
+    if fields:
+        lines += ["", "Attributes:", *(f"    {field}: {comment}" for field, comment in fields)]
+
+
+def shorten_signature(app, what, name, obj, options, signature, returned):
+    """Show no signature of a scenario's tables: their page lists all keys."""
+    return ("(...)", returned) if hasattr(obj, "model_fields") else None
+
+
+def skip_described(app, what, name, obj, skip, options):
+    """Leave out the entry of each field of a named tuple: `describe_fields` lists them."""
+    return True if type(obj).__name__ == "_tuplegetter" else None
+
+
+def link_unqualified(app, env, node, content):
+    """Find a name that is written without its module, if it is unique."""
+    if node["refdomain"] != "py":
+        return None
+    domain = env.get_domain("py")
+    name = node["reftarget"].rpartition(".")[2]
+    found = domain.find_obj(env, "", "", f".{name}", None, 1)
+    found = [(full, entry) for full, entry in found if not entry.aliased]
+    if len(found) != 1:
+        return None
+    docname, anchor = found[0][1].docname, found[0][1].node_id
+    reference = nodes.reference("", "", content, internal=True)
+    reference["refuri"] = f"{app.builder.get_relative_uri(node['refdoc'], docname)}#{anchor}"
+    return reference
+
+
+def mathml(writer, node):
+    """Write a formula as MathML, which browsers show without a script and without the network."""
+    block = isinstance(node, nodes.math_block)
+    writer.body.append(tex2mathml(node.astext(), as_block=block))
+    raise nodes.SkipNode
+
+
+def setup(app):
+    """Connect the functions above."""
+    app.add_html_math_renderer("mathml", (mathml, None), (mathml, None))
+    app.connect("source-read", link_pages_outside)
+    app.connect("autodoc-process-docstring", describe_fields, priority=400)
+    app.connect("autodoc-process-signature", shorten_signature)
+    app.connect("autodoc-skip-member", skip_described)
+    app.connect("missing-reference", link_unqualified)
