@@ -102,7 +102,8 @@ def link_unqualified(app, env, node, content):
 def mathml(writer, node):
     """Write a formula as MathML, which browsers show without a script and without the network."""
     block = isinstance(node, nodes.math_block)
-    writer.body.append(tex2mathml(node.astext(), as_block=block))
+    formula = tex2mathml(node.astext(), as_block=block)
+    writer.body.append(f'<div class="math">{formula}</div>' if block else formula)
     raise nodes.SkipNode
 
 

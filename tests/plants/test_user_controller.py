@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import re
 import sys
 import tomllib
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -14,6 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import tiltsim
+from tests.docs.pages import code
 from tiltsim.cli import main
 from tiltsim.closed_loop.userdata import evaluation_time
 from tiltsim.errors import InputError
@@ -58,7 +57,6 @@ class Slow:
 
 not_callable = 3.0
 """
-ROOT = Path(__file__).parents[2]
 MODELS = ("tiltrotor", "quadrotor")
 STILL = Command(thrusts=[1.05105] * 4)  # a quarter of the weight each, nearly
 
@@ -739,15 +737,10 @@ def test_flights_of_a_users_own_read_back(law, model, tmp_path):
 # --- documentation -------------------------------------------------------------------------------
 
 
-def python_blocks(name):
-    text = (ROOT / name).read_text(encoding="utf-8")
-    return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-
-
 @pytest.mark.slow
 def test_the_documented_examples_fly(capsys):
     names = {}
-    for block in python_blocks("docs/own_controller.md"):
+    for block in code("docs/own_controller.md", "python"):
         exec(compile(block, "own_controller.md", "exec"), names)
     plain, integral = capsys.readouterr().out.splitlines()
     end, x, z = plain.split()
@@ -760,8 +753,8 @@ def test_the_documented_examples_fly(capsys):
 
 
 def test_the_readmes_law_is_the_documented_one_and_short():
-    (readme,) = (block for block in python_blocks("README.md") if "controller=hover" in block)
-    documented = python_blocks("docs/own_controller.md")[0]
+    (readme,) = (block for block in code("README.md", "python") if "controller=hover" in block)
+    documented = code("docs/own_controller.md", "python")[0]
     head, _, tail = readme.partition("\n\n\nscenario = ")
     assert documented.startswith(head)
     assert len([line for line in readme.splitlines() if line.strip()]) <= 15
