@@ -9,15 +9,19 @@ from __future__ import annotations
 import inspect
 import re
 from importlib.metadata import version as installed_version
+from pathlib import Path
 
 from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
+
+import tiltsim_controllers
 
 project = "tiltsim"
 author = project_copyright = "The tiltsim developers"
 release = installed_version("tiltsim")
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 suppress_warnings = ["ref.python"]  # a name of several modules, written without its module
+CONTROLLERS = Path(tiltsim_controllers.__file__).parent
 INCLUDED = {
     "README.md": "index.md",
     "CONTRIBUTING.md": "contributing.md",
@@ -60,6 +64,15 @@ def link_pages_outside(app, docname, source):
     """Lead links to pages outside of docs to the pages that include them."""
     for page, including in INCLUDED.items():
         source[0] = source[0].replace(f"](../{page}", f"]({including}")
+
+
+def list_modules(app, docname, source):
+    """Append the modules of a folder of tiltsim_controllers to its page of the API reference."""
+    folder = CONTROLLERS / docname.removeprefix("api/")
+    for file in sorted(folder.glob("[!_]*.py")) if docname.startswith("api/") else ():
+        module = f"tiltsim_controllers.{folder.name}.{file.stem}"
+        directive = f".. automodule:: {module}\n   :members:"
+        source[0] += f"\n## {file.stem}\n\n```{{eval-rst}}\n{directive}\n```\n"
 
 
 def describe_fields(app, what, name, obj, options, lines):
@@ -111,6 +124,7 @@ def setup(app):
     """Connect the functions above."""
     app.add_html_math_renderer("mathml", (mathml, None), (mathml, None))
     app.connect("source-read", link_pages_outside)
+    app.connect("source-read", list_modules)
     app.connect("autodoc-process-docstring", describe_fields, priority=400)
     app.connect("autodoc-process-signature", shorten_signature)
     app.connect("autodoc-skip-member", skip_described)
