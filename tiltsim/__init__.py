@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from tiltsim.simulation.batch import fly
     from tiltsim.simulation.simulate import simulate
     from tiltsim.simulation.stepwise import Simulation
+    from tiltsim.sweeps.sweep import sweep
     from tiltsim.views.rerun.viewer import view
 
 _HOMES = {
@@ -40,6 +41,7 @@ _HOMES = {
     "load_scenario": "scenario.loading",
     "parse_scenario": "scenario.loading",
     "simulate": "simulation.simulate",
+    "sweep": "sweeps.sweep",
     "view": "views.rerun.viewer",
 }
 
@@ -57,6 +59,7 @@ __all__ = [
     "load_scenario",
     "parse_scenario",
     "simulate",
+    "sweep",
     "view",
 ]
 

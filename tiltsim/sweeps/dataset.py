@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -18,11 +19,19 @@ from tiltsim.sweeps.folder import DATASET, DEFINITION, read_definition
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.stored_rows import finished_parts, read_rows
 from tiltsim.sweeps.tables import Sweep
+from tiltsim.system.optional import optional_package
+from tiltsim.system.text import html_table
+
+if TYPE_CHECKING:
+    import pyarrow
+
+MAX_SHOWN: Final = 6
+"""Metrics in the table for notebooks."""
 
 Column = npt.NDArray[Any]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SweepResults:
     """The rows of a sweep by column, and the points of the sweep.
 
@@ -32,10 +41,40 @@ class SweepResults:
 
     points: SweepPoints
     columns: Mapping[str, Column]
+    table: pyarrow.Table  # the columns as they are stored
 
     def __len__(self) -> int:
         """Number of rows."""
         return len(self.columns["index"])
+
+    def __repr__(self) -> str:
+        """Title, size and ends, in one line."""
+        return f"<SweepResults of {self._title}: {self._size}>"
+
+    def _repr_html_(self) -> str:
+        """Size, ends and the first rows, as a table for notebooks."""
+        names = [*self.points.columns, "end", *self.points.metrics[:MAX_SHOWN]]
+        names = [name for name in names if name in self.columns]
+        rows = [[_cell(self.columns[name][row]) for name in names] for row in range(len(self))[:5]]
+        return html_table(self._title, [self._size], rows, names)
+
+    @property
+    def _title(self) -> str:
+        return self.points.sweep.title or self.points.definition.address
+
+    @property
+    def _size(self) -> str:
+        ends = ", ".join(f"{n} {end}" for end, n in Counter(self.columns["end"]).most_common())
+        return f"{len(self)} rows of {len(self.table.column_names)} columns; {ends}"
+
+    def to_arrow(self) -> pyarrow.Table:
+        """The rows as an Arrow table: values of the axes, how the flight ended, metrics."""
+        return self.table
+
+    def to_pandas(self) -> Any:
+        """The same as a pandas DataFrame. Raises `InputError` if pandas is not installed."""
+        optional_package("pandas", "SweepResults.to_pandas")
+        return self.table.to_pandas()
 
     def values(self, expression: str) -> Column:
         """A column, or arithmetic on columns row by row. Raises `InputError` if it is neither."""
@@ -90,7 +129,11 @@ def load_results(folder: Path) -> SweepResults:
             for entry in range(max((len(value) for value in values if value), default=0)):
                 entries = [value[entry] if value else None for value in values]
                 columns[f"{name}[{entry}]"] = _column(entries)
-    return SweepResults(points, columns)
+    return SweepResults(points, columns, table)
+
+
+def _cell(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _column(values: list[Any]) -> Column:

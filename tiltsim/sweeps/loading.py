@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from copy import deepcopy
 from importlib.metadata import version
+from os import PathLike, fsdecode
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
 from tiltsim.errors import InputError
+from tiltsim.scenario.arguments import check_keys, plain
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.loading import (
     apply_overrides,
@@ -20,6 +23,7 @@ from tiltsim.scenario.loading import (
     without_none,
 )
 from tiltsim.scenario.messages import one_line_message
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.sweeps.checks import check_points
 from tiltsim.sweeps.definition import UNUSED, VERSIONS, SweepDefinition
 from tiltsim.sweeps.points import SweepPoints
@@ -34,26 +38,29 @@ from tiltsim.sweeps.tables import (
     UniformAxis,
     dotted,
 )
-from tiltsim.system.text import valid_unicode
+from tiltsim.system.text import short_repr, valid_unicode
 
 
-def load_sweep(path: str | Path, overrides: dict[str, Any] | None = None) -> SweepDefinition:
-    """Read a sweep file.
+def load_sweep(
+    source: str | PathLike[str] | Mapping[str, Any], overrides: Mapping[str, Any] | None = None
+) -> SweepDefinition:
+    """Read a sweep.
 
     Args:
-        path: A TOML file or the name of a sweep in the library.
+        source: A TOML file, the name of a sweep in the library, or the tables of a file as a dict,
+            whose ``scenario`` may be a `tiltsim.Scenario`.
         overrides: Values by dotted key of the scenario, on top of the file's ``[set]``.
 
     Raises:
         InputError: In one line: the file, the key, the value and what is allowed. The base scenario
             and every value of every axis are tried.
     """
-    file = find_scenario_file(path)
-    address = valid_unicode(library_name(file))
-    document = read_toml(file)
+    if overrides is not None:
+        check_keys("overrides", overrides)
+    document, address, folder = _document(source)
     fixed = document.setdefault("set", {})
     if overrides and isinstance(fixed, dict):
-        document["set"] = dotted(fixed) | overrides
+        document["set"] = dotted(fixed) | plain(overrides)
     if "scenario" not in document and not {"axis", "bisect"} & document.keys():
         raise InputError(f"{address}: a scenario, not a sweep: it has no [[axis]]; use tiltsim run")
     try:
@@ -62,8 +69,8 @@ def load_sweep(path: str | Path, overrides: dict[str, Any] | None = None) -> Swe
         raise InputError(f"{address}: {one_line_message(error, document, Sweep)}") from None
     for axis in sweep.axis:
         for tables in axis.cases.values() if isinstance(axis, CasesAxis) else ():
-            locate_named_files(tables, file.parent, address)
-    base = _base(sweep, file.parent, address)
+            locate_named_files(tables, folder, address)
+    base = _base(sweep, folder, address)
     definition = SweepDefinition(
         address,
         json.loads(sweep.model_dump_json(exclude_none=True)),
@@ -72,6 +79,28 @@ def load_sweep(path: str | Path, overrides: dict[str, Any] | None = None) -> Swe
     )
     check_points(SweepPoints(definition))
     return definition
+
+
+def _document(source: object) -> tuple[dict[str, Any], str, Path]:
+    """The tables of a `load_sweep` source, its name in messages, and what file names start from."""
+    if isinstance(source, Mapping):
+        check_keys("sweep", source)
+        base = source.get("scenario")
+        if isinstance(base, Scenario):
+            if base.own_controller is not None:
+                raise InputError(
+                    "sweep: scenario: has a controller that was given in Python, which no file "
+                    "holds; use tiltsim.fly"
+                )
+            tables = without_none(base.model_dump(mode="json", exclude_unset=True))
+            source = {**source, "scenario": tables}
+        return plain(source), "sweep", Path()
+    if not isinstance(source, str | PathLike):
+        raise InputError(
+            f"sweep = {short_repr(source)}: must be a name of the library, a TOML file or a dict"
+        )
+    file = find_scenario_file(fsdecode(source))
+    return read_toml(file), valid_unicode(library_name(file)), file.parent
 
 
 def _base(sweep: Sweep, folder: Path, address: str) -> dict[str, Any]:
