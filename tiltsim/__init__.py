@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from tiltsim.simulation.stepwise import Simulation
     from tiltsim.sweeps.sweep import sweep
     from tiltsim.views.rerun.viewer import view
+    from tiltsim.views.video.making import video
 
 _HOMES = {
     "Command": "plants.command",
@@ -42,6 +43,7 @@ _HOMES = {
     "parse_scenario": "scenario.loading",
     "simulate": "simulation.simulate",
     "sweep": "sweeps.sweep",
+    "video": "views.video.making",
     "view": "views.rerun.viewer",
 }
 
@@ -60,6 +62,7 @@ __all__ = [
     "parse_scenario",
     "simulate",
     "sweep",
+    "video",
     "view",
 ]
 

@@ -144,6 +144,10 @@ class Flight:
         """Show this flight in Rerun: in the notebook if it runs in one; see `tiltsim.view`."""
         return public("view")([self], url=url)
 
+    def video(self, path: str | PathLike[str], **options: Any) -> Any:
+        """Render this flight as a video; see `tiltsim.video` for the options."""
+        return public("video")(self, path, **options)
+
     def _repr_html_(self) -> str:
         """How the flight ended and its metrics, as a table for notebooks."""
         scenario, end = self.scenario, self.end
