@@ -19,9 +19,8 @@ prints one table on the terminal; `tiltsim schema > scenario.schema.json` writes
 with which editors complete and check the file. `tiltsim schema --markdown` prints this page.
 
 A key that is left out has its default. Units are SI, angles are in radians; [-] marks numbers
-without a unit. The world has z up. Rotors 1 to 4 are on +x, +y, -x and -y of the body. Numbers
-beyond a billion, and coordinates beyond a million meters, are refused. Chapters (ch.) are those of
-the thesis.
+without a unit. [Concepts](concepts.md) explains words, axes and signs. Numbers beyond a billion,
+and coordinates beyond a million meters, are refused. Chapters (ch.) are those of the thesis.
 
 `--set simulation.duration=20` on the command line and `{"simulation.duration": 20}` in Python
 change a key without editing the file; entries of lists are counted from 0:

@@ -89,7 +89,11 @@ class TrotGait(GaitTable):
         description="a trot: rotors 1 and 2 tilt by -rho, 3 and 4 by rho, so that diagonal legs "
         "move together, and rho changes its sign twice a period: at once, or at a constant rate"
     )
-    amplitude: Angle = Field(description=f"largest rho; {SIGN} [rad]", examples=[0.65])
+    amplitude: Angle = Field(
+        description="largest rho, with which the period begins; at positive rho rotors 1 and 3 "
+        "push to +y, 2 and 4 to -x [rad]",
+        examples=[0.65],
+    )
     period: Period = Field(description="T, of the whole cycle [s]", examples=[2.0])
 
     def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
