@@ -59,6 +59,11 @@ AXIS_LINES: Final[tuple[dict[str, Any], ...]] = (
 FORMATS: Final = (".png", ".svg", ".pdf")
 """Suffixes of figure files."""
 
+SINGULAR: Final = RED
+"""Curves of singular attitudes and of singular tilt angles, in every figure."""
+UNREACHABLE: Final = "#F3D3C3"
+"""The shade of what lies beyond singular attitudes or is as good as singular, in every figure."""
+
 _SETTINGS: Final = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],

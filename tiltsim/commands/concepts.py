@@ -1,0 +1,68 @@
+"""``tiltsim concepts``: draws the pictures of docs/concepts.md."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from tiltsim.commands.options import Subparsers
+from tiltsim.commands.text import print_line
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.figure import Figure
+
+    from tiltsim.flight.flight import Flight
+
+DECOUPLER_FLIGHTS: Final = {
+    "conventional": "ch04_tracking/setpoint#rho_065_conventional",
+    "modified": "ch04_tracking/setpoint#rho_065_modified",
+    "exact": "beyond/setpoint_exact_decoupler#rho_065",
+}
+"""Addresses of the flights that show the decouplers."""
+
+
+def add_parser(subparsers: Subparsers) -> None:
+    """Declare the command."""
+    description = """Draw what docs/concepts.md explains: the vehicle with its axes and signs,
+    gaits, decouplers (flown), singular attitudes and their margin, red and blue gaits."""
+    summary = "draw the vehicle, gaits, decouplers and singularities explained in the docs"
+    parser = subparsers.add_parser("concepts", help=summary, description=description)
+    out = "folder for the SVG files concepts_*.svg (default: concepts)"
+    parser.add_argument("--out", type=Path, default=Path("concepts"), metavar="DIR", help=out)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Draw and save one picture after the other."""
+    from tiltsim.system.files import prepare_folder
+    from tiltsim.views.figures.style import save
+
+    prepare_folder(arguments.out)
+    for name, draw in drawings().items():
+        file = arguments.out / f"concepts_{name}.svg"
+        save(draw(), file)
+        print_line(f"figure written to {file}")
+    return 0
+
+
+def drawings() -> dict[str, Callable[[], Figure]]:
+    """The pictures by their names, in the order of the page."""
+    from tiltsim.views.figures import concepts
+
+    return {
+        "vehicle": concepts.vehicle_figure,
+        "gaits": concepts.gait_figure,
+        "decouplers": lambda: concepts.decoupler_figure(_fly()),
+        "attitudes": concepts.attitude_figure,
+        "colors": concepts.color_figure,
+    }
+
+
+def _fly() -> dict[str, Flight]:
+    from tiltsim.scenario.loading import load_scenario
+    from tiltsim.simulation.simulate import simulate
+
+    return {name: simulate(load_scenario(at)) for name, at in DECOUPLER_FLIGHTS.items()}
