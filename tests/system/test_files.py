@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tiltsim.errors import InputError
-from tiltsim.system.files import remove_leftovers, replacing
+from tiltsim.system.files import prepare_file, prepare_folder, remove_leftovers, replacing
 from tiltsim.system.locks import locked
 
 HEX = "0123456789abcdef"
@@ -40,6 +40,21 @@ def test_a_durable_file_replaces_another_only_once_it_is_on_disk(tmp_path, monke
     with pytest.raises(InputError, match="no disk"), replacing(path, durable=True) as temporary:
         temporary.write_bytes(b"after")
     assert path.read_bytes() == b"before"
+
+
+@pytest.mark.parametrize(
+    ("attempt", "begins"),
+    [
+        (prepare_folder, "--out a\0b"),
+        (lambda path: prepare_file("--junit", path), "--junit a\0b"),
+        (lambda path: prepare_file("--junit", path / "file"), "--junit a\0b/file"),
+        (lambda path: replacing(path).__enter__(), "a\0b"),
+    ],
+)
+def test_a_name_with_a_null_character_is_a_mistake(attempt, begins):
+    with pytest.raises(InputError) as caught:
+        attempt(Path("a\0b"))
+    assert str(caught.value) == f"{begins}: no file can have a null character in its name"
 
 
 def test_a_full_disk_names_the_file_and_leaves_the_old_one(tmp_path):

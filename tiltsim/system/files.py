@@ -28,6 +28,7 @@ def digest(content: bytes) -> str:
 
 def prepare_folder(folder: Path) -> None:
     """Create a folder for results before the flight. Raises `InputError` if that is impossible."""
+    _require_possible_name("--out ", folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -47,6 +48,7 @@ def prepare_file(option: str, file: Path, suffixes: Sequence[str] = ()) -> None:
     Raises:
         InputError: If the file cannot be written or its suffix is not allowed.
     """
+    _require_possible_name(f"{option} ", file)
     if suffixes and file.suffix.lower() not in suffixes:
         raise InputError(
             f"{option} {file}: unknown format {file.suffix!r}; choose {', '.join(suffixes)}"
@@ -60,6 +62,12 @@ def prepare_file(option: str, file: Path, suffixes: Sequence[str] = ()) -> None:
         raise InputError(f"{option} {file}: not writable")
 
 
+def _require_possible_name(option: str, path: Path) -> None:
+    # Python raises a ValueError for such a name, where the system would an OSError.
+    if "\0" in str(path):
+        raise InputError(f"{option}{path}: no file can have a null character in its name")
+
+
 @contextmanager
 def replacing(path: Path, *, durable: bool = False) -> Iterator[Path]:
     """Yield a temporary path that replaces ``path`` atomically when the block succeeds.
@@ -70,6 +78,7 @@ def replacing(path: Path, *, durable: bool = False) -> Iterator[Path]:
     Raises:
         InputError: If the file cannot be written, as on a full disk.
     """
+    _require_possible_name("", path)
     special = path.exists() and not path.is_file()
     # A name that nobody can guess and make a link of. Unlike tempfile's, the file gets the
     # permissions of the umask.
