@@ -27,7 +27,7 @@ from tiltsim.engines.native_engine import compile_control
 from tiltsim.laws.attitude_altitude import TILTROTOR
 from tiltsim.scenario.loading import is_changed_from_library, load_scenario
 from tiltsim.scenario.metric_names import METRICS
-from tiltsim.vehicles.rotorcraft import COLUMN_UNITS
+from tiltsim.vehicles.rotorcraft import COLUMNS
 
 SETPOINT = "ch04_tracking/setpoint#rho_065_modified"
 SHORT = ("--set", "simulation.duration=0.2")
@@ -92,7 +92,7 @@ def test_run_writes_the_three_files_and_prints_a_summary(tmp_path, capsys):
     assert set(metrics) <= set(METRICS)
     assert metrics["duration"] == pytest.approx(0.2)
     table = pq.read_table(out / "flight.parquet")
-    assert table.column_names == list(COLUMN_UNITS)
+    assert table.column_names == list(COLUMNS)
     assert table.num_rows == 21
     assert table.schema.field("x").metadata == {b"unit": b"m"}
 

@@ -182,7 +182,7 @@ def test_plot_draws_lines_and_counts_lost_flights(grid, tmp_path):
         text + '[plot]\nkind = "lines"\nx = "initial.attitude[0]"\nlog = ["y"]\n', encoding="utf-8"
     )
     figure = sweep_figure(load_results(swept(grid, tmp_path / "out")), ("max_abs_roll",))
-    assert figure.axes[0].get_xlabel() == "initial.attitude[0] (rad)"
+    assert figure.axes[0].get_xlabel() == "initial attitude roll (rad)"
     assert (figure.axes[0].get_xscale(), figure.axes[0].get_yscale()) == ("linear", "log")
     assert len(figure.axes[0].lines) in {4, 5}  # two decouplers, their lost flights, the key
 

@@ -21,7 +21,7 @@ from tiltsim.flight.reading import load_flight
 from tiltsim.flight.writing import metrics_json
 from tiltsim.scenario.loading import parse_scenario, scenario_toml, without_none
 from tiltsim.system.files import prepare_folder
-from tiltsim.vehicles.rotorcraft import COLUMN_UNITS
+from tiltsim.vehicles.rotorcraft import COLUMNS
 
 NAMES = {"flight.parquet", "metrics.json", "scenario.toml"}
 SCENARIO = {"title": "by hand", "simulation": {"duration": 0.5, "seed": 5}}
@@ -99,8 +99,8 @@ def test_parquet_holds_every_column_with_its_unit(tmp_path):
     this.save(tmp_path)
     table = pq.read_table(tmp_path / "flight.parquet")
     units = {field.name: field.metadata[b"unit"].decode() for field in table.schema}
-    assert units == dict(COLUMN_UNITS)
-    assert list(units) == list(COLUMN_UNITS)
+    assert units == {name: column.unit for name, column in COLUMNS.items()}
+    assert list(units) == list(COLUMNS)
     for name, column in this.columns.items():
         np.testing.assert_array_equal(table[name].to_numpy(), column)
 

@@ -15,8 +15,8 @@ from tiltsim.commands.schema import scenario_schema
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.scenario.loading import parse_scenario
-from tiltsim.scenario.metric_names import BOOLEAN_METRICS, METRICS, unit_of
-from tiltsim.vehicles.rotorcraft import COLUMN_UNITS
+from tiltsim.scenario.metric_names import BOOLEAN_METRICS, METRICS
+from tiltsim.vehicles.rotorcraft import COLUMNS
 from tiltsim.vehicles.spans import in_last_second, when_settled
 
 R = 2.423e-7 / (0.1785 * 8.048e-6)  # K_m / (L K_f), ch. 3
@@ -294,7 +294,7 @@ def test_thrust_is_the_square_of_the_speed_with_the_sign_of_the_spin():
 
 def test_columns_come_in_the_order_of_the_file_and_of_one_length():
     flight = fly()
-    assert list(flight.columns) == list(COLUMN_UNITS)
+    assert list(flight.columns) == list(COLUMNS)
     assert {column.shape for column in flight.columns.values()} == {(len(TIMES),)}
 
 
@@ -330,7 +330,7 @@ def test_a_whole_turn_of_yaw_is_no_error():
 @pytest.mark.skipif(not METRICS_PAGE.is_file(), reason="the docs are not part of a distribution")
 def test_the_page_on_metrics_names_all_of_them_with_their_units():
     rows = re.findall(r"^\| `(\w+)` \| (.+?) \| .+ \|$", METRICS_PAGE.read_text("utf-8"), re.M)
-    units = {name: unit_of(name) or "-" for name in METRICS}
+    units = {name: METRICS[name].unit or "-" for name in METRICS}
     units |= dict.fromkeys(BOOLEAN_METRICS, "true or false")
     assert dict(rows) == units
     assert len(rows) == len(METRICS)
@@ -342,10 +342,8 @@ def test_editors_complete_the_metrics_of_expectations():
 
 
 def test_units_are_those_of_the_metrics():
-    assert unit_of("final_position_error_x") == "m"
-    assert unit_of("max_rotor_speed") == "rad/s"
-    assert unit_of("duration") == "s"
-    assert unit_of("switches") == unit_of("diverged") == unit_of("saturated_fraction") == ""
+    names = "final_position_error_x", "max_rotor_speed", "duration", "switches", "diverged"
+    assert [METRICS[name].unit for name in names] == ["m", "rad/s", "s", "", ""]
 
 
 @pytest.mark.parametrize(

@@ -18,9 +18,10 @@ from tiltsim.models.user_vehicle import read_user_vehicle
 from tiltsim.plants.command import Command
 from tiltsim.plants.flight_model import build_model
 from tiltsim.resources import shipped_folder
-from tiltsim.vehicles.rotorcraft import COLUMN_UNITS
+from tiltsim.vehicles.rotorcraft import COLUMNS
+from tiltsim.views.figures.plot import plot
 from tiltsim.views.rerun.recording_file import save_recording
-from tiltsim.views.vehicle_views import flight_figure, views_of
+from tiltsim.views.vehicle_views import views_of
 
 DOCS = Path(__file__).parents[2] / "docs"
 TETRAHEDRON = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -381,9 +382,9 @@ def test_ones_own_controller_flies_any_layout(other_layout):
 
 def test_numbers_of_another_layout_are_left_out(other_layout, tmp_path, capsys):
     flight = other_layout
-    assert {*COLUMN_UNITS} - {*flight.units} == {"singularity_margin", "determinant"}
+    assert {*COLUMNS} - {*flight.units} == {"singularity_margin", "determinant"}
     assert not {"min_singularity_margin", "min_decoupling_condition"} & {*flight.metrics()}
-    titles = " ".join(axes.get_title("left") for axes in flight_figure(flight).axes)
+    titles = " ".join(axes.get_title("left") for axes in plot(flight).axes)
     assert "Position error" in titles
     assert "margin" not in titles
     assert "Attitudes flown" not in titles

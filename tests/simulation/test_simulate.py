@@ -13,7 +13,7 @@ from tiltsim.laws.assembling import assemble
 from tiltsim.laws.attitude_altitude import TILTROTOR
 from tiltsim.plants.factory import make_plant
 from tiltsim.plants.mujoco_plant import MujocoPlant
-from tiltsim.vehicles.rotorcraft import COLUMN_UNITS
+from tiltsim.vehicles.rotorcraft import COLUMNS
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.gains import GAIN_SETS
 from tiltsim_controllers.vehicle.parameters import PRESETS
@@ -222,7 +222,7 @@ def test_plants_differ_by_the_gyroscopic_torque_once_the_body_rolls_and_yaws():
         tiltsim.simulate(scenario(simulation={"plant": p, "duration": 0.01}, **tables))
         for p in PLANTS
     )
-    names = list(COLUMN_UNITS)
+    names = list(COLUMNS)
     assert names.index("p") > 0
     inertia = np.array(PRESETS["ar_drone_2"][1:4])
     omega = np.array([3.0, 2.0, 1.0])
@@ -317,9 +317,9 @@ def test_interrupt_keeps_the_samples_so_far():
 def test_flight_table_has_every_column_with_its_unit_and_origin():
     flight = tiltsim.simulate(scenario())
     table = flight.to_arrow()
-    assert table.column_names == list(COLUMN_UNITS)
+    assert table.column_names == list(COLUMNS)
     for field in table.schema:
-        assert field.metadata == {b"unit": COLUMN_UNITS[field.name].encode()}
+        assert field.metadata == {b"unit": COLUMNS[field.name].unit.encode()}
     assert table.num_rows == len(flight) == 51
     metadata = table.schema.metadata
     assert {b"scenario", b"seed", b"mujoco_version", b"tiltsim_version"} <= set(metadata)

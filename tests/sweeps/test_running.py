@@ -18,7 +18,7 @@ from tests.sweeps.files import boundary_sweep, short_sweep
 from tests.system.test_files import HEX
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import parse_scenario
-from tiltsim.scenario.metric_names import METRICS
+from tiltsim.scenario.metric_names import METRICS, Metric
 from tiltsim.simulation import batch
 from tiltsim.simulation.simulate import simulate
 from tiltsim.sweeps import chunks, running
@@ -298,7 +298,7 @@ def test_a_damaged_folder_is_reported_or_repaired(tmp_path):
 def test_parts_with_other_columns_are_refused(tmp_path, monkeypatch):
     definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
     run_sweep(definition, tmp_path / "out")
-    monkeypatch.setitem(METRICS, "a_metric_of_tomorrow", "of no use, m")
+    monkeypatch.setitem(METRICS, "a_metric_of_tomorrow", Metric("use", "m", "of no use"))
     with pytest.raises(
         InputError, match=r"made by another version of tiltsim: .* a_metric_of_tomorrow"
     ):

@@ -14,12 +14,20 @@ from tiltsim.cli import main
 from tiltsim.flight.end import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.views.figures import style
-from tiltsim.views.figures.comparison import comparison_figure
-from tiltsim.views.vehicle_views import flight_figure
+from tiltsim.views.figures.plot import plot
 
 SIGNATURES = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
 PANELS = {"Attitude", "Altitude", "Position error", "Tilt angles", "Rotor speeds", "Plan view"}
-PLANES = {"Attitudes flown; shaded: unreachable", "Attitudes flown; all reachable"}
+PANELS |= {"Singularity margin", "Attitudes flown"}
+
+
+def legend_of(figure):
+    (legend,) = figure.legends
+    return [text.get_text() for text in legend.get_texts()]
+
+
+def heading(figure):
+    return figure.texts[0].get_text()
 
 
 def axes_by_title(figure):
@@ -28,17 +36,14 @@ def axes_by_title(figure):
 
 @pytest.mark.parametrize("name", RECIPES)
 def test_every_flight_can_be_drawn(name):
-    figure = flight_figure(flight(name))
+    figure = plot(flight(name))
     figure.canvas.draw()
-    titles = set(axes_by_title(figure))
-    assert titles >= PANELS
-    assert titles & PLANES
-    assert any(title.startswith("Singularity margin, minimum") for title in titles)
+    assert {title.partition(",")[0] for title in axes_by_title(figure)} == PANELS
 
 
 def test_the_lines_are_the_flights_columns():
     this = flight("trot")
-    panels = axes_by_title(flight_figure(this))
+    panels = axes_by_title(plot(this))
     roll = panels["Attitude"].lines[0]
     np.testing.assert_array_equal(roll.get_xdata(), this["time"])
     np.testing.assert_array_equal(roll.get_ydata(), this["roll"])
@@ -51,33 +56,34 @@ def test_the_lines_are_the_flights_columns():
 
 
 def test_axes_say_their_units():
-    for axes in flight_figure(flight("fixed")).axes:
+    for axes in plot(flight("fixed")).axes:
         assert any(unit in axes.get_ylabel() for unit in ("rad", "m")), axes.get_title(loc="left")
 
 
 @pytest.mark.parametrize("panel", ["Attitude", "Position error"])
 def test_lines_of_a_panel_differ_without_color(panel):
-    lines = axes_by_title(flight_figure(flight("trot")))[panel].lines
+    lines = axes_by_title(plot(flight("trot")))[panel].lines
     named = [line for line in lines if line.get_label() in {"roll", "pitch", "yaw", *"xyz"}]
     assert len({str(line._dash_pattern) for line in named}) == 3
 
 
-@pytest.mark.parametrize(("period", "shown"), [(0.5, "Tilt angles"), (0.05, "last 0.3 s")])
+@pytest.mark.parametrize(("period", "shown"), [(0.5, 1.2), (0.05, 0.2)])
 def test_of_many_periods_only_the_last_are_shown(period, shown):
     this = flight("trot")
     gait = this.scenario.gait.model_copy(update={"period": period})
     this = replace(this, assembly=assemble(this.scenario.model_copy(update={"gait": gait})))
-    panels = axes_by_title(flight_figure(this))
-    [title] = [title for title in panels if title.startswith("Tilt angles")]
-    assert title.endswith(shown)
+    panels = axes_by_title(plot(this))
     end = this["time"][-1]
-    assert panels[title].get_xlim() == pytest.approx((end - 0.3 if period < 0.1 else 0.0, end))
-    assert panels["Rotor speeds"].get_xlim() == pytest.approx((0.0, end))
+    limits = [
+        panels[name].get_xlim() for name in ("Attitude", "Tilt angles", "Rotor speeds", "Altitude")
+    ]
+    assert limits[:3] == [pytest.approx((end - shown, end))] * 3, "one column, one axis of time"
+    assert limits[3] == pytest.approx((0.0, end))
 
 
 def test_rotor_limits_are_drawn_where_there_are_some():
-    limited = axes_by_title(flight_figure(flight("limited")))["Rotor speeds"]
-    free = axes_by_title(flight_figure(flight("fixed")))["Rotor speeds"]
+    limited = axes_by_title(plot(flight("limited")))["Rotor speeds"]
+    free = axes_by_title(plot(flight("fixed")))["Rotor speeds"]
     levels = {line.get_ydata()[0] for line in limited.lines if len(set(line.get_ydata())) == 1}
     assert {150.0, 390.0} <= levels
     assert len(limited.lines) == len(free.lines) + 2
@@ -85,20 +91,18 @@ def test_rotor_limits_are_drawn_where_there_are_some():
 
 def test_the_closest_approach_is_marked():
     this = flight("trot")
-    plane = axes_by_title(flight_figure(this))["Attitudes flown; shaded: unreachable"]
+    plane = axes_by_title(plot(this))["Attitudes flown"]
     closest = int(np.argmin(np.abs(this["singularity_margin"])))
     dots = [line.get_xydata()[0] for line in plane.lines if len(line.get_xdata()) == 1]
     np.testing.assert_allclose(dots, [[this["roll"][closest], this["pitch"][closest]]])
-    (words,) = [text.get_text() for text in plane.texts]
-    assert words == (
-        f"minimum margin {abs(this['singularity_margin'][closest]):.2f} rad"
-        f" at {this['time'][closest]:.2f} s"
-    )
+    words = plane.get_legend_handles_labels()[1]
+    assert f"minimum margin, at {this['time'][closest]:.2f} s" in words
+    assert {"singular", "unreachable"} <= set(words)
 
 
 def test_drawing_does_not_change_matplotlibs_parameters():
     before = dict(matplotlib.rcParams)
-    flight_figure(flight("fixed"))
+    plot(flight("fixed"))
     assert dict(matplotlib.rcParams) == before
 
 
@@ -140,7 +144,7 @@ def test_a_diverged_flight_is_scaled_by_the_time_before_its_divergence():
     }
     spans = {}
     for kind, end in ends.items():
-        panels = axes_by_title(flight_figure(replace(whole, samples=samples, end=end)))
+        panels = axes_by_title(plot(replace(whole, samples=samples, end=end)))
         low, high = panels["Rotor speeds"].get_ylim()
         spans[kind] = high - low
         words = [text.get_text() for text in panels["Rotor speeds"].texts]
@@ -151,14 +155,15 @@ def test_a_diverged_flight_is_scaled_by_the_time_before_its_divergence():
 
 def test_a_flight_of_one_sample_is_drawn_without_a_warning(recwarn):
     whole = flight("fixed")
-    flight_figure(replace(whole, samples=whole.samples[:1].copy()))
+    plot(replace(whole, samples=whole.samples[:1].copy()))
     assert not recwarn.list
 
 
 def test_all_attitudes_of_a_red_gait_are_reachable():
     red = BASE | {"gait": {"type": "fixed", "angles": [-0.3, 0.3, -0.3, 0.3]}}
-    panels = axes_by_title(flight_figure(tiltsim.simulate(tiltsim.parse_scenario(red))))
-    plane = panels["Attitudes flown; all reachable"]
+    panels = axes_by_title(plot(tiltsim.simulate(tiltsim.parse_scenario(red))))
+    plane = panels["Attitudes flown"]
+    assert "unreachable" not in plane.get_legend_handles_labels()[1]
     assert [len(line.get_xdata()) > 1 for line in plane.lines].count(True) == 1, "the attitudes"
 
 
@@ -172,45 +177,41 @@ def supervised():
 def test_the_margin_shows_its_threshold_and_when_the_supervisor_is_active():
     this = supervised()
     assert 0.0 < this["supervision"].max() <= 1.0
-    panels = axes_by_title(flight_figure(this))
-    (title,) = [title for title in panels if title.startswith("Singularity margin")]
-    axes = panels[title]
-    levels = {line.get_ydata()[0] for line in axes.lines if len(set(line.get_ydata())) == 1}
-    assert 0.9 in levels
-    assert "shaded: supervisor active" in {text.get_text() for text in axes.texts}
-    plain = next(
-        v for k, v in axes_by_title(flight_figure(flight("trot"))).items() if "margin" in k
-    )
-    assert "shaded: supervisor active" not in {text.get_text() for text in plain.texts}
+    panels = axes_by_title(plot(this))
+    words = panels["Singularity margin"].get_legend_handles_labels()[1]
+    assert {"below 0.9", "supervisor active"} <= set(words)
+    plain = axes_by_title(plot(flight("trot")))["Singularity margin"]
+    assert plain.get_legend_handles_labels()[1][0] == "below 0.2"
 
 
 def test_flights_are_compared_by_margin_determinant_and_error():
     flights = [flight("jumps"), supervised()]
-    figure = comparison_figure(flights)
+    figure = plot(flights)
     figure.canvas.draw()
-    panels = axes_by_title(figure)
-    assert list(panels) == [
-        "Singularity margin",
-        "Determinant, 4 for a level untilted vehicle",
-        "Supervisor output",
-        "Distance from the reference",
-    ]
-    for axes, column in zip(
-        panels.values(), ("singularity_margin", "determinant", "supervision"), strict=False
-    ):
+    panels = {axes.get_ylabel(): axes for axes in figure.axes}
+    columns = {
+        "singularity margin (rad)": "singularity_margin",
+        "determinant n · r₃": "determinant",
+        "supervisor (0 to 1)": "supervision",
+    }
+    others = {"position error (m)", "roll (rad)", "pitch (rad)", "yaw (rad)", "y (m)"}
+    assert set(panels) == {*columns, *others}
+    for label, column in columns.items():
+        axes = panels[label]
         drawn = [line.get_ydata() for line in axes.lines if len(line.get_ydata()) > 2]
         columns = [this.columns[column] for this in flights if column in this.columns]
         for line, expected in zip(drawn, columns, strict=True):
             np.testing.assert_array_equal(line, np.maximum(expected, 0.0))
-    (legend,) = figure.legends
-    assert [text.get_text() for text in legend.get_texts()] == ["jumps", "supervised"]
-    assert legend.get_title().get_text() == "2 flights compared"
+    assert heading(figure) == "2 flights compared"
+    names = ["jumps", "supervised", "margin below 0.9 rad", "determinant below 0.5"]
+    assert legend_of(figure) == [*names, "reference", "start", "end"]
 
 
 def test_a_comparison_says_where_a_flight_terminated():
     lost = replace(flight("jumps"), end=End("singular", 0.7, "why"))
-    (legend,) = comparison_figure([lost, supervised()]).legends
-    assert legend.get_texts()[0].get_text() == "jumps, singular at 0.70 s"
+    words = legend_of(plot([lost, supervised()]))
+    assert words[0] == "jumps, singular at 0.70 s"
+    assert "terminated early" in words
 
 
 def test_the_command_compares_several_flights(tmp_path, capsys):
@@ -229,15 +230,14 @@ def test_flights_of_one_scenario_are_compared_by_their_folders(tmp_path, monkeyp
     monkeypatch.setattr(style, "save", lambda figure, _path: shown.append(figure))
     assert main(["plot", *map(str, folders), "--out", str(tmp_path / "both.png")]) == 0
     (figure,) = shown
-    (legend,) = figure.legends
-    assert [text.get_text() for text in legend.get_texts()] == ["mod", r"con\$v"]
-    assert legend.get_title().get_text() == "A trot around a circle"
+    assert legend_of(figure)[:2] == ["mod", r"con\$v"]
+    assert heading(figure) == "A trot around a circle"
 
 
 def test_the_page_of_a_variant_names_it():
     def subtitle(address):
         scenario = tiltsim.parse_scenario(BASE | RECIPES["trot"], address)
-        page = flight_figure(replace(flight("trot"), assembly=assemble(scenario)))
+        page = plot(replace(flight("trot"), assembly=assemble(scenario)))
         title, line = (text.get_text() for text in page.texts)
         assert title == "A trot around a circle"
         return line
@@ -246,11 +246,14 @@ def test_the_page_of_a_variant_names_it():
     assert subtitle("ch04/circle#modified_t2") == f"modified_t2  ·  {plain}"
 
 
-def test_a_vehicle_without_a_margin_is_not_compared(tmp_path, capsys):
-    folders = [str(saved(name, tmp_path)) for name in ("tilt_car", "jumps")]
-    assert main(["plot", *folders]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "the tilt_car has no singularity margin to compare" in line
+def test_vehicles_of_several_kinds_are_compared_by_what_they_have():
+    panels = {axes.get_ylabel(): axes for axes in plot([flight("tilt_car"), flight("jumps")]).axes}
+    lines = {
+        label: sum(len(line.get_xdata()) > 2 for line in axes.lines)
+        for label, axes in panels.items()
+        if label in {"position error (m)", "singularity margin (rad)"}
+    }
+    assert lines == {"position error (m)": 2, "singularity margin (rad)": 1}
 
 
 def test_text_in_any_script_is_drawn_without_a_warning(tmp_path):

@@ -16,6 +16,7 @@ import numpy as np
 
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.parts import ExtraActuators
+from tiltsim.system.quantity import Quantity, in_words
 from tiltsim_controllers.mathematics.records import flatten, record_dtype, record_size
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Values, Vector, scalar
 
@@ -228,4 +229,10 @@ class ClosedLoop:
     @cached_property
     def units(self) -> dict[str, str]:
         """The columns of a flight and their units, in order."""
-        return {**self.kind.columns, **self.columns.units}
+        own = {name: what.unit for name, what in self.kind.columns.items()}
+        return {**own, **self.columns.units}
+
+    def label(self, column: str) -> Quantity:
+        """The label and unit of a column of a flight."""
+        known = self.kind.columns.get(column)
+        return known or Quantity(in_words(column), self.units[column])

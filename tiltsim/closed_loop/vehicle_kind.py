@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from tiltsim.models.parts import ExtraActuators
     from tiltsim.scenario.scenario import FlightPlan, Scenario
+    from tiltsim.system.quantity import Quantity
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +25,7 @@ class VehicleKind:
 
     Attributes:
         observed_fields: Fields of a sample after the time.
-        columns: Columns of every flight and their units, in the order of the file.
+        columns: Columns of every flight, their labels and units, in the order of the file.
         thrusts: ``(columns so far, scenario) -> columns``: the rotors' thrusts, N.
         compile: ``(scenario, law_states, extra_actuators, userdata_size, visuals) -> model``.
             Raises `ValueError` where MuJoCo cannot build it.
@@ -37,7 +38,7 @@ class VehicleKind:
     """
 
     observed_fields: tuple[str, ...]
-    columns: Mapping[str, str]
+    columns: Mapping[str, Quantity]
     thrusts: Callable[[Mapping[str, Floats], Scenario], dict[str, Floats]]
     compile: Callable[[Scenario, int, tuple[ExtraActuators, ...], int, bool], mujoco.MjModel]
     initial_motion: Callable[[FlightPlan], tuple[Vector, Vector]]

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.commands.angles import allow_negative_lists, parse_angle, parse_vehicle
-from tiltsim.commands.options import Subparsers, add_json, add_plot, add_vehicle, prepare_figure
+from tiltsim.commands.figure_options import add_plot, prepare_figure, save_figure
+from tiltsim.commands.options import Subparsers, add_json, add_vehicle
 from tiltsim.commands.text import json_text, print_figure_path
 
 if TYPE_CHECKING:
@@ -71,9 +73,9 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.studies.gait_analysis import fault_report, gait_report
 
     if arguments.plot is not None:
-        from tiltsim.views.figures.style import save
-
-        save(draw_gait(selected, arguments.figure, arguments.speed_limits), arguments.plot)
+        kind, limits = arguments.figure, arguments.speed_limits
+        draw = partial(draw_gait, selected, kind, limits, arguments.panels)
+        save_figure(draw, arguments.plot, arguments)
     report = gait_report(selected.gait, selected.vehicle, roll=roll, pitch=pitch)
     if arguments.faults:
         a1, a2, a3, a4 = selected.gait.angles(0.0).tolist()
@@ -122,10 +124,9 @@ def _run_determinant(arguments: argparse.Namespace) -> int:
     from tiltsim.commands.gait_text import determinant_text
     from tiltsim.studies.gait_analysis import determinant_report
     from tiltsim.views.figures.determinant import determinant_figure
-    from tiltsim.views.figures.style import save
 
     vehicle, case = parse_vehicle(arguments.vehicle), arguments.case or "equal"
-    save(determinant_figure(case, vehicle), arguments.plot)
+    save_figure(partial(determinant_figure, case, vehicle), arguments.plot, arguments)
     _print(arguments, determinant_report(case, vehicle), determinant_text)
     print_figure_path(arguments)
     return 0

@@ -13,10 +13,16 @@ if TYPE_CHECKING:
     from tiltsim.commands.gait_selection import SelectedGait
 
 
-def draw_gait(selected: SelectedGait, kind: str | None, speed_limits: str | None) -> Figure:
+def draw_gait(
+    selected: SelectedGait, kind: str | None, speed_limits: str | None, panels: tuple[str, ...]
+) -> Figure:
     """The ``--figure`` of a gait, by default its roll-pitch diagram.
 
-    ``speed_limits`` is for the attainable figure; see `parse_speed_limits`.
+    Args:
+        selected: The gait with its vehicle.
+        kind: Which figure.
+        speed_limits: For the attainable figure; see `parse_speed_limits`.
+        panels: For the default one; default: all that suit the gait.
     """
     from tiltsim.views.figures import attainable, faults, gait
 
@@ -37,7 +43,7 @@ def draw_gait(selected: SelectedGait, kind: str | None, speed_limits: str | None
         return gait.comparison_figure(compared, selected.vehicle)
     if kind == "margin":
         return gait.margin_figure(compared, selected.vehicle)
-    return gait.gait_figure(selected.gait, selected.vehicle)
+    return gait.gait_figure(selected.gait, selected.vehicle, panels)
 
 
 def attainable_warnings(selected: SelectedGait, speed_limits: str | None) -> list[str]:

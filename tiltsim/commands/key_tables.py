@@ -10,11 +10,10 @@ from itertools import product
 from math import pi
 from typing import Any, Final, NamedTuple
 
+from tiltsim.scenario.key_units import UNIT
+
 TAG_KEYS: Final = ("type", "law", "model")
 """Keys whose value decides which other keys a table has."""
-
-UNIT: Final = re.compile(r"(.*) \[([^]]+)\]", re.DOTALL)
-"""A description that ends with a unit."""
 
 PLURAL: Final = re.compile(r"^(number|whole number|list|table)")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.angles import (
@@ -12,7 +13,8 @@ from tiltsim.commands.angles import (
     parse_vehicle,
     vehicle_text,
 )
-from tiltsim.commands.options import Subparsers, add_json, add_plot, add_vehicle, prepare_figure
+from tiltsim.commands.figure_options import add_plot, prepare_figure, save_figure
+from tiltsim.commands.options import Subparsers, add_json, add_vehicle
 from tiltsim.commands.text import aligned, json_text, print_figure_path, tally
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
 
@@ -57,10 +59,10 @@ def run(arguments: argparse.Namespace) -> int:
         place = "path" if path is not None else f"--vehicle {arguments.vehicle}"
         raise InputError(f"{place}: {error}") from None
     if arguments.plot is not None:
-        from tiltsim.views.figures.style import save
         from tiltsim.views.figures.two_color_map import map_figure
 
-        save(map_figure(vehicle, [("path", path)] if path else None), arguments.plot)
+        draw = partial(map_figure, vehicle, [("path", path)] if path else None)
+        save_figure(draw, arguments.plot, arguments)
     print(json_text(report) if arguments.json else _summary(report))
     print_figure_path(arguments)
     return DONE if path is None or report["path"]["sound"] else EXPECTATION_FAILED

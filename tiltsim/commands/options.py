@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import os
-from pathlib import Path
 from typing import TypeAlias
 
 Subparsers: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
@@ -60,13 +59,6 @@ def add_quiet(parser: argparse.ArgumentParser, text: str = "print nothing but er
     parser.add_argument("--quiet", action="store_true", help=text)
 
 
-def add_plot(parser: argparse.ArgumentParser, figure: str) -> None:
-    """Declare ``--plot``, which draws a ``figure``."""
-    parser.add_argument(
-        "--plot", type=Path, metavar="FILE", help=f"draw {figure}: FILE.png, .svg or .pdf"
-    )
-
-
 def add_vehicle(parser: argparse.ArgumentParser) -> None:
     """Declare ``--vehicle``, which `tiltsim.commands.angles.parse_vehicle` reads."""
     parser.add_argument(
@@ -74,12 +66,3 @@ def add_vehicle(parser: argparse.ArgumentParser) -> None:
         metavar="VEHICLE",
         help="ar_drone_2 (default), luukkonen, KEY=VALUE,..., or a preset with KEY=VALUE,...",
     )
-
-
-def prepare_figure(option: str, path: Path | None) -> None:
-    """Raise `InputError` unless a figure, if one is requested, can be written to ``path``."""
-    if path is not None:
-        from tiltsim.system.files import prepare_file
-        from tiltsim.views.figures.style import FORMATS
-
-        prepare_file(option, path, FORMATS)

@@ -6,21 +6,27 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tiltsim.commands.options import Subparsers, prepare_figure
+from tiltsim.commands.figure_options import add_figure_options, prepare_figure, save_figure
+from tiltsim.commands.options import Subparsers
 from tiltsim.commands.text import print_line
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from matplotlib.figure import Figure
 
 
 def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
-    description = """Draw a flight on one page: attitude, altitude, position error, tilt angles,
-    rotor speeds, singularity margin, path over the ground, roll-pitch plane. Several flights:
-    margin, determinant and position error of each over time. A sweep: lines, maps, distributions or
-    boundaries, according to its axes or its [plot] table."""
+    description = """Draw a flight on one page, several in the same axes, or a sweep: lines, maps,
+    distributions or boundaries, according to its axes or its [plot] table."""
+    epilog = """panels of a flight: position_error, altitude, margin, attitude, tilt_angles,
+    rotor_speeds, path, attitude_plane; of a tilt-car: position_error, inputs, direction,
+    direction_error, lyapunov, path, portrait; of several flights: position_error, margin,
+    determinant, supervisor, attitude, path; of a sweep: its metrics. Every column of a flight, such
+    as vx, is the name of a panel, too."""
     summary = "draw a flight, several, or a sweep as a figure"
-    parser = subparsers.add_parser("plot", help=summary, description=description)
+    parser = subparsers.add_parser("plot", help=summary, description=description, epilog=epilog)
     add = parser.add_argument
     flights = "folder of results, flight.parquet or folder of a sweep; several flights are compared"
     add("flights", type=Path, nargs="+", metavar="FLIGHT", help=flights)
@@ -28,6 +34,7 @@ def add_parser(subparsers: Subparsers) -> None:
     add("--metric", action="append", default=[], metavar="NAME", dest="metrics", help=metrics)
     out = "PNG, SVG or PDF (default: flight.png, flights.png or sweep.png beside the first flight)"
     add("--out", type=Path, metavar="FILE", help=out)
+    add_figure_options(parser)
     parser.set_defaults(run=run)
 
 
@@ -48,38 +55,39 @@ def run(arguments: argparse.Namespace) -> int:
     name = "flights.png" if others else "flight.png"
     out = arguments.out or folder / (name if sweep is None else "sweep.png")
     if sweep is not None:
-        figure = _sweep_figure(sweep, arguments.metrics, out)
+        draw = _sweep_figure(sweep, [*arguments.metrics, *arguments.panels])
     else:
-        figure = _flights_figure(arguments.flights, out)
-
-    from tiltsim.views.figures.style import save
-
-    save(figure, out)
+        draw = _flights_figure(arguments.flights, arguments)
+    prepare_figure("--out", out)
+    save_figure(draw, out, arguments, is_named=sweep is None)
     print_line(f"figure written to {out}")
     return 0
 
 
-def _flights_figure(paths: list[Path], out: Path) -> Figure:
+def _flights_figure(paths: list[Path], arguments: argparse.Namespace) -> Callable[[], Figure]:
     from tiltsim.flight.reading import load_flight
+    from tiltsim.views.titles import flight_names
 
     flights = [load_flight(path) for path in paths]
-    prepare_figure("--out", out)
-    if len(flights) > 1:
-        from tiltsim.views.figures.comparison import comparison_figure
-        from tiltsim.views.titles import flight_names
+    names = flight_names([flight.scenario for flight in flights], paths)
 
-        names = flight_names([flight.scenario for flight in flights], paths)
-        return comparison_figure(flights, names)
-    from tiltsim.views.vehicle_views import flight_figure
+    def draw() -> Figure:
+        from tiltsim.views.figures.plot import plot
 
-    return flight_figure(flights[0])
+        words = {"title": arguments.title, "labels": arguments.labels}
+        return plot(flights, panels=arguments.panels, names=names, **words)
+
+    return draw
 
 
-def _sweep_figure(folder: Path, metrics: list[str], out: Path) -> Figure:
+def _sweep_figure(folder: Path, metrics: list[str]) -> Callable[[], Figure]:
     from tiltsim.sweeps.dataset import load_results
 
     results = load_results(folder)
-    prepare_figure("--out", out)
-    from tiltsim.views.figures.sweep import sweep_figure
 
-    return sweep_figure(results, tuple(metrics))
+    def draw() -> Figure:
+        from tiltsim.views.figures.sweep import sweep_figure
+
+        return sweep_figure(results, tuple(metrics))
+
+    return draw

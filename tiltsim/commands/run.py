@@ -172,7 +172,7 @@ def fly(scenario: Scenario, arguments: argparse.Namespace) -> Flight:
 
 def summary(flight: Flight, verdicts: list[Verdict], *, judged: bool) -> str:
     """The flight in a few aligned lines, with or without a verdict on its expectations."""
-    from tiltsim.scenario.metric_names import unit_of
+    from tiltsim.scenario.metric_names import METRICS
 
     scenario, metrics = flight.scenario, flight.metrics()
     lines = [printable(scenario.title or scenario.address or "scenario")]
@@ -193,7 +193,8 @@ def summary(flight: Flight, verdicts: list[Verdict], *, judged: bool) -> str:
         lines += ["", *(expectation_lines(verdicts) if judged else _comparison_lines(verdicts))]
     lines.append("")
     lines += [
-        f"  {name:<{width}}  {_shown(metrics[name]):>12} {unit_of(name)}".rstrip() for name in shown
+        f"  {name:<{width}}  {_shown(metrics[name]):>12} {METRICS[name].unit}".rstrip()
+        for name in shown
     ]
     return "\n".join(lines)
 

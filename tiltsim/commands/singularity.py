@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.angles import allow_negative_lists, parse_angle, parse_vehicle
-from tiltsim.commands.options import Subparsers, add_json, add_plot, prepare_figure
+from tiltsim.commands.figure_options import add_plot, prepare_figure, save_figure
+from tiltsim.commands.options import Subparsers, add_json
 from tiltsim.commands.text import aligned, print_figure_path
 
 if TYPE_CHECKING:
@@ -40,9 +42,8 @@ def run(arguments: argparse.Namespace) -> int:
     report = _report(vehicle, *attitude)
     if arguments.plot is not None:
         from tiltsim.views.figures.quadrotor_singularity import singularity_figure
-        from tiltsim.views.figures.style import save
 
-        save(singularity_figure(vehicle), arguments.plot)
+        save_figure(partial(singularity_figure, vehicle), arguments.plot, arguments)
     print(json.dumps(report, indent=2) if arguments.json else _summary(report))
     print_figure_path(arguments)
     return 0

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 
 from tiltsim.flight.expectations import Verdict
 from tiltsim.report.statement import CHAPTER, Origin, Statement, slug
-from tiltsim.scenario.metric_names import METRICS, unit_of
+from tiltsim.scenario.metric_names import METRICS
 
 if TYPE_CHECKING:
     from tiltsim.scenario.expectation import Expectation
@@ -223,7 +223,7 @@ def scenario_claims(scenario: Scenario) -> list[ExpectationClaim]:
             key=slug(f"{_short(scenario.address)} {case}"),
             where=scenario.source,
             published=expectation.published,
-            unit=unit_of(expectation.metric),
+            unit=METRICS[expectation.metric].unit,
             tolerance=expectation.published_tolerance,
             in_kind=expectation.in_kind,
             why=expectation.why,
@@ -263,7 +263,8 @@ def _statement(scenario: Scenario, expectation: Expectation) -> Statement:
             fitted=table.fitted,
             finding=table.finding,
         )
-    words = expectation.claim or METRICS[expectation.metric].capitalize()
+    measured = METRICS[expectation.metric].described.capitalize()
+    words = expectation.claim or measured
     chapter = CHAPTER.match(scenario.source)
     assert chapter is not None
     return Statement(
@@ -271,5 +272,5 @@ def _statement(scenario: Scenario, expectation: Expectation) -> Statement:
         source=scenario.source,
         text=words,
         thesis=words,
-        criterion=f"{METRICS[expectation.metric].capitalize()}, compared with the published value.",
+        criterion=f"{measured}, compared with the published value.",
     )

@@ -14,7 +14,7 @@ from typing import Final
 
 from tiltsim.report.flights import PLANTS, FlightRecord, Flights, Plant, ReportEntry
 from tiltsim.report.statement import CHAPTER
-from tiltsim.scenario.metric_names import unit_of
+from tiltsim.scenario.metric_names import METRICS
 
 TITLE: Final = "Beyond the thesis"
 EXPLANATION: Final = (
@@ -83,7 +83,7 @@ def families(comparisons: list[Comparison]) -> Iterator[tuple[str, list[Comparis
 
 def quantity(comparison: Comparison) -> str:
     """Name and unit of the compared metric, as text."""
-    unit = unit_of(comparison.metric)
+    unit = METRICS[comparison.metric].unit
     return comparison.metric.replace("_", " ") + (f", {unit}" if unit else "")
 
 

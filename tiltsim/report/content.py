@@ -148,7 +148,9 @@ def criterion_text(claim: Claim) -> str:
         parts.append(f"tolerance {' and '.join(tolerances)} {claim.unit}".rstrip())
     elif isinstance(claim, ExpectationClaim) and claim.expectation.equals is None:
         low, high = claim.expectation.holds or (claim.expectation.min, claim.expectation.max)
-        parts.append(_range_text(METRICS[claim.expectation.metric], low, high, claim.unit))
+        parts.append(
+            _range_text(METRICS[claim.expectation.metric].described, low, high, claim.unit)
+        )
     if claim.in_kind is not None:
         parts.append("qualitatively: " + _range_text("value", *claim.in_kind, claim.unit))
     return "; ".join(parts) + "."

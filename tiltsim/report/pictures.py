@@ -15,6 +15,7 @@ from tiltsim.simulation.simulate import simulate
 from tiltsim.views.figures.attainable import attainable_figure
 from tiltsim.views.figures.determinant import determinant_figure
 from tiltsim.views.figures.gait import comparison_figure
+from tiltsim.views.figures.plot import plot
 from tiltsim.views.figures.quadrotor_singularity import singularity_figure
 from tiltsim.views.figures.tracking_errors import (
     PeriodErrors,
@@ -23,7 +24,6 @@ from tiltsim.views.figures.tracking_errors import (
     setpoint_figure,
 )
 from tiltsim.views.figures.two_color_map import map_figure
-from tiltsim.views.vehicle_views import flight_figure
 from tiltsim_controllers.analysis.published_gaits import PATHS, PUBLISHED_GAITS
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
@@ -49,7 +49,7 @@ def _flight_picture(chapter: int, name: str, caption: str, address: str) -> Pict
     """The page of one flight in MuJoCo, which is flown again."""
 
     def draw(metrics: object) -> Figure:
-        return flight_figure(simulate(variant_for(address, "mujoco")))
+        return plot(simulate(variant_for(address, "mujoco")))
 
     return Picture(chapter, name, caption, draw, ((address, "mujoco"),))
 

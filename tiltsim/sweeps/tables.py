@@ -281,6 +281,11 @@ class PlotTable(Table):
     log: Annotated[tuple[Literal["x", "y"], ...], Field(strict=False)] = Field(
         (), description="axes of lines with a logarithmic scale", examples=[["y"]]
     )
+    labels: dict[str, str] = Field(
+        {},
+        description="what the figure calls columns, with their units",
+        examples=[{"wind": "wind speed (m/s)"}],
+    )
 
 
 def dotted(tables: dict[str, Any], head: str = "") -> dict[str, Any]:

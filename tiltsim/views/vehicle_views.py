@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, Protocol
 
 from tiltsim.vehicles.rotorcraft import OTHER_LAYOUT, ROTORCRAFT
 from tiltsim.vehicles.tilt_car import TILT_CAR
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.closed_loop.vehicle_kind import VehicleKind
     from tiltsim.flight.flight import Flight
+    from tiltsim.views.figures.panels import Panel
     from tiltsim.views.rerun.display import VehicleDisplay
     from tiltsim.views.video.overlay import Overlay
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 class VehicleViews(Protocol):
     """The views of one kind of vehicle; methods import the libraries that they need."""
 
-    def figure(self, flight: Flight) -> Figure:
-        """One flight on a page."""
+    def panels(self) -> Mapping[str, Panel]:
+        """The panels of a flight's page, by name."""
 
     def overlay(self, flight: Flight, height: int) -> Overlay:
         """Camera and captions of a video of a flight, with frames of a height (pixels)."""
@@ -33,10 +33,10 @@ class VehicleViews(Protocol):
 class RotorcraftViews(VehicleViews):
     """Views of tiltrotor and quadrotor."""
 
-    def figure(self, flight: Flight) -> Figure:
-        from tiltsim.views.figures.rotorcraft import rotorcraft_figure
+    def panels(self) -> Mapping[str, Panel]:
+        from tiltsim.views.figures.rotorcraft import ROTORCRAFT_PANELS
 
-        return rotorcraft_figure(flight)
+        return ROTORCRAFT_PANELS
 
     def overlay(self, flight: Flight, height: int) -> Overlay:
         from tiltsim.views.video.overlay import RotorcraftOverlay
@@ -66,10 +66,10 @@ class OtherLayoutViews(RotorcraftViews):
 class TiltCarViews(VehicleViews):
     """Views of the tilt-car."""
 
-    def figure(self, flight: Flight) -> Figure:
-        from tiltsim.views.figures.tilt_car import tilt_car_figure
+    def panels(self) -> Mapping[str, Panel]:
+        from tiltsim.views.figures.tilt_car import TILT_CAR_PANELS
 
-        return tilt_car_figure(flight)
+        return TILT_CAR_PANELS
 
     def overlay(self, flight: Flight, height: int) -> Overlay:
         from tiltsim.views.video.overlay import TiltCarOverlay
@@ -92,8 +92,3 @@ VIEWS: Final[dict[VehicleKind, VehicleViews]] = {
 def views_of(assembly: Assembly) -> VehicleViews:
     """The views of an assembly's kind of vehicle."""
     return VIEWS[assembly.loop.kind]
-
-
-def flight_figure(flight: Flight) -> Figure:
-    """The page of a flight, with the panels of its kind of vehicle."""
-    return views_of(flight.assembly).figure(flight)

@@ -23,6 +23,7 @@ from tiltsim.closed_loop.limits import (
 )
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.parts import RotorLimits
+from tiltsim.system.quantity import SUBSCRIPTS, Quantity
 from tiltsim.vehicles.rotorcraft.layout import OBSERVED_FIELDS
 from tiltsim.vehicles.rotorcraft.metrics import rotorcraft_metrics
 from tiltsim_controllers.gaits.tilts import tilt_reference
@@ -39,21 +40,26 @@ if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan, Scenario
     from tiltsim.scenario.vehicle import VehicleTable
 
-COLUMN_UNITS: Final = {
-    "time": "s",
-    **dict.fromkeys(("x", "y", "z"), "m"),
-    **dict.fromkeys(("vx", "vy", "vz"), "m/s"),
-    **dict.fromkeys(("roll", "pitch", "yaw"), "rad"),
-    **dict.fromkeys(("p", "q", "r"), "rad/s"),
-    **{f"alpha_{i}": "rad" for i in ROTORS},
-    **{f"alpha_ref_{i}": "rad" for i in ROTORS},
-    **{f"alpha_rate_{i}": "rad/s" for i in ROTORS},
-    **{f"rotor_speed_{i}": "rad/s" for i in ROTORS},
-    **{f"thrust_{i}": "N" for i in ROTORS},
-    **dict.fromkeys(("x_ref", "y_ref", "z_ref"), "m"),
-    **dict.fromkeys(("roll_ref", "pitch_ref", "yaw_ref"), "rad"),
-    "singularity_margin": "rad",
-    "determinant": "1",
+COLUMNS: Final = {
+    "time": Quantity("time", "s"),
+    **{axis: Quantity(axis, "m") for axis in "xyz"},
+    **{f"v{axis}": Quantity(f"velocity along {axis}", "m/s") for axis in "xyz"},
+    **{angle: Quantity(angle, "rad") for angle in ("roll", "pitch", "yaw")},
+    **{
+        name: Quantity(f"body rate {name} about {axis}", "rad/s")
+        for name, axis in zip("pqr", "xyz", strict=True)
+    },
+    **{f"alpha_{i}": Quantity(f"tilt angle α{SUBSCRIPTS[i]}", "rad") for i in ROTORS},
+    **{f"alpha_ref_{i}": Quantity(f"planned tilt angle α{SUBSCRIPTS[i]}", "rad") for i in ROTORS},
+    **{
+        f"alpha_rate_{i}": Quantity(f"rate of tilt angle α{SUBSCRIPTS[i]}", "rad/s") for i in ROTORS
+    },
+    **{f"rotor_speed_{i}": Quantity(f"speed of rotor {i}", "rad/s") for i in ROTORS},
+    **{f"thrust_{i}": Quantity(f"thrust of rotor {i}", "N") for i in ROTORS},
+    **{f"{axis}_ref": Quantity(f"reference {axis}", "m") for axis in "xyz"},
+    **{f"{angle}_ref": Quantity(f"reference {angle}", "rad") for angle in ("roll", "pitch", "yaw")},
+    "singularity_margin": Quantity("singularity margin", "rad"),
+    "determinant": Quantity("determinant n · r₃", "1"),
 }
 
 
@@ -168,7 +174,7 @@ def _initial_motion(plan: FlightPlan) -> tuple[Vector, Vector]:
 
 ROTORCRAFT: Final = VehicleKind(
     observed_fields=OBSERVED_FIELDS,
-    columns=COLUMN_UNITS,
+    columns=COLUMNS,
     thrusts=rotor_thrusts,
     compile=_compile,
     initial_motion=_initial_motion,
@@ -181,6 +187,6 @@ SINGULARITY_COLUMNS: Final = ("singularity_margin", "determinant")
 
 OTHER_LAYOUT: Final = replace(
     ROTORCRAFT,
-    columns={name: unit for name, unit in COLUMN_UNITS.items() if name not in SINGULARITY_COLUMNS},
+    columns={name: what for name, what in COLUMNS.items() if name not in SINGULARITY_COLUMNS},
 )
 """A user's rotorcraft without four equal arms at right angles, of which those columns speak."""

@@ -14,6 +14,7 @@ from tiltsim.closed_loop.limits import (
     horizontal_error,
 )
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
+from tiltsim.system.quantity import Quantity
 from tiltsim.vehicles.tilt_car.metrics import tilt_car_metrics
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.mathematics.scalar import Floats, Vector, scalar
@@ -45,20 +46,24 @@ OBSERVED_FIELDS: Final = (
 SPEED_1, SPEED_2 = 8, 9
 """Where in a sample the rotor speeds lie."""
 
-COLUMN_UNITS: Final = {
-    "time": "s",
-    **dict.fromkeys(("x", "y"), "m"),
-    **dict.fromkeys(("vx", "vy"), "m/s"),
-    "yaw": "rad",
-    "r": "rad/s",
-    **dict.fromkeys(("alpha", "alpha_ref"), "rad"),
-    "alpha_rate": "rad/s",
-    **{f"rotor_speed_{i}": "rad/s" for i in ROTORS},
-    **{f"thrust_{i}": "N" for i in ROTORS},
-    **dict.fromkeys(("x_ref", "y_ref"), "m"),
-    **dict.fromkeys(("vx_ref", "vy_ref"), "m/s"),
-    **dict.fromkeys(("direction", "direction_lower", "direction_upper", "direction_ref"), "rad"),
-    "input_split": "rad^2/s^2",
+COLUMNS: Final = {
+    "time": Quantity("time", "s"),
+    **{axis: Quantity(axis, "m") for axis in "xy"},
+    **{f"v{axis}": Quantity(f"velocity along {axis}", "m/s") for axis in "xy"},
+    "yaw": Quantity("yaw", "rad"),
+    "r": Quantity("yaw rate r", "rad/s"),
+    "alpha": Quantity("tilt angle α", "rad"),
+    "alpha_ref": Quantity("planned tilt angle α", "rad"),
+    "alpha_rate": Quantity("rate of tilt angle α", "rad/s"),
+    **{f"rotor_speed_{i}": Quantity(f"speed of rotor {i}", "rad/s") for i in ROTORS},
+    **{f"thrust_{i}": Quantity(f"thrust of rotor {i}", "N") for i in ROTORS},
+    **{f"{axis}_ref": Quantity(f"reference {axis}", "m") for axis in "xy"},
+    **{f"v{axis}_ref": Quantity(f"reference velocity along {axis}", "m/s") for axis in "xy"},
+    "direction": Quantity("direction of the thrusts", "rad"),
+    "direction_lower": Quantity("lowest admissible direction", "rad"),
+    "direction_upper": Quantity("highest admissible direction", "rad"),
+    "direction_ref": Quantity("direction of the desired acceleration", "rad"),
+    "input_split": Quantity("ω₁² − ω₂²", "rad^2/s^2"),
 }
 """Columns of every flight of a car and their units.
 
@@ -136,7 +141,7 @@ def _initial_motion(plan: FlightPlan) -> tuple[Vector, Vector]:
 
 TILT_CAR: Final = VehicleKind(
     observed_fields=OBSERVED_FIELDS,
-    columns=COLUMN_UNITS,
+    columns=COLUMNS,
     thrusts=_thrusts,
     compile=_compile,
     initial_motion=_initial_motion,

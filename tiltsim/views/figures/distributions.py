@@ -56,14 +56,14 @@ def distributions_figure(results: SweepResults, metrics: tuple[str, ...]) -> Fig
             axes.set_xscale("log")
         axes.margins(x=0.1)  # room for the numbers
         axes.set_ylim(0.0, 1.03)
-        axes.set_xlabel(label_of(metric))
+        axes.set_xlabel(label_of(results, metric))
         axes.set_ylabel("share of flights at or below")
     if not keys:
         return figure
     panels = np.atleast_1d(below.subplots(1, len(keys), sharey=True))
     for axes, drawn in zip(panels, keys):
         _draw_scatter(axes, results, drawn, metrics[0], groups)
-    panels[0].set_ylabel(label_of(metrics[0]))
+    panels[0].set_ylabel(label_of(results, metrics[0]))
     if not completed_mask(results).all():
         panels[0].set_title("× terminated early", pad=10.0 + 6.0 * len(groups))
     return figure
@@ -180,6 +180,6 @@ def _draw_scatter(
         above = axes.get_xaxis_transform()
         (line,) = axes.plot(draws[ended], height, "x", color=color, ms=3.0, transform=above)
         line.set(mew=0.8, clip_on=False, in_layout=False)
-    axes.set_xlabel(label_of(key))
+    axes.set_xlabel(label_of(results, key))
     if spans_decades(values[completed]):
         axes.set_yscale("log")

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from math import pi
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from tiltsim.errors import InputError
+from tiltsim.scenario.messages import choose
 from tiltsim.studies.gait_analysis import NEARLY_SINGULAR
 from tiltsim.views.attitude_plane import MIN_DIRECTION_TILT
 from tiltsim.views.figures import style
+from tiltsim.views.figures.layout import add_legend, legend_over, new_page
 from tiltsim_controllers.analysis.singularity import (
     determinant,
     margin_over_gait,
@@ -25,37 +29,49 @@ if TYPE_CHECKING:
     from tiltsim_controllers.gaits.plans import Gait
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
-_CURVES = 24
+_CURVES: Final = 24
 """Instants of a period for which the curve of singular attitudes is drawn."""
 
 AREA, CURVE = "area", "curve"
 """Optional contents of a roll-pitch diagram."""
 
-_LAST_SHADE = 0.92
+_LAST_SHADE: Final = 0.92
 """Part of the colour map in use; the rest is too bright on white."""
 
+PANELS: Final = ("attitude_plane", "tilt_angles", "margin")
+"""Panels of the figure of a gait."""
 
-def gait_figure(gait: Gait, vehicle: Vehicle) -> Figure:
-    """Roll-pitch diagram of a gait and, if it moves, its angles and margin over a period."""
+
+def gait_figure(gait: Gait, vehicle: Vehicle, panels: Sequence[str] = ()) -> Figure:
+    """Roll-pitch diagram of a gait and, if it moves, its angles and margin over a period.
+
+    ``panels`` are some of `PANELS`.
+
+    Raises:
+        InputError: If a panel is unknown.
+    """
+    for name in panels:
+        if name not in PANELS:
+            raise InputError(f"panels: {name!r}: {choose(name, PANELS)}")
+    chosen = panels or (PANELS[:1] if gait.is_constant else PANELS)
+    over_time = [name for name in chosen if name != PANELS[0]]
     with style.paper_style():
-        if gait.is_constant:
-            figure = style.new_figure(4.2, 4.2)
-            axes: Any = figure.subplots()
-            _roll_pitch_legend(figure, _roll_pitch(axes, gait, vehicle), constant=True)
-            return figure
-        figure = style.new_figure(8.6, 4.2)
-        grid = figure.add_gridspec(2, 2, width_ratios=[1.05, 1.0])
-        diagram = figure.add_subplot(grid[:, 0])
-        shown = _roll_pitch(diagram, gait, vehicle)
-        if CURVE in shown:
-            _time_bar(figure, [diagram], gait)
-        _roll_pitch_legend(figure, shown)
-        upper = figure.add_subplot(grid[0, 1])
-        lower = figure.add_subplot(grid[1, 1], sharex=upper)
-        _angles(upper, gait)
-        _margin(lower, [(gait, "")], vehicle)
-        upper.tick_params(labelbottom=False)
-        return figure
+        page = new_page(len(over_time), len(chosen) - len(over_time))
+        for axes in page.square[:1]:
+            shown = _roll_pitch(axes, gait, vehicle)
+            if CURVE in shown:
+                _time_bar(axes.figure, [axes], gait)
+            _roll_pitch_legend(page.figure, shown, constant=gait.is_constant)
+        draw: dict[str, Callable[[Axes], None]] = {
+            "tilt_angles": lambda axes: _angles(axes, gait),
+            "margin": lambda axes: _margin(axes, [(gait, "")], vehicle),
+        }
+        for column in page.over_time:
+            for axes in column:
+                draw[over_time.pop(0)](axes)
+                axes.tick_params(labelbottom=axes is column[-1])
+                axes.set_xlabel("time (s)" if axes is column[-1] else "")
+        return page.figure
 
 
 def comparison_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure:
@@ -81,7 +97,7 @@ def margin_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure:
         figure = style.new_figure(5.4, 3.2)
         axes: Any = figure.subplots()
         _margin(axes, [(gait, label) for label, gait in gaits], vehicle)
-        axes.legend(ncols=len(gaits), loc="lower left", bbox_to_anchor=(0.0, 1.0))
+        legend_over(axes, "Singularity margin", len(gaits))
         return figure
 
 
@@ -95,27 +111,30 @@ def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> set[str]:
     period = gait.period or 1.0
     times = np.zeros(1) if gait.is_constant else np.arange(_CURVES) / _CURVES * period
     angles = gait.angles(times)
-    side = np.linspace(-pi / 2, pi / 2, 301)
-    roll, pitch = np.meshgrid(side, side)
+    edges = np.linspace(-pi / 2, pi / 2, 302)
+    roll, pitch = np.meshgrid(*[0.5 * (edges[1:] + edges[:-1])] * 2)
     level = determinant(angles[0], 0.0, 0.0, vehicle)
-    reachable = np.ones_like(roll, dtype=bool)
+    share = np.zeros_like(roll)
     for instant in angles:
-        reachable &= determinant(instant, roll, pitch, vehicle) * level > 0.0
+        share += (determinant(instant, roll, pitch, vehicle) * level <= 0.0) / len(angles)
     curves = [unacceptable_attitudes(instant, vehicle, 721) for instant in angles]
     singular = sum(curve.kind == "everywhere" for curve in curves)
 
-    if not singular:
-        axes.contourf(roll, pitch, reachable, levels=[0.5, 1.5], colors=[style.PALE])
+    values = singular_values(angles, vehicle)
+    conditioning = float((values[:, 2] / values[:, 0]).min())
+    nearly = not singular and conditioning < NEARLY_SINGULAR
+    if singular or nearly:
+        share = np.full_like(share, singular / len(curves) or 1.0)
+    style.shade_share(axes, edges, share)
+    axes.grid(False)
     colors = colormaps[style.SEQUENTIAL](np.arange(len(curves)) / len(curves) * _LAST_SHADE)
     n = np.nan_to_num(torque_free_direction(angles, vehicle))
     drawn = np.hypot(n[:, 0], n[:, 1]) > MIN_DIRECTION_TILT
     for curve, color, is_drawn in zip(curves, colors, drawn, strict=True):
         if is_drawn:
-            line = style.RED if len(curves) == 1 else color
+            line = style.SINGULAR if len(curves) == 1 else color
             axes.plot(curve.roll, curve.pitch, color=line, lw=1.3)
-    values = singular_values(angles, vehicle)
-    conditioning = float((values[:, 2] / values[:, 0]).min())
-    if not singular and conditioning < NEARLY_SINGULAR:
+    if nearly:
         ratio = f"{conditioning:.0e}".replace("e-0", "e−")
         _note(axes, 0.75, f"nearly singular at every attitude:\nσ₃/σ₁ of τ is {ratio}")
     elif not singular and not drawn.any():
@@ -124,13 +143,12 @@ def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> set[str]:
         text = "singular at every attitude"
         if singular < len(curves):
             text += f",\nat {singular} of {len(curves)} instants"
-        axes.set_facecolor("#F3F3F3")
         _note(axes, 0.75 if singular < len(curves) else 0.35, text)
     axes.plot(0.0, 0.0, "+", color=style.INK, ms=8, mew=1.2)
     style.roll_pitch_axes(axes)
     axes.set_title(f"Singular attitudes, {gait.name}")
     shown = {CURVE} if drawn.any() else set()
-    return shown | ({AREA} if reachable.any() and not singular else set())
+    return shown | ({AREA} if share.any() and not nearly and singular < len(curves) else set())
 
 
 def _note(axes: Axes, height: float, text: str) -> None:
@@ -138,7 +156,7 @@ def _note(axes: Axes, height: float, text: str) -> None:
     axes.text(0.0, height, text, ha="center", va="center", color=style.INK, bbox=box, zorder=8)
 
 
-def _time_bar(figure: Figure, diagrams: list[Axes], gait: Gait) -> None:
+def _time_bar(figure: Any, diagrams: list[Axes], gait: Gait) -> None:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
@@ -154,23 +172,24 @@ def _roll_pitch_legend(figure: Figure, shown: set[str], *, constant: bool = Fals
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    line = style.RED if constant else style.GREY
-    reachable = "reachable" if constant else "reachable at all times"
+    line = style.SINGULAR if constant else style.GREY
+    unreachable = "unreachable" if constant else "unreachable, darker where for longer"
     marks = {
-        AREA: Patch(facecolor=style.PALE, edgecolor=style.GREY, linewidth=0.4, label=reachable),
+        AREA: Patch(facecolor=style.UNREACHABLE, label=unreachable),
         CURVE: Line2D([], [], color=line, lw=1.3, label="singular"),
     }
     handles = [mark for name, mark in marks.items() if name in shown]
     handles.append(Line2D([], [], color=style.INK, marker="+", ls="", ms=8, mew=1.2, label="level"))
-    figure.legend(handles=handles, loc="outside lower left", ncols=3)
+    add_legend(figure, handles)
 
 
 def _angles(axes: Axes, gait: Gait) -> None:
     times = gait.sample_times(401)
     for name, angle, line in zip("₁₂₃₄", gait.angles(times).T, style.ROTOR_LINES, strict=True):
         axes.plot(times, angle, label=f"α{name}", **line)
-    axes.set_ylabel("tilt angle (rad)")
-    axes.legend(ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
+    axes.set_xlim(0.0, times[-1])
+    axes.set_ylabel("rad")
+    legend_over(axes, "Tilt angles")
 
 
 def _margin(axes: Axes, gaits: list[tuple[Gait, str]], vehicle: Vehicle) -> None:
@@ -189,4 +208,5 @@ def _margin(axes: Axes, gaits: list[tuple[Gait, str]], vehicle: Vehicle) -> None
     axes.set_ylim(low * 1.05 if lowest < -0.05 else -0.12, pi / 2 * 1.05)
     axes.set_xlim(0.0, longest)
     axes.set_xlabel("time (s)")
-    axes.set_ylabel("singularity margin (rad)")
+    axes.set_ylabel("rad")
+    axes.set_title("Singularity margin")

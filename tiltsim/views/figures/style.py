@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from math import pi
-from typing import TYPE_CHECKING, Any, Final
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+from tiltsim.errors import InputError
 from tiltsim.system.files import replacing
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from tiltsim_controllers.mathematics.scalar import Floats
 
 # After Okabe and Ito; each pair also differs in lightness, so that grey prints stay legible.
 BLUE: Final = "#0072B2"
@@ -65,11 +69,13 @@ UNREACHABLE: Final = "#F3D3C3"
 """The shade of what lies beyond singular attitudes or is as good as singular, in every figure."""
 
 _SETTINGS: Final = {
-    "font.family": "sans-serif",
+    "font.family": ["sans-serif"],
     "font.sans-serif": ["DejaVu Sans"],
-    "font.size": 9,
-    "axes.titlesize": 9.5,
-    "axes.labelsize": 9,
+    "font.size": 9.0,
+    "figure.titlesize": "large",
+    "figure.titleweight": "bold",
+    "axes.titlesize": "medium",
+    "axes.labelsize": "medium",
     "axes.edgecolor": INK,
     "axes.linewidth": 0.7,
     "axes.labelcolor": INK,
@@ -82,31 +88,157 @@ _SETTINGS: Final = {
     "grid.linewidth": 0.5,
     "xtick.color": INK,
     "ytick.color": INK,
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
-    "legend.fontsize": 8,
+    "xtick.labelsize": "small",
+    "ytick.labelsize": "small",
+    "legend.fontsize": "small",
+    "legend.title_fontsize": "small",
     "legend.frameon": False,
     "lines.linewidth": 1.4,
-    "figure.dpi": 100,
-    "savefig.dpi": 160,
+    "figure.dpi": 100.0,
+    "savefig.dpi": 160.0,
     "svg.hashsalt": "tiltsim",
     "pdf.fonttype": 42,
 }
 
+_GLYPHS: Final = "DejaVu Sans"
+"""The font, part of matplotlib, of letters that the chosen ones lack, such as subscripts."""
 
-def line_style(number: int) -> dict[str, Any]:
-    """Colour and dashes of the line with this number, from 0."""
-    return {"color": CYCLE[number % len(CYCLE)], "ls": DASHES[number % len(DASHES)]}
+
+class Size(NamedTuple):
+    """Width and, unless the content decides, height of a figure, inches."""
+
+    width: float
+    height: float | None = None
+
+
+_styled: ContextVar[bool] = ContextVar("styled", default=False)
+_size: ContextVar[Size | None] = ContextVar("size", default=None)
+
+PRINT_DPI: Final = 300.0
+"""Resolution of pixel formats of a figure whose size is given, unless the user sets another."""
+
+
+_LENGTH: Final = r"(\d+(?:\.\d*)?|\.\d+)\s*(mm|cm|in)?"
+_SIZE: Final = re.compile(rf"{_LENGTH}(?:\s*x\s*{_LENGTH})?")
+_INCHES: Final = {"in": 1.0, "cm": 1.0 / 2.54, "mm": 1.0 / 25.4}
+_ALLOWED: Final = (0.5, 80.0)
+"""Smallest and largest width or height of a figure, inches."""
+
+
+def parse_size(name: str, size: str | tuple[float, float] | None) -> Size | None:
+    """A size from a text such as "85mm x 60mm", "3.3x2.4in" or "85mm", or in inches.
+
+    Raises:
+        InputError: If ``size``, the value of ``name``, is neither.
+    """
+    if size is None:
+        return None
+    if isinstance(size, str):
+        found = _SIZE.fullmatch(size.strip())
+        if found is None:
+            raise InputError(f"{name}: {size!r}: write such as 85mm, 85x60mm or 3.3x2.4in")
+        width, unit, height, height_unit = found.groups()
+        last = height_unit or unit
+        if last is None:
+            raise InputError(f"{name}: {size!r}: add mm, cm or in")
+        scale = _INCHES[unit or last]
+        inches = Size(float(width) * scale, float(height) * _INCHES[last] if height else None)
+    else:
+        inches = Size(*size)
+    low, high = _ALLOWED
+    if not all(side is None or low <= side <= high for side in inches):
+        raise InputError(f"{name}: {size!r}: must be from {low:g} to {high:g} inches")
+    return inches
 
 
 @contextmanager
-def paper_style() -> Iterator[None]:
-    """Apply the common style within this context."""
-    from cycler import cycler
-    from matplotlib import rc_context
+def paper_style(file: Path | None = None, size: Size | None = None) -> Iterator[None]:
+    """Apply the common style within this context, below the user's own settings.
 
-    with rc_context({**_SETTINGS, "axes.prop_cycle": cycler(color=CYCLE)}):
-        yield
+    Those are what a matplotlib style ``file`` sets, what differs from matplotlib's defaults, and
+    what the user's matplotlibrc sets. Contexts within this one only change the ``size`` of figures.
+
+    Raises:
+        InputError: If the file cannot be read.
+    """
+    from cycler import cycler
+    from matplotlib import rc_context, rcParams
+
+    outer = _size.set(size if size is not None else _size.get())
+    try:
+        if _styled.get():
+            yield
+            return
+        own = {} if file is None else _style_of(file)
+        common = {**_SETTINGS, "axes.prop_cycle": cycler(color=CYCLE)}
+        common |= {} if size is None else {"savefig.dpi": PRINT_DPI}
+        for key in _users_settings(common):
+            del common[key]
+        inner = _styled.set(True)
+        try:
+            with rc_context({**common, **own}):
+                families = dict.fromkeys([*rcParams["font.family"], _GLYPHS])
+                rcParams["font.family"] = list(families)
+                yield
+        finally:
+            _styled.reset(inner)
+    finally:
+        _size.reset(outer)
+
+
+def _users_settings(keys: Iterable[str]) -> set[str]:
+    """Those of some settings that the user has changed or named in a matplotlibrc."""
+    import matplotlib
+
+    # All of `rcParams` cannot be read without choosing a backend.
+    changed = {key for key in keys if matplotlib.rcParams[key] != matplotlib.rcParamsDefault[key]}
+    file = Path(matplotlib.matplotlib_fname())
+    if not file.is_relative_to(matplotlib.get_data_path()):
+        named = matplotlib.rc_params_from_file(file, use_default_template=False)
+        changed |= set(keys) & set(named)
+    return changed
+
+
+def _style_of(file: Path) -> dict[str, Any]:
+    """The settings of a matplotlib style, given as a file or by its name."""
+    import matplotlib
+    from matplotlib import style as styles
+
+    if str(file) in styles.library:
+        return dict(styles.library[str(file)])
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            return dict(matplotlib.rc_params_from_file(file, use_default_template=False))
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "is no text"
+        raise InputError(
+            f"--style {file}: {reason}; give a matplotlib style file, or one of "
+            f"{', '.join(sorted(name for name in styles.available if name[0] != '_'))}"
+        ) from error
+
+
+def line_style(number: int) -> dict[str, Any]:
+    """Colour and dashes of the line with this number, from 0."""
+    return {"color": cycle_color(number), "ls": DASHES[number % len(DASHES)]}
+
+
+def marked_line(number: int, samples: int) -> dict[str, Any]:
+    """Colour and markers of the line with this number, from 0, with so many samples.
+
+    Dashes would vanish in dense oscillations; the few markers of each line have their own places.
+    """
+    every = max(1, samples // 8)
+    look = {"color": cycle_color(number), "marker": MARKERS[number % len(MARKERS)], "ms": 4.5}
+    return {**look, "mfc": "white", "markevery": (every * (number + 1) // 8, every)}
+
+
+def cycle_color(number: int) -> str:
+    """The colour of the line with this number, from 0: `CYCLE`, unless the user has another."""
+    from matplotlib import rcParams
+
+    colors = rcParams["axes.prop_cycle"].by_key().get("color", CYCLE)
+    return str(colors[number % len(colors)])
 
 
 def verbatim(text: str) -> str:
@@ -115,10 +247,24 @@ def verbatim(text: str) -> str:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of the given size (inches) with constrained layout."""
+    """An empty figure with constrained layout.
+
+    It has the size of the context or, without one, this size (inches); with the width alone given,
+    the same proportions.
+    """
     from matplotlib.figure import Figure
 
+    asked = _size.get()
+    if asked is not None:
+        height = asked.height or height * asked.width / width
+        width = asked.width
     return Figure(figsize=(width, height), layout="constrained")
+
+
+def figure_width(natural: float) -> float:
+    """The width (inches) that a new figure will have if this is its natural one."""
+    asked = _size.get()
+    return natural if asked is None else asked.width
 
 
 def angle_axis(axes: Axes, axis: str, limit: float) -> None:
@@ -137,6 +283,28 @@ def roll_pitch_axes(axes: Axes) -> None:
     angle_axis(axes, "x", pi / 2)
     angle_axis(axes, "y", pi / 2)
     axes.set(xlabel="roll φ (rad)", ylabel="pitch θ (rad)", aspect="equal")
+
+
+def shade_share(axes: Axes, edges: Floats, share: Floats) -> None:
+    """Shade a plane by the share (0 to 1) of the time at which its points are unreachable."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    shades = LinearSegmentedColormap.from_list("unreachable", ["#FFFFFF", UNREACHABLE])
+    axes.pcolormesh(edges, edges, share, cmap=shades, vmin=0.0, vmax=1.0, rasterized=True)
+
+
+def legend_below(axes: Axes, columns: int = 4) -> None:
+    """A legend below the x label, in as many columns as fit."""
+    from matplotlib import rcParams
+
+    look: dict[str, Any] = {"loc": "upper center", "handlelength": 1.4, "columnspacing": 1.2}
+    below = -4.2 * rcParams["font.size"] * axes.figure.dpi / 72.0
+    box = axes.get_window_extent()
+    for number in range(columns, 0, -1):
+        anchor = (0.5, below / box.height)
+        legend = axes.legend(ncols=number, bbox_to_anchor=anchor, **look)
+        if legend.get_window_extent().width <= 1.15 * box.width:
+            return
 
 
 def zero_lines(axes: Axes, which: str = "xy") -> None:

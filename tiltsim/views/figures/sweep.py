@@ -151,7 +151,7 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
                 heights = np.full(len(missing), 0.03 + 0.04 * (len(groups) - 1 - number))
                 bottom = axes.get_xaxis_transform()
                 axes.plot(missing, heights, "x", color=color, ms=4, transform=bottom)
-            axes.set(title=title, xlabel=label_of(x), ylabel=label_of(metric))
+            axes.set(title=title, xlabel=label_of(results, x), ylabel=label_of(results, metric))
     for axis in results.points.sweep.plot.log:
         for axes in grid.flat:
             getattr(axes, f"set_{axis}scale")("log")
@@ -213,8 +213,8 @@ def _map_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
             )
             ended = mask & ~completed
             axes.plot(abscissa[ended], ordinate[ended], "x", color=RED, ms=4, ls="none")
-            axes.set(title=title, xlabel=label_of(x), ylabel=label_of(y))
-        figure.colorbar(image, ax=list(row), label=label_of(metric))
+            axes.set(title=title, xlabel=label_of(results, x), ylabel=label_of(results, y))
+        figure.colorbar(image, ax=list(row), label=label_of(results, metric))
     if not completed.all():
         figure.supxlabel("× terminated early", x=0.99, ha="right", fontsize=8, color=RED)
     return figure
@@ -242,7 +242,7 @@ def _boundary_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure
             always, never = np.isnan(first), np.isnan(last)
             axes.plot(line[always], last[always], "^", ms=6, color=color)
             axes.plot(line[never], first[never], "x", ms=6, color=color)
-        axes.set(title=title, xlabel=label_of(x), ylabel=f"last {bisect.key} that holds")
+        axes.set(title=title, xlabel=label_of(results, x), ylabel=f"last {bisect.key} that holds")
     _share_limits(grid)
     add_legend(grid[0][0], lines)
     _boundary_key(grid[0][-1], holds, fails)
@@ -281,7 +281,7 @@ def _plane_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure:
             axes.plot(x[always], y[always], "^", ms=width + 4.5, color=color)
         zero_lines(axes)
         axes.set_aspect("equal", adjustable="datalim")
-        axes.set(title=title, xlabel=label_of(plot.x), ylabel=label_of(plot.y))
+        axes.set(title=title, xlabel=label_of(results, plot.x), ylabel=label_of(results, plot.y))
         add_legend(axes, plot.lines)
     for axes in grid.flat[len(columns) :]:
         axes.set_axis_off()

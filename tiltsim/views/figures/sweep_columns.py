@@ -3,36 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tiltsim.scenario.metric_names import METRICS, unit_of
+from tiltsim.scenario.key_units import quantity_of_key
+from tiltsim.scenario.metric_names import METRICS
 from tiltsim.sweeps.dataset import Column, SweepResults
 from tiltsim.sweeps.tables import NormalAxis, UniformAxis
 from tiltsim.views.figures.style import verbatim
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-_KEY_UNITS: Final = {
-    "gait.period": "s",
-    "gait.amplitude": "rad",
-    "gait.angles": "rad",
-    "initial.attitude": "rad",
-    "initial.position": "m",
-    "simulation.duration": "s",
-    "simulation.control_timestep": "s",
-    "simulation.control_latency": "s",
-    "sensors.attitude_noise": "rad",
-    "vehicle.mass": "kg",
-    "vehicle.rotor_time_constant": "s",
-    "vehicle.rotor_inertia": "kg m^2",
-    "vehicle.tilt_servo.natural_frequency": "rad/s",
-    "vehicle.tilt_servo.max_rate": "rad/s",
-    "wind": "m/s",
-    "wind_direction": "rad",
-}
 
 
 def sampled_keys(results: SweepResults) -> list[str]:
@@ -73,11 +55,12 @@ def text_of(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float | int) else verbatim(str(value))
 
 
-def label_of(name: str) -> str:
-    """A column's name with its unit if known."""
-    key = name.partition("[")[0]
-    unit = unit_of(name) if name in METRICS else _KEY_UNITS.get(key, "")
-    return f"{name} ({unit})" if unit else name
+def label_of(results: SweepResults, name: str) -> str:
+    """What the sweep's ``[plot]`` table or else tiltsim calls a column, with its unit if known."""
+    own = results.points.sweep.plot.labels.get(name)
+    if own is not None:
+        return verbatim(own)
+    return (METRICS[name].quantity if name in METRICS else quantity_of_key(name)).text
 
 
 def add_legend(axes: Axes, title: str | None) -> None:

@@ -1,4 +1,4 @@
-"""The figure of a tilt-car's flight, with the panels of ch. 10 and 11."""
+"""The panels of a tilt-car's flight (ch. 10 and 11)."""
 
 from __future__ import annotations
 
@@ -8,51 +8,39 @@ import numpy as np
 
 from tiltsim.scenario.gait import PenguinGait
 from tiltsim.views.figures import style
-from tiltsim.views.figures.flight_layout import (
-    SIZE,
-    add_headings,
-    label,
-    legend_below,
-    plan_view,
-    widen,
-)
+from tiltsim.views.figures.layout import legend_over
+from tiltsim.views.figures.panels import Panel, of_one, plan_view, widen
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from tiltsim.flight.flight import Flight
 
 SHOWN_TIME: Final = 10.0
 """Last part (s) of a flight more than twice as long for which the direction is drawn."""
 
+SETTLED: Final = 0.02
+"""Share of the largest error below which a flight has settled, and its errors go on a log scale."""
 
-def tilt_car_figure(flight: Flight) -> Figure:
-    """Errors, inputs, directions and plan view."""
-    with style.paper_style():
-        figure = style.new_figure(*SIZE)
-        add_headings(figure, flight)
-        halves: Any = figure.subfigures(1, 2, width_ratios=[1.75, 1.0])
-        left, right = halves
-        series: Any = left.subplots(4, 1)
-        last = _direction_error if "lyapunov" not in flight.columns else _lyapunov
-        for axes, panel in zip(series, (_errors, _inputs, _direction, last), strict=True):
-            panel(axes, flight)
-        series[-1].set_xlabel("time (s)")
-        above, below = right.subplots(2, 1)
-        plan_view(above, flight)
-        _portrait(below, flight)
-        return figure
+SMALLEST_ERROR: Final = 1e-9
+"""Lower end (m) of the logarithmic scale of errors."""
 
 
 def _errors(axes: Axes, flight: Flight) -> None:
-    style.zero_lines(axes, "x")
-    for axis, line in zip("xy", style.AXIS_LINES):
-        error = flight[f"{axis}_ref"] - flight[axis]
-        axes.plot(flight["time"], error, label=axis, **line)
-    _whole(axes, flight)
-    widen(axes, 1e-6)
-    label(axes, "Dynamic state error, reference minus actual", "m")
+    errors = {axis: flight[f"{axis}_ref"] - flight[axis] for axis in "xy"}
+    size = np.max(np.abs([*errors.values()]), axis=0)
+    decays = size[len(size) // 10 :].max() < SETTLED * size.max()
+    for (axis, error), line in zip(errors.items(), style.AXIS_LINES):
+        values = np.maximum(np.abs(error), SMALLEST_ERROR) if decays else error
+        axes.plot(flight["time"], values, label=axis, **line)
+    axes.set_ylabel("m")
+    if decays:
+        axes.set_yscale("log")
+        legend_over(axes, "Position error, absolute value")
+    else:
+        style.zero_lines(axes, "x")
+        widen(axes, 1e-6)
+        legend_over(axes, "Position error, reference minus actual")
 
 
 def _inputs(axes: Axes, flight: Flight) -> None:
@@ -65,8 +53,8 @@ def _inputs(axes: Axes, flight: Flight) -> None:
     later = time >= min(2.0, 0.5 * time[-1])  # the values at the start may be far larger
     top = max(float((flight[f"rotor_speed_{rotor}"] ** 2)[later].max()) for rotor in (1, 2))
     axes.set_ylim(-0.04 * top, 1.6 * top)
-    _whole(axes, flight)
-    label(axes, "Inputs squared", "rad²/s²")
+    axes.set_ylabel("rad²/s²")
+    legend_over(axes, "Inputs squared")
 
 
 def _direction(axes: Axes, flight: Flight) -> None:
@@ -76,40 +64,39 @@ def _direction(axes: Axes, flight: Flight) -> None:
     middle, lower, upper, desired = (
         flight[f"direction{name}"][shown] for name in ("", "_lower", "_upper", "_ref")
     )
-    axes.fill_between(time[shown], lower, upper, color=style.PALE, lw=0.0, label="admissible")
-    axes.plot(time[shown], middle, color=style.AMBER, lw=2.2, label="middle")
-    dashes = (0, (4, 2))
-    axes.plot(
-        time[shown], desired, color=style.INK, lw=1.1, ls=dashes, label="desired acceleration"
-    )
-    axes.set_xlim(begin, time[-1])
-    label(axes, "Direction of the thrusts", "rad")
+    axes.plot(time[shown], middle, color=style.AMBER, lw=2.2, label="middle of the thrusts")
+    text = "desired acceleration"
+    axes.plot(time[shown], desired, color=style.INK, lw=1.1, ls=(0, (4, 2)), label=text)
+    axes.margins(y=0.15)
+    low, high = axes.get_ylim()
+    shade: dict[str, Any] = {"color": style.UNREACHABLE, "lw": 0.0, "zorder": 0.5}
+    axes.fill_between(time[shown], low, lower, **shade, label="inadmissible")
+    axes.fill_between(time[shown], upper, high, **shade)
+    axes.set(xlim=(begin, time[-1]), ylim=(low, high), ylabel="rad")
+    if begin > 0.0:
+        axes.set_xlabel(f"time (s), the last {SHOWN_TIME:g} s")
+    legend_over(axes, "Direction")
 
 
 def _direction_error(axes: Axes, flight: Flight) -> None:
     time = flight["time"]
     half = flight.scenario.tilt_car.half_angle
     difference = flight["direction_ref"] - flight["direction"]
-    axes.fill_between(time, -half, half, color=style.PALE, lw=0.0)
     style.zero_lines(axes, "x")
-    axes.plot(time, difference, color=style.GREEN)
+    axes.plot(time, difference, color=style.GREEN, label="desired minus middle")
     later = time >= min(2.0, 0.5 * time[-1])
     limit = max(1.15 * half, 1.1 * float(np.abs(difference[later]).max()))
-    axes.set_ylim(-limit, limit)
-    _whole(axes, flight)
-    title = "Desired acceleration relative to the middle of the thrusts; shaded: admissible"
-    label(axes, title, "rad")
+    axes.axhspan(half, limit, color=style.UNREACHABLE, lw=0.0, label="inadmissible")
+    axes.axhspan(-limit, -half, color=style.UNREACHABLE, lw=0.0)
+    axes.set(ylim=(-limit, limit), ylabel="rad")
+    legend_over(axes, "Direction error")
 
 
 def _lyapunov(axes: Axes, flight: Flight) -> None:
     axes.plot(flight["time"], flight["lyapunov"], color=style.GREEN)
-    _whole(axes, flight)
     widen(axes, 1e-6)
-    label(axes, "Lyapunov candidate, ½ ė² + ½ K e², along y", "m²/s²")
-
-
-def _whole(axes: Axes, flight: Flight) -> None:
-    style.time_axis(axes, flight["time"][-1])
+    axes.set_ylabel("m²/s²")
+    legend_over(axes, "Lyapunov candidate, ½ ė² + ½ K e², along y")
 
 
 def _portrait(axes: Axes, flight: Flight) -> None:
@@ -129,4 +116,16 @@ def _portrait(axes: Axes, flight: Flight) -> None:
     axes.margins(0.08)
     title = "Error along y and its rate"
     axes.set(xlabel="error e_y (m)", ylabel="rate of the error (m/s)", title=title)
-    legend_below(axes)
+    style.legend_below(axes)
+
+
+TILT_CAR_PANELS: Final[dict[str, Panel]] = {
+    "position_error": of_one(_errors),
+    "inputs": of_one(_inputs),
+    "direction": of_one(_direction),
+    "direction_error": of_one(_direction_error, unless="lyapunov"),
+    "lyapunov": of_one(_lyapunov, needs="lyapunov"),
+    "path": of_one(plan_view, over_time=False),
+    "portrait": of_one(_portrait, over_time=False),
+}
+"""The panels of a tilt-car's page, by name."""

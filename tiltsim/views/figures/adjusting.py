@@ -1,0 +1,62 @@
+"""Titles and labels of finished figures, replaced by the user's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from tiltsim.errors import InputError
+from tiltsim.scenario.messages import choose
+from tiltsim.scenario.metric_names import METRICS
+from tiltsim.views.figures import style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from matplotlib.text import Text
+
+
+def retitle(figure: Figure, title: str | None) -> None:
+    """Replace the title of a figure, or of its only panel; empty for none, None for no change."""
+    if title is None:
+        return
+    single = [axes for axes in figure.axes if axes.get_title(loc="left")]
+    if len(figure.axes) == 1 and single:
+        figure.axes[0].set_title(style.verbatim(title))
+    else:
+        figure.suptitle(style.verbatim(title), x=0.01, ha="left", wrap=True)
+
+
+def relabel(figure: Figure, labels: Mapping[str, str]) -> None:
+    """Replace labels of axes, panels and legends; a unit in brackets behind them stays.
+
+    ``labels`` are the new texts by what the figure says now, or by the name of a metric.
+
+    Raises:
+        InputError: If the figure does not say it.
+    """
+    if not labels:
+        return
+    texts = [text for text in _texts(figure) if text.get_text()]
+    for name, new in labels.items():
+        old = METRICS[name].label if name in METRICS else style.verbatim(name)
+        found = False
+        for text in texts:
+            said = text.get_text().replace("\n", " ")
+            label, bracket, unit = said.partition(" (")
+            if said == old or label == old:
+                text.set_text(style.verbatim(new) + ("" if said == old else bracket + unit))
+                found = True
+        if not found:
+            known = [*dict.fromkeys(text.get_text().partition(" (")[0] for text in texts)]
+            raise InputError(f"label {name!r}: {choose(name, known)}")
+
+
+def _texts(figure: Figure) -> Iterator[Text]:
+    """The labels, titles and legends of a figure."""
+    for axes in figure.axes:
+        yield from (axes.xaxis.label, axes.yaxis.label)
+        legend = axes.get_legend()
+        yield from (axes.title, axes._left_title)  # type: ignore[attr-defined]
+        yield from [] if legend is None else [*legend.get_texts(), legend.get_title()]
+    for legend in figure.legends:
+        yield from [*legend.get_texts(), legend.get_title()]

@@ -1,0 +1,144 @@
+"""Layout of figures at any size: panels in columns, and headings and legends that fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import ceil
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from tiltsim.views.figures import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
+    from matplotlib.text import Text
+
+MIN_COLUMN: Final = 2.9
+"""Width (inches) that a column of panels needs."""
+
+ROW: Final = 1.75
+"""Height (inches) of a panel over time, unless the height of the figure is given."""
+
+MAX_STACK: Final = 3
+"""Panels over time in one column before a second one is begun, if there is room."""
+
+
+class Page(NamedTuple):
+    """A figure with axes for panels over time, in columns, and for square ones."""
+
+    figure: Figure
+    over_time: list[list[Axes]]
+    square: list[Axes]
+
+
+def new_page(over_time: int, square: int) -> Page:
+    """An empty page for so many panels over time, on the left, and square ones, right or below."""
+    many = over_time > MAX_STACK
+    natural = (8.4 if many else 5.4 if over_time else 0.0) + min(
+        square, 3 if not over_time else 1
+    ) * (3.0 if over_time else 4.2)
+    width = style.figure_width(natural)
+    columns = 0 if not over_time else 2 if many and width >= 2 * MIN_COLUMN else 1
+    rows = ceil(over_time / columns) if columns else 0
+    beside = bool(columns and square) and width >= (columns + 1) * MIN_COLUMN
+    across = 1 if beside else max(1, min(square, int(width / MIN_COLUMN)))
+    side = width / (columns + 1) if beside else min(width / across, 4.2)
+    height_over_time, height_square = ROW * rows, 0.92 * side * ceil(square / across)
+    stacked = height_over_time + height_square
+    height = max(height_over_time, height_square) if beside else stacked
+    figure = style.new_figure(width, height + 0.85)
+    left: Any = figure
+    right: Any = figure
+    halves: Any = figure.subfigures
+    if columns and square:
+        if beside:
+            left, right = halves(1, 2, width_ratios=[1.05 * columns, 1.0])
+        else:
+            shares = [height_over_time, height_square]
+            left, right = halves(2, 1, height_ratios=shares)
+    series: Any = left.subplots(rows, columns, squeeze=False) if columns else []
+    placed = [[*column] for column in zip(*series)]
+    for axes in placed[-1][over_time - rows * columns :] if over_time < rows * columns else []:
+        axes.remove()
+        placed[-1].remove(axes)
+    squares: list[Axes] = []
+    if square:
+        cells: Any = right.subplots(ceil(square / across), across, squeeze=False)
+        squares = [*cells.flat]
+        for axes in squares[square:]:
+            axes.remove()
+        del squares[square:]
+    return Page(figure, placed, squares)
+
+
+def add_heading(figure: Figure, title: str, more: str = "", legend: Sequence[Any] = ()) -> None:
+    """Write what stands above the panels, wrapped to the width.
+
+    Args:
+        figure: Without a title or legend.
+        title: Its title.
+        more: A line of facts, in grey.
+        legend: Handles of a legend.
+    """
+    from matplotlib import rcParams
+
+    width, height = figure.get_size_inches() * figure.dpi
+    gap = 0.07 * figure.dpi
+    top = height - gap
+    looks: list[tuple[str, dict[str, Any]]] = [
+        (title, {"size": rcParams["figure.titlesize"], "weight": rcParams["figure.titleweight"]}),
+        (more, {"color": "#555555"}),
+    ]
+    for text, look in looks:
+        if text:
+            written = figure.text(2.0 * gap / width, top / height, text, va="top", **look)
+            wrap(written, width - 4.0 * gap)
+            top -= written.get_window_extent().height + gap
+    if legend:
+        place = {"bbox_to_anchor": (1.6 * gap / width, top / height), "borderaxespad": 0.0}
+        drawn = add_legend(figure, legend, loc="upper left", borderpad=0.0, **place)
+        top -= drawn.get_window_extent().height + gap
+    layout: Any = figure.get_layout_engine()
+    layout.set(rect=(0.0, 0.0, 1.0, top / height))
+
+
+def add_legend(figure: Figure, handles: Sequence[Any], **look: Any) -> Legend:
+    """A legend of the whole figure, below it by default, in as many columns as fit."""
+    width = 0.96 * figure.get_size_inches()[0] * figure.dpi
+    look = {"loc": "outside lower center", **look}
+    columns = len(handles)
+    while True:
+        legend = figure.legend(handles=handles, ncols=columns, **look)
+        if columns == 1 or legend.get_window_extent().width <= width:
+            return legend
+        legend.remove()
+        columns -= 1
+
+
+def wrap(text: Text, width: float) -> None:
+    """Break a text into lines of at most a width (pixels), between words."""
+    lines: list[str] = []
+    for word in text.get_text().split(" "):
+        longer = f"{lines[-1]} {word}" if lines else word
+        text.set_text(longer)
+        if lines and text.get_window_extent().width > width:
+            lines.append(word)
+        else:
+            lines[-1:] = [longer]
+    text.set_text("\n".join(lines))
+
+
+def legend_over(axes: Axes, title: str, columns: int = 4) -> None:
+    """A title at the left above a panel and its legend at the right, or below the title."""
+    axes.set_title(title)
+    if not axes.get_legend_handles_labels()[0]:
+        return
+    look: dict[str, Any] = {"borderaxespad": 0.0, "handlelength": 1.4, "columnspacing": 0.9}
+    look |= {"loc": "lower right", "bbox_to_anchor": (1.0, 0.985), "handletextpad": 0.4}
+    legend = axes.legend(ncols=columns, **look)
+    box = legend.get_window_extent()
+    written = axes.set_title(title).get_window_extent()
+    if box.width + written.width > 1.12 * axes.get_window_extent().width:
+        points = 72.0 / axes.figure.dpi
+        axes.set_title(title, pad=box.height * points)

@@ -1,0 +1,173 @@
+"""Figures of flights: one flight on a page, or several compared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+from tiltsim.errors import InputError
+from tiltsim.scenario.messages import choose
+from tiltsim.views.figures import style
+from tiltsim.views.figures.adjusting import relabel
+from tiltsim.views.figures.layout import add_heading, new_page
+from tiltsim.views.figures.panels import (
+    COMPARED,
+    GROUPS,
+    Panel,
+    Shown,
+    column_panel,
+    exclude_divergence_from_scale,
+)
+from tiltsim.views.titles import common_title, describe_controller, describe_gait, flight_names
+from tiltsim.views.vehicle_views import views_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from tiltsim.flight.flight import Flight
+
+MAX_FLIGHTS: Final = len(style.CYCLE)
+
+WIDE: Final = 6.0
+"""Width (inches) from which a page names gait, controller, plant and end below its title."""
+
+
+def plot(
+    flights: Flight | Sequence[Flight],
+    *,
+    panels: Sequence[str] = (),
+    size: str | tuple[float, float] | None = None,
+    title: str | None = None,
+    labels: Mapping[str, str] | None = None,
+    names: Sequence[str] = (),
+) -> Figure:
+    """One flight on a page, or several in the same axes.
+
+    The caller's rcParams take precedence over tiltsim's style, and stay as they are.
+
+    Args:
+        flights: One or several.
+        panels: Names of panels or of columns, such as ``("path", "margin", "vx")``; default: all
+            that suit the flights.
+        size: Such as "85mm x 60mm", or width and height in inches; the panels are arranged to fit.
+        title: Instead of the scenarios' title; empty for none.
+        labels: Texts instead of the names of flights, and of other texts of the figure.
+        names: Names of several flights, by default `flight_names`.
+
+    Raises:
+        InputError: If a panel, size or label is unknown, or there are more flights than colours.
+    """
+    flights = [flights] if not isinstance(flights, Sequence) else flights
+    if not flights:
+        raise InputError("plot: no flights")
+    if len(flights) > MAX_FLIGHTS:
+        raise InputError(f"plot: {len(flights)} flights: at most {MAX_FLIGHTS} fit on one page")
+    scenarios = [flight.scenario for flight in flights]
+    names = names or (flight_names(scenarios) if len(flights) > 1 else [""])
+    texts = dict(labels or {})
+    names = [texts.pop(name, name) for name in names]
+    with style.paper_style(size=style.parse_size("size", size)):
+        looks = [style.marked_line(n, len(flight)) for n, flight in enumerate(flights)]
+        shown = [Shown(*one) for one in zip(flights, names, looks, strict=True)]
+        chosen = _chosen(flights, panels)
+        over_time = [name for name, panel in chosen.items() if panel.over_time]
+        page = new_page(len(over_time), len(chosen) - len(over_time))
+        for column in page.over_time:
+            for axes in column:
+                name = over_time.pop(0)
+                style.time_axis(axes, max(float(flight["time"][-1]) for flight in flights))
+                drawn = _with(shown, chosen[name])
+                chosen[name].draw(axes, drawn)
+                if not chosen[name].scaled:
+                    exclude_divergence_from_scale(axes, drawn)
+            _label_time(column)
+        squares = [panel for panel in chosen.values() if not panel.over_time]
+        for axes, panel in zip(page.square, squares, strict=True):
+            panel.draw(axes, _with(shown, panel))
+        marks = _handles(shown, page.figure.axes) if len(flights) > 1 else ()
+        add_heading(page.figure, *_heading(flights, title, page.figure.get_figwidth()), [*marks])
+        relabel(page.figure, texts)
+        return page.figure
+
+
+def _with(shown: Sequence[Shown], panel: Panel) -> list[Shown]:
+    """Those flights that a panel can show."""
+    return [one for one in shown if panel.needs in one.flight.units]
+
+
+def _chosen(flights: Sequence[Flight], names: Sequence[str]) -> dict[str, Panel]:
+    """The panels to draw, by name."""
+    available = dict(COMPARED)
+    if len(flights) == 1:
+        available = dict(views_of(flights[0].assembly).panels())
+    fitting = {
+        name: panel
+        for name, panel in available.items()
+        if any(panel.needs in flight.units for flight in flights)
+    }
+    if not names:
+        columns = {column for flight in flights for column in flight.units}
+        return {name: panel for name, panel in fitting.items() if panel.unless not in columns}
+    chosen: dict[str, Panel] = {}
+    for name in names:
+        known = fitting if len(flights) == 1 else {**GROUPS, **fitting}
+        if name in GROUPS and name not in fitting:
+            chosen |= {part: fitting[part] for part in GROUPS[name] if part in fitting}
+        elif name in fitting:
+            chosen[name] = fitting[name]
+        elif any(name in flight.units for flight in flights):
+            chosen[name] = column_panel(name)
+        else:
+            raise InputError(f"panels: {name!r}: {choose(name, [*known, *flights[0].units])}")
+    return chosen
+
+
+def _heading(flights: Sequence[Flight], title: str | None, width: float) -> tuple[str, str]:
+    """The title of a page and the line below it, for its width (inches)."""
+    scenarios = [flight.scenario for flight in flights]
+    if title is not None:
+        return style.verbatim(title), ""
+    if len(flights) > 1:
+        return style.verbatim(common_title(scenarios) or f"{len(flights)} flights compared"), ""
+    scenario, end = scenarios[0], flights[0].end
+    text = style.verbatim(scenario.title or scenario.address or "Flight")
+    if width < WIDE:
+        return text, ""
+    parts = [style.verbatim(scenario.address.partition("#")[2])]
+    parts += [*describe_gait(flights[0].assembly), *describe_controller(scenario)]
+    parts.append(f"{scenario.simulation.plant} plant")
+    if end.kind == "completed":
+        parts.append(f"completed after {end.time:g} s")
+    else:
+        parts.append(f"{end.kind} at {end.time:.2f} s")
+    return text, "  ·  ".join(filter(None, parts))
+
+
+def _label_time(column: Sequence[Axes]) -> None:
+    """Name the time below the lowest panel, and below every one that shows another part of it."""
+    for axes, below in zip(column, [*column[1:], None]):
+        same = below is not None and axes.get_xlim() == below.get_xlim()
+        axes.tick_params(labelbottom=not same)
+        if same:
+            axes.set_xlabel("")
+        elif not axes.get_xlabel():
+            axes.set_xlabel("time (s)")
+
+
+def _handles(shown: Sequence[Shown], axes: Sequence[Axes]) -> Iterator[Any]:
+    """The flights, and what the axes mark."""
+    from matplotlib.lines import Line2D
+
+    for flight, name, look in shown:
+        end = flight.end
+        more = "" if end.kind == "completed" else f", {end.kind} at {end.time:.2f} s"
+        yield Line2D([], [], label=style.verbatim(name) + more, **{**look, "markevery": None})
+    if any(flight.end.kind != "completed" for flight, _, _ in shown):
+        look = {"color": style.GREY, "marker": "X", "ls": "", "ms": 6}
+        yield Line2D([], [], **look, label="terminated early")
+    marks: dict[str, Any] = {}
+    for one in axes:
+        for handle, text in zip(*one.get_legend_handles_labels(), strict=True):
+            marks.setdefault(text, handle)
+    yield from marks.values()
