@@ -598,7 +598,7 @@ ALL_MARKS = ["unreachable, darker where for longer", "singular", "level"]
     ("gait", "marks", "bar"),
     [
         (plans.continuous_trot(0.65, 1.0), ALL_MARKS, True),
-        (PUBLISHED_GAITS["ch08_gait_1"].gait, ["level"], False),
+        (PUBLISHED_GAITS["ch08_gait_1"].gait, [ALL_MARKS[0], "level"], False),
         (plans.fixed([0.0] * 4), ["level"], False),
     ],
 )

@@ -135,3 +135,8 @@ WALL_CLOCK_METRICS: Final = frozenset({"realtime_factor"})
 """Metrics that depend on the computer; they differ between equal flights."""
 
 BOOLEAN_METRICS: Final = frozenset({"diverged"})
+
+
+def unit_of(metric: str) -> str:
+    """The unit of a metric; empty for dimensionless ones."""
+    return METRICS[metric].unit
