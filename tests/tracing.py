@@ -54,6 +54,7 @@ def trace_seldom(patch):
     Args:
         patch: What replaces the functions, a `pytest.MonkeyPatch`.
     """
+    import sympy
     from matplotlib.figure import Figure
     from numba.core import compiler
 
@@ -65,5 +66,12 @@ def trace_seldom(patch):
 
     for plant in (MujocoPlant, ThesisPlant):
         patch.setattr(plant, "advance", seldom_traced(plant.advance, begins))
-    for owner, name in ((compiler, "compile_extra"), (Figure, "savefig")):
-        patch.setattr(owner, name, untraced(getattr(owner, name)))
+    elsewhere = {
+        compiler: ["compile_extra"],
+        Figure: ["savefig"],
+        sympy: ["diff", "expand", "simplify"],
+        sympy.MatrixBase: ["det"],
+    }
+    for owner, names in elsewhere.items():
+        for name in names:
+            patch.setattr(owner, name, untraced(getattr(owner, name)))

@@ -35,8 +35,14 @@ def fly(case, **simulation):
     return tiltsim.simulate(tiltsim.parse_scenario(document))
 
 
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+@pytest.mark.parametrize(
+    ("case", "plant"),
+    [
+        *((case, "mujoco") for case in CASES),
+        *(("keyframes", "thesis"), ("trot", "thesis")),
+        pytest.param("quadrotor", "thesis", marks=pytest.mark.slow),  # compiles for seconds
+    ],
+)
 def test_engines_fly_the_same_waypoints(case, plant):
     python, native = (fly(case, plant=plant, engine=engine) for engine in ("python", "native"))
     np.testing.assert_array_equal(python.samples, native.samples)

@@ -276,6 +276,7 @@ def native_record(gait: Gait) -> np.ndarray:
     return values.view(record_dtype(GaitParameters))
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=200)
 @given(name=st.sampled_from(sorted(GAITS)), time=st.floats(-100, 100))
 def test_native_code_gives_the_same_bits(native, name, time) -> None:
@@ -285,6 +286,7 @@ def test_native_code_gives_the_same_bits(native, name, time) -> None:
     assert evaluated == tilt_reference(time, gait.parameters, gait.knots)
 
 
+@pytest.mark.slow
 def test_native_code_needs_no_table_for_gaits_without_keyframes(native) -> None:
     for name in ("fixed", "trot_instant", "trot_continuous", "red_circle"):
         gait = GAITS[name]

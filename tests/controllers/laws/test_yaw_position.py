@@ -103,6 +103,7 @@ def sources():
     return symbolic()
 
 
+@pytest.mark.slow
 def test_every_entry_of_delta_is_the_derivative_by_the_input(derivatives, sources):
     entries = sources[decoupling_matrix](SYMBOLS, VEHICLE)
     for row, expression in enumerate(derivatives):
@@ -111,6 +112,7 @@ def test_every_entry_of_delta_is_the_derivative_by_the_input(derivatives, source
             assert sympy.simplify(difference) == 0, (row + 1, column + 1)
 
 
+@pytest.mark.slow
 def test_ma_is_what_is_left_without_input(derivatives, sources):
     """To 40 digits at random points; the expressions are too long to simplify quickly."""
     entries = sources[drift](SYMBOLS, VEHICLE)
@@ -276,6 +278,7 @@ def test_stable_gains_fly_the_circle_through_the_published_curve():
 # --- compiled ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_compiled_code_gives_the_same_bits(native):
     law = native[yaw_position_inputs]
     random = np.random.default_rng(6)
