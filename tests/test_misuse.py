@@ -1,0 +1,132 @@
+"""Wrong use of the Python API: a TiltsimError with the argument, the value and what is allowed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tiltsim
+from tests.flights import flight
+
+ADDRESS = "ch04_tracking/setpoint#rho_065_modified"
+SWEEP = {"scenario": ADDRESS, "axis": [{"type": "list", "key": "vehicle.mass", "values": [0.4]}]}
+SHORT = {"simulation": {"duration": 0.01}}
+
+
+def hover(observation):
+    return tiltsim.Command(thrusts=[1.0] * 4)
+
+
+class Aimed:
+    def __init__(self, target):
+        self.target = target
+
+    def __call__(self, observation):
+        return hover(observation)
+
+
+def scenario():
+    return tiltsim.load_scenario(ADDRESS)
+
+
+def simulation():
+    return tiltsim.Simulation(SHORT)
+
+
+MISUSES = {
+    "a number as scenario": (lambda: tiltsim.load_scenario(3), "scenario = 3: must be"),
+    "nothing as scenario": (lambda: tiltsim.simulate(None), "scenario = None: must be"),
+    "bytes as scenario": (lambda: tiltsim.simulate(b"ch04"), "scenario = b'ch04': must be"),
+    "a flight as scenario": (lambda: tiltsim.simulate(flight("fixed")), "scenario = <Flight"),
+    "a class as scenario": (lambda: tiltsim.simulate(tiltsim.Scenario), "scenario = <class"),
+    "a list as scenario": (lambda: tiltsim.simulate([ADDRESS]), "must be a name of the library"),
+    "an empty name": (lambda: tiltsim.simulate(""), "name a scenario"),
+    "an unknown name": (lambda: tiltsim.simulate("ch04_trackin/setpoint"), "did you mean ch04"),
+    "a name with a NUL": (lambda: tiltsim.load_scenario("ch04\0"), "no such file"),
+    "a family without a member": (lambda: tiltsim.simulate("ch04_tracking/setpoint"), "choose a"),
+    "a sweep as scenario": (
+        lambda: tiltsim.simulate("beyond/sweeps/monte_carlo"),
+        "this is a sweep",
+    ),
+    "an unknown key": (lambda: tiltsim.simulate({"gaits": {}}), "gaits = {}: unknown key"),
+    "a key that is no text": (lambda: tiltsim.simulate({3: 4}), "key 3: must be text"),
+    "a nested key that is no text": (lambda: tiltsim.simulate({"gait": {3: 4}}), "scenario: "),
+    "a function as value": (lambda: tiltsim.simulate({"title": hover}), "title = "),
+    "overrides in a list": (lambda: tiltsim.load_scenario(ADDRESS, ["a=1"]), "must be a dict"),
+    "a key of overrides": (lambda: scenario().replace({1: 2}), "key 1: must be text"),
+    "an empty key": (lambda: scenario().replace({"": 2}), "unknown key"),
+    "a text to replace by": (lambda: scenario().replace("gait.period=1"), "must be a dict"),
+    "a wrong value": (lambda: scenario().replace({"gait.angles": 1}), "gait.angles = 1: must be"),
+    "an array of a wrong shape": (
+        lambda: scenario().replace({"initial.position": np.zeros(2)}),
+        "initial.position = [0.0, 0.0]: must have 3 entries",
+    ),
+    "an array that is not finite": (
+        lambda: scenario().replace({"initial.position": np.full(3, np.nan)}),
+        "must be a finite number",
+    ),
+    "the law python without a file": (
+        lambda: scenario().replace({"controller.law": "python"}),
+        "controller= of tiltsim.load_scenario",
+    ),
+    "a number as controller": (
+        lambda: tiltsim.simulate(SHORT, controller=3),
+        "controller = 3: must be callable",
+    ),
+    "a controller file that is missing": (
+        lambda: tiltsim.simulate(SHORT, controller="no.py:hover"),
+        "no such file",
+    ),
+    "a controller for a tilt-car": (
+        lambda: tiltsim.simulate("ch10_state_drift/third_derivative#clockwise", controller=hover),
+        "vehicle",
+    ),
+    "a controller class with arguments": (
+        lambda: tiltsim.simulate(SHORT, controller=Aimed),
+        "raised when it was made",
+    ),
+    "a controller on the thesis plant": (
+        lambda: tiltsim.simulate({"simulation": {"plant": "thesis"}}, controller=hover),
+        "mujoco plant only",
+    ),
+    "True as observer": (lambda: tiltsim.simulate(SHORT, True), "observer = True: must be"),
+    "True as progress": (lambda: tiltsim.simulate(SHORT, progress=True), "progress = True"),
+    "one scenario to a batch": (lambda: tiltsim.fly(ADDRESS), "must be a list of scenarios"),
+    "a number to a batch": (lambda: tiltsim.fly(3), "scenarios = 3: must be a list"),
+    "numbers in a batch": (lambda: tiltsim.fly([1, 2]), "scenario = 1: must be"),
+    "no threads": (lambda: tiltsim.fly([SHORT], threads=0), "threads = 0: must be"),
+    "a number as sweep": (lambda: tiltsim.sweep(3), "sweep = 3: must be"),
+    "a scenario as sweep": (lambda: tiltsim.sweep(ADDRESS), "no such file"),
+    "a dict without axes": (lambda: tiltsim.sweep(SHORT), "it has no [[axis]]"),
+    "an unknown axis": (lambda: tiltsim.sweep({**SWEEP, "axis": [{"type": "x"}]}), "choose"),
+    "a list as axis": (lambda: tiltsim.sweep({**SWEEP, "axis": 3}), "axis = 3"),
+    "no jobs": (lambda: tiltsim.sweep(SWEEP, jobs=0), "jobs = 0: must be"),
+    "a number as folder": (lambda: tiltsim.sweep(SWEEP, out=3), "out = 3: must be"),
+    "no steps": (lambda: simulation().step(0), "steps = 0: must be a whole number from 1"),
+    "half a step": (lambda: simulation().step(0.5), "steps = 0.5: must be"),
+    "steps on the thesis plant": (
+        lambda: tiltsim.Simulation({"simulation": {"plant": "thesis"}}),
+        'stepwise simulation needs "mujoco"',
+    ),
+    "an unknown column": (lambda: flight("fixed")["height"], "'height': no column"),
+    "a number as column": (lambda: flight("fixed")[0], "0: no column"),
+    "a flight from a number": (lambda: tiltsim.load_flight(3), "path = 3: must be"),
+    "a flight that is not there": (lambda: tiltsim.load_flight("nowhere"), "no such file"),
+    "saving to a number": (lambda: flight("fixed").save(3), "folder = 3: must be"),
+    "a scenario to view": (lambda: tiltsim.view(scenario()), "must be a tiltsim.Flight"),
+    "no flights to view": (lambda: tiltsim.view([]), "flights = []: must be"),
+    "a number as viewer": (lambda: flight("fixed").view(url=3), "url = 3: must be"),
+    "a video of a scenario": (lambda: tiltsim.video(scenario(), "x.mp4"), "flight = "),
+    "a video into a number": (lambda: flight("fixed").video(3), "path = 3: must be"),
+    "a video of a wrong format": (lambda: flight("fixed").video("x.avi"), "choose .mp4, .gif"),
+    "a video of nothing": (lambda: flight("fixed").video("x.mp4", start=9), "start 9: is not in"),
+}
+
+
+@pytest.mark.parametrize("misuse", MISUSES)
+def test_wrong_use_is_one_line_of_a_tiltsim_error(misuse):
+    use, words = MISUSES[misuse]
+    with pytest.raises(tiltsim.TiltsimError) as caught:
+        use()
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
