@@ -61,7 +61,7 @@ BESIDE: Final = View(azimuth=-0.65, elevation=0.6)
 TROT_ANGLES: Final = (-0.65, -0.65, 0.65, 0.65)
 """Tilt angles (rad) of the trot at rho = 0.65."""
 
-LEANING: Final = (-0.15, -0.65)
+LEANING: Final = (-0.45, -0.41)
 """Roll and pitch (rad) of the vehicle whose margin is drawn."""
 
 _LEGS: Final = ("right fore", "left fore", "left hind", "right hind")
@@ -279,7 +279,7 @@ def _side_view(axes: Axes, n: Floats) -> None:
     """A leaning vehicle in the vertical plane of its force at zero torque."""
     pose = Pose(TROT_ANGLES, (*LEANING, 0.0))
     force = pose.to_world(n)
-    view, length = View(azimuth=atan2(force[1], force[0]) - pi / 2, elevation=0.0), 0.42
+    view, length = View(azimuth=atan2(force[1], force[0]) - pi / 2, elevation=0.0), 0.34
     blank(axes)
     up = view.project([0.0, 0.0, 1.0])
     along = view.project(force)
@@ -310,14 +310,13 @@ def _roll_pitch_plane(axes: Axes, n: Floats, vehicle: Vehicle) -> None:
     style.roll_pitch_axes(axes)
     text(axes, (-0.95, -1.2), "singular\nmargin < 0", color=style.SINGULAR)
     hover = exact_decoupler(0.0, 0.0, 0.0, 0.0, vehicle.gravity, tuple(n[0]))
+    nearest = nearest_singular(n, np.array([LEANING]))[0]
+    axes.plot(*np.array([LEANING, nearest]).T, color=style.PURPLE, lw=2.4)
     for attitude, name in ((LEANING, "leaning"), ((0.0, 0.0), "level"), (hover, "hover")):
         margin = float(singularity_margin(TROT_ANGLES, vehicle, *attitude))
-        if name != "hover":  # from there all singular attitudes are equally far
-            nearest = nearest_singular(n, np.array([attitude]))[0]
-            axes.plot(*np.array([attitude, nearest]).T, color=style.PURPLE, lw=2.4)
         axes.plot(*attitude, "o", color=style.INK, ms=6)
         label = f"{name}: {margin:.2f} rad"
-        axes.annotate(label, attitude, (-2, 5), textcoords="offset points", va="bottom")
+        axes.annotate(label, attitude, (2, -5), textcoords="offset points", va="top")
 
 
 def color_figure() -> Figure:
