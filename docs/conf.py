@@ -43,13 +43,16 @@ add_module_names = False
 autodoc_member_order = "bysource"
 ALIASES = ("ArrayLike", "Floats", "Pair", "Triple", "Quad", "Octet", "Values", "Vector")
 autodoc_type_aliases = {"npt.ArrayLike": "ArrayLike"} | {name: name for name in ALIASES}
+ALIASED = {  # as Sphinx spells what it has evaluated
+    r"TypeAliasForwardRef\('(\w+)'\)": r"\1",
+    r"(numpy\.)?ndarray\[[^]]*\], (numpy\.)?dtype\[(numpy\.)?float64\]\]": "Floats",
+}
 napoleon_attr_annotations = False  # the signature has them
 napoleon_use_ivar = True
 python_maximum_signature_line_length = 88
 python_use_unqualified_type_names = True
 
 html_theme = "furo"
-pygments_style = "a11y-high-contrast-light"
 pygments_dark_style = "a11y-high-contrast-dark"
 html_title = "tiltsim"
 html_static_path = ["static"]
@@ -86,9 +89,14 @@ def describe_fields(app, what, name, obj, options, lines):
         lines += ["", "Attributes:", *(f"    {field}: {comment}" for field, comment in fields)]
 
 
-def shorten_signature(app, what, name, obj, options, signature, returned):
-    """Show no signature of a scenario's tables: their page lists all keys."""
-    return ("(...)", returned) if hasattr(obj, "model_fields") else None
+def tidy_signature(app, what, name, obj, options, signature, returned):
+    """Name type aliases, and show no tables of a scenario: their page lists all keys."""
+    if hasattr(obj, "model_fields"):
+        return "(...)", returned
+    for pattern, name in ALIASED.items():
+        signature = signature and re.sub(pattern, name, signature)
+        returned = returned and re.sub(pattern, name, returned)
+    return signature, returned
 
 
 def skip_described(app, what, name, obj, skip, options):
@@ -126,6 +134,6 @@ def setup(app):
     app.connect("source-read", link_pages_outside)
     app.connect("source-read", list_modules)
     app.connect("autodoc-process-docstring", describe_fields, priority=400)
-    app.connect("autodoc-process-signature", shorten_signature)
+    app.connect("autodoc-process-signature", tidy_signature)
     app.connect("autodoc-skip-member", skip_described)
     app.connect("missing-reference", link_unqualified)
