@@ -90,7 +90,7 @@ MISUSES = {
         "mujoco plant only",
     ),
     "True as observer": (lambda: tiltsim.simulate(SHORT, True), "observer = True: must be"),
-    "True as progress": (lambda: tiltsim.simulate(SHORT, progress=True), "progress = True"),
+    "a number as progress": (lambda: tiltsim.simulate(SHORT, progress=3), "progress = 3: must be"),
     "one scenario to a batch": (lambda: tiltsim.fly(ADDRESS), "must be a list of scenarios"),
     "a number to a batch": (lambda: tiltsim.fly(3), "scenarios = 3: must be a list"),
     "numbers in a batch": (lambda: tiltsim.fly([1, 2]), "scenario = 1: must be"),

@@ -42,6 +42,7 @@ _HOMES = {
     "load_scenario": "scenario.loading",
     "parse_scenario": "scenario.loading",
     "simulate": "simulation.simulate",
+    "show_progress": "commands.progress",  # for progress=True
     "sweep": "sweeps.sweep",
     "video": "views.video.making",
     "view": "views.rerun.viewer",

@@ -436,3 +436,17 @@ def test_a_flight_has_a_one_line_repr_and_lists_its_columns():
     assert repr(flown) == line
     with pytest.raises(KeyError, match=r"'rol': no column of this flight; did you mean roll\?"):
         flown["rol"]
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_progress_is_told_now_and_then_and_at_the_end(engine):
+    times = []
+    tables = {"simulation": {"duration": 0.2, "engine": engine}}
+    flight = tiltsim.simulate(tables, progress=times.append)
+    assert times[-1] == flight["time"][-1] == pytest.approx(0.2)
+    assert len(times) < len(flight)
+
+
+def test_progress_may_be_a_bar(capsys):
+    tiltsim.simulate({"simulation": {"duration": 0.01}}, progress=True)
+    assert capsys.readouterr().out == ""

@@ -83,6 +83,8 @@ def test_mujoco_s_own_model_and_data_are_those_that_fly():
     simulation = tiltsim.Simulation(TROT)
     model, data = simulation.model, simulation.data
     assert isinstance(model, mujoco.MjModel)
+    assert model.ngeom > 10
+    assert data.sensor("gyro").data.shape == (3,)
     data.qpos[2] = 5.0
     simulation.step()
     assert simulation.observation().position[2] == pytest.approx(5.0, abs=1e-3)

@@ -40,8 +40,8 @@ class CommandedPlant(MujocoPlant):
     else the control callback holds the commands.
     """
 
-    def __init__(self, assembly: Assembly) -> None:
-        super().__init__(assembly, engine="python")
+    def __init__(self, assembly: Assembly, model: mujoco.MjModel | None = None) -> None:
+        super().__init__(assembly, model, engine="python")
         vehicle = assembly.scenario.rotorcraft
         self.tilting = vehicle.has_tilting_rotors
         self._min_speed, self._max_speed = vehicle.speeds_along_spin

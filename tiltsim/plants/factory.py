@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import mujoco
+
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.engines.base import EngineName
 from tiltsim.plants.mujoco_plant import MujocoPlant
@@ -11,19 +13,22 @@ from tiltsim.plants.user_controller import UserControlledPlant
 from tiltsim.system.interrupts import reraise_swallowed_interrupts
 
 
-def make_plant(assembly: Assembly, engine: EngineName | None = None) -> Plant:
+def make_plant(
+    assembly: Assembly, engine: EngineName | None = None, model: mujoco.MjModel | None = None
+) -> Plant:
     """The plant that a scenario requests, at its initial state.
 
     Args:
         assembly: The flight.
         engine: In place of the scenario's.
+        model: For MuJoCo; default: the one that `flight_model` compiles.
 
     Raises:
         InputError: If MuJoCo cannot compile the vehicle, or the user's controller cannot be loaded.
     """
     if assembly.scenario.controller.is_external:
-        return UserControlledPlant(assembly)
+        return UserControlledPlant(assembly, model)
     with reraise_swallowed_interrupts():  # it may compile
         if assembly.scenario.simulation.plant == "thesis":
             return ThesisPlant(assembly, engine)
-        return MujocoPlant(assembly, engine=engine)
+        return MujocoPlant(assembly, model, engine)

@@ -19,9 +19,18 @@ _TABLES_WITHOUT_EFFECT: Final = frozenset(
 """Tables of a scenario that do not change the model, except for two keys of ``simulation``."""
 
 
-def flight_model(assembly: Assembly, knots: int | None = None) -> mujoco.MjModel:
-    """The model that a flight integrates; see `build_model`."""
-    model = build_model(assembly, knots=knots)
+def flight_model(
+    assembly: Assembly, knots: int | None = None, *, visuals: bool = False
+) -> mujoco.MjModel:
+    """The model that a flight integrates; see `build_model`.
+
+    With ``visuals`` it flies the same, bit for bit, and has what is drawn or measured, too, unless
+    there is a ground to touch.
+    """
+    visuals = visuals and assembly.scenario.ground is None
+    model = build_model(assembly, knots=knots, visuals=visuals)
+    if visuals:
+        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     # A diverged state must stay visible; by default MuJoCo would silently start over.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return model

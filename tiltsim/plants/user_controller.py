@@ -14,6 +14,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import mujoco
+
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.errors import InputError
 from tiltsim.plants.command import (
@@ -144,8 +146,8 @@ class UserControlledPlant(CommandedPlant):
 
     """
 
-    def __init__(self, assembly: Assembly) -> None:
-        super().__init__(assembly)
+    def __init__(self, assembly: Assembly, model: mujoco.MjModel | None = None) -> None:
+        super().__init__(assembly, model)
         self._scenario = assembly.scenario
         self._every = max(1, assembly.scenario.simulation.control_steps)
         self.restart()

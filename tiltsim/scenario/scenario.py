@@ -46,6 +46,12 @@ class Scenario(ScenarioTables):
         changed: Scenario = public("load_scenario")(self, changes)
         return changed
 
+    def __repr__(self) -> str:
+        """Address and title, in one line; `str` has all keys."""
+        return (
+            f"<Scenario {': '.join(filter(None, (self.address, self.title))) or 'without title'}>"
+        )
+
     def _repr_html_(self) -> str:
         """What is not left at its default, as a table for notebooks."""
         given = self.model_dump(mode="json", exclude_unset=True, exclude={*DESCRIPTIVE})

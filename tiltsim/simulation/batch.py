@@ -28,7 +28,7 @@ WINDOW: Final = 512
 """How many scenarios are grouped together into those that share a batch."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FlightResult:
     """The result of one flight among many.
 
@@ -43,6 +43,11 @@ class FlightResult:
     end: End
     metrics: dict[str, float | bool]
     flight: Flight | None = None
+
+    def __repr__(self) -> str:
+        """The scenario and the end, in one line."""
+        name = self.scenario.address or self.scenario.title
+        return f"<FlightResult of {name}: {self.end.kind} at {self.end.time:g} s>"
 
 
 def fly(

@@ -22,6 +22,7 @@ from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.monitor import TerminationMonitor
 from tiltsim.system.interrupts import reraise_swallowed_interrupts
+from tiltsim.system.progress import Report, reported
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -39,7 +40,7 @@ def simulate(
     observer: Observer | None = None,
     *,
     controller: Controller | type | str | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Report | bool | None = None,
 ) -> Flight:
     """Fly a scenario from start to end.
 
@@ -53,7 +54,7 @@ def simulate(
             is recorded.
         controller: A controller of your own in place of the scenario's; see
             `tiltsim.load_scenario`. Threads do not share one that is a class.
-        progress: Called with the simulated time (s) from time to time, for example ``print``.
+        progress: True for a bar; or a function, called with the simulated time (s) now and then.
 
     Returns:
         All samples up to the end. A flight that diverges or reaches a singular decoupling matrix is
@@ -66,12 +67,12 @@ def simulate(
             controller cannot be used.
         KeyboardInterrupt: If interrupted before the first sample.
     """
-    for name, given in (("observer", observer), ("progress", progress)):
-        if given is not None and not callable(given):
-            raise InputError(f"{name} = {short_repr(given)}: must be callable")
+    if observer is not None and not callable(observer):
+        raise InputError(f"observer = {short_repr(observer)}: must be callable")
     if controller is not None or not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario, controller=controller)
-    return simulate_assembly(assemble(scenario), observer, progress=progress)
+    with reported(progress, "flight", scenario.simulation.duration) as report:
+        return simulate_assembly(assemble(scenario), observer, report=report)
 
 
 def simulate_assembly(
@@ -79,14 +80,15 @@ def simulate_assembly(
     observer: Observer | None = None,
     *,
     engine: EngineName | None = None,
-    progress: Callable[[float], None] | None = None,
+    report: Report = lambda time: None,
 ) -> Flight:
     """As `simulate`, for a flight that is assembled already.
 
     Args:
         assembly: The flight.
-        observer, progress: See `simulate`.
+        observer: See `simulate`.
         engine: In place of the scenario's.
+        report: Called with the simulated time (s) after every chunk of samples.
     """
     simulation = assembly.scenario.simulation
     plant = make_plant(assembly, engine)
@@ -111,8 +113,7 @@ def simulate_assembly(
                 flown, end = fly_chunk(plant, monitor, count, steps)
             for sample in flown:
                 record(sample)
-            if progress is not None:
-                progress(float(samples[-1][0]))
+            report(float(samples[-1][0]))
             steps_left -= count * steps
             if plant.engine == "native":
                 pace = CHUNK_TIME / max(perf_counter() - began, 1e-9)

@@ -17,6 +17,7 @@ from tiltsim.laws.assembling import assemble
 from tiltsim.plants.built_in_command import built_in_command
 from tiltsim.plants.command import Command, Controller, Observation
 from tiltsim.plants.factory import make_plant
+from tiltsim.plants.flight_model import flight_model
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import Observer
 from tiltsim.plants.plant import take_sample
@@ -59,7 +60,8 @@ class Simulation:
             )
         self._assembly = assemble(self.scenario)
         native = simulation.engine == "native"
-        plant = make_plant(self._assembly, "native" if native else "python")
+        model = flight_model(self._assembly, visuals=True)
+        plant = make_plant(self._assembly, "native" if native else "python", model)
         assert isinstance(plant, MujocoPlant)
         self._plant, self._beginning = plant, plant.state
         self.reset()
@@ -111,7 +113,7 @@ class Simulation:
 
     @property
     def model(self) -> mujoco.MjModel:
-        """MuJoCo's model."""
+        """MuJoCo's model, with what is drawn and measured, for renderers and sensors of yours."""
         return self._plant.model
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,7 +11,9 @@ from typing import Any
 from tiltsim.errors import InputError
 from tiltsim.sweeps.dataset import SweepResults, load_results
 from tiltsim.sweeps.loading import load_sweep
+from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.running import run_sweep
+from tiltsim.system.progress import Report, reported
 from tiltsim.system.text import short_repr
 
 
@@ -21,7 +23,7 @@ def sweep(
     *,
     out: str | PathLike[str] | None = None,
     jobs: int = 1,
-    progress: Callable[[int], None] | None = None,
+    progress: Report | bool | None = None,
     trusted: bool = False,
 ) -> SweepResults:
     """Fly a scenario along axes.
@@ -34,7 +36,7 @@ def sweep(
             rows are in memory only.
         jobs: Processes. With several, a script has to call this under
             ``if __name__ == "__main__":``, as for any use of processes in Python.
-        progress: Called with the number of finished rows.
+        progress: True for a bar; or a function, called with the number of finished rows.
         trusted: Whether to execute Python files that scenarios name.
 
     Returns:
@@ -45,13 +47,13 @@ def sweep(
     """
     if not isinstance(jobs, int) or isinstance(jobs, bool) or jobs < 1:
         raise InputError(f"jobs = {short_repr(jobs)}: must be a whole number from 1")
-    if progress is not None and not callable(progress):
-        raise InputError(f"progress = {short_repr(progress)}: must be callable")
     if out is not None and not isinstance(out, str | PathLike):
         raise InputError(f"out = {short_repr(out)}: must be the name of a folder")
     definition = load_sweep(source, overrides)
-    with TemporaryDirectory(prefix="tiltsim-sweep-") as temporary:
+    with (
+        reported(progress, "flights", len(SweepPoints(definition))) as report,
+        TemporaryDirectory(prefix="tiltsim-sweep-") as temporary,
+    ):
         folder = Path(temporary if out is None else out)
-        report = progress or (lambda rows: None)
         run_sweep(definition, folder, jobs=jobs, report=report, trusted=trusted)
         return load_results(folder)

@@ -1,0 +1,57 @@
+"""Progress of long work, as its caller wants to hear of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from time import monotonic
+from typing import Final
+
+from tiltsim.errors import InputError
+from tiltsim.system.public import public
+from tiltsim.system.text import short_repr
+
+INTERVAL: Final = 0.1
+"""Wall time (s) between reports; the last one always comes."""
+
+Report = Callable[[float], None]
+
+
+@contextmanager
+def reported(progress: Report | bool | None, stage: str, total: float) -> Iterator[Report]:
+    """Yield a function to call with what is done, from 0 to ``total``.
+
+    Args:
+        progress: A function that is called with it now and then; True for a bar on a terminal and a
+            line now and then elsewhere; None or False for silence.
+        stage: Name of the work.
+        total: When it is all done: a float is in seconds, an integer a count.
+
+    Raises:
+        InputError: For anything else.
+    """
+    if progress is None or progress is False:
+        yield lambda done: None
+    elif progress is True:
+        with public("show_progress")(shown=True) as display:
+            display.begin(stage, total)
+            yield display.move
+    elif callable(progress):
+        yield _seldom(progress, total)
+    else:
+        allowed = "must be True or a function"
+        raise InputError(f"progress = {short_repr(progress)}: {allowed}")
+
+
+def _seldom(report: Report, total: float) -> Report:
+    """A report that passes on what comes after an interval, and the end."""
+    last = -INTERVAL
+
+    def move(done: float) -> None:
+        nonlocal last
+        now = monotonic()
+        if now - last >= INTERVAL or done >= total:
+            last = now
+            report(done)
+
+    return move
