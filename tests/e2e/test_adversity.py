@@ -65,7 +65,7 @@ def test_a_family_is_not_replaced_by_one_of_its_members(tmp_path, capsys, monkey
     text = '[simulation]\nduration = 0.1\n[[variant]]\nname = "a"\n'
     (tmp_path / "scenario.toml").write_text(text)
     error = refused(capsys, "run", "scenario.toml#a", "--quiet", "--out", ".")
-    assert "scenario.toml: not written by tiltsim" in error
+    assert "scenario.toml: not written by this version of tiltsim" in error
     assert (tmp_path / "scenario.toml").read_text() == text
     assert [file.name for file in tmp_path.iterdir()] == ["scenario.toml"]
 

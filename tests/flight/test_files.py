@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -23,6 +24,7 @@ from tiltsim.scenario.loading import parse_scenario, scenario_toml, without_none
 from tiltsim.system.files import prepare_folder
 from tiltsim.vehicles.rotorcraft import COLUMNS
 
+FOREIGN = "not written by this version of tiltsim, or edited since"
 NAMES = {"flight.parquet", "metrics.json", "scenario.toml"}
 SCENARIO = {"title": "by hand", "simulation": {"duration": 0.5, "seed": 5}}
 
@@ -275,9 +277,38 @@ def test_a_scenario_that_somebody_wrote_or_edited_is_not_replaced(tmp_path, edit
     with (tmp_path / "scenario.toml").open("a") as file:
         file.write(edit or OWN_SCENARIO)
     before = contents(tmp_path)
-    with pytest.raises(InputError, match=r"scenario.toml: not written by tiltsim, or edited since"):
+    with pytest.raises(InputError, match=rf"scenario.toml: {FOREIGN}"):
         flight(x=2.0).save(tmp_path)
     assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("name", ["flight.parquet", "metrics.json"])
+def test_a_file_without_a_scenario_of_ours_is_not_replaced(tmp_path, name):
+    (tmp_path / name).write_bytes(b"mine")
+    with pytest.raises(InputError, match=f"{name}: {FOREIGN}"):
+        flight().save(tmp_path)
+    assert contents(tmp_path) == {name: b"mine"}
+
+
+@pytest.mark.parametrize("kept", [0, 1, 2, 3])
+def test_a_killed_process_leaves_a_folder_that_the_next_flight_may_replace(
+    tmp_path, law, monkeypatch, kept
+):
+    """Killed after some of the four files took their places: later ones are not replaced."""
+    out, replace = tmp_path / "out", Path.replace
+    replaced = []
+
+    def dies(path, target):
+        replaced.append(target.name)
+        return replace(path, target) if len(replaced) <= kept else None
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "replace", dies)
+        flown_with(law, out)
+    assert replaced[0] == "scenario.toml"
+    law.write_text("law = 3\n")
+    flown_with(law, out)
+    assert (out / "my_law.py").read_text() == "law = 3\n"
 
 
 def test_a_copied_controller_is_replaced_by_a_later_version(tmp_path, law):
@@ -300,9 +331,36 @@ def test_another_controller_is_not_replaced(tmp_path, law, flown_before):
         flown_with(law, out)
     (out / "my_law.py").write_text("law = 'another'\n")
     before = contents(out)
-    with pytest.raises(InputError, match=r"my_law.py: not written by tiltsim, or edited since"):
+    with pytest.raises(InputError, match=rf"my_law.py: {FOREIGN}"):
         flown_with(law, out)
     assert contents(out) == before
+
+
+def test_the_digest_of_a_copied_controller_is_carried_forward(tmp_path, law):
+    """By flights of the resolved scenario, and by those without a controller of their own."""
+    out = tmp_path / "out"
+    flown_with(law, out)
+    flown_with(out / "my_law.py", out)
+    flight().save(out)
+    law.write_text("law = 3\n")
+    flown_with(law, out)
+    assert (out / "my_law.py").read_text() == "law = 3\n"
+
+
+@pytest.mark.parametrize("flown_before", [False, True])
+def test_a_controller_that_was_flown_from_its_own_folder_is_not_replaced(
+    tmp_path, law, flown_before
+):
+    """It is no copy: the user's own file, or a copy that was edited."""
+    out = tmp_path / "out"
+    out.mkdir()
+    if flown_before:
+        flown_with(law, out)
+    (out / "my_law.py").write_text("law = 'mine'\n")
+    flown_with(out / "my_law.py", out)
+    with pytest.raises(InputError, match=rf"my_law.py: {FOREIGN}"):
+        flown_with(law, out)
+    assert (out / "my_law.py").read_text() == "law = 'mine'\n"
 
 
 @pytest.mark.parametrize("name", sorted(NAMES))

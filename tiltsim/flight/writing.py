@@ -1,15 +1,16 @@
 """Write a flight into a folder: metrics.json, flight.parquet, scenario.toml.
 
-A later flight into the same folder replaces these files, but never a scenario or controller that
-somebody has written or edited: the resolved scenario begins with digests of itself and of the
-controller that was copied with it.
+A later flight into the same folder replaces these files, but none that tiltsim has not written, and
+no scenario or controller that was edited: the resolved scenario begins with digests of itself and
+of the controllers that were copied into the folder.
 """
 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping
-from hashlib import sha256
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -17,7 +18,7 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.loading import scenario_toml
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.system.files import prepare_folder, replacing
+from tiltsim.system.files import digest, prepare_folder, replacing
 from tiltsim.system.parquet import parquet_bytes
 from tiltsim.system.text import printable
 
@@ -30,6 +31,8 @@ SCENARIO: Final = "scenario.toml"
 
 _WRITTEN: Final = "# written by tiltsim: sha256 {}\n"
 _COPIED: Final = "# its controller: sha256 {}\n"
+"""One for each controller in the folder that is a copy of tiltsim's."""
+
 _UNWRITTEN: Final = (
     "# Not to be flown from this file: its controller, {}, was given in Python. Give it again:\n"
     '# tiltsim.simulate("scenario.toml", controller=...)\n'
@@ -40,8 +43,8 @@ def prepare_flight_folder(folder: Path, scenario: Scenario) -> None:
     """Create a folder for a flight of a scenario.
 
     Raises:
-        InputError: If that is impossible, or the flight would replace what is not a file, or a
-            scenario or controller that tiltsim did not write.
+        InputError: If that is impossible, or the flight would replace what is not a file, or what
+            tiltsim did not write.
     """
     prepare_folder(folder)
     controller = _controller_file(scenario)
@@ -50,13 +53,15 @@ def prepare_flight_folder(folder: Path, scenario: Scenario) -> None:
     for file in files:
         if file.exists() and not file.is_file():
             raise InputError(f"{file}: not a file; choose another folder")
-    written = _read_if_written(folder / SCENARIO)
+    if not _read_if_written(folder / SCENARIO):
+        for file in (folder / FLIGHT, folder / METRICS):
+            if file.exists():
+                raise _foreign(file)
     if controller is not None:
         copy = folder / controller.name
-        if copy.exists() and not copy.samefile(controller):
-            digest = _digest(copy.read_bytes())
-            if digest != _digest(controller.read_bytes()) and _COPIED.format(digest) not in written:
-                raise _foreign(copy)
+        own = {digest(controller.read_bytes()), *_copies(folder)}
+        if copy.exists() and digest(copy.read_bytes()) not in own:
+            raise _foreign(copy)
 
 
 def write_flight(
@@ -75,30 +80,31 @@ def write_flight(
         InputError: As `prepare_flight_folder`, or if a file cannot be written.
     """
     prepare_flight_folder(folder, scenario)
-    with replacing(folder / FLIGHT) as path:
-        path.write_bytes(parquet_bytes(table))
-    with replacing(folder / METRICS) as path:
-        path.write_text(metrics_json(metrics), encoding="utf-8")
-    text = resolved_text(scenario, folder)
-    with replacing(folder / SCENARIO) as path:
-        path.write_bytes(text.encode())
+    files = {FLIGHT: parquet_bytes(table), METRICS: metrics_json(metrics).encode()}
+    files |= _resolved_files(scenario, folder)
+    # All are complete before the first takes its place, and that is the last of them: a killed
+    # process leaves no file without the scenario that marks it as tiltsim's.
+    with ExitStack() as stack:
+        for name, content in files.items():
+            stack.enter_context(replacing(folder / name)).write_bytes(content)
 
 
-def resolved_text(scenario: Scenario, folder: Path) -> str:
-    """The text of scenario.toml; the file of a user's controller is copied to its folder."""
-    controller, table, copied = _controller_file(scenario), scenario.controller, ""
+def _resolved_files(scenario: Scenario, folder: Path) -> dict[str, bytes]:
+    """By name: the file of a user's controller, unless it is there, and last scenario.toml."""
+    controller, table = _controller_file(scenario), scenario.controller
+    copies, files = _copies(folder), {}
     if controller is not None and isinstance(table, PythonController):
         copy, content = folder / controller.name, controller.read_bytes()
-        if not (copy.exists() and copy.samefile(controller)):
-            with replacing(copy) as path:
-                path.write_bytes(content)
+        if not copy.exists() or copy.read_bytes() != content:
+            files[copy.name] = content
+            copies.append(digest(content))
         named = table.model_copy(update={"function": f"{copy.name}:{table.attribute}"})
         scenario = scenario.model_copy(update={"controller": named})
-        copied = _COPIED.format(_digest(content))
-    elif isinstance(table, PythonController):
-        copied = _UNWRITTEN.format(printable(table.function))
-    text = copied + scenario_toml(scenario)
-    return _WRITTEN.format(_digest(text.encode())) + text
+    lines = "".join(map(_COPIED.format, copies))
+    if controller is None and isinstance(table, PythonController):
+        lines += _UNWRITTEN.format(printable(table.function))
+    text = lines + scenario_toml(scenario)
+    return {**files, SCENARIO: (_WRITTEN.format(digest(text.encode())) + text).encode()}
 
 
 def _controller_file(scenario: Scenario) -> Path | None:
@@ -108,24 +114,29 @@ def _controller_file(scenario: Scenario) -> Path | None:
     return file if file is not None and file.is_file() else None
 
 
+def _copies(folder: Path) -> list[str]:
+    """Digests of the controllers that tiltsim copied into a folder and nobody has edited since."""
+    written = _read_if_written(folder / SCENARIO)
+    files = [file for file in folder.glob("*.py") if file.is_file() and os.access(file, os.R_OK)]
+    there = {digest(file.read_bytes()) for file in files} if written else set()
+    return sorted(one for one in there if _COPIED.format(one) in written)
+
+
 def _read_if_written(file: Path) -> str:
     """The text of a resolved scenario, empty without one; `InputError` if it is somebody's own."""
     if not file.exists():
         return ""
     content = file.read_bytes()
     first, _, text = content.partition(b"\n")
-    if first + b"\n" != _WRITTEN.format(_digest(text)).encode():
+    if first + b"\n" != _WRITTEN.format(digest(text)).encode():
         raise _foreign(file)
     return content.decode()
 
 
-def _digest(content: bytes) -> str:
-    return sha256(content).hexdigest()
-
-
 def _foreign(file: Path) -> InputError:
     return InputError(
-        f"{file}: not written by tiltsim, or edited since; choose another folder, or move it away"
+        f"{file}: not written by this version of tiltsim, or edited since; choose another folder, "
+        "or move it away"
     )
 
 
