@@ -45,7 +45,8 @@ def fuzz(count, seed, report=lambda done, mistake: None):
         stack.enter_context(chdir(working))
         stack.callback(signal.signal, signal.SIGALRM, signal.signal(signal.SIGALRM, _hang))
         for number in range(count):
-            mistake = run_one(number, seed, folder) or _remove_what_is_in(working)
+            found = run_one(number, seed, folder), _remove_what_is_in(working)
+            mistake = "; ".join(filter(None, found))
             if mistake:
                 mistake = f"seed {seed}, input {number} ({_kind(number)}): {mistake}"
                 mistakes.append(mistake)

@@ -260,6 +260,15 @@ def test_an_edited_file_is_read_again(write):
     assert total_inertia(build_model(assemble(scenario(path))))[0] == pytest.approx(0.78)
 
 
+def test_an_edited_include_is_read_again(write, tmp_path):
+    text = re.sub(r"<option .*?/>", '<include file="moon.xml"/>', XML, count=1)
+    path = write(text)
+    for gravity in (1.62, 1.625):
+        (tmp_path / "moon.xml").write_text(f"<mujoco><option gravity='0 0 -{gravity}'/></mujoco>")
+        assert scenario(path).rotorcraft.resolve().gravity == gravity
+        assert -build_model(assemble(scenario(path))).opt.gravity[2] == gravity
+
+
 def rename(name):
     return lambda: XML.replace(f'name="{name}"', 'name="other"')
 

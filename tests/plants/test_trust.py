@@ -39,6 +39,25 @@ simulation = { duration = 0.004, timestep = 0.002 }
 controller = { law = "python", function = "law.py:law" }
 """
 
+ELSEWHERE = """
+[set]
+simulation = { duration = 0.004, timestep = 0.002 }
+controller.law = "python"
+controller.function = "../law.py:law"
+[[axis]]
+type = "list"
+key = "initial.position[0]"
+values = [0.0, 0.1]
+"""
+LISTED_ELSEWHERE = """
+[set]
+simulation = { duration = 0.004, timestep = 0.002 }
+[[axis]]
+type = "list"
+keys = ["controller.law", "controller.function"]
+values = [["python", "../law.py:law"]]
+"""
+
 
 @pytest.fixture
 def folder(tmp_path):
@@ -92,4 +111,15 @@ def test_code_elsewhere_is_not_executed(folder, function, capsys):
     told = capsys.readouterr().err
     assert "controller.function" in told
     assert "must lie in the folder of the scenario file" in told
+    assert not ran(folder)
+
+
+@pytest.mark.parametrize("text", [ELSEWHERE, LISTED_ELSEWHERE])
+def test_sweeps_execute_no_code_elsewhere(folder, text, capsys, monkeypatch):
+    inner = folder / "inner"
+    inner.mkdir()
+    monkeypatch.chdir(inner)
+    (inner / "sweep.toml").write_text('scenario = "ch04_tracking/setpoint#rho_0_modified"' + text)
+    assert main(["sweep", "sweep.toml", "--jobs", "1", "--quiet", "--trust", "--out", "out"]) == 2
+    assert "must lie in the folder of the scenario file" in capsys.readouterr().err
     assert not ran(folder)

@@ -8,7 +8,6 @@ of the controllers that were copied into the folder.
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
@@ -18,7 +17,7 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.loading import scenario_toml
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.system.files import digest, prepare_folder, replacing
+from tiltsim.system.files import digest, file_digests, prepare_folder, replacing
 from tiltsim.system.parquet import parquet_bytes
 from tiltsim.system.text import printable
 
@@ -117,8 +116,7 @@ def _controller_file(scenario: Scenario) -> Path | None:
 def _copies(folder: Path) -> list[str]:
     """Digests of the controllers that tiltsim copied into a folder and nobody has edited since."""
     written = _read_if_written(folder / SCENARIO)
-    files = [file for file in folder.glob("*.py") if file.is_file() and os.access(file, os.R_OK)]
-    there = {digest(file.read_bytes()) for file in files} if written else set()
+    there = {*file_digests(folder.glob("*.py")).values()} if written else set()
     return sorted(one for one in there if _COPIED.format(one) in written)
 
 

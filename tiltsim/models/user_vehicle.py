@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from tiltsim.models.mjcf_editing import set_servo_gains, set_stop
-from tiltsim.models.mjcf_limits import check_mjcf
+from tiltsim.models.mjcf_files import mjcf_version
 from tiltsim.models.parts import TiltServo
 from tiltsim.system.hooks import mujoco_hooks
 from tiltsim.system.locks import one_thread_at_a_time
@@ -49,7 +49,6 @@ class UserVehicle:
 
     Attributes:
         path: The file.
-        modified: When it was last changed, ns, to distinguish its versions.
         vehicle: Its parameters; inertia about the centre of mass.
         layout_mismatch: How it differs from the layout that the built-in control laws assume; empty
             if it does not.
@@ -61,7 +60,6 @@ class UserVehicle:
     """
 
     path: str
-    modified: int
     vehicle: Vehicle
     layout_mismatch: str
     hinge_inertias: tuple[float, ...]
@@ -154,19 +152,18 @@ def read_user_vehicle(path: str, model: str) -> UserVehicle:
         ValueError: In one line: the file cannot be read or compiled, or lacks a name.
     """
     try:
-        modified = Path(path).stat().st_mtime_ns
+        Path(path).stat()
     except OSError as error:
         raise ValueError(f"cannot be read: {error.strerror}") from None
     if not Path(path).is_file():
         raise ValueError("is not a file")
-    return _read(path, model, modified)
+    return _read(path, model, mjcf_version(Path(path)))
 
 
 @lru_cache(maxsize=64)
-def _read(path: str, model: str, modified: int) -> UserVehicle:
+def _read(path: str, model: str, _version: object) -> UserVehicle:
     import mujoco
 
-    check_mjcf(Path(path))
     try:
         with mujoco_hooks():
             compiled = mujoco.MjModel.from_xml_path(path)
@@ -197,7 +194,6 @@ def _read(path: str, model: str, modified: int) -> UserVehicle:
     tilts = [compiled.joint(f"tilt_{i}").dofadr[0] for i in ROTORS] if tilting else []
     return UserVehicle(
         path=path,
-        modified=modified,
         vehicle=Vehicle(whole.mass, xx, yy, zz, arm, thrust_coefficient, drag_coefficient, gravity),
         layout_mismatch=_layout_mismatch(pose, arm, tilting=tilting),
         hinge_inertias=tuple(float(compiled.dof_M0[dof]) for dof in tilts),

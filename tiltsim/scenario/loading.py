@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from os import PathLike, fsdecode
 from pathlib import Path
 from typing import Any, Final
@@ -13,6 +14,7 @@ import tomli_w
 from pydantic import ValidationError
 
 from tiltsim.errors import InputError
+from tiltsim.models.mjcf_files import check_mjcf
 from tiltsim.scenario.arguments import check_keys, controller_name, plain
 from tiltsim.scenario.controller import DEFAULT_LAW
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
@@ -139,17 +141,38 @@ def locate_named_files(
     Raises:
         InputError: If the code lies elsewhere.
     """
+    for table, key, is_code in _file_keys(document):
+        name = document[table][key]
+        if address is not None and is_code and not _lies_in(folder, name.rpartition(":")[0]):
+            raise InputError(
+                f"{address}: {table}.{key} = {show(name)}: must lie in the folder of the "
+                "scenario file, by a relative path; for other files use tiltsim run "
+                "--controller FILE.py:NAME"
+            )
+        document[table][key] = str((folder / name).absolute())
+
+
+def named_files(document: Mapping[str, Any]) -> set[Path]:
+    """The files that a document names; of MJCF also what it can include and name."""
+    files: set[Path] = set()
+    for table, key, is_code in _file_keys(document):
+        name = document[table][key]
+        if is_code:
+            files.add(Path(name.rpartition(":")[0]))
+            continue
+        files.add(Path(name))
+        with suppress(ValueError, OSError):  # where it is flown, it is refused
+            files |= check_mjcf(Path(name))
+    return files
+
+
+def _file_keys(document: Mapping[str, Any]) -> Iterator[tuple[str, str, bool]]:
+    """Table and key of each file that a document names, and whether it is code."""
     for table, key, mark in FILE_KEYS:
         keys = document.get(table)
         name = keys.get(key) if isinstance(keys, dict) else None
-        if isinstance(keys, dict) and isinstance(name, str) and mark in name:
-            if address is not None and mark and not _lies_in(folder, name.rpartition(":")[0]):
-                raise InputError(
-                    f"{address}: {table}.{key} = {show(name)}: must lie in the folder of the "
-                    "scenario file, by a relative path; for other files use tiltsim run "
-                    "--controller FILE.py:NAME"
-                )
-            keys[key] = str((folder / name).absolute())
+        if isinstance(name, str) and mark in name:
+            yield table, key, bool(mark)
 
 
 def _lies_in(folder: Path, name: str) -> bool:

@@ -43,9 +43,10 @@ class ChunkWork:
     trusted: bool = False  # whether to execute Python code that scenarios name
 
     def __call__(self, number: int) -> FinishedChunk:
-        """Fly one chunk."""
+        """Fly one chunk. Raises `InputError` if a file that scenarios name has changed."""
         points = _points(self.definition_json)
         rows, flights = fly_points(points, points.chunk(number), self.engine, trusted=self.trusted)
+        points.definition.require_same_files()
         table = parquet_bytes(rows_to_table(points, rows))
         return FinishedChunk(number, len(rows), table, flights, installed_versions())
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
-from hashlib import sha256
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from tiltsim.errors import InputError
@@ -13,6 +13,7 @@ from tiltsim.scenario.loading import parse_scenario, without_none
 from tiltsim.scenario.messages import show
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.sweeps.tables import Sweep
+from tiltsim.system.files import digest, file_digests
 
 VERSIONS: Final = ("tiltsim", "mujoco", "numpy", "scipy")
 """Packages whose arithmetic the rows depend on."""
@@ -32,16 +33,17 @@ class SweepDefinition:
     sweep: dict[str, Any]  # the validated file
     base: dict[str, Any]  # the base scenario with every default written out
     versions: dict[str, str]  # installed versions of `VERSIONS`
+    files: dict[str, str] = field(default_factory=dict)  # digests of those that scenarios name
 
     def to_json(self) -> str:
         """The definition as text with a checksum, for a file."""
-        return json.dumps({"sha256": self._checksum(), **vars(self)}, indent=2) + "\n"
+        return json.dumps({"sha256": _checksum(vars(self)), **vars(self)}, indent=2) + "\n"
 
     @staticmethod
     def from_json(text: str) -> SweepDefinition:
         """The inverse of `to_json`. Raises ValueError for any other text.
 
-        Earlier versions wrote no checksum.
+        Earlier versions wrote no checksum, and no digests of files.
         """
         try:
             document = dict(json.loads(text))
@@ -50,15 +52,22 @@ class SweepDefinition:
             definition = SweepDefinition(**document)
         except (TypeError, RecursionError, InputError):
             raise ValueError("keys are missing or unknown") from None
-        for key, kind in (("address", str), ("sweep", dict), ("base", dict), ("versions", dict)):
-            if not isinstance(document[key], kind):
-                raise ValueError(f"{key} = {show(document[key])}")
-        if checksum not in {None, definition._checksum()}:
+        for key, value in vars(definition).items():
+            if not isinstance(value, str if key == "address" else dict):
+                raise ValueError(f"{key} = {show(value)}")
+        if checksum not in {None, _checksum(document)}:
             raise ValueError("its content differs from its checksum")
         return definition
 
-    def _checksum(self) -> str:
-        return sha256(json.dumps(vars(self)).encode()).hexdigest()
+    def require_same_files(self) -> None:
+        """Raise `InputError` if a file is not the one with which the definition was made."""
+        found = file_digests(self.files)
+        for file, expected in self.files.items():
+            if found.get(file) != expected:
+                raise InputError(
+                    f"{self.address}: {file}: no longer the file with which this sweep began; "
+                    "finished flights are kept"
+                )
 
     def mistake(self, key: str, value: object, allowed: str) -> InputError:
         """The error, to be raised by the caller, for a key of the sweep file."""
@@ -91,7 +100,12 @@ class SweepDefinition:
         sweep = {key: value for key, value in self.sweep.items() if key not in COSMETIC}
         base = {key: value for key, value in self.base.items() if key not in COSMETIC}
         sweep.pop("scenario", None)  # the scenario that it names is in the base
-        return {**sweep, "scenario": base, "versions": self.versions}
+        files = {f"sha256 of {file}": of_file for file, of_file in self.files.items()}
+        return {**sweep, "scenario": base, **files, "versions": self.versions}
+
+
+def _checksum(document: Mapping[str, Any]) -> str:
+    return digest(json.dumps(document).encode())
 
 
 def _flat(value: Any, key: str = "") -> dict[str, Any]:

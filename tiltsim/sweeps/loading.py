@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from copy import deepcopy
+from dataclasses import replace
 from importlib.metadata import version
 from os import PathLike, fsdecode
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pydantic import ValidationError
 
@@ -16,9 +17,11 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.arguments import check_keys, plain
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.loading import (
+    FILE_KEYS,
     apply_overrides,
     load_scenario,
     locate_named_files,
+    named_files,
     parse_scenario,
     without_none,
 )
@@ -28,6 +31,7 @@ from tiltsim.sweeps.checks import check_points
 from tiltsim.sweeps.definition import UNUSED, VERSIONS, SweepDefinition
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.tables import (
+    Axis,
     AxisTable,
     CasesAxis,
     LinspaceAxis,
@@ -38,7 +42,11 @@ from tiltsim.sweeps.tables import (
     UniformAxis,
     dotted,
 )
+from tiltsim.system.files import file_digests
 from tiltsim.system.text import short_repr, valid_unicode
+
+_FILE_KEYS: Final = frozenset(f"{table}.{key}" for table, key, _ in FILE_KEYS)
+"""Keys of a scenario that name files."""
 
 
 def load_sweep(
@@ -59,17 +67,16 @@ def load_sweep(
         check_keys("overrides", overrides)
     document, address, folder = _document(source)
     fixed = document.setdefault("set", {})
-    if overrides and isinstance(fixed, dict):
-        document["set"] = dotted(fixed) | plain(overrides)
+    if isinstance(fixed, dict):
+        document["set"] = _located(dotted(fixed), folder, address) | plain(overrides or {})
     if "scenario" not in document and not {"axis", "bisect"} & document.keys():
         raise InputError(f"{address}: a scenario, not a sweep: it has no [[axis]]; use tiltsim run")
     try:
         sweep = Sweep.model_validate(document)
     except ValidationError as error:
         raise InputError(f"{address}: {one_line_message(error, document, Sweep)}") from None
-    for axis in sweep.axis:
-        for tables in axis.cases.values() if isinstance(axis, CasesAxis) else ():
-            locate_named_files(tables, folder, address)
+    axes = tuple(_with_located_files(axis, folder, address) for axis in sweep.axis)
+    sweep = sweep.model_copy(update={"axis": axes})
     base = _base(sweep, folder, address)
     definition = SweepDefinition(
         address,
@@ -78,7 +85,42 @@ def load_sweep(
         {name: version(name) for name in VERSIONS},
     )
     check_points(SweepPoints(definition))
-    return definition
+    return replace(definition, files=file_digests(sorted(_named_files(sweep, base))))
+
+
+def _with_located_files(axis: Axis, folder: Path, address: str) -> Axis:
+    """An axis in which file names are absolute; `InputError` for code outside the folder."""
+    if isinstance(axis, CasesAxis):
+        for tables in axis.cases.values():
+            locate_named_files(tables, folder, address)
+    elif isinstance(axis, ListAxis) and not _FILE_KEYS.isdisjoint(axis.targets):
+        rows = [_located(dict(zip(axis.targets, row)), folder, address) for row in axis.rows()]
+        values = [tuple(row.values()) if axis.keys else row[axis.name] for row in rows]
+        return axis.model_copy(update={"values": tuple(values)})
+    return axis
+
+
+def _located(values: dict[str, Any], folder: Path, address: str) -> dict[str, Any]:
+    """Values by dotted key in which file names are absolute."""
+    located = {}
+    for name in _FILE_KEYS & values.keys():
+        table, _, key = name.partition(".")
+        document = {table: {key: values[name]}}
+        locate_named_files(document, folder, address)
+        located[name] = document[table][key]
+    return values | located
+
+
+def _named_files(sweep: Sweep, base: dict[str, Any]) -> set[Path]:
+    """The files that the scenarios of a sweep name."""
+    documents = [base]
+    for axis in sweep.axis:
+        if isinstance(axis, CasesAxis):
+            documents += axis.cases.values()
+        for row in axis.rows() if isinstance(axis, ListAxis) else ():
+            keys = (target.partition(".") for target in axis.targets)
+            documents += [{table: {key: value}} for (table, _, key), value in zip(keys, row)]
+    return {file for document in documents for file in named_files(document)}
 
 
 def _document(source: object) -> tuple[dict[str, Any], str, Path]:

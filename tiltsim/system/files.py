@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
@@ -24,6 +24,16 @@ _RANDOM_BYTES: Final = 8
 def digest(content: bytes) -> str:
     """The SHA-256 of the content of a file, in hexadecimal digits."""
     return sha256(content).hexdigest()
+
+
+def file_digests(files: Iterable[str | Path]) -> dict[str, str]:
+    """The digests of those files that can be read, by name."""
+    found = {}
+    for file in map(Path, files):
+        with suppress(OSError, ValueError):  # the latter for a NUL in the name
+            if file.is_file():
+                found[str(file)] = digest(file.read_bytes())
+    return found
 
 
 def prepare_folder(folder: Path) -> None:

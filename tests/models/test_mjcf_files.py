@@ -9,7 +9,7 @@ import pytest
 import tiltsim
 from tiltsim.errors import InputError
 from tiltsim.models.mjcf_editing import parse_mjcf
-from tiltsim.models.mjcf_limits import check_mjcf
+from tiltsim.models.mjcf_files import check_mjcf
 from tiltsim.resources import shipped_folder
 
 SHIPPED = sorted(shipped_folder("mjcf").glob("*.xml"))
@@ -45,6 +45,25 @@ def test_what_exceeds_a_limit_is_refused(inside, words, tmp_path):
     assert "\n" not in str(caught.value)
     with pytest.raises(InputError, match=re.escape(str(caught.value))):
         tiltsim.parse_scenario({"vehicle": {"mjcf": str(file)}})
+
+
+@pytest.mark.parametrize("name", ["none.xml", "9" * 400, "../none.xml", "/none.xml"])
+def test_what_is_included_and_missing_is_refused_in_a_line(tmp_path, name):
+    file = tmp_path / "own.xml"
+    file.write_text(f"<mujoco><include file='{name}'/></mujoco>")
+    assert file in check_mjcf(file)
+    with pytest.raises(InputError, match="MuJoCo says: ") as caught:
+        tiltsim.parse_scenario({"vehicle": {"mjcf": str(file)}})
+    assert "\n" not in str(caught.value)
+
+
+def test_what_an_included_file_includes_counts(tmp_path):
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "many.xml").write_text(f"<mujoco>{MANY}</mujoco>")
+    (tmp_path / "parts" / "one.xml").write_text("<mujoco><include file='many.xml'/></mujoco>")
+    (tmp_path / "own.xml").write_text("<mujoco><include file='parts/one.xml'/></mujoco>")
+    with pytest.raises(ValueError, match="more than 5000 elements"):
+        check_mjcf(tmp_path / "own.xml")
 
 
 def test_what_dm_control_cannot_read_is_refused_in_a_line(tmp_path):

@@ -1,7 +1,12 @@
-"""Limits of a user's MJCF, checked before MuJoCo allocates memory and time for it."""
+"""The files of a user's MJCF: their limits and their versions.
+
+The limits are checked before MuJoCo allocates memory and time.
+"""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterable
 from math import isfinite, prod
 from pathlib import Path
 from typing import Any, Final
@@ -19,20 +24,37 @@ MAX_SAMPLES: Final = 4096**2
 MAX_SIZE: Final = 100_000
 """An attribute of ``<size>``."""
 
+MAX_FILES: Final = 10_000
+"""Places at which the files are searched that it names."""
+
+_MODELS: Final = ("include", "model")
+"""Elements that name MJCF."""
+
+_FOLDERS: Final = ("assetdir", "meshdir", "texturedir")
+"""Attributes of ``<compiler>`` that say where files are."""
+
 _TEXTS: Final = frozenset(("name", "class", "childclass", "file", "model"))
 """Attributes that are names, of any spelling."""
 
 
-def check_mjcf(path: Path) -> None:
-    """Raise ValueError, in one line, for MJCF that is no XML, too large, or has a NaN in it."""
+def check_mjcf(path: Path) -> set[Path]:
+    """Raise ValueError, in one line, for MJCF that is no XML, too large, or has a NaN in it.
+
+    Returns:
+        The file and all that its includes, meshes and textures can be: MuJoCo and dm_control search
+        for them in different places. Most of these do not exist.
+    """
     waiting, bytes_read, elements = [path], 0, 0
+    names, folders = {path.name}, {"."}
     while waiting:
         file = waiting.pop()
-        if not file.is_file():
+        if not os.path.isfile(file):  # noqa: PTH113, Path.is_file raises if a name is too long
             continue  # MuJoCo reports it
         bytes_read += file.stat().st_size
         if bytes_read > MAX_BYTES:
             raise ValueError(f"more than {MAX_BYTES} bytes with what it includes")
+        inside = file.parent.is_relative_to(path.parent)
+        folders.add(str(file.parent.relative_to(path.parent) if inside else file.parent))
         try:
             # MuJoCo reads some text that is no XML; dm_control, which edits the file, does not.
             root = ElementTree.fromstring(file.read_bytes())
@@ -42,13 +64,48 @@ def check_mjcf(path: Path) -> None:
         while pending:
             element, replicas = pending.pop()
             _check_attributes(element)
-            if element.tag == "include":
-                waiting.append(path.parent / element.get("file", ""))
+            named = {value for name, value in element.attrib.items() if name.startswith("file")}
+            names |= named | {Path(name).name for name in named}
+            if element.tag in _MODELS:
+                waiting += {
+                    folder / name for name in named for folder in (path.parent, file.parent)
+                }
+            elif element.tag == "compiler":
+                folders |= {element.get(key, ".") for key in _FOLDERS}
             replicas *= prod(max(1, int(count)) for count in _numbers(element.get("count", "")))
             elements += replicas
             if elements > MAX_ELEMENTS:
                 raise ValueError(f"more than {MAX_ELEMENTS} elements")
             pending += [(child, replicas) for child in element]
+    if len(names) * len(folders) ** 2 > MAX_FILES:
+        raise ValueError(f"more than {MAX_FILES} places of files that it names")
+    return {path.parent / one / two / name for one in folders for two in folders for name in names}
+
+
+Version = tuple[tuple[Path, int, int], ...]
+"""Time of the last change (ns) and size of files; zeros for those that do not exist."""
+
+_versions: dict[Path, Version] = {}
+
+
+def mjcf_version(path: Path) -> Version:
+    """The version of an MJCF file with what it includes and names. Raises as `check_mjcf`."""
+    known = _versions.get(path)
+    if known is None or known != _version_of(file for file, *_ in known):
+        known = _versions[path] = _version_of(sorted(check_mjcf(path)))
+    return known
+
+
+def _version_of(files: Iterable[Path]) -> Version:
+    found = []
+    for file in files:
+        try:
+            state = file.stat()
+        except (OSError, ValueError):
+            found.append((file, 0, 0))
+        else:
+            found.append((file, state.st_mtime_ns, state.st_size))
+    return tuple(found)
 
 
 def _check_attributes(element: Any) -> None:
