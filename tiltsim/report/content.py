@@ -261,7 +261,7 @@ def lead_text(rows: list[Row]) -> str:
         f"is ours. They complete {sum(whole.values())} of {len(whole)} distinct statements. Of all "
         f"{len(rows)} rows, {counts[ClaimVerdict.REPRODUCED]} are reproduced, "
         f"{counts[ClaimVerdict.QUALITATIVE]} qualitatively, {counts[ClaimVerdict.FITTED]} are "
-        "consistent with a fit and show nothing, "
+        "consistent with a fit, which is no evidence, "
         f"{counts[ClaimVerdict.NOT_REPRODUCED]} are not reproduced "
         f"({statements[ClaimVerdict.NOT_REPRODUCED]} statements), and in "
         f"{counts[ClaimVerdict.WRONG]} the published claim is wrong "

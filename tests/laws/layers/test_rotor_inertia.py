@@ -198,6 +198,32 @@ def test_pods_that_jump_turn_the_body_at_once():
     np.testing.assert_allclose(after[9:12] - before[9:12], turned, atol=by_thrusts)
 
 
+@pytest.mark.parametrize("plant", [{}, THESIS], ids=["mujoco", "thesis"])
+def test_a_trot_turns_the_body_and_a_fixed_gait_does_not(plant):
+    """By the momentum that the pods take with them, before the controller answers at 40 1/s."""
+    hover = {
+        "simulation": {"duration": 0.004, "record_timestep": 0.001},
+        "controller": {"decoupler": "none"},
+        "reference": {"type": "attitude_altitude"},
+    }
+    vehicle, turned = PRESETS["ar_drone_2"], {}
+    initial = {"attitude": [0.0, 0.0, 0.0], "rotor_speed": vehicle.hover_rotor_speed}
+    trot = {"type": "trot_continuous", "amplitude": 0.4, "period": 0.4}
+    for gait in (trot, {"type": "fixed", "angles": [0.0] * 4}):
+        with_inertia, without = (
+            fly(plant, hover, gait=gait, initial=initial, vehicle={"rotor_inertia": inertia})
+            for inertia in (INERTIA, 0.0)
+        )
+        turned[gait["type"]] = [with_inertia[rate][-1] - without[rate][-1] for rate in "pqr"]
+        if gait is trot:
+            tilts = np.stack([with_inertia[f"alpha_{i}"] for i in range(1, 5)], axis=-1)
+            moved = SPIN @ (thrust_axes(tilts[-1]) - thrust_axes(tilts[0]))
+    expected = -INERTIA * vehicle.hover_rotor_speed * moved / vehicle[1:4]
+    assert np.abs(expected[:2]).min() > 0.05
+    np.testing.assert_allclose(turned["trot_continuous"][:2], expected[:2], rtol=0.1)
+    assert np.abs(turned["fixed"]).max() < 1e-9
+
+
 def test_stiff_servos_approach_pods_that_follow_exactly():
     """The torques by tilt rates and rotor accelerations against the momentum formulation.
 
