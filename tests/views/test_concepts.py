@@ -13,7 +13,10 @@ import pytest
 
 from tests.flights import flight
 from tiltsim.cli import main
-from tiltsim.commands.concepts import DECOUPLER_FLIGHTS, drawings
+from tiltsim.commands.concepts import DECOUPLER_FLIGHTS, drawings, fly_decouplers
+from tiltsim.commands.key_tables import key_tables
+from tiltsim.commands.schema import scenario_schema
+from tiltsim.scenario.metric_names import METRICS
 from tiltsim.views.figures import concepts, vehicle_drawing
 from tiltsim.views.figures.vehicle_drawing import ABOVE, Pose, View
 from tiltsim_controllers.analysis.singularity import (
@@ -139,6 +142,28 @@ def test_gaits_and_colors_are_drawn(draw):
 def test_the_page_shows_all_drawings():
     shown = re.findall(r"\(pictures/concepts_(\w+)\.svg\)", PAGE.read_text(encoding="utf-8"))
     assert shown == list(drawings())
+
+
+def test_keys_columns_and_flights_of_the_page_exist():
+    text = PAGE.read_text(encoding="utf-8")
+    keys = set(re.findall(r"`(\w+\.\w+)[ `]", text))
+    tables = key_tables(scenario_schema())
+    described = {f"{t.places[0][0].name}.{key.name}" for t in tables[1:] for key in t.keys}
+    assert keys
+    assert keys <= described
+    columns = set(re.findall(r"`([a-z]+_\w+)`", text.partition("## Glossary")[2]))
+    assert columns
+    assert columns <= {*flight("fixed").units, *METRICS}
+    assert all(f"#{address.partition('#')[2]}`" in text for address in DECOUPLER_FLIGHTS.values())
+
+
+@pytest.mark.slow
+def test_the_decouplers_rest_where_the_page_says():
+    text = PAGE.read_text(encoding="utf-8")
+    for name, flown in fly_decouplers().items():
+        away = np.hypot(flown["x"][-1], flown["y"][-1])
+        row = f"| {name} | ({flown['x'][-1]:.2f}, {flown['y'][-1]:.2f}) m | {away:.2f} m |"
+        assert row in text or (name == "exact" and away < 1e-6 and "| below 1e-6 m |" in text)
 
 
 @pytest.mark.slow

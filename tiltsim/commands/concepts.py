@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.commands.options import Subparsers
-from tiltsim.commands.text import print_line
+from tiltsim.commands.progress import show_progress
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,10 +41,12 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.views.figures.style import save
 
     prepare_folder(arguments.out)
-    for name, draw in drawings().items():
-        file = arguments.out / f"concepts_{name}.svg"
-        save(draw(), file)
-        print_line(f"figure written to {file}")
+    with show_progress(shown=True) as progress:
+        for name, draw in drawings().items():
+            progress.begin(f"drawing {name}")
+            file = arguments.out / f"concepts_{name}.svg"
+            save(draw(), file)
+            progress.print(f"figure written to {file}")
     return 0
 
 
@@ -55,13 +57,14 @@ def drawings() -> dict[str, Callable[[], Figure]]:
     return {
         "vehicle": concepts.vehicle_figure,
         "gaits": concepts.gait_figure,
-        "decouplers": lambda: concepts.decoupler_figure(_fly()),
+        "decouplers": lambda: concepts.decoupler_figure(fly_decouplers()),
         "attitudes": concepts.attitude_figure,
         "colors": concepts.color_figure,
     }
 
 
-def _fly() -> dict[str, Flight]:
+def fly_decouplers() -> dict[str, Flight]:
+    """The flights that show the decouplers, by their names."""
     from tiltsim.scenario.loading import load_scenario
     from tiltsim.simulation.simulate import simulate
 
