@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from tiltsim.simulation.simulate import simulate
     from tiltsim.simulation.stepwise import Simulation
     from tiltsim.sweeps.sweep import sweep
+    from tiltsim.views.figures.plot import plot
     from tiltsim.views.rerun.viewer import view
     from tiltsim.views.video.making import video
 
@@ -42,6 +43,7 @@ _HOMES = {
     "load_scenario": "scenario.loading",
     "parse_scenario": "scenario.loading",
     "simulate": "simulation.simulate",
+    "plot": "views.figures.plot",
     "show_progress": "commands.progress",  # for progress=True
     "sweep": "sweeps.sweep",
     "video": "views.video.making",
@@ -61,6 +63,7 @@ __all__ = [
     "load_flight",
     "load_scenario",
     "parse_scenario",
+    "plot",
     "simulate",
     "sweep",
     "video",

@@ -10,11 +10,7 @@ from tiltsim.scenario.loading import parse_scenario, split_key
 from tiltsim.scenario.messages import show
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.sweeps.definition import SweepDefinition
-
-
-def is_number(value: object) -> bool:
-    """Whether a TOML value is an integer or a float."""
-    return isinstance(value, int | float) and not isinstance(value, bool)
+from tiltsim.system.numbers import is_number
 
 
 class BaseValues:

@@ -7,9 +7,10 @@ import math
 import operator
 from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
-from typing import Any, Final, TypeGuard
+from typing import Any, Final
 
 from tiltsim.scenario.messages import did_you_mean
+from tiltsim.system.numbers import is_number
 
 _BINARY: Final[dict[type[ast.operator], Callable[[Any, Any], Any]]] = {
     ast.Add: operator.add,
@@ -60,7 +61,7 @@ def evaluate(expression: str, values: Mapping[str, Any]) -> float:
         raise ValueError(f"has no value: {error}") from None
     except TypeError:
         raise ValueError("has an operator or a function with the wrong type of argument") from None
-    if not (_is_number(value) and math.isfinite(value)):
+    if not (is_number(value) and math.isfinite(value)):
         raise ValueError("is not a real number")
     return float(value)
 
@@ -102,12 +103,8 @@ def _names(node: ast.expr) -> Iterator[str]:
                 yield from _names(child)
 
 
-def _is_number(value: object) -> TypeGuard[int | float]:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
 def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
-    if isinstance(node, ast.Constant) and _is_number(node.value):
+    if isinstance(node, ast.Constant) and is_number(node.value):
         return float(node.value)
     if _is_name(node):
         name = ast.unparse(node)

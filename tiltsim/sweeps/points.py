@@ -15,7 +15,7 @@ from typing import Any, Final
 from tiltsim.scenario.loading import apply_overrides, merge, parse_scenario, split_key
 from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.sweeps.base_values import BaseValues, is_number
+from tiltsim.sweeps.base_values import BaseValues
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.expressions import evaluate
 from tiltsim.sweeps.sampling import draw_samples
@@ -28,6 +28,7 @@ from tiltsim.sweeps.tables import (
     Sweep,
     UniformAxis,
 )
+from tiltsim.system.numbers import is_number
 from tiltsim_controllers.mathematics.scalar import Floats
 
 MAX_POINTS: Final = 10_000_000

@@ -6,7 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.errors import InputError
+from tiltsim.flight.flight import as_flights
 from tiltsim.scenario.messages import choose
+from tiltsim.system.text import short_repr
 from tiltsim.views.figures import style
 from tiltsim.views.figures.adjusting import relabel
 from tiltsim.views.figures.layout import add_heading, new_page
@@ -36,10 +38,10 @@ WIDE: Final = 6.0
 def plot(
     flights: Flight | Sequence[Flight],
     *,
-    panels: Sequence[str] = (),
+    panels: str | Sequence[str] = (),
     size: str | tuple[float, float] | None = None,
     title: str | None = None,
-    labels: Mapping[str, str] | None = None,
+    labels: Sequence[str] | Mapping[str, str] | None = None,
     names: Sequence[str] = (),
 ) -> Figure:
     """One flight on a page, or several in the same axes.
@@ -52,20 +54,24 @@ def plot(
             that suit the flights.
         size: Such as "85mm x 60mm", or width and height in inches; the panels are arranged to fit.
         title: Instead of the scenarios' title; empty for none.
-        labels: Texts instead of the names of flights, and of other texts of the figure.
+        labels: Names of several flights in their order; or, as a dict, texts instead of their names
+            and of other texts of the figure.
         names: Names of several flights, by default `flight_names`.
 
     Raises:
-        InputError: If a panel, size or label is unknown, or there are more flights than colours.
+        InputError: If an argument is wrong, or there are more flights than colours.
     """
-    flights = [flights] if not isinstance(flights, Sequence) else flights
-    if not flights:
-        raise InputError("plot: no flights")
+    flights = as_flights(flights)
+    panels = [panels] if isinstance(panels, str) else panels
+    if not isinstance(panels, list | tuple) or not all(isinstance(name, str) for name in panels):
+        raise InputError(f"panels = {short_repr(panels)}: must be a list of names")
+    if title is not None and not isinstance(title, str):
+        raise InputError(f"title = {short_repr(title)}: must be text")
+    names, texts = _names_and_texts(flights, names, labels)
     if len(flights) > MAX_FLIGHTS:
         raise InputError(f"plot: {len(flights)} flights: at most {MAX_FLIGHTS} fit on one page")
     scenarios = [flight.scenario for flight in flights]
     names = names or (flight_names(scenarios) if len(flights) > 1 else [""])
-    texts = dict(labels or {})
     names = [texts.pop(name, name) for name in names]
     with style.paper_style(size=style.parse_size("size", size)):
         looks = [style.marked_line(n, len(flight)) for n, flight in enumerate(flights)]
@@ -89,6 +95,21 @@ def plot(
         add_heading(page.figure, *_heading(flights, title, page.figure.get_figwidth()), [*marks])
         relabel(page.figure, texts)
         return page.figure
+
+
+def _names_and_texts(
+    flights: Sequence[Flight],
+    names: Sequence[str],
+    labels: Sequence[str] | Mapping[str, str] | None,
+) -> tuple[Sequence[str], dict[str, str]]:
+    """The names of flights if any are given, and other texts by those that they replace."""
+    if labels is None or isinstance(labels, Mapping):
+        return names, dict(labels or {})
+    one_each = isinstance(labels, list | tuple) and len(labels) == len(flights)
+    if not one_each or not all(isinstance(label, str) for label in labels):
+        allowed = f"must be {len(flights)} texts, one for each flight, or a dict"
+        raise InputError(f"labels = {short_repr(labels)}: {allowed}")
+    return labels, {}
 
 
 def _with(shown: Sequence[Shown], panel: Panel) -> list[Shown]:

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from tiltsim.errors import InputError
 from tiltsim.system.files import replacing
+from tiltsim.system.numbers import is_finite
+from tiltsim.system.text import short_repr
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -143,8 +145,10 @@ def parse_size(name: str, size: str | tuple[float, float] | None) -> Size | None
             raise InputError(f"{name}: {size!r}: add mm, cm or in")
         scale = _INCHES[unit or last]
         inches = Size(float(width) * scale, float(height) * _INCHES[last] if height else None)
-    else:
+    elif isinstance(size, list | tuple) and len(size) == 2 and all(map(is_finite, size)):
         inches = Size(*size)
+    else:
+        raise InputError(f"{name} = {short_repr(size)}: must be two numbers, inches, or a text")
     low, high = _ALLOWED
     if not all(side is None or low <= side <= high for side in inches):
         raise InputError(f"{name}: {size!r}: must be from {low:g} to {high:g} inches")
@@ -252,13 +256,13 @@ def new_figure(width: float, height: float) -> Figure:
     It has the size of the context or, without one, this size (inches); with the width alone given,
     the same proportions.
     """
-    from matplotlib.figure import Figure
+    from tiltsim.views.figures.shown import ShownFigure
 
     asked = _size.get()
     if asked is not None:
         height = asked.height or height * asked.width / width
         width = asked.width
-    return Figure(figsize=(width, height), layout="constrained")
+    return ShownFigure(figsize=(width, height), layout="constrained")
 
 
 def figure_width(natural: float) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from math import inf, isfinite
+from math import inf
 from os import PathLike, fsdecode
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -13,6 +13,7 @@ from tiltsim.errors import InputError
 from tiltsim.flight.flight import Flight
 from tiltsim.scenario.messages import choose
 from tiltsim.system.files import prepare_file
+from tiltsim.system.numbers import is_finite
 from tiltsim.system.text import short_repr
 from tiltsim.views.video import prefer_offscreen_gl
 
@@ -116,7 +117,7 @@ class _Options:
         """A number in a range."""
         value = self._values[name]
         allowed = f"from {least:g} to {most:g}" if most < inf else f"of at least {least:g}"
-        if not (_is_number(value) and least <= value <= most):
+        if not (is_finite(value) and least <= value <= most):
             raise self.mistake(name, f"must be a number {allowed}")
         return float(value)
 
@@ -125,15 +126,11 @@ class _Options:
         values = self._values[name]
         fits = isinstance(values, list | tuple) and len(values) == len(ranges)
         if not fits or not all(
-            _is_number(value) and low <= value <= high
+            is_finite(value) and low <= value <= high
             for value, (low, high) in zip(values, ranges, strict=True)
         ):
             raise self.mistake(name, allowed)
         return values
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
 
 
 def _format(options: _Options, flight_end: float, suffix: str) -> VideoFormat:

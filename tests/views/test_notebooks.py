@@ -1,4 +1,4 @@
-"""Rerun within a notebook."""
+"""Figures and Rerun within a notebook."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import sys
 from types import SimpleNamespace
 
 import pytest
+from matplotlib.text import Text
 
 import tiltsim
 from tests.flights import flight
@@ -52,3 +53,15 @@ def test_without_rerun_s_widget_the_message_says_what_to_install(in_a_notebook, 
     monkeypatch.setitem(sys.modules, "rerun_notebook", None)
     with pytest.raises(tiltsim.TiltsimError, match=r"pip install 'rerun-sdk\[notebook\]'"):
         flight("fixed").view()
+
+
+def test_a_figure_is_the_picture_below_its_cell():
+    figure = flight("fixed").plot(panels=["z"], size=(3, 2))
+    assert figure._repr_png_().startswith(b"\x89PNG")
+    assert figure.get_size_inches().tolist() == [3.0, 2.0]
+
+
+def test_the_labels_of_several_flights_are_in_their_order():
+    figure = tiltsim.plot([flight("fixed"), flight("trot")], panels="z", labels=["one", "two"])
+    shown = [text.get_text() for text in figure.findobj(Text)]
+    assert shown.index("one") < shown.index("two")
