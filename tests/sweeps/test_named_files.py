@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
 
 import pytest
 
 from tests.models.test_user_vehicle import TETRAHEDRON, XML
 from tiltsim.errors import InputError
+from tiltsim.scenario.loading import load_scenario
 from tiltsim.sweeps.folder import open_sweep_folder
 from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.points import SweepPoints
@@ -83,3 +85,20 @@ def test_rows_of_a_file_that_changes_meanwhile_are_not_kept(folder):
     with pytest.raises(InputError, match=r"one\.py: no longer the file with which this sweep"):
         run_sweep(definition, folder / "out", trusted=True)
     assert not list((folder / "out" / "parts").iterdir())
+
+
+def test_a_sweep_given_in_python_may_name_code_anywhere(folder):
+    (folder / "scenario.toml").write_text(
+        "controller = { law = 'python', function = 'one.py:law' }\n"
+        "simulation = { duration = 0.004, timestep = 0.002 }\n"
+    )
+    axis = {
+        "type": "list",
+        "key": "controller.function",
+        "values": [f"{folder}/one.py:law", f"{folder}/laws/two.py:law"],
+    }
+    (folder / "elsewhere").mkdir()
+    os.chdir(folder / "elsewhere")
+    base = load_scenario(folder / "scenario.toml")
+    files = load_sweep({"scenario": base, "axis": [axis]}).files
+    assert files.keys() == {f"{folder}/one.py", f"{folder}/laws/two.py"}

@@ -88,11 +88,19 @@ def load_sweep(
     return replace(definition, files=file_digests(sorted(_named_files(sweep, base))))
 
 
-def _with_located_files(axis: Axis, folder: Path, address: str) -> Axis:
-    """An axis in which file names are absolute; `InputError` for code outside the folder."""
+def _locate(document: dict[str, Any], folder: Path | None, address: str) -> None:
+    """Make file names absolute. Raises `InputError` for code outside the folder of a file."""
+    if folder is None:
+        locate_named_files(document, Path())
+    else:
+        locate_named_files(document, folder, address)
+
+
+def _with_located_files(axis: Axis, folder: Path | None, address: str) -> Axis:
+    """An axis in which file names are absolute."""
     if isinstance(axis, CasesAxis):
         for tables in axis.cases.values():
-            locate_named_files(tables, folder, address)
+            _locate(tables, folder, address)
     elif isinstance(axis, ListAxis) and not _FILE_KEYS.isdisjoint(axis.targets):
         rows = [_located(dict(zip(axis.targets, row)), folder, address) for row in axis.rows()]
         values = [tuple(row.values()) if axis.keys else row[axis.name] for row in rows]
@@ -100,13 +108,13 @@ def _with_located_files(axis: Axis, folder: Path, address: str) -> Axis:
     return axis
 
 
-def _located(values: dict[str, Any], folder: Path, address: str) -> dict[str, Any]:
+def _located(values: dict[str, Any], folder: Path | None, address: str) -> dict[str, Any]:
     """Values by dotted key in which file names are absolute."""
     located = {}
     for name in _FILE_KEYS & values.keys():
         table, _, key = name.partition(".")
         document = {table: {key: values[name]}}
-        locate_named_files(document, folder, address)
+        _locate(document, folder, address)
         located[name] = document[table][key]
     return values | located
 
@@ -123,8 +131,8 @@ def _named_files(sweep: Sweep, base: dict[str, Any]) -> set[Path]:
     return {file for document in documents for file in named_files(document)}
 
 
-def _document(source: object) -> tuple[dict[str, Any], str, Path]:
-    """The tables of a `load_sweep` source, its name in messages, and what file names start from."""
+def _document(source: object) -> tuple[dict[str, Any], str, Path | None]:
+    """The tables of a `load_sweep` source, its name in messages, and the folder of its file."""
     if isinstance(source, Mapping):
         check_keys("sweep", source)
         base = source.get("scenario")
@@ -136,7 +144,7 @@ def _document(source: object) -> tuple[dict[str, Any], str, Path]:
                 )
             tables = without_none(base.model_dump(mode="json", exclude_unset=True))
             source = {**source, "scenario": tables}
-        return plain(source), "sweep", Path()
+        return plain(source), "sweep", None
     if not isinstance(source, str | PathLike):
         raise InputError(
             f"sweep = {short_repr(source)}: must be a name of the library, a TOML file or a dict"
@@ -145,7 +153,7 @@ def _document(source: object) -> tuple[dict[str, Any], str, Path]:
     return read_toml(file), valid_unicode(library_name(file)), file.parent
 
 
-def _base(sweep: Sweep, folder: Path, address: str) -> dict[str, Any]:
+def _base(sweep: Sweep, folder: Path | None, address: str) -> dict[str, Any]:
     """The base scenario with ``[set]`` and all defaults, without its expectations.
 
     If it lacks a key that an axis gives, with the first values of the axes.
@@ -177,11 +185,13 @@ def _first_values(sweep: Sweep) -> dict[str, Any]:
     return {key: value for key, value in first.items() if "." in key}
 
 
-def _scenario(sweep: Sweep, values: dict[str, Any], folder: Path, address: str) -> dict[str, Any]:
+def _scenario(
+    sweep: Sweep, values: dict[str, Any], folder: Path | None, address: str
+) -> dict[str, Any]:
     """The scenario that a sweep names or contains, with values by dotted key."""
     if isinstance(sweep.scenario, str):
         name, _, variant = sweep.scenario.partition("#")
-        beside = (folder / name) if name else folder
+        beside = (folder or Path()) / name
         path = str(beside) if beside.is_file() else name
         try:
             scenario = load_scenario(path + (f"#{variant}" if variant else ""), values or None)
@@ -189,7 +199,7 @@ def _scenario(sweep: Sweep, values: dict[str, Any], folder: Path, address: str) 
             raise InputError(f"{address}: scenario: {error}") from None
     else:
         document = deepcopy(sweep.scenario)
-        locate_named_files(document, folder, f"{address}: scenario")
+        _locate(document, folder, f"{address}: scenario")
         apply_overrides(document, values, f"{address}: scenario")
         scenario = parse_scenario(document, f"{address}: scenario")
     base: dict[str, Any] = without_none(scenario.model_dump(mode="json", exclude=UNUSED))
