@@ -23,8 +23,8 @@ def add_parser(subparsers: Subparsers) -> None:
     add("flight", type=Path, metavar="FLIGHT", help="a folder of results, or a flight.parquet")
     out = "FILE.mp4 or FILE.gif (default: flight.mp4 beside the flight)"
     add("--out", type=Path, metavar="FILE", help=out)
-    quality = """draft: 480x270, 15 frames per second; standard (default): 640x360, 25; high:
-    1280x720, 30, with shadows"""
+    quality = """draft: 640x360, 15 frames per second, jagged edges; standard (default): 640x360,
+    25; high: 1280x720, 30, with shadows"""
     add("--quality", choices=("draft", "standard", "high"), default="standard", help=quality)
     add(
         "--size",

@@ -45,8 +45,8 @@ def video(
         path: The file, FILE.mp4 or FILE.gif.
         start, end: The part of the flight, s; default: all of it.
         speed: Times real time, 0.01 to 100.
-        quality: ``"draft"`` (480 x 270 pixels, 15 frames per second), ``"standard"`` (640 x 360,
-            25) or ``"high"`` (1280 x 720, 30, with shadows).
+        quality: ``"draft"`` (640 x 360 pixels, 15 frames per second, jagged edges),
+            ``"standard"`` (640 x 360, 25) or ``"high"`` (1280 x 720, 30, with shadows).
         size: Width and height in place of the quality's, pixels, even numbers from 64 to 4096.
         fps: Frames per second in place of the quality's, 1 to 240.
         camera: Its distance from the vehicle, in radii of it from 1.5 to 1000, azimuth and

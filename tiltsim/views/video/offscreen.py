@@ -21,8 +21,8 @@ Image = npt.NDArray[np.uint8]
 MODULES: Final = {"egl": "mujoco.egl", "osmesa": "mujoco.osmesa", "glfw": "mujoco.glfw"}
 """OpenGL modules by the values of MUJOCO_GL."""
 
-SMALL_HEIGHT: Final = 320
-"""Frames lower than this (pixels) have small text."""
+LARGE_HEIGHT: Final = 700
+"""Frames at least as high as this (pixels) have larger text; there is no smaller one."""
 
 
 def make_contexts(model: mujoco.MjModel, width: int, height: int) -> tuple[Any, mujoco.MjrContext]:
@@ -35,8 +35,8 @@ def make_contexts(model: mujoco.MjModel, width: int, height: int) -> tuple[Any, 
         InputError: If no implementation works.
     """
     failures = []
-    small, normal = mujoco.mjtFontScale.mjFONTSCALE_50, mujoco.mjtFontScale.mjFONTSCALE_100
-    font = small if height < SMALL_HEIGHT else normal
+    normal, large = mujoco.mjtFontScale.mjFONTSCALE_100, mujoco.mjtFontScale.mjFONTSCALE_150
+    font = large if height >= LARGE_HEIGHT else normal
     for name, make in _implementations().items():
         # GLFW only warns, and only MuJoCo detects that there is no context.
         with warnings.catch_warnings(record=True) as caught:
