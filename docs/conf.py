@@ -28,6 +28,7 @@ INCLUDED = {
     "SECURITY.md": "security.md",
 }
 
+highlight_language = "none"  # output, where a page names no language
 # Backticks in docstrings: a link where the name is on the site, else code.
 default_role = "py:obj"
 nitpick_ignore_regex = [("py:(class|obj)", ".*")]
@@ -45,7 +46,7 @@ ALIASES = ("ArrayLike", "Floats", "Pair", "Triple", "Quad", "Octet", "Values", "
 autodoc_type_aliases = {"npt.ArrayLike": "ArrayLike"} | {name: name for name in ALIASES}
 ALIASED = {  # as Sphinx spells what it has evaluated
     r"TypeAliasForwardRef\('(\w+)'\)": r"\1",
-    r"(numpy\.)?ndarray\[[^]]*\], (numpy\.)?dtype\[(numpy\.)?float64\]\]": "Floats",
+    r"[~\w.]*ndarray\[[^]]*\], [~\w.]*dtype\[[~\w.]*float64\]\]": "Floats",
 }
 napoleon_attr_annotations = False  # the signature has them
 napoleon_use_ivar = True
