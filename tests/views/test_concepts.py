@@ -25,6 +25,7 @@ from tiltsim_controllers.analysis.singularity import (
     torque_free_direction,
 )
 from tiltsim_controllers.gaits.plans import continuous_trot
+from tiltsim_controllers.laws.decouplers import exact_decoupler
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
 
 VEHICLE = PRESETS["ar_drone_2"]
@@ -159,8 +160,11 @@ def test_keys_columns_and_flights_of_the_page_exist():
 
 @pytest.mark.slow
 def test_the_decouplers_rest_where_the_page_says():
+    force = torque_free_direction(concepts.TROT_ANGLES, VEHICLE)
     text = PAGE.read_text(encoding="utf-8")
+    hover = exact_decoupler(0.0, 0.0, 0.0, 0.0, 9.8, tuple(force))
     for name, flown in fly_decouplers().items():
+        assert (flown["roll"][-1], flown["pitch"][-1]) == pytest.approx(hover, abs=1e-6)
         away = np.hypot(flown["x"][-1], flown["y"][-1])
         row = f"| {name} | ({flown['x'][-1]:.2f}, {flown['y'][-1]:.2f}) m | {away:.2f} m |"
         assert row in text or (name == "exact" and away < 1e-6 and "| below 1e-6 m |" in text)
