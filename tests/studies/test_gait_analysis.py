@@ -591,7 +591,7 @@ def test_an_empty_attainable_set_is_a_warning(tmp_path, capsys) -> None:
     assert words not in capsys.readouterr().out
 
 
-ALL_MARKS = ["unreachable, darker where for longer", "singular", "level"]
+ALL_MARKS = ["unreachable (darker: for longer)", "singular", "level"]
 
 
 @pytest.mark.parametrize(

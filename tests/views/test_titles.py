@@ -54,5 +54,10 @@ def test_a_title_is_common_where_all_have_it():
     assert common_title([tiltsim.parse_scenario(trot)] * 2) == "A trot around a circle"
     assert common_title([tiltsim.parse_scenario(one) for one in (fixed, trot)]) == ""
     assert common_title(scenarios(*SAME)) == ""
-    assert common_title(scenarios("ch06/walk#a", "ch06/walk#b")) == "ch06/walk"
+    assert common_title(scenarios("ch06/walk#a", "ch06/slow_walk#b")) == ""
+    walks = scenarios("ch06/slow_walk#a", "ch06/slow_walk#b")
+    assert common_title(walks) == "Slow walk"
+    titles = ("A trot that leans, held", "A trot that leans: loses control")
+    trots = [tiltsim.parse_scenario(trot | {"title": title}) for title in titles]
+    assert common_title(trots) == "A trot that leans"
     assert common_title(scenarios("ch06/walk#a", "ch04/walk#a")) == ""

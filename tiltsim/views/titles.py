@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from itertools import takewhile
+from typing import TYPE_CHECKING, Final
 
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
+from tiltsim.system.quantity import in_words
 from tiltsim.system.text import valid_unicode
 
 if TYPE_CHECKING:
@@ -13,6 +15,11 @@ if TYPE_CHECKING:
 
     from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.scenario.scenario import Scenario
+
+MIN_WORDS: Final = 4
+"""Words that titles must share to make a title of their own."""
+
+_MARKS: Final = ",:;."
 
 
 def flight_names(scenarios: Sequence[Scenario], paths: Sequence[Path] = ()) -> list[str]:
@@ -32,11 +39,15 @@ def flight_names(scenarios: Sequence[Scenario], paths: Sequence[Path] = ()) -> l
 
 
 def common_title(scenarios: Sequence[Scenario]) -> str:
-    """The title or else the scenario file that all scenarios share; empty without either."""
-    titles = {scenario.title for scenario in scenarios}
+    """What the titles of all scenarios begin with, or else the name of their scenario file."""
+    titles = [scenario.title.split() for scenario in scenarios]
+    columns = ({word.rstrip(_MARKS) for word in words} for words in zip(*titles, strict=False))
+    start = [words.pop() for words in takewhile(lambda words: len(words) == 1, columns)]
+    if len(start) >= MIN_WORDS or (titles[0] and all(title == titles[0] for title in titles)):
+        return " ".join(titles[0][: len(start)]).rstrip(_MARKS)
     families = {file for file, _, _ in (one.address.rpartition("#") for one in scenarios)}
-    title = titles.pop() if len(titles) == 1 else ""
-    return title or (families.pop() if len(families) == 1 else "")
+    words = in_words(families.pop().rpartition("/")[2]) if len(families) == 1 else ""
+    return words[:1].upper() + words[1:]
 
 
 def _short(address: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from math import sqrt
 from typing import TYPE_CHECKING, Any, Final
 
@@ -50,11 +51,21 @@ def distributions_figure(results: SweepResults, metrics: tuple[str, ...]) -> Fig
     shares, *curves = above.subplots(1, 1 + len(metrics), width_ratios=ratios)
     _draw_shares(shares, results, groups)
     for axes, metric in zip(curves, metrics):
-        for number, (_, group) in enumerate(groups):
+        marked = [
             _draw_curve(axes, results, metric, group, number % len(CYCLE))
+            for number, (_, group) in enumerate(groups)
+        ]
+        # The leftmost curve has its numbers on the left, so that they do not lie on the others.
+        middles = [np.median([value for _, value in one.values()] or [0.0]) for one in marked]
+        for number, one in enumerate(marked):
+            left = len(marked) > 1 and number == int(np.argmin(middles))
+            _write_quantiles(axes, one, CYCLE[number % len(CYCLE)], left=left)
         if spans_decades(results.columns[metric][completed_mask(results)]):
             axes.set_xscale("log")
-        axes.margins(x=0.1)  # room for the numbers
+        else:
+            axes.locator_params(axis="x", nbins=5)
+            axes.ticklabel_format(axis="x", useOffset=False)
+        axes.margins(x=0.22)  # room for the numbers
         axes.set_ylim(0.0, 1.03)
         axes.set_xlabel(label_of(results, metric))
         axes.set_ylabel("share of flights at or below")
@@ -91,11 +102,11 @@ def _draw_shares(axes: Axes, results: SweepResults, groups: list[tuple[str, Colu
         share, color = flown / trials, CYCLE[number % len(CYCLE)]
         hatch = HATCHES[number % len(CYCLE)]
         axes.barh(
-            number, share, height=0.34, color=color, alpha=0.85, hatch=hatch, ec="white", lw=0
+            number, share, height=0.26, color=color, alpha=0.85, hatch=hatch, ec="white", lw=0
         )
         axes.plot([low, high], [number, number], color=INK, lw=1.6, solid_capstyle="butt")
         text = f"{name}: {flown} of {trials}".lstrip(": ")
-        axes.annotate(text, (0.01, number - 0.25), fontsize=8.5, color=color).set_in_layout(False)
+        axes.annotate(text, (0.01, number - 0.25), size="small", color=color).set_in_layout(False)
     axes.set_yticks([])
     axes.grid(visible=False, axis="y")
     axes.set_xlim(0.0, 1.0)
@@ -103,7 +114,10 @@ def _draw_shares(axes: Axes, results: SweepResults, groups: list[tuple[str, Colu
     axes.set_xlabel("completed share")
 
 
-def _draw_curve(axes: Axes, results: SweepResults, metric: str, group: Column, look: int) -> None:
+def _draw_curve(
+    axes: Axes, results: SweepResults, metric: str, group: Column, look: int
+) -> dict[str, tuple[float, float]]:
+    """Draw a curve; returns the texts of its quantiles with their shares and values."""
     color, marker = CYCLE[look], MARKERS[look]
     values = results.columns[metric][group & completed_mask(results)]
     values = np.sort(values[~np.isnan(values)])
@@ -111,20 +125,35 @@ def _draw_curve(axes: Axes, results: SweepResults, metric: str, group: Column, l
     worst = total - len(values) if metric.startswith("min_") else 0
     share = (worst + np.arange(1, len(values) + 1)) / total
     axes.step(values, share, where="post", color=color, ls=DASHES[look])
+    marked: dict[float, float] = {}
     for quantile in QUANTILES:
         place = int(np.searchsorted(share, quantile - 1e-12))
-        if place == len(values) or (place == 0 and worst):
-            continue  # among the flights that terminated early
-        value = float(values[place])
-        axes.plot(value, share[place], marker, ms=4.5, color=color)
-        axes.annotate(
-            f"{value:.3g}",
-            (value, share[place]),
-            xytext=(5.0, -3.0),
-            textcoords="offset points",
-            fontsize=8,
-            color=color,
-        ).set_in_layout(False)
+        if place < len(values) and not (place == 0 and worst):  # among the completed flights
+            marked[float(share[place])] = float(values[place])
+    axes.plot([*marked.values()], [*marked], marker, ms=4.5, color=color)
+    return dict(zip(distinct_texts([*marked.values()]), marked.items(), strict=True))
+
+
+def distinct_texts(values: Sequence[float]) -> list[str]:
+    """Numbers with three digits or, if that makes unequal ones alike, with more."""
+    for digits in range(3, 9):
+        texts = [f"{value:.{digits}g}".replace("-", "−") for value in values]
+        if len(set(texts)) == len(set(values)):
+            break
+    return texts
+
+
+def _write_quantiles(
+    axes: Axes, marked: Mapping[str, tuple[float, float]], color: str, *, left: bool
+) -> None:
+    """Write the marked values beside their marks, on one side of the curve."""
+    for text, (share, value) in marked.items():
+        # Above a rising curve on its left, below it on its right.
+        shift, side = ((-5.0, 2.0), "right") if left else ((5.0, -8.0), "left")
+        place: dict[str, Any] = {"xytext": shift, "textcoords": "offset points"}
+        written = axes.annotate(text, (value, share), **place)
+        written.set(size="small", color=color, ha=side)
+        written.set_in_layout(False)
 
 
 def _most_effective(
@@ -181,5 +210,7 @@ def _draw_scatter(
         (line,) = axes.plot(draws[ended], height, "x", color=color, ms=3.0, transform=above)
         line.set(mew=0.8, clip_on=False, in_layout=False)
     axes.set_xlabel(label_of(results, key))
+    axes.locator_params(axis="x", nbins=4)
+    axes.ticklabel_format(axis="x", useOffset=False)
     if spans_decades(values[completed]):
         axes.set_yscale("log")

@@ -173,7 +173,7 @@ def _roll_pitch_legend(figure: Figure, shown: set[str], *, constant: bool = Fals
     from matplotlib.patches import Patch
 
     line = style.SINGULAR if constant else style.GREY
-    unreachable = "unreachable" if constant else "unreachable, darker where for longer"
+    unreachable = "unreachable" if constant else "unreachable (darker: for longer)"
     marks = {
         AREA: Patch(facecolor=style.UNREACHABLE, label=unreachable),
         CURVE: Line2D([], [], color=line, lw=1.3, label="singular"),

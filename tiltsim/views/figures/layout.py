@@ -96,18 +96,21 @@ def add_heading(figure: Figure, title: str, more: str = "", legend: Sequence[Any
             wrap(written, width - 4.0 * gap)
             top -= written.get_window_extent().height + gap
     if legend:
-        place = {"bbox_to_anchor": (1.6 * gap / width, top / height), "borderaxespad": 0.0}
+        place: dict[str, Any] = {
+            "bbox_to_anchor": (2.0 * gap / width, top / height),
+            "borderaxespad": 0.0,
+        }
         drawn = add_legend(figure, legend, loc="upper left", borderpad=0.0, **place)
         top -= drawn.get_window_extent().height + gap
     layout: Any = figure.get_layout_engine()
     layout.set(rect=(0.0, 0.0, 1.0, top / height))
 
 
-def add_legend(figure: Figure, handles: Sequence[Any], **look: Any) -> Legend:
+def add_legend(figure: Figure, handles: Sequence[Any], columns: int = 9, **look: Any) -> Legend:
     """A legend of the whole figure, below it by default, in as many columns as fit."""
     width = 0.96 * figure.get_size_inches()[0] * figure.dpi
     look = {"loc": "outside lower center", **look}
-    columns = len(handles)
+    columns = min(columns, len(handles))
     while True:
         legend = figure.legend(handles=handles, ncols=columns, **look)
         if columns == 1 or legend.get_window_extent().width <= width:
@@ -136,9 +139,12 @@ def legend_over(axes: Axes, title: str, columns: int = 4) -> None:
         return
     look: dict[str, Any] = {"borderaxespad": 0.0, "handlelength": 1.4, "columnspacing": 0.9}
     look |= {"loc": "lower right", "bbox_to_anchor": (1.0, 0.985), "handletextpad": 0.4}
-    legend = axes.legend(ncols=columns, **look)
-    box = legend.get_window_extent()
+    width = axes.get_window_extent().width
+    for fewer in range(columns, 0, -1):
+        box = axes.legend(ncols=fewer, **look).get_window_extent()
+        if box.width <= 1.12 * width:
+            break
     written = axes.set_title(title).get_window_extent()
-    if box.width + written.width > 1.12 * axes.get_window_extent().width:
+    if box.width + written.width > 1.12 * width:
         points = 72.0 / axes.figure.dpi
         axes.set_title(title, pad=box.height * points)

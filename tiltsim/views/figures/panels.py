@@ -166,6 +166,8 @@ def _path(axes: Axes, shown: Sequence[Shown]) -> None:
     if min(data.width, data.height) * NARROW < max(data.width, data.height):
         widen(axes, 1e-3)
         axes.set_title("Plan view, x and y to different scales")
+    elif len(shown) > 1:
+        axes.set_aspect("equal", anchor="N")
     else:
         axes.set_aspect("equal", adjustable="datalim")
 
@@ -185,18 +187,36 @@ def _reference(axes: Axes, reference: Floats, label: str) -> None:
 
 def show_last_periods(axes: Axes, flights: Sequence[Flight]) -> None:
     """Show only the last periods of moving gaits where all of them would be a solid band."""
+    longest = many_periods(flights)
+    if longest > 0.0:
+        end = max(float(flight["time"][-1]) for flight in flights)
+        show_part(axes, end - SHOWN_PERIODS * longest, end)
+        axes.set_xlabel(f"time (s), the last {SHOWN_PERIODS} periods")
+
+
+def many_periods(flights: Sequence[Flight]) -> float:
+    """The longest period (s) of gaits with so many of them that they are a solid band, else 0."""
     end = max(float(flight["time"][-1]) for flight in flights)
     if any(SUPERVISION in flight.units for flight in flights):
-        return
+        return 0.0
     periods = [
         flight.assembly.gait.period or 0.0
         for flight in flights
         if flight.scenario.vehicle.has_tilting_rotors
     ]
-    longest = max((period for period in periods if end > MAX_PERIODS * period), default=0.0)
-    if longest > 0.0:
-        axes.set_xlim(end - SHOWN_PERIODS * longest, end)
-        axes.set_xlabel(f"time (s), the last {SHOWN_PERIODS} periods")
+    return max((period for period in periods if end > MAX_PERIODS * period), default=0.0)
+
+
+def show_part(axes: Axes, begin: float, end: float) -> None:
+    """Limit a panel to a part of the time (s), with the scale of what it shows."""
+    axes.set_xlim(begin, end)
+    shown = []
+    for line in axes.get_lines():
+        time, values = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+        shown.append(values[(time >= begin) & (time <= end)] if len(time) > 2 else values)
+    seen = np.concatenate(shown)
+    pad = 0.08 * float(np.ptp(seen)) or 0.05
+    axes.set_ylim(float(seen.min()) - pad, float(seen.max()) + pad)
 
 
 def shade_below(axes: Axes, value: float, label: str) -> None:

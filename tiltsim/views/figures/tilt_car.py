@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import ceil, log10
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -19,28 +20,33 @@ if TYPE_CHECKING:
 SHOWN_TIME: Final = 10.0
 """Last part (s) of a flight more than twice as long for which the direction is drawn."""
 
-SETTLED: Final = 0.02
-"""Share of the largest error below which a flight has settled, and its errors go on a log scale."""
+SETTLED: Final = 0.01
+"""Share of the largest error below which the errors of a flight have settled."""
 
-SMALLEST_ERROR: Final = 1e-9
-"""Lower end (m) of the logarithmic scale of errors."""
+SMALLEST: Final = 1e-9
+"""Errors (m) below this are rounding."""
+
+SHORT: Final = 0.1
+"""Share of a flight below which only the time until the errors have settled is shown."""
 
 
 def _errors(axes: Axes, flight: Flight) -> None:
+    time = flight["time"]
     errors = {axis: flight[f"{axis}_ref"] - flight[axis] for axis in "xy"}
-    size = np.max(np.abs([*errors.values()]), axis=0)
-    decays = size[len(size) // 10 :].max() < SETTLED * size.max()
     for (axis, error), line in zip(errors.items(), style.AXIS_LINES):
-        values = np.maximum(np.abs(error), SMALLEST_ERROR) if decays else error
-        axes.plot(flight["time"], values, label=axis, **line)
+        axes.plot(time, error, label=axis, **line)
+    style.zero_lines(axes, "x")
+    widen(axes, 1e-6)
     axes.set_ylabel("m")
-    if decays:
-        axes.set_yscale("log")
-        legend_over(axes, "Position error, absolute value")
-    else:
-        style.zero_lines(axes, "x")
-        widen(axes, 1e-6)
-        legend_over(axes, "Position error, reference minus actual")
+    title = "Position error, reference minus actual"
+    size = np.max(np.abs([*errors.values()]), axis=0)
+    settled = time[np.flatnonzero(size > SETTLED * size.max())[-1]] if size.any() else time[-1]
+    if 2.0 * settled < SHORT * time[-1]:
+        axes.set_xlim(0.0, 2.0 * settled)
+        axes.set_xlabel(f"time (s), the first {2.0 * settled:.0f} s")
+        later = max(float(size[time > 2.0 * settled].max()), SMALLEST)
+        title = f"Position error, later below $10^{{{ceil(log10(later))}}}$ m"
+    legend_over(axes, title)
 
 
 def _inputs(axes: Axes, flight: Flight) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tiltsim.views.figures import style
+from tiltsim.views.figures.layout import add_legend
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,26 +30,26 @@ class PeriodErrors(NamedTuple):
 
 
 def setpoint_figure(families: Sequence[SetpointErrors]) -> Figure:
-    """Steady position errors, reference minus actual, with the published values."""
+    """Steady position errors, reference minus actual, with the published values.
+
+    One panel per family, each with its own scale, so that every point has room for its name.
+    """
     with style.paper_style():
-        figure = style.new_figure(4.6, 4.3)
-        axes: Any = figure.subplots()
-        style.zero_lines(axes)
-        x, y = zip(*(point for family in families for point in family.published), strict=True)
-        axes.plot(x, y, "s", ms=10, mfc="none", mec=style.INK, label="published")
-        for family, color in zip(families, (style.RED, style.BLUE), strict=False):
-            x, y = zip(*family.points, strict=True)
-            axes.plot(x, y, "o", ms=4.5, color=color, label=family.label)
-            offset, ha, va = (7, 5), "left", "bottom"
-            if color == style.BLUE:
-                offset, ha, va = (-7, -5), "right", "top"
+        figure = style.new_figure(4.2 * len(families), 4.3)
+        row: Any = figure.subplots(1, len(families), squeeze=False)[0]
+        for axes, family, color in zip(row, families, (style.RED, style.BLUE), strict=False):
+            style.zero_lines(axes)
+            x, y = zip(*family.published, strict=True)
+            axes.plot(x, y, "s", ms=10, mfc="none", mec=style.INK, label="published")
+            axes.plot(*zip(*family.points, strict=True), "o", ms=4.5, color=color, label="measured")
             for name, point in zip(family.names, family.points, strict=True):
-                text = axes.annotate(name, point, offset, textcoords="offset points")
-                text.set(fontsize=7.5, color=color, ha=ha, va=va)
-        axes.set(xlabel="error along x (m)", ylabel="error along y (m)")
-        axes.set_aspect("equal", adjustable="datalim")
-        axes.margins(0.12)
-        axes.legend(loc="upper right")
+                text = axes.annotate(name, point, (7, 5), textcoords="offset points")
+                text.set(size="small", color=color)
+            axes.set_title(family.label)
+            axes.set(xlabel="error along x (m)", ylabel="error along y (m)")
+            axes.set_aspect("equal", adjustable="datalim")
+            axes.margins(0.14)
+        row[0].legend(loc="upper right")
         return figure
 
 
@@ -81,5 +82,7 @@ def period_figure(panels: Sequence[tuple[str, Sequence[PeriodErrors]]]) -> Figur
         if terminated:
             (cross,) = row[0].plot([], [], "x", color=style.INK, ms=8, mew=2.0)
             handles, labels = [*handles, cross], [*labels, "terminated early"]
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(handles))
+        for handle, label in zip(handles, labels, strict=True):
+            handle.set_label(label)
+        add_legend(figure, handles)
         return figure

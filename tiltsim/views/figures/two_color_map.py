@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltsim.views.figures import style
+from tiltsim.views.figures.layout import add_legend
 from tiltsim_controllers.analysis.two_color_map import curve_l, delta, point_p, red_residual
 from tiltsim_controllers.analysis.two_color_planner import Circle, check_path
 
@@ -19,67 +20,81 @@ if TYPE_CHECKING:
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
-BELOW: Final = "#F8F8F8"
-"""Where R < 0 on red."""
+NEARLY: Final = 0.5
+"""Absolute R, 4 for a level untilted vehicle, below which red counts as nearly singular."""
+
+_COLORS: Final = {"red": "#C4001A", "blue": style.BLUE}
+"""The colours of the map's own name: this red is not that of what is singular."""
+
+_SIDES: Final = (
+    ((1.0, 1.0), "left", "bottom"),
+    ((-1.0, -1.0), "right", "top"),
+    ((-1.0, 1.0), "right", "bottom"),
+    ((1.0, -1.0), "left", "top"),
+)
+"""Directions in which labels of paths lie, with their alignment."""
+
+_DASHES: Final[dict[str, Any]] = {"red": "-", "blue": (0, (4, 2))}
 
 
 def map_figure(vehicle: Vehicle, paths: list[tuple[str, Path]] | None = None) -> Figure:
     """Regions S_U and S_D of red, the curve L, the point P, and paths given with their labels."""
     with style.paper_style():
-        figure = style.new_figure(5.4, 6.5)
+        figure = style.new_figure(5.4, 6.3)
         axes: Any = figure.subplots()
         axes.grid(False)
         limit = pi / 2
         side = np.linspace(-limit, limit, 401)
         alpha_1, alpha_2 = np.meshgrid(side, side)
-        residual = red_residual(alpha_1, alpha_2, vehicle)
-        axes.contourf(
-            alpha_1, alpha_2, residual, [-np.inf, 0.0, np.inf], colors=[BELOW, style.PALE]
-        )
+        residual = np.abs(red_residual(alpha_1, alpha_2, vehicle))
+        axes.contourf(alpha_1, alpha_2, residual, [0.0, NEARLY], colors=[style.UNREACHABLE])
         inside = np.linspace(-limit, limit, 801)[1:-1]
-        axes.plot(inside, curve_l(inside, vehicle), color=style.INK, lw=1.6)
+        axes.plot(inside, curve_l(inside, vehicle), color=style.SINGULAR, lw=1.8)
         square_x, square_y = [-1, 1, 1, -1, -1], [-1, -1, 1, 1, -1]
         axes.plot(square_x, square_y, color=style.GREY, lw=0.8, ls=(0, (5, 3)))
         # The other zeros of R, close to pi/2.
         angle = delta(vehicle)
-        axes.axvline(angle - limit, color=style.INK, lw=0.6, ls=":")
-        axes.axhline(limit - angle, color=style.INK, lw=0.6, ls=":")
+        for line, value in ((axes.axvline, angle - limit), (axes.axhline, limit - angle)):
+            line(value, color=style.SINGULAR, lw=1.8)
         first, second = point_p(vehicle)
-        axes.plot(first, second, "o", color=style.AMBER, mec=style.INK, mew=0.8, ms=7, zorder=7)
-        axes.text(-1.3, 1.2, "$S_U$:  R > 0", fontsize=10)
-        axes.text(0.75, -1.3, "$S_D$:  R < 0", fontsize=10)
+        axes.plot(first, second, "o", color="white", mec=style.INK, mew=1.2, ms=7, zorder=7)
+        axes.text(-0.75, 1.2, "$S_U$:  R > 0", size="large")
+        axes.text(0.55, -1.3, "$S_D$:  R < 0", size="large")
         shown: set[str] = set()
-        for label, path in paths or []:
-            shown |= _draw_path(axes, label, path, vehicle)
+        for number, (label, path) in enumerate(paths or []):
+            shown |= _draw_path(axes, label, path, vehicle, number)
         _legend(figure, f"P = (δ, −δ), δ = {first:.4f} rad", shown)
         style.angle_axis(axes, "x", limit)
         style.angle_axis(axes, "y", limit)
         axes.set_aspect("equal")
         axes.set_xlabel("α₁ (rad)")
         axes.set_ylabel("α₂ (rad)")
-        axes.set_title("Two Color Map: sign of R on red; blue is singular at every attitude")
+        axes.set_title("Two Color Map of red gaits")
         return figure
 
 
-def _draw_path(axes: Axes, label: str, path: Path, vehicle: Vehicle) -> set[str]:
-    """Draw a path; returns its colours, and "crossing" if it crosses the curve L."""
-    colors = {"red": style.RED, "blue": style.BLUE}
-    looks = {"red": "-", "blue": (0, (4, 2))}
+def _draw_path(axes: Axes, label: str, path: Path, vehicle: Vehicle, number: int) -> set[str]:
+    """Draw a path; returns its colours, and "crossing" if it crosses the curve L.
+
+    The ``number`` of the path decides the side of its label.
+    """
     for color, points in _outlines(path):
-        axes.plot(*points.T, color=colors[color], ls=looks[color], lw=1.8)
+        axes.plot(*points.T, color=_COLORS[color], ls=_DASHES[color], lw=1.8)
         # An arrow at the first third shows the direction.
         start = max(1, len(points) // 3)
         axes.annotate(
             "",
             xy=tuple(0.5 * (points[start] + points[start - 1])),
             xytext=tuple(points[start - 1]),
-            arrowprops={"arrowstyle": "-|>", "color": colors[color], "lw": 1.4},
+            arrowprops={"arrowstyle": "-|>", "color": _COLORS[color], "lw": 1.4},
         )
     check = check_path(path, vehicle)
     outline = np.concatenate([points[:-1] for _, points in _outlines(path)])
-    corner = outline[np.argmax(outline @ [1.0, 1.0])]
-    mark = "" if check.accepted else ", refused"
-    axes.annotate(label + mark, corner, (4, 3), textcoords="offset points", ha="left", fontsize=8.5)
+    (x, y), ha, va = _SIDES[number % len(_SIDES)]
+    corner = outline[np.argmax(outline @ [x, y])]
+    mark = "" if check.accepted else ", rejected"
+    text = axes.annotate(label + mark, corner, (5 * x, 5 * y), textcoords="offset points")
+    text.set(ha=ha, va=va, size="small", zorder=8)
     for crossing in check.crossings:
         axes.plot(*crossing, "x", color=style.INK, ms=8, mew=1.8, zorder=6)
     shown = {color for color, _ in _outlines(path)}
@@ -92,23 +107,20 @@ def _legend(figure: Figure, label_of_p: str, shown: set[str]) -> None:
 
     dashed = (0, (5, 3))
     handles = [
-        Patch(facecolor=style.PALE, edgecolor=style.GREY, lw=0.4, label="$S_U$: R > 0 on red"),
-        Patch(facecolor=BELOW, edgecolor=style.GREY, lw=0.4, label="$S_D$: R < 0 on red"),
-        Line2D([], [], color=style.INK, lw=1.6, label="L, R = 0: tan α₂ = tan α₁ − 2 tan δ"),
-        Line2D([], [], color=style.INK, lw=0.6, ls=":", label="R = 0 as well"),
-        Line2D([], [], color=style.AMBER, marker="o", mec=style.INK, ls="", label=label_of_p),
+        Line2D([], [], color=style.SINGULAR, lw=1.8, label="singular: R = 0, the curve L"),
+        Patch(facecolor=style.UNREACHABLE, label=f"nearly singular: |R| < {NEARLY:g}"),
+        Line2D([], [], color="white", marker="o", mec=style.INK, ls="", label=label_of_p),
         Line2D([], [], color=style.GREY, lw=0.8, ls=dashed, label="|α₁|, |α₂| ≤ 1 (ch. 8)"),
     ]
-    cross = "red crosses L: singular"
+    texts = {"red": "red path", "blue": "blue path: singular at every attitude"}
     marks = {
-        "red": Line2D([], [], color=style.RED, lw=1.8, label="red path"),
-        "blue": Line2D(
-            [], [], color=style.BLUE, lw=1.8, ls=(0, (4, 2)), label="blue path: singular"
-        ),
-        "crossing": Line2D([], [], color=style.INK, marker="x", mew=1.8, ls="", label=cross),
+        name: Line2D([], [], color=_COLORS[name], lw=1.8, ls=_DASHES[name], label=text)
+        for name, text in texts.items()
     }
+    cross = "red crosses L: singular"
+    marks["crossing"] = Line2D([], [], color=style.INK, marker="x", mew=1.8, ls="", label=cross)
     handles += [mark for name, mark in marks.items() if name in shown]
-    figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    add_legend(figure, handles, columns=2)
 
 
 def _outlines(path: Path) -> list[tuple[str, Any]]:
