@@ -17,6 +17,8 @@ from tempfile import TemporaryFile, mkdtemp
 from time import perf_counter
 from traceback import format_exception
 
+import mujoco
+
 from tests.fuzz.inputs import KINDS
 from tiltsim.errors import InputError
 
@@ -43,6 +45,7 @@ def fuzz(count, seed, report=lambda done, mistake: None):
         working = folder / "working"
         working.mkdir()
         stack.enter_context(chdir(working))
+        stack.callback(mujoco.set_mju_user_warning, mujoco.get_mju_user_warning())
         stack.callback(signal.signal, signal.SIGALRM, signal.signal(signal.SIGALRM, _hang))
         for number in range(count):
             found = run_one(number, seed, folder), _remove_what_is_in(working)
@@ -110,6 +113,7 @@ def run_one(number, seed, folder):
 def _native_output(found):
     """Append what compiled code, such as MuJoCo's, prints past Python in the block."""
     flush = ctypes.CDLL(None).fflush
+    mujoco.set_mju_user_warning(None)  # dm_control's handler would pass warnings to Python's log
     with TemporaryFile() as file:
         sys.stdout.flush()
         sys.stderr.flush()
