@@ -41,41 +41,8 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Check everything and print a table."""
-    from tiltsim.plants.trust import is_trusted
-    from tiltsim.resources import shipped_folder
-    from tiltsim.scenario.loading import parse_override
-    from tiltsim.studies.checking import check_all, collect, interrupted_result, write_junit
-    from tiltsim.system.files import prepare_file
-
-    junit: Path | None = arguments.junit
-    if junit is not None:
-        prepare_file("--junit", junit)
-    overrides = dict(parse_override(text) for text in arguments.overrides)
-    addresses = collect(arguments.paths or [str(shipped_folder("scenarios"))])
-    finished: dict[str, CheckResult] = {}
-
-    def report(result: CheckResult) -> None:
-        finished[result.address] = result
-        progress.tell("scenarios", len(finished), len(addresses))
-        if result.status != "passed" or not arguments.quiet:
-            _print_result(result, max(map(len, addresses)), progress)
-
     with show_progress(shown=not arguments.quiet) as progress:
-        progress.begin("scenarios", len(addresses))
-        try:
-            results = check_all(
-                addresses, arguments.jobs, overrides, report, trusted=is_trusted(arguments.trust)
-            )
-        except KeyboardInterrupt:
-            if junit is not None:
-                with defer_interrupts():
-                    write_junit(
-                        [finished.get(name) or interrupted_result(name) for name in addresses],
-                        junit,
-                    )
-            raise
-    if junit is not None:
-        write_junit(results, junit)
+        results = _check(arguments, progress)
     labels = Counter(
         "without expectations" if _is_unchecked(result) else result.status for result in results
     )
@@ -87,6 +54,45 @@ def run(arguments: argparse.Namespace) -> int:
     if counts["lost"]:
         return VEHICLE_LOST
     return EXPECTATION_FAILED if counts["failed"] else DONE
+
+
+def _check(arguments: argparse.Namespace, progress: Progress) -> list[CheckResult]:
+    """Fly and report everything; the JUnit file is written even when that is interrupted."""
+    from tiltsim.plants.trust import is_trusted
+    from tiltsim.resources import shipped_folder
+    from tiltsim.scenario.loading import parse_override
+    from tiltsim.studies.checking import check_all, collect, interrupted_result, write_junit
+    from tiltsim.system.files import prepare_file
+
+    junit: Path | None = arguments.junit
+    if junit is not None:
+        prepare_file("--junit", junit)
+    overrides = dict(parse_override(text) for text in arguments.overrides)
+    addresses = collect(arguments.paths or [str(shipped_folder("scenarios"))])
+    width = max(len(address) for address in addresses)
+    finished: dict[str, CheckResult] = {}
+
+    def report(result: CheckResult) -> None:
+        finished[result.address] = result
+        progress.tell("scenarios", len(finished), len(addresses))
+        if result.status != "passed" or not arguments.quiet:
+            _print_result(result, width, progress)
+
+    progress.begin("scenarios", len(addresses))
+    try:
+        results = check_all(
+            addresses, arguments.jobs, overrides, report, trusted=is_trusted(arguments.trust)
+        )
+    except KeyboardInterrupt:
+        if junit is not None:
+            with defer_interrupts():
+                write_junit(
+                    [finished.get(name) or interrupted_result(name) for name in addresses], junit
+                )
+        raise
+    if junit is not None:
+        write_junit(results, junit)
+    return results
 
 
 def _is_unchecked(result: CheckResult) -> bool:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 TICK: Final = 1.0
 """Interval (s) at which the clock of a bar moves while nothing is finished."""
 
-LINE_INTERVAL: Final = 9.0
+LINE_INTERVAL: Final = 8.0
 """Interval (s) of the lines where there is no terminal: CI services end a job that is silent."""
 
 
@@ -144,7 +144,7 @@ class _Lines(Progress):
         if total:
             line += f": {done:.0f} of {total:g}{' s' if isinstance(total, float) else ''}"
         line += f", {_clock(elapsed)}"
-        if done > self._initial:
+        if self._initial < done < total:
             left = elapsed * (total - done) / (done - self._initial)
             line += f", about {_clock(left)} left"
         print_line(line, error=True)

@@ -35,22 +35,22 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fly, evaluate, write."""
-    from tiltsim.report.claim_rows import count
-    from tiltsim.report.content import failure_text
-    from tiltsim.report.html_page import page
-    from tiltsim.report.made import Made
-    from tiltsim.report.making import make_report
-    from tiltsim.report.markdown import markdown
-    from tiltsim.report.store import store
-    from tiltsim.system.files import prepare_file, prepare_folder
-
-    out: Path = arguments.out
-    target = out / "report.html"
-    prepare_folder(out)
-    prepare_file("--out", target)
-    if arguments.markdown is not None:
-        prepare_file("--markdown", arguments.markdown)
     with show_progress(shown=not arguments.quiet) as progress:
+        from tiltsim.report.claim_rows import count
+        from tiltsim.report.content import failure_text
+        from tiltsim.report.html_page import page
+        from tiltsim.report.made import Made
+        from tiltsim.report.making import make_report
+        from tiltsim.report.markdown import markdown
+        from tiltsim.report.store import store
+        from tiltsim.system.files import prepare_file, prepare_folder
+
+        out: Path = arguments.out
+        target = out / "report.html"
+        prepare_folder(out)
+        prepare_file("--out", target)
+        if arguments.markdown is not None:
+            prepare_file("--markdown", arguments.markdown)
         report = make_report(arguments.paths, out / "kept", arguments.jobs, progress.tell)
         progress.begin("writing the page")
         store(target, page(report, Made.now()).encode())
