@@ -33,6 +33,20 @@ def test_a_vehicle_without_tilt_angles_has_no_plot_of_them():
     assert views_of(flight("fixed").scenario).keys() - quadrotor == {tilts}
 
 
+def test_compared_flights_have_a_vehicle_and_a_plane_each():
+    views = views_of(flight("fixed").scenario, flight("trot").scenario)
+    for name in ("fixed", "trot"):
+        assert views[name].origin == f"world/{name}/camera"
+        assert views[f"Unreachable: {name}"].origin == f"plane/{name}"
+
+
+def test_a_diverging_rotor_does_not_flatten_the_plot():
+    axis = views_of(flight("fixed").scenario)["Rotor speeds along their spins (rad/s)"]
+    ((low, high),) = axis.properties["ScalarAxis"].range.as_arrow_array().to_pylist()
+    hover = flight("fixed").scenario.rotorcraft.resolve().hover_rotor_speed
+    assert (low, high) == pytest.approx((0.0, 2.0 * hover))
+
+
 def test_compared_flights_have_one_legend():
     def legends(*names):
         views = views_of(*(flight(name).scenario for name in names)).values()

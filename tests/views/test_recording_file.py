@@ -201,15 +201,15 @@ def test_several_flights_share_a_recording_under_distinct_names(tmp_path):
         assert all(text.startswith(f"{name}: ") for (text,) in texts)
 
 
-def test_compared_flights_have_no_labels_in_the_plane(tmp_path):
-    """Labels of several flights would cover each other."""
-    alone, compared = tmp_path / "alone.rrd", tmp_path / "compared.rrd"
-    save_recording([flight("fixed")], alone)
+def test_compared_flights_have_a_plane_each(tmp_path):
+    compared = tmp_path / "compared.rrd"
     save_recording([flight("fixed"), flight("trot")], compared)
-    _, labels = rows(alone, "/plane/attitude", "Points2D:labels")
-    assert len(labels) == len(flight("fixed"))
-    _, labels = rows(compared, "/plane/fixed/attitude", "Points2D:labels")
-    assert labels == []
+    for name in ("fixed", "trot"):
+        _, labels = rows(compared, f"/plane/{name}/attitude", "Points2D:labels")
+        assert len(labels) == len(flight(name))
+        assert {f"/plane/{name}/{part}" for part in ("forbidden", "axes/grid")} <= entities(
+            compared
+        )
 
 
 def test_vehicle_and_reference_are_visible_from_any_distance(recorded):

@@ -74,7 +74,8 @@ def _flights_figure(paths: list[Path], arguments: argparse.Namespace) -> Callabl
     def draw() -> Figure:
         from tiltsim.views.figures.plot import plot
 
-        words = {"title": arguments.title, "labels": arguments.labels}
+        in_words = {name: name.replace("_", " ") for name in names if len(names) > 1}
+        words = {"title": arguments.title, "labels": {**in_words, **arguments.labels}}
         return plot(flights, panels=arguments.panels, names=names, **words)
 
     return draw

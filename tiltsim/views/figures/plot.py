@@ -72,7 +72,7 @@ def plot(
         raise InputError(f"plot: {len(flights)} flights: at most {MAX_FLIGHTS} fit on one page")
     scenarios = [flight.scenario for flight in flights]
     names = names or (flight_names(scenarios) if len(flights) > 1 else [""])
-    names = [texts.pop(name, name.replace("_", " ")) for name in names]
+    names = [texts.pop(name, name) for name in names]
     with style.paper_style(size=style.parse_size("size", size)):
         longest = max(len(flight) for flight in flights)
         looks = [style.marked_line(number, longest) for number in range(len(flights))]

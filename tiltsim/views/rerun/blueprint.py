@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from tiltsim.views.rerun.flight_recorder import FlightRecorder
 
 
+ALONE: Final = "Attitude (shaded: unreachable attitudes)"
+"""Title of the roll-pitch plane of a single flight."""
+
 OVERVIEW_HEIGHT: Final = 1.35
 """Height of the overview camera in lengths of the reference, which it shows completely."""
 
@@ -29,13 +32,20 @@ def flight_blueprint(flights: Sequence[FlightRecorder], *, live: bool = False) -
 
     ``live`` lets the viewer follow the latest time instead of playing from the start.
     """
-    vehicle, trajectory, events = _vehicle_view(flights), _trajectory_view(flights), _events_view()
-    if flights[0].plane is not None:
-        views = rrb.Horizontal(vehicle, _plane_view(flights), column_shares=[5, 4])
-        below = rrb.Horizontal(trajectory, events, column_shares=[5, 4])
+    trajectory, events = _trajectory_view(flights), _events_view()
+    vehicles = [_vehicle_view(flight) for flight in flights]
+    planes = [_plane_view(flight) for flight in flights if flight.plane is not None]
+    if len(flights) > 1:
+        # Each flight has its own vehicle and curve; together they would cover each other.
+        rows = [rrb.Horizontal(*views) for views in (vehicles, planes) if views]
+        below = rrb.Horizontal(trajectory, events, column_shares=[4, 5])
+        left = rrb.Vertical(*rows, below)
+    elif planes:
+        views = rrb.Horizontal(*vehicles, *planes, column_shares=[5, 4])
+        below = rrb.Horizontal(trajectory, events, column_shares=[4, 5])
         left = rrb.Vertical(views, below, row_shares=[11, 8])
     else:
-        views = rrb.Horizontal(vehicle, trajectory, column_shares=[1, 1])
+        views = rrb.Horizontal(*vehicles, trajectory, column_shares=[1, 1])
         left = rrb.Vertical(views, events, row_shares=[11, 4])
     plots, heights = _plots(flights)
     right = rrb.Vertical(*plots, row_shares=heights)
@@ -50,21 +60,21 @@ def flight_blueprint(flights: Sequence[FlightRecorder], *, live: bool = False) -
     )
 
 
-def _vehicle_view(flights: Sequence[FlightRecorder]) -> rrb.View:
+def _vehicle_view(flight: FlightRecorder) -> rrb.View:
     """The vehicle at close range; the camera moves with it but does not rotate."""
-    first = flights[0]
-    radius = vehicle_radius(first.model)
+    radius = vehicle_radius(flight.model)
+    arrows = f"thrust arrows: {100.0 * thrust_scale(flight.model):g} cm per newton"
     return rrb.Spatial3DView(
-        origin=first.scene.camera,
-        contents=[f"{flight.scene.root}/**" for flight in flights],
-        name=f"Vehicle (thrust arrows: {100.0 * thrust_scale(first.model):g} cm per newton)",
+        origin=flight.scene.camera,
+        contents=[f"{flight.scene.root}/**"],
+        name=flight.name or f"Vehicle ({arrows})",
         eye_controls=rrb.EyeControls3D(
-            position=[radius * part for part in first.display.eye],
-            look_target=(0.0, 0.0, 0.15 * radius),
-            eye_up=first.display.up,
+            position=[radius * part for part in flight.display.eye],
+            look_target=(0.0, 0.0, 0.3 * radius),
+            eye_up=flight.display.up,
         ),
         line_grid=False,
-        overrides=_trails(flights),
+        overrides=_trails([flight]),
     )
 
 
@@ -96,12 +106,14 @@ def _from_above(flight: FlightRecorder) -> rrb.EyeControls3D | None:
     )
 
 
-def _plane_view(flights: Sequence[FlightRecorder]) -> rrb.View:
+def _plane_view(flight: FlightRecorder) -> rrb.View:
+    assert flight.plane is not None
+    root = flight.plane.root
     return rrb.Spatial2DView(
-        origin="plane",
-        name="Attitude (shaded: unreachable attitudes)",
+        origin=root,
+        name=f"Unreachable: {flight.name}" if flight.name else ALONE,
         visual_bounds=rrb.VisualBounds2D(x_range=(-BOUND, BOUND), y_range=(-BOUND, BOUND)),
-        overrides={f"{f.plane.root}/trail": _attitude_trail(f) for f in flights if f.plane},
+        overrides={f"{root}/trail": _attitude_trail(flight)},
     )
 
 
@@ -124,26 +136,35 @@ def _plots(flights: Sequence[FlightRecorder]) -> tuple[list[rrb.View], list[floa
     """
     panels = flights[0].display.panels(flights[0].assembly)
     if len(flights) == 1:
-        whole = [(panel.title, [f"{panel.path}/**"]) for panel in panels]
-        return [_plot(*plot) for plot in whole], [panel.height for panel in panels]
+        whole = [
+            _plot(panel.title, [f"{panel.path}/**"], panel.limits(flights[0].assembly))
+            for panel in panels
+        ]
+        return whole, [panel.height for panel in panels]
 
     parts = [rr.escape_entity_path_part(flight.name) for flight in flights]
     plots: list[rrb.View] = []
     for panel in panels:
+        limits = panel.limits(flights[0].assembly)
         levels = [f"{parts[0]}/{panel.path}/{level}" for level in panel.levels]
         for compared in panel.compared:
             lines = [f"{part}/{panel.path}/{compared.name}" for part in parts]
-            plots.append(_plot(compared.title, [*lines, *levels], legend=not plots))
+            legend = not plots
+            plots.append(_plot(compared.title, [*lines, *levels], limits, legend))
     return plots, [1.0] * len(plots)
 
 
-def _plot(title: str, contents: list[str], *, legend: bool = True) -> rrb.View:
+def _plot(
+    title: str, contents: list[str], limits: tuple[float, float] | None, legend: bool = True
+) -> rrb.View:
+    # On the left: how a flight ends matters more than how it begins.
     return rrb.TimeSeriesView(
         origin="/",
         contents=contents,
         name=title,
         axis_x=rrb.TimeAxis(link="LinkToGlobal"),
-        plot_legend=rrb.PlotLegend("RightTop", visible=legend),
+        axis_y=None if limits is None else rrb.ScalarAxis(range=limits),
+        plot_legend=rrb.PlotLegend("LeftTop", visible=legend),
     )
 
 

@@ -62,6 +62,8 @@ class Panel:
     height: float  # relative to the other panels
     compared: tuple[Compared, ...] = ()
     levels: tuple[str, ...] = ()  # names of the levels that a comparison shows, too
+    limits: Callable[[Assembly], tuple[float, float] | None] = lambda _assembly: None
+    """Of the y axis when the recording is opened; None for those of the values."""
 
 
 @dataclass(frozen=True)

@@ -59,7 +59,7 @@ class FlightRecorder:
         self.scene = Scene(recording, assembly, self.model, f"world{suffix}", color, name)
         self.plane = None
         if display.plane is not None:
-            self.plane = display.plane(recording, scenario, f"plane{suffix}", color, bool(name))
+            self.plane = display.plane(recording, scenario, f"plane{suffix}", color)
         series = self._comparison(color) if name else display.series(assembly)
         self._series = TimeSeries(recording, series, f"{part}/" if name else "")
         self._recording = recording
@@ -79,7 +79,7 @@ class FlightRecorder:
         """Log the static data."""
         not_drawn = self.scene.begin()
         if self.plane is not None:
-            self.plane.begin(first=self._first)
+            self.plane.begin()
         self._series.begin()
         self._log_events([self._events.opening()])
         if not_drawn:

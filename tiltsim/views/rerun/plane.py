@@ -52,41 +52,29 @@ class AttitudePlane:
         scenario: The scenario of the flight, of a rotorcraft.
         root: The entity of the plane.
         color: The flight's colour.
-        compared: Whether the recording compares several flights, whose labels would cover each
-            other.
     """
 
     def __init__(
-        self,
-        recording: rr.RecordingStream,
-        scenario: Scenario,
-        root: str,
-        color: Color,
-        compared: bool = False,
+        self, recording: rr.RecordingStream, scenario: Scenario, root: str, color: Color
     ) -> None:
         self._recording = recording
         self._vehicle = scenario.rotorcraft.resolve()
         self.root = root
         self._color = color
-        self._labelled = not compared
         self._curve_ticks = Ticks(CURVE_INTERVAL)
         self._trail = Trail(ATTITUDE_TRAIL_INTERVAL)
         self._drawn: Floats | None = None  # the unit vector along n of the current curve
         self._side = 0.0
 
-    def begin(self, *, first: bool) -> None:
-        """Log styles; the ``first`` flight also draws the axes and the unreachable region."""
-        self._first = first
-        if first:
-            log_axes(self._recording, self.root.partition("/")[0])
+    def begin(self) -> None:
+        """Log axes and styles."""
+        log_axes(self._recording, self.root)
         styles = {
             "forbidden": rr.LineStrips2D.from_fields(
                 colors=[palette.UNREACHABLE], radii=[STRIPE_RADIUS], draw_order=-20.0
             ),
             "curve": rr.LineStrips2D.from_fields(
-                colors=[palette.RED if first else self._color],
-                radii=[-2.0],
-                draw_order=1.5 if first else 1.0,  # the first on top of curves equal to it
+                colors=[palette.RED], radii=[-2.0], draw_order=1.0
             ),
             "margin": rr.LineStrips2D.from_fields(radii=[-1.2], draw_order=2.0),
             "trail": rr.LineStrips2D.from_fields(
@@ -105,8 +93,7 @@ class AttitudePlane:
         n = torque_free_directions(piece.columns, self._vehicle)
         self._append_curves(time, n)
         attitude = np.stack([piece["roll"], piece["pitch"]], axis=1)
-        labels = margin_labels(margin) if self._labelled else None
-        points = rr.Points2D.columns(positions=on_screen(attitude), labels=labels)
+        points = rr.Points2D.columns(positions=on_screen(attitude), labels=margin_labels(margin))
         self._send("attitude", time, points)
         to_nearest = np.stack([attitude, nearest_singular(n, attitude)], axis=1)
         near = np.abs(margin) < MARGIN_THRESHOLD
@@ -129,8 +116,7 @@ class AttitudePlane:
         curves = on_screen(singular_curves(n))
         exist = np.isfinite(curves).all(axis=(1, 2))
         self._send("curve", time, _strips(curves[exist], exist.astype(int)))
-        if self._first:
-            self._send("forbidden", time, _strips(*unreachable_stripes(n, self._side)))
+        self._send("forbidden", time, _strips(*unreachable_stripes(n, self._side)))
 
     def _moved(self, picked: npt.NDArray[np.intp], n: Floats) -> list[int]:
         """Those of the picked samples whose ``n`` differs from the one drawn before."""

@@ -54,6 +54,12 @@ def _distance(flight: Flight) -> Floats:
     return distance(flight, error_axes(flight.assembly))
 
 
+def _speed_limits(assembly: Assembly) -> tuple[float, float]:
+    """From standstill to twice hover: diverging rotors would make all others a flat line."""
+    vehicle = assembly.scenario.rotorcraft
+    return 0.0, max(2.0 * vehicle.resolve().hover_rotor_speed, vehicle.max_rotor_speed or 0.0)
+
+
 PANELS: Final = (
     Panel(
         "attitude",
@@ -68,6 +74,7 @@ PANELS: Final = (
         6.0,
         (Compared("slowest", "Slowest rotor and limits (rad/s)", _slowest),),
         ("min", "max"),
+        _speed_limits,
     ),
     Panel(
         "singularity",
@@ -145,7 +152,7 @@ ROTORCRAFT_DISPLAY: Final = VehicleDisplay(
     series=rotorcraft_series,
     levels=rotorcraft_levels,
     plane=AttitudePlane,
-    eye=(-2.4, -2.4, 1.9),
+    eye=(-3.3, -3.3, 2.4),
     up=(0.0, 0.0, 1.0),
     overview=False,
 )
