@@ -330,11 +330,19 @@ def save(figure: Figure, path: Path) -> None:
     `tiltsim.system.files.prepare_file` checks a path beforehand.
 
     Raises:
-        InputError: If the file cannot be written.
+        InputError: If the file cannot be written, or the figure is too small for its content.
     """
     suffix = path.suffix.lower()
     undated = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
     with paper_style(), replacing(path) as temporary, warnings.catch_warnings():
         # Text in scripts that the font lacks, such as Chinese, is drawn as boxes.
         warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from font")
-        figure.savefig(temporary, format=suffix[1:], metadata=undated.get(suffix))
+        warnings.filterwarnings("error", "constrained_layout not applied")
+        try:
+            figure.savefig(temporary, format=suffix[1:], metadata=undated.get(suffix))
+        except UserWarning as warning:
+            width, height = figure.get_size_inches() * 25.4
+            raise InputError(
+                f"{path}: {width:.0f} mm x {height:.0f} mm are too small for these panels; choose "
+                "fewer panels or a larger size"
+            ) from warning

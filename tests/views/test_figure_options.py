@@ -1,0 +1,208 @@
+"""Figures in the user's size, style and words, from the command line and in Python."""
+
+from __future__ import annotations
+
+import argparse
+
+import matplotlib
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from tests.flights import OTHER_KINDS, RECIPES, flight, saved
+from tiltsim.cli import build_parser, main
+from tiltsim.errors import InputError
+from tiltsim.scenario.key_units import quantity_of_key
+from tiltsim.scenario.metric_names import METRICS
+from tiltsim.views.figures import style
+from tiltsim.views.figures.adjusting import relabel, retitle
+from tiltsim.views.figures.distributions import distinct_texts
+from tiltsim.views.figures.plot import plot
+
+
+def labels_of(figure):
+    return [axes.get_ylabel() for axes in figure.axes]
+
+
+# --- size and panels -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "inches"),
+    [
+        ("85mm x 60mm", (85 / 25.4, 60 / 25.4)),
+        ("85x60mm", (85 / 25.4, 60 / 25.4)),
+        ("3.3x2.4in", (3.3, 2.4)),
+        ("8.5cm", (8.5 / 2.54, None)),
+        ((4.0, 3.0), (4.0, 3.0)),
+    ],
+)
+def test_sizes_are_given_in_mm_cm_or_inches(text, inches):
+    assert style.parse_size("size", text) == pytest.approx(inches)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("85", "add mm, cm or in"),
+        ("wide", "write such as 85mm"),
+        ("1x1mm", "from 0.5 to 80 inches"),
+    ],
+)
+def test_mistakes_in_sizes(text, words):
+    with pytest.raises(InputError, match=words):
+        style.parse_size("--size", text)
+
+
+def test_panels_are_drawn_in_the_order_and_size_asked_for():
+    figure = plot(flight("trot"), panels=["vx", "margin", "path"], size="85mm x 150mm")
+    assert labels_of(figure) == ["velocity along x (m/s)", "rad", "y (m)"]
+    assert tuple(figure.get_size_inches()) == pytest.approx((85 / 25.4, 150 / 25.4))
+    (line,) = [line for line in figure.axes[0].lines if len(line.get_xdata()) > 2]
+    np.testing.assert_array_equal(line.get_ydata(), flight("trot")["vx"])
+
+
+def test_the_attitude_of_several_flights_has_a_panel_per_angle():
+    figure = plot([flight("trot"), flight("fixed")], panels=["attitude", "alpha_1"], size="170mm")
+    angles = ["roll (rad)", "pitch (rad)", "yaw (rad)"]
+    assert labels_of(figure) == [*angles[:1], *angles[2:], angles[1], "tilt angle α₁ (rad)"]
+
+
+def test_an_unknown_panel_is_one_line(tmp_path, capsys):
+    assert main(["plot", str(saved("fixed", tmp_path)), "--panels", "path,margins"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "panels: 'margins': " in line
+    assert "margin" in line.partition("'margins'")[2]
+
+
+def test_too_small_a_figure_is_one_line(tmp_path, capsys):
+    assert main(["plot", str(saved("fixed", tmp_path)), "--size", "20x15mm"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "20 mm x 15 mm are too small for these panels" in line
+
+
+def test_every_command_that_draws_has_the_options():
+    (commands,) = (
+        action
+        for action in build_parser()._actions
+        if isinstance(action, argparse._SubParsersAction)
+    )
+    for name, parser in commands.choices.items():
+        options = {option for action in parser._actions for option in action.option_strings}
+        draws = name == "plot" or "--plot" in options
+        assert ({"--size", "--style", "--title", "--label", "--panels"} <= options) is draws, name
+
+
+# --- style ---------------------------------------------------------------------------------------
+
+
+def test_the_users_settings_take_precedence_and_stay_as_they_are():
+    users = {"font.family": ["serif"], "font.size": 7.0, "axes.prop_cycle": plt.cycler(color="km")}
+    with matplotlib.rc_context(users):
+        before = dict(matplotlib.rcParams)
+        figure = plot([flight("trot"), flight("fixed")], panels=["margin"])
+        assert dict(matplotlib.rcParams) == before
+    label = figure.axes[0].yaxis.label
+    assert label.get_fontfamily()[0] == "serif"
+    assert label.get_fontsize() == 7.0
+    colors = {line.get_color() for line in figure.axes[0].lines if len(line.get_xdata()) > 2}
+    assert colors == {"k", "m"}
+    assert plt.get_fignums() == []
+
+
+def test_a_matplotlibrc_is_respected_even_where_it_says_the_default(tmp_path, monkeypatch):
+    file = tmp_path / "matplotlibrc"
+    file.write_text("axes.spines.right: True\n", encoding="utf-8")
+    monkeypatch.setenv("MATPLOTLIBRC", str(file))
+    axes = plot(flight("fixed"), panels=["altitude"]).axes[0]
+    assert axes.spines["right"].get_visible()
+    assert not axes.spines["top"].get_visible()
+
+
+def test_a_style_file_takes_precedence(tmp_path):
+    file = tmp_path / "paper.mplstyle"
+    file.write_text("font.family: serif\nfont.size: 6\nsavefig.dpi: 50\n", encoding="utf-8")
+    with style.paper_style(file, style.parse_size("--size", "3x2in")):
+        label = plot(flight("fixed"), panels=["altitude"]).axes[0].yaxis.label
+        assert (label.get_fontfamily()[0], label.get_fontsize()) == ("serif", 6.0)
+        assert matplotlib.rcParams["savefig.dpi"] == 50.0
+    with style.paper_style(size=style.parse_size("--size", "3x2in")):
+        assert matplotlib.rcParams["savefig.dpi"] == style.PRINT_DPI
+
+
+def test_a_missing_style_file_is_one_line(tmp_path, capsys):
+    words = ["plot", str(saved("fixed", tmp_path)), "--style", "no.mplstyle"]
+    assert main(words) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("tiltsim: --style no.mplstyle: No such file or directory; give a")
+
+
+# --- words ---------------------------------------------------------------------------------------
+
+
+def test_title_and_labels_are_the_users(tmp_path, monkeypatch):
+    shown = []
+    monkeypatch.setattr(style, "save", lambda figure, _path: shown.append(figure))
+    folders = [str(saved(name, tmp_path)) for name in ("trot", "fixed")]
+    options = ["--label", "trot=A trot of 1 s", "--label", "singularity margin=margin μ"]
+    assert main(["plot", *folders, "--title", "Two gaits", "--panels", "margin", *options]) == 0
+    (figure,) = shown
+    assert figure.texts[0].get_text() == "Two gaits"
+    assert labels_of(figure) == ["margin μ (rad)"]
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()][:2] == ["A trot of 1 s", "fixed"]
+
+
+def test_a_label_of_nothing_is_one_line(tmp_path, capsys):
+    words = ["plot", str(saved("fixed", tmp_path)), "--label", "altitud=Height"]
+    assert main(words) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "label 'altitud': " in line
+    assert "Altitude" in line
+
+
+def test_metrics_are_relabelled_by_their_names_and_keep_their_units():
+    figure = Figure()
+    axes = figure.subplots()
+    axes.set_xlabel(METRICS["sup_position_error_after_20s"].quantity.text)
+    relabel(figure, {"sup_position_error_after_20s": "error"})
+    assert axes.get_xlabel() == "error (m)"
+    retitle(figure, "A $ sign")
+    assert figure.get_suptitle() == r"A \$ sign"
+
+
+def test_every_metric_and_column_has_a_label_of_its_own():
+    assert len({metric.label for metric in METRICS.values()}) == len(METRICS)
+    for name in (*RECIPES, *OTHER_KINDS):
+        this = flight(name)
+        labels = [this.assembly.loop.label(column).label for column in this.units]
+        assert len(set(labels)) == len(labels), name
+        assert not [label for label in labels if "_" in label or not label]
+
+
+@pytest.mark.parametrize(
+    ("key", "text"),
+    [
+        ("gait.period", "gait period (s)"),
+        ("vehicle.tilt_servo.max_rate", "tilt servo max rate (rad/s)"),
+        ("vehicle.rotor_inertia", "rotor inertia (kg m²)"),
+        ("initial.attitude[1]", "initial attitude pitch (rad)"),
+        ("gait.angles[0]", "gait angles α₁ (rad)"),
+        ("my_own_variable", "my own variable"),
+    ],
+)
+def test_keys_have_the_units_of_their_descriptions(key, text):
+    assert quantity_of_key(key).text == text
+
+
+@pytest.mark.parametrize(
+    ("values", "texts"),
+    [
+        ([0.0392, 0.0963, 0.247], ["0.0392", "0.0963", "0.247"]),
+        ([4.93312, 4.93328, 4.9341], ["4.9331", "4.9333", "4.9341"]),
+        ([-1.5, -1.5], ["−1.5", "−1.5"]),
+    ],
+)
+def test_unequal_quantiles_are_told_apart(values, texts):
+    assert distinct_texts(values) == texts
