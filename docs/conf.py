@@ -13,6 +13,7 @@ from pathlib import Path
 
 from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx.util.inspect import TypeAliasForwardRef
 
 import tiltsim_controllers
 
@@ -44,10 +45,8 @@ add_module_names = False
 autodoc_member_order = "bysource"
 ALIASES = ("ArrayLike", "Floats", "Pair", "Triple", "Quad", "Octet", "Values", "Vector")
 autodoc_type_aliases = {"npt.ArrayLike": "ArrayLike"} | {name: name for name in ALIASES}
-ALIASED = {  # as Sphinx spells what it has evaluated
-    r"TypeAliasForwardRef\('(\w+)'\)": r"\1",
-    r"[~\w.]*ndarray\[[^]]*\], [~\w.]*dtype\[[~\w.]*float64\]\]": "Floats",
-}
+TypeAliasForwardRef.__repr__ = lambda alias: alias.name  # inside of a list or tuple, too
+FLOATS = r"[~\w.]*ndarray\[[^]]*\], [~\w.]*dtype\[[~\w.]*float64\]\]"  # in types from elsewhere
 napoleon_attr_annotations = False  # the signature has them
 napoleon_use_ivar = True
 python_maximum_signature_line_length = 88
@@ -91,12 +90,11 @@ def describe_fields(app, what, name, obj, options, lines):
 
 
 def tidy_signature(app, what, name, obj, options, signature, returned):
-    """Name type aliases, and show no tables of a scenario: their page lists all keys."""
+    """Name the type of arrays, and show no tables of a scenario: their page lists all keys."""
     if hasattr(obj, "model_fields"):
         return "(...)", returned
-    for pattern, name in ALIASED.items():
-        signature = signature and re.sub(pattern, name, signature)
-        returned = returned and re.sub(pattern, name, returned)
+    signature = signature and re.sub(FLOATS, "Floats", signature)
+    returned = returned and re.sub(FLOATS, "Floats", returned)
     return signature, returned
 
 
