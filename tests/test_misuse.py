@@ -73,6 +73,10 @@ MISUSES = {
         lambda: tiltsim.simulate(SHORT, controller=3),
         "controller = 3: must be callable",
     ),
+    "a name as controller": (
+        lambda: tiltsim.simulate(SHORT, controller="hover"),
+        "controller = 'hover': must be callable or FILE.py:NAME",
+    ),
     "a controller file that is missing": (
         lambda: tiltsim.simulate(SHORT, controller="no.py:hover"),
         "no such file",

@@ -59,9 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.system.files import prepare_file
 
     overrides = dict(parse_override(text) for text in arguments.overrides)
-    if arguments.controller is not None:
-        overrides |= {"controller.law": "python", "controller.function": arguments.controller}
-    scenario = load_scenario(arguments.scenario, overrides)
+    scenario = load_scenario(arguments.scenario, overrides, controller=arguments.controller)
     expecting, judged = scenario, arguments.judge
     if judged is None:
         own_bounds = any(key.startswith("expect") for key in overrides)

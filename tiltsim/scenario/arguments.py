@@ -25,12 +25,10 @@ def controller_name(controller: object) -> str:
 
     Raises `InputError` if it can be no controller.
     """
-    if isinstance(controller, str):
+    if isinstance(controller, str) and ".py:" in controller:
         return controller
     if not callable(controller):
-        raise InputError(
-            f"controller = {short_repr(controller)}: must be callable, or a text FILE.py:NAME"
-        )
+        raise InputError(f"controller = {short_repr(controller)}: must be callable or FILE.py:NAME")
     named = controller if hasattr(controller, "__qualname__") else type(controller)
     return f"{named.__module__}.{named.__qualname__}"
 

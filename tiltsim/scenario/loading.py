@@ -44,8 +44,8 @@ def load_scenario(
             of a family, for example ``"ch04_tracking/setpoint#rho_065_modified"``; or the tables of
             a file as a dict; or a scenario, to change it.
         overrides: Values by dotted key in the units of docs/scenario.md, for example
-            ``{"gait.period": 2.0, "gait.angles[0]": 0.1}``. For a family without ``#variant`` they
-            are required and change its base. Arrays are taken as lists, here and in a dict.
+            ``{"gait.period": 2.0, "gait.angles[0]": 0.1}``. Arrays are taken as lists, here and in
+            a dict. A family without ``#variant`` needs them or a controller, and is its base then.
         controller: A controller of your own, which replaces the scenario's before anything is
             checked: a function from `tiltsim.Observation` to `tiltsim.Command`, an object with
             ``__call__`` and, if it has a memory, ``reset(scenario)``, a class of such objects, or
@@ -56,7 +56,8 @@ def load_scenario(
     """
     if overrides is not None:
         check_keys("overrides", overrides)
-    document, address = _document(source, with_base=bool(overrides))
+    changed = bool(overrides) or controller is not None
+    document, address = _document(source, with_base=changed)
     if controller is not None:
         document["controller"] = {"law": "python", "function": controller_name(controller)}
     apply_overrides(document, overrides or {}, address)
