@@ -337,6 +337,8 @@ def test_further_mistakes_are_named(write):
         ('[gait]\ntype = "waypoints"\nperiod = 1\nangles = 5', "must be a list of lists"),
         ("[controller]\nleave_out = 5", "leave_out = 5: must be a list of names"),
         ("[vehicle]\nmass = 500", "vehicle.mass = 500.0: is in kg; to hover its rotors would"),
+        ("[vehicle]\ninertia = [2.24, 2.99, 4.80]", "is in kg m^2, arms in m: mass this far"),
+        ("[vehicle]\narm_length = 178.5", "does not belong to arms of 178.5 m; check inertia, "),
     ],
 )
 def test_a_mistake_says_what_to_write(write, text, words):
@@ -392,6 +394,12 @@ def test_a_misspelt_list_is_answered_with_the_closest(write):
         load_scenario(path, {"initial.atitude[0]": 1.0})
     with pytest.raises(InputError, match="no such entry; give the whole list"):
         load_scenario(path, {"initial.position[0]": 1.0})
+    with pytest.raises(InputError, match=r"no such entry; initial.attitude has 3, from .*\[0\]"):
+        load_scenario(path, {"initial.attitude[3]": 1.0})
+    with pytest.raises(
+        InputError, match=r"initial.attitude is a list; write initial.attitude\[0\]"
+    ):
+        load_scenario(path, {"initial.attitude.0": 1.0})
 
 
 def test_a_folder_is_not_a_scenario(tmp_path):

@@ -284,26 +284,31 @@ def _override(address: str, document: dict[str, Any], key: str, value: object) -
         target = _enter(target, step)
     if isinstance(last, int):
         if not isinstance(target, list) or last >= len(target):
-            hint = _other_list(document, path)
-            hint += f"give the whole list {key.rpartition('[')[0]}"
-            raise InputError(f"{address}: {key} = {show(value)}: no such entry; {hint}")
+            raise InputError(
+                f"{address}: {key} = {show(value)}: no such entry; "
+                f"{_entries_instead(document, path, key.rpartition('[')[0])}"
+            )
     elif not isinstance(target, dict):
-        raise InputError(
-            f"{address}: {key} = {show(value)}: {key.rpartition('.')[0]} is not a table"
-        )
+        name = key.rpartition(".")[0]
+        is_list = isinstance(target, list)
+        reason = f"is a list; write {name}[{last}]" if is_list else "is not a table"
+        raise InputError(f"{address}: {key} = {show(value)}: {name} {reason}")
     elif last in KIND_KEYS and target.get(last, KIND_KEYS[last]) != value:
         target.clear()
     target[last] = value
 
 
-def _other_list(document: dict[str, Any], path: list[str | int]) -> str:
-    """A suggestion for a list that does not exist and may be misspelt."""
+def _entries_instead(document: dict[str, Any], path: list[str | int], whole: str) -> str:
+    """What to write instead of an entry that a list has not, or of a list that does not exist."""
     *above, name = path
     table: Any = document
     for step in above:
         table = _enter(table, step)
     lists = table.items() if isinstance(table, dict) else ()
-    return did_you_mean(name, (key for key, value in lists if isinstance(value, list)))
+    lengths = {key: len(value) for key, value in lists if isinstance(value, list)}
+    if name in lengths:
+        return f"{whole} has {lengths[name]}, from {whole}[0]"
+    return did_you_mean(name, lengths) + f"give the whole list {whole}"
 
 
 def _enter(target: object, step: str | int) -> object:

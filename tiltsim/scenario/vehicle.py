@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from math import inf, pi
+from math import inf, pi, sqrt
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
@@ -73,6 +73,11 @@ class PodTable(Table):
     inertia: Annotated[float, Field(ge=1e-14)] = Field(
         Pod.inertia, description="about each axis of the pod [kg m^2]", examples=[1e-5]
     )
+
+
+MIN_GYRATION: Final = 1e-3
+MAX_GYRATION: Final = 10.0
+"""Radii of gyration over the arms' length; beyond them a unit is mistaken. Vehicles have 0.3."""
 
 
 def require_physical_inertia(key: str, value: object, moments: tuple[float, ...]) -> None:
@@ -233,8 +238,17 @@ class VehicleTable(AnyVehicleTable):
     def _check(self) -> Self:
         if self.mjcf is not None:
             self.require_defaults(("arm_length", "pod"), "defined by vehicle.mjcf; remove it")
-        moments = self.resolve()[1:4]
+        vehicle = self.resolve()
+        moments = vehicle[1:4]
         require_physical_inertia("vehicle.inertia", sorted(moments), moments)
+        radius = sqrt(max(moments) / vehicle.mass)  # of gyration, m
+        if not MIN_GYRATION < radius / vehicle.arm_length < MAX_GYRATION:
+            raise InvalidValueError(
+                "vehicle.inertia",
+                moments,
+                f"is in kg m^2, arms in m: mass this far out, {radius:.3g} m on average, does not "
+                f"belong to arms of {vehicle.arm_length:g} m; check inertia, mass and arm_length",
+            )
         if 4.0 * self.rotor_inertia >= moments[2]:
             reason = f"must be below {moments[2] / 4.0:g}: vehicle.inertia includes the four rotors"
             raise self.mistake("rotor_inertia", reason)
