@@ -10,7 +10,7 @@ import pytest
 import tiltsim
 from tests.flights import TILT_CAR
 from tiltsim.flight.vectors import VECTORS
-from tiltsim.vehicles.rotorcraft import COLUMN_UNITS
+from tiltsim.vehicles.rotorcraft import COLUMNS
 
 SHORT = {"simulation.duration": 0.02, "simulation.engine": "python"}
 
@@ -30,7 +30,7 @@ def own_flight():
 
 
 def test_vectors_are_columns_side_by_side(flight):
-    assert set().union(*VECTORS.values()) <= set(COLUMN_UNITS)
+    assert set().union(*VECTORS.values()) <= set(COLUMNS)
     for name, columns in VECTORS.items():
         assert flight[name].shape == (len(flight), len(columns))
         np.testing.assert_array_equal(flight[name][:, -1], flight[columns[-1]])
