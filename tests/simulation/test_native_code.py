@@ -124,9 +124,44 @@ def test_all_that_processes_fly_with_is_compiled_for_them_once(monkeypatch):
             calls.append("advance")
 
     monkeypatch.setattr(shared_engine, "make_plant", Recorded)
-    flights = [scenario({}, plant="thesis", duration=1000.0) for _ in range(2)]
-    assert shared_engine.shared_engine(flights) == "native"
+    flights = [scenario({}, plant="thesis", duration=1.0) for _ in range(2)]
+    assert shared_engine.shared_engine(flights, 99_999) is None
+    assert shared_engine.shared_engine(flights, 100_000) == "native"
     assert calls == ["thesis", "record", "advance"]
+
+
+def test_only_loops_that_fly_long_are_compiled_together(monkeypatch, tmp_path):
+    import tiltsim.engines.cache as cache
+    import tiltsim.simulation.shared_engine as shared_engine
+
+    compiled = []
+
+    def in_processes(work, groups, jobs):
+        compiled.append(([[_plant_and_law(one) for one in group] for group in groups], jobs))
+        return iter(())
+
+    def _plant_and_law(one):
+        return one.simulation.plant, one.controller.law
+
+    monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
+    monkeypatch.setattr(shared_engine, "in_processes", in_processes)
+    long = [scenario({}, engine="auto", plant=p, duration=40.0) for p in ("thesis", "mujoco")]
+    two = [scenario(ALL_LAWS["full_pose"], engine="auto", duration=d) for d in (12.0, 12.999)]
+    names = shared_engine.compile_together([*long, *two], 2)
+    assert names == {loop_of(one).native_name(one.simulation.plant) for one in long}
+    assert compiled == [([[("thesis", "attitude_altitude"), ("mujoco", "attitude_altitude")]], 2)]
+    flown = [shared_engine.with_compiled(one, names).simulation.engine for one in (*long, *two)]
+    assert flown == ["native", "native", "auto", "auto"]
+
+    third = scenario(ALL_LAWS["full_pose"], engine="auto", duration=0.001)
+    assert len(shared_engine.compile_together([*long, *two, third], 2)) == 3
+    assert shared_engine.compile_together([long[0], *two], 2) == frozenset()  # 65,000 steps
+    compiled.clear()
+    assert shared_engine.compile_together([*long, *two], 1) == names
+    cache.mark_native_code_compiled(loop_of(long[0]).native_name("thesis"))
+    cache.mark_native_code_compiled(loop_of(long[1]).native_name("mujoco"))
+    shared_engine.compile_together([*long, *two], 2)
+    assert [groups for groups, _ in compiled] == [[]]
 
 
 def test_whether_native_code_is_cached_is_known_by_law_and_plant(monkeypatch, tmp_path):

@@ -24,7 +24,7 @@ from tiltsim.report.claim import (
 from tiltsim.report.claims import registered_claims
 from tiltsim.report.flights import PLANTS, FlightRecord, Flights, Plant, ReportEntry
 from tiltsim.report.statement import Origin, Statement
-from tiltsim.report.store import code_digest, results, sources_digest, store
+from tiltsim.report.store import code_digest, sources_digest, store
 from tiltsim.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -86,15 +86,12 @@ class Failure:
 
 
 def analyze(
-    folder: Path, jobs: int, progress: Callable[[int, int], None] = lambda done, total: None
+    folder: Path, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> dict[str, Value]:
     """The measured values of all computed claims, by `Claim.id`.
 
     They are stored in the folder until the core or the report changes. ``progress`` is called with
-    the number of computed claims and of those to compute.
-
-    Raises:
-        InputError: If a claim cannot be computed or a process dies.
+    the number of computed claims and of those to compute: seconds in all, not worth processes.
     """
     digest = sources_digest([*Path(__file__).parent.rglob("*.py")], code_digest().hex()).hex()
     path = folder / f"analysis-{digest[:24]}.json"
@@ -105,19 +102,15 @@ def analyze(
     values: dict[str, Value] = {
         key: tuple(value) if isinstance(value, list) else value for key, value in stored.items()
     }
-    missing = [key for key in _computed() if key not in values]
+    missing = {key: claim for key, claim in _computed().items() if key not in values}
     if missing:
         progress(0, len(missing))
-        for done, (key, value) in enumerate(results(_measure, missing, jobs, str), start=1):
-            values[key] = value
+        for done, (key, claim) in enumerate(missing.items(), start=1):
+            values[key] = plain(claim.measure())
             progress(done, len(missing))
         folder.mkdir(parents=True, exist_ok=True)
         store(path, json.dumps(values, indent=1).encode())
     return values
-
-
-def _measure(key: str) -> Value:
-    return plain(_computed()[key].measure())
 
 
 def _computed() -> dict[str, AnalysisClaim]:

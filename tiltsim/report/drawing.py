@@ -71,7 +71,14 @@ def draw_all(
             content = [picture.name, *(flight_key(one) + one.title for one in shown)]
             digest = hashlib.sha256(style + "".join(content).encode()).hexdigest()
             files[picture.name] = folder / f"{digest[:24]}.png"
-    missing = [(name, file) for name, file in files.items() if not file.is_file()]
+    steps = {
+        picture.name: sum(scenarios[one].simulation.steps for one in picture.flights)
+        for picture in PICTURES
+        if picture.name in files
+    }
+    # First those that fly long, so that no process ends up alone with one of them.
+    by_length = sorted(files.items(), key=lambda item: -steps[item[0]])
+    missing = [(name, file) for name, file in by_length if not file.is_file()]
     progress(0, len(missing))
     work = partial(_draw_one, metrics=metrics)
     drawn = results(work, missing, jobs, lambda task: f"figure {task[0]}")

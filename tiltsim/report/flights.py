@@ -14,14 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 
 from tiltsim.errors import InputError
-from tiltsim.plants.engine_choice import with_engine
 from tiltsim.report.store import flight_key, results, store
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.metric_names import WALL_CLOCK_METRICS
-from tiltsim.simulation.shared_engine import shared_engine
+from tiltsim.simulation.shared_engine import compile_together, with_compiled
 
 if TYPE_CHECKING:
-    from tiltsim.engines.base import EngineName
     from tiltsim.flight.flight import Flight
     from tiltsim.scenario.scenario import Scenario
 
@@ -133,21 +131,19 @@ def fly(
     progress(len(flights), total)
     # The longest first, so that no process ends up alone with one of them.
     tasks = sorted(missing, key=lambda task: -missing[task].simulation.steps)
-    engine = shared_engine(list(missing.values())) if missing else None
-    work = partial(_fly_one, folder=folder, engine=engine)
+    jobs = min(jobs, len(tasks))
+    compiled = compile_together(list(missing.values()), jobs)
+    work = partial(_fly_one, folder=folder, compiled=compiled)
     for task, record in results(work, tasks, jobs, lambda t: f"{t.address} on the {t.plant} plant"):
         flights[task.address, task.plant] = record
         progress(len(flights), total)
     return flights
 
 
-def _fly_one(task: _Task, folder: Path, engine: EngineName | None) -> FlightRecord:
+def _fly_one(task: _Task, folder: Path, compiled: frozenset[str]) -> FlightRecord:
     from tiltsim.simulation.simulate import simulate
 
-    scenario = variant_for(task.address, task.plant)
-    if engine is not None and scenario.simulation.engine == "auto":
-        scenario = with_engine(scenario, engine)
-    flight = simulate(scenario)
+    flight = simulate(with_compiled(variant_for(task.address, task.plant), compiled))
     if flight.end.kind == "interrupted":
         raise KeyboardInterrupt
     record = make_record(task.address, task.plant, flight)

@@ -37,7 +37,7 @@ def make_report(
     whole = not paths
     entries = report_entries(collect(paths or [str(shipped_folder("scenarios"))]))
     flights = fly(entries, folder, jobs, partial(progress, "flights"))
-    values = analyze(folder, jobs, partial(progress, "computed claims")) if whole else {}
+    values = analyze(folder, partial(progress, "computed claims")) if whole else {}
     rows = make_rows(entries, flights, values, whole=whole)
     drawing = partial(progress, "figures")
     return Report(

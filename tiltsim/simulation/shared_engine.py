@@ -1,38 +1,97 @@
-"""One engine for several flights."""
+"""Native code for flights in several processes."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
+from itertools import groupby
+from typing import Final
 
 from tiltsim.engines.base import EngineName
+from tiltsim.engines.cache import (
+    announce_native_code,
+    native_code_is_cacheable,
+    native_code_is_cached,
+)
 from tiltsim.laws.assembling import assemble, loop_of
-from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE
+from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE, with_engine
 from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.interrupts import reraise_swallowed_interrupts
+from tiltsim.system.processes import ProcessDiedError, in_processes
+
+MIN_STEPS_TO_SHARE: Final = 25_000
+"""Steps of all flights of one loop that repay compiling it, where others are compiled, too.
+
+A loop takes 1 to 14 s to compile, and 15 to 860 us a step in Python.
+"""
 
 
-def shared_engine(scenarios: Sequence[Scenario], steps: int | None = None) -> EngineName | None:
+def shared_engine(scenarios: Sequence[Scenario], steps: int) -> EngineName | None:
     """Choose one engine for flights in several processes, and compile it for all of them.
 
     Args:
-        scenarios: The flights, or examples of them.
-        steps: Physics steps of all flights; default: of ``scenarios``.
+        scenarios: Examples of the flights.
+        steps: Physics steps of all flights.
 
     Returns:
         "native" if the flights together repay compilation, else None, the choice of each scenario.
     """
-    if steps is None:
-        steps = sum(scenario.simulation.steps for scenario in scenarios)
     if steps < MIN_STEPS_TO_COMPILE:
         return None
-    ready: set[tuple[object, str]] = set()
-    for scenario in scenarios:
-        kind = (loop_of(scenario), scenario.simulation.plant)
-        if kind not in ready and not scenario.controller.is_external:
-            with reraise_swallowed_interrupts():
-                plant = make_plant(assemble(scenario), engine="native")
-                plant.record(1, 1)  # on the thesis plant compiled separately from `advance`
-                plant.advance(1)
-            ready.add(kind)
+    _compile([*_examples(scenarios).values()])
     return "native"
+
+
+def compile_together(scenarios: Sequence[Scenario], jobs: int) -> frozenset[str]:
+    """Compile on several processes what repays it in flights on several processes.
+
+    Args:
+        scenarios: All flights.
+        jobs: Processes; a single one compiles what it flies itself.
+
+    Returns:
+        The names of the compiled loops, for `with_compiled`.
+    """
+    if sum(scenario.simulation.steps for scenario in scenarios) < MIN_STEPS_TO_COMPILE:
+        return frozenset()
+    examples, steps = _examples(scenarios), Counter[str]()
+    for scenario in scenarios:
+        steps[_name(scenario)] += scenario.simulation.steps
+    names = frozenset(name for name in examples if steps[name] >= MIN_STEPS_TO_SHARE)
+    missing = [name for name in examples if name in names and not native_code_is_cached(name)]
+    if jobs > 1 and native_code_is_cacheable():
+        for name in missing:
+            announce_native_code(name)
+        # A scenario's loops on both plants share most of their code.
+        by_address = groupby((examples[name] for name in missing), lambda one: one.address)
+        for _, future in in_processes(_compile, [[*group] for _, group in by_address], jobs):
+            error = future.exception()
+            # Without memory for both, the processes that fly compile for themselves.
+            if error is not None and not isinstance(error, ProcessDiedError):
+                raise error
+    return names
+
+
+def with_compiled(scenario: Scenario, names: frozenset[str]) -> Scenario:
+    """The scenario natively if its engine is auto and its loop is one of `compile_together`."""
+    compiled = scenario.simulation.engine == "auto" and _name(scenario) in names
+    return with_engine(scenario, "native") if compiled else scenario
+
+
+def _name(scenario: Scenario) -> str:
+    return loop_of(scenario).native_name(scenario.simulation.plant)
+
+
+def _examples(scenarios: Sequence[Scenario]) -> dict[str, Scenario]:
+    """A scenario of each loop that can fly natively, by its name."""
+    flown = (scenario for scenario in scenarios if not scenario.controller.is_external)
+    return {_name(scenario): scenario for scenario in flown}
+
+
+def _compile(scenarios: Sequence[Scenario]) -> None:
+    for scenario in scenarios:
+        with reraise_swallowed_interrupts():
+            plant = make_plant(assemble(scenario), engine="native")
+            plant.record(1, 1)  # on the thesis plant compiled separately from `advance`
+            plant.advance(1)

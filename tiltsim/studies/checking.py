@@ -11,16 +11,14 @@ from time import perf_counter
 from typing import Any, Literal
 from xml.etree import ElementTree
 
-from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
 from tiltsim.flight.expectations import Verdict, check_expectations
-from tiltsim.plants.engine_choice import with_engine
 from tiltsim.plants.trust import require_trust
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.library import closest_in_library, library_name, read_toml, scenario_files
 from tiltsim.scenario.loading import load_scenario, variant_names
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.simulation.shared_engine import shared_engine
+from tiltsim.simulation.shared_engine import compile_together, with_compiled
 from tiltsim.simulation.simulate import simulate
 from tiltsim.system.files import replacing
 from tiltsim.system.processes import in_processes
@@ -82,7 +80,7 @@ def _find(name: str) -> Path:
 def check_one(
     address: str,
     overrides: Mapping[str, Any],
-    engine: EngineName | None = None,
+    compiled: frozenset[str] = frozenset(),
     *,
     trusted: bool = False,
 ) -> CheckResult:
@@ -91,16 +89,14 @@ def check_one(
     Args:
         address: Of the scenario.
         overrides: Values by dotted key.
-        engine: For a scenario whose engine is auto.
+        compiled: Loops to fly natively, of `compile_together`.
         trusted: Whether to execute Python code that the scenario names.
     """
     start = perf_counter()
     try:
         scenario = load_scenario(address, overrides)
         require_trust(scenario, trusted)
-        if engine is not None and scenario.simulation.engine == "auto":
-            scenario = with_engine(scenario, engine)
-        flight = simulate(scenario)
+        flight = simulate(with_compiled(scenario, compiled))
     except InputError as error:
         return CheckResult(address, "invalid", str(error))
     if flight.end.kind == "interrupted":
@@ -148,15 +144,16 @@ def check_all(
         In the order of the addresses.
     """
     scenarios = _valid(addresses, overrides)
-    engine = shared_engine(list(scenarios.values()))
-    if jobs == 1 or len(addresses) == 1:
+    jobs = min(jobs, len(addresses))
+    compiled = compile_together(list(scenarios.values()), jobs)
+    if jobs == 1:
         results = []
         for address in addresses:
-            results.append(check_one(address, overrides, engine, trusted=trusted))
+            results.append(check_one(address, overrides, compiled, trusted=trusted))
             report(results[-1])
         return results
     by_address: dict[str, CheckResult] = {}
-    work = partial(check_one, overrides=overrides, engine=engine, trusted=trusted)
+    work = partial(check_one, overrides=overrides, compiled=compiled, trusted=trusted)
     # The longest first, so that none of them is still running when all others have finished.
     steps = {address: scenario.simulation.steps for address, scenario in scenarios.items()}
     by_length = sorted(addresses, key=lambda address: -steps.get(address, 0))
