@@ -64,7 +64,7 @@ class Simulation:
         plant = make_plant(self._assembly, "native" if native else "python", model)
         assert isinstance(plant, MujocoPlant)
         self._plant, self._beginning = plant, plant.state
-        self.reset()
+        self._begin()
 
     def __repr__(self) -> str:
         """The scenario and the time, in one line."""
@@ -76,6 +76,9 @@ class Simulation:
         self._plant.state = self._beginning
         if isinstance(self._plant, UserControlledPlant):
             self._plant.restart()
+        self._begin()
+
+    def _begin(self) -> None:
         self._monitor = TerminationMonitor(self._assembly)
         self._samples = [take_sample(self._plant)]
         self._end = self._monitor.check(self._plant, self._samples[0])
