@@ -43,6 +43,7 @@ nb_execution_timeout = 60  # s, a cell
 
 add_module_names = False
 autodoc_member_order = "bysource"
+autodoc_preserve_defaults = True
 ALIASES = ("ArrayLike", "Floats", "Pair", "Triple", "Quad", "Octet", "Values", "Vector")
 autodoc_type_aliases = {"npt.ArrayLike": "ArrayLike"} | {name: name for name in ALIASES}
 TypeAliasForwardRef.__repr__ = lambda alias: alias.name  # inside of a list or tuple, too
@@ -109,7 +110,7 @@ def link_unqualified(app, env, node, content):
         return None
     domain = env.get_domain("py")
     name = node["reftarget"].rpartition(".")[2]
-    found = domain.find_obj(env, "", "", f".{name}", None, 1)
+    found = domain.find_obj(env, "", "", name, None, 1)
     found = [(full, entry) for full, entry in found if not entry.aliased]
     if len(found) != 1:
         return None
