@@ -55,6 +55,7 @@ def trace_seldom(patch):
         patch: What replaces the functions, a `pytest.MonkeyPatch`.
     """
     import sympy
+    from dm_control import mjcf
     from matplotlib.figure import Figure
     from numba.core import compiler
 
@@ -68,7 +69,9 @@ def trace_seldom(patch):
         patch.setattr(plant, "advance", seldom_traced(plant.advance, begins))
     elsewhere = {
         compiler: ["compile_extra"],
-        Figure: ["savefig"],
+        Figure: ["draw", "savefig"],
+        mjcf: ["from_path"],
+        mjcf.RootElement: ["to_xml_string"],
         sympy: ["diff", "expand", "simplify"],
         sympy.MatrixBase: ["det"],
     }

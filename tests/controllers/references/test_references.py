@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -148,10 +150,16 @@ def test_two_waypoints_are_joined_by_the_known_polynomial():
         assert found == pytest.approx((2 * share, 1.0, 2 - 4 * share), abs=1e-12)
 
 
+@cache
+def snap_along_the_way():
+    """Instants, and the snap along x there."""
+    times = np.linspace(0.0, TIMES[-1], 13001)
+    return times, np.array([motion(t, WAYPOINTS)[4, 0] for t in times])
+
+
 def snap_cost(shift):
     """Integral of squared snap of the motion with a middle stretch bent by a bump of its own."""
-    times = np.linspace(0.0, TIMES[-1], 13001)
-    snap = np.array([motion(t, WAYPOINTS)[4, 0] for t in times])
+    times, snap = snap_along_the_way()
     # A bump that is zero with three derivatives at the knots 2 and 5: (s (1 - s))^4.
     s = np.clip((times - 2.0) / 3.0, 0.0, 1.0)
     bump = np.polynomial.Polynomial([0, 1, -1]) ** 4
