@@ -19,6 +19,13 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_collection_modifyitems(items):
+    """The longest of the slow tests begin first: at the end, one process would fly them alone."""
+    markers = [item.get_closest_marker("slow") for item in items]
+    longest = [bool(marker and marker.kwargs.get("longest")) for marker in markers]
+    items[:] = [item for _, item in sorted(zip(longest, items), key=lambda pair: not pair[0])]
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _seldom_traced():
     """Under coverage, most steps of a flight run without its tracer."""

@@ -202,7 +202,7 @@ def test_killed_at_random_moments_it_continues_to_the_same_dataset(tmp_path):
     assert (folder / "sweep.parquet").read_bytes() == whole.read_bytes()
 
 
-@pytest.mark.slow
+@pytest.mark.slow(longest=True)
 def test_two_thousand_flights_killed_twenty_times(tmp_path):
     file = short_sweep(tmp_path / "sweep.toml", count=1000, chunk_size=20)
     whole = run_sweep(load_sweep(file), tmp_path / "whole", jobs=2)
