@@ -61,11 +61,12 @@ def trace_seldom(patch):
 
     from tiltsim.plants.mujoco_plant import MujocoPlant
     from tiltsim.plants.thesis_plant import ThesisPlant
+    from tiltsim.plants.user_controller import UserControlledPlant
 
     def begins(plant, _steps):
         return plant.time < BEGINNING
 
-    for plant in (MujocoPlant, ThesisPlant):
+    for plant in (MujocoPlant, ThesisPlant, UserControlledPlant):
         patch.setattr(plant, "advance", seldom_traced(plant.advance, begins))
     elsewhere = {
         compiler: ["compile_extra"],
