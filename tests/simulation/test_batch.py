@@ -10,6 +10,7 @@ import tiltsim
 import tiltsim.engines.sample_evaluation
 import tiltsim.plants.engine_choice
 import tiltsim.simulation.native_batch
+from tests.flights import TILT_CAR
 from tests.laws.layers.test_actuation import EVERYTHING
 from tests.laws.layers.test_air import STORM
 from tests.laws.test_laws import GUST, LAWS
@@ -451,3 +452,14 @@ def test_many_short_flights_are_worth_the_native_engine(plant, monkeypatch):
 
 def test_no_flights_give_no_results():
     assert list(fly([])) == []
+
+
+def test_a_batch_takes_whatever_describes_a_scenario_and_flies_own_controllers():
+    short = {"simulation": {"duration": 0.02}}
+    own = tiltsim.load_scenario(short, controller=lambda _: tiltsim.Command(thrusts=[2.0] * 4))
+    mixture = [own, short, tiltsim.load_scenario(TILT_CAR, {"simulation.duration": 0.02})]
+    results = list(tiltsim.fly((one for one in mixture), keep_samples=True))
+    models = [result.scenario.vehicle.model for result in results]
+    assert models == ["tiltrotor", "tiltrotor", "tilt_car"]
+    assert results[0].flight["thrusts"][-1] == pytest.approx([2.0] * 4)
+    np.testing.assert_array_equal(results[1].flight.samples, tiltsim.simulate(short).samples)

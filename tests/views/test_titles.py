@@ -61,3 +61,17 @@ def test_a_title_is_common_where_all_have_it():
     trots = [tiltsim.parse_scenario(trot | {"title": title}) for title in titles]
     assert common_title(trots) == "A trot that leans"
     assert common_title(scenarios("ch06/walk#a", "ch04/walk#a")) == ""
+
+
+def test_names_of_changed_scenarios_are_what_was_changed():
+    base = tiltsim.load_scenario("ch04_tracking/setpoint#rho_0_modified")
+    exact = base.replace({"controller.decoupler": "exact"})
+
+    def hover(observation):
+        raise NotImplementedError
+
+    own = tiltsim.load_scenario(base, controller=hover)
+    assert flight_names([base, exact, own]) == ["modified", "exact", "hover"]
+    heavy = base.replace({"vehicle.mass": 0.5})
+    assert flight_names([heavy, heavy.replace({"vehicle.mass": 0.6})]) == ["mass 0.5", "mass 0.6"]
+    assert flight_names([base, base]) == ["rho_0_modified_1", "rho_0_modified_2"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from os import PathLike, fsdecode
 from typing import Any
 
@@ -44,3 +44,12 @@ def plain(value: Any, depth: int = 0) -> Any:
     if isinstance(value, PathLike):
         return fsdecode(value)
     return value.tolist() if hasattr(value, "tolist") else value
+
+
+def leaves(tables: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """The values of nested tables by dotted key, without those that are None."""
+    for name, value in tables.items():
+        if isinstance(value, dict):
+            yield from leaves(value, f"{before}{name}.")
+        elif value is not None:
+            yield before + name, value

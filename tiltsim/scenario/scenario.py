@@ -7,12 +7,13 @@ else. `tiltsim.scenario.loading` reads the files, `tiltsim.scenario.messages` wo
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
+from tiltsim.scenario.arguments import leaves
 from tiltsim.scenario.consistency import check_consistency
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE, ScenarioTables
 from tiltsim.scenario.table import Table
@@ -55,19 +56,10 @@ class Scenario(ScenarioTables):
     def _repr_html_(self) -> str:
         """What is not left at its default, as a table for notebooks."""
         given = self.model_dump(mode="json", exclude_unset=True, exclude={*DESCRIPTIVE})
-        rows = [(key, json.dumps(value)) for key, value in _leaves(given)]
+        rows = [(key, json.dumps(value)) for key, value in leaves(given)]
         return html_table(
             self.title or self.address or "Scenario", [self.address, self.source], rows
         )
-
-
-def _leaves(tables: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    """The values of nested tables by dotted key, without those that are None."""
-    for name, value in tables.items():
-        if isinstance(value, dict):
-            yield from _leaves(value, f"{before}{name}.")
-        elif value is not None:
-            yield before + name, value
 
 
 class Variant(Table):

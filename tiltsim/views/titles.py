@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import takewhile
+from itertools import chain, takewhile
 from typing import TYPE_CHECKING, Final
 
+from tiltsim.scenario.arguments import leaves
+from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.system.quantity import in_words
 from tiltsim.system.text import valid_unicode
@@ -26,16 +28,37 @@ def flight_names(scenarios: Sequence[Scenario], paths: Sequence[Path] = ()) -> l
     """A distinct name for each of several flights.
 
     The first of these that is distinct: the variant or file of the address, longer parts of the
-    address, the folder from which the flight was loaded, longer parts of its path, a number.
+    address, the folder from which the flight was loaded, longer parts of its path, the value of a
+    key in which the scenarios differ (a controller of one's own is the value of any), a number.
     ``paths`` are the folders or files of the flights; empty for flights in memory.
     """
     addresses = [scenario.address for scenario in scenarios]
     short = [_short(address) for address in addresses]
     folders = [_folder(path) for path in paths]
-    for names in (short, *_endings(addresses), *_endings(folders)):
+    candidates = chain([short], _endings(addresses), _endings(folders), _differences(scenarios))
+    for names in candidates:
         if all(names) and len(set(names)) == len(scenarios):
             return names
     return [f"{name or 'flight'}_{number}" for number, name in enumerate(short, start=1)]
+
+
+def _differences(scenarios: Sequence[Scenario]) -> Iterator[list[str]]:
+    """The values, in words, of each key that scenarios have in different ways."""
+    given = [
+        dict(leaves(one.model_dump(exclude_unset=True, exclude={*DESCRIPTIVE})))
+        for one in scenarios
+    ]
+    own = [getattr(s.controller, "attribute", "").rpartition(".")[2] for s in scenarios]
+    for key in dict.fromkeys(key for keys in given for key in keys):
+        values = [name or keys.get(key) for name, keys in zip(own, given, strict=True)]
+        yield [_in_words(key, value) for value in values]
+
+
+def _in_words(key: str, value: object) -> str:
+    """A value with its key, which names speak without; empty for none."""
+    if value is None or isinstance(value, str):
+        return value or ""
+    return f"{in_words(key.rpartition('.')[2])} {value}"
 
 
 def common_title(scenarios: Sequence[Scenario]) -> str:
