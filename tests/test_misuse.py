@@ -65,6 +65,10 @@ MISUSES = {
         lambda: scenario().replace({"initial.position": np.full(3, np.nan)}),
         "must be a finite number",
     ),
+    "a key that is set": (
+        lambda: setattr(scenario().simulation, "duration", 3.0),
+        "simulation.duration = 3.0: a scenario stays as it is; make another with Scenario.replace",
+    ),
     "the law python without a file": (
         lambda: scenario().replace({"controller.law": "python"}),
         "controller= of tiltsim.load_scenario",

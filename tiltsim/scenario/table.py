@@ -9,8 +9,9 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
+from tiltsim.errors import InputError
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.system.text import valid_unicode
+from tiltsim.system.text import short_repr, valid_unicode
 
 # The outer bounds keep arithmetic far from overflow, and far beyond any real vehicle.
 Positive = Annotated[float, Field(gt=0.0, le=1e9)]
@@ -54,6 +55,17 @@ class Table(BaseModel):
             key = f"{cls.table_name}.{info.field_name}".removeprefix(".")
             raise InvalidValueError(key, value, "not valid Unicode")
         return value
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Refuse to change a key, in words that help."""
+        if name.startswith("_"):
+            super().__setattr__(name, value)
+            return
+        key = f"{self.table_name}.{name}".removeprefix(".")
+        raise InputError(
+            f"{key} = {short_repr(value)}: a scenario stays as it is; make another with "
+            "Scenario.replace"
+        )
 
     def mistake(self, key: str, allowed: str) -> InvalidValueError:
         """The error of the value of a dotted key that is not allowed; see `InvalidValueError`."""
