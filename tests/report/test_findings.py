@@ -10,9 +10,11 @@ import pytest
 
 from tiltsim.report.findings import FINDINGS
 from tiltsim.report.pictures import PICTURES
+from tiltsim.resources import shipped_folder
 from tiltsim.scenario.library import library_entries
 
 ROOT = Path(__file__).parents[2]
+SCENARIOS = shipped_folder("scenarios")
 
 
 @pytest.mark.parametrize("finding", FINDINGS, ids=lambda finding: finding.key)
@@ -40,6 +42,9 @@ def test_flights_and_pictures_of_findings_exist():
         assert finding.proof, finding.key
         assert set(finding.flights) <= library, finding.key
         assert set(finding.pictures) <= pictures, finding.key
+        assert not finding.sweep or (SCENARIOS / f"{finding.sweep}.toml").is_file(), finding.key
+        if "by flights" in finding.proof:
+            assert finding.flights, finding.key
 
 
 def test_keys_are_unique():

@@ -88,11 +88,12 @@ def _finding(finding: Finding, report: Report) -> Iterator[str]:
     if settled:
         links = ", ".join(f'<a href="#{name}">{name}</a>' for name in dict.fromkeys(settled))
         yield f'<p class="where">Settles {links}.</p>'
-    tests = f"{len(finding.nodes)} tests" if len(finding.nodes) > 1 else "1 test"
-    flights = "".join(f"tiltsim run '{address}'\n" for address in finding.flights)
-    commands = escape(flights + finding.command)
-    count = f", {len(finding.flights)} flights" if finding.flights else ""
-    yield f"<details><summary>{tests}{count}</summary><pre>{commands}</pre></details></article>"
+    counts = {"test": len(finding.nodes), "flight": len(finding.flights)}
+    named = [f"{count} {name}{'s' * (count > 1)}" for name, count in counts.items() if count]
+    named += ["1 sweep"] * bool(finding.sweep)
+    commands = escape("\n".join([*finding.flown, finding.command]))
+    summary = ", ".join(named)
+    yield f"<details><summary>{summary}</summary><pre>{commands}</pre></details></article>"
 
 
 def _chapter(report: Report, chapter: int) -> Iterator[str]:

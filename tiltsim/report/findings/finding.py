@@ -21,6 +21,8 @@ class Finding:
     """Names of tests by their file in the folder of the tests."""
     flights: tuple[str, ...] = ()
     """Addresses in the scenario library that show it."""
+    sweep: str = ""
+    """Name of a sweep of the library that shows it."""
     pictures: tuple[str, ...] = ()
     """Names of pictures of the report that show it."""
     numbers: Callable[[], dict[str, str]] = dict
@@ -35,6 +37,12 @@ class Finding:
     def nodes(self) -> list[str]:
         """Its tests, as pytest addresses them."""
         return [f"tests/{file}::{name}" for file, names in self.tests.items() for name in names]
+
+    @property
+    def flown(self) -> list[str]:
+        """The commands that fly what shows it."""
+        sweep = [f"tiltsim sweep '{self.sweep}'"] if self.sweep else []
+        return [*(f"tiltsim run '{address}'" for address in self.flights), *sweep]
 
     @property
     def command(self) -> str:

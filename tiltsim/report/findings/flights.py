@@ -204,6 +204,7 @@ FINDINGS: Final = (
             ),
             _FLOWN: ("test_rotor_inertia_changes_trots_but_no_fixed_gait",),
         },
+        sweep="beyond/sweeps/rotor_inertia",
     ),
     Finding(
         key="norm",

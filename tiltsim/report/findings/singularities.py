@@ -313,6 +313,10 @@ FINDINGS: Final = (
                 "test_experiment_2_with_the_other_reference_rests_on_the_zones_edge",
             )
         },
+        flights=(
+            "ch02_singular_zone/experiments#experiment_2_goal",
+            "ch02_singular_zone/experiments#experiment_2_reference",
+        ),
     ),
 )
 """In the order of the report."""
