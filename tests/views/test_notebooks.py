@@ -56,7 +56,7 @@ def test_without_rerun_s_widget_the_message_says_what_to_install(in_a_notebook, 
 
 
 def test_a_figure_is_the_picture_below_its_cell():
-    figure = flight("fixed").plot(panels=["z"], size=(3, 2))
+    figure = flight("fixed").plot("z", size=(3, 2))
     assert figure._repr_png_().startswith(b"\x89PNG")
     assert figure.get_size_inches().tolist() == [3.0, 2.0]
 

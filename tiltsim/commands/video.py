@@ -69,18 +69,19 @@ def _numbers(separator: str, kind: type[int] | type[float], example: str) -> Cal
 def run(arguments: argparse.Namespace) -> int:
     """Render and encode."""
     from tiltsim.flight.reading import load_flight
-    from tiltsim.views.video.making import make_video
+    from tiltsim.views.video.making import video_format
 
     with show_progress(shown=not arguments.quiet) as progress:
         progress.begin("reading the flight")
         flight = load_flight(arguments.flight)
         folder = arguments.flight if arguments.flight.is_dir() else arguments.flight.parent
         out = arguments.out or folder / "flight.mp4"
+        video = video_format(flight, out, vars(arguments), prefix="--")
+        from tiltsim.views.video.encoding import write_video
+        from tiltsim.views.video.rendering import frame_times
 
-        def tell(finished: int, frames: int) -> None:
-            progress.tell("frames", finished, frames)
-
-        make_video(flight, out, vars(arguments), tell, prefix="--")
+        progress.begin("frames", len(frame_times(flight, video)))
+        write_video(flight, out, video, progress.move)
     if not arguments.quiet:
         print_line(f"video written to {out}")
     return 0

@@ -140,9 +140,9 @@ class Flight:
         """The metrics of the flight by name; see `tiltsim.scenario.metric_names.METRICS`."""
         return dict(self._metrics)
 
-    def plot(self, **options: Any) -> Any:
+    def plot(self, panels: str | Sequence[str] = (), **options: Any) -> Any:
         """A matplotlib Figure of this flight; see `tiltsim.plot` for the options."""
-        return public("plot")([self], **options)
+        return public("plot")([self], panels=panels, **options)
 
     def view(self, *, url: str | None = None) -> Any:
         """Show this flight in Rerun: in the notebook if it runs in one; see `tiltsim.view`."""

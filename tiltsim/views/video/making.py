@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import inf
 from os import PathLike, fsdecode
@@ -14,6 +14,7 @@ from tiltsim.flight.flight import Flight
 from tiltsim.scenario.messages import choose
 from tiltsim.system.files import prepare_file
 from tiltsim.system.numbers import is_finite
+from tiltsim.system.progress import Report, reported
 from tiltsim.system.text import short_repr
 from tiltsim.views.video import prefer_offscreen_gl
 
@@ -36,7 +37,7 @@ def video(
     size: tuple[int, int] | None = None,
     fps: int | None = None,
     camera: tuple[float, float, float] | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Report | bool | None = None,
 ) -> Path:
     """Render a flight with MuJoCo, the camera following the vehicle; no screen is needed.
 
@@ -51,7 +52,7 @@ def video(
         fps: Frames per second in place of the quality's, 1 to 240.
         camera: Its distance from the vehicle, in radii of it from 1.5 to 1000, azimuth and
             elevation, degrees.
-        progress: Called with the numbers of finished and of all frames.
+        progress: True for a bar; or a function, called with the number of finished frames.
 
     Returns:
         The file.
@@ -66,35 +67,32 @@ def video(
         raise InputError(f"flight = {short_repr(flight)}: must be a tiltsim.Flight")
     if not isinstance(path, str | PathLike):
         raise InputError(f"path = {short_repr(path)}: must be the name of a file")
-    if progress is not None and not callable(progress):
-        raise InputError(f"progress = {short_repr(progress)}: must be callable")
-    return make_video(flight, Path(fsdecode(path)), options, progress or (lambda *_: None))
-
-
-def make_video(
-    flight: Flight,
-    path: Path,
-    options: dict[str, Any],
-    progress: Callable[[int, int], None],
-    prefix: str = "",
-) -> Path:
-    """As `video`.
-
-    Args:
-        flight, path, progress: See there.
-        options: The other arguments of `video` by name.
-        prefix: Before their names in messages.
-    """
-    prepare_file(f"{prefix}out" if prefix else "video", path, FORMATS)
-    prefer_offscreen_gl()  # before anything imports MuJoCo
+    file = Path(fsdecode(path))
+    chosen = video_format(flight, file, options)
     from tiltsim.views.video.encoding import write_video
     from tiltsim.views.video.rendering import frame_times
 
-    chosen = _format(_Options(options, prefix), float(flight["time"][-1]), path.suffix.lower())
-    total = len(frame_times(flight, chosen))
-    progress(0, total)
-    write_video(flight, path, chosen, lambda finished: progress(finished, total))
-    return path
+    with reported(progress, "frames", len(frame_times(flight, chosen))) as report:
+        write_video(flight, file, chosen, report)
+    return file
+
+
+def video_format(
+    flight: Flight, path: Path, options: dict[str, Any], prefix: str = ""
+) -> VideoFormat:
+    """The video that the arguments of `video` ask for.
+
+    Args:
+        flight, path: See there.
+        options: Its other arguments by name.
+        prefix: Before their names in messages.
+
+    Raises:
+        InputError: If an argument is wrong or the file cannot be written.
+    """
+    prepare_file(f"{prefix}out" if prefix else "video", path, FORMATS)
+    prefer_offscreen_gl()  # before anything imports MuJoCo
+    return _format(_Options(options, prefix), float(flight["time"][-1]), path.suffix.lower())
 
 
 class _Options:
