@@ -296,7 +296,7 @@ def test_the_page_has_the_chapters_panels():
         "Inputs squared",
         "Direction",
         "Lyapunov candidate, ½ ė² + ½ K e², along y",
-        "Plan view, x and y to different scales",
+        "Plan view",
         "Error along y and its rate",
     }
 

@@ -626,9 +626,9 @@ def test_the_margin_figure_shows_the_biased_twin(tmp_path, monkeypatch) -> None:
         run("gait", *words, "--figure", "margin", "--plot", str(tmp_path / "margin.png"))
     labels = [[text.get_text() for text in f.axes[0].get_legend().get_texts()] for f in shown]
     assert labels == [
-        ["ch06_gait_3, as printed", "biased, η = 80%"],
-        ["two_color, biased 80%", "without bias"],
-        ["ch09_gait_2, as printed"],
+        ["ch06 gait 3, as printed", "biased, η = 80%"],
+        ["two color, biased 80%", "without bias"],
+        ["ch09 gait 2, as printed"],
     ]
 
 

@@ -82,7 +82,7 @@ def comparison_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure
         shown: set[str] = set()
         for axes, (title, gait) in zip(row, gaits, strict=True):
             shown |= _roll_pitch(axes, gait, vehicle)
-            axes.set_title(title)
+            axes.set_title(title.replace("_", " "))
             if axes is not row[0]:
                 axes.set_ylabel("")
         if CURVE in shown:
@@ -146,7 +146,7 @@ def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> set[str]:
         _note(axes, 0.75 if singular < len(curves) else 0.35, text)
     axes.plot(0.0, 0.0, "+", color=style.INK, ms=8, mew=1.2)
     style.roll_pitch_axes(axes)
-    axes.set_title(f"Singular attitudes, {gait.name}")
+    axes.set_title(f"Singular attitudes, {gait.name.replace('_', ' ')}")
     shown = {CURVE} if drawn.any() else set()
     return shown | ({AREA} if share.any() and not nearly and singular < len(curves) else set())
 
@@ -200,7 +200,7 @@ def _margin(axes: Axes, gaits: list[tuple[Gait, str]], vehicle: Vehicle) -> None
         times = np.array([0.0, 1.0]) if gait.is_constant else gait.sample_times(401)
         margin = margin_over_gait(gait.angles(times), vehicle)
         longest = max(longest, period)
-        axes.plot(times, margin, looks[index % 4], label=label)
+        axes.plot(times, margin, looks[index % 4], label=label.replace("_", " "))
     axes.axhline(0.0, color=style.INK, lw=0.8)
     style.angle_axis(axes, "y", pi / 2)
     low, _ = axes.get_ylim()

@@ -25,7 +25,7 @@ END_FRACTION: Final = 0.02
 MAX_WIDENING: Final = 4.0
 """Factor by which these samples may widen the scale of a panel before they are ignored."""
 
-MAX_PERIODS: Final = 12
+MAX_PERIODS: Final = 10
 """Periods of a gait above which what moves with it would be a solid band."""
 
 SHOWN_PERIODS: Final = 4
@@ -107,7 +107,7 @@ def _margins(axes: Axes, shown: Sequence[Shown]) -> None:
     shade_below(axes, threshold, f"margin below {threshold:g} rad")
     for one in shown:
         margin = np.maximum(one.flight["singularity_margin"], 0.0)
-        axes.plot(one.flight["time"], margin, **one.look)
+        axes.plot(one.flight["time"], margin, **one.look, lw=line_width([one.flight]))
         _mark_end(axes, one, margin)
     style.angle_axis(axes, "y", pi / 2)
     axes.set_ylim(0.0, pi / 2 * 1.02)
@@ -124,7 +124,7 @@ def _determinant(axes: Axes, shown: Sequence[Shown]) -> None:
     for one in shown:
         values = np.maximum(one.flight["determinant"], 0.0)
         top = max(top, 1.05 * float(values.max()))
-        axes.plot(one.flight["time"], values, **one.look)
+        axes.plot(one.flight["time"], values, **one.look, lw=line_width([one.flight]))
         _mark_end(axes, one, values)
     axes.set_ylim(0.0, top)
     axes.set_ylabel("determinant n · r₃")
@@ -155,7 +155,8 @@ def _path(axes: Axes, shown: Sequence[Shown]) -> None:
         label = "start" if first else ""
         axes.plot(x[0], y[0], "o", color=style.INK, mfc="white", ms=5, label=label, zorder=3)
         if flight.end.kind != "completed":
-            axes.plot(x[-1], y[-1], "X", color=one.look["color"], ms=7, zorder=6)
+            text = "terminated early" if single else ""
+            axes.plot(x[-1], y[-1], "X", color=one.look["color"], ms=7, zorder=6, label=text)
         else:
             color = style.INK if single else one.look["color"]
             axes.plot(x[-1], y[-1], "s", color=color, ms=4.5, zorder=4)
@@ -205,6 +206,11 @@ def many_periods(flights: Sequence[Flight]) -> float:
         if flight.scenario.vehicle.has_tilting_rotors
     ]
     return max((period for period in periods if end > MAX_PERIODS * period), default=0.0)
+
+
+def line_width(flights: Sequence[Flight]) -> float:
+    """The width (points) of lines over whole flights: thin where they oscillate densely."""
+    return 0.7 if many_periods(flights) else 1.4
 
 
 def show_part(axes: Axes, begin: float, end: float) -> None:

@@ -22,7 +22,7 @@ from tiltsim.views.figures import style
 from tiltsim.views.figures.layout import legend_over
 from tiltsim.views.figures.panels import (
     Panel,
-    many_periods,
+    line_width,
     of_one,
     plan_view,
     shade_below,
@@ -109,7 +109,7 @@ def _margin(axes: Axes, flight: Flight) -> None:
         edge = axes.get_xaxis_transform()
         text = "supervisor active"
         axes.fill_between(time, 0.0, 1.0, where=active, transform=edge, **look, label=text)
-    axes.plot(time, margin, color=style.BLUE, lw=0.7 if many_periods([flight]) else 1.4)
+    axes.plot(time, margin, color=style.BLUE, lw=line_width([flight]))
     text = f"minimum, {margin[closest]:.2f}"
     dot: dict[str, Any] = {"color": style.SINGULAR, "ms": 5, "clip_on": False, "zorder": 5}
     axes.plot(time[closest], margin[closest], "o", **dot, label=text)

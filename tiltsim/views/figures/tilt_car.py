@@ -10,7 +10,7 @@ import numpy as np
 from tiltsim.scenario.gait import PenguinGait
 from tiltsim.views.figures import style
 from tiltsim.views.figures.layout import legend_over
-from tiltsim.views.figures.panels import Panel, of_one, plan_view, widen
+from tiltsim.views.figures.panels import Panel, of_one, plan_view, show_last_periods, widen
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,6 +59,7 @@ def _inputs(axes: Axes, flight: Flight) -> None:
     later = time >= min(2.0, 0.5 * time[-1])  # the values at the start may be far larger
     top = max(float((flight[f"rotor_speed_{rotor}"] ** 2)[later].max()) for rotor in (1, 2))
     axes.set_ylim(-0.04 * top, 1.6 * top)
+    show_last_periods(axes, [flight])
     axes.set_ylabel("rad²/s²")
     legend_over(axes, "Inputs squared")
 
@@ -101,6 +102,7 @@ def _direction_error(axes: Axes, flight: Flight) -> None:
 def _lyapunov(axes: Axes, flight: Flight) -> None:
     axes.plot(flight["time"], flight["lyapunov"], color=style.GREEN)
     widen(axes, 1e-6)
+    show_last_periods(axes, [flight])
     axes.set_ylabel("m²/s²")
     legend_over(axes, "Lyapunov candidate, ½ ė² + ½ K e², along y")
 
