@@ -22,6 +22,7 @@ author = project_copyright = "The tiltsim developers"
 release = installed_version("tiltsim")
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 suppress_warnings = ["ref.python"]  # a name of several modules, written without its module
+
 CONTROLLERS = Path(tiltsim_controllers.__file__).parent
 INCLUDED = {
     "README.md": "index.md",
@@ -39,6 +40,7 @@ myst_enable_extensions = ["dollarmath"]
 myst_fence_as_directive = ["math"]
 nb_execution_mode = "cache"  # until the notebook changes, or build is removed
 nb_execution_raise_on_error = True
+nb_execution_in_temp = True
 nb_execution_timeout = 60  # s, a cell
 
 add_module_names = False
@@ -59,7 +61,6 @@ html_title = "tiltsim"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_math_renderer = "mathml"  # needs no script
-nb_execution_in_temp = True
 html_copy_source = False
 html_show_sphinx = False
 
@@ -105,12 +106,11 @@ def skip_described(app, what, name, obj, skip, options):
 
 
 def link_unqualified(app, env, node, content):
-    """Find a name that is written without its module, if it is unique."""
-    if node["refdomain"] != "py":
+    """Find a name of ours that is written without its module, if it is unique."""
+    package, _, name = node["reftarget"].rpartition(".")
+    if node["refdomain"] != "py" or (package and not package.startswith("tiltsim")):
         return None
-    domain = env.get_domain("py")
-    name = node["reftarget"].rpartition(".")[2]
-    found = domain.find_obj(env, "", "", name, None, 1)
+    found = env.get_domain("py").find_obj(env, "", "", name, None, 1)
     found = [(full, entry) for full, entry in found if not entry.aliased]
     if len(found) != 1:
         return None
