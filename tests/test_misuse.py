@@ -65,6 +65,10 @@ MISUSES = {
         lambda: scenario().replace({"initial.position": np.full(3, np.nan)}),
         "must be a finite number",
     ),
+    "a scenario of an unknown table": (
+        lambda: tiltsim.Scenario(gaits={}),
+        "scenario: gaits = {}: unknown key; did you mean gait?",
+    ),
     "a key that is set": (
         lambda: setattr(scenario().simulation, "duration", 3.0),
         "simulation.duration = 3.0: a scenario stays as it is; make another with Scenario.replace",

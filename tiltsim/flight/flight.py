@@ -25,7 +25,7 @@ from tiltsim.scenario.messages import did_you_mean
 from tiltsim.scenario.metric_names import unit_of
 from tiltsim.system.optional import optional_package
 from tiltsim.system.public import public
-from tiltsim.system.text import html_table, short_repr, valid_unicode
+from tiltsim.system.text import html_table, short_repr, shortened, valid_unicode
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
@@ -87,7 +87,8 @@ class Flight:
     def __repr__(self) -> str:
         """The scenario and the end, in one line."""
         name = self.scenario.address or self.scenario.title
-        end = f"{self.end.kind} at {self.end.time:g} s"
+        cause = f" ({shortened(self.end.cause)})" if self.end.cause else ""
+        end = f"{self.end.kind} at {self.end.time:g} s{cause}"
         return f"<Flight of {name}: {end}, {len(self)} samples of {len(self.units)} columns>"
 
     def __len__(self) -> int:

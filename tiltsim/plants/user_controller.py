@@ -69,12 +69,18 @@ def _describe(error: BaseException) -> str:
 
 
 def _place(error: BaseException) -> str:
-    """The innermost file and line of the controller's own code in an error's traceback."""
+    """The innermost file and line of the controller's own code in an error's traceback.
+
+    The function instead of the file where there is none, as in a notebook.
+    """
     frames = traceback.extract_tb(error.__traceback__)[1:]  # without our own call
     if not frames:
         return ""
     last = [frame for frame in frames if frame.filename == frames[0].filename][-1]
-    return f" ({Path(last.filename).name}, line {last.lineno})"
+    file = Path(last.filename)
+    if not file.is_file():
+        return f" (line {last.lineno} of {last.name})"
+    return f" ({file.name}, line {last.lineno})"
 
 
 def load_controller(scenario: Scenario) -> UserController:

@@ -11,10 +11,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, ValidationError, model_validator
 
+from tiltsim.errors import InputError
 from tiltsim.scenario.arguments import leaves
 from tiltsim.scenario.consistency import check_consistency
+from tiltsim.scenario.messages import one_line_message
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE, ScenarioTables
 from tiltsim.scenario.table import Table
 from tiltsim.scenario.time_steps import check_time_steps
@@ -27,6 +29,14 @@ from tiltsim_controllers.references.trajectories import ReferenceParameters
 
 class Scenario(ScenarioTables):
     """One flight, fully specified and consistent."""
+
+    def __init__(self, **tables: Any) -> None:
+        try:
+            super().__init__(**tables)
+        except ValidationError as error:
+            raise InputError(f"scenario: {one_line_message(error, tables, Scenario)}") from None
+
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # validation needs no call
 
     @model_validator(mode="after")
     def _check(self) -> Self:
