@@ -94,6 +94,33 @@ def test_every_command_that_draws_has_the_options():
         assert ({"--size", "--style", "--title", "--label", "--panels"} <= options) is draws, name
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["map", "--size", "85mm"], "--size: needs --plot FILE"),
+        (["map", "--panels", "a", "--plot", "FILE"], "--panels: this figure has no panels"),
+        (["gait", "--angles", "0,0,0,0", "--panels", "a", "--plot", "FILE"], "panels: 'a': choose"),
+    ],
+)
+def test_options_of_no_use_are_one_line(words, message, tmp_path, capsys):
+    words = [str(tmp_path / "figure.png") if word == "FILE" else word for word in words]
+    assert main(words) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert message in line
+
+
+def test_figures_of_gaits_take_panels_size_and_words(tmp_path, monkeypatch):
+    shown = []
+    monkeypatch.setattr(style, "save", lambda figure, _path: shown.append(figure))
+    words = ["gait", "ch05_gaits/line#walk_full", "--plot", str(tmp_path / "gait.png")]
+    words += ["--panels", "margin", "--size", "85mm x 60mm", "--title", "A walk"]
+    assert main([*words, "--label", "rad=margin"]) == 0
+    (figure,) = shown
+    (axes,) = figure.axes
+    assert (axes.get_title(loc="left"), axes.get_ylabel()) == ("A walk", "margin")
+    assert tuple(figure.get_size_inches()) == pytest.approx((85 / 25.4, 60 / 25.4))
+
+
 # --- style ---------------------------------------------------------------------------------------
 
 

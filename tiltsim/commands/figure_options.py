@@ -58,6 +58,28 @@ def prepare_figure(option: str, path: Path | None) -> None:
         prepare_file(option, path, FORMATS)
 
 
+def check_plot(arguments: argparse.Namespace, *, has_panels: bool = False) -> None:
+    """Raise `InputError` for options of a figure without a figure, and for a file of no use.
+
+    ``has_panels`` tells whether the figure has panels to choose from.
+    """
+    from tiltsim.errors import InputError
+
+    options = {
+        "--size": arguments.size,
+        "--style": arguments.style,
+        "--title": arguments.title,
+        "--label": arguments.labels or None,
+        "--panels": arguments.panels or None,
+    }
+    for option, value in options.items():
+        if value is not None and arguments.plot is None:
+            raise InputError(f"{option}: needs --plot FILE")
+    if arguments.panels and not has_panels:
+        raise InputError("--panels: this figure has no panels to choose from")
+    prepare_figure("--plot", arguments.plot)
+
+
 def save_figure(
     draw: Callable[[], Figure], path: Path, arguments: argparse.Namespace, *, is_named: bool = False
 ) -> None:

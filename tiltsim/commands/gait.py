@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.commands.angles import allow_negative_lists, parse_angle, parse_vehicle
-from tiltsim.commands.figure_options import add_plot, prepare_figure, save_figure
+from tiltsim.commands.figure_options import add_plot, check_plot, save_figure
 from tiltsim.commands.options import Subparsers, add_json, add_vehicle
 from tiltsim.commands.text import json_text, print_figure_path
 
@@ -116,7 +116,7 @@ def _check_options(arguments: argparse.Namespace) -> None:
         raise InputError(f"--case {arguments.case}: needs --figure determinant")
     if arguments.speed_limits is not None and kind != "attainable":
         raise InputError("--speed-limits: needs --figure attainable")
-    prepare_figure("--plot", arguments.plot)
+    check_plot(arguments, has_panels=kind in (None, "roll_pitch"))
 
 
 def _run_determinant(arguments: argparse.Namespace) -> int:

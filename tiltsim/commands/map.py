@@ -13,7 +13,7 @@ from tiltsim.commands.angles import (
     parse_vehicle,
     vehicle_text,
 )
-from tiltsim.commands.figure_options import add_plot, prepare_figure, save_figure
+from tiltsim.commands.figure_options import add_plot, check_plot, save_figure
 from tiltsim.commands.options import Subparsers, add_json, add_vehicle
 from tiltsim.commands.text import aligned, json_text, print_figure_path, tally
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.errors import InputError
     from tiltsim.studies.gait_analysis import map_report
 
-    prepare_figure("--plot", arguments.plot)
+    check_plot(arguments)
     vehicle = parse_vehicle(arguments.vehicle)
     path = _path(arguments, vehicle)
     try:

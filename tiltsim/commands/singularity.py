@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.angles import allow_negative_lists, parse_angle, parse_vehicle
-from tiltsim.commands.figure_options import add_plot, prepare_figure, save_figure
+from tiltsim.commands.figure_options import add_plot, check_plot, save_figure
 from tiltsim.commands.options import Subparsers, add_json
 from tiltsim.commands.text import aligned, print_figure_path
 
@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Compute, draw, print."""
     vehicle = parse_vehicle(arguments.vehicle or "ar_drone_2_unrounded")
     attitude = (parse_angle("--roll", arguments.roll), parse_angle("--pitch", arguments.pitch))
-    prepare_figure("--plot", arguments.plot)
+    check_plot(arguments)
     report = _report(vehicle, *attitude)
     if arguments.plot is not None:
         from tiltsim.views.figures.quadrotor_singularity import singularity_figure

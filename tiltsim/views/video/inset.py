@@ -8,13 +8,16 @@ import numpy as np
 import numpy.typing as npt
 
 from tiltsim.views.attitude_plane import HALF_WIDTH, MARGIN_THRESHOLD
+from tiltsim.views.figures import style
 from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.mathematics.scalar import Floats
 
 Image = npt.NDArray[np.uint8]
 
 GROUND: Final = (250, 250, 250)
-UNREACHABLE: Final = (240, 190, 165)
+_RED, _GREEN, _BLUE = bytes.fromhex(style.UNREACHABLE[1:])
+UNREACHABLE: Final = (_RED, _GREEN, _BLUE)
+"""The colour of the figures."""
 CURVE: Final = (213, 94, 0)
 GRID: Final = (212, 216, 220)
 FRAME: Final = (70, 78, 86)
