@@ -19,17 +19,16 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection(session):
+    """Under coverage, most steps of a flight run without its tracer."""
+    runs_tests = hasattr(session.config, "workerinput") or not session.config.getoption("-n", None)
+    if runs_tests and sys.gettrace() is not None:
+        trace_seldom()
+
+
 def pytest_collection_modifyitems(items):
     """The longest of the slow tests begin first: at the end, one process would fly them alone."""
     markers = [item.get_closest_marker("slow") for item in items]
     longest = [bool(marker and marker.kwargs.get("longest")) for marker in markers]
     items[:] = [item for _, item in sorted(zip(longest, items), key=lambda pair: not pair[0])]
-
-
-@pytest.fixture(scope="session", autouse=True)
-def _seldom_traced():
-    """Under coverage, most steps of a flight run without its tracer."""
-    with pytest.MonkeyPatch.context() as patch:
-        if sys.gettrace() is not None:
-            trace_seldom(patch)
-        yield
