@@ -22,6 +22,30 @@ CASES = {
         "gait": {"type": "trot_continuous", "amplitude": 0.3, "period": 1.0},
         "reference": {**WAYPOINTS, "acceleration_feedforward": True},
     },
+    "tables": {
+        "gait": {
+            "type": "table",
+            "rows": [[0, 0, 0, 0, 0], [0.2, 0.2, -0.1, 0.1, 0.1], [0.3, 0, 0, 0, 0]],
+            "repeat": True,
+            "scale": 0.5,
+        },
+        "controller": {
+            "gait_rate_feedforward": True,
+            "decoupler": "exact",
+            "decoupling": "exact",
+            "gains": "exact",
+        },
+        "reference": {
+            "type": "table",
+            "rows": [
+                [0, 0, 0, 0],
+                [0.1, 0, 0.02, 0.05],
+                [0.3, 0.2, 0.1, 0.1],
+                [0.8, 0.1, 0.3, 0.2],
+            ],
+            "interpolation": "cubic",
+        },
+    },
     "quadrotor": {
         "vehicle": {"model": "quadrotor", "preset": "ar_drone_2_unrounded"},
         "controller": {"law": "yaw_position"},
@@ -39,7 +63,7 @@ def fly(case, **simulation):
     ("case", "plant"),
     [
         *((case, "mujoco") for case in CASES),
-        *(("keyframes", "thesis"), ("trot", "thesis")),
+        *(("keyframes", "thesis"), ("trot", "thesis"), ("tables", "thesis")),
         pytest.param("quadrotor", "thesis", marks=pytest.mark.slow),  # compiles for seconds
     ],
 )

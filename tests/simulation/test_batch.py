@@ -32,6 +32,7 @@ GAITS = {
     "transverse_gallop": TROT,
     "rotary_gallop": TROT,
     "two_color": {"period": 1.0, "centre": [0.2, -0.2], "radius": 0.1},
+    "table": {"rows": [[0, 0.1, 0, 0.1, 0], [0.2, 0.2, -0.1, 0.2, -0.1], [0.3, 0.1, 0, 0.1, 0]]},
     "waypoints": {"period": 0.7, "angles": [[0.1, 0.0, 0.1, 0.0], [0.2, -0.1, 0.2, -0.1]]},
 }
 CAR = LAWS["tilt_car_planned_direction"]

@@ -1,4 +1,4 @@
-"""A sweep's definition has the digests of the controllers and MJCF that its scenarios name."""
+"""A sweep's definition has the digests of controllers, MJCF and tables that its scenarios name."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ SWEEP = """
 [scenario]
 simulation = { duration = 0.004, timestep = 0.002 }
 vehicle = { mjcf = "own.xml" }
+reference = { type = "table", file = "tables/way.csv" }
 [[axis]]
 type = "cases"
 key = "law"
@@ -36,7 +37,10 @@ type = "list"
 key = "vehicle.mjcf"
 values = ["own.xml", "other.xml"]
 """
-FILES = ("laws/two.py", "meshes/wing.obj", "one.py", "other.xml", "own.xml", "parts/moon.xml")
+FILES = (
+    *("laws/two.py", "meshes/wing.obj", "one.py", "other.xml", "own.xml", "parts/moon.xml"),
+    "tables/way.csv",
+)
 
 
 @pytest.fixture
@@ -52,6 +56,7 @@ def folder(tmp_path, monkeypatch):
         "other.xml": vehicle.replace("<worldbody>", f"{mesh}<worldbody>", 1),
         "parts/moon.xml": "<mujoco><option gravity='0 0 -1.62'/></mujoco>",
         "meshes/wing.obj": TETRAHEDRON,
+        "tables/way.csv": "time,x,y,z\n0,0,0,0\n1,0,0,1\n",
     }
     for name, text in texts.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)

@@ -37,7 +37,7 @@ class ControlSetup(NamedTuple):
     """Parameters of the control step of one flight."""
 
     parameters: Any  # the loop's record
-    knots: tuple[float, ...] = ()  # keyframes of the gait, then waypoints of the reference
+    knots: tuple[float, ...] = ()  # those of the gait, then those of the reference
 
     @property
     def userdata(self) -> Floats:

@@ -185,8 +185,9 @@ class Flight:
 
     def origin(self) -> dict[str, str]:
         """The metadata of the file: scenario (JSON), versions, seed, engine, end, wall time (s)."""
+        tables = {name: table.in_scenario() for name, table in self.scenario.time_tables.items()}
         texts = {
-            "scenario": self.scenario.model_dump_json(),
+            "scenario": self.scenario.model_copy(update=tables).model_dump_json(),
             "address": self.scenario.address,
             "seed": str(self.scenario.simulation.seed),
             "engine": self.engine,

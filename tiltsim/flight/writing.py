@@ -1,8 +1,8 @@
 """Write a flight into a folder: metrics.json, flight.parquet, scenario.toml.
 
 A later flight into the same folder replaces these files, but none that tiltsim has not written, and
-no scenario or controller that was edited: the resolved scenario begins with digests of itself and
-of the controllers that were copied into the folder.
+no scenario, controller or table that was edited: the resolved scenario begins with digests of
+itself and of the controllers and tables that were copied into the folder.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import json
 from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.controller import PythonController
@@ -29,8 +29,8 @@ METRICS: Final = "metrics.json"
 SCENARIO: Final = "scenario.toml"
 
 _WRITTEN: Final = "# written by tiltsim: sha256 {}\n"
-_COPIED: Final = "# its controller: sha256 {}\n"
-"""One for each controller in the folder that is a copy of tiltsim's."""
+_COPIED: Final = {".py": "# its controller: sha256 {}\n", ".csv": "# its table: sha256 {}\n"}
+"""One for each controller and table in the folder that is a copy of tiltsim's."""
 
 _UNWRITTEN: Final = (
     "# Not to be flown from this file: its controller, {}, was given in Python. Give it again:\n"
@@ -46,20 +46,18 @@ def prepare_flight_folder(folder: Path, scenario: Scenario) -> None:
             tiltsim did not write.
     """
     prepare_folder(folder)
-    controller = _controller_file(scenario)
-    files = [folder / name for name in (FLIGHT, METRICS, SCENARIO)]
-    files += [] if controller is None else [folder / controller.name]
-    for file in files:
+    named = _named_files(scenario)
+    for file in [folder / name for name in (FLIGHT, METRICS, SCENARIO, *named)]:
         if file.exists() and not file.is_file():
             raise InputError(f"{file}: not a file; choose another folder")
     if not _read_if_written(folder / SCENARIO):
         for file in (folder / FLIGHT, folder / METRICS):
             if file.exists():
                 raise _foreign(file)
-    if controller is not None:
-        copy = folder / controller.name
-        own = {digest(controller.read_bytes()), *_copies(folder)}
-        if copy.exists() and digest(copy.read_bytes()) not in own:
+    copies = _copies(folder)
+    for name, content in named.items():
+        copy = folder / name
+        if copy.exists() and digest(copy.read_bytes()) not in {digest(content), *copies}:
             raise _foreign(copy)
 
 
@@ -73,7 +71,8 @@ def write_flight(
         table: The columns, for flight.parquet.
         metrics: For metrics.json.
         scenario: For scenario.toml, with all defaults filled in; the file of a user's controller is
-            copied.
+            copied, and the tables of its reference and gait are written as reference.csv and
+            gait.csv.
 
     Raises:
         InputError: As `prepare_flight_folder`, or if a file cannot be written.
@@ -89,21 +88,31 @@ def write_flight(
 
 
 def _resolved_files(scenario: Scenario, folder: Path) -> dict[str, bytes]:
-    """By name: the file of a user's controller, unless it is there, and last scenario.toml."""
-    controller, table = _controller_file(scenario), scenario.controller
+    """By name: the files that the scenario names, unless they are there, and last scenario.toml."""
     copies, files = _copies(folder), {}
-    if controller is not None and isinstance(table, PythonController):
-        copy, content = folder / controller.name, controller.read_bytes()
+    for name, content in _named_files(scenario).items():
+        copy = folder / name
         if not copy.exists() or copy.read_bytes() != content:
-            files[copy.name] = content
-            copies.append(digest(content))
-        named = table.model_copy(update={"function": f"{copy.name}:{table.attribute}"})
-        scenario = scenario.model_copy(update={"controller": named})
-    lines = "".join(map(_COPIED.format, copies))
-    if controller is None and isinstance(table, PythonController):
+            files[name] = content
+            copies[digest(content)] = copy.suffix
+    controller, table = _controller_file(scenario), scenario.controller
+    lines = "".join(_COPIED[suffix].format(one) for one, suffix in sorted(copies.items()))
+    tables = scenario.time_tables
+    changes: dict[str, Any] = {name: own.in_file(f"{name}.csv") for name, own in tables.items()}
+    if controller is not None and isinstance(table, PythonController):
+        function = f"{controller.name}:{table.attribute}"
+        changes["controller"] = table.model_copy(update={"function": function})
+    elif isinstance(table, PythonController):
         lines += _UNWRITTEN.format(printable(table.function))
-    text = lines + scenario_toml(scenario)
+    text = lines + scenario_toml(scenario.model_copy(update=changes))
     return {**files, SCENARIO: (_WRITTEN.format(digest(text.encode())) + text).encode()}
+
+
+def _named_files(scenario: Scenario) -> dict[str, bytes]:
+    """Files that a flight folder needs for its scenario, by name: a controller and tables."""
+    controller = _controller_file(scenario)
+    files = {} if controller is None else {controller.name: controller.read_bytes()}
+    return files | {f"{name}.csv": own.csv() for name, own in scenario.time_tables.items()}
 
 
 def _controller_file(scenario: Scenario) -> Path | None:
@@ -113,11 +122,15 @@ def _controller_file(scenario: Scenario) -> Path | None:
     return file if file is not None and file.is_file() else None
 
 
-def _copies(folder: Path) -> list[str]:
-    """Digests of the controllers that tiltsim copied into a folder and nobody has edited since."""
+def _copies(folder: Path) -> dict[str, str]:
+    """Digests of files that tiltsim copied into a folder and nobody has edited, with suffixes."""
     written = _read_if_written(folder / SCENARIO)
-    there = {*file_digests(folder.glob("*.py")).values()} if written else set()
-    return sorted(one for one in there if _COPIED.format(one) in written)
+    return {
+        one: suffix
+        for suffix, line in _COPIED.items()
+        for one in (file_digests(folder.glob(f"*{suffix}")).values() if written else ())
+        if line.format(one) in written
+    }
 
 
 def _read_if_written(file: Path) -> str:

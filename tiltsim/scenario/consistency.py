@@ -7,7 +7,7 @@ from typing import Final
 
 from tiltsim.scenario.claim import NAME
 from tiltsim.scenario.controller import laws_for
-from tiltsim.scenario.gait import FixedGait
+from tiltsim.scenario.gait import FixedGait, TableGait
 from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.reference import WaypointReference
 from tiltsim.scenario.scenario_tables import ScenarioTables
@@ -22,7 +22,7 @@ from tiltsim.scenario.vehicle import (
 )
 
 MAX_KNOTS: Final = 1500
-"""Numbers of a gait and a reference together, which every evaluation of the law reads."""
+"""Numbers of a gait and a reference together, unless they are tables with a limit of their own."""
 
 
 def check_consistency(scenario: ScenarioTables) -> None:
@@ -198,7 +198,7 @@ def _check_reference(scenario: ScenarioTables) -> None:
             reason = f"roll and pitch are not outputs of the {controller.law} law"
             raise scenario.mistake(f"reference.{key}", reason)
         raise scenario.mistake("reference.type", f"the {controller.law} law cannot track it")
-    if reference.type == "waypoints" and scenario.vehicle.is_planar:
+    if reference.type in {"waypoints", "table"} and scenario.vehicle.is_planar:
         raise scenario.mistake("reference.type", "the tilt_car's laws cannot track it")
     if reference.adds_acceleration and not controller.omits_reference_acceleration:
         own = isinstance(controller, AttitudeAltitudeController)
@@ -233,7 +233,7 @@ def _check_gait(scenario: ScenarioTables) -> None:
             f"tilts by {gait.amplitude:.4g} rad, beyond the servo limit "
             f"vehicle.tilt_servo.max_angle = {limit}"
         )
-    knots = len(gait.knots)
+    knots = 0 if isinstance(scenario.gait, TableGait) else len(gait.knots)
     if knots > MAX_KNOTS:
         raise mistake(f"too many keyframes: {knots} numbers, at most {MAX_KNOTS}")
     reference = scenario.reference

@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from functools import lru_cache
 from math import pi
 from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from tiltsim.scenario.table import Angle, Angles2, Angles4, Factor, Period, Positive, Table, example
+from tiltsim.scenario.table import (
+    Angle,
+    Angles2,
+    Angles4,
+    Factor,
+    NonNegative,
+    Period,
+    Positive,
+    Table,
+    example,
+)
+from tiltsim.scenario.time_table import GAIT_COLUMNS, Rows, TimeTable
 from tiltsim_controllers.analysis.two_color_planner import (
     Circle,
     Leg,
@@ -34,6 +46,8 @@ COLOR: Final = (
     "and the matrix is singular"
 )
 """The two colours of ch. 6, for descriptions."""
+
+GaitRow = Annotated[tuple[NonNegative, Angle, Angle, Angle, Angle], Field(strict=False)]
 
 
 class GaitTable(Table, ABC):
@@ -142,6 +156,61 @@ class WaypointGait(GaitTable):
 
     def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
         return plans.waypoints(self.angles, self.period, self.phases)
+
+
+class TableGait(GaitTable, TimeTable):
+    """Tilt angles through the rows of a table, along cubic splines."""
+
+    model_config = example(
+        type="table", rows=[[0.0, 0.0, 0.0, 0.0, 0.0], [1.0, 0.3, -0.3, 0.3, -0.3]]
+    )
+    columns = GAIT_COLUMNS
+    largest = pi
+
+    type: Literal["table"] = Field(description="your own gait, as a table over time")
+    file: str | None = Field(
+        None,
+        description="CSV or Parquet file with the columns time and alpha_1 to alpha_4, in s and "
+        "rad, relative to the scenario's folder; times from 0, at least 1e-4 s apart; 2 to 10,000 "
+        "rows",
+        examples=["my_gait.csv"],
+    )
+    rows: Annotated[tuple[GaitRow, ...], Field(strict=False)] | None = Field(
+        None,
+        description=f"the table itself in place of a file: time and alpha_1..4 of each row; {SIGN} "
+        "[s, rad, rad, rad, rad]",
+        examples=[[[0.0, 0.0, 0.0, 0.0, 0.0], [1.0, 0.3, -0.3, 0.3, -0.3]]],
+    )
+    interpolation: Literal["cubic"] = Field(
+        "cubic", description="cubic splines, whose angular accelerations are continuous"
+    )
+    repeat: bool = Field(
+        False,
+        description="start over after the last row, which must then have the angles of the first; "
+        "otherwise the angles of the last row hold",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        (_, *first), (_, *last) = self.table[0], self.table[-1]
+        if self.repeat and first != last:
+            raise self.mistake(
+                "repeat", f"the angles of the last row, {last}, must equal the first, {first}"
+            )
+        return self
+
+    def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+        return _table_gait(self.table, self.repeat)
+
+    @property
+    def size(self) -> tuple[str, object]:
+        return ("rows", len(self.table)) if self.file is None else ("file", self.file)
+
+
+@lru_cache(maxsize=64)
+def _table_gait(rows: Rows, repeats: bool) -> PlannedGait:
+    times, *columns = zip(*rows, strict=True)
+    return plans.table(times, [*zip(*columns, strict=True)], repeats=repeats)
 
 
 class TwoColorLeg(Table):
@@ -268,7 +337,14 @@ class RotatingGait(TiltCarGait):
 
 
 Gait = Annotated[
-    FixedGait | TrotGait | CatGait | WaypointGait | TwoColorGait | PenguinGait | RotatingGait,
+    FixedGait
+    | TrotGait
+    | CatGait
+    | WaypointGait
+    | TableGait
+    | TwoColorGait
+    | PenguinGait
+    | RotatingGait,
     Field(discriminator="type"),
 ]
 """The ``[gait]`` table, discriminated by its type."""

@@ -16,6 +16,9 @@ MAX_DEPTH: Final = 64
 MAX_VALUES: Final = 200_000
 """Values of a document, those of lists one by one."""
 
+MAX_ROWS: Final = 10_000
+"""Rows of a table of a reference or a gait."""
+
 
 def read_text(path: Path) -> str:
     """The text of a file in UTF-8. Raises `InputError` if it cannot be read or is too large."""

@@ -20,6 +20,7 @@ from tiltsim.scenario.controller import DEFAULT_LAW
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.limits import MAX_DEPTH, check_limits
 from tiltsim.scenario.messages import choose, did_you_mean, one_line_message, show
+from tiltsim.scenario.own_tables import replace_tables
 from tiltsim.scenario.scenario import Scenario, Variant
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.system.text import short_repr, shortened, valid_unicode
@@ -27,7 +28,12 @@ from tiltsim.system.text import short_repr, shortened, valid_unicode
 KIND_KEYS: Final = {"type": None, "law": DEFAULT_LAW}
 """Keys that decide which other keys a table may have, with their defaults."""
 
-FILE_KEYS: Final = (("controller", "function", ".py:"), ("vehicle", "mjcf", ""))
+FILE_KEYS: Final = (
+    ("controller", "function", ".py:"),
+    ("vehicle", "mjcf", ""),
+    ("reference", "file", ""),
+    ("gait", "file", ""),
+)
 """Keys that name files: table, key, and a string that marks the value as a file name."""
 
 
@@ -36,6 +42,8 @@ def load_scenario(
     overrides: Mapping[str, Any] | None = None,
     *,
     controller: object = None,
+    reference: object = None,
+    gait: object = None,
 ) -> Scenario:
     """Read a scenario.
 
@@ -50,6 +58,13 @@ def load_scenario(
             checked: a function from `tiltsim.Observation` to `tiltsim.Command`, an object with
             ``__call__`` and, if it has a memory, ``reset(scenario)``, a class of such objects, or
             ``"FILE.py:NAME"``.
+        reference: A motion of your own in place of the scenario's, whose attitude and
+            acceleration_feedforward stay: a function of time (s) that returns a position ``(x, y,
+            z)`` (m), sampled over the duration of the flight every 0.01 s; or a table with the
+            columns time, x, y and z: of pandas or Arrow, a dict of arrays, or the name of a CSV or
+            Parquet file.
+        gait: A gait of your own in place of the scenario's, as the reference: a function that
+            returns four tilt angles (rad), or a table with the columns time and alpha_1 to alpha_4.
 
     Raises:
         InputError: In one line: the file, the key, the value and what is allowed.
@@ -61,6 +76,7 @@ def load_scenario(
     if controller is not None:
         document["controller"] = {"law": "python", "function": controller_name(controller)}
     apply_overrides(document, overrides or {}, address)
+    replace_tables(document, reference=reference, gait=gait)
     locate_named_files(document, Path())
     scenario = parse_scenario(document, address)
     if controller is None and isinstance(source, Scenario):
@@ -162,6 +178,8 @@ def named_files(document: Mapping[str, Any]) -> set[Path]:
             files.add(Path(name.rpartition(":")[0]))
             continue
         files.add(Path(name))
+        if key != "mjcf":
+            continue
         with suppress(ValueError, OSError):  # where it is flown, it is refused
             files |= check_mjcf(Path(name))
     return files

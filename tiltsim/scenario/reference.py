@@ -10,13 +10,26 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from tiltsim.scenario.controller_table import ReferenceKind
-from tiltsim.scenario.table import Angle, Angles3, Positive, Table, Vector3, example
+from tiltsim.scenario.table import (
+    Angle,
+    Angles3,
+    Coordinate,
+    NonNegative,
+    Positive,
+    Table,
+    Vector3,
+    example,
+)
+from tiltsim.scenario.time_table import REFERENCE_COLUMNS, Rows, TimeTable
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.mathematics.scalar import Triple, Values
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
-from tiltsim_controllers.references.waypoints import minimum_snap_knots
+from tiltsim_controllers.references.waypoints import minimum_snap_knots, table_knots
 
 Tilt = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
+ReferenceRow = Annotated[
+    tuple[NonNegative, Coordinate, Coordinate, Coordinate], Field(strict=False)
+]
 
 
 class _Reference(Table, ABC):
@@ -217,6 +230,58 @@ class WaypointReference(_PositionReference):
         return self
 
 
+class TableReference(_PositionReference, TimeTable):
+    """Motion through the rows of a table, along polynomials; after the last row it holds that."""
+
+    model_config = example(
+        type="table", rows=[[0.0, 0.0, 0.0, 0.0], [2.0, 0.5, 0.0, 0.2], [5.0, 1.0, 1.0, 0.5]]
+    )
+    columns = REFERENCE_COLUMNS
+    largest = 1e6
+
+    type: Literal["table"] = Field(description="your own motion, as a table over time")
+    file: str | None = Field(
+        None,
+        description="CSV or Parquet file with the columns time, x, y and z, in s and m, relative "
+        "to the scenario's folder; times from 0, at least 1e-4 s apart; 2 to 10,000 rows",
+        examples=["my_reference.csv"],
+    )
+    rows: Annotated[tuple[ReferenceRow, ...], Field(strict=False)] | None = Field(
+        None,
+        description="the table itself in place of a file: time, x, y and z of each row "
+        "[s, m, m, m]",
+        examples=[[[0.0, 0.0, 0.0, 0.0], [2.0, 0.5, 0.0, 0.2]]],
+    )
+    interpolation: Literal["minimum_snap", "cubic"] = Field(
+        "minimum_snap",
+        description="minimum_snap: polynomials of degree 7 with six continuous derivatives, of "
+        "which laws use up to four; cubic: continuous acceleration only, for rows that are rounded "
+        "or noisy",
+    )
+
+    def _motion(self) -> dict[str, float]:
+        return {"segments": float(len(self.table))}
+
+    @property
+    def knots(self) -> Values:
+        """Polynomials; see `tiltsim_controllers.references.waypoints.table_knots`."""
+        return _reference_table_knots(self.table, self.interpolation)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        try:
+            _ = self.knots
+        except ValueError as error:
+            raise self.mistake("file" if self.rows is None else "rows", str(error)) from None
+        return self
+
+
+@lru_cache(maxsize=64)
+def _reference_table_knots(rows: Rows, interpolation: str) -> Values:
+    times, *columns = zip(*rows, strict=True)
+    return table_knots(times, [*zip(*columns, strict=True)], interpolation)
+
+
 _minimum_snap_knots = lru_cache(maxsize=64)(minimum_snap_knots)
 
 
@@ -261,6 +326,7 @@ Reference = Annotated[
     | LissajousReference
     | FigureEightReference
     | WaypointReference
+    | TableReference
     | AttitudeAltitudeReference,
     Field(discriminator="type"),
 ]

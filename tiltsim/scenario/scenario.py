@@ -6,7 +6,6 @@ else. `tiltsim.scenario.loading` reads the files, `tiltsim.scenario.messages` wo
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Self
@@ -16,7 +15,7 @@ from pydantic import ConfigDict, Field, ValidationError, model_validator
 from tiltsim.errors import InputError
 from tiltsim.scenario.arguments import leaves
 from tiltsim.scenario.consistency import check_consistency
-from tiltsim.scenario.messages import one_line_message
+from tiltsim.scenario.messages import one_line_message, show
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE, ScenarioTables
 from tiltsim.scenario.table import Table
 from tiltsim.scenario.time_steps import check_time_steps
@@ -66,7 +65,7 @@ class Scenario(ScenarioTables):
     def _repr_html_(self) -> str:
         """What is not left at its default, as a table for notebooks."""
         given = self.model_dump(mode="json", exclude_unset=True, exclude={*DESCRIPTIVE})
-        rows = [(key, json.dumps(value)) for key, value in leaves(given)]
+        rows = [(key, show(value)) for key, value in leaves(given)]
         return html_table(
             self.title or self.address or "Scenario", [self.address, self.source], rows
         )
@@ -89,7 +88,7 @@ class FlightPlan:
     scenario: Scenario
     gait: Gait  # planned for the scenario's vehicle
     reference: ReferenceParameters
-    knots: Values  # keyframes of the gait, then waypoints of the reference
+    knots: Values  # those of the gait, then those of the reference
 
 
 def plan_flight(scenario: Scenario) -> FlightPlan:

@@ -15,6 +15,7 @@ from tiltsim.scenario.simulation_table import InitialTable, SimulationTable
 from tiltsim.scenario.surroundings import AirTable, Disturbance, Fault, GroundTable, SensorTable
 from tiltsim.scenario.table import Table
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
+from tiltsim.scenario.time_table import TimeTable
 from tiltsim.scenario.vehicle import (
     ModelErrorTable,
     TiltCarTable,
@@ -99,6 +100,12 @@ class ScenarioTables(Table):
         state = super().__getstate__()
         private = {**(state["__pydantic_private__"] or {}), "_own_controller": None}
         return {**state, "__pydantic_private__": private}
+
+    @property
+    def time_tables(self) -> dict[str, TimeTable]:
+        """Reference and gait by name, as far as they are tables over time."""
+        named = {"reference": self.reference, "gait": self.gait}
+        return {name: table for name, table in named.items() if isinstance(table, TimeTable)}
 
     @property
     def actuator_options(self) -> list[tuple[str, object, object]]:

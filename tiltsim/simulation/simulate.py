@@ -40,6 +40,8 @@ def simulate(
     observer: Observer | None = None,
     *,
     controller: Controller | type | str | None = None,
+    reference: object = None,
+    gait: object = None,
     progress: Report | bool | None = None,
 ) -> Flight:
     """Fly a scenario from start to end.
@@ -54,6 +56,9 @@ def simulate(
             is recorded.
         controller: A controller of your own in place of the scenario's; see
             `tiltsim.load_scenario`. Threads do not share one that is a class.
+        reference: A motion of your own, as a function of time or a table; see
+            `tiltsim.load_scenario`.
+        gait: A gait of your own, likewise.
         progress: True for a bar; or a function, called with the simulated time (s) now and then.
 
     Returns:
@@ -69,8 +74,9 @@ def simulate(
     """
     if observer is not None and not callable(observer):
         raise InputError(f"observer = {short_repr(observer)}: must be callable")
-    if controller is not None or not isinstance(scenario, Scenario):
-        scenario = load_scenario(scenario, controller=controller)
+    replaced = any(own is not None for own in (controller, reference, gait))
+    if replaced or not isinstance(scenario, Scenario):
+        scenario = load_scenario(scenario, controller=controller, reference=reference, gait=gait)
     with reported(progress, "flight", scenario.simulation.duration) as report:
         return simulate_assembly(assemble(scenario), observer, report=report)
 

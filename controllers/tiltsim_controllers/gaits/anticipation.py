@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tiltsim_controllers.gaits.parameters import FIXED, TWO_COLOR_CIRCLE, GaitParameters
+from tiltsim_controllers.gaits.parameters import FIXED, TABLE, TWO_COLOR_CIRCLE, GaitParameters
 from tiltsim_controllers.gaits.tilts import planned_jets, tilt_reference
 from tiltsim_controllers.mathematics.jets import Jet, Jets4
 from tiltsim_controllers.mathematics.scalar import Vector, clipped, scalar
@@ -68,7 +68,8 @@ def anticipated_tilts(time: float, gait: GaitParameters, knots: Vector, half: fl
     Returns:
         Four jets, rad and s.
     """
-    if half <= 0.0 or gait.type == FIXED or gait.type == TWO_COLOR_CIRCLE:
+    smooth = gait.type == FIXED or gait.type == TWO_COLOR_CIRCLE or gait.type == TABLE
+    if half <= 0.0 or smooth:
         return planned_jets(time, gait, knots)
     a1, a2, a3, a4, v1, v2, v3, v4 = tilt_reference(time - half, gait, knots)
     b1, b2, b3, b4, w1, w2, w3, w4 = tilt_reference(time + half, gait, knots)

@@ -13,25 +13,10 @@ from typing import Final
 
 from tiltsim_controllers.gaits.parameters import TiltsAndRates
 from tiltsim_controllers.mathematics.scalar import Vector, scalar
+from tiltsim_controllers.mathematics.splines import row_at
 
 ROW: Final = 5
 """Floats per keyframe."""
-
-
-@scalar
-def keyframe_row(phase: float, rows: int, knots: Vector) -> int:
-    """Index of the last of the ``rows - 1`` segments that starts at or before ``phase``.
-
-    ``knots`` are the keyframes.
-    """
-    low, high = 0, rows - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if knots[ROW * middle] <= phase:
-            low = middle
-        else:
-            high = middle
-    return low
 
 
 @scalar
@@ -45,7 +30,7 @@ def keyframe_gait(time: float, period: float, rows: float, knots: Vector) -> Til
     """
     turns = time / period
     phase = turns - floor(turns)
-    start = ROW * keyframe_row(phase, int(rows), knots)
+    start = ROW * row_at(phase, int(rows) - 1, 0, ROW, knots)
     stop = start + ROW
     span = knots[stop] - knots[start]
     part = (phase - knots[start]) / span

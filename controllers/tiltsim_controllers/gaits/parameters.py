@@ -19,6 +19,7 @@ KEYFRAMES: Final = 3.0
 TWO_COLOR_CIRCLE: Final = 4.0
 PENGUIN: Final = 5.0
 ROTATING: Final = 6.0
+TABLE: Final = 7.0
 
 GAIT_TYPES: Final = {
     "fixed": FIXED,
@@ -33,6 +34,7 @@ GAIT_TYPES: Final = {
     "penguin_small": PENGUIN,
     "penguin_large": PENGUIN,
     "rotating": ROTATING,
+    "table": TABLE,
 }
 """How a gait is evaluated, by its name in a scenario."""
 
@@ -46,13 +48,14 @@ class GaitParameters(NamedTuple):
     angle_3: float = 0.0
     angle_4: float = 0.0
     amplitude: float = 0.0  # rad, trots and penguins
-    period: float = 1.0  # s, all but fixed
+    period: float = 1.0  # s, all but fixed; of a table its last time
     scale: float = 1.0  # factor of all four angles (ch. 5, Eq. 16: 1/n)
     bias: float = 1.0  # [eta] factor of alpha_3 and alpha_4 (ch. 6, Eqs. 12-15)
-    keyframes: float = 0.0  # number of keyframes in the knots
+    keyframes: float = 0.0  # number of keyframes, or of segments of a table, in the knots
     centre_1: float = 0.0  # rad, circle in the alpha_1-alpha_2 plane
     centre_2: float = 0.0
     radius: float = 0.0
     color: float = 0.0
     drag_ratio: float = 0.0  # [r] sets the offset of the blue lines
     rate: float = 0.0  # rad/s, rotating
+    repeats: float = 0.0  # 1 or 0: whether a table starts over after its period

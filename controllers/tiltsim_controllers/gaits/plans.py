@@ -9,10 +9,11 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass, replace
 from math import inf, isfinite, pi
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tiltsim_controllers.gaits import tabulated
 from tiltsim_controllers.gaits.cat import FOOTFALLS, cat_keyframes
 from tiltsim_controllers.gaits.keyframes import ROW
 from tiltsim_controllers.gaits.parameters import (
@@ -21,6 +22,7 @@ from tiltsim_controllers.gaits.parameters import (
     NO_KNOTS,
     PENGUIN,
     ROTATING,
+    TABLE,
     TROT_CONTINUOUS,
     TROT_INSTANT,
     TWO_COLOR_CIRCLE,
@@ -28,6 +30,7 @@ from tiltsim_controllers.gaits.parameters import (
 )
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.gaits.two_color import COLORS
+from tiltsim_controllers.mathematics.splines import spline_knots
 from tiltsim_controllers.vehicle.parameters import drag_ratio
 
 if TYPE_CHECKING:
@@ -37,6 +40,10 @@ if TYPE_CHECKING:
 
     from tiltsim_controllers.mathematics.scalar import Floats
     from tiltsim_controllers.vehicle.parameters import Vehicle
+
+
+_TABLE_SAMPLES: Final = 20_000
+"""Samples in which the extremes of a table are sought."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +62,10 @@ class Gait:
 
     @property
     def period(self) -> float | None:
-        """Seconds after which the gait repeats; None for a constant gait."""
+        """Seconds after which the gait repeats; None for a constant gait.
+
+        Of a table that does not repeat, its length.
+        """
         return None if self.is_constant else self.parameters.period
 
     @property
@@ -78,6 +88,8 @@ class Gait:
         rows = self._rows()
         if rows is not None:
             return float(np.abs(rows[:, 1:]).max())
+        if self.parameters.type == TABLE:
+            return float(np.abs(self._table_motion()[0]).max())
         # The other types reach their extremes at quarters of the period.
         quarters = np.arange(4) / 4.0 * self.parameters.period
         return float(np.abs(self.angles(quarters)).max())
@@ -93,6 +105,8 @@ class Gait:
             steps = steps[steps[:, 0] > 0.0]
             slopes = steps[:, 1:] / steps[:, :1] / self.parameters.period
             return float(np.abs(slopes).max())
+        if self.parameters.type == TABLE:
+            return float(np.abs(self._table_motion()[1]).max())
         eighths = np.arange(8) / 8.0 * self.parameters.period
         return float(np.abs(self.rates(eighths)).max())
 
@@ -155,6 +169,18 @@ class Gait:
         rows[:, 1:] *= self.parameters.scale
         rows[:, 3:] *= self.parameters.bias
         return rows
+
+    def _table_motion(self) -> tuple[Floats, Floats]:
+        """Tilt angles and rates of a table as flown, close together, each of shape (..., 4)."""
+        rows = np.reshape(self.knots, (-1, tabulated.ROW))
+        pieces = rows[:-1, 1:].reshape(len(rows) - 1, 1, 4, tabulated.COEFFICIENTS)
+        third, second, first, value = np.moveaxis(pieces, -1, 0)
+        parts = np.linspace(0.0, 1.0, 2 + _TABLE_SAMPLES // len(rows))
+        since = (np.diff(rows[:, 0])[:, np.newaxis] * parts)[..., np.newaxis]
+        angles = ((third * since + second) * since + first) * since + value
+        rates = (3.0 * third * since + 2.0 * second) * since + first
+        scale = self.parameters.scale * np.array([1.0, 1.0, *[self.parameters.bias] * 2])
+        return scale * angles, scale * rates
 
     def _evaluate(self, time: ArrayLike) -> Floats:
         times = np.asarray(time, dtype=float)
@@ -263,6 +289,29 @@ def keyframes(
         raise ValueError(f"keyframe phases {phases}: at most two rows may share a phase")
     parameters = GaitParameters(KEYFRAMES, period=_positive(period), keyframes=float(len(frames)))
     return Gait(name, parameters, tuple(value for frame in frames for value in frame), source)
+
+
+def table(times: Sequence[float], angles: Sequence[Sequence[float]], *, repeats: bool) -> Gait:
+    """A gait through the rows of a table along a cubic spline, whose acceleration is continuous.
+
+    Args:
+        times: s, from 0 and increasing, at least 2
+        angles: four tilt angles at each, rad
+        repeats: whether the gait starts over after the last row, smoothly, or holds it
+
+    Raises:
+        ValueError: If a gait that repeats does not end where it begins.
+    """
+    ends = "periodic" if repeats else None
+    degree = 3 if repeats else min(3, len(times) - 1)
+    knots = spline_knots(times, angles, tabulated.COEFFICIENTS, degree=degree, ends=ends)
+    parameters = GaitParameters(
+        TABLE,
+        period=_positive(times[-1]),
+        keyframes=float(len(times) - repeats),
+        repeats=float(repeats),
+    )
+    return Gait("table", parameters, knots)
 
 
 def two_color_circle(

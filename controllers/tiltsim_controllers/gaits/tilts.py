@@ -11,12 +11,14 @@ from tiltsim_controllers.gaits.parameters import (
     NO_KNOTS,
     PENGUIN,
     ROTATING,
+    TABLE,
     TROT_CONTINUOUS,
     TWO_COLOR_CIRCLE,
     GaitParameters,
     TiltsAndRates,
 )
 from tiltsim_controllers.gaits.penguin import penguin_swing, rotating
+from tiltsim_controllers.gaits.tabulated import table_gait
 from tiltsim_controllers.gaits.trot import continuous_trot, instant_trot
 from tiltsim_controllers.gaits.two_color import RED, two_color_circle
 from tiltsim_controllers.mathematics.jets import Jets4
@@ -36,6 +38,9 @@ def planned_angles(time: float, gait: GaitParameters, knots: Vector) -> TiltsAnd
         return penguin_swing(time, gait.amplitude, gait.period)
     if gait.type == ROTATING:
         return rotating(time, gait.angle_1, gait.rate)
+    if gait.type == TABLE:
+        (a1, v1, _), (a2, v2, _), (a3, v3, _), (a4, v4, _) = table_gait(time, gait, knots)
+        return a1, a2, a3, a4, v1, v2, v3, v4
     if gait.type == TROT_CONTINUOUS:
         return continuous_trot(time, gait.amplitude, gait.period)
     return instant_trot(time, gait.amplitude, gait.period)
@@ -51,9 +56,9 @@ def tilt_reference(time: float, gait: GaitParameters, knots: Vector = NO_KNOTS) 
     Args:
         time: s
         gait: type and parameters
-        knots: The keyframes of gaits that have them (`tiltsim_controllers.gaits.keyframes`): a flat
-            tuple of floats in Python, a one-dimensional array in native code. Other gaits do not
-            read it.
+        knots: The keyframes or the spline of gaits that have them
+            (`tiltsim_controllers.gaits.keyframes` and ``tabulated``): a flat tuple of floats in
+            Python, a one-dimensional array in native code. Other gaits do not read it.
 
     Returns:
         ``(alpha_1, ..., alpha_4, rate_1, ..., rate_4)``.
@@ -64,11 +69,15 @@ def tilt_reference(time: float, gait: GaitParameters, knots: Vector = NO_KNOTS) 
 
 
 @scalar
-def tilt_acceleration(time: float, gait: GaitParameters) -> Quad:
-    """The second derivatives (rad/s^2) of the planned tilt angles at a time (s).
+def tilt_acceleration(time: float, gait: GaitParameters, knots: Vector = NO_KNOTS) -> Quad:
+    """The second derivatives (rad/s^2) of the planned tilt angles; arguments as `tilt_reference`.
 
     Zero for constant and piecewise linear gaits, whose rates jump at the corners.
     """
+    if gait.type == TABLE:
+        (_, _, b1), (_, _, b2), (_, _, b3), (_, _, b4) = table_gait(time, gait, knots)
+        f, b = gait.scale, gait.scale * gait.bias
+        return f * b1, f * b2, b * b3, b * b4
     if gait.type != TWO_COLOR_CIRCLE:
         return 0.0, 0.0, 0.0, 0.0
     turning = 2.0 * pi / gait.period
@@ -82,5 +91,5 @@ def tilt_acceleration(time: float, gait: GaitParameters) -> Quad:
 def planned_jets(time: float, gait: GaitParameters, knots: Vector) -> Jets4:
     """The planned tilt angles with rates and accelerations; arguments as for `tilt_reference`."""
     a1, a2, a3, a4, v1, v2, v3, v4 = tilt_reference(time, gait, knots)
-    b1, b2, b3, b4 = tilt_acceleration(time, gait)
+    b1, b2, b3, b4 = tilt_acceleration(time, gait, knots)
     return (a1, v1, b1), (a2, v2, b2), (a3, v3, b3), (a4, v4, b4)

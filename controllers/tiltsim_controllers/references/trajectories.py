@@ -24,6 +24,7 @@ REFERENCE_TYPES: Final = {
     "lissajous": LISSAJOUS,
     "figure_eight": LISSAJOUS,
     "waypoints": WAYPOINTS,
+    "table": WAYPOINTS,
 }
 """Reference types by their name in a scenario."""
 
@@ -53,7 +54,7 @@ class ReferenceParameters(NamedTuple):
     phase_x: float = 0.0  # rad, lissajous
     phase_y: float = 0.0
     phase_z: float = 0.0
-    segments: float = 0.0  # number of segments in the knots, waypoints
+    segments: float = 0.0  # number of segments in the knots, waypoints and table
     offset: float = 0.0  # index of their first knot, waypoints
     acceleration_x: float = 0.0  # m/s^2, line
     acceleration_y: float = 0.0
@@ -89,7 +90,8 @@ def reference_derivatives(
     Args:
         time: s
         reference: type and parameters
-        knots: those of the flight; `ReferenceParameters.offset` is the index where waypoints begin
+        knots: those of the flight; `ReferenceParameters.offset` is the index where those of
+            waypoints or of a table begin
 
     Returns:
         Position, velocity, acceleration, jerk and snap, three floats each, m and s, world axes.

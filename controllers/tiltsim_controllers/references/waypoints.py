@@ -11,34 +11,17 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from math import factorial, isfinite
+from math import isfinite
 from typing import Final
 
 from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
+from tiltsim_controllers.mathematics.splines import polynomial_motion, row_at, spline_knots
 
 COEFFICIENTS: Final = 8
 """Coefficients of a polynomial of degree seven, highest power first."""
 
 ROW: Final = 25
 """Floats per segment: the time at which it begins, and one polynomial per axis."""
-
-
-@scalar
-def polynomial_motion(
-    since: float, start: int, knots: Vector
-) -> tuple[float, float, float, float, float]:
-    """A polynomial and its first four derivatives, ``since`` (s) its beginning.
-
-    Its coefficients are in ``knots`` from index ``start``.
-    """
-    value = first = second = third = fourth = 0.0
-    for index in range(start, start + COEFFICIENTS):
-        fourth = fourth * since + third
-        third = third * since + second
-        second = second * since + first
-        first = first * since + value
-        value = value * since + knots[index]
-    return value, first, 2.0 * second, 6.0 * third, 24.0 * fourth
 
 
 @scalar
@@ -49,21 +32,15 @@ def waypoint_motion(time: float, rows: float, offset: float, knots: Vector) -> V
         time: s
         rows: number of segments
         offset: index of the first knot
-        knots: contains the segments of `minimum_snap_knots`
+        knots: contains the segments of `minimum_snap_knots` or `table_knots`
     """
     begin = int(offset)
-    low, high = 0, int(rows)
-    while high - low > 1:
-        middle = (low + high) // 2
-        if knots[begin + ROW * middle] <= time:
-            low = middle
-        else:
-            high = middle
-    row = begin + ROW * low
+    row = begin + ROW * row_at(time, int(rows), begin, ROW, knots)
+    x, y, z = row + 1, row + 1 + COEFFICIENTS, row + 1 + 2 * COEFFICIENTS
     since = max(0.0, time - knots[row])
-    x0, x1, x2, x3, x4 = polynomial_motion(since, row + 1, knots)
-    y0, y1, y2, y3, y4 = polynomial_motion(since, row + 1 + COEFFICIENTS, knots)
-    z0, z1, z2, z3, z4 = polynomial_motion(since, row + 1 + 2 * COEFFICIENTS, knots)
+    x0, x1, x2, x3, x4 = polynomial_motion(since, x, y, knots)
+    y0, y1, y2, y3, y4 = polynomial_motion(since, y, z, knots)
+    z0, z1, z2, z3, z4 = polynomial_motion(since, z, row + ROW, knots)
     return x0, y0, z0, x1, y1, z1, x2, y2, z2, x3, y3, z3, x4, y4, z4
 
 
@@ -80,8 +57,6 @@ def minimum_snap_knots(
         ValueError: If there are fewer than two points, the number of times differs, the times do
             not start at 0 or do not increase, or a number is not finite.
     """
-    from scipy.interpolate import make_interp_spline  # a third of a second to import
-
     if len(points) < 2:
         raise ValueError(f"{len(points)} waypoints: at least 2 are needed")
     if len(times) != len(points):
@@ -91,12 +66,22 @@ def minimum_snap_knots(
     if times[0] != 0.0 or any(b <= a for a, b in itertools.pairwise(times)):
         raise ValueError(f"times {list(times)}: must start at 0 and increase")
     rest = [(order, [0.0, 0.0, 0.0]) for order in (1, 2, 3)]
-    spline = make_interp_spline(times, points, k=COEFFICIENTS - 1, bc_type=(rest, rest))
-    powers = range(COEFFICIENTS - 1, -1, -1)
-    rows: list[float] = []
-    for start in times[:-1]:
-        # Taylor coefficients at the start of the segment, from the right, one row per power.
-        piece = [spline(start, nu=power) / factorial(power) for power in powers]
-        rows += [float(start), *(float(row[axis]) for axis in range(3) for row in piece)]
-    ends = ([*[0.0] * (COEFFICIENTS - 1), float(value)] for value in points[-1])
-    return (*rows, float(times[-1]), *(value for end in ends for value in end))
+    return spline_knots(times, points, COEFFICIENTS, degree=COEFFICIENTS - 1, ends=(rest, rest))
+
+
+def table_knots(
+    times: Sequence[float], points: Sequence[Sequence[float]], interpolation: str
+) -> Values:
+    """The knots of `waypoint_motion` through the rows of a table, with free ends.
+
+    Args:
+        times: s, increasing
+        points: m, of three coordinates each
+        interpolation: ``minimum_snap``: of all motions through the points, the one that minimizes
+            the integral of squared snap; up to four points are joined by one polynomial, without
+            snap. ``cubic``: a spline of degree three, whose acceleration is continuous.
+    """
+    if interpolation == "cubic" or len(points) <= 4:
+        return spline_knots(times, points, COEFFICIENTS, degree=min(3, len(points) - 1))
+    free = [(order, [0.0, 0.0, 0.0]) for order in (4, 5, 6)]
+    return spline_knots(times, points, COEFFICIENTS, degree=COEFFICIENTS - 1, ends=(free, free))

@@ -42,6 +42,17 @@ GAITS: dict[str, Gait] = {
     "jump": plans.keyframes(
         [(0, 0, 0, 0, 0), (0.4, 1, 0, 0, 0), (0.4, -1, 0.5, 0, 0), (1, 0, 0, 0, 0)], 2.0
     ),
+    "table": plans.table(
+        [0.0, 0.3, 0.7, 1.2, 1.5],
+        [
+            [0.1, 0, -0.1, 0],
+            [0.3, -0.2, 0, 0.1],
+            [0, 0.2, 0.4, 0.2],
+            [-0.3, 0, 0, 0],
+            [0.1, 0, -0.1, 0],
+        ],
+        repeats=True,
+    ),
     "red_circle": plans.two_color_circle((0.5, -0.5), 0.3, "red", 1.5, AR_DRONE),
     "blue_circle": plans.two_color_circle((0.1, -0.2), 0.4, "blue", 1.5, AR_DRONE),
 }
@@ -51,6 +62,7 @@ GAITS |= {
 }
 GAITS |= {
     "walk_third": GAITS["walk"].scaled(3),
+    "table_biased": GAITS["table"].scaled(2).biased(0.8),
     "circle_biased": GAITS["red_circle"].biased(0.8),
     "trot_biased": GAITS["trot_continuous"].scaled(2).biased(0.99),
 }
@@ -83,7 +95,7 @@ def test_accelerations_are_derivatives_and_smooth_gaits_need_no_rounded_corners(
         corner = np.abs(difference).max() > 1e4
         smooth &= not corner
         if not corner:
-            found = tilt_acceleration(time, gait.parameters)
+            found = tilt_acceleration(time, gait.parameters, gait.knots)
             np.testing.assert_allclose(found, difference, atol=1e-3)
     smooth &= gait.parameters.type not in {KEYFRAMES, TROT_CONTINUOUS}  # corners between samples
     if smooth:
@@ -291,6 +303,34 @@ def test_native_code_needs_no_table_for_gaits_without_keyframes(native) -> None:
     for name in ("fixed", "trot_instant", "trot_continuous", "red_circle"):
         gait = GAITS[name]
         assert native["without"](0.7, native_record(gait)) == tilt_reference(0.7, gait.parameters)
+
+
+def test_a_table_that_does_not_repeat_holds_its_last_row() -> None:
+    times, angles = [0.0, 0.2, 0.5], [[0.0, 0.1, 0.2, 0.3], [0.4, 0.1, 0.2, 0.3], [0.6, 0, 0, 0]]
+    gait = plans.table(times, angles, repeats=False)
+    np.testing.assert_allclose(gait.angles(times), angles, atol=1e-15)
+    for time in (0.5, 7.0):
+        assert tilt_reference(time, gait.parameters, gait.knots) == (0.6, *[0.0] * 7)
+        assert tilt_acceleration(time, gait.parameters, gait.knots) == (0.0,) * 4
+    line = plans.table([0.0, 0.5], angles[:2], repeats=False)
+    np.testing.assert_allclose(line.rates(0.3), [0.8, 0, 0, 0], atol=1e-12)
+
+
+def test_a_table_of_a_sine_is_as_exact_as_a_cubic_spline() -> None:
+    """Within 5/384 h^4 of the angle and h^3/24 of the rate, times the fourth derivative."""
+    step, turning = 0.01, 2.0 * pi
+    times = np.arange(101) * step
+    sine = 0.3 * np.sin(turning * times)
+    sine[-1] = sine[0]
+    gait = plans.table(times.tolist(), np.transpose([sine] * 4), repeats=True)
+    at = np.linspace(0.0, 3.0, 997)
+    fourth = 0.3 * turning**4
+    assert (
+        np.abs(gait.angles(at)[:, 0] - 0.3 * np.sin(turning * at)).max()
+        < fourth * step**4 * 5 / 384
+    )
+    rate = 0.3 * turning * np.cos(turning * at)
+    assert np.abs(gait.rates(at)[:, 0] - rate).max() < fourth * step**3 / 24 * 1.01
 
 
 def test_every_type_name_has_a_gait() -> None:

@@ -15,7 +15,7 @@ from tiltsim_controllers.references.trajectories import (
     position_reference,
     reference_derivatives,
 )
-from tiltsim_controllers.references.waypoints import minimum_snap_knots
+from tiltsim_controllers.references.waypoints import minimum_snap_knots, table_knots
 
 CIRCLE = ReferenceParameters(
     REFERENCE_TYPES["circle"], 1.0, -2.0, 3.0, radius=5.0, angular_frequency=0.1
@@ -96,21 +96,22 @@ MOTIONS = {
     "circle": CIRCLE,
     "lissajous": LISSAJOUS,
     "waypoints": WAYPOINTS,
+    "table": WAYPOINTS._replace(type=REFERENCE_TYPES["table"], offset=103.0),
 }
+KNOTS = (*BEFORE, *SNAP_TABLE, *table_knots(TIMES, POINTS, "cubic"))
 
 
 def motion(time, reference):
     """Five rows: position and its derivatives up to snap."""
-    table = (*BEFORE, *SNAP_TABLE)
-    return np.reshape(reference_derivatives(time, reference, table), (5, 3))
+    return np.reshape(reference_derivatives(time, reference, KNOTS), (5, 3))
 
 
 @pytest.mark.parametrize("name", MOTIONS)
 @quick
 @given(time=st.floats(0.01, 9.0))
 def test_every_reference_has_its_derivatives_up_to_snap(name, time):
-    if min(abs(time - knot) for knot in TIMES) < 0.005 and name == "waypoints":
-        return  # the snap bends there
+    if min(abs(time - knot) for knot in TIMES) < 0.005 and name in {"waypoints", "table"}:
+        return  # the snap bends there, the jerk of a cubic spline jumps
     step = 1e-3
     f = {k: motion(time + k * step, MOTIONS[name]) for k in (-2, -1, 1, 2)}
     slope = (f[-2] - 8 * f[-1] + 8 * f[1] - f[2]) / (12 * step)
@@ -122,13 +123,12 @@ def test_every_reference_has_its_derivatives_up_to_snap(name, time):
 @quick
 @given(time=st.floats(0.0, 9.0))
 def test_both_views_of_a_reference_agree(name, time):
-    table = (*BEFORE, *SNAP_TABLE)
-    full = reference_derivatives(time, MOTIONS[name], table)
-    plain = position_reference(time, MOTIONS[name], table)
+    full = reference_derivatives(time, MOTIONS[name], KNOTS)
+    plain = position_reference(time, MOTIONS[name], KNOTS)
     assert plain[:6] == pytest.approx(full[:6], abs=1e-13)
     assert plain[6:] == (0.0, 0.0, 0.0), "the acceleration is left out by default"
     forward = MOTIONS[name]._replace(acceleration_feedforward=1.0)
-    assert position_reference(time, forward, table)[6:] == pytest.approx(full[6:9], abs=1e-13)
+    assert position_reference(time, forward, KNOTS)[6:] == pytest.approx(full[6:9], abs=1e-13)
 
 
 def test_waypoints_are_passed_at_their_times_from_rest_to_rest():
@@ -155,6 +155,36 @@ def snap_along_the_way():
     """Instants, and the snap along x there."""
     times = np.linspace(0.0, TIMES[-1], 13001)
     return times, np.array([motion(t, WAYPOINTS)[4, 0] for t in times])
+
+
+def along_table(interpolation, rows, time):
+    """Five rows as `motion`, of the curve (t^3, t, 1/(1 + t)) read from ``rows`` rows."""
+    times = np.linspace(0.0, 2.0, rows)
+    points = np.transpose([times**3, times, 1.0 / (1.0 + times)])
+    parameters = WAYPOINTS._replace(segments=float(rows), offset=0.0)
+    knots = table_knots(times.tolist(), points, interpolation)
+    return np.reshape(reference_derivatives(time, parameters, knots), (5, 3))
+
+
+@pytest.mark.parametrize("interpolation", ["minimum_snap", "cubic"])
+@pytest.mark.parametrize("rows", [2, 3, 4, 5, 9])
+def test_a_table_passes_its_rows_and_cubics_exactly(interpolation, rows):
+    for time in np.linspace(0.0, 2.0, rows)[:-1].tolist():
+        found = along_table(interpolation, rows, time)[0]
+        np.testing.assert_allclose(found, [time**3, time, 1.0 / (1.0 + time)], atol=1e-12)
+    if rows >= 4:  # neither has reason to bend, whatever the rows between
+        found = along_table(interpolation, rows, 1.23)[:, :2]
+        expected = [[1.23**3, 1.23], [3 * 1.23**2, 1.0], [6 * 1.23, 0.0], [6.0, 0.0], [0.0, 0.0]]
+        np.testing.assert_allclose(found, expected, atol=1e-7)
+    np.testing.assert_array_equal(along_table(interpolation, rows, 9.0)[:, 0], [8.0, 0, 0, 0, 0])
+
+
+def test_the_snap_of_a_table_begins_and_ends_at_zero():
+    """With its first two derivatives: a motion with free ends has least snap where nothing pulls."""
+    for time in (0.0, 2.0 - 1e-9):
+        assert along_table("minimum_snap", 9, time)[4] == pytest.approx(0.0, abs=1e-6)
+    near = along_table("minimum_snap", 9, 0.01)[4] / along_table("minimum_snap", 9, 0.02)[4]
+    assert near[2] == pytest.approx(1 / 8, rel=1e-3)
 
 
 def snap_cost(shift):

@@ -1,0 +1,204 @@
+"""References and gaits as tables over time: files, tables of other libraries, functions."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+import tiltsim
+from tiltsim.errors import InputError
+from tiltsim.scenario.limits import MAX_ROWS
+from tiltsim.scenario.loading import load_scenario
+
+SHORT = {"simulation": {"duration": 0.4}, "controller": {"decoupling": "exact", "gains": "exact"}}
+TIMES = np.linspace(0.0, 0.4, 9)
+COLUMNS = {"time": TIMES, "x": np.sin(TIMES), "y": np.cos(TIMES), "z": TIMES**2}
+HEAD = "time,x,y,z\n0,0,0,0\n"
+
+
+def csv_text(columns):
+    lines = [columns, *zip(*(column.tolist() for column in columns.values()))]
+    return "".join(",".join(map(str, line)) + "\n" for line in lines)
+
+
+@pytest.fixture
+def files(tmp_path):
+    """The same table in three files; columns that have no meaning here do not matter."""
+    more = {"speed": TIMES, **COLUMNS}
+    (tmp_path / "own.csv").write_text(csv_text(COLUMNS))
+    (tmp_path / "more.csv").write_text(csv_text(more).replace(",", " , ").replace("\n", "\n\n"))
+    pq.write_table(pa.table(more), tmp_path / "own.parquet")
+    return tmp_path
+
+
+def test_every_way_to_give_a_table_gives_the_same_rows(files, monkeypatch):
+    rows = tuple(zip(*(column.tolist() for column in COLUMNS.values())))
+    toml = '[reference]\ntype = "table"\nfile = "../own.csv"\nyaw = 0.25\n'
+    (files / "down").mkdir()
+    (files / "down" / "own.toml").write_text(toml)
+    monkeypatch.chdir(files)
+    base = {**SHORT, "reference": {"type": "setpoint", "yaw": 0.25, "position": [1, 2, 3]}}
+    scenarios = [
+        load_scenario("down/own.toml"),
+        load_scenario(base, {"reference.type": "table", "reference.rows": rows}),
+        *(
+            load_scenario(base, reference=given)
+            for given in (COLUMNS, pa.table(COLUMNS), "own.csv", files / "more.csv", "own.parquet")
+        ),
+    ]
+    knots = scenarios[0].reference.knots
+    for scenario in scenarios:
+        assert scenario.reference.table == rows
+        assert scenario.reference.knots == knots
+    assert {s.reference.yaw for s in scenarios} == {0.25, 0.0}
+    assert scenarios[1].reference.yaw == 0.0, "another type empties its table"
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (HEAD + "1,abc,0,0\n", "row 2, column x = 'abc': no number"),
+        (HEAD + "1,0,nan,0\n", "row 2, column y = nan: must be from -1e+06 to 1e+06"),
+        (HEAD + "1,0,0,2e6\n", "row 2, column z = 2000000.0: must be from"),
+        (HEAD + "0,0,0,0\n", "row 2, column time = 0.0: must be at least 0.0001 s after"),
+        (HEAD + "nan,0,0,0\n", "row 2, column time = nan: must be at least 0.0001 s after"),
+        ("time,x,y,z\n1,0,0,0\n", "1 row; at least 2"),
+        ("time,x,y,z\n1,0,0,0\n2,0,0,0\n", "row 1, column time = 1.0: must be 0"),
+        (HEAD + "1,0,0\n", "row 2: 3 values in 4 columns"),
+        ("", "no column time; needs one each of time, x, y, z"),
+        ("time,x,x,y,z\n", "2 columns x; needs one each"),
+        ("time,x,y,z,yaw\n", "column yaw: the heading cannot vary"),
+        (HEAD + "".join(f"{i},0,0,0\n" for i in range(1, MAX_ROWS + 1)), "10001 rows; at most"),
+        (b"\xff\xfe", "not UTF-8 text"),
+    ],
+)
+def test_a_mistake_in_a_file_is_named_by_row_column_and_value(tmp_path, content, words):
+    file = tmp_path / "a.csv"
+    file.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(InputError) as caught:
+        load_scenario(SHORT, reference=file)
+    message = str(caught.value)
+    assert message.startswith(f'scenario: reference.file = "{file}": {words}')
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("a\0.csv", "a file name has no NUL"),
+        ("missing.csv", "cannot be read: No such file"),
+        ("missing.parquet", "no such file"),
+        ("table.txt", "must end with .csv or .parquet"),
+        (".", "not a file"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_named(tmp_path, name, words):
+    with pytest.raises(InputError, match=rf"reference\.file = .*: {words}"):
+        load_scenario(SHORT, reference=tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"reference": 3}, "reference = 3: must be a function of time, the name of a CSV"),
+        ({"gait": [1, 2]}, r"gait = \[1, 2\]: must be a function .* alpha_4"),
+        ({"gait": COLUMNS}, "gait: no column alpha_1"),
+        ({"reference": {**COLUMNS, "x": ["a"] * 9}}, "reference: columns must be numbers"),
+        ({"reference": {**COLUMNS, "x": TIMES[1:]}}, "reference: columns must be numbers, all of"),
+        ({"reference": lambda t: (t, t)}, r"reference\(0\) = \(0.0, 0.0\): must be 3 finite"),
+        ({"gait": lambda t: [1 / (t < 0.1)] * 4}, r"gait\(0.1\) raised ZeroDivisionError"),
+        ({"gait": lambda t: [4.0] * 4}, r"gait.rows\[0\]\[1\] = 4.0: angles are in rad"),
+        ({"reference": lambda t: "abc"}, "reference.0. = 'abc': must be 3 finite numbers"),
+    ],
+)
+def test_a_wrong_argument_is_one_line(arguments, words):
+    with pytest.raises(InputError, match=words) as caught:
+        load_scenario(SHORT, **arguments)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({}, "reference.file = null: give one of file and rows"),
+        ({"rows": [[0, 0, 0, 0]] * 2, "file": "a.csv"}, "give one of file and rows"),
+        ({"rows": [[0, 0, 0], [1, 0, 0]]}, "must have 4 entries"),
+        ({"rows": [[0, 0, 0, 0]]}, "1 row; at least 2"),
+    ],
+)
+def test_a_wrong_table_is_one_line(table, words):
+    with pytest.raises(InputError, match=words):
+        load_scenario({"reference": {"type": "table", **table}})
+
+
+def test_a_gait_that_repeats_must_end_where_it_begins():
+    rows = [[0, 0, 0, 0, 0], [1, 0, 0, 0, 0.1]]
+    with pytest.raises(InputError, match=r"gait.repeat = true: the angles of the last row"):
+        load_scenario({"gait": {"type": "table", "repeat": True, "rows": rows}})
+
+
+@pytest.fixture(scope="module")
+def circling():
+    """A circle, flown as it is and as a function."""
+    circle = {"type": "circle", "radius": 0.5, "angular_frequency": 2.0, "position": [0, 0, 1]}
+    tables = {
+        **SHORT,
+        "simulation": {"duration": 2.0},
+        "reference": {**circle, "acceleration_feedforward": True},
+    }
+
+    def as_function(time):
+        return 0.5 * cos(2.0 * time), 0.5 * sin(2.0 * time), 1.0
+
+    return tiltsim.simulate(tables), tiltsim.simulate(tables, reference=as_function)
+
+
+def test_a_circle_as_a_function_flies_as_the_circle(circling):
+    built_in, own = circling
+    assert own.end.kind == "completed"
+    assert own.scenario.reference.acceleration_feedforward
+    assert np.abs(own["position"] - built_in["position"]).max() < 1e-6
+    # Free ends: within h^4 / 100 of the fourth derivative, 8 m/s^4, in the first and last rows.
+    for name in ("x_ref", "y_ref"):
+        assert np.abs(own[name] - built_in[name]).max() < 8.0 * 0.01**4 / 100
+
+
+def test_a_flight_with_tables_is_saved_with_them(circling, tmp_path):
+    _, own = circling
+    own.save(tmp_path)
+    assert {file.name for file in tmp_path.glob("*.csv")} == {"reference.csv"}
+    again = load_scenario(tmp_path / "scenario.toml")
+    assert again.reference.table == own.scenario.reference.table
+    own.save(tmp_path)  # over itself
+    (tmp_path / "reference.csv").write_text("mine")
+    with pytest.raises(InputError, match=r"reference\.csv: not written by this version"):
+        own.save(tmp_path)
+    loaded = tiltsim.load_flight(tmp_path)  # without the file
+    assert loaded.scenario.reference.knots == own.scenario.reference.knots
+
+
+def test_a_smooth_gait_as_a_function_flies_as_itself_and_corners_are_rounded():
+    circle = {"type": "two_color", "centre": [-0.2, 0.2], "radius": 0.1, "period": 1.0}
+
+    def as_function(time):
+        first, second = -0.2 + 0.1 * cos(2 * pi * time), 0.2 + 0.1 * sin(2 * pi * time)
+        return first, second, first, second
+
+    tables = {**SHORT, "gait": circle}
+    built_in, own = tiltsim.simulate(tables), tiltsim.simulate(tables, gait=as_function)
+    assert own.end.kind == "completed"
+    assert np.abs(own["position"] - built_in["position"]).max() < 1e-6
+
+    trot = load_scenario({"gait": {"type": "trot_continuous", "amplitude": 0.3, "period": 0.5}})
+    planned = trot.gait.plan(trot.vehicle.resolve())
+    table = load_scenario(SHORT, gait=planned.angles).gait.plan(trot.vehicle.resolve())
+    times = np.linspace(0.0, 0.4, 1601)
+    error = np.abs(table.angles(times) - planned.angles(times)).max(axis=1)
+    # At the corner, in the row at 0.25 s: about h / 12 of the jump of the rate, and there alone.
+    jump = 2 * 4 * 0.3 / 0.5
+    assert 0.01 / 13 < error.max() / jump < 0.01 / 11
+    assert error[np.abs(times - 0.25) > 0.1].max() < 1e-6

@@ -1,0 +1,154 @@
+"""Tables over time, of references and gaits: in a file, in the scenario, or of other libraries."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, ClassVar, Final, Self
+
+import numpy as np
+from pydantic import Field, PrivateAttr, model_validator
+
+from tiltsim.errors import InputError
+from tiltsim.scenario.limits import MAX_FILE_SIZE, MAX_ROWS, read_text
+from tiltsim.scenario.table import Table
+from tiltsim.system.parquet import open_parquet
+from tiltsim.system.text import short_repr
+from tiltsim_controllers.mathematics.scalar import Values
+
+REFERENCE_COLUMNS: Final = ("time", "x", "y", "z")
+GAIT_COLUMNS: Final = ("time", "alpha_1", "alpha_2", "alpha_3", "alpha_4")
+
+SHORTEST_STEP: Final = 1e-4
+"""Seconds between the rows of any table."""
+
+Rows = tuple[Values, ...]
+
+
+class TimeTable(Table):
+    """A table over time, from a file or in the scenario itself."""
+
+    columns: ClassVar[tuple[str, ...]]
+    largest: ClassVar[float]  # magnitude of a value
+
+    file: str | None = Field(None)
+    _rows: Rows = PrivateAttr(())
+
+    @property
+    def table(self) -> Rows:
+        """The rows: a time (s) and the values of the other columns."""
+        return self._rows
+
+    def in_file(self, name: str) -> Self:
+        """The same, to be read from a file of that name."""
+        return self.model_copy(update={"file": name, "rows": None})
+
+    def in_scenario(self) -> Self:
+        """The same without a file."""
+        return self.model_copy(update={"file": None, "rows": self._rows})
+
+    def csv(self) -> bytes:
+        """The table as a CSV file, with all its digits."""
+        lines = [self.columns, *(map(repr, row) for row in self._rows)]
+        return "".join(f"{','.join(line)}\n" for line in lines).encode()
+
+    @model_validator(mode="after")
+    def _check_rows(self) -> Self:
+        given: Rows | None = dict(self)["rows"]
+        if (self.file is None) == (given is None):
+            raise self.mistake("file", "give one of file and rows")
+        try:
+            rows = _read_rows(Path(self.file), self.columns) if self.file is not None else given
+            self._rows = _checked(rows or (), self.columns, self.largest)
+        except InputError as error:
+            key, reason = "rows" if self.file is None else "file", str(error)
+            raise self.mistake(key, reason.removeprefix(f"{self.file}: ")) from None
+        return self
+
+
+def rows_of_columns(table: Any, columns: Sequence[str]) -> list[Values]:
+    """Rows of a table of another library. Raises `InputError` in one line."""
+    names = getattr(table, "column_names", getattr(table, "columns", table))
+    _check_names([*map(str, names)], columns)
+    try:
+        values = [np.asarray(table[column], dtype=float).tolist() for column in columns]
+        return [*zip(*values, strict=True)]
+    except (TypeError, ValueError) as error:
+        raise InputError(f"columns must be numbers, all of one length: {error}") from None
+
+
+def _read_rows(file: Path, columns: Sequence[str]) -> list[Values]:
+    """Rows of a CSV or Parquet file."""
+    if "\0" in str(file):
+        raise InputError("a file name has no NUL")
+    if file.exists() and not file.is_file():
+        raise InputError("not a file")
+    if file.suffix.lower() == ".parquet":
+        return _read_parquet(file, columns)
+    if file.suffix.lower() != ".csv":
+        raise InputError("must end with .csv or .parquet")
+    head, *lines = [row for row in csv.reader(read_text(file).splitlines()) if row] or [[]]
+    head = [name.strip() for name in head]
+    _check_names(head, columns)
+    places = [head.index(name) for name in columns]
+    rows = []
+    for number, line in enumerate(lines[: MAX_ROWS + 1], start=1):
+        if len(line) != len(head):
+            raise InputError(f"row {number}: {len(line)} values in {len(head)} columns")
+        rows.append(tuple(_number(line[place], number, head[place]) for place in places))
+    return rows
+
+
+def _read_parquet(file: Path, columns: Sequence[str]) -> list[Values]:
+    if file.is_file() and file.stat().st_size > MAX_FILE_SIZE:
+        raise InputError(f"{file.stat().st_size} bytes; at most {MAX_FILE_SIZE}")
+    with open_parquet(file) as opened:
+        _check_names(opened.schema_arrow.names, columns)
+        if opened.metadata.num_rows > MAX_ROWS:
+            raise InputError(_too_many(opened.metadata.num_rows))
+        return rows_of_columns(opened.read(columns=[*columns]), columns)
+
+
+def _check_names(names: Sequence[str], columns: Sequence[str]) -> None:
+    if "yaw" in names and "x" in columns:
+        raise InputError(
+            "column yaw: the heading cannot vary; remove the column and set reference.yaw"
+        )
+    for name in columns:
+        if (count := names.count(name)) != 1:
+            found = f"{count} columns" if count else "no column"
+            raise InputError(f"{found} {name}; needs one each of {', '.join(columns)}")
+
+
+def _number(text: str, row: int, column: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"row {row}, column {column} = {short_repr(text)}: no number") from None
+
+
+def _too_many(rows: int) -> str:
+    return f"{rows} rows; at most {MAX_ROWS}"
+
+
+def _checked(rows: Sequence[Values], columns: Sequence[str], largest: float) -> Rows:
+    """Rows whose numbers are allowed. Raises `InputError` for the first that is not."""
+    if len(rows) > MAX_ROWS:
+        raise InputError(_too_many(len(rows)))
+    if len(rows) < 2:
+        raise InputError(f"{len(rows)} row{'s' * (len(rows) != 1)}; at least 2")
+    before = -SHORTEST_STEP
+    for number, (time, *values) in enumerate(rows, start=1):
+        where = f"row {number}, column"
+        if number == 1 and time != 0.0:
+            raise InputError(f"{where} time = {time!r}: must be 0")
+        if not before + SHORTEST_STEP <= time <= 1e9:
+            allowed = f"must be at least {SHORTEST_STEP:g} s after the row before, and finite"
+            raise InputError(f"{where} time = {time!r}: {allowed}")
+        for name, value in zip(columns[1:], values, strict=True):
+            if not abs(value) <= largest:
+                allowed = f"must be from {-largest:g} to {largest:g}"
+                raise InputError(f"{where} {name} = {value!r}: {allowed}")
+        before = time
+    return tuple(rows)
