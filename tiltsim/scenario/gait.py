@@ -9,17 +9,7 @@ from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from tiltsim.scenario.table import (
-    Angle,
-    Angles2,
-    Angles4,
-    Factor,
-    NonNegative,
-    Period,
-    Positive,
-    Table,
-    example,
-)
+from tiltsim.scenario.table import Angle, Angles2, Angles4, Factor, Period, Positive, Table, example
 from tiltsim.scenario.time_table import GAIT_COLUMNS, Rows, TimeTable
 from tiltsim_controllers.analysis.two_color_planner import (
     Circle,
@@ -47,7 +37,7 @@ COLOR: Final = (
 )
 """The two colours of ch. 6, for descriptions."""
 
-GaitRow = Annotated[tuple[NonNegative, Angle, Angle, Angle, Angle], Field(strict=False)]
+GaitRow = Annotated[tuple[float, Angle, Angle, Angle, Angle], Field(strict=False)]
 
 
 class GaitTable(Table, ABC):

@@ -10,16 +10,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from tiltsim.scenario.controller_table import ReferenceKind
-from tiltsim.scenario.table import (
-    Angle,
-    Angles3,
-    Coordinate,
-    NonNegative,
-    Positive,
-    Table,
-    Vector3,
-    example,
-)
+from tiltsim.scenario.table import Angle, Angles3, Coordinate, Positive, Table, Vector3, example
 from tiltsim.scenario.time_table import REFERENCE_COLUMNS, Rows, TimeTable
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.mathematics.scalar import Triple, Values
@@ -27,9 +18,7 @@ from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, Referen
 from tiltsim_controllers.references.waypoints import minimum_snap_knots, table_knots
 
 Tilt = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
-ReferenceRow = Annotated[
-    tuple[NonNegative, Coordinate, Coordinate, Coordinate], Field(strict=False)
-]
+ReferenceRow = Annotated[tuple[float, Coordinate, Coordinate, Coordinate], Field(strict=False)]
 
 
 class _Reference(Table, ABC):

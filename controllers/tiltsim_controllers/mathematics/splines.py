@@ -40,9 +40,12 @@ def row_at(position: float, rows: int, begin: int, size: int, knots: Vector) -> 
 def polynomial_motion(
     since: float, start: int, stop: int, knots: Vector
 ) -> tuple[float, float, float, float, float]:
-    """A polynomial and its first four derivatives, ``since`` (s) its beginning.
+    """A polynomial and its first four derivatives.
 
-    Its coefficients, highest power first, are in ``knots`` from index ``start`` to ``stop``.
+    Args:
+        since: its beginning, s
+        start, stop: indices of its first coefficient, that of the highest power, and after its last
+        knots: contains the coefficients
     """
     value = first = second = third = fourth = 0.0
     for index in range(start, stop):

@@ -180,7 +180,7 @@ def test_a_table_passes_its_rows_and_cubics_exactly(interpolation, rows):
 
 
 def test_the_snap_of_a_table_begins_and_ends_at_zero():
-    """With its first two derivatives: a motion with free ends has least snap where nothing pulls."""
+    """With its first two derivatives, as where nothing pulls at a beam: the ends are free."""
     for time in (0.0, 2.0 - 1e-9):
         assert along_table("minimum_snap", 9, time)[4] == pytest.approx(0.0, abs=1e-6)
     near = along_table("minimum_snap", 9, 0.01)[4] / along_table("minimum_snap", 9, 0.02)[4]
