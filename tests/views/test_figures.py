@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import matplotlib
 import numpy as np
@@ -34,16 +35,22 @@ def axes_by_title(figure):
     return {axes.get_title(loc="left"): axes for axes in figure.axes}
 
 
+@cache
+def page(name):
+    """The figure of a flight by its name in `RECIPES`, drawn once; do not change it."""
+    return plot(flight(name))
+
+
 @pytest.mark.parametrize("name", RECIPES)
 def test_every_flight_can_be_drawn(name):
-    figure = plot(flight(name))
+    figure = page(name)
     figure.canvas.draw()
     assert {title.partition(",")[0] for title in axes_by_title(figure)} == PANELS
 
 
 def test_the_lines_are_the_flights_columns():
     this = flight("trot")
-    panels = axes_by_title(plot(this))
+    panels = axes_by_title(page("trot"))
     roll = panels["Attitude"].lines[0]
     np.testing.assert_array_equal(roll.get_xdata(), this["time"])
     np.testing.assert_array_equal(roll.get_ydata(), this["roll"])
@@ -56,13 +63,13 @@ def test_the_lines_are_the_flights_columns():
 
 
 def test_axes_say_their_units():
-    for axes in plot(flight("fixed")).axes:
+    for axes in page("fixed").axes:
         assert any(unit in axes.get_ylabel() for unit in ("rad", "m")), axes.get_title(loc="left")
 
 
 @pytest.mark.parametrize("panel", ["Attitude", "Position error"])
 def test_lines_of_a_panel_differ_without_color(panel):
-    lines = axes_by_title(plot(flight("trot")))[panel].lines
+    lines = axes_by_title(page("trot"))[panel].lines
     named = [line for line in lines if line.get_label() in {"roll", "pitch", "yaw", *"xyz"}]
     assert len({str(line._dash_pattern) for line in named}) == 3
 
@@ -82,8 +89,8 @@ def test_of_many_periods_only_the_last_are_shown(period, shown):
 
 
 def test_rotor_limits_are_drawn_where_there_are_some():
-    limited = axes_by_title(plot(flight("limited")))["Rotor speeds"]
-    free = axes_by_title(plot(flight("fixed")))["Rotor speeds"]
+    limited = axes_by_title(page("limited"))["Rotor speeds"]
+    free = axes_by_title(page("fixed"))["Rotor speeds"]
     levels = {line.get_ydata()[0] for line in limited.lines if len(set(line.get_ydata())) == 1}
     assert {150.0, 390.0} <= levels
     assert len(limited.lines) == len(free.lines) + 2
@@ -91,7 +98,7 @@ def test_rotor_limits_are_drawn_where_there_are_some():
 
 def test_the_closest_approach_is_marked():
     this = flight("trot")
-    plane = axes_by_title(plot(this))["Attitudes flown"]
+    plane = axes_by_title(page("trot"))["Attitudes flown"]
     closest = int(np.argmin(np.abs(this["singularity_margin"])))
     dots = [line.get_xydata()[0] for line in plane.lines if len(line.get_xdata()) == 1]
     np.testing.assert_allclose(dots, [[this["roll"][closest], this["pitch"][closest]]])
@@ -180,7 +187,7 @@ def test_the_margin_shows_its_threshold_and_when_the_supervisor_is_active():
     panels = axes_by_title(plot(this))
     words = panels["Singularity margin"].get_legend_handles_labels()[1]
     assert {"below 0.9", "supervisor active"} <= set(words)
-    plain = axes_by_title(plot(flight("trot")))["Singularity margin"]
+    plain = axes_by_title(page("trot"))["Singularity margin"]
     assert plain.get_legend_handles_labels()[1][0] == "below 0.2"
 
 
