@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from types import SimpleNamespace
 
 import matplotlib
 import matplotlib.pyplot as plt
@@ -15,10 +16,12 @@ from tiltsim.cli import build_parser, main
 from tiltsim.errors import InputError
 from tiltsim.scenario.key_units import quantity_of_key
 from tiltsim.scenario.metric_names import METRICS
+from tiltsim.sweeps.tables import PlotTable
 from tiltsim.views.figures import style
 from tiltsim.views.figures.adjusting import relabel, retitle
 from tiltsim.views.figures.distributions import distinct_texts
 from tiltsim.views.figures.plot import plot
+from tiltsim.views.figures.sweep_columns import label_of
 
 
 def labels_of(figure):
@@ -221,6 +224,14 @@ def test_every_metric_and_column_has_a_label_of_its_own():
 )
 def test_keys_have_the_units_of_their_descriptions(key, text):
     assert quantity_of_key(key).text == text
+
+
+def test_columns_of_a_sweep_have_the_labels_of_its_plot_table():
+    plot_table = PlotTable(labels={"wind": "wind speed (m/s)"})
+    results = SimpleNamespace(points=SimpleNamespace(sweep=SimpleNamespace(plot=plot_table)))
+    names = ("wind", "gait.period", "max_abs_roll")
+    labels = [label_of(results, name) for name in names]
+    assert labels == ["wind speed (m/s)", "gait period (s)", "largest roll (rad)"]
 
 
 @pytest.mark.parametrize(
