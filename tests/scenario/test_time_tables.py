@@ -11,6 +11,7 @@ import pytest
 
 import tiltsim
 from tiltsim.errors import InputError
+from tiltsim.flight.flight import Flight
 from tiltsim.scenario.limits import MAX_ROWS
 from tiltsim.scenario.loading import load_scenario
 
@@ -84,6 +85,27 @@ def test_a_mistake_in_a_file_is_named_by_row_column_and_value(tmp_path, content,
     message = str(caught.value)
     assert message.startswith(f'scenario: reference.file = "{file}": {words}')
     assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("column", "words"),
+    [
+        (["a"] * 9, "column x is of type string; choose double, float"),
+        ([None, *TIMES[1:]], "row 1, column x = nan: must be from"),
+    ],
+)
+def test_a_parquet_file_has_numbers(tmp_path, column, words):
+    file = tmp_path / "a.parquet"
+    pq.write_table(pa.table({**COLUMNS, "x": column}), file)
+    with pytest.raises(InputError, match=rf"reference\.file = .*: {words}"):
+        load_scenario(SHORT, reference=file)
+
+
+def test_a_parquet_file_has_no_more_rows_than_a_csv_file(tmp_path):
+    file, zeros = tmp_path / "a.parquet", np.zeros(MAX_ROWS + 1)
+    pq.write_table(pa.table(dict.fromkeys(COLUMNS, zeros)), file)
+    with pytest.raises(InputError, match="10001 rows; at most 10000"):
+        load_scenario(SHORT, reference=file)
 
 
 @pytest.mark.parametrize(
@@ -174,11 +196,14 @@ def test_a_flight_with_tables_is_saved_with_them(circling, tmp_path):
     again = load_scenario(tmp_path / "scenario.toml")
     assert again.reference.table == own.scenario.reference.table
     own.save(tmp_path)  # over itself
+    from_file = Flight.of_scenario(again, own.samples, own.end, "python", 0.1)
+    from_file.save(tmp_path / "copy")
     (tmp_path / "reference.csv").write_text("mine")
     with pytest.raises(InputError, match=r"reference\.csv: not written by this version"):
         own.save(tmp_path)
-    loaded = tiltsim.load_flight(tmp_path)  # without the file
-    assert loaded.scenario.reference.knots == own.scenario.reference.knots
+    for folder in (tmp_path, tmp_path / "copy"):
+        loaded = tiltsim.load_flight(folder)  # without the file
+        assert loaded.scenario.reference.knots == own.scenario.reference.knots
 
 
 def test_a_smooth_gait_as_a_function_flies_as_itself_and_corners_are_rounded():

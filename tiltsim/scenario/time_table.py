@@ -23,6 +23,9 @@ GAIT_COLUMNS: Final = ("time", "alpha_1", "alpha_2", "alpha_3", "alpha_4")
 SHORTEST_STEP: Final = 1e-4
 """Seconds between the rows of any table."""
 
+_NUMBERS: Final = ("double", "float", "int64", "int32")
+"""Types of columns of a Parquet file."""
+
 Rows = tuple[Values, ...]
 
 
@@ -107,6 +110,9 @@ def _read_parquet(file: Path, columns: Sequence[str]) -> list[Values]:
         _check_names(opened.schema_arrow.names, columns)
         if opened.metadata.num_rows > MAX_ROWS:
             raise InputError(_too_many(opened.metadata.num_rows))
+        for name in columns:  # text could be long beyond any limit once it is decompressed
+            if (kind := str(opened.schema_arrow.field(name).type)) not in _NUMBERS:
+                raise InputError(f"column {name} is of type {kind}; choose {', '.join(_NUMBERS)}")
         return rows_of_columns(opened.read(columns=[*columns]), columns)
 
 
