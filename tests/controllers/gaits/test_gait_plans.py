@@ -264,12 +264,15 @@ def test_bad_names_list_the_choices() -> None:
         plans.waypoints([[0] * 4, [1] * 4], 1.0, [0.0])
 
 
+NEEDED_BY_GAITS = ("tiltsim_controllers.gaits", "tiltsim_controllers.mathematics.splines")
+
+
 @pytest.fixture(scope="module")
 def native():
     """`tilt_reference` compiled from the registered source, fed as the native engine feeds it."""
     numba = pytest.importorskip("numba")
     for function in scalar_functions():
-        if function.__module__.startswith("tiltsim_controllers.gaits"):
+        if function.__module__.startswith(NEEDED_BY_GAITS):
             numba.extending.register_jitable(function)
     reference = numba.njit(tilt_reference)
 
