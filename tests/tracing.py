@@ -56,6 +56,7 @@ def trace_seldom():
     _import_others_untraced()
     import sympy
     from _pytest.assertion import rewrite
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numba.core import compiler
 
@@ -74,7 +75,8 @@ def trace_seldom():
         plant.advance = seldom_traced(plant.advance, begins)
     elsewhere = {
         compiler: ["compile_extra"],
-        Figure: ["draw", "savefig"],
+        Figure: ["add_subplot", "draw", "legend", "savefig"],
+        Axes: ["legend", "plot"],
         mjcf: ["from_path"],
         mjcf.RootElement: ["to_xml_string"],
         rewrite: ["rewrite_asserts"],
