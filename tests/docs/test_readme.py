@@ -47,10 +47,8 @@ def test_it_counts_rows_and_scenarios_as_they_are():
     statements, rows, reproduced, wrong, errors = summary.groups()
     words = re.sub(r"\s+", " ", README)
     assert f"{statements} published statements, in {rows} rows" in words
-    assert (
-        f"{reproduced} rows are reproduced; {wrong} published claims are wrong, by {errors} er"
-        in words
-    )
+    assert f"{reproduced} rows are reproduced; {wrong} are wrong, and" in words
+    assert f"trace back to {errors} errors" in words
     assert f"# {len(list(library_entries()))} scenarios" in words
 
 
@@ -62,7 +60,7 @@ def test_its_figures_are_those_of_the_pages():
     published = [float(cell) for cell in re.findall(r"0\.\d+", published)]
     ours = [1e3 * float(cell) for cell in re.findall(r"0\.\d+", ours)]
     assert f"to {min(ours):.0f} to {max(ours):.0f} mm" in words
-    assert f"leaves {min(published):.2f} to {max(published):.2f} m" in words
+    assert f"leaves an error of {min(published):.2f} to {max(published):.2f} m" in words
     assert "370,000 (implicitfast)" in page("performance.md")
     assert "370,000 closed-loop steps per second on one core, 1.1 times as many" in words
     native = re.search(r"\| single, native \| 1 \|(.*?)\| recorded", page("performance.md"))[1]

@@ -204,7 +204,7 @@ def _table_gait(rows: Rows, repeats: bool) -> PlannedGait:
 
 
 class TwoColorLeg(Table):
-    """A part of a two-colour path: line segments in one colour."""
+    """A part of a two-color path: line segments in one color."""
 
     color: Literal["red", "blue"] = Field(description=COLOR)
     vertices: Annotated[tuple[Angles2, ...], Field(min_length=2, strict=False)] = Field(
@@ -215,14 +215,14 @@ class TwoColorLeg(Table):
 class TwoColorGait(GaitTable):
     """A path on the Two Color Map (ch. 6 to 8): a rectangle, a circle, or a path of legs.
 
-    The colour gives alpha_3 and alpha_4, on the exact lines of the scenario's vehicle;
+    The color gives alpha_3 and alpha_4, on the exact lines of the scenario's vehicle;
     delta = atan(K_m / (L K_f)).
     """
 
     model_config = example(rectangle=[[-0.3, -0.1], [0.1, 0.3]])
 
     type: Literal["two_color"] = Field(
-        description="a closed curve of alpha_1 and alpha_2; its colour gives the other two angles"
+        description="a closed curve of alpha_1 and alpha_2; its color gives the other two angles"
     )
     period: Period = Field(description="time once around [s]", examples=[4.0])
     color: Literal["red", "blue"] = Field("red", description=COLOR)
@@ -239,7 +239,7 @@ class TwoColorGait(GaitTable):
     radius: Positive | None = Field(None, description="of the circle [rad]", examples=[0.1])
     path: Annotated[tuple[TwoColorLeg, ...], Field(strict=False)] = Field(
         (),
-        description="the curve consists of legs, each in one colour; colours may change where the "
+        description="the curve consists of legs, each in one color; colors may change where the "
         "two meet, at the point P = (delta, -delta)",
     )
 

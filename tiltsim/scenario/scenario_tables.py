@@ -57,8 +57,7 @@ class ScenarioTables(Table):
     )
     gait: Gait = Field(
         FixedGait(),
-        description="the plan of the tilt angles over time: the rotors tilt to a rhythm, as the "
-        "legs of an animal swing",
+        description="the plan of the tilt angles: prescribed functions of time, mostly periodic",
     )
     reference: Reference = Field(SetpointReference(), description="the motion to track")
     ground: GroundTable | None = Field(
