@@ -24,7 +24,18 @@ from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.tables import Sweep
 
 NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
-LANGUAGES = {"sh", "python", "toml", "xml", "math", "{include}", "{toctree}", "{eval-rst}", ""}
+LANGUAGES = {
+    "sh",
+    "python",
+    "toml",
+    "xml",
+    "yaml",
+    "math",
+    "{include}",
+    "{toctree}",
+    "{eval-rst}",
+    "",
+}
 WITH_COMMANDS = [name for name in NAMES if code(name, "sh")]
 WITH_TOML = [name for name in NAMES if code(name, "toml") and name != "docs/scenario.md"]
 """Pages with TOML but the one that is generated; tests/commands/test_schema.py has its examples."""
@@ -126,7 +137,7 @@ def check_tiltsim(arguments):
     parsed = parser().parse_args(arguments)
     overrides = dict(map(parse_override, getattr(parsed, "overrides", [])))
     if arguments[0] == "check":
-        assert collect(parsed.paths)
+        assert collect(parsed.paths or [str(ROOT / "scenarios")], parsed.word)
     elif arguments[0] == "sweep":
         find_scenario_file(parsed.sweep)
     elif "--controller" in arguments:

@@ -210,6 +210,12 @@ def test_run_of_a_family_lists_its_variants_and_exits_2(capsys):
         ),
         (["check", "no/such/folder"], ["no/such/folder"]),
         (["check", "--jobs", "0"], ["--jobs", "0", "at least 1"]),
+        (["check", "--shard", "0/4"], ["--shard", "0/4", "1 <= K <= N"]),
+        (["check", "--shard", "5/4"], ["--shard", "5/4", "1/4"]),
+        (["check", "--shard", "x"], ["--shard", "x", "K/N"]),
+        (["check", "--shard", "1/-4"], ["--shard", "1/-4", "K/N"]),
+        (["check", "-k", "zebra"], ["-k zebra", "address, title or source"]),
+        (["check", "--json", "no/such/c.json"], ["--json no/such/c.json", "folder"]),
         (["run"], ["SCENARIO"]),
         (["fly"], ["fly", "choose from"]),
         (["run", SETPOINT, "--set", "simulation.duration=1e9"], ["duration", "steps"]),
@@ -271,19 +277,62 @@ def test_check_reports_every_outcome_and_writes_junit(tmp_path, capsys):
     (tmp_path / "typo.toml").write_text("titel = 'x'\n")
     upside_down = "[simulation]\nduration = 2.0\n[initial]\nattitude = [3.14159, 0.0, 0.0]\n"
     (tmp_path / "lost.toml").write_text(upside_down)
-    junit = tmp_path / "junit.xml"
-    assert main(["check", str(tmp_path), "--jobs", "1", "--junit", str(junit)]) == 2
+    junit, file = tmp_path / "junit.xml", tmp_path / "check.json"
+    files = ["--junit", str(junit), "--json", str(file)]
+    assert main(["check", str(tmp_path), "--jobs", "1", *files]) == 2
     printed = capsys.readouterr().out
-    assert "4 scenarios: 1 failed, 1 passed, 1 lost, 1 invalid" in printed
+    assert "\n\n4 scenarios: 1 failed, 1 passed, 1 lost, 1 invalid\n" in printed
     suite = ElementTree.parse(junit).getroot()[0]
-    assert {key: suite.get(key) for key in ("tests", "failures", "errors")} == {
-        "tests": "4",
-        "failures": "2",
-        "errors": "1",
+    counts = {key: suite.get(key) for key in ("tests", "failures", "errors", "skipped")}
+    assert counts == {"tests": "4", "failures": "2", "errors": "1", "skipped": "0"}
+    document = json.loads(file.read_text())
+    summary = document["summary"]
+    assert (summary["scenarios"], summary["passed"], summary["exit_code"]) == (4, 1, 2)
+    found = {Path(entry["address"]).stem: entry for entry in document["scenarios"]}
+    codes = {name: (entry["status"], entry["exit_code"]) for name, entry in found.items()}
+    assert codes == {
+        "failing": ("failed", 1),
+        "good": ("passed", 0),
+        "lost": ("lost", 3),
+        "typo": ("invalid", 2),
     }
+    bounds = {"min": None, "max": -1.0, "equals": None, "published": 0.0}
+    expected = {"metric": "max_abs_roll", "measured": 0.0, "holds": False, **bounds}
+    assert found["failing"]["expectations"] == [expected]
+    for case, entry in zip(suite, document["scenarios"], strict=True):
+        properties = {item.get("name"): item.get("value") for item in case.iter("property")}
+        assert {name: json.loads(value) for name, value in properties.items()} == entry["metrics"]
+        errors = case.findall("failure") + case.findall("error")
+        assert [error.get("message") for error in errors] == [entry["message"]] * len(errors)
+    assert found["lost"]["metrics"]["diverged"] is True
+    assert found["typo"]["metrics"] == {}
     assert main(["check", str(good), "--jobs", "1"]) == 0
     assert main(["check", str(tmp_path / "failing.toml"), str(good), "--jobs", "1"]) == 1
     assert main(["check", str(tmp_path / "lost.toml"), "--jobs", "1"]) == 3
+
+
+def test_check_prints_json_instead_of_the_table_and_can_end_at_a_failure(tmp_path, capsys):
+    for name, bound in {"a": 1.0, "b": -1.0, "c": 1.0}.items():
+        (tmp_path / f"{name}.toml").write_text(EXPECTING.format(bound=bound))
+    junit = tmp_path / "junit.xml"
+    options = ["--jobs", "1", "--fail-fast", "--json", "-", "--junit", str(junit)]
+    assert main(["check", str(tmp_path), *options]) == 1
+    output, error = capsys.readouterr()
+    assert "3 scenarios: 1 passed, 1 failed, 1 skipped\n" in error
+    document = json.loads(output)
+    statuses = [entry["status"] for entry in document["scenarios"]]
+    assert statuses == ["passed", "failed", "skipped"]
+    assert document["scenarios"][2]["exit_code"] is None
+    assert document["summary"]["exit_code"] == 1
+    suite = ElementTree.parse(junit).getroot()[0]
+    assert suite.get("skipped") == "1"
+    assert suite[2][0].tag == "skipped"
+
+
+def test_a_shard_without_scenarios_passes(tmp_path, capsys):
+    (tmp_path / "a.toml").write_text(EXPECTING.format(bound=1.0))
+    assert main(["check", str(tmp_path), "--shard", "2/2"]) == 0
+    assert capsys.readouterr().out == "\n0 scenarios\n"
 
 
 def test_check_marks_flights_without_expectations(tmp_path, capsys):
@@ -361,8 +410,9 @@ def test_interrupt_ends_a_whole_check_at_once_and_keeps_what_is_finished(
     unflown = len(paths) - 1
     assert (suite.get("tests"), suite.get("errors")) == (str(len(paths)), str(unflown))
     assert [case.get("name") for case in suite] == [path.name for path in paths]
-    errors = [None if not len(case) else (case[0].tag, case[0].get("message")) for case in suite]
-    assert errors == [None, *[("error", "not flown: interrupted")] * unflown]
+    errors = [case.find("error") for case in suite]
+    assert errors[0] is None
+    assert [error.get("message") for error in errors[1:]] == ["not flown: interrupted"] * unflown
 
 
 def test_interrupted_run_keeps_its_files_and_says_so(tmp_path, capsys, monkeypatch):
@@ -462,6 +512,10 @@ def test_list_of_what_contains_a_word(capsys):
     entries = json.loads(capsys.readouterr().out)
     assert {SETPOINT} <= {entry["scenario"] for entry in entries}
     assert all("Fig. 4" in entry["source"] + entry["title"] for entry in entries)
+    assert main(["list", SETPOINT.upper()]) == 0
+    family, _, variant = SETPOINT.partition("#")
+    shown = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
+    assert shown == [family, f"#{variant}"]
     assert main(["list", "zebra"]) == 2
     assert (
         capsys.readouterr().err == "tiltsim: zebra: in no address, title or source of the library\n"

@@ -19,7 +19,11 @@ def add_parser(subparsers: Subparsers) -> None:
     summary = "list the scenario library"
     parser = subparsers.add_parser("list", help=summary, description=description)
     parser.add_argument(
-        "word", nargs="?", default="", metavar="WORD", help="list only what contains this"
+        "word",
+        nargs="?",
+        default="",
+        metavar="WORD",
+        help="list only what has this text in its address, title or source; case does not matter",
     )
     parser.add_argument("--sweeps", action="store_true", help="list only the sweeps")
     add_json(parser)
@@ -28,39 +32,30 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print one line per file, with one per variant below it; sweeps at the end."""
-    word = arguments.word.lower()
-    sweeps = [sweep for sweep in library_sweeps() if _contains(sweep, word)]
+    word = arguments.word
+    sweeps = [sweep for sweep in library_sweeps() if sweep.contains(word)]
     if arguments.json:
-        entries = sweeps if arguments.sweeps else library_entries()
+        found = sweeps if arguments.sweeps else library_entries(word)
         keys = ("sweep" if arguments.sweeps else "scenario", "title", "source")
-        found = [dict(zip(keys, entry)) for entry in entries if _contains(entry, word)]
-        print(json.dumps(found, indent=2))
+        print(json.dumps([dict(zip(keys, entry)) for entry in found], indent=2))
         return 0
     lines = [] if arguments.sweeps else _family_lines(word)
     if lines and sweeps:
         lines.append("\nsweeps, for tiltsim sweep:")
     lines += [_line(sweep, sweep.address) for sweep in sweeps]
     if not lines:
-        raise InputError(f"{arguments.word}: in no address, title or source of the library")
+        raise InputError(f"{word}: in no address, title or source of the library")
     print("\n".join(lines))
     return 0
 
 
-def _contains(entry: Entry, word: str) -> bool:
-    """Whether a word in lower case is in the address, the title or the source."""
-    return word in " ".join(entry).lower()
-
-
 def _family_lines(word: str) -> list[str]:
-    """The files that contain a word, with all variants, and other files' variants with it."""
+    """The files that a word selects, each above its variants."""
     lines = []
-    for family in library_families():
-        whole = _contains(family.entry, word)
-        members = [member for member in family.members if whole or _contains(member, word)]
-        width = max((len(member.address) for member in members), default=0)
-        if whole or members:
-            lines.append(_line(family.entry, family.entry.address))
-        lines += [_line(member, f"  {member.address:<{width}}") for member in members]
+    for family in library_families(word):
+        width = max((len(member.address) for member in family.members), default=0)
+        lines.append(_line(family.entry, family.entry.address))
+        lines += [_line(member, f"  {member.address:<{width}}") for member in family.members]
     return lines
 
 

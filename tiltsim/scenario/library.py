@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -85,11 +85,15 @@ def library_name(path: Path) -> str:
 
 
 class Entry(NamedTuple):
-    """A scenario of the library."""
+    """A scenario or sweep, as the library lists it."""
 
     address: str
     title: str
     source: str
+
+    def contains(self, word: str) -> bool:
+        """Whether a word is in the address, the title or the source, ignoring case."""
+        return any(word.casefold() in text.casefold() for text in self)
 
 
 class Family(NamedTuple):
@@ -99,21 +103,44 @@ class Family(NamedTuple):
     members: tuple[Entry, ...]  # "#name", title or changed keys, source if it differs
 
 
-def library_entries() -> Iterator[Entry]:
-    """Address, title and source of every scenario of the library, variants included."""
+def library_entries(word: str = "") -> Iterator[Entry]:
+    """Every scenario of the library that a word selects, variants included; '' selects all."""
     for name, document in _documents():
-        variants = document.get("variant", [])
-        for variant in variants or [{}]:
-            address = f"{name}#{variant['name']}" if "name" in variant else name
-            title = document.get("title", "")
-            if variant:
-                title = variant.get("title") or f"{title}: {_differences(document, variant)}"
-            yield Entry(address, title, variant.get("source", document.get("source", "")))
+        yield from selected_entries(name, document, word)
 
 
-def library_families() -> Iterator[Family]:
-    """The files of the library; a file without variants has no members."""
+def selected_entries(name: str, document: Mapping[str, Any], word: str) -> list[Entry]:
+    """The scenarios of a file that a word selects.
+
+    A word that the file's own address, title or source contains selects all its variants; another
+    one those that contain it.
+
+    Args:
+        name: Address of the file.
+        document: Its content; only that of a valid file is certain to have the right types.
+        word: Plain text, without wildcards; the case of its letters does not matter.
+    """
+    title, source = str(document.get("title", "")), str(document.get("source", ""))
+    family = Entry(name, title, source)
+    variants = document.get("variant", [])
+    entries = [
+        Entry(
+            f"{name}#{variant['name']}",
+            str(variant.get("title") or f"{title}: {_differences(document, variant)}"),
+            str(variant.get("source", source)),
+        )
+        for variant in variants
+    ]
+    whole = family.contains(word)
+    return [entry for entry in entries or [family] if whole or entry.contains(word)]
+
+
+def library_families(word: str = "") -> Iterator[Family]:
+    """The files of the library with the variants that a word selects; '' selects all."""
     for name, document in _documents():
+        selected = {entry.address for entry in selected_entries(name, document, word)}
+        if not selected:
+            continue
         title, source = document.get("title", ""), document.get("source", "")
         members = tuple(
             Entry(
@@ -122,6 +149,7 @@ def library_families() -> Iterator[Family]:
                 _shorter(variant.get("source", source), source),
             )
             for variant in document.get("variant", [])
+            if f"{name}#{variant['name']}" in selected
         )
         yield Family(Entry(name, title, source), members)
 
@@ -131,13 +159,14 @@ def _documents() -> Iterator[tuple[str, dict[str, Any]]]:
         yield library_name(path), read_toml(path)
 
 
-def _differences(document: dict[str, Any], variant: dict[str, Any]) -> str:
+def _differences(document: Mapping[str, Any], variant: Mapping[str, Any]) -> str:
     """The keys that a variant changes, with their values."""
     changes: dict[str, Any] = {}
     for table, values in variant.items():
         if isinstance(values, dict):
-            base = document.get(table, {})
-            changes |= {key: value for key, value in values.items() if base.get(key) != value}
+            base = document.get(table)
+            same = base.items() if isinstance(base, dict) else ()
+            changes |= {key: value for key, value in values.items() if (key, value) not in same}
     return ", ".join(f"{key} = {value}" for key, value in changes.items()) or "as the family"
 
 
