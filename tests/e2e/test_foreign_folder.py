@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import sysconfig
-import venv
 from pathlib import Path
 
 import pytest
+
+from tests.environments import new_environment
 
 pytestmark = pytest.mark.slow
 
@@ -45,15 +45,7 @@ def pip(*words, cwd):
 
 @pytest.fixture
 def python(tmp_path):
-    """The interpreter of a new environment that sees the packages of this one, tiltsim excepted."""
-    folder = tmp_path / "venv"
-    venv.create(folder, symlinks=True)
-    paths = {"base": str(folder), "platbase": str(folder)}
-    site = Path(sysconfig.get_path("purelib", "venv", vars=paths))
-    # Path lines only: .pth files in these folders, as of an editable install, are not read.
-    shared = [path for path in sys.path if Path(path).name in {"site-packages", "dist-packages"}]
-    (site / "shared.pth").write_text("\n".join(shared), encoding="utf-8")
-    return Path(sysconfig.get_path("scripts", "venv", vars=paths)) / "python"
+    return new_environment(tmp_path / "venv")
 
 
 @pytest.fixture
