@@ -57,6 +57,34 @@ def test_a_dict_is_not_changed():
     assert tables == {"initial": {"position": [0.0, 0.0, 0.0]}}
 
 
+def test_overrides_are_not_changed():
+    table = {"gait": {"type": "fixed", "angles": [0.0, 0.0, 0.0, 0.0]}}
+    file = {"controller.law": "python", "controller": {"law": "python", "function": "own.py:f"}}
+    scenario = tiltsim.load_scenario(ADDRESS, {**table, "gait.angles[0]": 0.2})
+    assert scenario.gait.angles[0] == 0.2
+    scenario.replace(file)
+    assert table == {"gait": {"type": "fixed", "angles": [0.0, 0.0, 0.0, 0.0]}}
+    assert file["controller"] == {"law": "python", "function": "own.py:f"}
+
+
+def test_an_entry_of_an_array_that_is_given_with_it_can_be_overridden():
+    changes = {"gait.type": "fixed", "gait.angles": np.zeros(4), "gait.angles[0]": 0.1}
+    assert tiltsim.load_scenario(ADDRESS, changes).gait.angles == (0.1, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        {"controller.law": "full_pose"},
+        {"controller": {"law": "full_pose"}},
+        {"controller.function": "x.py:y"},
+    ],
+)
+def test_a_controller_and_overrides_of_another_contradict(overrides):
+    with pytest.raises(tiltsim.InputError, match=r"contradicts the given controller .*hover"):
+        tiltsim.load_scenario(ADDRESS, overrides, controller=hover)
+
+
 def test_a_controller_replaces_the_shipped_one_before_anything_is_checked():
     with pytest.raises(tiltsim.InputError, match="control_timestep"):
         tiltsim.load_scenario(ADDRESS, COARSE)

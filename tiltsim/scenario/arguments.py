@@ -8,7 +8,7 @@ from typing import Any
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.limits import MAX_DEPTH
-from tiltsim.system.text import short_repr
+from tiltsim.system.text import short_repr, shortened
 
 
 def check_keys(name: str, mapping: object) -> None:
@@ -31,6 +31,16 @@ def controller_name(controller: object) -> str:
         raise InputError(f"controller = {short_repr(controller)}: must be callable or FILE.py:NAME")
     named = controller if hasattr(controller, "__qualname__") else type(controller)
     return f"{named.__module__}.{named.__qualname__}"
+
+
+def check_one_controller(overrides: Mapping[str, Any], controller: object) -> None:
+    """Raise `InputError` if overrides name another controller than the one that is given."""
+    for key in ("controller", "controller.law", "controller.function"):
+        if key in overrides:
+            raise InputError(
+                f"{key} = {short_repr(overrides[key])}: contradicts the given controller "
+                f"{shortened(controller_name(controller))}; leave one of them out"
+            )
 
 
 def plain(value: Any, depth: int = 0) -> Any:

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from tiltsim.errors import InputError
 from tiltsim.models.mjcf_files import check_mjcf
-from tiltsim.scenario.arguments import check_keys, controller_name, plain
+from tiltsim.scenario.arguments import check_keys, check_one_controller, controller_name, plain
 from tiltsim.scenario.controller import DEFAULT_LAW
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.limits import MAX_DEPTH, check_limits
@@ -55,7 +55,7 @@ def load_scenario(
             ``{"gait.period": 2.0, "gait.angles[0]": 0.1}``. Arrays are taken as lists, here and in
             a dict. A family without ``#variant`` needs them or a controller, and is its base then.
         controller: A controller of your own, which replaces the scenario's before anything is
-            checked: a function from `tiltsim.Observation` to `tiltsim.Command`, an object with
+            checked; the overrides then have no other law or function: a function from `tiltsim.Observation` to `tiltsim.Command`, an object with
             ``__call__`` and, if it has a memory, ``reset(scenario)``, a class of such objects, or
             ``"FILE.py:NAME"``.
         reference: A motion of your own in place of the scenario's, whose attitude and
@@ -75,6 +75,7 @@ def load_scenario(
     document, address = _document(source, with_base=changed)
     if controller is not None:
         document["controller"] = {"law": "python", "function": controller_name(controller)}
+        check_one_controller(overrides or {}, controller)
     apply_overrides(document, overrides or {}, address)
     replace_tables(document, reference=reference, gait=gait)
     locate_named_files(document, Path())
@@ -214,7 +215,7 @@ def apply_overrides(document: dict[str, Any], overrides: Mapping[str, Any], addr
     Raises:
         InputError: If a key does not exist.
     """
-    for key, value in _kinds_first(overrides):
+    for key, value in _kinds_first(plain(overrides)):  # a copy, as entries of lists are set in it
         _override(address, document, key, value)
 
 
