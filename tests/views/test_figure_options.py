@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 
 import matplotlib
@@ -11,9 +13,10 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from tests.flights import OTHER_KINDS, RECIPES, flight, saved
+from tests.flights import OTHER_KINDS, RECIPES, SAMPLE_FIELDS, flight, saved
 from tiltsim.cli import build_parser, main
 from tiltsim.errors import InputError
+from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.key_units import quantity_of_key
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.sweeps.tables import PlotTable
@@ -66,10 +69,45 @@ def test_panels_are_drawn_in_the_order_and_size_asked_for():
     np.testing.assert_array_equal(line.get_ydata(), flight("trot")["vx"])
 
 
+@pytest.mark.parametrize("size", [None, "85mm"])
+@pytest.mark.parametrize(
+    "names", [("position_error", "path", "margin"), ("path", "margin", "position_error")]
+)
+def test_squares_keep_their_place_among_panels_over_time(names, size):
+    figure = plot(flight("trot"), panels=names, size=size)
+    titles = {"position_error": "Position error", "path": "Plan view"}
+    expected = [titles.get(name, "Singularity margin") for name in names]
+    assert [axes.get_title(loc="left") for axes in figure.axes] == expected
+    figure.draw_without_rendering()
+    boxes = [axes.get_window_extent() for axes in figure.axes]
+    assert all(later.x0 > former.x1 or later.y1 < former.y0 for former, later in pairwise(boxes))
+
+
 def test_the_attitude_of_several_flights_has_a_panel_per_angle():
     figure = plot([flight("trot"), flight("fixed")], panels=["attitude", "alpha_1"], size="170mm")
     angles = ["roll (rad)", "pitch (rad)", "yaw (rad)"]
     assert labels_of(figure) == [*angles[:1], *angles[2:], angles[1], "tilt angle α₁ (rad)"]
+
+
+def test_the_last_periods_shown_are_those_of_the_shortest_flight():
+    scenario = flight("trot").scenario
+    gait = scenario.gait.model_copy(update={"period": 0.05})
+    assembly = assemble(scenario.model_copy(update={"gait": gait}))
+    long = replace(flight("trot"), assembly=assembly)
+    half = len(long) // 2
+    short = replace(long, samples=long.samples[: half + 1].copy())
+    (axes,) = plot([long, short], panels="roll").axes
+    end = short["time"][-1]
+    assert axes.get_xlim() == pytest.approx((end - 0.2, end))
+    assert axes.get_xlabel() == "time (s), the last 4 periods of all flights"
+
+
+def test_angles_that_are_as_good_as_zero_have_an_axis_of_a_milliradian():
+    whole = flight("fixed")
+    samples = whole.samples.copy()
+    samples[:, SAMPLE_FIELDS.index("yaw")] = 1e-9 * np.sin(whole["time"])
+    (axes,) = plot(replace(whole, samples=samples), panels="yaw").axes
+    assert np.ptp(axes.get_ylim()) == pytest.approx(1e-3)
 
 
 def test_an_unknown_panel_is_one_line(tmp_path, capsys):
@@ -182,6 +220,15 @@ def test_title_and_labels_are_the_users(tmp_path, monkeypatch):
     assert labels_of(figure) == ["margin μ (rad)"]
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()][:2] == ["A trot of 1 s", "fixed"]
+
+
+@pytest.mark.parametrize("names", [["trot"], ["trot", "fixed"]])
+def test_panels_are_relabelled_by_their_names(names):
+    labels = {"position_error": "Distance", "trot": "T"} if len(names) > 1 else {}
+    labels = labels or {"position_error": "Distance"}
+    figure = plot([flight(name) for name in names], panels="position_error", labels=labels)
+    (axes,) = figure.axes
+    assert (axes.get_title(loc="left") or axes.get_ylabel()) in {"Distance", "Distance (m)"}
 
 
 def test_a_label_of_nothing_is_one_line(tmp_path, capsys):

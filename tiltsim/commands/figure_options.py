@@ -29,7 +29,7 @@ def add_figure_options(parser: argparse.ArgumentParser) -> None:
     style = "a matplotlib style file or the name of a style; a matplotlibrc is respected, too"
     add("--style", type=Path, metavar="FILE", help=style)
     add("--title", metavar="TEXT", help="instead of the figure's own; empty for none")
-    label = "TEXT instead of NAME: of a flight, metric, axis, panel or line; repeatable"
+    label = "TEXT instead of NAME: of a flight, metric, panel, axis or line; repeatable"
     add("--label", action=_Label, default={}, metavar="NAME=TEXT", dest="labels", help=label)
     panels = "the panels to draw, in this order"
     add("--panels", type=_names, default=(), metavar="A,B,...", help=panels)

@@ -36,10 +36,12 @@ METRICS: Final = {
         "final error along z", "m", "reference minus actual, mean over the last second"
     ),
     "sup_position_error_after_20s": Metric(
-        "largest position error after 20 s", "m", "largest horizontal position error from 20 s on"
+        "largest horizontal error after 20 s", "m", "largest horizontal position error from 20 s on"
     ),
     "least_position_error_after_20s": Metric(
-        "smallest position error after 20 s", "m", "smallest horizontal position error from 20 s on"
+        "smallest horizontal error after 20 s",
+        "m",
+        "smallest horizontal position error from 20 s on",
     ),
     "max_orbit_radius_after_20s": Metric(
         "largest radius after 20 s", "m", "largest distance from the reference circle's centre"

@@ -11,6 +11,7 @@ from tiltsim.scenario.metric_names import METRICS
 from tiltsim.views.figures import style
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.text import Text
 
@@ -26,10 +27,15 @@ def retitle(figure: Figure, title: str | None) -> None:
         figure.suptitle(style.verbatim(title), x=0.01, ha="left", wrap=True)
 
 
-def relabel(figure: Figure, labels: Mapping[str, str]) -> None:
+def relabel(
+    figure: Figure, labels: Mapping[str, str], panels: Mapping[str, Axes] | None = None
+) -> None:
     """Replace labels of axes, panels and legends; a unit in brackets behind them stays.
 
-    ``labels`` are the new texts by what the figure says now, or by the name of a metric.
+    Args:
+        figure: A finished figure.
+        labels: New texts by what the figure says now, or by the name of a metric or panel.
+        panels: Its panels by their names, if they have some.
 
     Raises:
         InputError: If the figure does not say it.
@@ -39,16 +45,30 @@ def relabel(figure: Figure, labels: Mapping[str, str]) -> None:
     texts = [text for text in _texts(figure) if text.get_text()]
     for name, new in labels.items():
         old = METRICS[name].label if name in METRICS else style.verbatim(name)
+        if panels and name in panels and not any(_says(text, old) for text in texts):
+            axes = panels[name]
+            old = _said(axes._left_title) or _said(axes.yaxis.label)  # type: ignore[attr-defined]
+            old = old.partition(" (")[0]
         found = False
         for text in texts:
-            said = text.get_text().replace("\n", " ")
-            label, bracket, unit = said.partition(" (")
-            if said == old or label == old:
+            said = _said(text)
+            _, bracket, unit = said.partition(" (")
+            if _says(text, old):
                 text.set_text(style.verbatim(new) + ("" if said == old else bracket + unit))
                 found = True
         if not found:
-            known = [*dict.fromkeys(text.get_text().partition(" (")[0] for text in texts)]
+            said_now = [_said(text).partition(" (")[0] for text in texts]
+            known = [*dict.fromkeys([*said_now, *(panels or ())])]
             raise InputError(f"label {name!r}: {choose(name, known)}")
+
+
+def _said(text: Text) -> str:
+    return text.get_text().replace("\n", " ")
+
+
+def _says(text: Text, label: str) -> bool:
+    """Whether a text is this label, with or without a unit."""
+    return label in {_said(text), _said(text).partition(" (")[0]}
 
 
 def _texts(figure: Figure) -> Iterator[Text]:

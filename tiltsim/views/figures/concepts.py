@@ -299,7 +299,7 @@ def _side_view(axes: Axes, n: Floats) -> None:
     arc = 0.75 * length * np.stack([np.cos(turned), np.sin(turned)], axis=1)
     axes.plot(*arc.T, color=style.PURPLE, lw=2.4, zorder=5.0)
     text(axes, arc[-1] - (0.02, 0.0), "margin", ha="right")
-    text(axes, -0.55 * length * along, "singular", color=style.SINGULAR)
+    text(axes, -0.55 * length * along, "unreachable", color=style.SINGULAR)
 
 
 def _roll_pitch_plane(axes: Axes, n: Floats, vehicle: Vehicle) -> None:
@@ -308,7 +308,7 @@ def _roll_pitch_plane(axes: Axes, n: Floats, vehicle: Vehicle) -> None:
     axes.fill_between(roll, low, high, color=style.UNREACHABLE, lw=0.0, zorder=0.5)
     axes.plot(*singular_curves(n)[0].T, color=style.SINGULAR, lw=1.8)
     style.roll_pitch_axes(axes)
-    text(axes, (-0.95, -1.2), "singular\nmargin < 0", color=style.SINGULAR)
+    text(axes, (-0.95, -1.2), "unreachable\nmargin < 0", color=style.SINGULAR)
     hover = exact_decoupler(0.0, 0.0, 0.0, 0.0, vehicle.gravity, tuple(n[0]))
     nearest = nearest_singular(n, np.array([LEANING]))[0]
     axes.plot(*np.array([LEANING, nearest]).T, color=style.PURPLE, lw=2.4)
@@ -348,7 +348,7 @@ def color_figure() -> Figure:
         plane.annotate("P", point_p(vehicle), (7, -3), textcoords="offset points")
         plane.plot(0.0, 0.0, "+", color=style.INK, ms=9, mew=1.4)
         plane.annotate("untilted", (0.0, 0.0), (-5, 5), textcoords="offset points", ha="right")
-        text(plane, (0.75, -0.9), "singular\nR < 0", color=style.SINGULAR)
+        text(plane, (0.75, -0.9), "unreachable\nR < 0", color=style.SINGULAR)
         text(plane, (-0.8, 0.95), "R > 0")
         plane.set(xlabel="α₁ = α₃ (rad)", ylabel="α₂ = α₄ (rad)", title="Red gaits")
         for axes in row:

@@ -38,7 +38,8 @@ AREA, CURVE = "area", "curve"
 _LAST_SHADE: Final = 0.92
 """Part of the colour map in use; the rest is too bright on white."""
 
-PANELS: Final = ("attitude_plane", "tilt_angles", "margin")
+ATTITUDES: Final = "attitude_plane"
+PANELS: Final = ("tilt_angles", "margin", ATTITUDES)
 """Panels of the figure of a gait."""
 
 
@@ -53,22 +54,25 @@ def gait_figure(gait: Gait, vehicle: Vehicle, panels: Sequence[str] = ()) -> Fig
     for name in panels:
         if name not in PANELS:
             raise InputError(f"panels: {name!r}: {choose(name, PANELS)}")
-    chosen = panels or (PANELS[:1] if gait.is_constant else PANELS)
-    over_time = [name for name in chosen if name != PANELS[0]]
+    chosen = [*dict.fromkeys(panels)] or ([ATTITUDES] if gait.is_constant else [*PANELS])
     with style.paper_style():
-        page = new_page(len(over_time), len(chosen) - len(over_time))
-        for axes in page.square[:1]:
+        page = new_page([name != ATTITUDES for name in chosen])
+
+        def attitudes(axes: Axes) -> None:
             shown = _roll_pitch(axes, gait, vehicle)
             if CURVE in shown:
                 _time_bar(axes.figure, [axes], gait)
             _roll_pitch_legend(page.figure, shown, constant=gait.is_constant)
+
         draw: dict[str, Callable[[Axes], None]] = {
+            ATTITUDES: attitudes,
             "tilt_angles": lambda axes: _angles(axes, gait),
             "margin": lambda axes: _margin(axes, [(gait, "")], vehicle),
         }
-        for column in page.over_time:
+        for name, axes in zip(chosen, page.panels, strict=True):
+            draw[name](axes)
+        for column in page.columns:
             for axes in column:
-                draw[over_time.pop(0)](axes)
                 axes.tick_params(labelbottom=axes is column[-1])
                 axes.set_xlabel("time (s)" if axes is column[-1] else "")
         return page.figure
@@ -102,7 +106,7 @@ def margin_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure:
 
 
 def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> set[str]:
-    """Curves of singular attitudes, and the attitudes reachable from level at all times, shaded.
+    """Curves of singular attitudes, and the attitudes beyond them, shaded.
 
     Returns those of `AREA` and `CURVE` that the diagram contains.
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby
 from math import ceil
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -25,51 +26,58 @@ MAX_STACK: Final = 3
 
 
 class Page(NamedTuple):
-    """A figure with axes for panels over time, in columns, and for square ones."""
+    """A figure with axes for its panels, in their order, and the columns of those over time."""
 
     figure: Figure
-    over_time: list[list[Axes]]
-    square: list[Axes]
+    panels: list[Axes]
+    columns: list[list[Axes]]
 
 
-def new_page(over_time: int, square: int) -> Page:
-    """An empty page for so many panels over time, on the left, and square ones, right or below."""
-    many = over_time > MAX_STACK
-    natural = (8.4 if many else 5.4 if over_time else 0.0) + min(
-        square, 3 if not over_time else 1
-    ) * (3.0 if over_time else 4.2)
+def new_page(over_time: Sequence[bool]) -> Page:
+    """An empty page for panels over time and square ones, given as True and False in their order.
+
+    Panels of one kind that follow each other are a block; the blocks are beside or below each
+    other, in their order.
+    """
+    blocks = [(kind, len([*block])) for kind, block in groupby(over_time)]
+    longest = max((number for kind, number in blocks if kind), default=0)
+    many, square = longest > MAX_STACK, len(over_time) - sum(over_time)
+    natural = 8.4 if many else 5.4 if longest else 0.0
+    natural += 3.6 * max(0, sum(kind for kind, _ in blocks) - 1)
+    natural += min(square, 3 if not longest else 1) * (3.0 if longest else 4.2)
     width = style.figure_width(natural)
-    columns = 0 if not over_time else 2 if many and width >= 2 * MIN_COLUMN else 1
-    rows = ceil(over_time / columns) if columns else 0
-    beside = bool(columns and square) and width >= (columns + 1) * MIN_COLUMN
+    columns = 0 if not longest else 2 if many and width >= 2 * MIN_COLUMN else 1
+    parts = [columns if kind else 1 for kind, _ in blocks]
+    beside = len(blocks) > 1 and width >= sum(parts) * MIN_COLUMN
     across = 1 if beside else max(1, min(square, int(width / MIN_COLUMN)))
-    side = width / (columns + 1) if beside else min(width / across, 4.2)
-    height_over_time, height_square = ROW * rows, 0.92 * side * ceil(square / across)
-    stacked = height_over_time + height_square
-    height = max(height_over_time, height_square) if beside else stacked
-    figure = style.new_figure(width, height + 0.85)
-    left: Any = figure
-    right: Any = figure
-    halves: Any = figure.subfigures
-    if columns and square:
-        if beside:
-            left, right = halves(1, 2, width_ratios=[1.05 * columns, 1.0])
-        else:
-            shares = [height_over_time, height_square]
-            left, right = halves(2, 1, height_ratios=shares)
-    series: Any = left.subplots(rows, columns, squeeze=False) if columns else []
-    placed = [[*column] for column in zip(*series)]
-    for axes in placed[-1][over_time - rows * columns :] if over_time < rows * columns else []:
-        axes.remove()
-        placed[-1].remove(axes)
-    squares: list[Axes] = []
-    if square:
-        cells: Any = right.subplots(ceil(square / across), across, squeeze=False)
-        squares = [*cells.flat]
-        for axes in squares[square:]:
+    side = width / sum(parts) if beside else min(width / across, 4.2)
+    shapes = [
+        (ceil(n / columns), columns) if kind else (ceil(n / across), across) for kind, n in blocks
+    ]
+    heights = [
+        rows * (ROW if kind else 0.92 * side)
+        for (rows, _), (kind, _) in zip(shapes, blocks, strict=True)
+    ]
+    figure = style.new_figure(width, (max(heights) if beside else sum(heights)) + 0.85)
+    parents: Any = [figure]
+    if beside:
+        shares = [
+            1.05 * part if kind else 1.0 for part, (kind, _) in zip(parts, blocks, strict=True)
+        ]
+        parents = figure.subfigures(1, len(blocks), width_ratios=shares)
+    elif len(blocks) > 1:
+        parents = figure.subfigures(len(blocks), 1, height_ratios=heights)
+    page = Page(figure, [], [])
+    for parent, shape, (kind, number) in zip(parents, shapes, blocks, strict=True):
+        cells = parent.subplots(*shape, squeeze=False)
+        placed = [*(cells.T if kind else cells).flat]
+        page.panels.extend(placed[:number])
+        for axes in placed[number:]:
             axes.remove()
-        del squares[square:]
-    return Page(figure, placed, squares)
+        if kind:
+            rows = shape[0]
+            page.columns.extend(placed[k : min(k + rows, number)] for k in range(0, number, rows))
+    return page
 
 
 def add_heading(figure: Figure, title: str, more: str = "", legend: Sequence[Any] = ()) -> None:

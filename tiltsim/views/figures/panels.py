@@ -35,6 +35,10 @@ NARROW: Final = 8.0
 """Ratio of a path's extents above which its plan view has a scale of its own for each axis."""
 
 
+SMALLEST_ANGLES: Final = 1e-3
+"""Smallest range (rad) of an axis of angles: what is far smaller is as good as zero."""
+
+
 class Shown(NamedTuple):
     """A flight of a figure, with the text of its legend and the look of its lines."""
 
@@ -78,9 +82,10 @@ def column_panel(name: str) -> Panel:
                 color = one.look["color"] if len(shown) > 1 else style.INK
                 axes.plot(time, one.flight[f"{name}_ref"], color=color, ls=":", lw=0.8)
             _mark_end(axes, one, values)
-        axes.set_ylabel(shown[0].flight.assembly.loop.label(name).text)
-        widen(axes, 1e-6)
+        label = shown[0].flight.assembly.loop.label(name)
+        axes.set_ylabel(label.text)
         show_last_periods(axes, [one.flight for one in shown])
+        widen(axes, SMALLEST_ANGLES if label.unit == "rad" else 1e-6)
 
     return Panel(draw, needs=name)
 
@@ -187,12 +192,17 @@ def _reference(axes: Axes, reference: Floats, label: str) -> None:
 
 
 def show_last_periods(axes: Axes, flights: Sequence[Flight]) -> None:
-    """Show only the last periods of moving gaits where all of them would be a solid band."""
+    """Show only the last periods of moving gaits where all of them would be a solid band.
+
+    Of flights of different lengths they are the last ones that all flights have.
+    """
     longest = many_periods(flights)
     if longest > 0.0:
-        end = max(float(flight["time"][-1]) for flight in flights)
-        show_part(axes, end - SHOWN_PERIODS * longest, end)
-        axes.set_xlabel(f"time (s), the last {SHOWN_PERIODS} periods")
+        ends = [float(flight["time"][-1]) for flight in flights]
+        begin = max(0.0, min(ends) - SHOWN_PERIODS * longest)
+        show_part(axes, begin, begin + SHOWN_PERIODS * longest)
+        shared = "" if min(ends) == max(ends) else " of all flights"
+        axes.set_xlabel(f"time (s), the last {SHOWN_PERIODS} periods{shared}")
 
 
 def many_periods(flights: Sequence[Flight]) -> float:

@@ -78,23 +78,19 @@ def plot(
         looks = [style.marked_line(number, longest) for number in range(len(flights))]
         shown = [Shown(*one) for one in zip(flights, names, looks, strict=True)]
         chosen = _chosen(flights, panels)
-        over_time = [name for name, panel in chosen.items() if panel.over_time]
-        page = new_page(len(over_time), len(chosen) - len(over_time))
-        for column in page.over_time:
-            for axes in column:
-                name = over_time.pop(0)
+        page = new_page([panel.over_time for panel in chosen.values()])
+        for axes, panel in zip(page.panels, chosen.values(), strict=True):
+            drawn = _with(shown, panel)
+            if panel.over_time:
                 style.time_axis(axes, max(float(flight["time"][-1]) for flight in flights))
-                drawn = _with(shown, chosen[name])
-                chosen[name].draw(axes, drawn)
-                if not chosen[name].scaled:
-                    exclude_divergence_from_scale(axes, drawn)
+            panel.draw(axes, drawn)
+            if panel.over_time and not panel.scaled:
+                exclude_divergence_from_scale(axes, drawn)
+        for column in page.columns:
             _label_time(column)
-        squares = [panel for panel in chosen.values() if not panel.over_time]
-        for axes, panel in zip(page.square, squares, strict=True):
-            panel.draw(axes, _with(shown, panel))
         marks = _handles(shown, page.figure.axes) if len(flights) > 1 else ()
         add_heading(page.figure, *_heading(flights, title, page.figure.get_figwidth()), [*marks])
-        relabel(page.figure, texts)
+        relabel(page.figure, texts, dict(zip(chosen, page.panels, strict=True)))
         return page.figure
 
 

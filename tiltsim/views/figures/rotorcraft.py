@@ -21,6 +21,7 @@ from tiltsim.views.attitude_plane import (
 from tiltsim.views.figures import style
 from tiltsim.views.figures.layout import legend_over
 from tiltsim.views.figures.panels import (
+    SMALLEST_ANGLES,
     Panel,
     line_width,
     of_one,
@@ -48,6 +49,7 @@ def _attitude(axes: Axes, flight: Flight) -> None:
         axes.plot(flight["time"], flight[f"{angle}_ref"], color=style.INK, ls=":", lw=0.8)
     axes.plot([], [], color=style.INK, ls=":", lw=0.8, label="reference")
     show_last_periods(axes, [flight])
+    widen(axes, SMALLEST_ANGLES)
     axes.set_ylabel("rad")
     legend_over(axes, "Attitude")
 
@@ -76,8 +78,8 @@ def _tilt_angles(axes: Axes, flight: Flight) -> None:
     for rotor, line in zip(ROTORS, style.ROTOR_LINES, strict=True):
         name = f"α{SUBSCRIPTS[rotor]}"
         axes.plot(flight["time"], flight[f"alpha_{rotor}"], label=name, **line)
-    widen(axes, 0.1)
     show_last_periods(axes, [flight])
+    widen(axes, 0.1)
     axes.set_ylabel("rad")
     legend_over(axes, "Tilt angles")
 
@@ -92,8 +94,8 @@ def _rotor_speeds(axes: Axes, flight: Flight) -> None:
             known = axes.get_legend_handles_labels()[1]
             text = "" if "limit" in known else "limit"
             axes.axhline(limit, color=style.RED, ls="--", lw=0.9, label=text)
-    widen(axes, 20.0)
     show_last_periods(axes, [flight])
+    widen(axes, 20.0)
     axes.set_ylabel("along the spin (rad/s)")
     legend_over(axes, "Rotor speeds", 5)
 
