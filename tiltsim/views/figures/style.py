@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 import warnings
 from collections.abc import Iterable, Iterator
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from tiltsim.errors import InputError
 from tiltsim.system.files import replacing
 from tiltsim.system.numbers import is_finite
-from tiltsim.system.text import short_repr
+from tiltsim.system.text import short_repr, shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -163,7 +164,7 @@ def paper_style(file: Path | None = None, size: Size | None = None) -> Iterator[
     what the user's matplotlibrc sets. Contexts within this one only change the ``size`` of figures.
 
     Raises:
-        InputError: If the file cannot be read.
+        InputError: If the file cannot be read or is no style.
     """
     from cycler import cycler
     from matplotlib import rc_context, rcParams
@@ -210,16 +211,41 @@ def _style_of(file: Path) -> dict[str, Any]:
 
     if str(file) in styles.library:
         return dict(styles.library[str(file)])
+    settings: dict[str, Any] = {}
+    with _complaints() as complaints:
+        try:
+            settings = dict(matplotlib.rc_params_from_file(file, use_default_template=False))
+        except (OSError, UnicodeDecodeError, Warning) as error:
+            unreadable = isinstance(error, UnicodeDecodeError)
+            reason = "is no text" if unreadable else getattr(error, "strerror", None) or str(error)
+            complaints.insert(0, reason)
+    if complaints:
+        first = complaints[0].strip().partition("\n")[0]
+        raise InputError(
+            f"--style {file}: {shortened(first, 160)}; give a matplotlib style file, or one of "
+            f"{', '.join(sorted(name for name in styles.available if name[0] != '_'))}"
+        )
+    return settings
+
+
+@contextmanager
+def _complaints() -> Iterator[list[str]]:
+    """What matplotlib logs as wrong within this context; warnings are raised."""
+    logged: list[str] = []
+
+    def keep(record: logging.LogRecord) -> bool:
+        if record.levelno >= logging.WARNING:
+            logged.append(record.getMessage())
+        return False
+
+    logger = logging.getLogger("matplotlib")
+    logger.addFilter(keep)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            return dict(matplotlib.rc_params_from_file(file, use_default_template=False))
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "is no text"
-        raise InputError(
-            f"--style {file}: {reason}; give a matplotlib style file, or one of "
-            f"{', '.join(sorted(name for name in styles.available if name[0] != '_'))}"
-        ) from error
+            yield logged
+    finally:
+        logger.removeFilter(keep)
 
 
 def line_style(number: int) -> dict[str, Any]:
