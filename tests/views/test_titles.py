@@ -74,4 +74,6 @@ def test_names_of_changed_scenarios_are_what_was_changed():
     assert flight_names([base, exact, own]) == ["modified", "exact", "hover"]
     heavy = base.replace({"vehicle.mass": 0.5})
     assert flight_names([heavy, heavy.replace({"vehicle.mass": 0.6})]) == ["mass 0.5", "mass 0.6"]
+    biased = base.replace({"gait.bias": 0.1})
+    assert flight_names([base, biased]) == ["bias 1.0", "bias 0.1"]
     assert flight_names([base, base]) == ["rho_0_modified_1", "rho_0_modified_2"]

@@ -43,14 +43,12 @@ def flight_names(scenarios: Sequence[Scenario], paths: Sequence[Path] = ()) -> l
 
 
 def _differences(scenarios: Sequence[Scenario]) -> Iterator[list[str]]:
-    """The values, in words, of each key that scenarios have in different ways."""
-    given = [
-        dict(leaves(one.model_dump(exclude_unset=True, exclude={*DESCRIPTIVE})))
-        for one in scenarios
-    ]
+    """The values, defaults included, of each key that a scenario sets, in words."""
+    tables = [one.model_dump(exclude_unset=True, exclude={*DESCRIPTIVE}) for one in scenarios]
+    whole = [dict(leaves(one.model_dump())) for one in scenarios]
     own = [getattr(s.controller, "attribute", "").rpartition(".")[2] for s in scenarios]
-    for key in dict.fromkeys(key for keys in given for key in keys):
-        values = [name or keys.get(key) for name, keys in zip(own, given, strict=True)]
+    for key in dict.fromkeys(key for given in tables for key, _ in leaves(given)):
+        values = [name or keys.get(key) for name, keys in zip(own, whole, strict=True)]
         yield [_in_words(key, value) for value in values]
 
 
