@@ -123,6 +123,9 @@ def test_too_small_a_figure_is_one_line(tmp_path, capsys):
     assert "20 mm x 15 mm are too small for these panels" in line
 
 
+GAIT = ["gait", "--angles", "0,0,0,0", "--panels", "a"]
+
+
 def test_every_command_that_draws_has_the_options():
     (commands,) = (
         action
@@ -132,15 +135,17 @@ def test_every_command_that_draws_has_the_options():
     for name, parser in commands.choices.items():
         options = {option for action in parser._actions for option in action.option_strings}
         draws = name == "plot" or "--plot" in options
-        assert ({"--size", "--style", "--title", "--label", "--panels"} <= options) is draws, name
+        assert ({"--size", "--style", "--title", "--label"} <= options) is draws, name
+        assert ("--panels" in options) is (name in ("plot", "gait")), name
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         (["map", "--size", "85mm"], "--size: needs --plot FILE"),
-        (["map", "--panels", "a", "--plot", "FILE"], "--panels: this figure has no panels"),
-        (["gait", "--angles", "0,0,0,0", "--panels", "a", "--plot", "FILE"], "panels: 'a': choose"),
+        (GAIT, "--panels: needs --plot FILE"),
+        ([*GAIT, "--figure", "margin", "--plot", "FILE"], "--panels: this figure has no panels"),
+        ([*GAIT, "--plot", "FILE"], "panels: 'a': choose"),
     ],
 )
 def test_options_of_no_use_are_one_line(words, message, tmp_path, capsys):
@@ -204,6 +209,27 @@ def test_a_missing_style_file_is_one_line(tmp_path, capsys):
     assert main(words) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("tiltsim: --style no.mplstyle: No such file or directory; give a")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (b"font.size: 6\nA letter\n", "Missing colon in file "),
+        (b"font.sise: 6\n", "Bad key font.sise in file "),
+        (b"font.size: big\n", "Bad value in file "),
+        (b"\xff\xfe", "is no text; "),
+    ],
+)
+def test_a_file_that_is_no_style_is_one_line(text, words, tmp_path, capfd):
+    file = tmp_path / "paper.mplstyle"
+    file.write_bytes(text)
+    with (
+        pytest.raises(InputError, match=rf"^--style {file}: {words}") as caught,
+        style.paper_style(file),
+    ):
+        pass
+    assert "\n" not in str(caught.value)
+    assert capfd.readouterr().err == ""
 
 
 # --- words ---------------------------------------------------------------------------------------

@@ -12,16 +12,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def add_plot(parser: argparse.ArgumentParser, figure: str) -> None:
+def add_plot(parser: argparse.ArgumentParser, figure: str, *, panels: bool = False) -> None:
     """Declare ``--plot``, which draws a ``figure``, and the options of figures."""
     parser.add_argument(
         "--plot", type=Path, metavar="FILE", help=f"draw {figure}: FILE.png, .svg or .pdf"
     )
-    add_figure_options(parser)
+    add_figure_options(parser, panels=panels)
 
 
-def add_figure_options(parser: argparse.ArgumentParser) -> None:
-    """Declare size, style, title, labels and panels of a figure."""
+def add_figure_options(parser: argparse.ArgumentParser, *, panels: bool = True) -> None:
+    """Declare size, style, title, labels and, of a figure that has some, panels."""
     group = parser.add_argument_group("figure")
     add = group.add_argument
     size = "such as 85mm, 85x60mm or 3.3x2.4in; without a height, as high as the content needs"
@@ -31,8 +31,9 @@ def add_figure_options(parser: argparse.ArgumentParser) -> None:
     add("--title", metavar="TEXT", help="instead of the figure's own; empty for none")
     label = "TEXT instead of NAME: of a flight, metric, panel, axis or line; repeatable"
     add("--label", action=_Label, default={}, metavar="NAME=TEXT", dest="labels", help=label)
-    panels = "the panels to draw, in this order"
-    add("--panels", type=_names, default=(), metavar="A,B,...", help=panels)
+    if panels:
+        these = "the panels to draw, in this order"
+        add("--panels", type=_names, default=(), metavar="A,B,...", help=these)
 
 
 class _Label(argparse.Action):
@@ -70,12 +71,12 @@ def check_plot(arguments: argparse.Namespace, *, has_panels: bool = False) -> No
         "--style": arguments.style,
         "--title": arguments.title,
         "--label": arguments.labels or None,
-        "--panels": arguments.panels or None,
+        "--panels": getattr(arguments, "panels", ()) or None,
     }
     for option, value in options.items():
         if value is not None and arguments.plot is None:
             raise InputError(f"{option}: needs --plot FILE")
-    if arguments.panels and not has_panels:
+    if options["--panels"] and not has_panels:
         raise InputError("--panels: this figure has no panels to choose from")
     prepare_figure("--plot", arguments.plot)
 

@@ -41,7 +41,7 @@ def add_parser(subparsers: Subparsers) -> None:
     add("--pitch", metavar="RAD")
     add("--faults", action="store_true", help="also print which rotor losses allow hovering")
     add_json(parser)
-    add_plot(parser, "a figure")
+    add_plot(parser, "a figure", panels=True)
     figure = """roll_pitch (default); comparison, two roll-pitch diagrams, with and without bias;
     margin over a period; attainable torques, thrusts and accelerations (ch. 9); determinant
     surfaces and zero curves (ch. 3), without a gait; faults: rotor speeds that hover needs after a
