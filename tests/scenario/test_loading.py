@@ -349,6 +349,8 @@ def test_a_long_value_is_cut(write):
     line = refusal(write(f'foo = "{"x" * 500}"'))
     assert "x" * 60 in line
     assert "x" * 81 not in line
+    path = "/".join(["folder"] * 20)
+    assert path in refusal(write(f'foo = "{path}"'))
 
 
 def test_gains_that_fail_routh_fly_when_allowed(write):

@@ -6,9 +6,10 @@ import json
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from math import pi
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args, get_origin
 
-from tiltsim.system.text import shortened
+from tiltsim.system.text import LONGEST_WORD, shortened
 
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
@@ -42,8 +43,10 @@ _PLAIN_TYPES: Final = {
 
 
 def show(value: object) -> str:
-    """A value as the user wrote it, shortened to 80 characters."""
-    return shortened(json.dumps(value, default=str))
+    """A value as the user wrote it, shortened to 80 characters unless it is a path."""
+    is_path = isinstance(value, str) and Path(value).name != value
+    length = LONGEST_WORD if is_path else 80
+    return shortened(json.dumps(value, default=str), length)
 
 
 def did_you_mean(name: object, names: Iterable[str]) -> str:
