@@ -17,7 +17,8 @@ from tests.docs.shell import commands
 from tiltsim.cli import build_parser, main
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, VEHICLE_LOST
-from tiltsim.scenario.loading import find_scenario_file, parse_override
+from tiltsim.scenario.loading import find_scenario_file
+from tiltsim.scenario.override_keys import parse_override
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.studies.checking import collect
 from tiltsim.sweeps.loading import load_sweep

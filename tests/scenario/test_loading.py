@@ -10,14 +10,9 @@ import pytest
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.library import library_entries
-from tiltsim.scenario.loading import (
-    load_scenario,
-    merge,
-    parse_override,
-    parse_scenario,
-    scenario_toml,
-)
+from tiltsim.scenario.loading import load_scenario, merge, parse_scenario, scenario_toml
 from tiltsim.scenario.metric_names import METRICS
+from tiltsim.scenario.override_keys import parse_override
 from tiltsim.studies.checking import collect
 
 LIBRARY = [address for address, _, _ in library_entries()]
@@ -748,3 +743,50 @@ def test_another_law_or_type_replaces_the_whole_table():
     assert longer == {"simulation": {"duration": 1.0, "timestep": 0.002}}
     assert merge({"gait": 1}, {"gait": walk}) == {"gait": walk}
     assert merge({"gait": walk}, {"gait": 1}) == {"gait": 1}
+
+
+def test_a_kind_with_the_same_keys_keeps_them():
+    trot = load_scenario({"gait": {"type": "trot_continuous", "amplitude": 0.3, "period": 2.0}})
+    changed = trot.replace({"gait.type": "trot_instant"})
+    assert changed.gait.model_dump() == trot.gait.model_dump() | {"type": "trot_instant"}
+    assert merge(trot.model_dump(), {"gait": {"type": "trot_instant"}})["gait"]["period"] == 2.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "end"),
+    [
+        (
+            {"gait.type": "trot_instant"},
+            'gait.type = "trot_instant": drops the other keys of gait; also set gait.amplitude, '
+            "gait.period",
+        ),
+        (
+            {"reference.type": "circle"},
+            'reference.type = "circle": drops the other keys of reference; also set '
+            "reference.radius, reference.angular_frequency",
+        ),
+    ],
+)
+def test_a_change_of_kind_says_what_it_drops(changes, end):
+    case = {"gait": {"type": "fixed", "angles": [0.0, 0.0, 0.0, 0.0]}}
+    assert refusal(case, changes).endswith(end)
+
+
+@pytest.mark.parametrize(
+    ("document", "line"),
+    [
+        (
+            {"reference": {"type": "waypoints", "waypoints": [[0, 0, 0], [1, 0, 0]]}},
+            "reference.waypoints = [[0, 0, 0], [1, 0, 0]]: unknown key; ",
+        ),
+        (
+            {"reference": {"type": "waypoints", "waypoints": [[0, 0, 0]], "times": [0, 1]}},
+            "did you mean positions? known:",
+        ),
+        ({"gait": {"type": "walk"}}, "gait.amplitude: missing, and required (also missing: gait.p"),
+        ({"simulation": {"duration": "10s"}}, '"10s": must be a number in s, without the unit'),
+    ],
+)
+def test_messages_name_the_keys_of_the_file_and_their_units(document, line):
+    assert line in refusal(document)
+    assert "waypoints.waypoints" not in refusal(document)

@@ -86,7 +86,7 @@ def _check(arguments: argparse.Namespace, progress: Progress) -> list[CheckResul
     """Fly and report everything; the files are written even when that is interrupted."""
     from tiltsim.plants.trust import is_trusted
     from tiltsim.resources import shipped_folder
-    from tiltsim.scenario.loading import parse_override
+    from tiltsim.scenario.override_keys import parse_override
     from tiltsim.studies.check_results import not_flown
     from tiltsim.studies.checking import check_all, collect, shard
     from tiltsim.system.files import prepare_file

@@ -10,7 +10,7 @@ from itertools import product
 from math import pi
 from typing import Any, Final, NamedTuple
 
-from tiltsim.scenario.key_units import UNIT
+from tiltsim.scenario.messages import UNIT
 
 TAG_KEYS: Final = ("type", "law", "model")
 """Keys whose value decides which other keys a table has."""

@@ -55,7 +55,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Fly, save, evaluate."""
     from tiltsim.flight.expectations import check_expectations
     from tiltsim.flight.writing import prepare_flight_folder
-    from tiltsim.scenario.loading import is_changed_from_library, load_scenario, parse_override
+    from tiltsim.scenario.loading import is_changed_from_library, load_scenario
+    from tiltsim.scenario.override_keys import parse_override
     from tiltsim.system.files import prepare_file
 
     overrides = dict(parse_override(text) for text in arguments.overrides)

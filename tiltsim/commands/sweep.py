@@ -36,7 +36,7 @@ def add_parser(subparsers: Subparsers) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Fly the points that are not yet finished, and print a summary."""
     from tiltsim.plants.trust import is_trusted
-    from tiltsim.scenario.loading import parse_override
+    from tiltsim.scenario.override_keys import parse_override
     from tiltsim.sweeps.loading import load_sweep
     from tiltsim.sweeps.points import SweepPoints
     from tiltsim.sweeps.running import run_sweep

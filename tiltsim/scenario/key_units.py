@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from functools import cache
 from typing import Any, Final
 
+from tiltsim.scenario.messages import UNIT
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.quantity import SUBSCRIPTS, Quantity, in_words
-
-UNIT: Final = re.compile(r"(.*) \[([^]]+)\]", re.DOTALL)
-"""A description that ends with a unit."""
 
 _WITHOUT_NAME: Final = ("simulation", "vehicle", "controller", "sensors")
 """Tables whose keys speak for themselves."""

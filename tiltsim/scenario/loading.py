@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
-import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from os import PathLike, fsdecode
 from pathlib import Path
@@ -18,8 +16,9 @@ from tiltsim.models.mjcf_files import check_mjcf
 from tiltsim.scenario.arguments import check_keys, check_one_controller, controller_name, plain
 from tiltsim.scenario.controller import DEFAULT_LAW
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
-from tiltsim.scenario.limits import MAX_DEPTH, check_limits
-from tiltsim.scenario.messages import choose, did_you_mean, one_line_message, show
+from tiltsim.scenario.limits import check_limits
+from tiltsim.scenario.messages import choose, did_you_mean, has_same_keys, one_line_message, show
+from tiltsim.scenario.override_keys import split_key
 from tiltsim.scenario.own_tables import replace_tables
 from tiltsim.scenario.scenario import Scenario, Variant
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
@@ -76,10 +75,10 @@ def load_scenario(
     if controller is not None:
         document["controller"] = {"law": "python", "function": controller_name(controller)}
         check_one_controller(overrides or {}, controller)
-    apply_overrides(document, overrides or {}, address)
+    emptied = apply_overrides(document, overrides or {}, address)
     replace_tables(document, reference=reference, gait=gait)
     locate_named_files(document, Path())
-    scenario = parse_scenario(document, address)
+    scenario = parse_scenario(document, address, emptied)
     if controller is None and isinstance(source, Scenario):
         controller = source.own_controller if source.controller == scenario.controller else None
     scenario._own_controller = None if isinstance(controller, str) else controller
@@ -204,8 +203,10 @@ def _lies_in(folder: Path, name: str) -> bool:
     return inside and not Path(name).is_absolute()
 
 
-def apply_overrides(document: dict[str, Any], overrides: Mapping[str, Any], address: str) -> None:
-    """Set values in a document.
+def apply_overrides(
+    document: dict[str, Any], overrides: Mapping[str, Any], address: str
+) -> list[str]:
+    """Set values in a document. Returns those of `KIND_KEYS`, dotted, that emptied their table.
 
     Args:
         document: Changed in place.
@@ -215,16 +216,19 @@ def apply_overrides(document: dict[str, Any], overrides: Mapping[str, Any], addr
     Raises:
         InputError: If a key does not exist.
     """
-    for key, value in _kinds_first(plain(overrides)):  # a copy, as entries of lists are set in it
-        _override(address, document, key, value)
+    given = _kinds_first(plain(overrides))  # a copy, as entries of lists are set in it
+    return [key for key, value in given if _override(address, document, key, value)]
 
 
-def parse_scenario(document: Mapping[str, Any], address: str = "scenario") -> Scenario:
+def parse_scenario(
+    document: Mapping[str, Any], address: str = "scenario", emptied: Collection[str] = ()
+) -> Scenario:
     """Validate a scenario's document.
 
     Args:
         document: Plain dicts and lists, as read from TOML.
         address: Name of the document in messages.
+        emptied: What `apply_overrides` returned.
 
     Raises:
         InputError: As `load_scenario` does.
@@ -236,7 +240,8 @@ def parse_scenario(document: Mapping[str, Any], address: str = "scenario") -> Sc
     try:
         scenario = Scenario.model_validate(document)
     except ValidationError as error:
-        raise InputError(f"{address}: {one_line_message(error, document, Scenario)}") from None
+        message = one_line_message(error, document, Scenario, emptied)
+        raise InputError(f"{address}: {message}") from None
     scenario._address = valid_unicode(address)
     return scenario
 
@@ -275,20 +280,31 @@ def _select_variant(file: Path, document: dict[str, Any], name: str) -> dict[str
     return merged
 
 
-def merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """A document with changes, table by table; a table of another kind replaces the old one."""
+def merge(
+    base: Mapping[str, Any], changes: Mapping[str, Any], path: tuple[str | int, ...] = ()
+) -> dict[str, Any]:
+    """A document with changes, table by table; a table with other keys replaces the old one.
+
+    ``path`` is where the documents lie in a scenario.
+    """
     merged = dict(base)
     for key, value in changes.items():
         old = merged.get(key)
         if isinstance(old, dict) and isinstance(value, dict):
+            place = (*path, key)
             other_kind = any(
-                tag in value and value[tag] != old.get(tag, default)
+                tag in value and _has_other_keys(place, old.get(tag, default), value[tag])
                 for tag, default in KIND_KEYS.items()
             )
-            merged[key] = value if other_kind else merge(old, value)
+            merged[key] = value if other_kind else merge(old, value, place)
         else:
             merged[key] = value
     return merged
+
+
+def _has_other_keys(path: Sequence[str | int], old: object, new: object) -> bool:
+    """Whether a table has other keys for another of its kinds, as a walk has for a trot."""
+    return old != new and not has_same_keys(Scenario, path, old, new)
 
 
 def _kinds_first(overrides: Mapping[str, Any]) -> list[tuple[str, Any]]:
@@ -296,7 +312,8 @@ def _kinds_first(overrides: Mapping[str, Any]) -> list[tuple[str, Any]]:
     return sorted(overrides.items(), key=lambda item: item[0].rpartition(".")[2] not in KIND_KEYS)
 
 
-def _override(address: str, document: dict[str, Any], key: str, value: object) -> None:
+def _override(address: str, document: dict[str, Any], key: str, value: object) -> bool:
+    """Set one value. Returns whether it emptied its table, which has other keys for it."""
     *path, last = split_key(key)
     target: Any = document
     for step in path:
@@ -312,9 +329,11 @@ def _override(address: str, document: dict[str, Any], key: str, value: object) -
         is_list = isinstance(target, list)
         reason = f"is a list; write {name}[{last}]" if is_list else "is not a table"
         raise InputError(f"{address}: {key} = {show(value)}: {name} {reason}")
-    elif last in KIND_KEYS and target.get(last, KIND_KEYS[last]) != value:
+    empties = last in KIND_KEYS and _has_other_keys(path, target.get(last, KIND_KEYS[last]), value)
+    if empties:
         target.clear()
     target[last] = value
+    return empties
 
 
 def _entries_instead(document: dict[str, Any], path: list[str | int], whole: str) -> str:
@@ -335,40 +354,6 @@ def _enter(target: object, step: str | int) -> object:
     if isinstance(step, int):
         return target[step] if isinstance(target, list) and step < len(target) else None
     return target.setdefault(step, {}) if isinstance(target, dict) else None
-
-
-def split_key(key: str) -> list[str | int]:
-    """A dotted key as names and positions: ``gait.angles[1]`` is ``gait``, ``angles``, ``1``."""
-    steps: list[str | int] = []
-    if key.count(".") + key.count("[") > MAX_DEPTH:
-        raise InputError(f"{key[:60]}...: a key of more than {MAX_DEPTH} names and positions")
-    for name in key.split("."):
-        plain, *positions = name.split("[")
-        steps.append(plain)
-        for position in positions:
-            if re.fullmatch(r"[0-9]{1,9}\]", position) is None:
-                raise InputError(f"{key}: entries of lists are written NAME[0], NAME[1], ...")
-            steps.append(int(position[:-1]))
-    return steps
-
-
-def parse_override(text: str) -> tuple[str, Any]:
-    """Split ``KEY=VALUE``; the value is read as TOML, or as a string if it is not TOML.
-
-    Raises `InputError` if the key or the equals sign is missing.
-    """
-    key, equals, value = text.partition("=")
-    key, value = key.strip(), value.strip()
-    if not equals or not key:
-        raise InputError(f"--set {text}: write KEY=VALUE, for example controller.decoupler=exact")
-    try:
-        parsed = tomllib.loads(f"value = {value}")["value"]
-    except ValueError:  # TOMLDecodeError, or an integer with too many digits
-        return key, value
-    except RecursionError:
-        raise InputError(f"--set {key}: lists and tables nest too deep") from None
-    check_limits(parsed, f"--set {key}")
-    return key, parsed
 
 
 def scenario_toml(scenario: Scenario) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from math import pi
 from pathlib import Path
@@ -29,6 +30,9 @@ class InvalidValueError(ValueError):
 
 MAX_OTHERS: Final = 5
 """So many keys with further mistakes are named."""
+
+UNIT: Final = re.compile(r"(.*) \[([^]]+)\]", re.DOTALL)
+"""A description that ends with a unit."""
 
 _PLAIN_TYPES: Final = {
     "float_type": "must be a number",
@@ -62,7 +66,10 @@ def choose(name: object, names: Iterable[str]) -> str:
 
 
 def one_line_message(
-    error: ValidationError, document: Mapping[str, Any], schema: type[BaseModel]
+    error: ValidationError,
+    document: Mapping[str, Any],
+    schema: type[BaseModel],
+    emptied: Collection[str] = (),
 ) -> str:
     """The first mistake in one line, and the keys of others.
 
@@ -70,17 +77,43 @@ def one_line_message(
         error: What pydantic found.
         document: The document that was validated.
         schema: The table that it was validated against.
+        emptied: Dotted keys, such as ``gait.type``, whose change dropped other keys of the table.
     """
     details = error.errors(include_url=False)
     # A misspelt key is often a missing key, too: the unknown one is more helpful.
     details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
-    line = _short_list(details, document) or _describe(details[0], document, schema)
     # Missing entries of one list, and the options of one union, are one mistake each.
-    _, *others = dict.fromkeys(_mistake(detail, document) for detail in details)
+    missing = {_mistake(detail, document): detail["type"] == "missing" for detail in details}
+    told, line = _dropped_keys(missing, document, emptied) or (
+        [*missing][:1],
+        _short_list(details, document) or _describe(details[0], document, schema, details),
+    )
+    others = [key for key in missing if key not in told]
     if not others:
         return line
     more = f" and {len(others) - MAX_OTHERS} more" if len(others) > MAX_OTHERS else ""
-    return f"{line} (also wrong: {', '.join(others[:MAX_OTHERS])}{more})"
+    kind = "missing" if all(missing[other] for other in others) else "wrong"
+    return f"{line} (also {kind}: {', '.join(others[:MAX_OTHERS])}{more})"
+
+
+def _dropped_keys(
+    missing: Mapping[str, bool], document: Mapping[str, Any], emptied: Iterable[str]
+) -> tuple[list[str], str] | None:
+    """Required keys that a change of kind dropped, and the line for them; None if it is not first.
+
+    Args:
+        missing: The keys with mistakes, and whether they are missing.
+        document, emptied: See `one_line_message`.
+    """
+    first = next(iter(missing))
+    for kind in emptied:
+        table, _, tag = kind.rpartition(".")
+        required = [key for key in missing if missing[key] and key.startswith(f"{table}.")]
+        if first in required:
+            value = show(_locate((*table.split("."), tag), document)[1])
+            also = ", ".join(required)
+            return required, f"{kind} = {value}: drops the other keys of {table}; also set {also}"
+    return None
 
 
 def _mistake(detail: Any, document: Mapping[str, Any]) -> str:
@@ -103,14 +136,23 @@ def _short_list(details: Any, document: Mapping[str, Any]) -> str:
     return f"{key} = {show(value)}: must have {length} entries"
 
 
-def _describe(detail: Any, document: Mapping[str, Any], schema: type[BaseModel]) -> str:
+def _describe(
+    detail: Any, document: Mapping[str, Any], schema: type[BaseModel], details: Iterable[Any]
+) -> str:
     kind, context = detail["type"], detail.get("ctx", {})
     if isinstance(context.get("error"), InvalidValueError):
         return str(context["error"])
     keep_last = kind in {"missing", "extra_forbidden"}
     key, value = _locate(detail["loc"], document, keep_last=keep_last)
     if kind == "extra_forbidden":
-        return f"{key} = {show(value)}: unknown key; {_known_keys(schema, detail['loc'], key)}"
+        *table, _ = detail["loc"]
+        missing = [
+            other["loc"][-1]
+            for other in details
+            if other["type"] == "missing" and [*other["loc"][:-1]] == table
+        ]
+        known = _known_keys(schema, detail["loc"], key, missing)
+        return f"{key} = {show(value)}: unknown key; {known}"
     if kind == "missing":
         return f"{key}: missing, and required"
     if kind in {"union_tag_invalid", "union_tag_not_found"}:
@@ -133,9 +175,22 @@ def _describe(detail: Any, document: Mapping[str, Any], schema: type[BaseModel])
         return f"{key} = {show(value)}: angles are in rad, from -3.14159 to 3.14159"
     if kind == "tuple_type":
         return f"{key} = {show(value)}: must be a list{_entries(schema, detail['loc'])}"
+    unit = _unit(schema, detail["loc"])
+    if kind == "float_type" and unit and re.match(r"[-+.]*\d", str(value)):
+        return f"{key} = {show(value)}: must be a number in {unit}, without the unit"
     if kind in _PLAIN_TYPES:
         return f"{key} = {show(value)}: {_PLAIN_TYPES[kind]}"
     return f"{key} = {show(value)}: {detail['msg'].replace('Input should', 'must')}"
+
+
+def _unit(schema: Any, location: tuple[Any, ...]) -> str:
+    """The unit of a number, from the description of its key; empty without one."""
+    *path, name = "", *(part for part in location if not isinstance(part, int))
+    for part in path:
+        schema = _member(schema, part)
+    field = getattr(schema, "model_fields", {}).get(name)
+    match = UNIT.fullmatch((field and field.description) or "")
+    return match[2] if match and match[2] != "-" and "," not in match[2] else ""
 
 
 def _bound(context: Mapping[str, Any]) -> float:
@@ -151,11 +206,16 @@ def _locate(
     """
     keys: list[str] = []
     value: Any = document
+    tag: object = None
     for position, part in enumerate(location):
+        if part == tag and tag is not None:  # also where a key has the same name
+            tag = None
+            continue
         in_table = isinstance(value, Mapping) and part in value
         in_list = isinstance(value, list | tuple) and isinstance(part, int) and part < len(value)
         if in_table or in_list:
             value = value[part]
+            tag = value.get(_tag_key(value)) if isinstance(value, Mapping) else None
         elif not (keep_last and position == len(location) - 1):
             continue
         keys.append(f"[{part}]" if isinstance(part, int) else f".{part}")
@@ -179,8 +239,25 @@ def _tag_key(fields: Mapping[str, Any]) -> str:
     return next((key for key in ("type", "law", "model") if key in fields), "")
 
 
-def _known_keys(schema: Any, location: tuple[Any, ...], key: str) -> str:
-    """The keys allowed instead of an unknown one, after a hint where it may belong."""
+def has_same_keys(schema: Any, path: Iterable[object], one: object, other: object) -> bool:
+    """Whether two kinds of a table have one declaration of their keys.
+
+    Args:
+        schema: The type of the whole document.
+        path: Where the table lies in it.
+        one, other: The kinds, such as ``trot_instant``.
+    """
+    for part in path:
+        schema = _member(schema, part)
+    table = _member(schema, one)
+    return table is not schema and table is _member(schema, other)
+
+
+def _known_keys(schema: Any, location: tuple[Any, ...], key: str, missing: Sequence[str]) -> str:
+    """The keys allowed instead of an unknown one, after a hint where it may belong.
+
+    ``missing`` are the required keys that its table lacks.
+    """
     union, table, name = schema, schema, key.rpartition(".")[2]
     for part in location[:-1]:
         union, table = table, _member(table, part)
@@ -196,6 +273,8 @@ def _known_keys(schema: Any, location: tuple[Any, ...], key: str) -> str:
         hint = f"did you mean {' or '.join(elsewhere[:3])}? "
     else:
         hint = did_you_mean(name, names)
+        if not hint and len(missing) == 1:
+            hint = f"did you mean {missing[0]}? "
     return f"{hint}known: {', '.join(names)}"
 
 

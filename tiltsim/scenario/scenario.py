@@ -48,7 +48,8 @@ class Scenario(ScenarioTables):
 
         Args:
             changes: Values by dotted key, for example ``{"gait.amplitude": 0.3}``. Another
-                ``gait.type``, ``controller.law`` or the like empties its table first.
+                ``gait.type``, ``controller.law`` or the like empties its table first, unless both
+                kinds have the same keys, as ``trot_instant`` and ``trot_continuous``.
 
         Raises:
             InputError: In one line: the key, the value and what is allowed.

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
-from tiltsim.scenario.loading import parse_scenario, split_key
+from tiltsim.scenario.loading import parse_scenario
 from tiltsim.scenario.messages import show
+from tiltsim.scenario.override_keys import split_key
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.system.numbers import is_number

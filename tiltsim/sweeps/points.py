@@ -12,8 +12,9 @@ from functools import cached_property
 from math import prod
 from typing import Any, Final
 
-from tiltsim.scenario.loading import apply_overrides, merge, parse_scenario, split_key
+from tiltsim.scenario.loading import apply_overrides, merge, parse_scenario
 from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
+from tiltsim.scenario.override_keys import split_key
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.sweeps.base_values import BaseValues
 from tiltsim.sweeps.definition import SweepDefinition

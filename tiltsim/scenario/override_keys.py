@@ -1,0 +1,46 @@
+"""Values by dotted key, as ``--set`` and the overrides of `load_scenario` have them."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from typing import Any
+
+from tiltsim.errors import InputError
+from tiltsim.scenario.limits import MAX_DEPTH, check_limits
+
+
+def split_key(key: str) -> list[str | int]:
+    """A dotted key as names and positions: ``gait.angles[1]`` is ``gait``, ``angles``, ``1``."""
+    steps: list[str | int] = []
+    if key.count(".") + key.count("[") > MAX_DEPTH:
+        raise InputError(f"{key[:60]}...: a key of more than {MAX_DEPTH} names and positions")
+    for name in key.split("."):
+        plain, *positions = name.split("[")
+        steps.append(plain)
+        for position in positions:
+            if re.fullmatch(r"[0-9]{1,9}\]", position) is None:
+                raise InputError(
+                    f"{key}: entries of lists count from 0, and are written NAME[0], NAME[1], ..."
+                )
+            steps.append(int(position[:-1]))
+    return steps
+
+
+def parse_override(text: str) -> tuple[str, Any]:
+    """Split ``KEY=VALUE``; the value is read as TOML, or as a string if it is not TOML.
+
+    Raises `InputError` if the key or the equals sign is missing.
+    """
+    key, equals, value = text.partition("=")
+    key, value = key.strip(), value.strip()
+    if not equals or not key:
+        raise InputError(f"--set {text}: write KEY=VALUE, for example controller.decoupler=exact")
+    try:
+        parsed = tomllib.loads(f"value = {value}")["value"]
+    except ValueError:  # TOMLDecodeError, or an integer with too many digits
+        return key, value
+    except RecursionError:
+        raise InputError(f"--set {key}: lists and tables nest too deep") from None
+    check_limits(parsed, f"--set {key}")
+    return key, parsed
