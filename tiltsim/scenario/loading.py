@@ -54,9 +54,9 @@ def load_scenario(
             ``{"gait.period": 2.0, "gait.angles[0]": 0.1}``. Arrays are taken as lists, here and in
             a dict. A family without ``#variant`` needs them or a controller, and is its base then.
         controller: A controller of your own, which replaces the scenario's before anything is
-            checked; the overrides then have no other law or function: a function from `tiltsim.Observation` to `tiltsim.Command`, an object with
-            ``__call__`` and, if it has a memory, ``reset(scenario)``, a class of such objects, or
-            ``"FILE.py:NAME"``.
+            checked; the overrides then have no other law or function: a function from
+            `tiltsim.Observation` to `tiltsim.Command`, an object with ``__call__`` and, if it has a
+            memory, ``reset(scenario)``, a class of such objects, or ``"FILE.py:NAME"``.
         reference: A motion of your own in place of the scenario's, whose attitude and
             acceleration_feedforward stay: a function of time (s) that returns a position ``(x, y,
             z)`` (m), sampled over the duration of the flight every 0.01 s; or a table with the
