@@ -23,12 +23,13 @@ from tiltsim.sweeps.tables import PlotTable
 from tiltsim.views.figures import style
 from tiltsim.views.figures.adjusting import relabel, retitle
 from tiltsim.views.figures.distributions import distinct_texts
+from tiltsim.views.figures.layout import MIN_PANEL
 from tiltsim.views.figures.plot import plot
 from tiltsim.views.figures.sweep_columns import label_of
 
 
 def labels_of(figure):
-    return [axes.get_ylabel() for axes in figure.axes]
+    return [axes.get_ylabel().replace("\n", " ") for axes in figure.axes]
 
 
 # --- size and panels -----------------------------------------------------------------------------
@@ -87,6 +88,21 @@ def test_the_attitude_of_several_flights_has_a_panel_per_angle():
     figure = plot([flight("trot"), flight("fixed")], panels=["attitude", "alpha_1"], size="170mm")
     angles = ["roll (rad)", "pitch (rad)", "yaw (rad)"]
     assert labels_of(figure) == [*angles[:1], *angles[2:], angles[1], "tilt angle α₁ (rad)"]
+
+
+def test_the_height_that_panels_need_is_named_and_suffices():
+    two = [flight("trot"), flight("fixed")]
+    drawing = {"panels": ["position_error", "margin"], "labels": ["a long name " * 6, "b"]}
+    with pytest.raises(InputError, match=r"^60 mm is too low for 2 panels; at least ") as raised:
+        plot(two, **drawing, size="85x60mm")
+    least = int(str(raised.value).split()[-2])
+    assert 60 < least < 120
+    figure = plot(two, **drawing, size=f"85x{least}mm")
+    figure.draw_without_rendering()
+    heights = [axes.get_window_extent().height / figure.dpi for axes in figure.axes]
+    assert min(heights) >= MIN_PANEL
+    (legend,) = figure.legends
+    assert legend.get_window_extent().x1 <= figure.bbox.x1
 
 
 def test_the_last_periods_shown_are_those_of_the_shortest_flight():

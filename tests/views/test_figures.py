@@ -195,7 +195,7 @@ def test_flights_are_compared_by_margin_determinant_and_error():
     flights = [flight("jumps"), supervised()]
     figure = plot(flights)
     figure.canvas.draw()
-    panels = {axes.get_ylabel(): axes for axes in figure.axes}
+    panels = {axes.get_ylabel().replace("\n", " "): axes for axes in figure.axes}
     columns = {
         "singularity margin (rad)": "singularity_margin",
         "determinant n · r₃": "determinant",
@@ -254,7 +254,8 @@ def test_the_page_of_a_variant_names_it():
 
 
 def test_vehicles_of_several_kinds_are_compared_by_what_they_have():
-    panels = {axes.get_ylabel(): axes for axes in plot([flight("tilt_car"), flight("jumps")]).axes}
+    figure = plot([flight("tilt_car"), flight("jumps")])
+    panels = {axes.get_ylabel().replace("\n", " "): axes for axes in figure.axes}
     lines = {
         label: sum(len(line.get_xdata()) > 2 for line in axes.lines)
         for label, axes in panels.items()

@@ -299,7 +299,7 @@ def _side_view(axes: Axes, n: Floats) -> None:
     arc = 0.75 * length * np.stack([np.cos(turned), np.sin(turned)], axis=1)
     axes.plot(*arc.T, color=style.PURPLE, lw=2.4, zorder=5.0)
     text(axes, arc[-1] - (0.02, 0.0), "margin", ha="right")
-    text(axes, -0.55 * length * along, "unreachable", color=style.SINGULAR)
+    text(axes, -0.8 * length * along, "unreachable", color=style.SINGULAR)
 
 
 def _roll_pitch_plane(axes: Axes, n: Floats, vehicle: Vehicle) -> None:
@@ -308,7 +308,7 @@ def _roll_pitch_plane(axes: Axes, n: Floats, vehicle: Vehicle) -> None:
     axes.fill_between(roll, low, high, color=style.UNREACHABLE, lw=0.0, zorder=0.5)
     axes.plot(*singular_curves(n)[0].T, color=style.SINGULAR, lw=1.8)
     style.roll_pitch_axes(axes)
-    text(axes, (-0.95, -1.2), "unreachable\nmargin < 0", color=style.SINGULAR)
+    text(axes, (-0.9, -1.33), "unreachable\nmargin < 0", color=style.SINGULAR)
     hover = exact_decoupler(0.0, 0.0, 0.0, 0.0, vehicle.gravity, tuple(n[0]))
     nearest = nearest_singular(n, np.array([LEANING]))[0]
     axes.plot(*np.array([LEANING, nearest]).T, color=style.PURPLE, lw=2.4)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Sequence
 from itertools import groupby
 from math import ceil
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+from tiltsim.errors import InputError
 from tiltsim.views.figures import style
 
 if TYPE_CHECKING:
@@ -21,8 +23,15 @@ MIN_COLUMN: Final = 2.9
 ROW: Final = 1.75
 """Height (inches) of a panel over time, unless the height of the figure is given."""
 
+_TRIES: Final = 5
+"""Heights that are tried for a page of a given width."""
+
 MAX_STACK: Final = 3
 """Panels over time in one column before a second one is begun, if there is room."""
+
+
+MIN_PANEL: Final = 0.6
+"""Height (inches) that a panel needs for its scale and label."""
 
 
 class Page(NamedTuple):
@@ -80,6 +89,58 @@ def new_page(over_time: Sequence[bool]) -> Page:
     return page
 
 
+def fitting(draw: Callable[[], Page]) -> Figure:
+    """A page of the size in use whose panels are high enough to be read.
+
+    If only its width is given, it is drawn as high as they need.
+
+    Raises:
+        InputError: If the height is given and too low.
+    """
+    page, asked = draw(), style.asked_size()
+    if asked is None:
+        return page.figure
+    first, (width, height) = page, page.figure.get_size_inches()
+    lowest, rows = _heights(page)
+    if rows == 0:
+        with style.paper_style(size=style.Size(width)):
+            page = draw()
+        height = page.figure.get_size_inches()[1]
+        lowest, rows = _heights(page)
+        height, lowest = height - rows * (lowest - MIN_PANEL), 0.0
+    for _ in range(_TRIES):
+        if rows == 0 or lowest >= MIN_PANEL:
+            break
+        height = ceil(25.4 * (height + rows * max(0.0, MIN_PANEL - lowest))) / 25.4
+        with style.paper_style(size=style.Size(width, height)):
+            page = draw()
+        lowest, rows = _heights(page)
+    if page is first or rows == 0:  # if it is too narrow, saving it says so
+        return first.figure
+    if asked.height is not None:
+        number = f"{len(page.panels)} panel{'s' * (len(page.panels) > 1)}"
+        least = f"at least {25.4 * height:.0f} mm"
+        raise InputError(f"{25.4 * asked.height:.0f} mm is too low for {number}; {least}")
+    return page.figure
+
+
+def _heights(page: Page) -> tuple[float, int]:
+    """Height (inches) of the lowest panel, and the rows of panels; zeros if they do not fit."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from font")
+        warnings.filterwarnings("error", "constrained_layout not applied")
+        try:
+            page.figure.draw_without_rendering()
+        except UserWarning:
+            return 0.0, 0
+    parents: Any = [axes.figure for axes in page.panels]
+    boxes = [
+        axes.get_position(original=True).transformed(parent.transSubfigure)
+        for axes, parent in zip(page.panels, parents, strict=True)
+    ]
+    return min(box.height for box in boxes) / page.figure.dpi, len({round(b.y0) for b in boxes})
+
+
 def add_heading(figure: Figure, title: str, more: str = "", legend: Sequence[Any] = ()) -> None:
     """Write what stands above the panels, wrapped to the width.
 
@@ -116,24 +177,31 @@ def add_heading(figure: Figure, title: str, more: str = "", legend: Sequence[Any
 
 def add_legend(figure: Figure, handles: Sequence[Any], columns: int = 9, **look: Any) -> Legend:
     """A legend of the whole figure, below it by default, in as many columns as fit."""
-    width = 0.96 * figure.get_size_inches()[0] * figure.dpi
+    inches = figure.get_size_inches()[0]
+    # Letters are a little wider in the resolution of print.
+    width = min(0.96 * inches, 0.97 * (inches - 0.28)) * figure.dpi
     look = {"loc": "outside lower center", **look}
     columns = min(columns, len(handles))
     while True:
         legend = figure.legend(handles=handles, ncols=columns, **look)
-        if columns == 1 or legend.get_window_extent().width <= width:
+        if legend.get_window_extent().width <= width:
+            return legend
+        if columns == 1:
+            for text in legend.get_texts():
+                wrap(text, width - 3.0 * float(text.get_fontsize()) * figure.dpi / 72.0)
             return legend
         legend.remove()
         columns -= 1
 
 
 def wrap(text: Text, width: float) -> None:
-    """Break a text into lines of at most a width (pixels), between words."""
+    """Break a text, level or upright, into lines of at most a width (pixels), between words."""
     lines: list[str] = []
     for word in text.get_text().split(" "):
         longer = f"{lines[-1]} {word}" if lines else word
         text.set_text(longer)
-        if lines and text.get_window_extent().width > width:
+        box = text.get_window_extent()
+        if lines and (box.height if text.get_rotation() == 90.0 else box.width) > width:
             lines.append(word)
         else:
             lines[-1:] = [longer]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.errors import InputError
@@ -11,7 +12,7 @@ from tiltsim.scenario.messages import choose
 from tiltsim.system.text import short_repr
 from tiltsim.views.figures import style
 from tiltsim.views.figures.adjusting import relabel
-from tiltsim.views.figures.layout import add_heading, new_page
+from tiltsim.views.figures.layout import Page, add_heading, fitting, new_page, wrap
 from tiltsim.views.figures.panels import (
     COMPARED,
     GROUPS,
@@ -78,20 +79,44 @@ def plot(
         looks = [style.marked_line(number, longest) for number in range(len(flights))]
         shown = [Shown(*one) for one in zip(flights, names, looks, strict=True)]
         chosen = _chosen(flights, panels)
-        page = new_page([panel.over_time for panel in chosen.values()])
-        for axes, panel in zip(page.panels, chosen.values(), strict=True):
-            drawn = _with(shown, panel)
-            if panel.over_time:
-                style.time_axis(axes, max(float(flight["time"][-1]) for flight in flights))
-            panel.draw(axes, drawn)
-            if panel.over_time and not panel.scaled:
-                exclude_divergence_from_scale(axes, drawn)
-        for column in page.columns:
-            _label_time(column)
-        marks = _handles(shown, page.figure.axes) if len(flights) > 1 else ()
-        add_heading(page.figure, *_heading(flights, title, page.figure.get_figwidth()), [*marks])
-        relabel(page.figure, texts, dict(zip(chosen, page.panels, strict=True)))
-        return page.figure
+        heading = partial(_heading, flights, title)
+        return fitting(lambda: _page(shown, chosen, heading, texts))
+
+
+def _page(
+    shown: Sequence[Shown],
+    chosen: Mapping[str, Panel],
+    heading: Callable[[float], tuple[str, str]],
+    texts: Mapping[str, str],
+) -> Page:
+    """Draw the panels.
+
+    Args:
+        shown: The flights.
+        chosen: The panels by name.
+        heading: Title and line below it for a width (inches).
+        texts: Texts instead of others.
+    """
+    page = new_page([panel.over_time for panel in chosen.values()])
+    for axes, panel in zip(page.panels, chosen.values(), strict=True):
+        drawn = _with(shown, panel)
+        if panel.over_time:
+            style.time_axis(axes, max(float(one.flight["time"][-1]) for one in shown))
+        panel.draw(axes, drawn)
+        if panel.over_time and not panel.scaled:
+            exclude_divergence_from_scale(axes, drawn)
+    for column in page.columns:
+        _label_time(column)
+    marks = [*_handles(shown, page.figure.axes)] if len(shown) > 1 else []
+    said = {str(mark.get_label()): mark for mark in marks}
+    for name in said.keys() & texts.keys():
+        said[name].set_label(style.verbatim(texts[name]))
+    others = {name: text for name, text in texts.items() if name not in said}
+    relabel(page.figure, others, dict(zip(chosen, page.panels, strict=True)))
+    add_heading(page.figure, *heading(page.figure.get_figwidth()), marks)
+    for axes in page.panels:
+        wrap(axes.yaxis.label, axes.get_window_extent().height)
+    return page
 
 
 def _names_and_texts(

@@ -291,6 +291,11 @@ def new_figure(width: float, height: float) -> Figure:
     return ShownFigure(figsize=(width, height), layout="constrained")
 
 
+def asked_size() -> Size | None:
+    """The size of the context."""
+    return _size.get()
+
+
 def figure_width(natural: float) -> float:
     """The width (inches) that a new figure will have if this is its natural one."""
     asked = _size.get()
