@@ -190,7 +190,10 @@ class FigureEightReference(_PositionReference):
 class WaypointReference(_PositionReference):
     """Minimum-snap motion from rest to rest through points at given times."""
 
-    type: Literal["waypoints"] = Field(description="a smooth motion through given points")
+    type: Literal["waypoints"] = Field(
+        description="a smooth motion through given points; it leaves the straight lines between "
+        "them, by half a side of a square in even times; further points on a line keep it closer"
+    )
     positions: Annotated[tuple[Vector3, ...], Field(min_length=2, max_length=50, strict=False)] = (
         Field(
             description="the points; the first is the start [m]",

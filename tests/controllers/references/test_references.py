@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from functools import cache
 
 import numpy as np
@@ -15,7 +16,11 @@ from tiltsim_controllers.references.trajectories import (
     position_reference,
     reference_derivatives,
 )
-from tiltsim_controllers.references.waypoints import minimum_snap_knots, table_knots
+from tiltsim_controllers.references.waypoints import (
+    minimum_snap_knots,
+    table_knots,
+    waypoint_motion,
+)
 
 CIRCLE = ReferenceParameters(
     REFERENCE_TYPES["circle"], 1.0, -2.0, 3.0, radius=5.0, angular_frequency=0.1
@@ -223,3 +228,15 @@ def test_waypoints_that_make_no_motion_are_refused(points, times, message):
 
 def test_what_a_reference_leaves_out_is_zero():
     assert not any(ReferenceParameters(REFERENCE_TYPES["line"])[1:])
+
+
+def test_a_square_of_waypoints_is_left_as_documented():
+    """docs/beyond.md: by 0.98 m with even times, with the edges' midpoints by 0.10 m."""
+    corners = [(0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.0, 2.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 0.0)]
+    halves = [tuple((np.add(a, b) / 2).tolist()) for a, b in itertools.pairwise(corners)]
+    more = [point for pair in zip(corners, halves, strict=False) for point in pair] + corners[-1:]
+    for points, outside in ((corners, 0.98), (more, 0.10)):
+        times = np.linspace(0.0, 20.0, len(points)).tolist()
+        knots = np.array(minimum_snap_knots(points, times))
+        x = [waypoint_motion(t, len(times), 0.0, knots)[0] for t in np.linspace(0.0, 20.0, 401)]
+        assert round(max(x) - 2.0, 2) == outside
