@@ -790,3 +790,12 @@ def test_a_change_of_kind_says_what_it_drops(changes, end):
 def test_messages_name_the_keys_of_the_file_and_their_units(document, line):
     assert line in refusal(document)
     assert "waypoints.waypoints" not in refusal(document)
+
+
+def test_a_controller_of_ones_own_decides_on_the_acceleration_of_the_reference():
+    case = {"reference": {"type": "setpoint", "acceleration_feedforward": True}}
+    own = {"controller.law": "python", "controller.function": "mine.py:fly"}
+    for changed in (load_scenario(case, own), load_scenario(case, controller="mine.py:fly")):
+        assert not changed.reference.acceleration_feedforward
+    kept = own | {"reference.acceleration_feedforward": True}
+    assert refusal(case, kept).endswith("always includes all derivatives; set it to false")

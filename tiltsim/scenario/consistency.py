@@ -205,7 +205,7 @@ def _check_reference(scenario: ScenarioTables) -> None:
         option = " with gait_rate_feedforward" if own else ""
         raise scenario.mistake(
             "reference.acceleration_feedforward",
-            f"the {controller.law} law{option} always includes all derivatives; remove it",
+            f"the {controller.law} law{option} always includes all derivatives; set it to false",
         )
     if isinstance(controller, AttitudeAltitudeController):
         needs_none = reference.kind == "attitude_altitude"

@@ -76,6 +76,8 @@ def load_scenario(
         document["controller"] = {"law": "python", "function": controller_name(controller)}
         check_one_controller(overrides or {}, controller)
     emptied = apply_overrides(document, overrides or {}, address)
+    if controller is not None or "controller.law" in emptied:
+        _drop_what_own_controllers_ignore(document, overrides or {})
     replace_tables(document, reference=reference, gait=gait)
     locate_named_files(document, Path())
     scenario = parse_scenario(document, address, emptied)
@@ -83,6 +85,16 @@ def load_scenario(
         controller = source.own_controller if source.controller == scenario.controller else None
     scenario._own_controller = None if isinstance(controller, str) else controller
     return scenario
+
+
+def _drop_what_own_controllers_ignore(
+    document: dict[str, Any], overrides: Mapping[str, Any]
+) -> None:
+    """Leave it to a controller of one's own which derivatives it uses, unless overrides say it."""
+    law, reference = document["controller"]["law"], document.get("reference")
+    is_given = "reference.acceleration_feedforward" in overrides
+    if law == "python" and isinstance(reference, dict) and not is_given:
+        reference.pop("acceleration_feedforward", None)
 
 
 def as_scenario(source: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Scenario:
