@@ -135,6 +135,18 @@ MISUSES = {
     "a size of nothing": (lambda: flight("fixed").plot(size=(0, 2)), "must be from 0.5"),
     "a number as title": (lambda: flight("fixed").plot(title=3), "title = 3: must be text"),
     "two labels for a flight": (lambda: flight("fixed").plot(labels="ab"), "labels = 'ab': must"),
+    "a label that is no text": (lambda: flight("fixed").plot(labels={"x": 4}), "labels = {'x': 4}"),
+    "a label of a number": (lambda: flight("fixed").plot(labels={3: "x"}), "labels = {3: 'x'}"),
+    "numbers as labels": (lambda: flight("fixed").plot(labels=[1]), "labels = [1]: must be a list"),
+    "a number as labels": (lambda: flight("fixed").plot(labels=3), "labels = 3: must be a list"),
+    "a figure too narrow": (
+        lambda: flight("fixed").plot(panels="margin", size=(0.5, 3)),
+        "13 mm x 76 mm are too small for these panels",
+    ),
+    "a figure too low": (
+        lambda: flight("fixed").plot(panels="margin", size=(3, 0.5)),
+        "13 mm is too low for 1 panel; at least",
+    ),
     "labels of other words": (lambda: flight("fixed").plot(labels={"no": "x"}), "no"),
     "a scenario to view": (lambda: tiltsim.view(scenario()), "must be a tiltsim.Flight"),
     "no flights to view": (lambda: tiltsim.view([]), "flights = []: must be"),

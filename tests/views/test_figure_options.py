@@ -126,6 +126,16 @@ def test_angles_that_are_as_good_as_zero_have_an_axis_of_a_milliradian():
     assert np.ptp(axes.get_ylim()) == pytest.approx(1e-3)
 
 
+def test_a_vector_is_a_panel_of_its_components():
+    (axes,) = plot(flight("trot"), panels="velocity", size="85x60mm").axes
+    assert (axes.get_title(loc="left"), axes.get_ylabel()) == ("Velocity", "m/s")
+    shown = {line.get_label(): line.get_ydata() for line in axes.lines}
+    assert [*shown] == [f"velocity along {axis}" for axis in "xyz"]
+    np.testing.assert_array_equal(np.stack([*shown.values()], axis=-1), flight("trot")["velocity"])
+    compared = plot([flight("trot"), flight("tilt_car")], panels="position", size="85x150mm")
+    assert labels_of(compared) == ["x (m)", "y (m)", "z (m)"]
+
+
 def test_an_unknown_panel_is_one_line(tmp_path, capsys):
     assert main(["plot", str(saved("fixed", tmp_path)), "--panels", "path,margins"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
@@ -271,6 +281,11 @@ def test_panels_are_relabelled_by_their_names(names):
     figure = plot([flight(name) for name in names], panels="position_error", labels=labels)
     (axes,) = figure.axes
     assert (axes.get_title(loc="left") or axes.get_ylabel()) in {"Distance", "Distance (m)"}
+
+
+def test_the_label_of_a_single_flight_is_its_title():
+    figure = plot(flight("trot"), panels="margin", labels=["mine"])
+    assert figure.texts[0].get_text() == "mine"
 
 
 def test_a_label_of_nothing_is_one_line(tmp_path, capsys):

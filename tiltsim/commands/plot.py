@@ -23,8 +23,8 @@ def add_parser(subparsers: Subparsers) -> None:
     epilog = """panels of a flight: position_error, altitude, margin, attitude, tilt_angles,
     rotor_speeds, path, attitude_plane; of a tilt-car: position_error, inputs, direction,
     direction_error, lyapunov, path, portrait; of several flights: position_error, margin,
-    determinant, supervisor, attitude, path; of a sweep: its metrics. Every column of a flight, such
-    as vx, is the name of a panel, too."""
+    determinant, supervisor, attitude, path; of a sweep: its metrics. Every column or vector of a
+    flight, such as vx or velocity, is the name of a panel, too."""
     summary = "draw a flight, several, or a sweep as a figure"
     parser = subparsers.add_parser("plot", help=summary, description=description, epilog=epilog)
     add = parser.add_argument
@@ -69,14 +69,14 @@ def _flights_figure(paths: list[Path], arguments: argparse.Namespace) -> Callabl
     from tiltsim.views.titles import flight_names
 
     flights = [load_flight(path) for path in paths]
-    names = flight_names([flight.scenario for flight in flights], paths)
+    names = flight_names([flight.scenario for flight in flights], paths) if paths[1:] else [""]
+    texts = {name: name.replace("_", " ") for name in names if name} | arguments.labels
 
     def draw() -> Figure:
-        from tiltsim.views.figures.plot import plot
+        from tiltsim.views.figures.plot import draw_flights
 
-        in_words = {name: name.replace("_", " ") for name in names if len(names) > 1}
-        words = {"title": arguments.title, "labels": {**in_words, **arguments.labels}}
-        return plot(flights, panels=arguments.panels, names=names, **words)
+        panels, title = arguments.panels, arguments.title
+        return draw_flights(flights, names, texts, panels=panels, title=title)
 
     return draw
 

@@ -95,7 +95,7 @@ def fitting(draw: Callable[[], Page]) -> Figure:
     If only its width is given, it is drawn as high as they need.
 
     Raises:
-        InputError: If the height is given and too low.
+        InputError: If the width is too small, or the height is given and too low.
     """
     page, asked = draw(), style.asked_size()
     if asked is None:
@@ -115,8 +115,10 @@ def fitting(draw: Callable[[], Page]) -> Figure:
         with style.paper_style(size=style.Size(width, height)):
             page = draw()
         lowest, rows = _heights(page)
-    if page is first or rows == 0:  # if it is too narrow, saving it says so
-        return first.figure
+    if rows == 0:
+        raise InputError(style.too_small(first.figure))
+    if page is first:
+        return page.figure
     if asked.height is not None:
         number = f"{len(page.panels)} panel{'s' * (len(page.panels) > 1)}"
         least = f"at least {25.4 * height:.0f} mm"

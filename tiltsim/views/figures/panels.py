@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from tiltsim.laws.layers.supervision import SUPERVISION
+from tiltsim.system.quantity import in_words
 from tiltsim.views.attitude_plane import margin_threshold
 from tiltsim.views.figures import style
+from tiltsim.views.figures.layout import legend_over
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -88,6 +90,21 @@ def column_panel(name: str) -> Panel:
         widen(axes, SMALLEST_ANGLES if label.unit == "rad" else 1e-6)
 
     return Panel(draw, needs=name)
+
+
+def vector_panel(name: str, columns: Sequence[str]) -> Panel:
+    """The components of a vector of one flight over time."""
+
+    def draw(axes: Axes, flight: Flight) -> None:
+        known = [flight.assembly.loop.label(column) for column in columns]
+        for column, (label, _), line in zip(columns, known, style.ROTOR_LINES, strict=False):
+            axes.plot(flight["time"], flight[column], label=label, **line)
+        widen(axes, 1e-6)
+        show_last_periods(axes, [flight])
+        axes.set_ylabel(known[0].unit)
+        legend_over(axes, in_words(name).capitalize())
+
+    return of_one(draw)
 
 
 def _distance(axes: Axes, shown: Sequence[Shown]) -> None:
@@ -297,6 +314,3 @@ COMPARED: Final[dict[str, Panel]] = {
     "path": Panel(_path, over_time=False),
 }
 """The panels of a comparison, by name."""
-
-GROUPS: Final = {"attitude": ("roll", "pitch", "yaw")}
-"""Names that stand for several panels of a comparison."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.errors import InputError
 from tiltsim.flight.flight import as_flights
+from tiltsim.flight.vectors import VECTORS, components
 from tiltsim.scenario.messages import choose
 from tiltsim.system.text import short_repr
 from tiltsim.views.figures import style
@@ -15,11 +16,11 @@ from tiltsim.views.figures.adjusting import relabel
 from tiltsim.views.figures.layout import Page, add_heading, fitting, new_page, wrap
 from tiltsim.views.figures.panels import (
     COMPARED,
-    GROUPS,
     Panel,
     Shown,
     column_panel,
     exclude_divergence_from_scale,
+    vector_panel,
 )
 from tiltsim.views.titles import common_title, describe_controller, describe_gait, flight_names
 from tiltsim.views.vehicle_views import views_of
@@ -43,7 +44,6 @@ def plot(
     size: str | tuple[float, float] | None = None,
     title: str | None = None,
     labels: Sequence[str] | Mapping[str, str] | None = None,
-    names: Sequence[str] = (),
 ) -> Figure:
     """One flight on a page, or several in the same axes.
 
@@ -51,16 +51,16 @@ def plot(
 
     Args:
         flights: One or several.
-        panels: Names of panels or of columns, such as ``("path", "margin", "vx")``; default: all
-            that suit the flights.
+        panels: Names of panels, columns or vectors, such as ``("path", "margin", "velocity")``;
+            default: all that suit the flights.
         size: Such as "85mm x 60mm", or width and height in inches; the panels are arranged to fit.
         title: Instead of the scenarios' title; empty for none.
-        labels: Names of several flights in their order; or, as a dict, texts instead of their names
-            and of other texts of the figure.
-        names: Names of several flights, by default `flight_names`.
+        labels: Names of the flights in their order, that of a single one as its title; or, as a
+            dict, texts instead of their names and of other texts of the figure.
 
     Raises:
-        InputError: If an argument is wrong, or there are more flights than colours.
+        InputError: If an argument is wrong, there are more flights than colours, or the size is too
+            small.
     """
     flights = as_flights(flights)
     panels = [panels] if isinstance(panels, str) else panels
@@ -68,19 +68,38 @@ def plot(
         raise InputError(f"panels = {short_repr(panels)}: must be a list of names")
     if title is not None and not isinstance(title, str):
         raise InputError(f"title = {short_repr(title)}: must be text")
-    names, texts = _names_and_texts(flights, names, labels)
+    names, texts = _names_and_texts(flights, labels)
+    with style.paper_style(size=style.parse_size("size", size)):
+        return draw_flights(flights, names, texts, panels=panels, title=title)
+
+
+def draw_flights(
+    flights: Sequence[Flight],
+    names: Sequence[str],
+    texts: Mapping[str, str],
+    *,
+    panels: Sequence[str],
+    title: str | None,
+) -> Figure:
+    """The figure of `plot`, in the style and size of the context.
+
+    Args:
+        flights: One or several.
+        names: Their names; empty for a single one without a name.
+        texts: Texts instead of these names and of other texts of the figure.
+        panels: Names; empty for all that suit the flights.
+        title: Instead of the scenarios' title; empty for none.
+    """
     if len(flights) > MAX_FLIGHTS:
         raise InputError(f"plot: {len(flights)} flights: at most {MAX_FLIGHTS} fit on one page")
-    scenarios = [flight.scenario for flight in flights]
-    names = names or (flight_names(scenarios) if len(flights) > 1 else [""])
-    names = [texts.pop(name, name) for name in names]
-    with style.paper_style(size=style.parse_size("size", size)):
-        longest = max(len(flight) for flight in flights)
-        looks = [style.marked_line(number, longest) for number in range(len(flights))]
-        shown = [Shown(*one) for one in zip(flights, names, looks, strict=True)]
-        chosen = _chosen(flights, panels)
-        heading = partial(_heading, flights, title)
-        return fitting(lambda: _page(shown, chosen, heading, texts))
+    others = dict(texts)
+    names = [others.pop(name, name) if name else "" for name in names]
+    longest = max(len(flight) for flight in flights)
+    looks = [style.marked_line(number, longest) for number in range(len(flights))]
+    shown = [Shown(*one) for one in zip(flights, names, looks, strict=True)]
+    chosen = _chosen(flights, panels)
+    heading = partial(_heading, shown, title)
+    return fitting(lambda: _page(shown, chosen, heading, others))
 
 
 def _page(
@@ -120,18 +139,21 @@ def _page(
 
 
 def _names_and_texts(
-    flights: Sequence[Flight],
-    names: Sequence[str],
-    labels: Sequence[str] | Mapping[str, str] | None,
+    flights: Sequence[Flight], labels: Sequence[str] | Mapping[str, str] | None
 ) -> tuple[Sequence[str], dict[str, str]]:
-    """The names of flights if any are given, and other texts by those that they replace."""
-    if labels is None or isinstance(labels, Mapping):
-        return names, dict(labels or {})
-    one_each = isinstance(labels, list | tuple) and len(labels) == len(flights)
-    if not one_each or not all(isinstance(label, str) for label in labels):
-        allowed = f"must be {len(flights)} texts, one for each flight, or a dict"
+    """The names of flights, and other texts by those that they replace."""
+    names = flight_names([flight.scenario for flight in flights]) if len(flights) > 1 else [""]
+    if labels is None:
+        return names, {}
+    if isinstance(labels, Mapping):
+        known, texts = True, [*labels, *labels.values()]
+    else:
+        known = isinstance(labels, list | tuple) and len(labels) == len(flights)
+        texts = [*labels] if known else []
+    if not known or not all(isinstance(text, str) for text in texts):
+        allowed = f"must be a list of one text per flight, here {len(flights)}, or a dict of texts"
         raise InputError(f"labels = {short_repr(labels)}: {allowed}")
-    return labels, {}
+    return (names, dict(labels)) if isinstance(labels, Mapping) else (texts, {})
 
 
 def _with(shown: Sequence[Shown], panel: Panel) -> list[Shown]:
@@ -149,32 +171,37 @@ def _chosen(flights: Sequence[Flight], names: Sequence[str]) -> dict[str, Panel]
         for name, panel in available.items()
         if any(panel.needs in flight.units for flight in flights)
     }
+    columns = dict.fromkeys(column for flight in flights for column in flight.units)
     if not names:
-        columns = {column for flight in flights for column in flight.units}
         return {name: panel for name, panel in fitting.items() if panel.unless not in columns}
     chosen: dict[str, Panel] = {}
     for name in names:
-        known = fitting if len(flights) == 1 else {**GROUPS, **fitting}
-        if name in GROUPS and name not in fitting:
-            chosen |= {part: fitting[part] for part in GROUPS[name] if part in fitting}
-        elif name in fitting:
+        parts = components(name, columns)
+        if name in fitting:
             chosen[name] = fitting[name]
-        elif any(name in flight.units for flight in flights):
+        elif name in columns:
             chosen[name] = column_panel(name)
+        elif len(flights) == 1 and parts:
+            chosen[name] = vector_panel(name, parts)
+        elif parts:
+            chosen |= {part: column_panel(part) for part in parts}
         else:
-            raise InputError(f"panels: {name!r}: {choose(name, [*known, *flights[0].units])}")
+            vectors = [vector for vector in VECTORS if components(vector, columns)]
+            known = dict.fromkeys([*fitting, *vectors, *columns])
+            raise InputError(f"panels: {name!r}: {choose(name, known)}")
     return chosen
 
 
-def _heading(flights: Sequence[Flight], title: str | None, width: float) -> tuple[str, str]:
+def _heading(shown: Sequence[Shown], title: str | None, width: float) -> tuple[str, str]:
     """The title of a page and the line below it, for its width (inches)."""
+    flights = [one.flight for one in shown]
     scenarios = [flight.scenario for flight in flights]
     if title is not None:
         return style.verbatim(title), ""
     if len(flights) > 1:
         return style.verbatim(common_title(scenarios) or f"{len(flights)} flights compared"), ""
     scenario, end = scenarios[0], flights[0].end
-    text = style.verbatim(scenario.title or scenario.address or "Flight")
+    text = style.verbatim(shown[0].name or scenario.title or scenario.address or "Flight")
     if width < WIDE:
         return text, ""
     parts = [style.verbatim(scenario.address.partition("#")[2])]

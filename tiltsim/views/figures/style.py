@@ -372,8 +372,11 @@ def save(figure: Figure, path: Path) -> None:
         try:
             figure.savefig(temporary, format=suffix[1:], metadata=undated.get(suffix))
         except UserWarning as warning:
-            width, height = figure.get_size_inches() * 25.4
-            raise InputError(
-                f"{path}: {width:.0f} mm x {height:.0f} mm are too small for these panels; choose "
-                "fewer panels or a larger size"
-            ) from warning
+            raise InputError(f"{path}: {too_small(figure)}") from warning
+
+
+def too_small(figure: Figure) -> str:
+    """What is wrong with a figure into which its panels do not fit."""
+    width, height = figure.get_size_inches() * 25.4
+    size = f"{width:.0f} mm x {height:.0f} mm"
+    return f"{size} are too small for these panels; choose fewer panels or a larger size"
