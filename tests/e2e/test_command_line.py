@@ -132,6 +132,7 @@ def test_a_changed_flight_of_the_library_is_not_judged(tmp_path, capsys):
     printed = capsys.readouterr().out
     assert tomllib.loads((tmp_path / "scenario.toml").read_text())["expect"] == []
     assert "no verdict" in printed
+    assert f"  changed: {', '.join(SHORT[1::2]).replace('=', ' = ')}\n" in printed
     assert re.search(r"final_position_error_x +0\.\d+ +-0\.38 ", printed)
     assert main(["run", SETPOINT, *SHORT, "--quiet"]) == 0
     assert capsys.readouterr().err == ""
@@ -588,3 +589,8 @@ def test_library_scenarios_are_shipped_beside_the_package():
 
     assert (shipped_folder("scenarios") / "ch04_tracking" / "setpoint.toml").is_file()
     assert Path(shipped_folder("mjcf") / "tiltrotor.xml").is_file()
+
+
+def test_an_override_without_an_equals_sign_is_refused_as_such(capsys):
+    assert main(["run", SETPOINT, "--set", "simulation.duration", "10"]) == 2
+    assert "simulation.duration: write KEY=VALUE" in capsys.readouterr().err

@@ -145,11 +145,14 @@ def test_prepare_folder_makes_it_with_its_parents(tmp_path):
 
 def test_a_folder_that_cannot_be_made_is_an_input_error(tmp_path):
     (tmp_path / "file").write_text("in the way")
-    for folder in (tmp_path / "file", tmp_path / "file" / "below"):
+    for folder, reason in (
+        (tmp_path / "file", "is a file; give a folder"),
+        (tmp_path / "file" / "below", "cannot be created: "),
+    ):
         with pytest.raises(InputError) as caught:
             prepare_folder(folder)
         line = str(caught.value)
-        assert line.startswith(f"--out {folder}: cannot be created: ")
+        assert line.startswith(f"--out {folder}: {reason}")
         assert len(line.splitlines()) == 1
 
 

@@ -799,3 +799,16 @@ def test_a_controller_of_ones_own_decides_on_the_acceleration_of_the_reference()
         assert not changed.reference.acceleration_feedforward
     kept = own | {"reference.acceleration_feedforward": True}
     assert refusal(case, kept).endswith("always includes all derivatives; set it to false")
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("[gait]\n[gait]", "Cannot declare [gait] twice (at line 2"),
+        ("[vehicle.pod]\n[vehicle.pod]", "Cannot declare [vehicle.pod] twice (at line 2"),
+        ("title = trot", "Invalid value; text needs quotes (at line 1"),
+        ('[[expect]]\nmetric = "final_eror_x"\nmax = 1.0', "did you mean final_position_error_x?"),
+    ],
+)
+def test_mistakes_in_files_are_said_as_the_file_has_them(write, text, reason):
+    assert reason in refusal(write(text))

@@ -6,6 +6,8 @@ import argparse
 import os
 from typing import TypeAlias
 
+from tiltsim.errors import InputError
+
 Subparsers: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 """The subcommands of the parser that `tiltsim.cli.build_parser` makes."""
 
@@ -28,11 +30,19 @@ def add_jobs(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def assignment(text: str) -> str:
+    """``KEY=VALUE``, from the command line."""
+    if "=" not in text:
+        raise InputError(f"--set {text}: write KEY=VALUE, as in controller.decoupler=exact")
+    return text
+
+
 def add_overrides(parser: argparse.ArgumentParser, target: str, example: str) -> None:
     """Declare ``--set``, which overrides keys of ``target``, with an example in its help."""
     parser.add_argument(
         "--set",
         action="append",
+        type=assignment,  # before a value after a space counts as an unknown argument
         default=[],
         metavar="KEY=VALUE",
         dest="overrides",

@@ -15,6 +15,8 @@ from tiltsim.system.interrupts import defer_interrupts
 from tiltsim.system.text import printable
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from tiltsim.flight.expectations import Verdict
     from tiltsim.flight.flight import Flight
     from tiltsim.scenario.expectation import Expectation
@@ -108,7 +110,10 @@ def run(arguments: argparse.Namespace) -> int:
         )
     verdicts = check_expectations(expecting, metrics)
     if not arguments.quiet:
-        print(summary(flight, verdicts, judged=judged))
+        changes = [*overrides.items()]
+        if arguments.controller is not None:
+            changes.append(("controller", arguments.controller))
+        print(summary(flight, verdicts, judged=judged, changes=changes))
         if arguments.out is not None:
             print_line(f"flight written to {viewing(arguments.out)}")
         if arguments.rerun is not None:
@@ -169,8 +174,22 @@ def fly(scenario: Scenario, arguments: argparse.Namespace) -> Flight:
     return flight
 
 
-def summary(flight: Flight, verdicts: list[Verdict], *, judged: bool) -> str:
-    """The flight in a few aligned lines, with or without a verdict on its expectations."""
+def summary(
+    flight: Flight,
+    verdicts: list[Verdict],
+    *,
+    judged: bool,
+    changes: Sequence[tuple[str, object]] = (),
+) -> str:
+    """The flight in a few aligned lines.
+
+    Args:
+        flight: What was flown.
+        verdicts: On its expectations.
+        judged: Whether the verdicts count.
+        changes: Keys of the scenario that the command line changed, and their values.
+    """
+    from tiltsim.scenario.messages import show
     from tiltsim.scenario.metric_names import METRICS
 
     scenario, metrics = flight.scenario, flight.metrics()
@@ -179,11 +198,16 @@ def summary(flight: Flight, verdicts: list[Verdict], *, judged: bool) -> str:
         lines.append(f"  {printable(scenario.address)}")
     if scenario.source:
         lines.append(f"  {printable(scenario.source)}")
+    if changes:
+        values = (f"{key} = {show(value)}" for key, value in changes)
+        lines.append(f"  changed: {printable(', '.join(values))}")
     simulation = scenario.simulation
     solver = simulation.integrator if simulation.plant == "mujoco" else "ode3"
+    factor = metrics["realtime_factor"]
+    speed = f"{factor:.0f}" if factor >= 10.0 else f"{factor:.2g}"
     lines.append(
         f"  {metrics['duration']:g} s on the {simulation.plant} plant, {solver} at "
-        f"{simulation.timestep:g} s, {flight.engine} engine, {metrics['realtime_factor']:.0f} times"
+        f"{simulation.timestep:g} s, {flight.engine} engine, {speed} times"
         " real time"
     )
     shown = [name for name in metrics if name not in _IN_HEADER]

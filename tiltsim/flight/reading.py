@@ -83,7 +83,8 @@ def _flight_file(given: str | PathLike[str]) -> Path:
         return file
     missing = "no flight.parquet in this folder" if path.is_dir() else "no such file"
     raise InputError(
-        f"{path}: {missing}; give a folder that tiltsim run --out wrote, or a flight.parquet"
+        f"{path}: {missing}; give a folder that tiltsim run --out wrote, a flight.parquet or, to "
+        "tiltsim plot, what tiltsim sweep wrote"
     )
 
 

@@ -53,9 +53,18 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         document = tomllib.loads(read_text(path))
     except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError
-        raise InputError(f"{path}: not valid TOML: {error}") from error
+        raise InputError(f"{path}: not valid TOML: {_in_words(str(error))}") from error
     check_limits(document, str(path))
     return document
+
+
+def _in_words(mistake: str) -> str:
+    """What tomllib found, with names as the file has them and the usual cause."""
+    name = re.match(r"Cannot (declare|mutate immutable namespace) \((.*?),?\)(.*)", mistake)
+    if name is not None:
+        table = ".".join(part.strip(" '\"") for part in name[2].split(","))
+        return f"Cannot {name[1]} [{table}]{name[3]}"
+    return mistake.replace("Invalid value", "Invalid value; text needs quotes")
 
 
 def scenario_files(path: Path) -> list[Path]:

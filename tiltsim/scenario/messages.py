@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
 from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args, get_origin
@@ -55,8 +55,22 @@ def show(value: object) -> str:
 
 def did_you_mean(name: object, names: Iterable[str]) -> str:
     """A suggestion of the closest of some names; empty if none is close."""
-    close = get_close_matches(shortened(str(name)), list(names), n=1)
-    return f"did you mean {close[0]}? " if close else ""
+    given = shortened(str(name))
+    names = list(names)
+    close = get_close_matches(given, names, n=max(1, len(names)))
+    # Of close names, final_position_error_x shares more words with final_eror_x than final_roll.
+    best = max(close, key=lambda known: _shared_words(given, known), default="")
+    return f"did you mean {best}? " if best else ""
+
+
+def _shared_words(given: str, known: str) -> float:
+    """How well the words of one name are found in another, from 0 to 1."""
+    words = given.split("_")
+    likeness = (
+        max(SequenceMatcher(None, word, other).ratio() for other in known.split("_"))
+        for word in words
+    )
+    return sum(likeness) / len(words)
 
 
 def choose(name: object, names: Iterable[str]) -> str:

@@ -39,6 +39,8 @@ def file_digests(files: Iterable[str | Path]) -> dict[str, str]:
 def prepare_folder(folder: Path) -> None:
     """Create a folder for results before the flight. Raises `InputError` if that is impossible."""
     _require_possible_name("--out ", folder)
+    if folder.is_file():
+        raise InputError(f"--out {folder}: is a file; give a folder")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
