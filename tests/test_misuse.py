@@ -10,6 +10,7 @@ from tests.flights import flight
 
 ADDRESS = "ch04_tracking/setpoint#rho_065_modified"
 SWEEP = {"scenario": ADDRESS, "axis": [{"type": "list", "key": "vehicle.mass", "values": [0.4]}]}
+LONG = "x" * 300
 SHORT = {"simulation": {"duration": 0.01}}
 
 
@@ -43,6 +44,16 @@ MISUSES = {
     "an empty name": (lambda: tiltsim.simulate(""), "name a scenario"),
     "an unknown name": (lambda: tiltsim.simulate("ch04_trackin/setpoint"), "did you mean ch04"),
     "a name with a NUL": (lambda: tiltsim.load_scenario("ch04\0"), "no such file"),
+    "a name that is too long": (lambda: tiltsim.load_scenario(LONG), "no such file"),
+    "a scenario to validate": (
+        lambda: tiltsim.Scenario.model_validate({"title": 3}),
+        "scenario: title = 3: must be a string",
+    ),
+    "a number to validate": (lambda: tiltsim.Scenario.model_validate(3), "= 3: must be a dict"),
+    "a key that is deleted": (
+        lambda: delattr(scenario().simulation, "duration"),
+        "simulation.duration: a scenario stays as it is",
+    ),
     "a family without a member": (lambda: tiltsim.simulate("ch04_tracking/setpoint"), "choose a"),
     "a sweep as scenario": (
         lambda: tiltsim.simulate("beyond/sweeps/monte_carlo"),
@@ -89,6 +100,10 @@ MISUSES = {
         lambda: tiltsim.simulate(SHORT, controller="no.py:hover"),
         "no such file",
     ),
+    "a controller file of a name that is too long": (
+        lambda: tiltsim.simulate(SHORT, controller=f"{LONG}.py:hover"),
+        "no such file",
+    ),
     "a controller for a tilt-car": (
         lambda: tiltsim.simulate("ch10_state_drift/third_derivative#clockwise", controller=hover),
         "vehicle",
@@ -107,12 +122,26 @@ MISUSES = {
     "a number to a batch": (lambda: tiltsim.fly(3), "scenarios = 3: must be a list"),
     "numbers in a batch": (lambda: tiltsim.fly([1, 2]), "scenario = 1: must be"),
     "no threads": (lambda: tiltsim.fly([SHORT], threads=0), "threads = 0: must be"),
+    "true as threads": (lambda: tiltsim.fly([SHORT], threads=True), "threads = True: must be"),
+    "a number as progress of a batch": (
+        lambda: tiltsim.fly([SHORT], progress=3),
+        "progress = 3: must be",
+    ),
     "a number as sweep": (lambda: tiltsim.sweep(3), "sweep = 3: must be"),
     "a scenario as sweep": (lambda: tiltsim.sweep(ADDRESS), "no such file"),
     "a dict without axes": (lambda: tiltsim.sweep(SHORT), "it has no [[axis]]"),
     "an unknown axis": (lambda: tiltsim.sweep({**SWEEP, "axis": [{"type": "x"}]}), "choose"),
     "a list as axis": (lambda: tiltsim.sweep({**SWEEP, "axis": 3}), "axis = 3"),
     "no jobs": (lambda: tiltsim.sweep(SWEEP, jobs=0), "jobs = 0: must be"),
+    "a sweep of a name that is too long": (lambda: tiltsim.sweep(LONG), "no such file"),
+    "a folder of a name that is too long": (
+        lambda: tiltsim.sweep(SWEEP, out=LONG),
+        "File name too long",
+    ),
+    "a sweep of a scenario of a name that is too long": (
+        lambda: tiltsim.sweep({**SWEEP, "scenario": LONG}),
+        "no such file",
+    ),
     "a number as folder": (lambda: tiltsim.sweep(SWEEP, out=3), "out = 3: must be"),
     "no steps": (lambda: simulation().step(0), "steps = 0: must be a whole number from 1"),
     "half a step": (lambda: simulation().step(0.5), "steps = 0.5: must be"),
@@ -124,6 +153,7 @@ MISUSES = {
     "a number as column": (lambda: flight("fixed")[0], "0: no column"),
     "a flight from a number": (lambda: tiltsim.load_flight(3), "path = 3: must be"),
     "a flight that is not there": (lambda: tiltsim.load_flight("nowhere"), "no such file"),
+    "a flight of a name that is too long": (lambda: tiltsim.load_flight(LONG), "no such file"),
     "saving to a number": (lambda: flight("fixed").save(3), "folder = 3: must be"),
     "a scenario to plot": (lambda: tiltsim.plot(scenario()), "must be a tiltsim.Flight"),
     "no flights to plot": (lambda: tiltsim.plot([]), "flights = []: must be"),
@@ -153,6 +183,11 @@ MISUSES = {
     "a number as viewer": (lambda: flight("fixed").view(url=3), "url = 3: must be"),
     "a video of a scenario": (lambda: tiltsim.video(scenario(), "x.mp4"), "flight = "),
     "a video into a number": (lambda: flight("fixed").video(3), "path = 3: must be"),
+    "a video of a name that is too long": (
+        lambda: flight("fixed").video(f"{LONG}.mp4"),
+        "File name too long",
+    ),
+    "a list as quality": (lambda: flight("fixed").video("x.mp4", quality=[]), "quality []: choose"),
     "a video of a wrong format": (lambda: flight("fixed").video("x.avi"), "choose .mp4, .gif"),
     "a video of nothing": (lambda: flight("fixed").video("x.mp4", start=9), "start 9: is not in"),
 }

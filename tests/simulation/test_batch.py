@@ -464,3 +464,11 @@ def test_a_batch_takes_whatever_describes_a_scenario_and_flies_own_controllers()
     assert models == ["tiltrotor", "tiltrotor", "tilt_car"]
     assert results[0].flight["thrusts"][-1] == pytest.approx([2.0] * 4)
     np.testing.assert_array_equal(results[1].flight.samples, tiltsim.simulate(short).samples)
+
+
+def test_a_batch_tells_of_its_flights_and_takes_numbers_of_numpy():
+    told = []
+    short = {"simulation": {"duration": 0.01}}
+    results = tiltsim.fly([short] * 3, threads=np.int64(2), progress=told.append)
+    assert len([*results]) == 3
+    assert told[-1] == 3

@@ -55,6 +55,11 @@ def test_results_show_themselves(results):
     assert "vehicle.mass" in results._repr_html_()
 
 
+def test_values_of_a_number_are_refused(results):
+    with pytest.raises(tiltsim.InputError, match="expression = 3: must be a column"):
+        results.values(3)
+
+
 def test_a_folder_keeps_the_rows_and_continues(tmp_path):
     first = tiltsim.sweep(SWEEP, out=tmp_path / "sweep")
     again = tiltsim.sweep(SWEEP, out=str(tmp_path / "sweep"))

@@ -17,6 +17,7 @@ from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.limits import check_limits
 from tiltsim.scenario.loading import parse_scenario, without_none
+from tiltsim.system.files import is_file, is_folder
 from tiltsim.system.parquet import open_parquet
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -78,10 +79,10 @@ def _flight_file(given: str | PathLike[str]) -> Path:
     if not isinstance(given, str | PathLike):
         raise InputError(f"path = {short_repr(given)}: must be the name of a folder or file")
     path = Path(given)
-    file = path / "flight.parquet" if path.is_dir() else path
-    if file.is_file():
+    file = path / "flight.parquet" if is_folder(path) else path
+    if is_file(file):
         return file
-    missing = "no flight.parquet in this folder" if path.is_dir() else "no such file"
+    missing = "no flight.parquet in this folder" if is_folder(path) else "no such file"
     raise InputError(
         f"{path}: {missing}; give a folder that tiltsim run --out wrote, a flight.parquet or, to "
         "tiltsim plot, what tiltsim sweep wrote"

@@ -5,12 +5,13 @@ The limits are checked before MuJoCo allocates memory and time.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from math import isfinite, prod
 from pathlib import Path
 from typing import Any, Final
 from xml.etree import ElementTree
+
+from tiltsim.system.files import is_file
 
 MAX_BYTES: Final = 4 * 2**20
 """Of the file and of those that it includes, together."""
@@ -48,7 +49,7 @@ def check_mjcf(path: Path) -> set[Path]:
     names, folders = {path.name}, {"."}
     while waiting:
         file = waiting.pop()
-        if not os.path.isfile(file):  # noqa: PTH113, Path.is_file raises if a name is too long
+        if not is_file(file):
             continue  # MuJoCo reports it
         bytes_read += file.stat().st_size
         if bytes_read > MAX_BYTES:

@@ -28,6 +28,7 @@ from tiltsim.plants.command import (
 from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.system.files import is_file
 
 
 class UserController:
@@ -78,7 +79,7 @@ def _place(error: BaseException) -> str:
         return ""
     last = [frame for frame in frames if frame.filename == frames[0].filename][-1]
     file = Path(last.filename)
-    if not file.is_file():
+    if not is_file(file):
         return f" (line {last.lineno} of {last.name})"
     return f" ({file.name}, line {last.lineno})"
 
@@ -112,7 +113,7 @@ def _load(address: str, table: PythonController) -> Any:
             f"{start}: a controller that was given in Python, which no file holds; give it again "
             "as controller= to tiltsim.load_scenario or simulate, or write FILE.py:NAME"
         )
-    if not table.file.is_file():
+    if not is_file(table.file):
         raise InputError(f"{start}: no such file")
     module = _run_file(start, table.file)
     found = getattr(module, table.attribute, None)

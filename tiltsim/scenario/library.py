@@ -12,6 +12,7 @@ from tiltsim.errors import InputError
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.limits import check_limits, read_text
 from tiltsim.scenario.messages import did_you_mean
+from tiltsim.system.files import is_file, is_folder
 
 _SWEEP: Final = re.compile(r"^\s*\[\[?\s*(axis|bisect)\s*\]", re.MULTILINE)
 """The tables that distinguish a sweep from a scenario."""
@@ -25,14 +26,14 @@ def find_scenario_file(path: str | Path) -> Path:
     if not str(path):
         raise InputError("name a scenario; see tiltsim list")
     given = Path(path)
-    if given.is_file():
+    if is_file(given):
         return given
     if not given.is_absolute():
         library = shipped_folder("scenarios")
         for candidate in (library / given, library / f"{given}.toml"):
-            if candidate.is_file():
+            if is_file(candidate):
                 return candidate
-    if given.is_dir():
+    if is_folder(given):
         raise InputError(f"{path}: a folder, not a scenario file; tiltsim check takes folders")
     hint = closest_in_library(path)
     raise InputError(

@@ -54,7 +54,7 @@ def load_scenario(
             ``{"gait.period": 2.0, "gait.angles[0]": 0.1}``. Arrays are taken as lists, here and in
             a dict. A family without ``#variant`` needs them or a controller, and is its base then.
         controller: A controller of your own, which replaces the scenario's before anything is
-            checked; the overrides then have no other law or function: a function from
+            checked; the overrides then have no other law or function. It is a function from
             `tiltsim.Observation` to `tiltsim.Command`, an object with ``__call__`` and, if it has a
             memory, ``reset(scenario)``, a class of such objects, or ``"FILE.py:NAME"``.
         reference: A motion of your own in place of the scenario's, whose attitude and
@@ -249,11 +249,7 @@ def parse_scenario(
         raise InputError(f"scenario = {short_repr(document)}: must be a dict")
     document = plain(document)
     check_limits(document, address)
-    try:
-        scenario = Scenario.model_validate(document)
-    except ValidationError as error:
-        message = one_line_message(error, document, Scenario, emptied)
-        raise InputError(f"{address}: {message}") from None
+    scenario = Scenario.model_validate(document, address=address, emptied=emptied)
     scenario._address = valid_unicode(address)
     return scenario
 

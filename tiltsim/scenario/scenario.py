@@ -6,7 +6,8 @@ else. `tiltsim.scenario.loading` reads the files, `tiltsim.scenario.messages` wo
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
@@ -20,22 +21,47 @@ from tiltsim.scenario.scenario_tables import DESCRIPTIVE, ScenarioTables
 from tiltsim.scenario.table import Table
 from tiltsim.scenario.time_steps import check_time_steps
 from tiltsim.system.public import public
-from tiltsim.system.text import html_table
+from tiltsim.system.text import html_table, short_repr
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.references.trajectories import ReferenceParameters
+
+
+@contextmanager
+def _in_one_line(address: str, document: Any, emptied: Collection[str] = ()) -> Iterator[None]:
+    """Raise `InputError` in place of pydantic's error."""
+    try:
+        yield
+    except ValidationError as error:
+        message = one_line_message(error, document, Scenario, emptied)
+        raise InputError(f"{address}: {message}") from None
 
 
 class Scenario(ScenarioTables):
     """One flight, fully specified and consistent."""
 
     def __init__(self, **tables: Any) -> None:
-        try:
+        with _in_one_line("scenario", tables):
             super().__init__(**tables)
-        except ValidationError as error:
-            raise InputError(f"scenario: {one_line_message(error, tables, Scenario)}") from None
 
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # validation needs no call
+
+    @classmethod
+    def model_validate(
+        cls, obj: Any, *, address: str = "scenario", emptied: Collection[str] = (), **options: Any
+    ) -> Self:
+        """As pydantic's, but what is wrong is an `InputError` of one line.
+
+        Args:
+            obj: The tables.
+            address: Their name in messages.
+            emptied: See `one_line_message`.
+            options: Pydantic's.
+        """
+        if not isinstance(obj, Mapping | Scenario):
+            raise InputError(f"{address} = {short_repr(obj)}: must be a dict")
+        with _in_one_line(address, obj, emptied):
+            return super().model_validate(obj, **options)
 
     @model_validator(mode="after")
     def _check(self) -> Self:

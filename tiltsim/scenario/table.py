@@ -61,11 +61,19 @@ class Table(BaseModel):
         if name.startswith("_"):
             super().__setattr__(name, value)
             return
-        key = f"{self.table_name}.{name}".removeprefix(".")
-        raise InputError(
-            f"{key} = {short_repr(value)}: a scenario stays as it is; make another with "
-            "Scenario.replace"
-        )
+        raise self._frozen(f"{name} = {short_repr(value)}")
+
+    def __delattr__(self, name: str) -> None:
+        """Refuse to delete a key, likewise."""
+        if name.startswith("_"):
+            super().__delattr__(name)
+            return
+        raise self._frozen(name)
+
+    def _frozen(self, what: str) -> InputError:
+        """The error of a change of a key."""
+        key = f"{self.table_name}.{what}".removeprefix(".")
+        return InputError(f"{key}: a scenario stays as it is; make another with Scenario.replace")
 
     def mistake(self, key: str, allowed: str) -> InvalidValueError:
         """The error of the value of a dotted key that is not allowed; see `InvalidValueError`."""

@@ -22,6 +22,8 @@ from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.simulation.native_batch import NativeBatch
 from tiltsim.simulation.simulate import simulate_assembly
+from tiltsim.system.numbers import whole_number
+from tiltsim.system.progress import Report, check_progress, reported
 from tiltsim.system.text import short_repr
 
 WINDOW: Final = 512
@@ -55,6 +57,7 @@ def fly(
     *,
     threads: int | None = None,
     keep_samples: bool = False,
+    progress: Report | bool | None = None,
 ) -> Iterator[FlightResult]:
     """Fly scenarios and yield their results, in their order, as they become available.
 
@@ -65,6 +68,7 @@ def fly(
         threads: Maximum number of threads; None takes all cores.
         keep_samples: Whether results hold their flights. Without them memory does not grow with the
             number of scenarios.
+        progress: True for a bar; or a function, called with the number of finished flights.
 
     Yields:
         Bit-identical to `tiltsim.simulate` of the scenario except ``realtime_factor``, which is
@@ -77,10 +81,19 @@ def fly(
     """
     if isinstance(scenarios, str | Mapping | Scenario) or not isinstance(scenarios, Iterable):
         raise InputError(f"scenarios = {short_repr(scenarios)}: must be a list of scenarios")
-    threads = (os.cpu_count() or 1) if threads is None else threads
-    if not isinstance(threads, int) or threads < 1:
-        raise InputError(f"threads = {short_repr(threads)}: must be a whole number from 1")
-    return _fly([as_scenario(scenario) for scenario in scenarios], threads, keep_samples)
+    threads = (os.cpu_count() or 1) if threads is None else whole_number("threads", threads)
+    check_progress(progress)
+    chosen = [as_scenario(scenario) for scenario in scenarios]
+    return _with_progress(_fly(chosen, threads, keep_samples), len(chosen), progress)
+
+
+def _with_progress(
+    results: Iterator[FlightResult], total: int, progress: Report | bool | None
+) -> Iterator[FlightResult]:
+    with reported(progress, "flights", total) as report:
+        for done, result in enumerate(results, start=1):
+            report(done)
+            yield result
 
 
 def _fly(scenarios: Sequence[Scenario], threads: int, keep_samples: bool) -> Iterator[FlightResult]:

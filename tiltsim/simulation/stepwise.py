@@ -27,7 +27,7 @@ from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.monitor import TerminationMonitor
 from tiltsim.simulation.simulate import fly_chunk
 from tiltsim.system.interrupts import reraise_swallowed_interrupts
-from tiltsim.system.text import short_repr
+from tiltsim.system.numbers import whole_number
 
 
 class Simulation:
@@ -94,13 +94,12 @@ class Simulation:
             InputError: If that is no such number, or the flight has ended (see `end`).
             ControllerError: If a controller of your own fails.
         """
-        if not isinstance(steps, int | np.integer) or isinstance(steps, bool) or steps < 1:
-            raise InputError(f"steps = {short_repr(steps)}: must be a whole number from 1")
+        steps = whole_number("steps", steps)
         if self._end is not None:
             raise InputError(f"step: {self._end.message}; begin again with reset()")
         start = perf_counter()
         with reraise_swallowed_interrupts():
-            samples, self._end = fly_chunk(self._plant, self._monitor, 1, int(steps))
+            samples, self._end = fly_chunk(self._plant, self._monitor, 1, steps)
         self._samples += samples
         self._wall_time += perf_counter() - start
 

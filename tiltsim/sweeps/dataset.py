@@ -19,8 +19,9 @@ from tiltsim.sweeps.folder import DATASET, DEFINITION, read_definition
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.stored_rows import finished_parts, read_rows
 from tiltsim.sweeps.tables import Sweep
+from tiltsim.system.files import is_file
 from tiltsim.system.optional import optional_package
-from tiltsim.system.text import html_table
+from tiltsim.system.text import html_table, short_repr
 
 if TYPE_CHECKING:
     import pyarrow
@@ -78,6 +79,9 @@ class SweepResults:
 
     def values(self, expression: str) -> Column:
         """A column, or arithmetic on columns row by row. Raises `InputError` if it is neither."""
+        if not isinstance(expression, str):
+            allowed = "must be a column or arithmetic on columns, as text"
+            raise InputError(f"expression = {short_repr(expression)}: {allowed}")
         if expression in self.columns:
             return self.columns[expression]
         numbers = {k: v.tolist() for k, v in self.columns.items() if v.dtype == np.float64}
@@ -95,7 +99,7 @@ class SweepResults:
 
 def is_sweep_folder(path: Path) -> bool:
     """Whether a folder contains the results of a sweep."""
-    return (path / DEFINITION).is_file()
+    return is_file(path / DEFINITION)
 
 
 def load_results(folder: Path) -> SweepResults:

@@ -22,7 +22,7 @@ from tiltsim.sweeps.columns import schema
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.stored_rows import finished_parts, part_file, read_rows
-from tiltsim.system.files import prepare_folder, remove_leftovers, replacing
+from tiltsim.system.files import is_folder, prepare_folder, remove_leftovers, replacing
 from tiltsim.system.locks import locked
 from tiltsim.system.parquet import UnreadableError, parquet_writer
 
@@ -138,7 +138,7 @@ def open_sweep_folder(path: Path, points: SweepPoints) -> Iterator[SweepFolder]:
 
 def _require_new_or_same(path: Path, points: SweepPoints) -> None:
     """Raise `InputError` if a folder has files that this sweep has not written; change nothing."""
-    if not path.is_dir():
+    if not is_folder(path):
         return
     for name in (LOCK, DEFINITION, DATASET, PARTS, FLIGHTS):
         if (path / name).is_symlink():

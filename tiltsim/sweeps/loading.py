@@ -42,7 +42,7 @@ from tiltsim.sweeps.tables import (
     UniformAxis,
     dotted,
 )
-from tiltsim.system.files import file_digests
+from tiltsim.system.files import file_digests, is_file
 from tiltsim.system.text import short_repr, valid_unicode
 
 _FILE_KEYS: Final = frozenset(f"{table}.{key}" for table, key, _ in FILE_KEYS)
@@ -192,7 +192,7 @@ def _scenario(
     if isinstance(sweep.scenario, str):
         name, _, variant = sweep.scenario.partition("#")
         beside = (folder or Path()) / name
-        path = str(beside) if beside.is_file() else name
+        path = str(beside) if is_file(beside) else name
         try:
             scenario = load_scenario(path + (f"#{variant}" if variant else ""), values or None)
         except InputError as error:

@@ -31,9 +31,19 @@ def file_digests(files: Iterable[str | Path]) -> dict[str, str]:
     found = {}
     for file in map(Path, files):
         with suppress(OSError, ValueError):  # the latter for a NUL in the name
-            if file.is_file():
+            if is_file(file):
                 found[str(file)] = digest(file.read_bytes())
     return found
+
+
+def is_file(path: str | Path) -> bool:
+    """Whether a path is a file; no name is too long to ask, unlike with `Path.is_file`."""
+    return os.path.isfile(path)  # noqa: PTH113
+
+
+def is_folder(path: str | Path) -> bool:
+    """Whether a path is a folder; no name is too long to ask, unlike with `Path.is_dir`."""
+    return os.path.isdir(path)  # noqa: PTH112
 
 
 def prepare_folder(folder: Path) -> None:
@@ -78,6 +88,11 @@ def _require_possible_name(option: str, path: Path) -> None:
     # Python raises a ValueError for such a name, where the system would an OSError.
     if "\0" in str(path):
         raise InputError(f"{option}{path}: no file can have a null character in its name")
+    try:
+        path.lstat()
+    except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            raise InputError(f"{option}{path}: {reason(error)}") from None
 
 
 @contextmanager

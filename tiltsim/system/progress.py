@@ -28,17 +28,22 @@ def reported(progress: Report | bool | None, stage: str, total: float) -> Iterat
         total: When it is all done: a float is in seconds, an integer a count.
 
     Raises:
-        InputError: For anything else.
+        InputError: As `check_progress` does.
     """
+    check_progress(progress)
     if progress is None or progress is False:
         yield lambda done: None
     elif progress is True:
         with public("show_progress")(shown=True) as display:
             display.begin(stage, total)
             yield display.move
-    elif callable(progress):
-        yield _seldom(progress, total)
     else:
+        yield _seldom(progress, total)
+
+
+def check_progress(progress: object) -> None:
+    """Raise `InputError` unless it can be the first argument of `reported`."""
+    if not (progress is None or isinstance(progress, bool) or callable(progress)):
         allowed = "must be True or a function"
         raise InputError(f"progress = {short_repr(progress)}: {allowed}")
 

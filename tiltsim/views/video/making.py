@@ -136,7 +136,7 @@ def _format(options: _Options, flight_end: float, suffix: str) -> VideoFormat:
     from tiltsim.views.video.overlay import CameraPose
     from tiltsim.views.video.rendering import QUALITIES
 
-    if options.given("quality") not in QUALITIES:
+    if options.given("quality") not in [*QUALITIES]:  # a list, as not all that is given has a hash
         raise options.mistake("quality", choose(options.given("quality"), QUALITIES))
     base = QUALITIES[options.given("quality")]
     start, end = options.number("start", 0.0), inf
