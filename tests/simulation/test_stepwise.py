@@ -124,6 +124,25 @@ def test_a_failing_controller_raises_at_once():
         simulation.step()
 
 
+def test_a_simulation_ends_where_its_controller_fails_as_a_flight_does():
+    def failing(observation):
+        assert observation.time < 0.011, "too late"
+        return tiltsim.Command(thrusts=[1.05] * 4)
+
+    tables = {"simulation": TROT["simulation"]}
+    simulation = tiltsim.Simulation(tables, controller=failing)
+    simulation.step(10)
+    with pytest.raises(tiltsim.TiltsimError, match="too late"):
+        simulation.step(10)
+    alone = tiltsim.simulate(tables, controller=failing)
+    assert simulation.end == alone.end
+    np.testing.assert_array_equal(simulation.flight().samples, alone.samples)
+    with pytest.raises(tiltsim.TiltsimError, match=r"too late.*begin again with reset"):
+        simulation.step()
+    simulation.reset()
+    assert simulation.end is None
+
+
 def test_a_simulation_ends_where_the_flight_does_and_says_so():
     simulation = tiltsim.Simulation({"initial": {"angular_velocity": [0.0, 0.0, 1001.0]}})
     assert simulation.end is not None

@@ -129,14 +129,32 @@ def simulate_assembly(
             raise
         end = End("interrupted", float(samples[-1][0]), "interrupted from outside")
     except ControllerError as error:
-        sample = take_sample(plant)
-        end = monitor.check(plant, sample) or End("failed", plant.time, str(error))
-        if sample[0] > samples[-1][0] and np.isfinite(sample).all():
+        last, end = failure(plant, monitor, samples[-1][0], error)
+        for sample in last:
             record(sample)
     wall_time = perf_counter() - start
     if end is None:
         end = End("completed", plant.time)
     return Flight(assembly, np.array(samples), end, plant.engine, wall_time)
+
+
+def failure(
+    plant: Plant, monitor: TerminationMonitor, recorded: float, error: ControllerError
+) -> tuple[list[Floats], End]:
+    """The last sample and the end of a flight whose own controller has failed.
+
+    Args:
+        plant, monitor: The plant, where it failed, and the monitor of its flight.
+        recorded: Time (s) of the last sample that is recorded already.
+        error: Of the controller.
+
+    Returns:
+        A sample if there is a later one and it is finite, and the end.
+    """
+    sample = take_sample(plant)
+    end = monitor.check(plant, sample) or End("failed", plant.time, str(error))
+    is_new = sample[0] > recorded and np.isfinite(sample).all()
+    return [sample] if is_new else [], end
 
 
 def fly_chunk(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from os import PathLike
 from time import perf_counter
 from typing import Any
@@ -15,7 +15,7 @@ from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.built_in_command import built_in_command
-from tiltsim.plants.command import Command, Controller, Observation
+from tiltsim.plants.command import Command, Controller, ControllerError, Observation
 from tiltsim.plants.factory import make_plant
 from tiltsim.plants.flight_model import flight_model
 from tiltsim.plants.mujoco_plant import MujocoPlant
@@ -25,9 +25,10 @@ from tiltsim.plants.user_controller import UserControlledPlant
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.monitor import TerminationMonitor
-from tiltsim.simulation.simulate import fly_chunk
+from tiltsim.simulation.simulate import failure, fly_chunk
 from tiltsim.system.interrupts import reraise_swallowed_interrupts
 from tiltsim.system.numbers import whole_number
+from tiltsim_controllers.mathematics.scalar import Floats
 
 
 class Simulation:
@@ -92,16 +93,22 @@ class Simulation:
 
         Raises:
             InputError: If that is no such number, or the flight has ended (see `end`).
-            ControllerError: If a controller of your own fails.
+            ControllerError: If a controller of your own fails, which is then the `end`.
         """
         steps = whole_number("steps", steps)
         if self._end is not None:
             raise InputError(f"step: {self._end.message}; begin again with reset()")
         start = perf_counter()
-        with reraise_swallowed_interrupts():
-            samples, self._end = fly_chunk(self._plant, self._monitor, 1, steps)
-        self._samples += samples
-        self._wall_time += perf_counter() - start
+        samples: Iterable[Floats] = ()
+        try:
+            with reraise_swallowed_interrupts():
+                samples, self._end = fly_chunk(self._plant, self._monitor, 1, steps)
+        except ControllerError as error:
+            samples, self._end = failure(self._plant, self._monitor, self._samples[-1][0], error)
+            raise
+        finally:
+            self._samples += samples
+            self._wall_time += perf_counter() - start
 
     @property
     def time(self) -> float:
