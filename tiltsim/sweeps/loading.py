@@ -162,7 +162,8 @@ def _base(sweep: Sweep, folder: Path | None, address: str) -> dict[str, Any]:
         return _scenario(sweep, sweep.set, folder, address)
     except InputError as error:
         first = _first_values(sweep)
-        if not any(f"{key}: missing" in str(error) for key in first):
+        dropped = str(error).partition("; also set ")[2]
+        if not any(f"{key}: missing" in str(error) or key in dropped for key in first):
             raise
         return _scenario(sweep, sweep.set | first, folder, address)
 
