@@ -97,7 +97,8 @@ def vector_panel(name: str, columns: Sequence[str]) -> Panel:
 
     def draw(axes: Axes, flight: Flight) -> None:
         known = [flight.assembly.loop.label(column) for column in columns]
-        for column, (label, _), line in zip(columns, known, style.ROTOR_LINES, strict=False):
+        looks = style.AXIS_LINES if len(columns) <= 3 else style.ROTOR_LINES
+        for column, (label, _), line in zip(columns, known, looks, strict=False):
             axes.plot(flight["time"], flight[column], label=label, **line)
         widen(axes, 1e-6)
         show_last_periods(axes, [flight])
