@@ -142,6 +142,10 @@ MISUSES = {
         lambda: tiltsim.sweep({**SWEEP, "scenario": LONG}),
         "no such file",
     ),
+    "flights to keep without a folder": (
+        lambda: tiltsim.sweep({**SWEEP, "keep_flights": True}),
+        "keep_flights = true: needs out",
+    ),
     "a number as folder": (lambda: tiltsim.sweep(SWEEP, out=3), "out = 3: must be"),
     "no steps": (lambda: simulation().step(0), "steps = 0: must be a whole number from 1"),
     "half a step": (lambda: simulation().step(0.5), "steps = 0.5: must be"),
@@ -150,6 +154,10 @@ MISUSES = {
         'stepwise simulation needs "mujoco"',
     ),
     "an unknown column": (lambda: flight("fixed")["height"], "'height': no column"),
+    "a vector that a tilt-car has not": (
+        lambda: flight("tilt_car")["tilt_angles"],
+        "'tilt_angles': no column of this flight; see",
+    ),
     "a number as column": (lambda: flight("fixed")[0], "0: no column"),
     "a flight from a number": (lambda: tiltsim.load_flight(3), "path = 3: must be"),
     "a flight that is not there": (lambda: tiltsim.load_flight("nowhere"), "no such file"),

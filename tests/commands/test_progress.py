@@ -95,12 +95,12 @@ def test_without_a_terminal_a_line_tells_every_few_seconds_how_far_it_is(monkeyp
     monkeypatch.setattr(progress, "monotonic", lambda: next(clock))
     with show_progress(shown=True) as lines:
         time.sleep(0.12)
-        lines.tell("flights", 10, 100)
-        lines.move(20)
+        lines.tell("flights", 1_234_010, 1_234_100)
+        lines.move(1_234_020)
         time.sleep(0.12)
     shown = capsys.readouterr().err.splitlines()
     assert shown[0] == "tiltsim: starting, 0:30"
-    assert "tiltsim: flights: 20 of 100, 0:30, about 4:00 left" in shown
+    assert "tiltsim: flights: 1234020 of 1234100, 0:30, about 4:00 left" in shown
     assert 2 <= len(shown) <= 5
 
 

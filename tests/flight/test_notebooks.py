@@ -37,6 +37,7 @@ def test_vectors_are_columns_side_by_side(flight):
     assert "position" in flight
     assert "positions" not in flight
     assert 3 not in flight
+    assert [*flight] == [*flight.units]
 
 
 def test_a_tilt_car_has_the_vectors_of_its_plane():

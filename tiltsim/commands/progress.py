@@ -142,7 +142,7 @@ class _Lines(Progress):
         elapsed, done, total = monotonic() - self._start, self._done, self._total
         line = f"tiltsim: {self._stage}"
         if total:
-            line += f": {done:.0f} of {total:g}{' s' if isinstance(total, float) else ''}"
+            line += f": {done:.0f} of {_total(total)}"
         line += f", {_clock(elapsed)}"
         if self._initial < done < total:
             left = elapsed * (total - done) / (done - self._initial)
@@ -172,6 +172,11 @@ def show_progress(*, shown: bool) -> Iterator[Progress]:
             finished.set()
             ticking.join()
             progress.end()
+
+
+def _total(total: float) -> str:
+    """Seconds in a few digits, a count in all of its own."""
+    return f"{total:g} s" if isinstance(total, float) else str(total)
 
 
 def _clock(seconds: float) -> str:

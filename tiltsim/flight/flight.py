@@ -29,7 +29,7 @@ from tiltsim.system.text import html_table, short_repr, shortened, valid_unicode
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     import pyarrow
 
@@ -106,12 +106,17 @@ class Flight:
             return self.columns[name]
         columns = components(name, self.units) if known else []
         if not columns:
-            hint = did_you_mean(name, [*self.units, *VECTORS])
+            vectors = [vector for vector in VECTORS if components(vector, self.units)]
+            hint = did_you_mean(name, [*self.units, *vectors])
             raise UnknownColumnError(
                 f"{short_repr(name)}: no column of this flight; {hint}see Flight.units, or the "
-                f"vectors {', '.join(v for v in VECTORS if components(v, self.units))}"
+                f"vectors {', '.join(vectors)}"
             )
         return np.stack([self.columns[column] for column in columns], axis=-1)
+
+    def __iter__(self) -> Iterator[str]:
+        """The names of the columns, as those of a dict of them."""
+        return iter(self.units)
 
     def __contains__(self, name: object) -> bool:
         """Whether there is a column or vector of this name."""

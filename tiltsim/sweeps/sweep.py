@@ -50,8 +50,11 @@ def sweep(
     if out is not None and not isinstance(out, str | PathLike):
         raise InputError(f"out = {short_repr(out)}: must be the name of a folder")
     definition = load_sweep(source, overrides)
+    points = SweepPoints(definition)
+    if points.sweep.keep_flights and out is None:
+        raise InputError(f"{definition.address}: keep_flights = true: needs out, a folder for them")
     with (
-        reported(progress, "flights", len(SweepPoints(definition))) as report,
+        reported(progress, "flights", len(points)) as report,
         TemporaryDirectory(prefix="tiltsim-sweep-") as temporary,
     ):
         folder = Path(temporary if out is None else out)
