@@ -189,6 +189,7 @@ MISUSES = {
     "a scenario to view": (lambda: tiltsim.view(scenario()), "must be a tiltsim.Flight"),
     "no flights to view": (lambda: tiltsim.view([]), "flights = []: must be"),
     "a number as viewer": (lambda: flight("fixed").view(url=3), "url = 3: must be"),
+    "another word as viewer": (lambda: flight("fixed").view(url="x"), "address x: not a viewer's"),
     "a video of a scenario": (lambda: tiltsim.video(scenario(), "x.mp4"), "flight = "),
     "a video into a number": (lambda: flight("fixed").video(3), "path = 3: must be"),
     "a video of a name that is too long": (

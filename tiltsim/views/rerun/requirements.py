@@ -53,8 +53,8 @@ def _require_listener(url: str) -> None:
     except ValueError:
         valid = False
     if not valid:
-        raise InputError(f"--connect {url}: not a viewer's address; expected, e.g., {DEFAULT_URL}")
+        raise InputError(f"address {url}: not a viewer's; expected, e.g., {DEFAULT_URL}")
     if not viewer_listens(url):
         raise InputError(
-            f"--connect {url}: no viewer listens there; start one with the command rerun"
+            f"address {url}: no viewer listens there; start one with the command rerun"
         )
