@@ -36,7 +36,8 @@ def test_the_viewer_reports_no_errors(names, tmp_path):
     save_recording([flight(name) for name in names], path)
     shot = shoot(path, 1.0)
     assert shot.reports == []
-    assert len(shot.views) == (8 if names == ["tilt_car"] else 9)
+    of_each = 2 * (len(names) - 1)  # flights that are compared have a vehicle and a plane each
+    assert len(shot.views) == (8 if names == ["tilt_car"] else 9 + of_each)
     assert shot.png.startswith(b"\x89PNG")
 
 
