@@ -46,6 +46,18 @@ def test_steps_are_those_of_a_flight():
         assert simulation.time == 0.0
 
 
+def test_steps_follow_a_motion_and_a_gait_of_ones_own():
+    own = {
+        "reference": lambda time: (0.1 * np.sin(time), 0.0, 0.0),
+        "gait": lambda time: (0.1 * time, 0.0, -0.1 * time, 0.0),
+    }
+    flight, simulation = tiltsim.simulate(TROT, **own), tiltsim.Simulation(TROT, **own)
+    simulation.step(10)
+    simulation.step(10)
+    np.testing.assert_array_equal(simulation.flight().samples, flight.samples)
+    assert flight["x_ref"][-1] == pytest.approx(0.1 * np.sin(0.02), abs=1e-9)
+
+
 @pytest.mark.parametrize("layers", LAYERS)
 def test_the_built_in_command_as_a_controller_of_ones_own_flies_the_same_flight(layers):
     shipped = tiltsim.load_scenario(LAYERS[layers])

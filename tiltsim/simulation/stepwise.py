@@ -41,6 +41,9 @@ class Simulation:
         scenario: Anything that `tiltsim.load_scenario` takes.
         controller: A controller of your own in place of the scenario's; see
             `tiltsim.load_scenario`.
+        reference: A motion of your own, as a function of time or a table; see
+            `tiltsim.load_scenario`.
+        gait: A gait of your own, likewise.
 
     Raises:
         InputError: If the scenario is invalid or not simulated by MuJoCo, the vehicle cannot be
@@ -52,8 +55,12 @@ class Simulation:
         scenario: Scenario | str | PathLike[str] | Mapping[str, Any],
         *,
         controller: Controller | type | str | None = None,
+        reference: object = None,
+        gait: object = None,
     ) -> None:
-        self.scenario = load_scenario(scenario, controller=controller)
+        self.scenario = load_scenario(
+            scenario, controller=controller, reference=reference, gait=gait
+        )
         simulation = self.scenario.simulation
         if simulation.plant != "mujoco":
             raise InputError(
