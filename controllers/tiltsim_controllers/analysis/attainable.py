@@ -4,7 +4,8 @@ With the tilt angles fixed, forces and torques are linear in ``w_i = varpi_i |va
 limits confine ``w`` to a box. A condition such as ``tau_N = 0`` intersects the box with a
 hyperplane, which leaves a polytope whose vertices lie on faces of the box. They are found exactly,
 by solving one small system per face, without sampling or optimization. A linear image of them
-(torques, thrust, acceleration) spans the attainable set.
+(torques, thrust, acceleration) spans the attainable set. All this holds for any number of rotors
+(`TiltedRotors`); the sets of ch. 9 are those of four.
 
 Two published findings are not reproduced: the body accelerations of +-2 m/s^2 (Figs. 8, 9; see
 `attainable_accelerations`), and blue gaits (5 to 8) as a usable design: that their torques are
@@ -15,11 +16,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix
+from tiltsim_controllers.analysis.torque_free import RANK_TOLERANCE
 from tiltsim_controllers.vehicle.parameters import SPIN
 
 if TYPE_CHECKING:
@@ -38,6 +40,9 @@ HOVER_THRUST: Final = 4.2
 """N, the weight as ch. 9 rounds it (Eq. 21)."""
 
 _INSIDE: Final = 1e-9
+
+FORCES: Final = ("F_X (N)", "F_Y (N)", "F_Z (N)")
+TORQUES: Final = ("tau_L (N m)", "tau_M (N m)", "tau_N (N m)")
 
 
 def rotor_speed_for_thrust(total_thrust: float, vehicle: Vehicle) -> float:
@@ -59,7 +64,7 @@ class AttainableSet:
 
     labels: tuple[str, ...]  # names of the coordinates, with units
     vertices: Floats  # (N, len(labels)); hull vertices where the set has an interior
-    inputs: Floats  # (N, 4): the w (rad^2/s^2) that reach the vertices
+    inputs: Floats  # (N, rotors): the w (rad^2/s^2) that reach the vertices
     dimension: int  # affine dimension; -1 for the empty set
 
     @property
@@ -82,6 +87,25 @@ class AttainableSet:
         return np.full(len(self.labels), np.nan)
 
 
+class TiltedRotors(NamedTuple):
+    """Any number N of rotors at given tilt angles: what they do to the body, within which limits.
+
+    Body axes; torques about the centre of mass; per unit of ``w_i = varpi_i |varpi_i|``.
+    """
+
+    force: Floats  # F, N s^2/rad^2, shape (3, N)
+    torque: Floats  # tau, N m s^2/rad^2, shape (3, N)
+    lower: Floats  # of w, rad^2/s^2, shape (N,)
+    upper: Floats  # of w, rad^2/s^2, shape (N,)
+    weight: float  # N
+
+    def without(self, lost: int) -> TiltedRotors:
+        """The rotors that remain without the rotor with index ``lost``."""
+        force, torque = (np.delete(matrix, lost, axis=1) for matrix in self[:2])
+        lower, upper = (np.delete(bound, lost) for bound in self[2:4])
+        return TiltedRotors(force, torque, lower, upper, self.weight)
+
+
 def input_box(speed_limits: tuple[float, float]) -> tuple[Floats, Floats]:
     """Bounds of ``w`` (rad^2/s^2), each (4,), under limits of ``|varpi|`` (rad/s; Eq. 11).
 
@@ -96,40 +120,35 @@ def input_box(speed_limits: tuple[float, float]) -> tuple[Floats, Floats]:
 
 
 def box_slice_vertices(lower: Floats, upper: Floats, conditions: Floats, values: Floats) -> Floats:
-    """Vertices of ``{w : lower <= w <= upper, conditions w = values}``, shape (N, 4).
+    """Vertices of ``{w : lower <= w <= upper, conditions w = values}``, shape (vertices, N).
 
     A vertex of the slice lies on a face of the box with as many free coordinates as there are
     conditions, the others at a bound.
 
     Args:
-        lower, upper: shape (4,)
-        conditions, values: shapes (k, 4) and (k,), k from 0 to 4
+        lower, upper: shape (N,)
+        conditions, values: independent ones, shapes (k, N) and (k,), k from 0 to N
     """
-    count = len(conditions)
-    size = lower.size
+    count, size = len(conditions), lower.size
     scale = np.abs(np.concatenate([lower, upper])).max()
+    slack = _INSIDE * scale
+    norms = np.linalg.norm(conditions, axis=1)
+    ends = np.array(list(product((False, True), repeat=size - count)), dtype=bool)
     found: list[Floats] = []
-    for free in combinations(range(size), count):
+    for free in map(list, combinations(range(size), count)):
         bounded = [index for index in range(size) if index not in free]
-        matrix = conditions[:, list(free)]
-        norms = np.linalg.norm(conditions, axis=1)
+        matrix = conditions[:, free]
         if count and abs(np.linalg.det(matrix)) < 1e-12 * norms.prod():
             continue  # parallel to the face, whose vertices are those of its faces
-        for ends in product((0, 1), repeat=len(bounded)):
-            w = np.empty(size)
-            w[bounded] = [
-                (lower, upper)[end][index] for end, index in zip(ends, bounded, strict=True)
-            ]
-            if count:
-                w[list(free)] = np.linalg.solve(
-                    matrix, values - conditions[:, bounded] @ w[bounded]
-                )
-            slack = _INSIDE * scale
-            if (w >= lower - slack).all() and (w <= upper + slack).all():
-                found.append(np.clip(w, lower, upper))
-    if not found:
-        return np.empty((0, size))
-    return np.asarray(np.unique(np.round(np.array(found) / scale, 12), axis=0) * scale)
+        w = np.empty((len(ends), size))
+        w[:, bounded] = np.where(ends, upper[bounded], lower[bounded])
+        if count:
+            rest = values[:, np.newaxis] - conditions[:, bounded] @ w[:, bounded].T
+            w[:, free] = np.linalg.solve(matrix, rest).T
+        inside = ((w >= lower - slack) & (w <= upper + slack)).all(axis=1)
+        found.append(np.clip(w[inside], lower, upper))
+    vertices = np.concatenate(found) if found else np.empty((0, size))
+    return np.asarray(np.unique(np.round(vertices / scale, 12), axis=0) * scale)
 
 
 def attainable_torque_thrust(
@@ -191,14 +210,78 @@ def _attainable(
     conditions: list[tuple[Floats, float | None]],
     speed_limits: tuple[float, float],
 ) -> AttainableSet:
-    lower, upper = input_box(speed_limits)
     active = [(row, value) for row, value in conditions if value is not None]
     rows = np.array([row for row, _ in active]).reshape(-1, 4)
     values = np.array([value for _, value in active], dtype=float)
-    inputs = box_slice_vertices(lower, upper, rows, values)
+    return _image_of_slice(image, labels, (rows, values), input_box(speed_limits))
+
+
+def attainable_forces(rotors: TiltedRotors) -> AttainableSet:
+    """The forces without torque (N, body axes)."""
+    conditions = rotors.torque, np.zeros(3)
+    return _image_of_slice(rotors.force, FORCES, conditions, rotors[2:4])
+
+
+def attainable_torques(rotors: TiltedRotors, up: Floats) -> AttainableSet:
+    """The torques (N m, body axes) while the lift along ``up`` carries the weight.
+
+    Args:
+        rotors: of the vehicle
+        up: world up in body axes, shape (3,)
+    """
+    conditions = (up @ rotors.force)[np.newaxis], np.array([rotors.weight])
+    return _image_of_slice(rotors.torque, TORQUES, conditions, rotors[2:4])
+
+
+def level_side_forces(rotors: TiltedRotors) -> AttainableSet:
+    """The side forces (N, body axes) in level hover: without torque, the lift equal to the weight.
+
+    Empty where the rotors cannot hover level.
+    """
+    rows = np.vstack([rotors.torque, rotors.force[2]])
+    conditions = rows, np.array([0.0, 0.0, 0.0, rotors.weight])
+    return _image_of_slice(rotors.force[:2], FORCES[:2], conditions, rotors[2:4])
+
+
+def side_force_share(rotors: TiltedRotors) -> float:
+    """The side force that level hover leaves in every direction, as a share of the weight."""
+    from scipy.spatial import ConvexHull
+
+    found = level_side_forces(rotors)
+    if found.dimension < 2:
+        return 0.0
+    share = -ConvexHull(found.vertices).equations[:, -1].max() / rotors.weight
+    return max(0.0, float(share))
+
+
+def _image_of_slice(
+    image: Floats,
+    labels: tuple[str, ...],
+    conditions: tuple[Floats, Floats],
+    box: tuple[Floats, Floats],
+) -> AttainableSet:
+    """``{image w : rows w = values, w in the box}``, with the conditions rows and values."""
+    independent = _independent(*conditions)
+    inputs = (
+        box_slice_vertices(*box, *independent) if independent else np.empty((0, image.shape[1]))
+    )
     points = inputs @ image.T
     keep, dimension = _hull(points)
     return AttainableSet(labels, points[keep], inputs[keep], dimension)
+
+
+def _independent(rows: Floats, values: Floats) -> tuple[Floats, Floats] | None:
+    """Independent conditions with the same solutions; None where they contradict each other."""
+    sizes = np.linalg.norm(rows, axis=1)
+    sizes = np.where(sizes > 0.0, sizes, 1.0)
+    axes, factors, base = np.linalg.svd(rows / sizes[:, np.newaxis])
+    rank = int((factors > RANK_TOLERANCE).sum())
+    if rank == len(rows):
+        return rows, values
+    along = axes.T @ (values / sizes)
+    if np.abs(along[rank:]).max() > _INSIDE * np.abs(along).max():
+        return None
+    return base[:rank], along[:rank] / factors[:rank]
 
 
 def _hull(points: Floats) -> tuple[NDArray[np.int_], int]:

@@ -15,10 +15,11 @@ scales everything by the constant 1.025.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from tiltsim_controllers.analysis.torque_free import RANK_TOLERANCE
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     torque_entries,
     torque_free_force,
@@ -31,13 +32,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from tiltsim_controllers.mathematics.scalar import Floats
-
-RANK_TOLERANCE: Final = 1e-8
-"""A singular value below this fraction of the largest counts as zero.
-
-Rounding is 1e-16, but gaits are given in decimals: with tilt angles accurate to 1e-8 rad the
-smallest singular value of a rank-deficient ``tau`` is near that fraction.
-"""
 
 
 class Residuals(NamedTuple):

@@ -12,7 +12,13 @@ import itertools
 import numpy as np
 import pytest
 
-from tiltsim_controllers.analysis.singularity import force_matrix, singularity_margin, torque_matrix
+from tiltsim_controllers.analysis import singularity
+from tiltsim_controllers.analysis.torque_free import (
+    SINGULAR_ATTITUDES,
+    hover_direction,
+    singularity_margin,
+    torque_free_forces,
+)
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 ZERO = 1e-9
@@ -47,14 +53,6 @@ def random_vehicle(rng, kind):
     return axes.T, torque
 
 
-def by_torque_free_forces(force, torque):
-    """Rank of tau and an orthonormal basis of V, shape (3, dimension)."""
-    _, sizes, rows = np.linalg.svd(torque)
-    rank = int((sizes > ZERO * sizes[0]).sum())
-    axes, sizes, _ = np.linalg.svd(force @ rows[rank:].T)
-    return rank, axes[:, : int((sizes > ZERO).sum())]
-
-
 def by_determinants(force, torque):
     """The quadratic form det(B B^T) of world up, shape (3, 3)."""
 
@@ -75,22 +73,26 @@ def test_what_is_singular_follows_from_the_torque_free_forces(kind):
     dimensions = set()
     for _ in range(40):
         force, torque = random_vehicle(rng, kind)
-        rank, basis = by_torque_free_forces(force, torque)
+        found = torque_free_forces(force, torque)
+        assert found.rank == np.linalg.matrix_rank(torque, tol=ZERO)
         form, scale = by_determinants(force, torque), np.linalg.det(torque @ torque.T)
-        if rank < 3:
+        if found.rank < 3:
+            assert found.dimension == 0
             assert np.abs(form).max() < ZERO * np.linalg.norm(torque) ** 6  # at every attitude
             continue
         sizes, axes = np.linalg.eigh(form / scale)
         regular = axes[:, sizes > ZERO]
-        assert regular.shape == basis.shape  # circle, two directions, none
-        dimensions.add(basis.shape[1])
+        dimension = int(found.dimension)
+        assert regular.shape[1] == dimension  # circle, two directions, none
+        assert dimension == np.linalg.matrix_rank(np.vstack([torque, force]), tol=ZERO) - 3
+        dimensions.add(dimension)
         for up in rng.normal(size=(5, 3)):
             up /= np.linalg.norm(up)
-            margin = np.linalg.norm(basis.T @ up)
-            assert np.linalg.norm(regular.T @ up) == pytest.approx(margin, abs=1e-7)
+            sine = np.sin(singularity_margin(found, up))
+            assert np.linalg.norm(regular.T @ up) == pytest.approx(sine, abs=1e-7)
         # A direction perpendicular to V is singular, any other one is not.
-        across = [] if basis.shape[1] == 3 else [axes[:, 0]]
-        for singular, directions in ((True, across), (False, basis.T)):
+        across = [] if dimension == 3 else [axes[:, 0]]
+        for singular, directions in ((True, across), (False, regular.T)):
             for up in directions:
                 values = np.linalg.svd(np.vstack([torque, up @ force]), compute_uv=False)
                 assert (values[-1] < 1e-6 * values[0]) == singular
@@ -99,11 +101,83 @@ def test_what_is_singular_follows_from_the_torque_free_forces(kind):
 
 @pytest.mark.parametrize("preset", ["ar_drone_2", "luukkonen"])
 def test_four_rotors_have_the_margin_of_the_library(preset):
-    rng = np.random.default_rng(4)
-    for angles in rng.uniform(-1.2, 1.2, (50, 4)):
-        rank, basis = by_torque_free_forces(
-            force_matrix(angles), torque_matrix(angles, PRESETS[preset])
-        )
-        assert (rank, basis.shape[1]) == (3, 1)
-        margin = singularity_margin(angles, PRESETS[preset])
-        assert np.arcsin(abs(basis[2, 0])) == pytest.approx(abs(float(margin)), abs=1e-9)
+    vehicle = PRESETS[preset]
+    angles = np.random.default_rng(4).uniform(-1.2, 1.2, (50, 4))
+    torque = singularity.torque_matrix(angles, vehicle)
+    found = torque_free_forces(singularity.force_matrix(angles), torque)
+    assert (found.rank == 3).all()
+    assert (found.dimension == 1).all()
+    margin = np.abs(singularity.singularity_margin(angles, vehicle))
+    np.testing.assert_allclose(singularity_margin(found), margin, rtol=0.0, atol=1e-9)
+    direction = singularity.torque_free_direction(angles, vehicle)
+    np.testing.assert_allclose(hover_direction(found), direction, rtol=0.0, atol=1e-9)
+
+
+def random_unit(rng, *shape):
+    vectors = rng.normal(size=(*shape, 3))
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def smallest_singular_value(matrices, up):
+    """Of ``[tau; up^T F]``, for many directions of world up, shape (..., 3)."""
+    force, torque = matrices
+    last = up[..., np.newaxis, :] @ force
+    rows = np.concatenate([np.broadcast_to(torque, (*up.shape[:-1], *torque.shape)), last], axis=-2)
+    return np.linalg.svd(rows, compute_uv=False)[..., -1]
+
+
+def zeros_over_attitudes(matrices, rng, starts):
+    """Directions of world up where the decoupling matrix is singular, by pattern search."""
+    at, reach = random_unit(rng, starts), np.full(starts, 0.3)
+    value = smallest_singular_value(matrices, at)
+    while reach.max() > 1e-8:
+        steps = random_unit(rng, 12, starts) * reach[:, np.newaxis]
+        tried = at + steps
+        tried /= np.linalg.norm(tried, axis=-1, keepdims=True)
+        values = smallest_singular_value(matrices, tried)
+        best = values.argmin(axis=0), np.arange(starts)
+        better = values[best] < value
+        at = np.where(better[:, np.newaxis], tried[best], at)
+        value = np.where(better, values[best], value)
+        reach = np.where(better, 1.3, 0.7) * reach
+    return at[value < 1e-6]
+
+
+def by_brute_force(zeros, starts, up):
+    """The class of the set of singular directions and the least angle from ``up`` to it."""
+    if not len(zeros):
+        return "none", np.pi / 2.0
+    sizes, axes = np.linalg.svd(zeros)[1:]
+    spread = (sizes > 1e-4 * np.sqrt(len(zeros))).sum()
+    if spread == 1:
+        return "two directions", np.arccos(np.abs(zeros @ up).max())
+    if spread == 2:  # a plane through the origin
+        return "great circle", np.arcsin(np.abs(axes[2] @ up))
+    assert len(zeros) == starts
+    return "all", 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_classes_and_margins_are_those_of_a_search_over_attitudes(kind):
+    rng, starts = np.random.default_rng(100 + KINDS.index(kind)), 16
+    for _ in range(40):
+        force, torque = random_vehicle(rng, kind)
+        matrices = force, torque / np.linalg.norm(torque, axis=0).max()
+        found, up = torque_free_forces(force, torque), random_unit(rng)
+        searched, angle = by_brute_force(zeros_over_attitudes(matrices, rng, starts), starts, up)
+        assert SINGULAR_ATTITUDES[found.dimension] == searched
+        assert singularity_margin(found, up) == pytest.approx(angle, abs=1e-4)
+
+
+def test_many_tilt_angles_at_once_are_one_after_another():
+    rng = np.random.default_rng(5)
+    force, torque = rng.normal(size=(2, 7, 5, 3, 6))
+    torque[2, :, 2] = torque[2, :, 0]  # loses rank
+    found = torque_free_forces(force, torque)
+    assert sorted(np.unique(found.dimension)) == [0, 3]
+    alone = torque_free_forces(force[2, 4], torque[2, 4])
+    for every, one in zip(found, alone, strict=True):
+        np.testing.assert_allclose(every[2, 4], one, atol=1e-12)
+    assert np.isnan(hover_direction(alone)).all()
+    assert singularity_margin(alone) == 0.0

@@ -1,0 +1,163 @@
+"""Hover of any number of rotors within their limits, intact or with one lost.
+
+Static hover means zero torque and a force as large as the weight. Its direction in the body is up
+in the world: the vehicle leans by the angle between it and the body's z axis. The torque-free
+forces within the rotors' limits are a polytope (`tiltsim_controllers.analysis.attainable`); the
+hovers are those of its points that are as far from the origin as the weight. The one of least lean
+is level, or on a face or an edge of the polytope, so it is found without search.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from math import acos
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull
+
+from tiltsim_controllers.analysis.attainable import TiltedRotors, attainable_forces
+from tiltsim_controllers.analysis.torque_free import torque_free_forces
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tiltsim_controllers.analysis.attainable import AttainableSet
+    from tiltsim_controllers.mathematics.scalar import Floats
+
+INSIDE: Final = 1e-7
+"""Distance of a squared rotor speed to its limits, as a share of the hover's, that counts as none:
+the tolerance of the linear programs."""
+
+
+class Hover(NamedTuple):
+    """A static hover, with the smallest largest rotor speed in its attitude."""
+
+    lean: float  # between the body's z axis and the vertical, rad
+    force: Floats  # body axes, N, shape (3,)
+    rotor_speeds: Floats  # varpi, signed, rad/s, shape (N,)
+    controllable: bool  # torque and lift can change in every direction
+
+    @property
+    def max_rotor_speed(self) -> float:
+        """The largest rotor speed (rad/s)."""
+        return float(np.abs(self.rotor_speeds).max())
+
+
+def hover(rotors: TiltedRotors) -> Hover | None:
+    """The hover of least lean within the rotors' limits; None if there is none.
+
+    Among the rotor speeds that make its force, those whose largest is smallest. It is controllable
+    where ``[tau; up^T F]`` has rank 4 and some rotor inputs make the force without any of them at a
+    limit.
+    """
+    forces = torque_free_forces(rotors.force, rotors.torque)
+    for force in _candidates(rotors):
+        w = _evenest_inputs(rotors, force)
+        if w is not None:
+            break
+    else:
+        return None
+    up = force / rotors.weight
+    full = forces.rank == 3 and np.linalg.norm(forces.projector @ up) > INSIDE
+    lean = acos(min(1.0, max(-1.0, float(up[2]))))
+    speeds = np.copysign(np.sqrt(np.abs(w)), w)
+    return Hover(lean, force, speeds, bool(full and _has_reserve(rotors, force)))
+
+
+def rotor_losses(rotors: TiltedRotors) -> list[Hover | None]:
+    """The hover without each rotor in turn, at the same tilt angles; None where there is none.
+
+    The lost rotor has speed zero.
+    """
+    losses = []
+    for lost in range(rotors.lower.size):
+        found = hover(rotors.without(lost))
+        if found is not None:
+            found = found._replace(rotor_speeds=np.insert(found.rotor_speeds, lost, 0.0))
+        losses.append(found)
+    return losses
+
+
+def _candidates(rotors: TiltedRotors) -> list[Floats]:
+    """Forces as large as the weight among which is the hover of least lean, least lean first."""
+    points = [np.array([0.0, 0.0, rotors.weight])]
+    found = attainable_forces(rotors)
+    for corners in _faces(found):
+        points += _highest_on_sphere(corners, rotors.weight)
+    return sorted(points, key=lambda force: -float(force[2]))
+
+
+def _faces(found: AttainableSet) -> Iterator[Floats]:
+    """Vertices of the edges of a set of forces and, where it has an area, of its triangles."""
+    if found.dimension < 1:
+        return
+    if found.dimension == 1:
+        yield found.vertices
+        return
+    if found.dimension == 2:  # its vertices are in order
+        triangles = [(0, i, i + 1) for i in range(1, len(found.vertices) - 1)]
+    else:
+        triangles = ConvexHull(found.vertices).simplices.tolist()
+    yield from (found.vertices[list(triangle)] for triangle in triangles)
+    edges = {tuple(sorted(edge)) for triangle in triangles for edge in combinations(triangle, 2)}
+    yield from (found.vertices[list(edge)] for edge in edges)
+
+
+def _highest_on_sphere(corners: Floats, radius: float) -> list[Floats]:
+    """Where the plane or line through corners meets a sphere around the origin: the highest point.
+
+    Both points of a line.
+    """
+    along = np.linalg.svd(corners[1:] - corners[0], full_matrices=False)[2]
+    center = corners[0] - along.T @ (along @ corners[0])
+    square = radius * radius - center @ center
+    if square < -INSIDE * radius * radius:
+        return []
+    reach = np.sqrt(max(0.0, square))
+    if len(along) == 1:
+        return [center + reach * along[0], center - reach * along[0]]
+    uphill = along.T @ along[:, 2]
+    length = np.linalg.norm(uphill)
+    return [center + reach * uphill / length] if length > INSIDE else []
+
+
+def _evenest_inputs(rotors: TiltedRotors, force: Floats) -> Floats | None:
+    """The w of a torque-free force within the limits whose largest is smallest; None if none."""
+    rows, values, unit = _balance(rotors, force)
+    ones = np.ones((rotors.lower.size, 1))
+    identity = np.eye(rotors.lower.size)
+    found = linprog(
+        [0.0] * rotors.lower.size + [1.0],
+        A_ub=np.block([[identity, -ones], [-identity, -ones]]),
+        b_ub=np.zeros(2 * rotors.lower.size),
+        A_eq=np.column_stack([rows, np.zeros(6)]),
+        b_eq=values,
+        bounds=[*zip(rotors.lower / unit, rotors.upper / unit), (0.0, None)],
+    )
+    return found.x[:-1] * unit if found.status == 0 else None
+
+
+def _has_reserve(rotors: TiltedRotors, force: Floats) -> bool:
+    """Whether some inputs make a torque-free force with no rotor at a limit."""
+    rows, values, unit = _balance(rotors, force)
+    ones = np.ones((rotors.lower.size, 1))
+    identity = np.eye(rotors.lower.size)
+    found = linprog(
+        [0.0] * rotors.lower.size + [-1.0],
+        A_ub=np.block([[identity, ones], [-identity, ones]]),
+        b_ub=np.concatenate([rotors.upper, -rotors.lower]) / unit,
+        A_eq=np.column_stack([rows, np.zeros(6)]),
+        b_eq=values,
+        bounds=[(None, None)] * rotors.lower.size + [(None, 1.0)],
+    )
+    return bool(found.status == 0 and found.x[-1] > 10.0 * INSIDE)
+
+
+def _balance(rotors: TiltedRotors, force: Floats) -> tuple[Floats, Floats, float]:
+    """The conditions of a torque-free force, scaled, in units of w that alone carry the weight."""
+    unit = rotors.weight / np.linalg.norm(rotors.force, axis=0).max()
+    arm = np.linalg.norm(rotors.torque, axis=0).max() * unit
+    rows = np.vstack([rotors.torque * unit / arm, rotors.force * unit / rotors.weight])
+    return rows, np.concatenate([np.zeros(3), force / rotors.weight]), float(unit)

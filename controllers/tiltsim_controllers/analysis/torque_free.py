@@ -1,0 +1,88 @@
+"""Singular attitudes of any number of rotors, from the forces that they make without torque.
+
+With the tilt angles fixed, N rotors make the force ``F w`` and the torque ``tau w`` of their inputs
+``w_i = varpi_i |varpi_i|``. The decoupling matrix ``[tau; r3^T F]``, with world up seen from the
+body ``r3``, has rank 4 exactly where ``tau`` has rank 3 and ``r3`` is not perpendicular to the
+torque-free forces ``V = F ker tau``. So the dimension of V decides which attitudes are singular:
+
+- 1: those with world up in the plane perpendicular to V, a great circle of directions. Rotors with
+  parallel thrust axes are of this kind, and all vehicles of four rotors (ch. 3);
+- 2: two opposite directions of world up;
+- 3: none; force and torque are independent of each other;
+- 0, and wherever ``tau`` has lost rank: all.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from tiltsim_controllers.mathematics.scalar import Floats
+
+SINGULAR_ATTITUDES: Final = ("all", "great circle", "two directions", "none")
+"""The set of singular directions of world up, by the dimension of the torque-free forces."""
+
+RANK_TOLERANCE: Final = 1e-8
+"""A singular value below this fraction of the largest counts as zero.
+
+Rounding is 1e-16, but gaits are given in decimals: with tilt angles accurate to 1e-8 rad the
+smallest singular value of a rank-deficient ``tau`` is near that fraction.
+"""
+
+LEVEL: Final = (0.0, 0.0, 1.0)
+"""World up in body axes at level attitude."""
+
+
+class TorqueFreeForces(NamedTuple):
+    """The torque-free forces V of tilt angles, or of many: every field has their shape first."""
+
+    rank: NDArray[np.int_]  # of tau
+    dimension: NDArray[np.int_]  # of V; 0 where tau has lost rank
+    projector: Floats  # on V, body axes, shape (..., 3, 3)
+
+
+def torque_free_forces(force: ArrayLike, torque: ArrayLike) -> TorqueFreeForces:
+    """Rank of ``tau`` and the space of torque-free forces.
+
+    Args:
+        force, torque: Effectiveness F and tau, each of shape (..., 3, N), N of at least 3, in any
+            unit; a rotor that is lost has columns of zeros.
+    """
+    force, torque = np.asarray(force, float), np.asarray(torque, float)
+    _, sizes, rows = np.linalg.svd(torque)
+    rank = (sizes > RANK_TOLERANCE * sizes[..., :1]).sum(axis=-1)
+    in_kernel = np.arange(force.shape[-1]) >= rank[..., np.newaxis]
+    kernel = np.swapaxes(rows * in_kernel[..., np.newaxis], -1, -2)
+    strongest = np.linalg.norm(force, axis=-2).max(axis=-1)
+    axes, sizes, _ = np.linalg.svd(force @ kernel)
+    used = (sizes > RANK_TOLERANCE * strongest[..., np.newaxis]) & (rank == 3)[..., np.newaxis]
+    basis = axes * used[..., np.newaxis, :]
+    return TorqueFreeForces(rank, used.sum(axis=-1), basis @ np.swapaxes(basis, -1, -2))
+
+
+def singularity_margin(forces: TorqueFreeForces, up: ArrayLike = LEVEL) -> Floats:
+    """Smallest rotation (rad) that brings world up to a singular direction: ``asin |P_V r3|``.
+
+    Zero where every attitude is singular; pi/2, the largest value, also where none is.
+
+    Args:
+        forces: of the vehicle at its tilt angles
+        up: world up in body axes, unit vectors of shape (..., 3)
+    """
+    along = np.einsum("...ij,...j->...i", forces.projector, np.asarray(up, float))
+    return np.asarray(np.arcsin(np.minimum(1.0, np.linalg.norm(along, axis=-1))))
+
+
+def hover_direction(forces: TorqueFreeForces) -> Floats:
+    """The torque-free direction nearest to the body's z axis, shape (..., 3); NaN where none is.
+
+    The vehicle that hovers with this direction upward leans least.
+    """
+    along = forces.projector[..., 2]
+    length = np.linalg.norm(along, axis=-1, keepdims=True)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(length > RANK_TOLERANCE, along / length, np.nan)
