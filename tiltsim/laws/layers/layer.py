@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Sampling
 from tiltsim.models.parts import ExtraActuators
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
+from tiltsim_controllers.mathematics.vectors import entries_of
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
@@ -136,7 +136,7 @@ def _functions_within(inner: ClosedLoop, fields: int) -> tuple[Callable[..., Val
     inner_observe = inner.columns.observe
     inner_check = inner.monitoring.sign_check_values
     act_size, ctrl_size = inner.dynamics.sizes.act, inner.dynamics.sizes.ctrl
-    activations = _entries(act_size, fields)
+    activations = entries_of(act_size, fields)
 
     @scalar
     def controls(
@@ -160,23 +160,3 @@ def _functions_within(inner: ClosedLoop, fields: int) -> tuple[Callable[..., Val
         return inner_check(values, parameters.inner)
 
     return controls, hold, observe, sign_check_values
-
-
-@cache
-def _entries(first: int, count: int) -> Callable[[Vector], Values]:
-    """Scalar code that reads so many entries of a vector, which native code may have as a list."""
-    if count == 0:
-
-        @scalar
-        def nothing(vector: Vector) -> Values:
-            return ()
-
-        return nothing
-
-    further = _entries(first + 1, count - 1)
-
-    @scalar
-    def entries(vector: Vector) -> Values:
-        return (vector[first], *further(vector))
-
-    return entries

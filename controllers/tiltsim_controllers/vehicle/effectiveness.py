@@ -1,0 +1,139 @@
+"""What each rotor of any vehicle does to the body: force F(alpha) and torque tau(alpha).
+
+A pod turns about a fixed axis, so every vector fixed in it is a constant, a cosine and a sine of
+the tilt angle. So is the torque about a fixed point: with the rotor at ``h + Q p``, thrust axis
+``Q a`` and ``h`` on the hinge, ``(h + Q p) x Q a = h x Q a + Q (p x a)`` is linear in ``Q``. A
+rotor's wrench per unit of ``w = varpi |varpi|`` is therefore exactly ``A + B cos(alpha) + C
+sin(alpha)``, wherever its hinge is.
+
+The numbers of all rotors are one flat table, `ROTOR_FLOATS` each (`rotor_entries`): the number of
+its tilt, from 0 (-1: fixed), its spin (the sign of the speed with which it pushes along its axis),
+then A, B and C, force x, y, z and torque x, y, z each. It is part of a flight's knots, from an
+index ``at`` on. Rotors on one pod have the same tilt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from math import cos, sin
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
+from tiltsim_controllers.mathematics.vectors import (
+    componentwise,
+    tuple_text,
+    vectors_of,
+    written_out,
+)
+
+ROTOR_FLOATS: Final = 20
+"""Floats of one rotor."""
+
+TILT, SPIN_SIGN, CONSTANT, COSINE, SINE = 0, 1, 2, 8, 14
+"""Where in them its tilt, its spin, A, B and C begin."""
+
+Layout = tuple[int, ...]
+"""The number of every rotor's tilt, from 0; -1: fixed. Scalar code is made for a layout."""
+
+Rows = tuple[Values, Values, Values, Values, Values, Values]
+"""Force x, y, z and torque x, y, z by rotor."""
+
+
+def rotor_entries(
+    place: ArrayLike,
+    axis: ArrayLike,
+    thrust: float,
+    drag: float,
+    spin: float,
+    *,
+    tilt: int = -1,
+    hinge: ArrayLike = (0.0, 0.0, 0.0),
+    hinge_axis: ArrayLike = (0.0, 0.0, 0.0),
+) -> Values:
+    """A rotor's part of the table.
+
+    Args:
+        place: of the rotor at zero tilt, from the centre of mass, m, body axes
+        axis: unit vector of its thrust at zero tilt
+        thrust: coefficient, N s^2/rad^2
+        drag: coefficient of the torque against its rotation, N m s^2/rad^2
+        spin: 1 or -1, the sign of the speed with which it pushes along its axis
+        tilt: number of its tilt, from 0; -1 for a fixed rotor
+        hinge, hinge_axis: a point of its hinge as ``place``, and its unit vector
+    """
+    arm, n, along = np.asarray(hinge, float), np.asarray(axis, float), np.asarray(hinge_axis, float)
+    force = spin * thrust * n
+    # About the point of the hinge; turns with the pod as the force does.
+    torque = np.cross(np.asarray(place, float) - arm, force) - drag * n
+    parts = []
+    for vector in (force, torque):
+        constant = along * (along @ vector) if tilt >= 0 else vector
+        parts.append((constant, vector - constant, np.cross(along, vector)))
+    wrenches = [np.r_[f, t + np.cross(arm, f)] for f, t in zip(*parts)]
+    return tuple(map(float, (tilt, spin, *np.concatenate(wrenches))))
+
+
+def layout_of(table: Sequence[float]) -> Layout:
+    """The layout of a table."""
+    return tuple(int(tilt) for tilt in table[TILT::ROTOR_FLOATS])
+
+
+def tilts_of(layout: Layout) -> int:
+    """The number of tilts of a layout."""
+    return max(layout) + 1
+
+
+class Effectiveness(NamedTuple):
+    """Scalar functions for vehicles of one layout; ``table`` and ``at`` as in this module."""
+
+    cosines: Callable[..., Values]  # (tilts): of every tilt
+    sines: Callable[..., Values]
+    rows: Callable[..., Rows]
+    """``(constant, cosines, sines, table, at)``: ``constant A + B cosines + C sines``; derivatives
+    have the constant 0 and the derivatives of cosines and sines."""
+    squares: Callable[..., Values]  # (speeds): w = varpi |varpi| of every rotor
+    wrench: Callable[..., Values]  # (tilts, squares, table, at): force (N) and torque (N m)
+
+
+@cache
+def effectiveness_of(layout: Layout) -> Effectiveness:
+    """The functions for a layout."""
+    name = "_".join(str(tilt) if tilt >= 0 else "f" for tilt in layout)
+    tilts = tilts_of(layout)
+
+    def entry(rotor: int, component: int) -> str:
+        first, tilt = rotor * ROTOR_FLOATS + component, layout[rotor]
+        text = f"constant * table[at + {first + CONSTANT}]"
+        if tilt < 0:
+            return text
+        cosine = f"cosines[{tilt}] * table[at + {first + COSINE}]"
+        return f"{text} + {cosine} + sines[{tilt}] * table[at + {first + SINE}]"
+
+    rotors = range(len(layout))
+    all_rows = tuple_text(tuple_text(entry(i, k) for i in rotors) for k in range(6))
+    rows = written_out(f"rows_{name}", "constant, cosines, sines, table, at", all_rows)
+    cosines = componentwise("cosines", "tilts", "cos(tilts#)", tilts, cos=cos)
+    sines = componentwise("sines", "tilts", "sin(tilts#)", tilts, sin=sin)
+    squares = componentwise("squares", "speeds", "speeds# * abs(speeds#)", len(layout))
+    dot = vectors_of(len(layout)).dot
+
+    @scalar
+    def wrench(tilts: Values, squares: Values, table: Vector, at: int) -> Values:
+        fx, fy, fz, tx, ty, tz = rows(1.0, cosines(tilts), sines(tilts), table, at)
+        return (
+            *(dot(fx, squares), dot(fy, squares), dot(fz, squares)),
+            *(dot(tx, squares), dot(ty, squares), dot(tz, squares)),
+        )
+
+    return Effectiveness(cosines, sines, rows, squares, wrench)
+
+
+def force_and_torque(table: Sequence[float], tilts: Sequence[float] = ()) -> tuple[Floats, Floats]:
+    """F and tau at tilt angles (rad), shape (3, N) each, per unit of ``w``, body axes."""
+    functions = effectiveness_of(layout_of(table))
+    rows = functions.rows(1.0, functions.cosines(tilts), functions.sines(tilts), table, 0)
+    return np.array(rows[:3]), np.array(rows[3:])
