@@ -20,21 +20,32 @@ ROW: Final = 5
 
 
 @scalar
-def keyframe_gait(time: float, period: float, rows: float, knots: Vector) -> TiltsAndRates:
-    """Tilt angles (rad) and rates (rad/s) of a gait through keyframes.
+def keyframe_segment(
+    time: float, period: float, rows: float, size: int, knots: Vector
+) -> tuple[int, float, float]:
+    """Where a gait is between two keyframes: the first one's index, the part passed, and 1/s.
 
     Args:
         time, period: s
         rows: number of keyframes
+        size: floats per keyframe
         knots: the keyframes; further floats may follow
     """
     turns = time / period
     phase = turns - floor(turns)
-    start = ROW * row_at(phase, int(rows) - 1, 0, ROW, knots)
+    start = size * row_at(phase, int(rows) - 1, 0, size, knots)
+    span = knots[start + size] - knots[start]
+    return start, (phase - knots[start]) / span, 1.0 / (span * period)
+
+
+@scalar
+def keyframe_gait(time: float, period: float, rows: float, knots: Vector) -> TiltsAndRates:
+    """Tilt angles (rad) and rates (rad/s) of a gait through keyframes of four tilts.
+
+    Arguments as for `keyframe_segment`.
+    """
+    start, part, per_second = keyframe_segment(time, period, rows, ROW, knots)
     stop = start + ROW
-    span = knots[stop] - knots[start]
-    part = (phase - knots[start]) / span
-    per_second = 1.0 / (span * period)
     step_1 = knots[stop + 1] - knots[start + 1]
     step_2 = knots[stop + 2] - knots[start + 2]
     step_3 = knots[stop + 3] - knots[start + 3]

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from tiltsim_controllers.gaits import tabulated
+from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
 from tiltsim_controllers.gaits.cat import FOOTFALLS, cat_keyframes
-from tiltsim_controllers.gaits.keyframes import ROW
 from tiltsim_controllers.gaits.parameters import (
     FIXED,
     KEYFRAMES,
@@ -28,7 +28,6 @@ from tiltsim_controllers.gaits.parameters import (
     TWO_COLOR_CIRCLE,
     GaitParameters,
 )
-from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.gaits.two_color import COLORS
 from tiltsim_controllers.mathematics.splines import spline_knots
 from tiltsim_controllers.vehicle.parameters import drag_ratio
@@ -48,12 +47,16 @@ _TABLE_SAMPLES: Final = 20_000
 
 @dataclass(frozen=True)
 class Gait:
-    """A gait ready to be flown: pass `parameters` and `knots` to `tilt_reference`."""
+    """A gait ready to be flown: pass `parameters` and `knots` to `tilt_reference`.
+
+    Another number of tilts than four has `tilt_motion_of`.
+    """
 
     name: str
     parameters: GaitParameters
     knots: tuple[float, ...] = NO_KNOTS
     source: str = ""
+    tilts: int = 4
 
     @property
     def is_constant(self) -> bool:
@@ -121,12 +124,12 @@ class Gait:
         return 0.5 * self.parameters.period if self.parameters.type == TROT_CONTINUOUS else inf
 
     def angles(self, time: ArrayLike) -> Floats:
-        """Tilt angles (rad) at times (s) of shape (...), as an array of shape (..., 4)."""
-        return self._evaluate(time)[..., :4]
+        """Tilt angles (rad) at times (s) of shape (...), as an array of shape (..., tilts)."""
+        return self._evaluate(time)[..., 0]
 
     def rates(self, time: ArrayLike) -> Floats:
-        """Tilt rates (rad/s) at times (s) of shape (...), as an array of shape (..., 4)."""
-        return self._evaluate(time)[..., 4:]
+        """Tilt rates (rad/s) at times (s) of shape (...), as an array of shape (..., tilts)."""
+        return self._evaluate(time)[..., 1]
 
     def sample_times(self, samples: int = 201) -> Floats:
         """Times (s) over one period, with ends and keyframes; only 0 for a constant gait."""
@@ -162,35 +165,40 @@ class Gait:
         return replace(self, name=f"{self.name}, biased {eta:.0%}", parameters=parameters)
 
     def _rows(self) -> Floats | None:
-        """The keyframes as flown, shape (N, 5); None for gaits without them."""
+        """The keyframes as flown, shape (N, 1 + tilts); None for gaits without them."""
         if self.parameters.type != KEYFRAMES:
             return None
-        rows = np.reshape(self.knots, (-1, ROW))[: int(self.parameters.keyframes)].copy()
+        rows = np.reshape(self.knots, (-1, 1 + self.tilts))[: int(self.parameters.keyframes)].copy()
         rows[:, 1:] *= self.parameters.scale
         rows[:, 3:] *= self.parameters.bias
         return rows
 
     def _table_motion(self) -> tuple[Floats, Floats]:
-        """Tilt angles and rates of a table as flown, close together, each of shape (..., 4)."""
-        rows = np.reshape(self.knots, (-1, tabulated.ROW))
-        pieces = rows[:-1, 1:].reshape(len(rows) - 1, 1, 4, tabulated.COEFFICIENTS)
+        """Tilt angles and rates of a table as flown, close together, each of shape (..., tilts)."""
+        rows = np.reshape(self.knots, (-1, 1 + self.tilts * tabulated.COEFFICIENTS))
+        pieces = rows[:-1, 1:].reshape(len(rows) - 1, 1, self.tilts, tabulated.COEFFICIENTS)
         third, second, first, value = np.moveaxis(pieces, -1, 0)
         parts = np.linspace(0.0, 1.0, 2 + _TABLE_SAMPLES // len(rows))
         since = (np.diff(rows[:, 0])[:, np.newaxis] * parts)[..., np.newaxis]
         angles = ((third * since + second) * since + first) * since + value
         rates = (3.0 * third * since + 2.0 * second) * since + first
-        scale = self.parameters.scale * np.array([1.0, 1.0, *[self.parameters.bias] * 2])
+        back = np.arange(self.tilts) >= 2
+        scale = self.parameters.scale * np.where(back, self.parameters.bias, 1.0)
         return scale * angles, scale * rates
 
     def _evaluate(self, time: ArrayLike) -> Floats:
         times = np.asarray(time, dtype=float)
-        values = [tilt_reference(t, self.parameters, self.knots) for t in times.ravel().tolist()]
-        return np.reshape(np.asarray(values, dtype=float), (*times.shape, 8))
+        planned = tilt_motion_of(self.tilts).planned
+        jets = [planned(t, self.parameters, self.knots) for t in times.ravel().tolist()]
+        return np.reshape(np.asarray(jets, dtype=float), (*times.shape, self.tilts, 3))
 
 
 def fixed(angles: Sequence[float], *, name: str = "fixed", source: str = "") -> Gait:
-    """Constant tilt angles (rad) (ch. 3; ch. 4, Eq. 32)."""
-    return Gait(name, GaitParameters(FIXED, *map(float, angles)), source=source)
+    """Constant tilt angles (rad) (ch. 3; ch. 4, Eq. 32), of any number of tilts."""
+    values = tuple(map(float, angles))
+    if len(values) == 4:
+        return Gait(name, GaitParameters(FIXED, *values), source=source)
+    return Gait(name, GaitParameters(FIXED), values or NO_KNOTS, source, len(values))
 
 
 def instant_trot(amplitude: float, period: float) -> Gait:
@@ -237,14 +245,18 @@ def cat(name: str, amplitude: float, period: float, lean: float = 0.0) -> Gait:
 
 
 def waypoints(
-    angles: Sequence[Sequence[float]], period: float, phases: Sequence[float] | None = None
+    angles: Sequence[Sequence[float]],
+    period: float,
+    phases: Sequence[float] | None = None,
+    tilts: int = 4,
 ) -> Gait:
     """A closed, piecewise linear gait through the given tilt angles.
 
     Args:
-        angles: waypoints of four tilt angles, rad; the last segment leads back to the first
+        angles: waypoints of ``tilts`` angles, rad; the last segment leads back to the first
         period: s
         phases: when each waypoint is reached, as a fraction of the period; evenly spaced by default
+        tilts: number of tilts
 
     Raises:
         ValueError: If the numbers of waypoints and phases differ, or as `keyframes`.
@@ -257,27 +269,36 @@ def waypoints(
     rows = [(phase, *point) for phase, point in zip(phases, angles, strict=True)]
     if rows:
         rows.append((1.0, *rows[0][1:]))
-    return keyframes(rows, period, name="waypoints")
+    return keyframes(rows, period, name="waypoints", tilts=tilts)
 
 
 def keyframes(
-    rows: Iterable[Sequence[float]], period: float, *, name: str = "keyframes", source: str = ""
+    rows: Iterable[Sequence[float]],
+    period: float,
+    *,
+    name: str = "keyframes",
+    source: str = "",
+    tilts: int = 4,
 ) -> Gait:
     """A gait through keyframes, linear in between.
 
     Args:
-        rows: ``(phase, alpha_1, ..., alpha_4)``, phase from 0 to 1, angles in rad
+        rows: ``(phase, alpha_1, ...)``, phase from 0 to 1, angles in rad
         period: s
         name, source: name and origin of the gait
+        tilts: number of tilts
 
     Raises:
-        ValueError: If a row is not five finite numbers, the phases do not run from 0 to 1 or
+        ValueError: If a row is not as many finite numbers, the phases do not run from 0 to 1 or
             decrease, three rows share a phase (two make a jump), or the period is not positive.
     """
     frames = [tuple(map(float, row)) for row in rows]
     for frame in frames:
-        if len(frame) != ROW or not all(map(isfinite, frame)):
-            raise ValueError(f"keyframe {list(frame)}: needs a phase and four finite tilt angles")
+        if len(frame) != 1 + tilts or not all(map(isfinite, frame)):
+            count = "four" if tilts == 4 else tilts
+            raise ValueError(
+                f"keyframe {list(frame)}: needs a phase and {count} finite tilt angles"
+            )
     phases = [frame[0] for frame in frames]
     if len(phases) < 2 or phases[0] != 0.0 or phases[-1] != 1.0:
         raise ValueError(f"keyframe phases {phases}: must start at 0 and end at 1")
@@ -288,7 +309,8 @@ def keyframes(
     if any(third == first for first, third in zip(phases, phases[2:], strict=False)):
         raise ValueError(f"keyframe phases {phases}: at most two rows may share a phase")
     parameters = GaitParameters(KEYFRAMES, period=_positive(period), keyframes=float(len(frames)))
-    return Gait(name, parameters, tuple(value for frame in frames for value in frame), source)
+    knots = tuple(value for frame in frames for value in frame)
+    return Gait(name, parameters, knots, source, tilts)
 
 
 def table(times: Sequence[float], angles: Sequence[Sequence[float]], *, repeats: bool) -> Gait:
@@ -296,7 +318,7 @@ def table(times: Sequence[float], angles: Sequence[Sequence[float]], *, repeats:
 
     Args:
         times: s, from 0 and increasing, at least 2
-        angles: four tilt angles at each, rad
+        angles: the tilt angles at each, rad
         repeats: whether the gait starts over after the last row, smoothly, or holds it
 
     Raises:
@@ -311,7 +333,7 @@ def table(times: Sequence[float], angles: Sequence[Sequence[float]], *, repeats:
         keyframes=float(len(times) - repeats),
         repeats=float(repeats),
     )
-    return Gait("table", parameters, knots)
+    return Gait("table", parameters, knots, tilts=len(angles[0]))
 
 
 def two_color_circle(

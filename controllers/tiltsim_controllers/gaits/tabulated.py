@@ -18,7 +18,8 @@ ROW: Final = 1 + 4 * COEFFICIENTS
 
 
 @scalar
-def _segment_jet(since: float, start: int, knots: Vector) -> Jet:
+def segment_jet(since: float, start: int, knots: Vector) -> Jet:
+    """A tilt angle with rate and acceleration, ``since`` seconds into its polynomial's segment."""
     value, rate, acceleration, _, _ = polynomial_motion(since, start, start + COEFFICIENTS, knots)
     return value, rate, acceleration
 
@@ -37,8 +38,8 @@ def table_gait(time: float, gait: GaitParameters, knots: Vector) -> Jets4:
     row = ROW * row_at(time, int(gait.keyframes), 0, ROW, knots)
     since = max(0.0, time - knots[row])
     return (
-        _segment_jet(since, row + 1, knots),
-        _segment_jet(since, row + 1 + COEFFICIENTS, knots),
-        _segment_jet(since, row + 1 + 2 * COEFFICIENTS, knots),
-        _segment_jet(since, row + 1 + 3 * COEFFICIENTS, knots),
+        segment_jet(since, row + 1, knots),
+        segment_jet(since, row + 1 + COEFFICIENTS, knots),
+        segment_jet(since, row + 1 + 2 * COEFFICIENTS, knots),
+        segment_jet(since, row + 1 + 3 * COEFFICIENTS, knots),
     )

@@ -10,7 +10,7 @@ from tiltsim_controllers.mathematics.jets import (
     jet_square_root,
     jet_sum,
 )
-from tiltsim_controllers.mathematics.scalar import Triple, clipped, scalar
+from tiltsim_controllers.mathematics.scalar import Quad, Triple, clipped, scalar
 from tiltsim_controllers.vehicle.rigid_body import euler_derivatives
 
 
@@ -47,6 +47,24 @@ def integrator_rate(error: float, desired: float, limit: float) -> float:
     if abs(desired) > limit and error * desired > 0.0:
         return 0.0
     return error
+
+
+@scalar
+def force_control(
+    error: Jet, acceleration: Jet, integral: float, gains: Quad, limit: float
+) -> tuple[float, float]:
+    """Desired jerk along an axis that the force moves (ch. 4, Eq. 27), and its integrator's rate.
+
+    Args:
+        error, acceleration: the position error and the reference's acceleration with derivatives
+        integral: of the error, m s
+        gains: ``(k1, k2, k3, k4)``, 1/s to 1/s^4, the last on the integral
+        limit: of the acceleration that the error may ask for before its integrator stops, m/s^2
+    """
+    k1, k2, k3, k4 = gains
+    effort = k2 * error[1] + k3 * error[0] + k4 * integral
+    jerk = acceleration[1] + k1 * error[2] + k2 * error[1] + k3 * error[0] + k4 * integral
+    return jerk, integrator_rate(error[0], effort, k1 * limit)
 
 
 @scalar

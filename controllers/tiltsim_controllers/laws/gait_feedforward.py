@@ -21,7 +21,7 @@ Each of these terms can be omitted, to measure its effect.
 from __future__ import annotations
 
 from math import nan
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from tiltsim_controllers.gaits.anticipation import anticipated_tilts
 from tiltsim_controllers.gaits.parameters import NO_KNOTS, GaitParameters
@@ -31,6 +31,7 @@ from tiltsim_controllers.laws.decouplers import NONE
 from tiltsim_controllers.laws.feedback import (
     attitude_jerk,
     attitude_motion,
+    force_control,
     integrator_rate,
     limited_acceleration,
     position_feedback,
@@ -130,8 +131,8 @@ def _planned_force(
 
 
 @scalar
-def _tracking_errors(
-    time: float, state: Values, specific: Triple, parameters: Parameters, knots: Vector
+def tracking_errors(
+    time: float, state: Values, specific: Triple, parameters: Any, knots: Vector
 ) -> tuple[Jets3, Jets3]:
     """Position errors along x, y and z, and the reference's accelerations, with derivatives."""
     known = parameters.terms.reference_derivatives
@@ -153,61 +154,53 @@ def _tracking_errors(
 
 
 @scalar
-def _horizontal_control(
-    errors: Jets3,
-    accelerations: Jets3,
-    jerk: Triple,
-    force: Jets3,
-    yaw: Jet,
-    integrals: Triple,
-    parameters: Parameters,
+def horizontal_control(
+    errors: Jets3, accelerations: Jets3, jerk: Triple, integrals: Triple, parameters: Any
 ) -> tuple[Jet, Jet, float, float]:
-    """References of roll and pitch with derivatives, and integrator rates of x and y."""
+    """Desired horizontal acceleration with derivatives, and integrator rates of x and y."""
     terms, limit = parameters.terms, parameters.max_acceleration
     k3 = terms.integral_action * parameters.integral.position
     gains = (parameters.gains.position_1, parameters.gains.position_2, k3)
     error_x, error_y, _ = errors
-    along_x, along_y, along_z = accelerations
+    along_x, along_y, _ = accelerations
     back_x = position_feedback(error_x, along_x[1] - jerk[0], integrals[0], gains)
     back_y = position_feedback(error_y, along_y[1] - jerk[1], integrals[1], gains)
     x_rate = integrator_rate(error_x[0], back_x[0], limit)
     y_rate = integrator_rate(error_y[0], back_y[0], limit)
     back_x, back_y = limited_acceleration(back_x, back_y, limit)
-    roll, pitch = exact_decoupler_jet(
-        jet_sum(1.0, along_x, 1.0, back_x),
-        jet_sum(1.0, along_y, 1.0, back_y),
-        (parameters.vehicle.gravity + along_z[0], along_z[1], along_z[2]),
-        yaw,
-        force,
-    )
-    if terms.attitude_rates == 0.0:
-        roll, pitch = (roll[0], 0.0, 0.0), (pitch[0], 0.0, 0.0)
-    return roll, pitch, x_rate, y_rate
+    return jet_sum(1.0, along_x, 1.0, back_x), jet_sum(1.0, along_y, 1.0, back_y), x_rate, y_rate
 
 
 @scalar
-def _altitude_control(
-    error: Jet, acceleration: Jet, integral: float, parameters: Parameters
+def decoupled_attitude(
+    x: Jet, y: Jet, z: Jet, yaw: Jet, force: Jets3, parameters: Any
+) -> tuple[Jet, Jet]:
+    """References of roll and pitch with derivatives, from a desired acceleration (m/s^2, world)."""
+    lift = (parameters.vehicle.gravity + z[0], z[1], z[2])
+    roll, pitch = exact_decoupler_jet(x, y, lift, yaw, force)
+    if parameters.terms.attitude_rates == 0.0:
+        return (roll[0], 0.0, 0.0), (pitch[0], 0.0, 0.0)
+    return roll, pitch
+
+
+@scalar
+def altitude_control(
+    error: Jet, acceleration: Jet, integral: float, parameters: Any
 ) -> tuple[float, float]:
     """Desired vertical jerk (ch. 4, Eq. 27, plus the integral), and the integrator's rate."""
     gains = parameters.gains
     k4 = parameters.terms.integral_action * parameters.integral.altitude
-    climb = gains.altitude_2 * error[1] + gains.altitude_3 * error[0] + k4 * integral
-    jerk = (
-        acceleration[1]
-        + gains.altitude_1 * error[2]
-        + gains.altitude_2 * error[1]
-        + gains.altitude_3 * error[0]
-        + k4 * integral
+    return force_control(
+        error,
+        acceleration,
+        integral,
+        (gains.altitude_1, gains.altitude_2, gains.altitude_3, k4),
+        parameters.max_acceleration,
     )
-    limit = gains.altitude_1 * parameters.max_acceleration
-    return jerk, integrator_rate(error[0], climb, limit)
 
 
 @scalar
-def _attitude_control(
-    roll_ref: Jet, pitch_ref: Jet, attitude: Jets3, parameters: Parameters
-) -> Triple:
+def attitude_control(roll_ref: Jet, pitch_ref: Jet, attitude: Jets3, parameters: Any) -> Triple:
     """Desired second derivatives (rad/s^3) of the body rates."""
     gains, limit = parameters.gains, parameters.max_angular_acceleration
     roll, pitch, yaw = attitude
@@ -332,7 +325,7 @@ def tracking_inputs(
     specific = (per_force * fx, per_force * fy, per_force * fz)
 
     # Position and attitude control.
-    errors, accelerations = _tracking_errors(
+    errors, accelerations = tracking_errors(
         time, state, to_world(rotation, specific), parameters, knots
     )
     x_rate = y_rate = 0.0
@@ -340,11 +333,14 @@ def tracking_inputs(
     if parameters.decoupler != NONE:
         force = _planned_force(time, (roll, pitch), supervisor_motion, parameters, knots)
         jerk = to_world(rotation, jerk_along(force, specific, omega, terms.gait_rates))
-        roll_ref, pitch_ref, x_rate, y_rate = _horizontal_control(
-            errors, accelerations, jerk, force, attitude[2], integrals, parameters
+        along_x, along_y, x_rate, y_rate = horizontal_control(
+            errors, accelerations, jerk, integrals, parameters
         )
-    lift_jerk, z_rate = _altitude_control(errors[2], accelerations[2], integrals[2], parameters)
-    desired = _attitude_control(roll_ref, pitch_ref, attitude, parameters)
+        roll_ref, pitch_ref = decoupled_attitude(
+            along_x, along_y, accelerations[2], attitude[2], force, parameters
+        )
+    lift_jerk, z_rate = altitude_control(errors[2], accelerations[2], integrals[2], parameters)
+    desired = attitude_control(roll_ref, pitch_ref, attitude, parameters)
 
     # Rates of torque and lift that remain for the rotors.
     mx, my, mz = torque_rate(omega, omega_rate, desired, inertia, terms.gyroscopic_torque)

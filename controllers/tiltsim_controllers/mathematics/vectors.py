@@ -47,16 +47,16 @@ def tuple_text(components: Iterable[str]) -> str:
 @cache
 def componentwise(
     name: str, arguments: str, component: str, length: int, **functions: Callable[..., Any]
-) -> Callable[..., Values]:
-    """A scalar function that returns a vector.
+) -> Callable[..., Any]:
+    """A scalar function that returns a tuple.
 
     Args:
         name, arguments, functions: as for `written_out`; the length is added to the name
-        component: an expression in which ``#`` is replaced by the index, ``[0]`` and so on
+        component: an expression, ``@`` for the index and ``#`` for an argument's entry, ``[@]``
         length: how many components the result has
     """
-    texts = [component.replace("#", f"[{i}]") for i in range(length)]
-    function: Callable[..., Values] = written_out(
+    texts = [component.replace("#", "[@]").replace("@", str(i)) for i in range(length)]
+    function: Callable[..., Any] = written_out(
         f"{name}_{length}", arguments, tuple_text(texts), **functions
     )
     return function
