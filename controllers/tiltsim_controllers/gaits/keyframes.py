@@ -42,7 +42,8 @@ def keyframe_segment(
 def keyframe_gait(time: float, period: float, rows: float, knots: Vector) -> TiltsAndRates:
     """Tilt angles (rad) and rates (rad/s) of a gait through keyframes of four tilts.
 
-    Arguments as for `keyframe_segment`.
+    Args:
+        time, period, rows, knots: as for `keyframe_segment`
     """
     start, part, per_second = keyframe_segment(time, period, rows, ROW, knots)
     stop = start + ROW

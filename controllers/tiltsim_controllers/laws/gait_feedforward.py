@@ -134,7 +134,14 @@ def _planned_force(
 def tracking_errors(
     time: float, state: Values, specific: Triple, parameters: Any, knots: Vector
 ) -> tuple[Jets3, Jets3]:
-    """Position errors along x, y and z, and the reference's accelerations, with derivatives."""
+    """Position errors along x, y and z, and the reference's accelerations, with derivatives.
+
+    Args:
+        time: s
+        state: begins with position (m) and velocity (m/s), world axes
+        specific: force per mass, m/s^2, world axes
+        parameters, knots: of the controller, and of gait and reference
+    """
     known = parameters.terms.reference_derivatives
     x, y, z, vx, vy, vz = state[:6]
     motion = reference_derivatives(time, parameters.reference, knots)
@@ -157,7 +164,14 @@ def tracking_errors(
 def horizontal_control(
     errors: Jets3, accelerations: Jets3, jerk: Triple, integrals: Triple, parameters: Any
 ) -> tuple[Jet, Jet, float, float]:
-    """Desired horizontal acceleration with derivatives, and integrator rates of x and y."""
+    """Desired horizontal acceleration with derivatives, and integrator rates of x and y.
+
+    Args:
+        errors, accelerations: as `tracking_errors` returns them
+        jerk: of the body, m/s^3, world axes
+        integrals: `INTEGRAL_FIELDS`
+        parameters: of the controller
+    """
     terms, limit = parameters.terms, parameters.max_acceleration
     k3 = terms.integral_action * parameters.integral.position
     gains = (parameters.gains.position_1, parameters.gains.position_2, k3)
@@ -175,7 +189,14 @@ def horizontal_control(
 def decoupled_attitude(
     x: Jet, y: Jet, z: Jet, yaw: Jet, force: Jets3, parameters: Any
 ) -> tuple[Jet, Jet]:
-    """References of roll and pitch with derivatives, from a desired acceleration (m/s^2, world)."""
+    """References of roll and pitch with derivatives, from a desired acceleration.
+
+    Args:
+        x, y, z: the desired acceleration, m/s^2, world axes
+        yaw: rad
+        force: the torque-free force, of arbitrary unit, body axes
+        parameters: of the controller
+    """
     lift = (parameters.vehicle.gravity + z[0], z[1], z[2])
     roll, pitch = exact_decoupler_jet(x, y, lift, yaw, force)
     if parameters.terms.attitude_rates == 0.0:
@@ -187,7 +208,13 @@ def decoupled_attitude(
 def altitude_control(
     error: Jet, acceleration: Jet, integral: float, parameters: Any
 ) -> tuple[float, float]:
-    """Desired vertical jerk (ch. 4, Eq. 27, plus the integral), and the integrator's rate."""
+    """Desired vertical jerk (ch. 4, Eq. 27, plus the integral), and the integrator's rate.
+
+    Args:
+        error, acceleration: the altitude's, and that of its reference, with derivatives
+        integral: of the error, m s
+        parameters: of the controller
+    """
     gains = parameters.gains
     k4 = parameters.terms.integral_action * parameters.integral.altitude
     return force_control(
@@ -201,7 +228,13 @@ def altitude_control(
 
 @scalar
 def attitude_control(roll_ref: Jet, pitch_ref: Jet, attitude: Jets3, parameters: Any) -> Triple:
-    """Desired second derivatives (rad/s^3) of the body rates."""
+    """Desired second derivatives (rad/s^3) of the body rates.
+
+    Args:
+        roll_ref, pitch_ref: references with derivatives, rad
+        attitude: roll, pitch and yaw with derivatives, rad
+        parameters: of the controller
+    """
     gains, limit = parameters.gains, parameters.max_angular_acceleration
     roll, pitch, yaw = attitude
     yaw_error = wrap_angle(parameters.reference.yaw - yaw[0])
