@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 import warnings
+from contextlib import suppress
 from functools import wraps
 from importlib.machinery import SourceFileLoader
 
@@ -60,10 +61,6 @@ def trace_seldom():
     from matplotlib.figure import Figure
     from numba.core import compiler
 
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", module="glfw")  # complains without a screen
-        from dm_control import mjcf
-
     from tiltsim.plants.mujoco_plant import MujocoPlant
     from tiltsim.plants.thesis_plant import ThesisPlant
     from tiltsim.plants.user_controller import UserControlledPlant
@@ -77,12 +74,15 @@ def trace_seldom():
         compiler: ["compile_extra"],
         Figure: ["add_subplot", "draw", "legend", "savefig"],
         Axes: ["legend", "plot"],
-        mjcf: ["from_path"],
-        mjcf.RootElement: ["to_xml_string"],
         rewrite: ["rewrite_asserts"],
         sympy: ["diff", "expand", "simplify"],
         sympy.MatrixBase: ["det"],
     }
+    with warnings.catch_warnings(), suppress(ImportError):
+        warnings.filterwarnings("ignore", module="glfw")  # complains without a screen
+        from dm_control import mjcf
+
+        elsewhere |= {mjcf: ["from_xml_string"], mjcf.RootElement: ["to_xml_string"]}
     for owner, names in elsewhere.items():
         for name in names:
             setattr(owner, name, untraced(getattr(owner, name)))

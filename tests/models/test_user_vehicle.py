@@ -44,6 +44,9 @@ def write(tmp_path):
             text = text.replace(old, new)
         path = tmp_path / "my_tiltrotor.xml"
         path.write_text(text, encoding="utf-8")
+        (tmp_path / "parts").mkdir(exist_ok=True)
+        included = f"<mujoco><actuator>{''.join(SERVOS)}</actuator></mujoco>"
+        (tmp_path / "parts" / "servos.xml").write_text(included, encoding="utf-8")
         return path
 
     return save
@@ -52,6 +55,27 @@ def write(tmp_path):
 def changed(old, new, count=1):
     assert old in XML
     return XML.replace(old, new, count)
+
+
+def edited(*changes):
+    """The documented file with texts replaced wherever they stand."""
+    text = XML
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    return text
+
+
+SERVOS = re.findall(r"<position name=.*?/>", XML)
+GENERAL_SERVOS = [
+    (servo, f'<general {servo.split()[1]} {servo.split()[2]} biastype="affine" biasprm="0 -1 -1"/>')
+    for servo in SERVOS
+]
+DEFAULTS = [("<default>\n", '<default>\n<general ctrlrange="-1 1" forcerange="-2 2"/>')]
+INCLUDED_SERVOS = [
+    *((servo, "") for servo in SERVOS),
+    ("<actuator>", '<include file="parts/servos.xml"/><actuator>'),
+]
 
 
 def scenario(path, model="tiltrotor", vehicle=None, **tables):
@@ -229,6 +253,48 @@ def test_the_servo_is_the_scenarios(write):
     np.testing.assert_array_equal(model.joint("tilt_3").range, [-0.5, 0.5])
 
 
+def test_a_stop_is_an_angle_in_rad_in_a_file_of_degrees_too(write):
+    servo = {"tilt_servo": {"max_angle": 0.5}}
+    text = edited(('angle="radian" ', ""), ('autolimits="true"', 'autolimits="false"'))
+    model = build_model(assemble(scenario(write(text), vehicle={**servo, "max_rotor_speed": 900})))
+    assert model.joint("tilt_3").range == pytest.approx([-0.5, 0.5], rel=1e-15)
+    assert model.actuator("tilt_3").ctrlrange.tolist() == [-0.5, 0.5]
+    assert model.actuator_ctrllimited[:8].all()
+
+
+def test_a_general_actuator_can_be_the_servo(write):
+    models = [build_model(assemble(scenario(write(edited(*c))))) for c in ((), GENERAL_SERVOS)]
+    for name in ("gainprm", "biasprm", "gaintype", "biastype", "ctrllimited"):
+        one, other = (getattr(model, f"actuator_{name}") for model in models)
+        np.testing.assert_array_equal(one, other)
+
+
+def test_defaults_of_a_file_are_not_for_what_is_added_to_it(write):
+    this = scenario(write(edited(*DEFAULTS)), vehicle={"rotor_inertia": 1e-6})
+    model = build_model(assemble(this))
+    added = range(12, model.nu)
+    assert len(added) > 4
+    for name in ("ctrllimited", "forcelimited"):
+        assert getattr(model, f"actuator_{name}")[4:12].all()
+        assert not getattr(model, f"actuator_{name}")[added].any()
+
+
+def test_included_actuators_keep_their_place(write):
+    model = build_model(assemble(scenario(write(edited(*INCLUDED_SERVOS)))))
+    assert [model.actuator(i).name for i in range(5)] == [f"tilt_{i}" for i in range(1, 5)] + [
+        "thrust_1"
+    ]
+
+
+def test_keyframes_need_not_give_everything(write):
+    keys = '<keyframe><key name="home" qpos="0 0 1 1 0 0 0 0 0 0 0"/><key name="hover"/></keyframe>'
+    model = build_model(assemble(scenario(write(changed("</mujoco>", f"{keys}</mujoco>")))))
+    speed = read_user_vehicle(str(write()), "tiltrotor").vehicle.hover_rotor_speed
+    assert model.key("home").act[:4].tolist() == [0.0] * 4
+    assert model.key("hover").act[:4] == pytest.approx([-speed, speed, -speed, speed])
+    assert model.key("hover").ctrl[:8] == pytest.approx([0.0] * 4 + [speed**2] * 4)
+
+
 @pytest.mark.parametrize("model", ["tiltrotor", "quadrotor"])
 def test_a_shipped_file_as_ones_own_flies_the_shipped_flight(model):
     file = shipped_folder("mjcf") / f"{model}.xml"
@@ -308,6 +374,10 @@ def rename(name):
                 'joint="tilt_3" class="pod"/>\n    <position name="tilt_4"',
                 'joint="tilt_3"/>\n    <position name="tilt_4"',
             ),
+            ["'tilt_3' must be a position servo"],
+        ),
+        (
+            lambda: edited((SERVOS[2], SERVOS[2].replace("position", "velocity"))),
             ["'tilt_3' must be a position servo"],
         ),
         (lambda: changed('dyntype="integrator"', 'dyntype="none"'), ["dyntype integrator"]),

@@ -1,25 +1,76 @@
-"""Reading MJCF as dm_control's tree, and the edits that every vehicle's model needs."""
+"""Reading MJCF as a tree, and the edits that every vehicle's model needs."""
 
 from __future__ import annotations
 
+import re
 import warnings
+from collections.abc import Callable, Sequence
+from functools import partial
+from importlib.util import find_spec
+from math import degrees
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final
+from xml.etree import ElementTree
 
 from tiltsim.models.parts import TiltServo
 from tiltsim_controllers.vehicle.states import ROTORS
 
+if TYPE_CHECKING:
+    import mujoco
+
 
 def parse_mjcf(path: Path) -> Any:
-    """An MJCF file as dm_control's tree. Raises ValueError, in one line, where it has none."""
-    with warnings.catch_warnings():
-        # dm_control tries its window systems on import; without a screen GLFW complains.
-        warnings.filterwarnings("ignore", module="glfw")
-        from dm_control import mjcf
-    try:
-        return mjcf.from_path(str(path))
-    except Exception as error:  # of many kinds, for what MuJoCo reads and dm_control does not
-        raise ValueError(f"dm_control says: {' '.join(str(error).split())}") from error
+    """An MJCF file as dm_control's tree, or as one of the same interface on `mujoco.MjSpec`.
+
+    The latter where dm_control is not installed, for which Python 3.13 is too new, and for files
+    that MuJoCo reads and dm_control does not. Both trees compile to equal models.
+    """
+    if find_spec("dm_control") is not None:
+        with warnings.catch_warnings():
+            # dm_control tries its window systems on import; without a screen GLFW complains.
+            warnings.filterwarnings("ignore", module="glfw")
+            from dm_control import mjcf
+        try:
+            return mjcf.from_xml_string(_with_inclusions(path), model_dir=str(path.parent))
+        except Exception:  # of many kinds
+            pass
+    from tiltsim.models.mjspec_tree import MjSpecTree
+
+    return MjSpecTree(path)
+
+
+def _with_inclusions(path: Path) -> bytes:
+    """The MJCF of a file with what it includes in place, which dm_control would put at the end."""
+    tree = ElementTree.fromstring(path.read_bytes())
+    pending = [tree]
+    while pending:
+        element = pending.pop()
+        for include in element.findall("include"):
+            inside = ElementTree.fromstring((path.parent / include.get("file", "")).read_bytes())
+            place = list(element).index(include)
+            element[place : place + 1] = list(inside)
+            pending.append(element)  # for what that file includes
+            break
+        else:
+            pending += element
+    return ElementTree.tostring(tree)
+
+
+Compile = Callable[[], "mujoco.MjModel"]
+
+
+def compiler_of(root: Any) -> Compile:
+    """What compiles a tree as it is now, whatever is edited afterwards."""
+    import mujoco
+
+    from tiltsim.models.mjspec_tree import MjSpecTree
+
+    if isinstance(root, MjSpecTree):
+        compile_copy: Compile = root.spec.copy().compile
+        return compile_copy
+    unnamed = r' name="//unnamed_[^"]*"'  # dm_control's names for what has none
+    text = re.sub(unnamed, "", root.to_xml_string())
+    return partial(mujoco.MjModel.from_xml_string, text, root.get_assets())
 
 
 def remove_visuals(root: Any, *, contacts: bool) -> None:
@@ -35,29 +86,47 @@ def remove_visuals(root: Any, *, contacts: bool) -> None:
     for kind in ("camera", "light", "sensor"):
         for element in root.find_all(kind):
             element.remove()
-    acted_on = {getattr(actuator.site, "name", actuator.site) for actuator in root.actuator.general}
+    sites = [actuator.site for actuator in root.find_all("actuator")]
+    acted_on = {getattr(site, "name", site) for site in sites}
     for site in root.find_all("site"):
         if site.name not in acted_on:
             site.remove()
 
 
-def set_servo_gains(position: Any, inertia: float, servo: TiltServo) -> None:
-    """Give a position actuator a servo's frequency and damping on a hinge's inertia (kg m^2)."""
-    position.kp = inertia * servo.natural_frequency**2
-    position.kv = 2.0 * inertia * servo.damping_ratio * servo.natural_frequency
-
-
-def set_stop(joint: Any, position: Any, max_angle: float, timestep: float) -> None:
-    """Limit a hinge and its servo's command to plus and minus an angle.
+def set_servos(
+    root: Any, names: Sequence[str], servo: TiltServo, inertias: Sequence[float]
+) -> None:
+    """Give hinges and their actuators, position servos of the same names, a servo's behaviour.
 
     Args:
-        joint, position: Elements of the hinge and of its position actuator, or their defaults.
-        max_angle: rad.
-        timestep: Physics time step, s, which limits the stiffness of the stop.
+        root: The tree.
+        names: Of the hinges.
+        servo: Natural frequency, damping and stops.
+        inertias: About each hinge, kg m^2.
     """
-    joint.range = position.ctrlrange = (-max_angle, max_angle)
+    for name, inertia in zip(names, inertias, strict=True):
+        joint, actuator = root.find("joint", name), root.find("actuator", name)
+        kp = inertia * servo.natural_frequency**2
+        kv = 2.0 * inertia * servo.damping_ratio * servo.natural_frequency
+        if actuator.tag == "position":
+            actuator.kp, actuator.kv = kp, kv
+            actuator.dampratio = actuator.inheritrange = None
+        else:
+            actuator.gaintype = "fixed"
+            actuator.gainprm, actuator.biasprm = [kp, 0.0, 0.0], [0.0, -kp, -kv]
+        joint.range = actuator.ctrlrange = (0.0, 0.0)
+        joint.limited = actuator.ctrllimited = "false"
+        if servo.max_angle is not None:
+            _set_stop(root, joint, actuator, servo.max_angle)
+
+
+def _set_stop(root: Any, joint: Any, actuator: Any, max_angle: float) -> None:
+    """Limit a hinge and the command of its servo to plus and minus an angle (rad)."""
+    in_file = max_angle if root.compiler.angle == "radian" else degrees(max_angle)
+    joint.range, actuator.ctrlrange = (-in_file, in_file), (-max_angle, max_angle)
+    joint.limited = actuator.ctrllimited = "true"
     # As stiff as MuJoCo allows: its usual stop is softer than the servo and would do nothing.
-    joint.solreflimit = (2.0 * timestep, 1.0)
+    joint.solreflimit = (2.0 * root.option.timestep, 1.0)
     joint.solimplimit = (0.99, 0.99, 0.001, 0.5, 2.0)
 
 
@@ -75,11 +144,10 @@ def add_memories(root: Any, name: str, count: int) -> None:
 
 def _add_idle_actuators(root: Any, name: str, count: int, **attributes: str) -> None:
     vehicle = root.find("body", "vehicle")
-    joint = vehicle.freejoint or vehicle.joint[-1]  # acting on a joint costs MuJoCo least
+    # Acting on a joint costs MuJoCo least.
+    joint = vehicle.find_all("joint", immediate_children_only=True)[-1]
     for index in range(1, count + 1):
-        root.actuator.add(
-            "general", name=f"{name}_{index}", joint=joint, gainprm=[0.0], **attributes
-        )
+        _add_actuator(root, f"{name}_{index}", joint=joint, gainprm=[0.0], **attributes)
 
 
 def add_wrench(root: Any, name: str) -> None:
@@ -89,18 +157,37 @@ def add_wrench(root: Any, name: str) -> None:
     ):
         gear = [0.0] * 6
         gear[index] = 1.0
-        root.actuator.add("general", name=f"{name}_{axis}", site="imu", gear=gear)
+        _add_actuator(root, f"{name}_{axis}", site="imu", gear=gear)
     _extend_keyframes(root, ctrl=6)
 
 
 def add_hinge_torques(root: Any, name: str) -> None:
     """Append a torque about each of the tilt hinges."""
     for i in ROTORS:
-        root.actuator.add("general", name=f"{name}_hinge_{i}", joint=f"tilt_{i}")
+        _add_actuator(root, f"{name}_hinge_{i}", joint=f"tilt_{i}")
     _extend_keyframes(root, ctrl=len(ROTORS))
 
 
+_PLAIN: Final = {
+    "gear": [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    "dyntype": "none",
+    "gaintype": "fixed",
+    "gainprm": [1.0],
+    "biastype": "none",
+    "ctrllimited": "false",
+    "actlimited": "false",
+    "forcelimited": "false",
+}
+"""An actuator whose force is its control, whatever a user's file has as default."""
+
+
+def _add_actuator(root: Any, name: str, **attributes: Any) -> None:
+    root.actuator.add("general", name=name, **(_PLAIN | attributes))
+
+
 def _extend_keyframes(root: Any, act: int = 0, ctrl: int = 0) -> None:
-    for key in root.keyframe.key:
-        key.act = [*key.act, *[0.0] * act]
-        key.ctrl = [*key.ctrl, *[0.0] * ctrl]
+    for key in root.find_all("key"):
+        for name, count in (("act", act), ("ctrl", ctrl)):
+            values = getattr(key, name)
+            if values is not None:  # else MuJoCo takes zeros for all
+                setattr(key, name, [*values, *[0.0] * count])

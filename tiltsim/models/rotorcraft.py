@@ -13,14 +13,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.models.mjcf_editing import (
+    Compile,
     add_hinge_torques,
     add_memories,
     add_states,
     add_wrench,
+    compiler_of,
     parse_mjcf,
     remove_visuals,
-    set_servo_gains,
-    set_stop,
+    set_servos,
 )
 from tiltsim.models.parts import (
     SERVO_ARMATURE,
@@ -29,7 +30,6 @@ from tiltsim.models.parts import (
     ModelSpec,
     Pod,
     RotorLimits,
-    TiltServo,
     require_choice,
     require_positive,
 )
@@ -115,9 +115,9 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
     key = replace(spec, vehicle=preset), visuals
     if key in _compiled:
         return _with_parameters(*_compiled[key], spec)
-    complete, bare, assets = _compose(spec)
+    complete, bare = _compose(spec)
     with mujoco_hooks():
-        compiled = mujoco.MjModel.from_xml_string(complete if visuals else bare, assets)
+        compiled = complete() if visuals else bare()
     if spec.user_vehicle is None and not spec.has_stops:
         if len(_compiled) >= MODEL_CACHE_SIZE:
             _compiled.clear()
@@ -162,8 +162,8 @@ def _with_parameters(
 
 
 @lru_cache(maxsize=64)  # dm_control takes several times longer than MuJoCo's compiler
-def _compose(spec: RotorcraftSpec) -> tuple[str, str, dict[str, bytes]]:
-    """The vehicle's complete MJCF, the same without visuals, and the files that they name.
+def _compose(spec: RotorcraftSpec) -> tuple[Compile, Compile]:
+    """What compiles the complete vehicle, and the same without visuals.
 
     A flight is simulated with the one and shown with the other, so both are made at once.
     """
@@ -185,14 +185,19 @@ def _compose(spec: RotorcraftSpec) -> tuple[str, str, dict[str, bytes]]:
     else:
         user_vehicle.set_inertia(root, vehicle)
     _set_rotors(root, vehicle, spec.rotor_limits)
-    if spec.tilts and user_vehicle is None:
-        _set_servos(root, servo, spec.pod)
-    elif spec.tilts and user_vehicle is not None:
-        user_vehicle.set_servos(root, servo)
+    hinges = [f"tilt_{i}" for i in ROTORS if spec.tilts]
+    if hinges:
+        if user_vehicle is None:
+            for hinge in hinges:
+                root.find("joint", hinge).armature = SERVO_ARMATURE
+            inertias = tuple(spec.pod.inertia + SERVO_ARMATURE for _ in hinges)
+        else:
+            inertias = user_vehicle.hinge_inertias
+        set_servos(root, hinges, servo, inertias)
     for name, speed in (("hover", vehicle.hover_rotor_speed), ("start", START_SPEED)):
         key = root.find("key", name)
         if key is not None:
-            _set_keyframe(key, speed)
+            _set_keyframe(key, speed, len(hinges))
     add_states(root, "law", spec.law_states)
     for index, extra in enumerate(spec.extra_actuators, start=1):
         add_states(root, f"layer_{index}_state", extra.states)
@@ -205,17 +210,18 @@ def _compose(spec: RotorcraftSpec) -> tuple[str, str, dict[str, bytes]]:
             add_hinge_torques(root, f"layer_{index}")
     if spec.ground is not None:
         _set_ground(root, spec.ground)
-    complete = str(root.to_xml_string())
+    complete = compiler_of(root)
     if user_vehicle is not None:
-        return complete, complete, dict(root.get_assets())
+        return complete, complete
     remove_visuals(root, contacts=contacts)
-    return complete, str(root.to_xml_string()), {}
+    return complete, compiler_of(root)
 
 
 def _scale_lengths(root: Any, arm_length: float) -> None:
     """Scale the vehicle's positions and shapes so that its arms have this length (m)."""
     ratio = arm_length / root.find("body", "pod_1").pos[0]
-    pending = [root.find("body", "vehicle"), root.find("default", "vehicle")]
+    defaults = root.find("default", "vehicle")  # None where the elements have taken them
+    pending = [root.find("body", "vehicle"), *([] if defaults is None else [defaults])]
     while pending:
         element = pending.pop()
         pending.extend(element.all_children())
@@ -230,7 +236,7 @@ def _set_rotors(root: Any, vehicle: Vehicle, limits: RotorLimits) -> None:
         thrust = root.find("actuator", f"thrust_{i}")
         thrust.gear = _thrust_gear(vehicle, spin)
         if limits.thrust_range is not None:
-            thrust.ctrlrange = limits.thrust_range
+            thrust.ctrlrange, thrust.ctrllimited = limits.thrust_range, "true"
     _limit_speeds(root, "rotor_speed", limits)
 
 
@@ -239,7 +245,8 @@ def _limit_speeds(root: Any, name: str, limits: RotorLimits) -> None:
     for i, spin in zip(ROTORS, SPIN, strict=True):
         speed_range = limits.speed_range(spin)
         if speed_range is not None:
-            root.find("actuator", f"{name}_{i}").actrange = speed_range
+            rotor = root.find("actuator", f"{name}_{i}")
+            rotor.actrange, rotor.actlimited = speed_range, "true"
 
 
 def _thrust_gear(vehicle: Vehicle, spin: float) -> tuple[float, ...]:
@@ -279,14 +286,6 @@ def _body_inertia(spec: RotorcraftSpec) -> tuple[float, list[float]]:
     return mass, moments
 
 
-def _set_servos(root: Any, servo: TiltServo, pod: Pod) -> None:
-    defaults = root.find("default", "servo")
-    defaults.joint.armature = SERVO_ARMATURE
-    set_servo_gains(defaults.position, pod.inertia + SERVO_ARMATURE, servo)
-    if servo.max_angle is not None:
-        set_stop(defaults.joint, defaults.position, servo.max_angle, root.option.timestep)
-
-
 def _set_ground(root: Any, ground: Ground) -> None:
     """Let the vehicle's collision shapes touch the ground, and nothing else."""
     root.option.cone = "elliptic"  # a pyramid holds 29 % less along its diagonals
@@ -301,9 +300,8 @@ def _set_ground(root: Any, ground: Ground) -> None:
             geom.contype = 1
 
 
-def _set_keyframe(key: Any, rotor_speed: float) -> None:
+def _set_keyframe(key: Any, rotor_speed: float, hinges: int) -> None:
     """Let all rotors of an upright, untilted vehicle turn at this speed (rad/s)."""
     key.act = [spin * rotor_speed for spin in SPIN]
-    ctrl = key.ctrl.copy()
-    ctrl[-8:-4] = rotor_speed**2  # the thrust actuators precede the four rotor speeds
-    key.ctrl = ctrl
+    servos = [0.0] * hinges if key.ctrl is None else key.ctrl[:hinges]
+    key.ctrl = [*servos, *[rotor_speed**2] * 4, *[0.0] * 4]  # thrusts, rates of the rotor speeds

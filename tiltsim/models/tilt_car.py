@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import lru_cache
 from math import cos, sin
 from typing import TYPE_CHECKING, Any, Final
 
-from tiltsim.models.mjcf_editing import add_states, parse_mjcf, remove_visuals, set_servo_gains
-from tiltsim.models.parts import ModelSpec, TiltServo, require_positive
+from tiltsim.models.mjcf_editing import (
+    Compile,
+    add_states,
+    compiler_of,
+    parse_mjcf,
+    remove_visuals,
+    set_servos,
+)
+from tiltsim.models.parts import ModelSpec, require_positive
 from tiltsim.resources import shipped_folder
 from tiltsim.system.hooks import mujoco_hooks
 from tiltsim.system.locks import one_thread_at_a_time
@@ -16,6 +23,8 @@ from tiltsim_controllers.tilt_car.vehicle import TiltCar
 
 if TYPE_CHECKING:
     import mujoco
+
+ROTORS: Final = (1, 2)
 
 START_SPEED: Final = 200.0
 """Rotor speed (rad/s) of the keyframe ``start``: ch. 10's."""
@@ -43,16 +52,14 @@ def compile_tilt_car(spec: TiltCarSpec, *, visuals: bool = True) -> mujoco.MjMod
         spec: The specification of the model.
         visuals: Whether to keep what is drawn or measured only, as in `tiltsim.models.rotorcraft`.
     """
-    import mujoco
-
     complete, bare = _compose(spec)
     with mujoco_hooks():
-        return mujoco.MjModel.from_xml_string(complete if visuals else bare)
+        return complete() if visuals else bare()
 
 
 @lru_cache(maxsize=16)
-def _compose(spec: TiltCarSpec) -> tuple[str, str]:
-    """The car's complete MJCF, and the same without visuals."""
+def _compose(spec: TiltCarSpec) -> tuple[Compile, Compile]:
+    """What compiles the complete car, and the same without visuals."""
     root, car = parse_mjcf(shipped_folder("mjcf") / "tilt_car.xml"), spec.car
     root.option.timestep = spec.timestep
     root.option.integrator = spec.integrator
@@ -61,16 +68,20 @@ def _compose(spec: TiltCarSpec) -> tuple[str, str]:
     root.size.nuserdata = spec.userdata_size
     _set_inertia(root, car)
     _set_thrusts(root, car)
-    _set_servo(root, car, spec.tilt_servo)
+    # The inertia that the hinge feels while both discs are free to turn.
+    inertia = car.top_inertia * car.bottom_inertia / (car.top_inertia + car.bottom_inertia)
+    set_servos(root, ["tilt"], replace(spec.tilt_servo, max_angle=None), [inertia])
     if not spec.rotor_floor:
-        del root.find("default", "rotor_speed").general.actrange
-    start = root.keyframe.key["start"]
+        for rotor in ROTORS:
+            speed = root.find("actuator", f"rotor_speed_{rotor}")
+            speed.actrange, speed.actlimited = (0.0, 0.0), "false"
+    start = root.find("key", "start")
     start.act = [START_SPEED] * 2
     start.ctrl = [0.0, START_SPEED**2, START_SPEED**2, 0.0, 0.0]
     add_states(root, "law", spec.law_states)
-    complete = str(root.to_xml_string())
+    complete = compiler_of(root)
     remove_visuals(root, contacts=False)
-    return complete, str(root.to_xml_string())
+    return complete, compiler_of(root)
 
 
 def _set_inertia(root: Any, car: TiltCar) -> None:
@@ -83,9 +94,9 @@ def _set_inertia(root: Any, car: TiltCar) -> None:
 
 def _set_thrusts(root: Any, car: TiltCar) -> None:
     """Turn the propellers to plus and minus the half angle, lines of thrust through the axis."""
-    thrust = root.find("default", "thrust").general
-    thrust.gear = (0.0, 0.0, car.thrust_coefficient, 0.0, 0.0, 0.0)
-    for rotor, side in ((1, 1.0), (2, -1.0)):
+    for rotor, side in zip(ROTORS, (1.0, -1.0), strict=True):
+        thrust = root.find("actuator", f"thrust_{rotor}")
+        thrust.gear = (0.0, 0.0, car.thrust_coefficient, 0.0, 0.0, 0.0)
         out = cos(car.half_angle), side * sin(car.half_angle)
         parts = [root.find("site", f"rotor_{rotor}")]
         parts += [root.find("geom", f"{name}_{rotor}") for name in ("duct", "fan")]
@@ -93,9 +104,3 @@ def _set_thrusts(root: Any, car: TiltCar) -> None:
             reach = (part.pos[0] ** 2 + part.pos[1] ** 2) ** 0.5
             part.pos = (reach * out[0], reach * out[1], part.pos[2])
             part.zaxis = (*out, 0.0)
-
-
-def _set_servo(root: Any, car: TiltCar, servo: TiltServo) -> None:
-    """Gains of the servo on the inertia that the hinge feels while both discs are free to turn."""
-    inertia = car.top_inertia * car.bottom_inertia / (car.top_inertia + car.bottom_inertia)
-    set_servo_gains(root.find("default", "servo").position, inertia, servo)

@@ -14,9 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.models.mjcf_editing import set_servo_gains, set_stop
 from tiltsim.models.mjcf_files import mjcf_version
-from tiltsim.models.parts import TiltServo
 from tiltsim.system.hooks import mujoco_hooks
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -88,7 +86,7 @@ class UserVehicle:
         Centre of mass and products of inertia stay the file's.
 
         Args:
-            root: The file as dm_control's tree.
+            root: The file as a tree.
             vehicle: The parameters to set.
 
         Raises:
@@ -126,18 +124,6 @@ class UserVehicle:
             mass=mass,
             fullinertia=(xx, yy, zz, inertia[0, 1], inertia[0, 2], inertia[1, 2]),
         )
-
-    def set_servos(self, root: Any, servo: TiltServo) -> None:
-        """Give each tilt servo in a tree its natural frequency, damping and stops."""
-        for i, inertia in zip(ROTORS, self.hinge_inertias, strict=True):
-            actuator, joint = root.find("actuator", f"tilt_{i}"), root.find("joint", f"tilt_{i}")
-            set_servo_gains(actuator, inertia, servo)
-            actuator.dampratio = None
-            joint.range = actuator.ctrlrange = None
-            joint.limited = actuator.ctrllimited = "false"
-            if servo.max_angle is not None:
-                set_stop(joint, actuator, servo.max_angle, root.option.timestep)
-                joint.limited = actuator.ctrllimited = "true"
 
 
 @one_thread_at_a_time
@@ -287,7 +273,7 @@ def _check_servos(compiled: mujoco.MjModel) -> None:
     for i in ROTORS:
         servo, hinge = compiled.actuator(f"tilt_{i}"), compiled.joint(f"tilt_{i}").id
         on_hinge = servo.trntype[0] == mujoco.mjtTrn.mjTRN_JOINT and servo.trnid[0] == hinge
-        position = servo.biastype[0] == mujoco.mjtBias.mjBIAS_AFFINE
+        position = servo.biastype[0] == mujoco.mjtBias.mjBIAS_AFFINE and servo.biasprm[1] < 0.0
         plain = servo.gear[0] == 1.0 and servo.actadr[0] < 0
         if not (on_hinge and position and plain):
             raise ValueError(
