@@ -27,8 +27,10 @@ if TYPE_CHECKING:
     from tiltsim_controllers.mathematics.scalar import Floats
 
 INSIDE: Final = 1e-7
-"""Distance of a squared rotor speed to its limits, as a share of the hover's, that counts as none:
-the tolerance of the linear programs."""
+"""Share of the weight that counts as none; the linear programs are as accurate."""
+
+RESERVE: Final = 0.01
+"""Share of the mean thrust in hover that every rotor keeps from its limits to control with."""
 
 
 class Hover(NamedTuple):
@@ -37,7 +39,7 @@ class Hover(NamedTuple):
     lean: float  # between the body's z axis and the vertical, rad
     force: Floats  # body axes, N, shape (3,)
     rotor_speeds: Floats  # varpi, signed, rad/s, shape (N,)
-    controllable: bool  # torque and lift can change in every direction
+    controllable: bool  # torque and lift can change in every direction; see `hover`
 
     @property
     def max_rotor_speed(self) -> float:
@@ -48,22 +50,26 @@ class Hover(NamedTuple):
 def hover(rotors: TiltedRotors) -> Hover | None:
     """The hover of least lean within the rotors' limits; None if there is none.
 
-    Among the rotor speeds that make its force, those whose largest is smallest. It is controllable
-    where ``[tau; up^T F]`` has rank 4 and some rotor inputs make the force without any of them at a
-    limit.
+    If one of them is controllable, it is the controllable one of least lean: ``tau`` has rank 3 and
+    every rotor has a `RESERVE`, so that torque and lift can grow and fall. Of the rotor speeds that
+    make its force, those whose largest is smallest.
     """
-    forces = torque_free_forces(rotors.force, rotors.torque)
+    mean = rotors.weight / np.linalg.norm(rotors.force, axis=0).sum()
+    lower, upper = rotors.lower + RESERVE * mean, rotors.upper - RESERVE * mean
+    if (lower < upper).all() and torque_free_forces(rotors.force, rotors.torque).rank == 3:
+        found = _least_lean(rotors._replace(lower=lower, upper=upper), controllable=True)
+        if found is not None:
+            return found
+    return _least_lean(rotors, controllable=False)
+
+
+def _least_lean(rotors: TiltedRotors, *, controllable: bool) -> Hover | None:
     for force in _candidates(rotors):
         w = _evenest_inputs(rotors, force)
         if w is not None:
-            break
-    else:
-        return None
-    up = force / rotors.weight
-    full = forces.rank == 3 and np.linalg.norm(forces.projector @ up) > INSIDE
-    lean = acos(min(1.0, max(-1.0, float(up[2]))))
-    speeds = np.copysign(np.sqrt(np.abs(w)), w)
-    return Hover(lean, force, speeds, bool(full and _has_reserve(rotors, force)))
+            lean = acos(min(1.0, max(-1.0, float(force[2]) / rotors.weight)))
+            return Hover(lean, force, np.copysign(np.sqrt(np.abs(w)), w), controllable)
+    return None
 
 
 def rotor_losses(rotors: TiltedRotors) -> list[Hover | None]:
@@ -125,7 +131,9 @@ def _highest_on_sphere(corners: Floats, radius: float) -> list[Floats]:
 
 def _evenest_inputs(rotors: TiltedRotors, force: Floats) -> Floats | None:
     """The w of a torque-free force within the limits whose largest is smallest; None if none."""
-    rows, values, unit = _balance(rotors, force)
+    unit = rotors.weight / np.linalg.norm(rotors.force, axis=0).max()
+    arm = np.linalg.norm(rotors.torque, axis=0).max() * unit or 1.0
+    rows = np.vstack([rotors.torque * unit / arm, rotors.force * unit / rotors.weight])
     ones = np.ones((rotors.lower.size, 1))
     identity = np.eye(rotors.lower.size)
     found = linprog(
@@ -133,31 +141,7 @@ def _evenest_inputs(rotors: TiltedRotors, force: Floats) -> Floats | None:
         A_ub=np.block([[identity, -ones], [-identity, -ones]]),
         b_ub=np.zeros(2 * rotors.lower.size),
         A_eq=np.column_stack([rows, np.zeros(6)]),
-        b_eq=values,
+        b_eq=np.concatenate([np.zeros(3), force / rotors.weight]),
         bounds=[*zip(rotors.lower / unit, rotors.upper / unit), (0.0, None)],
     )
-    return found.x[:-1] * unit if found.status == 0 else None
-
-
-def _has_reserve(rotors: TiltedRotors, force: Floats) -> bool:
-    """Whether some inputs make a torque-free force with no rotor at a limit."""
-    rows, values, unit = _balance(rotors, force)
-    ones = np.ones((rotors.lower.size, 1))
-    identity = np.eye(rotors.lower.size)
-    found = linprog(
-        [0.0] * rotors.lower.size + [-1.0],
-        A_ub=np.block([[identity, ones], [-identity, ones]]),
-        b_ub=np.concatenate([rotors.upper, -rotors.lower]) / unit,
-        A_eq=np.column_stack([rows, np.zeros(6)]),
-        b_eq=values,
-        bounds=[(None, None)] * rotors.lower.size + [(None, 1.0)],
-    )
-    return bool(found.status == 0 and found.x[-1] > 10.0 * INSIDE)
-
-
-def _balance(rotors: TiltedRotors, force: Floats) -> tuple[Floats, Floats, float]:
-    """The conditions of a torque-free force, scaled, in units of w that alone carry the weight."""
-    unit = rotors.weight / np.linalg.norm(rotors.force, axis=0).max()
-    arm = np.linalg.norm(rotors.torque, axis=0).max() * unit
-    rows = np.vstack([rotors.torque * unit / arm, rotors.force * unit / rotors.weight])
-    return rows, np.concatenate([np.zeros(3), force / rotors.weight]), float(unit)
+    return np.asarray(found.x[:-1] * unit + 0.0) if found.status == 0 else None

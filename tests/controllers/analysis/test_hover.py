@@ -16,7 +16,7 @@ from tiltsim_controllers.analysis.attainable import (
     side_force_share,
 )
 from tiltsim_controllers.analysis.fault_tolerance import fixed_tilt_hover
-from tiltsim_controllers.analysis.hover import hover, rotor_losses
+from tiltsim_controllers.analysis.hover import RESERVE, hover, rotor_losses
 from tiltsim_controllers.analysis.statics import hover_rotor_speeds
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
@@ -83,6 +83,9 @@ def test_the_hover_leans_least_of_all_directions(dimension):
     for _ in range(6):
         given = random_rotors(rng, 3 + dimension, lift=4.0)
         found = hover(given)
+        if found is not None and found.controllable:
+            reserve = RESERVE * WEIGHT / (given.lower.size * THRUST)
+            given = given._replace(lower=given.lower + reserve, upper=given.upper - reserve)
         rows = np.vstack([given.torque, given.force])
         directions = rng.normal(size=(40, 3)) @ np.linalg.svd(given.force)[0]
         directions = [up / np.linalg.norm(up) for up in directions]
