@@ -21,12 +21,11 @@ from tiltsim.laws.commanded import COMMANDED_LOOPS, HeldCommand, commanded_param
 from tiltsim.laws.layers.delay_line import EXTERNAL_COMMANDS
 from tiltsim.laws.tiltrotor import gait_servo_commands
 from tiltsim.plants.command import CheckedCommand, ControllerError, Observation
-from tiltsim.plants.flight_model import evaluations_per_step
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import Observer, flip_by_spin
 from tiltsim.vehicles.rotorcraft.layout import ROTOR_STATES, TILT_1
 from tiltsim_controllers.mathematics.records import slotted
-from tiltsim_controllers.mathematics.scalar import Floats, Quad, clipped
+from tiltsim_controllers.mathematics.scalar import Floats, Quad, Values, clipped
 from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines
 from tiltsim_controllers.vehicle.rotor_inertia import sum_along_thrust_axes
 
@@ -63,14 +62,19 @@ class CommandedPlant(MujocoPlant):
         self._line = line.reshape(steps, EXTERNAL_COMMANDS)
         self._hold_command(self._commanded.command)
 
+    def _prepare_engine(self) -> None:
+        """Build none: `advance` holds the commands by a callback of its own."""
+
     def apply(self, command: CheckedCommand) -> None:
         """Send a command, once per control sample, and hold the one that arrives until the next.
 
         Rotors take a commanded speed at once, unless they lag: the observed state has it.
         """
-        line = np.vstack([self._external_command(command), self._line])
-        self._line[:] = line[:-1]
-        *arrived, are_speeds = line[-1].tolist()
+        *arrived, are_speeds = newest = self._external_command(command)
+        if len(self._line):
+            *arrived, are_speeds = self._line[-1].tolist()
+            self._line[1:] = self._line[:-1].copy()
+            self._line[0] = newest
         if are_speeds:
             self._set_speeds(np.array(arrived[4:]))
             arrived[4:] = _NONE
@@ -89,14 +93,14 @@ class CommandedPlant(MujocoPlant):
             data.qvel[:] -= self._rotor_inertia * turned[0]
         data.act[self._speeds] = speeds
 
-    def _external_command(self, command: CheckedCommand) -> Floats:
+    def _external_command(self, command: CheckedCommand) -> Values:
         """The `EXTERNAL_COMMANDS` that a command amounts to."""
         tilts = command.tilt_angles
         if tilts is None:
             tilts = self._gait_servo_commands() if self.tilting else _NONE
         are_speeds = command.kind != "rotor_accelerations"
         rotors = self._limited_speeds(command) if are_speeds else command.rotors
-        return np.array([*tilts, *flip_by_spin(rotors), are_speeds])
+        return (*tilts, *flip_by_spin(rotors), float(are_speeds))
 
     def _hold_command(self, command: HeldCommand) -> None:
         data, knots = self.data, self._setup.knots
@@ -143,7 +147,7 @@ class CommandedPlant(MujocoPlant):
 
     def advance(self, steps: int) -> None:
         moving = self._layered or self.data.ctrl[self._rates].any()
-        end = (self.steps_taken + steps) * evaluations_per_step(self.model)
+        end = (self.steps_taken + steps) * self._evaluations_per_step
         with control_callback(self._hold if moving else None):
             mujoco.mj_step(self.model, self.data, nstep=steps)
         self.data.userdata[EVALUATIONS] = end

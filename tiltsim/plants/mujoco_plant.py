@@ -50,13 +50,14 @@ class MujocoPlant(Plant):
         self._assembly, self._loop, self._setup = assembly, assembly.loop, assembly.setup
         self.model = flight_model(assembly) if model is None else model
         self.data = mujoco.MjData(self.model)
+        self._evaluations_per_step = evaluations_per_step(self.model)
         self._set_initial_state()
         self.engine: EngineName = engine or choose_engine(assembly.scenario, self._loop)
-        self._engine = make_engine(self.engine, self._loop, self.model, self.data)
+        self._prepare_engine()
 
     def _set_initial_state(self) -> None:
         assembly, data = self._assembly, self.data
-        simulation, per_step = assembly.scenario.simulation, evaluations_per_step(self.model)
+        simulation, per_step = assembly.scenario.simulation, self._evaluations_per_step
         data.userdata[:HEADER_SIZE] = Header(
             timestep=simulation.timestep,
             evaluations_per_step=per_step,
@@ -91,7 +92,10 @@ class MujocoPlant(Plant):
         mujoco.mj_setState(self.model, self.data, value, _INTEGRATION)
         with control_callback(None):
             mujoco.mj_forward(self.model, self.data)
-        # The state brings its own parameters, which the Python engine reads once.
+        self._prepare_engine()  # the state brings its own parameters
+
+    def _prepare_engine(self) -> None:
+        """Build the engine, which reads the parameters in ``userdata`` once."""
         self._engine = make_engine(self.engine, self._loop, self.model, self.data)
 
     def advance(self, steps: int) -> None:
@@ -130,7 +134,7 @@ class MujocoPlant(Plant):
         """
         from tiltsim.engines.recorder import Recorder
 
-        evaluations = evaluations_per_step(self.model)
+        evaluations = self._evaluations_per_step
         return Recorder(
             self._assembly,
             samples,
