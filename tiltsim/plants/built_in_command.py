@@ -1,4 +1,4 @@
-"""What a built-in controller commands in the present state of its plant."""
+"""What a built-in controller commands: in its plant's present state, or on an observation."""
 
 from __future__ import annotations
 
@@ -7,15 +7,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.errors import InputError
+from tiltsim.laws.assembling import assemble
 from tiltsim.laws.layers.actuation import Actuation, allocated_accelerations
 from tiltsim.laws.layers.measured_acceleration import Motion, plant_angular_acceleration
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.laws.layers.sensing import measured_qpos, measured_qvel
 from tiltsim.laws.tiltrotor import four
-from tiltsim.plants.command import Command
+from tiltsim.plants.command import Command, Observation
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import flip_by_spin
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.rotorcraft.layout import ACCELERATION_1, QUADROTOR_THRUSTS
+from tiltsim_controllers.mathematics.scalar import Quad, Values
 
 
 def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
@@ -41,11 +45,67 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
         loop, parameters = within, inner
     ctrl = loop.sampling.controls(time, qpos, qvel, act, parameters, knots)
     if loop.dynamics.model == "quadrotor":
-        coefficient = assembly.scenario.rotorcraft.resolve().thrust_coefficient
-        return Command(thrusts=coefficient * np.array(four(ctrl, QUADROTOR_THRUSTS)))
+        return _quadrotor_command(assembly, ctrl)
     rates = four(ctrl, ACCELERATION_1)
     if allocation is not None:
         rates = allocated_accelerations(rates, qpos, act, allocation)
+    return _tiltrotor_command(rates, ctrl)
+
+
+class BuiltInController:
+    """The built-in controller of a rotorcraft's scenario, as a function of what is observed.
+
+    It integrates its own states over ``simulation.control_timestep``.
+
+    Args:
+        scenario: With a built-in controller.
+
+    Raises:
+        InputError: If the controller is your own, or feeds back what is not observed.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        controller, simulation = scenario.controller, scenario.simulation
+        if controller.is_external or controller.measures_angular_acceleration:
+            raise InputError("controller: must be a built-in one that needs observations only")
+        self._assembly = assembly = assemble(scenario)
+        loop, parameters = assembly.loop, assembly.setup.parameters
+        while loop.within is not None:
+            loop, parameters = loop.within, parameters.inner
+        self._loop, self._parameters = loop, parameters
+        setup = assembly.setup._replace(parameters=parameters)
+        initial = loop.dynamics.initial_activations(assembly, setup)
+        self._count = loop.dynamics.controller_states
+        self._speeds = len(initial) - self._count
+        self._states = list(initial[self._speeds :])
+        self._period = simulation.control_timestep or simulation.timestep
+
+    def __call__(self, seen: Observation) -> Command:
+        """Its command, before latency, servos and motors: see `built_in_command`."""
+        loop, knots = self._loop, self._assembly.setup.knots
+        tilting = loop.dynamics.model == "tiltrotor"
+        qpos, qvel = [*seen.position, *seen.quaternion], [*seen.velocity, *seen.body_rates]
+        if tilting:
+            qpos, qvel = [*qpos, *seen.tilt_angles], [*qvel, *seen.tilt_rates]
+        act = [*flip_by_spin(seen.rotor_speeds.tolist())[: self._speeds], *self._states]
+        vectors = list(map(float, qpos)), list(map(float, qvel)), act
+        ctrl = loop.sampling.controls(seen.time, *vectors, self._parameters, knots)
+        rates = ctrl[len(ctrl) - self._count :]
+        self._states = [
+            state + self._period * rate for state, rate in zip(self._states, rates, strict=True)
+        ]
+        if not tilting:
+            return _quadrotor_command(self._assembly, ctrl)
+        return _tiltrotor_command(four(ctrl, ACCELERATION_1), ctrl)
+
+
+def _tiltrotor_command(accelerations: Quad, ctrl: Values) -> Command:
     return Command(
-        rotor_accelerations=np.array(flip_by_spin(rates)), tilt_angles=np.array(four(ctrl, 0))
+        rotor_accelerations=np.array(flip_by_spin(accelerations)),
+        tilt_angles=np.array(four(ctrl, 0)),
     )
+
+
+def _quadrotor_command(assembly: Assembly, ctrl: Values) -> Command:
+    coefficient = assembly.scenario.rotorcraft.resolve().thrust_coefficient
+    return Command(thrusts=coefficient * np.array(four(ctrl, QUADROTOR_THRUSTS)))
