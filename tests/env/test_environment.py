@@ -441,7 +441,7 @@ def test_the_documented_examples_run(tmp_path, monkeypatch, capsys):
     pytest.importorskip("gymnasium")
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"```python\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
-    assert len(blocks) == 3
+    assert len(blocks) == 4
     names = {}
     for block in blocks:
         exec(compile(block, str(DOCS), "exec"), names)
@@ -449,7 +449,7 @@ def test_the_documented_examples_run(tmp_path, monkeypatch, capsys):
     assert names["random"] < 200.0
     assert isinstance(names["terminated"], bool)
     assert len(load_flight(tmp_path / "flights" / "hovering")) == 501
-    assert capsys.readouterr().out.startswith("hover 500.0, random ")
+    assert "m away from the reference\nhover 500.0, random " in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("arguments", [{}, {"domain": AXES[1:]}], ids=["plain", "randomised"])
@@ -457,7 +457,7 @@ def test_gymnasiums_own_checker_passes_without_a_warning(arguments):
     gymnasium = pytest.importorskip("gymnasium")
     from gymnasium.utils.env_checker import check_env
 
-    from tiltsim.env.gymnasium import ID
+    from tiltsim.env.registration import ID
 
     check_env(gymnasium.make(ID, **arguments).unwrapped)
 

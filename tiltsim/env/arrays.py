@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from math import pi
 from typing import Final
 
@@ -9,8 +10,13 @@ import numpy as np
 import numpy.typing as npt
 from dm_env import specs
 
+from tiltsim.errors import InputError
 from tiltsim.plants.command import Observation
+from tiltsim.scenario.messages import choose
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.system.numbers import is_finite
+from tiltsim.system.text import short_repr
+from tiltsim_controllers.mathematics.rotation import rotation_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats
 
 THRUST_TO_WEIGHT: Final = 2.0
@@ -32,10 +38,35 @@ BOUNDS: Final = {
     "reference_velocity": 1e6,
     "reference_attitude": pi,
 }
-"""Observations by name and their largest absolute value, wider than any episode reaches."""
+"""Observations by default, and their largest absolute value, wider than any episode reaches."""
 
 _WIDTHS: Final = {"quaternion": 4, "tilt_angles": 4, "tilt_rates": 4, "rotor_speeds": 4}
 _TILT_OBSERVATIONS: Final = ("tilt_angles", "tilt_rates")
+
+Rotation = npt.NDArray[np.float64]  # (3, 3), body to world; ``vector @ rotation`` is in body axes
+
+OBSERVATIONS: Final[dict[str, Callable[[Observation, Rotation], Floats]]] = {
+    "position": lambda seen, _: seen.position,
+    "velocity": lambda seen, _: seen.velocity,
+    "attitude": lambda seen, _: seen.attitude,
+    "quaternion": lambda seen, _: seen.quaternion,
+    "body_rates": lambda seen, _: seen.body_rates,
+    "tilt_angles": lambda seen, _: seen.tilt_angles,
+    "tilt_rates": lambda seen, _: seen.tilt_rates,
+    "rotor_speeds": lambda seen, _: seen.rotor_speeds,
+    "reference_position": lambda seen, _: seen.reference.position,
+    "reference_velocity": lambda seen, _: seen.reference.velocity,
+    "reference_attitude": lambda seen, _: seen.reference.attitude,
+    "position_error_body": lambda seen, rotation: (
+        (seen.reference.position - seen.position) @ rotation
+    ),
+    "velocity_error_body": lambda seen, rotation: (
+        (seen.reference.velocity - seen.velocity) @ rotation
+    ),
+    "reference_acceleration_body": lambda seen, rotation: seen.reference.acceleration @ rotation,
+    "up_body": lambda _, rotation: rotation[2],
+}
+"""What can be observed. Errors are reference minus actual; ``_body`` is along the body's axes."""
 
 
 def has_tilts(scenario: Scenario) -> bool:
@@ -43,8 +74,14 @@ def has_tilts(scenario: Scenario) -> bool:
     return scenario.vehicle.has_tilting_rotors
 
 
-def action_spec(scenario: Scenario) -> specs.BoundedArray:
-    """Shape and bounds of an action: four thrusts (N), then four tilt angles (rad) if any."""
+def action_spec(scenario: Scenario, max_tilt_angle: float | None = None) -> specs.BoundedArray:
+    """Shape and bounds of an action: four thrusts (N), then four tilt angles (rad) if any.
+
+    ``max_tilt_angle`` (rad) narrows the tilt angles, whose bounds are else those of the servos, or
+    `TILT_RANGE`. Raises `InputError` if it is not above 0 or beyond them, or there are no tilts.
+    """
+    if max_tilt_angle is not None and not has_tilts(scenario):
+        raise InputError("environment: max_tilt_angle: the vehicle has no tilt servos")
     table = scenario.rotorcraft
     vehicle = table.resolve()
     fastest = table.max_rotor_speed
@@ -55,17 +92,11 @@ def action_spec(scenario: Scenario) -> specs.BoundedArray:
     low, high, name = [lowest] * 4, [highest] * 4, "thrusts"
     if has_tilts(scenario):
         tilt = table.tilt_servo.max_angle or TILT_RANGE
+        if max_tilt_angle is not None:
+            check_bound("max_tilt_angle", max_tilt_angle, tilt)
+            tilt = max_tilt_angle
         low, high, name = [*low, *[-tilt] * 4], [*high, *[tilt] * 4], "thrusts, tilt_angles"
     return specs.BoundedArray((len(low),), np.float64, low, high, name)
-
-
-def observation_spec(scenario: Scenario) -> dict[str, specs.BoundedArray]:
-    """Shape and bounds of every array of an observation, by name."""
-    return {
-        name: specs.BoundedArray((_WIDTHS.get(name, 3),), np.float64, -bound, bound, name)
-        for name, bound in BOUNDS.items()
-        if has_tilts(scenario) or name not in _TILT_OBSERVATIONS
-    }
 
 
 def clip_action(action: npt.ArrayLike, spec: specs.BoundedArray) -> Floats:
@@ -79,19 +110,60 @@ def clip_action(action: npt.ArrayLike, spec: specs.BoundedArray) -> Floats:
     return np.asarray(np.minimum(np.maximum(array, spec.minimum), spec.maximum))
 
 
-def observation_arrays(observation: Observation, *, tilting: bool) -> dict[str, Floats]:
-    """A controller's observation as a flat dict of arrays within `BOUNDS`."""
-    return {
-        name: np.minimum(np.maximum(_array(observation, name), -bound), bound)
-        for name, bound in BOUNDS.items()
-        if tilting or name not in _TILT_OBSERVATIONS
-    }
+def check_bound(name: str, value: object, most: float = np.inf) -> None:
+    """Raise `InputError` unless an argument is a number above 0 and not beyond ``most``."""
+    if not (is_finite(value) and 0.0 < value <= most):
+        allowed = "a number above 0" + (f", at most {most:.6g}" if most < np.inf else "")
+        raise InputError(f"environment: {name} = {short_repr(value)}: must be {allowed}")
 
 
-def _array(observation: Observation, name: str) -> Floats:
-    prefix = "reference_"
-    if name.startswith(prefix):
-        array: Floats = getattr(observation.reference, name.removeprefix(prefix))
-    else:
-        array = getattr(observation, name)
-    return array
+class Observed:
+    """The observed arrays of a vehicle.
+
+    Args:
+        bounds: Names of `OBSERVATIONS` and the largest absolute value of each; default: `BOUNDS`,
+            for a vehicle without tilt servos less the tilts.
+        tilting: Whether the vehicle has tilt servos.
+
+    Raises:
+        InputError: If there is no such observation of this vehicle, or a bound is invalid.
+    """
+
+    def __init__(self, bounds: Mapping[str, float] | None, *, tilting: bool) -> None:
+        known = [name for name in OBSERVATIONS if tilting or name not in _TILT_OBSERVATIONS]
+        self.bounds = {name: BOUNDS[name] for name in known if name in BOUNDS}
+        if bounds is not None:
+            _check_bounds(bounds, known)
+            self.bounds = dict(bounds)
+        self._readers = [OBSERVATIONS[name] for name in self.bounds]
+        widths = [_WIDTHS.get(name, 3) for name in self.bounds]
+        self._high = np.repeat([*self.bounds.values()], widths).astype(np.float64)
+        ends = np.cumsum(widths).tolist()
+        places = zip(self.bounds, widths, ends)
+        self._slices = {name: slice(end - width, end) for name, width, end in places}
+
+    def spec(self) -> dict[str, specs.BoundedArray]:
+        """Shape and bounds of every array, by name."""
+        return {
+            name: specs.BoundedArray((_WIDTHS.get(name, 3),), np.float64, -bound, bound, name)
+            for name, bound in self.bounds.items()
+        }
+
+    def arrays(self, observation: Observation) -> dict[str, Floats]:
+        """A controller's observation as a flat dict of arrays, clipped to their bounds."""
+        entries = rotation_from_quaternion(*observation.quaternion.tolist())
+        rotation = np.array(entries).reshape(3, 3)
+        all_of_them = np.concatenate([read(observation, rotation) for read in self._readers])
+        clipped = np.minimum(np.maximum(all_of_them, -self._high), self._high)
+        return {name: clipped[place] for name, place in self._slices.items()}
+
+
+def _check_bounds(bounds: object, known: list[str]) -> None:
+    if not isinstance(bounds, Mapping) or not bounds:
+        raise InputError(
+            f"environment: observations = {short_repr(bounds)}: must be a dict from names to bounds"
+        )
+    for name, bound in bounds.items():
+        if name not in known:
+            raise InputError(f"environment: observations: {name!r}: {choose(name, known)}")
+        check_bound(f"observations[{name!r}]", bound)

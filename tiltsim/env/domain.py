@@ -18,6 +18,7 @@ from tiltsim.sweeps.definition import UNUSED, SweepDefinition
 from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.tables import NormalAxis, SeedAxis, Sweep, UniformAxis
+from tiltsim.system.text import short_repr
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
@@ -40,6 +41,8 @@ class Domain:
     @classmethod
     def from_axes(cls, scenario: Scenario, axes: Sequence[Mapping[str, Any]]) -> Domain:
         """The domain around a scenario. Raises `InputError` if an axis is invalid."""
+        if isinstance(axes, str) or not all(isinstance(axis, Mapping) for axis in axes):
+            raise InputError(f"domain = {short_repr(axes)}: must be a list of axes, each a dict")
         drawn = any(axis.get("type") in {"uniform", "normal", "seed"} for axis in axes)
         document = {
             "scenario": "base",

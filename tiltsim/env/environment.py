@@ -7,9 +7,10 @@ other flight; `Environment.flight` returns it for metrics, files, figures and Re
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from os import PathLike
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import dm_env
 import numpy as np
@@ -25,11 +26,15 @@ from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.command import Command, Observation, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
+from tiltsim.plants.flight_model import model_cache_key
 from tiltsim.plants.plant import take_sample
-from tiltsim.scenario.loading import load_scenario, parse_scenario
+from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.monitor import TerminationMonitor
 from tiltsim_controllers.mathematics.scalar import Floats
+
+if TYPE_CHECKING:
+    from tiltsim.views.video.rendering import FlightRenderer
 
 HOVER: Final[dict[str, Any]] = {
     "title": "Hover at the origin",
@@ -55,6 +60,9 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
         self._action_spec = task.action_spec()
         self._observation_spec = task.observation_spec()
         self._plant: CommandedPlant | None = None
+        self._model_key: object = None
+        self._renderer: FlightRenderer | None = None
+        self._rendered = ""
         self._initial_state: Floats | None = None
         self._end: End | None = None
         self.reseed(seed)
@@ -71,8 +79,7 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
         """Begin a new episode. Raises `InputError` if its drawn scenario cannot be flown."""
         scenario = self.task.initialize_episode(self._generator)
         if self._plant is None or self._initial_state is None or scenario is not self._scenario:
-            self._scenario, self._assembly = scenario, assemble(scenario)
-            self._plant = CommandedPlant(self._assembly)
+            self._plant = self._make_plant(scenario)
             self._initial_state = self._plant.state
         else:
             self._plant.state = self._initial_state
@@ -83,6 +90,14 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
         self._wall_time = 0.0
         self._observation = self.task.get_observation(self._plant)
         return dm_env.restart(dict(self._observation))
+
+    def _make_plant(self, scenario: Scenario) -> CommandedPlant:
+        """The plant of another scenario, on the present model if that is the same."""
+        assembly = assemble(scenario)
+        key = assembly.loop, len(assembly.setup.knots), model_cache_key(scenario)
+        model = self._plant.model if self._plant is not None and key == self._model_key else None
+        self._scenario, self._assembly, self._model_key = scenario, assembly, key
+        return CommandedPlant(assembly, model)
 
     def step(self, action: npt.ArrayLike) -> dm_env.TimeStep:
         """Hold an action for one control step; begin a new episode if the last one has ended.
@@ -145,6 +160,27 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
         end = self._end or End("interrupted", plant.time, "the episode has not ended")
         return Flight(self._assembly, np.array(self._samples), end, "python", self._wall_time)
 
+    def render(self) -> npt.NDArray[np.uint8]:
+        """A picture of the present state, shape (360, 640, 3), as in the videos of flights.
+
+        Raises `InputError` before the first episode, and if no OpenGL implementation works.
+        """
+        from tiltsim.views.video.rendering import QUALITIES, FlightRenderer
+
+        flight, shown = self.flight(), repr(self._scenario.vehicle)
+        if self._renderer is None or shown != self._rendered:
+            self.close()
+            self._renderer, self._rendered = FlightRenderer(flight, QUALITIES["draft"]), shown
+        else:
+            self._renderer.show(flight)
+        return self._renderer.frame(len(flight) - 1)
+
+    def close(self) -> None:
+        """Free what `render` keeps."""
+        if self._renderer is not None:
+            self._renderer.canvas.close()
+            self._renderer = None
+
     def observe(self) -> Observation:
         """The observation that `tiltsim.simulate` would pass to a controller now."""
         return self._begun().observation()
@@ -173,7 +209,7 @@ class TiltrotorEnv(Environment):
     1, or with a discount and a reward of 0 when the vehicle is lost.
 
     Args:
-        scenario: A scenario, its file or its name in the library; its own controller is not used.
+        scenario: Anything that `tiltsim.load_scenario` takes; its own controller is not used.
             Default: `HOVER`.
         control_timestep: How long (s) an action is held, in place of the scenario's
             ``simulation.control_timestep``; where both are 0, one physics step.
@@ -182,6 +218,9 @@ class TiltrotorEnv(Environment):
             0.9, "high": 1.1, "relative": True}``, drawn anew for every episode.
         seed: Of the draws; default: the scenario's ``simulation.seed``.
         max_position_error: Distance from the reference (m) beyond which the vehicle counts as lost.
+        observations: Names of `tiltsim.env.arrays.OBSERVATIONS` and the largest absolute value of
+            each, in their order; default: `tiltsim.env.arrays.BOUNDS`.
+        max_tilt_angle: Largest tilt angle (rad) of an action, if less than the vehicle's own.
 
     Raises:
         InputError: If the scenario cannot be flown under commands, or an axis is invalid.
@@ -189,24 +228,24 @@ class TiltrotorEnv(Environment):
 
     def __init__(
         self,
-        scenario: Scenario | str | Path | None = None,
+        scenario: Scenario | str | PathLike[str] | Mapping[str, Any] | None = None,
         *,
         control_timestep: float | None = None,
         reward: Reward = hover_reward,
         domain: Domain | Sequence[Mapping[str, Any]] = (),
         seed: int | None = None,
         max_position_error: float = 10.0,
+        observations: Mapping[str, float] | None = None,
+        max_tilt_angle: float | None = None,
     ) -> None:
-        if scenario is None:
-            scenario = parse_scenario(HOVER, "environment")
-        elif not isinstance(scenario, Scenario):
-            scenario = load_scenario(scenario)
         task = Task(
-            scenario,
+            load_scenario(HOVER if scenario is None else scenario),
             control_timestep=control_timestep,
             domain=domain,
             reward=reward,
             max_position_error=max_position_error,
+            observations=observations,
+            max_tilt_angle=max_tilt_angle,
         )
         super().__init__(task, seed=seed)
 

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from math import dist
 from typing import Any, Final
 
 import numpy as np
 from dm_env import specs
 
-from tiltsim.env.arrays import action_spec, has_tilts, observation_arrays, observation_spec
+from tiltsim.env.arrays import OBSERVATIONS, Observed, action_spec, check_bound, has_tilts
 from tiltsim.env.domain import Domain
 from tiltsim.errors import InputError
 from tiltsim.flight.end import End
 from tiltsim.plants.command import CheckedCommand
 from tiltsim.plants.commanded_plant import CommandedPlant
+from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 
 Reward = Callable[[Mapping[str, Floats], Floats], float]
@@ -25,14 +28,24 @@ ENVIRONMENT: Final = "tiltsim.env.TiltrotorEnv"
 
 
 def hover_reward(observation: Mapping[str, Floats], action: Floats) -> float:
-    """Between 0 and 1: 1 at rest on the reference, half of it 1 m away."""
-    error = observation["reference_position"] - observation["position"]
-    velocity_error = observation["reference_velocity"] - observation["velocity"]
+    """Between 0 and 1: 1 at rest on the reference, half of it 1 m away.
+
+    ``1 / (1 + e^2 + 0.1 v^2 + 0.01 w^2)`` of the position error e (m), the velocity error v (m/s)
+    and the body rates w (rad/s), from observations in world or in body axes.
+    """
+    error, velocity_error = _error(observation, "position"), _error(observation, "velocity")
     rates = observation["body_rates"]
     return float(
         1.0
         / (1.0 + error @ error + 0.1 * (velocity_error @ velocity_error) + 0.01 * (rates @ rates))
     )
+
+
+def _error(observation: Mapping[str, Floats], name: str) -> Floats:
+    error = observation.get(f"{name}_error_body")
+    if error is None:
+        error = observation[f"reference_{name}"] - observation[name]
+    return error
 
 
 class Task:
@@ -51,39 +64,53 @@ class Task:
         domain: Domain | Sequence[Mapping[str, Any]] = (),
         reward: Reward = hover_reward,
         max_position_error: float = 10.0,
+        observations: Mapping[str, float] | None = None,
+        max_tilt_angle: float | None = None,
     ) -> None:
+        check_bound("max_position_error", max_position_error)
+        if not callable(reward):
+            raise InputError(f"environment: reward = {short_repr(reward)}: must be a function")
         self._timing = (
             {} if control_timestep is None else {"simulation.control_timestep": control_timestep}
         )
+        self.controller = scenario.controller  # in the place of which actions are taken
         self.scenario = self._commanded(scenario)
         self._domain = domain if isinstance(domain, Domain) else None
         if domain and not isinstance(domain, Domain):
             self._domain = Domain.from_axes(self.scenario, domain)
-        if not max_position_error > 0.0:
-            raise InputError(
-                f"environment: max_position_error = {max_position_error}: must be greater than 0"
-            )
-        self._tilting = has_tilts(scenario)
+        self._observed = Observed(observations, tilting=has_tilts(scenario))
+        self._action_spec = action_spec(self.scenario, max_tilt_angle)
         self._reward = reward
+        self._target = np.zeros(3)  # m, of the last observation
         self._max_position_error = max_position_error
 
     def _commanded(self, scenario: Scenario) -> Scenario:
         commanded = {"controller.law": "python", "controller.function": ENVIRONMENT}
         return scenario.replace({**commanded, **self._timing})
 
+    def _is_commanded(self, scenario: Scenario) -> bool:
+        """Whether `_commanded` would change nothing: checking a scenario again takes a ms."""
+        controller, step = scenario.controller, scenario.simulation.control_timestep
+        return (
+            isinstance(controller, PythonController)
+            and controller.function == ENVIRONMENT
+            and self._timing.get("simulation.control_timestep", step) == step
+        )
+
     def action_spec(self) -> specs.BoundedArray:
         """Shape and bounds of an action, N and rad."""
-        return action_spec(self.scenario)
+        return self._action_spec
 
     def observation_spec(self) -> dict[str, specs.BoundedArray]:
         """Shape and bounds of every array of an observation, by name."""
-        return observation_spec(self.scenario)
+        return self._observed.spec()
 
     def initialize_episode(self, generator: np.random.Generator) -> Scenario:
         """The scenario of the next episode. Raises `InputError` where the draw cannot be flown."""
         if self._domain is None:
             return self.scenario
-        return self._commanded(self._domain.draw(generator))
+        drawn = self._domain.draw(generator)
+        return drawn if self._is_commanded(drawn) else self._commanded(drawn)
 
     def before_step(self, action: Floats, plant: CommandedPlant) -> None:
         """Send a clipped action to the plant, where it is held for one control step."""
@@ -92,19 +119,29 @@ class Task:
 
     def get_observation(self, plant: CommandedPlant) -> dict[str, Floats]:
         """The observation of the plant's state, through the scenario's sensors."""
-        return observation_arrays(plant.observation(), tilting=self._tilting)
+        observation = plant.observation()
+        self._target = observation.reference.position
+        return self._observed.arrays(observation)
 
     def get_reward(self, observation: Mapping[str, Floats], action: Floats) -> float:
-        """The reward of a step that took ``action`` to ``observation``."""
-        return float(self._reward(observation, action))
+        """The reward of a step that took ``action`` to ``observation``.
+
+        Raises `InputError` if it needs an observation that there is not.
+        """
+        try:
+            return float(self._reward(observation, action))
+        except KeyError as error:
+            if error.args[0] in OBSERVATIONS and error.args[0] not in observation:
+                raise InputError(f"environment: observations: the reward needs {error}") from None
+            raise
 
     def get_termination(self, sample: Floats, observation: Mapping[str, Floats]) -> End | None:
         """How the episode ends in a state within the simulation's limits, or None.
 
         ``sample`` is the true state: time (s), position (m, world), and the rest of the columns.
         """
-        offset = observation["reference_position"] - sample[1:4]
-        error = float(offset @ offset) ** 0.5
+        target = observation.get("reference_position", self._target)
+        error = dist(target.tolist(), sample[1:4].tolist())
         if error <= self._max_position_error:
             return None
         return End("diverged", float(sample[0]), f"{error:.3g} m away from the reference")

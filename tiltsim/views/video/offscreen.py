@@ -113,6 +113,11 @@ class Canvas:
 
     def __exit__(self, *_: object) -> None:
         """Free the OpenGL context."""
+        self.close()
+
+    def close(self) -> None:
+        """Free the OpenGL context; nothing can be rendered any more."""
+        self._gl.make_current()
         self._context.free()
         self._gl.free()
 
@@ -126,6 +131,7 @@ class Canvas:
 
         ``names`` and ``values`` are the columns of the table, one line per row.
         """
+        self._gl.make_current()  # another canvas may have been in use since
         mujoco.mjr_render(self._frame, self.scene, self._context)
         frame = self._frame
         self._write(mujoco.mjtGridPos.mjGRID_TOPLEFT, frame, names, values)

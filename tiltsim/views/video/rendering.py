@@ -71,17 +71,24 @@ def frames(
 
 
 class FlightRenderer:
-    """Renders the samples of one flight."""
+    """Renders the samples of one flight, or of several of one vehicle."""
 
     def __init__(self, flight: Flight, video: VideoFormat) -> None:
-        self._flight = flight
+        self._video = video
         self._speed = "" if video.speed == 1.0 else f", {video.speed:g}x"
         self._model = model = replay.visible_model(flight.assembly)
         self._data = mujoco.MjData(model)
-        self._qpos = replay.joint_positions(model, flight.columns)
-        self._body = replay.first_free_body(model)
         self._radius = replay.vehicle_radius(model)
         self._arrow_scale = replay.thrust_scale(model)
+        self.show(flight)
+        self.canvas = Canvas(
+            model, video.width, video.height, samples=video.samples, shadows=video.shadows
+        )
+
+    def show(self, flight: Flight) -> None:
+        """Render this flight of the same vehicle from now on."""
+        self._flight = flight
+        self._qpos = replay.joint_positions(self._model, flight.columns)
         self._reference: Floats | None = None
         if flight.assembly.follows_position:
             path = replay.reference_path(
@@ -90,16 +97,13 @@ class FlightRenderer:
             self._reference = path if np.ptp(path, axis=0).max() > 0.0 else path[:1]
         self._targets = replay.reference_positions(flight.columns)
         self._position = replay.positions(flight.columns)
-        self._overlay = views_of(flight.assembly).overlay(flight, video.height)
+        self._overlay = views_of(flight.assembly).overlay(flight, self._video.height)
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_TRACKING
-        self._camera.trackbodyid = self._body
-        pose = video.camera or self._overlay.camera
+        self._camera.trackbodyid = replay.first_free_body(self._model)
+        pose = self._video.camera or self._overlay.camera
         self._camera.distance = pose.distance * self._radius
         self._camera.azimuth, self._camera.elevation = pose.azimuth, pose.elevation
-        self.canvas = Canvas(
-            model, video.width, video.height, samples=video.samples, shadows=video.shadows
-        )
 
     def frame(self, sample: int) -> Image:
         """The frame of a sample."""

@@ -1,0 +1,105 @@
+"""The learning tasks: the arguments of `tiltsim.env.TiltrotorEnv` for each, by name.
+
+The controller of their scenarios is the built-in one that policies are compared with.
+"""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Any, Final
+
+from tiltsim.env.environment import HOVER
+
+EPISODE_STEPS: Final = 500
+"""Control steps of an episode: 10 s at 50 Hz."""
+
+SIMULATION: Final = {
+    "duration": 10.0,
+    "timestep": 0.004,
+    "control_timestep": 0.02,
+    "integrator": "implicitfast",
+}
+
+CONTROLLER: Final = {
+    "law": "attitude_altitude",
+    "decoupling": "exact",
+    "decoupler": "exact",
+    "gait_rate_feedforward": True,
+    "max_angular_acceleration": 40.0,
+    "gains": {
+        "attitude": {"bandwidth": 10.0},
+        "yaw": {"bandwidth": 5.0},
+        "altitude": {"bandwidth": 5.0, "integral": 0.5},
+        "position": {"bandwidth": 2.0, "damping": 0.8, "integral": 0.5},
+    },
+}
+"""Feedback linearization with integral action, slow enough for thrusts that are held for 20 ms."""
+
+OBSERVATIONS: Final = {
+    "position_error_body": 3.0,  # m
+    "velocity_error_body": 5.0,  # m/s
+    "up_body": 1.0,
+    "body_rates": 10.0,  # rad/s
+}
+"""What is observed, with bounds. Along the body's axes one policy serves every heading."""
+
+
+def _uniform(key: str, *bounds: float) -> list[dict[str, Any]]:
+    """An axis for each entry of a vector, drawn from -bound to bound."""
+    return [
+        {"key": f"{key}[{entry}]", "type": "uniform", "low": -bound, "high": bound}
+        for entry, bound in enumerate(bounds)
+    ]
+
+
+def _task(
+    title: str,
+    domain: list[dict[str, Any]],
+    max_position_error: float,
+    observations: dict[str, float] = OBSERVATIONS,
+    **tables: Any,
+) -> dict[str, Any]:
+    """A task in which the vehicle starts in hover at the origin, unless ``tables`` differ."""
+    scenario = {"simulation": SIMULATION, "initial": HOVER["initial"], "controller": CONTROLLER}
+    return {
+        "scenario": {"title": title, **scenario, **tables},
+        "domain": domain,
+        "observations": observations,
+        "max_position_error": max_position_error,
+        "max_tilt_angle": 0.5,
+    }
+
+
+TASKS: Final[dict[str, dict[str, Any]]] = {
+    "Hover": _task(
+        "Recover hover at the origin from a random state",
+        [
+            *_uniform("initial.position", 1.0, 1.0, 1.0),
+            *_uniform("initial.velocity", 1.0, 1.0, 1.0),
+            *_uniform("initial.attitude", 0.5, 0.5, pi),
+            *_uniform("initial.angular_velocity", 1.0, 1.0, 1.0),
+        ],
+        max_position_error=4.0,
+    ),
+    "SetPoint": _task(
+        "Fly to a random set point in an unknown wind",
+        [*_uniform("reference.position", 1.5, 1.5, 1.5), *_uniform("air.wind", 5.0, 5.0, 1.0)],
+        max_position_error=6.0,
+        air={"drag": {"linear": [0.1, 0.1, 0.1]}},
+    ),
+    "Circle": _task(
+        "Track a circle, either way around, from hover near its beginning",
+        [
+            *_uniform("initial.position", 0.5, 0.5, 0.5),
+            {"key": "reference.angular_frequency", "type": "list", "values": [-1.0, 1.0]},
+        ],
+        max_position_error=2.5,
+        observations={**OBSERVATIONS, "reference_acceleration_body": 3.0},
+        reference={
+            "type": "circle",
+            "position": [-1.5, 0.0, 0.0],
+            "radius": 1.5,
+            "angular_frequency": 1.0,
+        },
+    ),
+}
