@@ -236,3 +236,49 @@ def test_the_page_on_the_architecture_lists_all_folders_in_their_order():
     assert re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE) == [*CONTROLLERS, *FLYING, *SHOWING]
     paths = set(re.findall(r"`((?:tiltsim|controllers|tests)/[a-z_/]+(?:\.py)?)`", page))
     assert [path for path in sorted(paths) if not (ROOT.parent / path).exists()] == []
+
+
+POSIX_ONLY = {
+    *("fcntl", "grp", "posix", "pty", "pwd", "resource", "syslog", "termios", "tty"),
+    *(f"os.O_{flag}" for flag in ("CLOEXEC", "DIRECTORY", "NOFOLLOW", "NONBLOCK")),
+    *("os.chown", "os.chroot", "os.fork", "os.forkpty", "os.getloadavg", "os.mkfifo", "os.nice"),
+    *("os.getegid", "os.geteuid", "os.getgid", "os.getgroups", "os.getuid", "os.setuid"),
+    *("os.getpgid", "os.getpgrp", "os.killpg", "os.setpgid", "os.setsid", "os.wait"),
+    *("os.pread", "os.pwrite", "os.sched_getaffinity", "os.sysconf", "os.uname"),
+    *("signal.alarm", "signal.pthread_sigmask", "signal.setitimer", "signal.sigwait"),
+    *("signal.SIG_BLOCK", "signal.SIG_SETMASK", "signal.SIG_UNBLOCK", "signal.SIGALRM"),
+    *("signal.SIGCHLD", "signal.SIGCONT", "signal.SIGHUP", "signal.SIGKILL", "signal.SIGPIPE"),
+    *("signal.SIGQUIT", "signal.SIGSTOP", "signal.SIGUSR1", "signal.SIGUSR2"),
+    *("/dev/", "/etc/", "/proc/", "/sys/", "/tmp"),
+}
+"""Modules, attributes and beginnings of paths that Windows does not have."""
+
+GUARDED = {
+    "tiltsim.engines.cache": {"os.getuid"},
+    "tiltsim.report.made": {"/proc/"},
+    "tiltsim.studies.benchmark": {"/proc/", "resource"},
+    "tiltsim.system.locks": {"fcntl", "os.O_NOFOLLOW"},
+    "tiltsim.system.processes": {
+        "signal.SIG_BLOCK",
+        "signal.SIG_SETMASK",
+        "signal.pthread_sigmask",
+    },
+}
+"""Where they are used, with an alternative in the same function."""
+
+
+def test_what_only_posix_has_is_guarded():
+    found = {}
+    for module, tree in TREES.items():
+        used = IMPORTS[module] & POSIX_ONLY
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Attribute):
+                used |= {ast.unparse(node)} & POSIX_ONLY
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                used |= {name for name in POSIX_ONLY if "/" in name and node.value.startswith(name)}
+        if used:
+            found[module] = used
+        top_level = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
+        at_the_top = {*imports(module, ast.Module(top_level, []))}
+        assert not at_the_top & POSIX_ONLY, module
+    assert found == GUARDED

@@ -79,11 +79,12 @@ def _print_ratios(rows: list[dict[str, Any]]) -> None:
 
 
 def _print_flights(row: dict[str, Any]) -> None:
+    memory = row["memory"]
     print(
         f"{row['vehicles']} flights, {row['completed']} completed, {row['integrator']} at "
         f"{1e3 * row['timestep']:g} ms on {row['threads']} threads: {row['seconds']:.1f} s, "
-        f"{row['steps_per_second']:.4g} steps/s, {row['realtime_factor']:.0f} x real time, "
-        f"peak memory {row['memory'] / 2**20:.0f} MiB"
+        f"{row['steps_per_second']:.4g} steps/s, {row['realtime_factor']:.0f} x real time"
+        + (f", peak memory {memory / 2**20:.0f} MiB" if memory else "")
     )
 
 

@@ -27,7 +27,8 @@ def core_sources() -> list[Path]:
 def native_code_folder() -> Path:
     """The folder of code compiled from exactly these sources with exactly these versions."""
     versions = [version(name) for name in ("numba", "llvmlite", "numpy", "mujoco")]
-    digest = hashlib.sha256(repr([*versions, platform.platform()]).encode())
+    machine = platform.python_version(), platform.platform()
+    digest = hashlib.sha256(repr([*versions, *machine]).encode())
     for source in core_sources():
         digest.update(source.read_bytes())
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"

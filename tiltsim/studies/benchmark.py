@@ -8,7 +8,6 @@ change of its clock, affects all variants of a round alike.
 from __future__ import annotations
 
 import os
-import resource
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -129,7 +128,8 @@ def bench_flights(vehicles: int, duration: float, integrator: str, timestep: flo
         timestep: Of the physics, s.
 
     Returns:
-        One row without a ratio; ``memory`` is the peak of the process, bytes.
+        One row without a ratio; ``memory`` is the peak of the process, bytes, or None
+        where the system does not tell.
     """
     simulation = {"integrator": integrator, "duration": duration, "timestep": timestep}
     scenarios = [_trotting(index, simulation) for index in range(vehicles)]
@@ -139,13 +139,17 @@ def bench_flights(vehicles: int, duration: float, integrator: str, timestep: flo
     return [row | {"seconds": seconds, "memory": _peak_memory(), "completed": completed}]
 
 
-def _peak_memory() -> int:
-    """Peak memory of this process, bytes."""
+def _peak_memory() -> int | None:
+    """Peak memory of this process, bytes; None where the system does not tell, as on Windows."""
     try:
         # Linux: the peak that getrusage gives may be that of the program which started this one.
         status = Path("/proc/self/status").read_text(encoding="ascii")
         return int(status.split("VmHWM:")[1].split()[0]) * 1024
     except (OSError, IndexError):
+        if sys.platform == "win32":
+            return None
+        import resource
+
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         return peak if sys.platform == "darwin" else peak * 1024
 

@@ -126,7 +126,9 @@ def replacing(path: Path, *, durable: bool = False) -> Iterator[Path]:
 
 
 def _flush(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
+    if path.is_dir() and os.name == "nt":
+        return  # Windows opens no folders
+    descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)  # to flush is to write
     try:
         os.fsync(descriptor)
     finally:
