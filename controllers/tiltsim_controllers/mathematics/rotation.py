@@ -103,6 +103,14 @@ def to_world(rotation: Sequence[float], vector: Triple) -> Triple:
 
 
 @scalar
+def to_body(rotation: Sequence[float], vector: Triple) -> Triple:
+    """A world vector in body axes; ``rotation`` is body to world as in `to_world`."""
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
+    x, y, z = vector
+    return (r11 * x + r21 * y + r31 * z, r12 * x + r22 * y + r32 * z, r13 * x + r23 * y + r33 * z)
+
+
+@scalar
 def quaternion_from_rotation(rotation: tuple[float, ...]) -> Quad:
     """A unit quaternion ``(w, x, y, z)`` of a body-to-world rotation, nine entries, row by row.
 

@@ -1,0 +1,138 @@
+"""Multirotors as tables of rotors, and their flights in plain floats with RK4."""
+
+from __future__ import annotations
+
+from math import cos, inf, pi, sin, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from tiltsim_controllers.gaits import plans
+from tiltsim_controllers.laws.decouplers import EXACT
+from tiltsim_controllers.laws.gains import GAIN_SETS, IntegralGains
+from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms
+from tiltsim_controllers.laws.multirotor import multirotor_law_of
+from tiltsim_controllers.laws.multirotor_steps import Parameters, SideGains
+from tiltsim_controllers.mathematics.rotation import euler_from_quaternion, quaternion_from_rotation
+from tiltsim_controllers.references.trajectories import SETPOINT, ReferenceParameters
+from tiltsim_controllers.vehicle.effectiveness import (
+    force_and_torque,
+    layout_of,
+    rotor_entries,
+    tilts_of,
+)
+from tiltsim_controllers.vehicle.multirotor import body_of, equations_of_motion_of
+
+HEXAROTOR = body_of(1.53, np.diag((0.0348, 0.0459, 0.08)), 9.81)
+SMALL = body_of(1.0, 0.012 * np.eye(3), 9.81)
+
+
+def ring(rotors, cant=0.0, *, hinged=False, along=None):
+    """Rotors on evenly spaced arms, canted to either side about them, or about one direction."""
+    table = []
+    for i in range(rotors):
+        out = np.array((cos(2.0 * pi * i / rotors), sin(2.0 * pi * i / rotors), 0.0))
+        about, turn = out if along is None else np.array(along, float), cant * (-1.0) ** i
+        axis = np.array((0.0, 0.0, cos(turn))) + np.cross(about, (0.0, 0.0, sin(turn)))
+        hinge = {"tilt": i, "hinge": 0.215 * out, "hinge_axis": out} if hinged else {}
+        table += rotor_entries(0.215 * out, axis, 8.5e-6, 1.4e-7, (-1.0) ** (i + 1), **hinge)
+    return tuple(table)
+
+
+def octorotor():
+    """Rotors on the corners of a cube that push evenly in every direction (Brescianini 2016)."""
+    a, b, c = 0.5 + 1.0 / sqrt(12.0), 0.5 - 1.0 / sqrt(12.0), 1.0 / sqrt(3.0)
+    axes = np.array(
+        [[-a, b, -b, a, a, -b, b, -a], [b, a, -a, -b, -b, -a, a, b], [c, -c, -c, c, c, -c, -c, c]]
+    ).T
+    signs = (1.0, -1.0)
+    places = [0.25 * c * np.array((x, y, z)) for z in signs for y in signs for x in signs]
+    entries = [rotor_entries(p, n, 8.5e-6, 1.5e-7, 1.0) for p, n in zip(places, axes, strict=True)]
+    return tuple(value for rotor in entries for value in rotor)
+
+
+class Vehicle(NamedTuple):
+    """A table of rotors, their body, how many components of force are controlled, and the norm."""
+
+    table: tuple[float, ...]
+    body: object
+    dimension: int
+    norm: str = "speed"
+
+
+def parameters_of(vehicle, gait=None, reference=None, **changes):
+    """Parameters without limits, and the knots: those of the gait and the table."""
+    gait = gait or plans.fixed(())
+    reference = reference or ReferenceParameters(SETPOINT)
+    law = Parameters(
+        vehicle=vehicle.body,
+        gains=GAIN_SETS["feedforward"],
+        integral=IntegralGains(),
+        side=SideGains(),
+        max_acceleration=inf,
+        max_angular_acceleration=inf,
+        anticipation=0.0,
+        terms=FeedforwardTerms(),
+        gait=gait.parameters,
+        reference=reference,
+        decoupler=EXACT,
+        rotors=float(len(gait.knots)),
+    )
+    return law._replace(**changes), (*gait.knots, *vehicle.table)
+
+
+def hover_speeds(vehicle, angles=(), acceleration=(0.0, 0.0, 0.0)):
+    """Rotor speeds of the least sum of squares of w that accelerate the level vehicle (m/s^2)."""
+    force, torque = force_and_torque(vehicle.table, angles)
+    lift = vehicle.body.mass * np.add(acceleration, (0.0, 0.0, vehicle.body.gravity))
+    rows = np.vstack([force / 1e-5, torque / 1e-6])
+    w = np.linalg.pinv(rows, rcond=1e-9) @ np.array([*lift / 1e-5, 0.0, 0.0, 0.0])
+    return np.sign(w) * np.sqrt(np.abs(w))
+
+
+class Flight(NamedTuple):
+    """Samples at the ends of the steps, time first."""
+
+    time: np.ndarray
+    position: np.ndarray  # (steps, 3)
+    up: np.ndarray  # (steps, 3), world up in body axes
+    speeds: np.ndarray  # (steps, N)
+    null_part: np.ndarray
+
+
+def fly(vehicle, law, knots, duration, *, gait=None, step=0.005, start=(), wind=(0.0, 0.0, 0.0)):
+    """Fly along a gait; ``start`` is position, velocity and acceleration, level and at rest."""
+    layout = layout_of(vehicle.table)
+    rotors, tilts = len(layout), tilts_of(layout)
+    inputs = multirotor_law_of(layout, vehicle.dimension, vehicle.norm)
+    motion = equations_of_motion_of(layout)
+    at = int(law.rotors)
+    planned = gait or plans.fixed((0.0,) * tilts)
+    seen = []
+
+    def rates(time, state):
+        angles, turning = planned.angles(time), planned.rates(time)
+        angles, turning = tuple(angles.tolist()), tuple(turning.tolist())
+        attitude = euler_from_quaternion(*quaternion_from_rotation(tuple(state[6:15])))
+        speeds, integrals = state[18 : 18 + rotors], tuple(state[18 + rotors :])
+        law_state = (*state[:6], *attitude, *state[15:18], *angles, *speeds)
+        u = inputs(time, law_state, turning, integrals, law, knots)
+        seen.append(u[-1])
+        moved = motion(state, angles, u, law.vehicle, knots, at, wind, 1.0)
+        return np.array((*moved, *u[rotors : rotors + 3]))
+
+    start = start or (0.0,) * 9
+    speeds = hover_speeds(vehicle, planned.angles(0.0), start[6:])
+    state = np.array((*start[:6], *np.eye(3).ravel(), 0.0, 0.0, 0.0, *speeds, 0.0, 0.0, 0.0))
+    rows = []
+    for k in range(round(duration / step)):
+        time = k * step
+        k1 = rates(time, state.tolist())
+        part = seen[-1]
+        k2 = rates(time + 0.5 * step, (state + 0.5 * step * k1).tolist())
+        k3 = rates(time + 0.5 * step, (state + 0.5 * step * k2).tolist())
+        k4 = rates(time + step, (state + step * k3).tolist())
+        state = state + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        rows.append((time + step, *state[:3], *state[12:15], *state[18 : 18 + rotors], part))
+    rows = np.array(rows)
+    return Flight(rows[:, 0], rows[:, 1:4], rows[:, 4:7], rows[:, 7:-1], rows[:, -1])
