@@ -30,7 +30,7 @@ BEST = 8
 """Directions per update, and how many of them count: those with the best scores."""
 
 NOISE, STEP = 0.15, 0.12
-"""Standard deviation of the perturbations, and step size."""
+"""Standard deviation of the perturbations, and step size; both shrink to a fifth in the end."""
 
 
 @cache
@@ -58,17 +58,18 @@ def train(updates: int, seed: int, processes: int) -> np.ndarray:
     weights, generator, start = np.zeros(shape), np.random.default_rng(seed), perf_counter()
     with get_context("spawn").Pool(processes) as pool:
         for update in range(updates):
+            scale = 1.0 - 0.8 * update / updates
             directions = generator.standard_normal((DIRECTIONS, *shape))
             starts = generator.integers(2**31, size=DIRECTIONS).tolist()
             flights = [
-                (weights + sign * NOISE * direction, begin, TRAINING_STEPS)
+                (weights + sign * scale * NOISE * direction, begin, TRAINING_STEPS)
                 for direction, begin in zip(directions, starts, strict=True)
                 for sign in (1.0, -1.0)
             ]
             scores = np.array(pool.starmap(fly, flights, chunksize=1)).reshape(-1, 2)
             best = np.argsort(scores.max(axis=1))[-BEST:]
             slopes = (scores[best, 0] - scores[best, 1]) / (scores[best].std() * BEST)
-            weights = weights + STEP * np.tensordot(slopes, directions[best], axes=1)
+            weights = weights + scale * STEP * np.tensordot(slopes, directions[best], axes=1)
             if update % 10 == 9:
                 print(f"update {update + 1}: {scores.mean():.1f}, {perf_counter() - start:.0f} s")
     return weights
@@ -77,7 +78,7 @@ def train(updates: int, seed: int, processes: int) -> np.ndarray:
 def main() -> None:
     """Train, and print the score on starts that the training has not seen."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--updates", type=int, default=150)
+    parser.add_argument("--updates", type=int, default=80)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--out", help="file for the weights, .npy")
