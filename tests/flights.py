@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import cache
 
 import tiltsim
-from tiltsim.vehicles.rotorcraft import OBSERVED_FIELDS
+from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 
 BASE = {"simulation": {"duration": 1.2, "timestep": 0.002, "engine": "python"}}
-SAMPLE_FIELDS = ("time", *OBSERVED_FIELDS)
+SAMPLE_FIELDS = ("time", *ROTORCRAFT.observed_fields)
 """What a sample of any rotorcraft begins with; a law's own states follow."""
 
 FIXED = {"gait": {"type": "fixed", "angles": [-0.65, -0.65, 0.65, 0.65]}}

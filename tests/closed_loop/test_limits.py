@@ -36,7 +36,7 @@ BOUNDS = {
     },
 }
 VEHICLES = {
-    "rotorcraft": (rotorcraft.OBSERVED_FIELDS, rotorcraft.rotorcraft_limit_exceeded),
+    "rotorcraft": (rotorcraft.ROTORCRAFT.observed_fields, rotorcraft.ROTORCRAFT.limit_exceeded),
     "tilt_car": (tilt_car.OBSERVED_FIELDS, tilt_car.tilt_car_limit_exceeded),
 }
 

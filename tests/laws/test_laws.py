@@ -359,7 +359,8 @@ MISTAKES = {
     "unknown law": ({"controller": {"law": "pid"}}, 'controller.law = "pid": choose attitude'),
     "key of another law": (
         {"vehicle": QUADROTOR, "controller": {"law": "yaw_position", "decoupler": "exact"}},
-        'controller.decoupler = "exact": unknown key; only for law attitude_altitude; known: ',
+        'controller.decoupler = "exact": unknown key; only for law attitude_altitude, '
+        "attitude_force; known: ",
     ),
     "unstable gains": (
         {"vehicle": QUADROTOR, "controller": {"law": "yaw_position", "gains": "ch02"}},
@@ -400,7 +401,7 @@ MISTAKES = {
     ),
     "unknown vehicle": (
         {"vehicle": {"model": "boat"}},
-        'vehicle.model = "boat": choose tiltrotor, quadrotor, tilt_car',
+        'vehicle.model = "boat": choose tiltrotor, quadrotor, multirotor, tilt_car',
     ),
     "law of a rotorcraft for a tilt-car": (
         {"vehicle": {"model": "tilt_car"}},

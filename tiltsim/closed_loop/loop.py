@@ -19,6 +19,7 @@ from tiltsim.models.parts import ExtraActuators
 from tiltsim.system.quantity import Quantity, in_words
 from tiltsim_controllers.mathematics.records import flatten, record_dtype, record_size
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Values, Vector, scalar
+from tiltsim_controllers.vehicle.parameters import SPIN
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan, Scenario
@@ -53,6 +54,7 @@ class Dynamics:
         model: Name of the MJCF model.
         sizes: Lengths of its vectors, the controller's own states among the activations.
         initial_activations: ``(plan, setup) -> act`` at time zero.
+        spins: Signs of the rotor speeds.
         controller_states: Number of activations that are states of the controller.
         extra_actuators: Actuators that layers around the controller append to the model, innermost
             first.
@@ -62,6 +64,7 @@ class Dynamics:
     sizes: Sizes
     initial_activations: Callable[[FlightPlan, ControlSetup], Vector]
     controller_states: int = 0
+    spins: Values = SPIN
     extra_actuators: tuple[ExtraActuators, ...] = ()
 
 

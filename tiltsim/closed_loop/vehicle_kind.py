@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tiltsim.models.vehicle_parts import MAX_ROTORS
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 
 if TYPE_CHECKING:
@@ -48,4 +49,4 @@ class VehicleKind:
     @property
     def rotors(self) -> tuple[int, ...]:
         """The numbers of the rotors."""
-        return tuple(i for i in range(1, 9) if f"rotor_speed_{i}" in self.columns)
+        return tuple(i for i in range(1, MAX_ROTORS + 1) if f"rotor_speed_{i}" in self.columns)

@@ -32,7 +32,7 @@ class RecorderHead(NamedTuple):
     reference: ReferenceParameters
 
 
-SIDES: Final = 8
+SIDES: Final = 17
 """How many sign checks a loop may have."""
 
 _RECORDER: Final = record_dtype(RecorderHead)

@@ -52,11 +52,15 @@ def mechanics(plan: FlightPlan) -> Mechanics:
     """The mechanics of a planned flight's rotorcraft."""
     rotorcraft = plan.scenario.rotorcraft
     servo = rotorcraft.tilt_servo
+    hinge_1, hinge_2, hinge_3, hinge_4 = rotorcraft.hinge_inertias
     return Mechanics(
         plan.scenario.true_rotorcraft,
         servo.natural_frequency,
         servo.damping_ratio,
-        *rotorcraft.hinge_inertias,
+        hinge_1,
+        hinge_2,
+        hinge_3,
+        hinge_4,
         inf if servo.max_angle is None else servo.max_angle,
         *rotorcraft.speeds_along_spin,
     )

@@ -45,13 +45,21 @@ def velocity_of(state: Vector) -> Values:
 
 
 @scalar
-def law_state(state: Vector, tilts: Quad) -> Values:
-    """State of the control laws, `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`."""
+def body_fields(state: Vector) -> Values:
+    """The rigid body's numbers, `tiltsim_controllers.vehicle.states.BODY_FIELDS`."""
     sin_pitch = min(1.0, max(-1.0, -state[R31]))  # rounding may carry the sine past one
     roll, pitch, yaw = atan2(state[R32], state[R33]), asin(sin_pitch), atan2(state[R21], state[R11])
     return (
         state[0], state[1], state[2], state[VX], state[VY], state[VZ],
         roll, pitch, yaw, state[P], state[Q], state[R],
+    )  # fmt: skip
+
+
+@scalar
+def law_state(state: Vector, tilts: Quad) -> Values:
+    """State of the control laws, `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`."""
+    return (
+        *body_fields(state),
         tilts[0], tilts[1], tilts[2], tilts[3],
         state[SPEED_1], state[SPEED_2], state[SPEED_3], state[SPEED_4],
     )  # fmt: skip

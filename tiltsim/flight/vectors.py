@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
+from tiltsim.models.vehicle_parts import MAX_ROTORS
+
 
 def _each_rotor(name: str) -> tuple[str, ...]:
-    return tuple(f"{name}_{rotor}" for rotor in range(1, 5))
+    return tuple(f"{name}_{rotor}" for rotor in range(1, MAX_ROTORS + 1))
 
 
 VECTORS: Final = {

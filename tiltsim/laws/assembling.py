@@ -15,6 +15,7 @@ from tiltsim.laws.layers.measured_acceleration import with_measured_acceleration
 from tiltsim.laws.layers.on_equations import on_equations
 from tiltsim.laws.layers.rotor_inertia import with_rotor_inertia
 from tiltsim.laws.layers.supervision import with_supervisor
+from tiltsim.laws.multirotor import loop_of_multirotor
 from tiltsim.laws.quadrotor_attitude_altitude import QUADROTOR_ATTITUDE_ALTITUDE
 from tiltsim.laws.switching import SWITCHING
 from tiltsim.laws.tilt_car_fourth_derivative import FOURTH_DERIVATIVE
@@ -61,6 +62,8 @@ def loop_of(scenario: Scenario) -> ClosedLoop:
     if external:
         standard = scenario.rotorcraft.has_standard_layout
         loop = (COMMANDED_LOOPS if standard else OTHER_LAYOUT_LOOPS)[scenario.vehicle.model]
+    elif scenario.vehicle.model == "multirotor":
+        loop = loop_of_multirotor(scenario)
     else:
         loop = (MEASURED_LOOPS if measured else LOOPS)[controller.loop_name]
     supervisor = controller.supervision

@@ -32,8 +32,8 @@ from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle, drag_ratio
 from tiltsim_controllers.vehicle.states import ALPHA_1, PITCH, ROLL, ROTORS, SPEED_1, TILT_FIELDS
 
 if TYPE_CHECKING:
+    from tiltsim.scenario.rotorcraft import ServoTable
     from tiltsim.scenario.scenario import FlightPlan, Scenario
-    from tiltsim.scenario.vehicle import ServoTable
 
 REFERENCE_COLUMNS: Final = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
 TILT_REFERENCE_COLUMNS: Final = tuple(f"alpha_ref_{rotor}" for rotor in ROTORS)
@@ -211,6 +211,7 @@ def reference_columns(
     fields: Sequence[str],
     samples: Mapping[str, Floats],
     setup: ControlSetup,
+    names: tuple[str, ...] = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS),
 ) -> dict[str, Floats]:
     """The columns of references, evaluated over samples.
 
@@ -219,9 +220,9 @@ def reference_columns(
         fields: Fields of a sample, its ``values``.
         samples: By field.
         setup: The flight's parameters and knots.
+        names: Of the columns.
     """
     states = np.stack([samples[name] for name in fields], axis=-1)
-    names = (*REFERENCE_COLUMNS, *TILT_REFERENCE_COLUMNS)
     rows = evaluate_over_samples(in_force, len(names), samples["time"], states, setup)
     return dict(zip(names, rows.T, strict=True))
 

@@ -33,17 +33,19 @@ from tiltsim.models.parts import (
     require_choice,
     require_positive,
 )
+from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.resources import shipped_folder
 from tiltsim.system.hooks import mujoco_hooks
 from tiltsim.system.locks import one_thread_at_a_time
+from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
 from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
     import mujoco
 
-MODELS: Final = ("tiltrotor", "quadrotor")
+MODELS: Final = ("tiltrotor", "quadrotor", "multirotor")
 
 START_SPEED: Final = 300.0
 """Rotor speed (rad/s) of the keyframe ``start``."""
@@ -54,7 +56,8 @@ class RotorcraftSpec(ModelSpec):
     """Specification of a rotorcraft's model. Raises ValueError if a value is out of range.
 
     Attributes:
-        model: ``tiltrotor`` or ``quadrotor`` (without hinges; its pods are part of the body).
+        model: ``tiltrotor``, ``quadrotor`` (without hinges; its pods are part of the body) or
+            ``multirotor``, which is a user's file.
         vehicle: Physical parameters, the pods' included.
         pod: Mass and inertia of a pod. Ignored for a quadrotor.
         rotor_limits: Limits on the rotor speeds.
@@ -65,7 +68,7 @@ class RotorcraftSpec(ModelSpec):
     """
 
     model: str
-    vehicle: Vehicle
+    vehicle: Vehicle | Multirotor
     _: KW_ONLY
     pod: Pod = field(default=Pod())
     rotor_limits: RotorLimits = field(default=RotorLimits())
@@ -76,18 +79,26 @@ class RotorcraftSpec(ModelSpec):
     def __post_init__(self) -> None:
         require_choice("vehicle.model", self.model, MODELS)
         super().__post_init__()
-        for name, value in self.vehicle._asdict().items():
-            require_positive(f"vehicle.{name}", value, "(SI)")
+        if isinstance(self.vehicle, Vehicle):
+            for name, value in self.vehicle._asdict().items():
+                require_positive(f"vehicle.{name}", value, "(SI)")
 
     @property
-    def tilts(self) -> bool:
-        """Whether the pods have hinges."""
-        return self.model == "tiltrotor"
+    def spins(self) -> Values:
+        """Signs of the rotor speeds."""
+        return SPIN if isinstance(self.vehicle, Vehicle) else self.vehicle.spins
+
+    @property
+    def tilts(self) -> int:
+        """Number of tilt hinges."""
+        if isinstance(self.vehicle, Multirotor):
+            return self.vehicle.tilts
+        return len(ROTORS) if self.model == "tiltrotor" else 0
 
     @property
     def has_stops(self) -> bool:
         """Whether the hinges have stops."""
-        return self.tilts and self.tilt_servo.max_angle is not None
+        return self.tilts > 0 and self.tilt_servo.max_angle is not None
 
 
 @one_thread_at_a_time
@@ -111,10 +122,12 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
     import mujoco
 
     # A preset's parameters in place of all that `_with_parameters` sets.
-    preset = PRESETS["ar_drone_2"]._replace(arm_length=spec.vehicle.arm_length)
-    key = replace(spec, vehicle=preset), visuals
-    if key in _compiled:
-        return _with_parameters(*_compiled[key], spec)
+    key = spec, visuals
+    if isinstance(spec.vehicle, Vehicle):
+        preset = PRESETS["ar_drone_2"]._replace(arm_length=spec.vehicle.arm_length)
+        key = replace(spec, vehicle=preset), visuals
+        if key in _compiled:
+            return _with_parameters(*_compiled[key], spec, spec.vehicle)
     complete, bare = _compose(spec)
     with mujoco_hooks():
         compiled = complete() if visuals else bare()
@@ -137,7 +150,7 @@ compiler computes.
 
 
 def _with_parameters(
-    compiled: mujoco.MjModel, data: mujoco.MjData, spec: RotorcraftSpec
+    compiled: mujoco.MjModel, data: mujoco.MjData, spec: RotorcraftSpec, vehicle: Vehicle
 ) -> mujoco.MjModel:
     """A copy of a model with another vehicle's mass, inertia, coefficients and gravity.
 
@@ -146,9 +159,9 @@ def _with_parameters(
     """
     import mujoco
 
-    model, vehicle = copy(compiled), spec.vehicle
+    model = copy(compiled)
     body = model.body("vehicle").id
-    model.body_mass[body], model.body_inertia[body] = _body_inertia(spec)
+    model.body_mass[body], model.body_inertia[body] = _body_inertia(spec, vehicle)
     for i, spin in zip(ROTORS, SPIN, strict=True):
         model.actuator(f"thrust_{i}").gear[:] = _thrust_gear(vehicle, spin)
     model.opt.gravity[:] = (0.0, 0.0, -vehicle.gravity)
@@ -179,13 +192,15 @@ def _compose(spec: RotorcraftSpec) -> tuple[Compile, Compile]:
     root.option.flag.constraint = "enable" if contacts or spec.has_stops else "disable"
     root.size.nuserdata = spec.userdata_size
 
-    if user_vehicle is None:
-        _scale_lengths(root, vehicle.arm_length)
-        _set_inertia(root, spec)
-    else:
+    if user_vehicle is not None:
         user_vehicle.set_inertia(root, vehicle)
-    _set_rotors(root, vehicle, spec.rotor_limits)
-    hinges = [f"tilt_{i}" for i in ROTORS if spec.tilts]
+    elif isinstance(vehicle, Vehicle):
+        _scale_lengths(root, vehicle.arm_length)
+        _set_inertia(root, spec, vehicle)
+    hinges = [f"tilt_{i}" for i in range(1, spec.tilts + 1)]
+    if isinstance(vehicle, Vehicle):
+        _set_rotors(root, vehicle, len(hinges))
+    _limit_rotors(root, spec)
     if hinges:
         if user_vehicle is None:
             for hinge in hinges:
@@ -194,15 +209,11 @@ def _compose(spec: RotorcraftSpec) -> tuple[Compile, Compile]:
         else:
             inertias = user_vehicle.hinge_inertias
         set_servos(root, hinges, servo, inertias)
-    for name, speed in (("hover", vehicle.hover_rotor_speed), ("start", START_SPEED)):
-        key = root.find("key", name)
-        if key is not None:
-            _set_keyframe(key, speed, len(hinges))
     add_states(root, "law", spec.law_states)
     for index, extra in enumerate(spec.extra_actuators, start=1):
         add_states(root, f"layer_{index}_state", extra.states)
         if extra.begins_with_rotor_speeds:
-            _limit_speeds(root, f"layer_{index}_state", spec.rotor_limits)
+            _limit_speeds(root, f"layer_{index}_state", spec)
         add_memories(root, f"layer_{index}_memory", extra.memories)
         if extra.wrench:
             add_wrench(root, f"layer_{index}")
@@ -231,19 +242,29 @@ def _scale_lengths(root: Any, arm_length: float) -> None:
                 setattr(element, name, length * ratio)
 
 
-def _set_rotors(root: Any, vehicle: Vehicle, limits: RotorLimits) -> None:
+def _set_rotors(root: Any, vehicle: Vehicle, hinges: int) -> None:
+    """Give four rotors on a cross their coefficients, and the keyframes their speeds."""
     for i, spin in zip(ROTORS, SPIN, strict=True):
-        thrust = root.find("actuator", f"thrust_{i}")
-        thrust.gear = _thrust_gear(vehicle, spin)
-        if limits.thrust_range is not None:
-            thrust.ctrlrange, thrust.ctrllimited = limits.thrust_range, "true"
-    _limit_speeds(root, "rotor_speed", limits)
+        root.find("actuator", f"thrust_{i}").gear = _thrust_gear(vehicle, spin)
+    for name, speed in (("hover", vehicle.hover_rotor_speed), ("start", START_SPEED)):
+        key = root.find("key", name)
+        if key is not None:
+            _set_keyframe(key, speed, hinges)
 
 
-def _limit_speeds(root: Any, name: str, limits: RotorLimits) -> None:
-    """Keep the activations ``name_1`` to ``name_4`` within the limits of the rotors' speeds."""
-    for i, spin in zip(ROTORS, SPIN, strict=True):
-        speed_range = limits.speed_range(spin)
+def _limit_rotors(root: Any, spec: RotorcraftSpec) -> None:
+    thrust_range = spec.rotor_limits.thrust_range
+    if thrust_range is not None:
+        for i in range(1, len(spec.spins) + 1):
+            thrust = root.find("actuator", f"thrust_{i}")
+            thrust.ctrlrange, thrust.ctrllimited = thrust_range, "true"
+    _limit_speeds(root, "rotor_speed", spec)
+
+
+def _limit_speeds(root: Any, name: str, spec: RotorcraftSpec) -> None:
+    """Keep the activations ``name_1``, ``name_2``, ... within the limits of the rotors' speeds."""
+    for i, spin in enumerate(spec.spins, start=1):
+        speed_range = spec.rotor_limits.speed_range(spin)
         if speed_range is not None:
             rotor = root.find("actuator", f"{name}_{i}")
             rotor.actrange, rotor.actlimited = speed_range, "true"
@@ -255,10 +276,10 @@ def _thrust_gear(vehicle: Vehicle, spin: float) -> tuple[float, ...]:
     return 0.0, 0.0, vehicle.thrust_coefficient, 0.0, 0.0, drag
 
 
-def _set_inertia(root: Any, spec: RotorcraftSpec) -> None:
+def _set_inertia(root: Any, spec: RotorcraftSpec, vehicle: Vehicle) -> None:
     """Give the pods their mass and inertia and the body the rest of the vehicle's."""
     inertial = root.find("body", "vehicle").inertial
-    inertial.mass, inertial.diaginertia = _body_inertia(spec)
+    inertial.mass, inertial.diaginertia = _body_inertia(spec, vehicle)
     if spec.tilts:
         for i in ROTORS:
             inertial = root.find("body", f"pod_{i}").inertial
@@ -266,9 +287,9 @@ def _set_inertia(root: Any, spec: RotorcraftSpec) -> None:
             inertial.diaginertia = [spec.pod.inertia] * 3
 
 
-def _body_inertia(spec: RotorcraftSpec) -> tuple[float, list[float]]:
+def _body_inertia(spec: RotorcraftSpec, vehicle: Vehicle) -> tuple[float, list[float]]:
     """Mass and principal moments of inertia of the body: the vehicle's less its hinged pods'."""
-    vehicle, pod = spec.vehicle, spec.pod if spec.tilts else None
+    pod = spec.pod if spec.tilts else None
     mass = vehicle.mass
     moments = [vehicle.inertia_xx, vehicle.inertia_yy, vehicle.inertia_zz]
     if pod is not None:

@@ -5,21 +5,24 @@ from __future__ import annotations
 import re
 from typing import Final
 
+from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.claim import NAME
 from tiltsim.scenario.controller import laws_for
 from tiltsim.scenario.gait import FixedGait, TableGait
 from tiltsim.scenario.messages import InvalidValueError, choose
+from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.reference import WaypointReference
+from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.simulation_table import InitialTable
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.scenario.vehicle import (
     ModelErrorTable,
     PodTable,
-    TiltServoTable,
     VehicleTable,
     require_physical_inertia,
 )
+from tiltsim_controllers.gaits.plans import Gait
 
 MAX_KNOTS: Final = 1500
 """Numbers of a gait and a reference together, unless they are tables with a limit of their own."""
@@ -61,8 +64,22 @@ def _check_law(scenario: ScenarioTables) -> None:
         _check_layout(scenario)
         if controller.is_external:
             _check_external(scenario)
-    if not vehicle.has_tilting_rotors:
+    if vehicle.model == "quadrotor":
         _check_fixed_rotors(scenario)
+    if isinstance(vehicle, MultirotorTable):
+        _check_multirotor(scenario, vehicle)
+
+
+def _check_multirotor(scenario: ScenarioTables, vehicle: MultirotorTable) -> None:
+    if not vehicle.has_tilting_rotors:
+        scenario.require(
+            "vehicle.tilt_servo", TiltServoTable(), "vehicle.mjcf has no tilts; remove it"
+        )
+    if scenario.simulation.plant == "thesis" and not scenario.has_ideal_actuators_in_still_air:
+        raise scenario.mistake(
+            "simulation.plant",
+            "its equations of a multirotor have ideal rotors and servos; use mujoco",
+        )
 
 
 def _check_fixed_rotors(scenario: ScenarioTables) -> None:
@@ -83,14 +100,21 @@ def _check_fixed_rotors(scenario: ScenarioTables) -> None:
 
 def _check_actuators(scenario: ScenarioTables) -> None:
     vehicle = scenario.vehicle
-    if scenario.has_air and vehicle.is_planar:
+    if scenario.has_air and not isinstance(vehicle, VehicleTable):
         raise scenario.mistake(
             "vehicle.model", "aerodynamic effects are not supported; remove [air]"
         )
-    supported = vehicle.has_tilting_rotors and not vehicle.is_planar
+    supported = vehicle.model in {"tiltrotor", "multirotor"}
     for key, value, ideal in scenario.actuator_options:
         if value != ideal and not supported:
             raise InvalidValueError(key, value, f"not supported for the {vehicle.model}; remove it")
+    for fault in scenario.fault:
+        if fault.rotor > vehicle.rotor_count:
+            reason = f"the vehicle has {vehicle.rotor_count} rotors"
+            raise InvalidValueError("fault.rotor", fault.rotor, reason)
+        fixed = supported and scenario.any_rotorcraft.tilt_of_rotor(fault.rotor) < 0
+        if fault.type == "stuck_servo" and fixed:
+            raise InvalidValueError("fault.rotor", fault.rotor, "is fixed and has no servo")
     faults = [(fault.rotor, fault.type == "stuck_servo") for fault in scenario.fault]
     for rotor, stuck in faults:
         if faults.count((rotor, stuck)) > 1:
@@ -114,7 +138,7 @@ def _check_actuators(scenario: ScenarioTables) -> None:
 
 
 def _check_layout(scenario: ScenarioTables) -> None:
-    user_vehicle, external = scenario.rotorcraft.user_vehicle, scenario.controller.is_external
+    user_vehicle, external = scenario.any_rotorcraft.user_vehicle, scenario.controller.is_external
     if user_vehicle is None or not user_vehicle.layout_mismatch:
         return
     if not external:
@@ -140,7 +164,8 @@ def _check_model_error(scenario: ScenarioTables) -> None:
         return
     if not isinstance(scenario.vehicle, VehicleTable):
         raise scenario.mistake(
-            "vehicle.model", "[model_error] is supported for rotorcraft only; remove it"
+            "vehicle.model",
+            "[model_error] is supported for tiltrotor and quadrotor only; remove it",
         )
     if scenario.vehicle.mjcf is not None:
         scenario.require("model_error.arm_length", 1.0, "defined by vehicle.mjcf; remove it")
@@ -244,11 +269,39 @@ def _check_gait(scenario: ScenarioTables) -> None:
             len(reference.times),
             f"too many waypoints: {total} numbers with the gait's, at most {MAX_KNOTS}",
         )
+    if isinstance(scenario.controller, AttitudeForceController):
+        _check_dimension(scenario, scenario.controller, gait)
     if scenario.controller.commands_tilts and not gait.is_constant:
         raise scenario.mistake(
             "gait.type",
             f"the {scenario.controller.law} law commands the tilts itself; give the initial angles "
             "as a fixed gait",
+        )
+
+
+def _check_dimension(
+    scenario: ScenarioTables, controller: AttitudeForceController, gait: Gait
+) -> None:
+    """Refuse more components of force than a multirotor has, and a pose that it cannot take."""
+    vehicle = scenario.vehicle.resolve()
+    assert isinstance(vehicle, Multirotor)
+    dimension = controller.resolve_dimension(vehicle, gait)
+    reference = scenario.reference
+    if (reference.kind == "attitude_altitude") != (controller.decoupler == "none"):
+        raise scenario.mistake(
+            "controller.decoupler",
+            f"reference.type = {reference.type!r} needs "
+            + ("none" if controller.decoupler != "none" else "conventional, modified or exact"),
+        )
+    if reference.kind == "pose" and dimension < 3:
+        key = "roll" if reference.roll else "pitch"
+        reason = f"is no output with {dimension} components of force; needs a vehicle with 3"
+        raise scenario.mistake(f"reference.{key}", reason)
+    if dimension == 1:
+        return
+    if controller.decoupling != "exact" or controller.decoupler != "exact":
+        raise scenario.mistake(
+            "controller.dimension", f"the vehicle has {dimension}; set it to 1 for this decoupler"
         )
 
 
@@ -260,7 +313,7 @@ def _check_ground(scenario: ScenarioTables) -> None:
         raise scenario.mistake("ground", "not supported for the tilt_car, which moves in a plane")
     reason = "its equations have no ground contact; use mujoco"
     scenario.require("simulation.plant", "mujoco", reason)
-    user_vehicle = scenario.rotorcraft.user_vehicle
+    user_vehicle = scenario.any_rotorcraft.user_vehicle
     if user_vehicle is not None and not user_vehicle.has_contact_geoms:
         raise scenario.mistake(
             "ground", "vehicle.mjcf needs a geom 'ground', and geoms whose names end in 'collision'"
@@ -270,8 +323,10 @@ def _check_ground(scenario: ScenarioTables) -> None:
 
 
 def _check_rotor_limits(scenario: ScenarioTables) -> None:
-    if not isinstance(scenario.vehicle, VehicleTable):
+    if not isinstance(scenario.vehicle, RotorcraftTable):
         return
+    if isinstance(scenario.vehicle, MultirotorTable) and scenario.initial.rotor_speed is None:
+        return  # those of hover
     low, high = scenario.vehicle.min_rotor_speed, scenario.vehicle.max_rotor_speed
     for speed in scenario.initial.rotor_speeds(scenario.vehicle.rotor_count):
         if (low is not None and speed < low) or (high is not None and speed > high):

@@ -9,6 +9,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from tiltsim.scenario.controller_table import ControllerTable
 from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.quadrotor_controllers import (
     QuadrotorAttitudeAltitudeController,
     SwitchingController,
@@ -74,6 +75,7 @@ Controller = Annotated[
     | Annotated[YawPositionController, Tag("yaw_position")]
     | Annotated[SwitchingController, Tag("switching")]
     | Annotated[QuadrotorAttitudeAltitudeController, Tag("quadrotor_attitude_altitude")]
+    | Annotated[AttitudeForceController, Tag("attitude_force")]
     | Annotated[PythonController, Tag("python")]
     | Annotated[ThirdDerivativeController, Tag("tilt_car_third_derivative")]
     | Annotated[FourthDerivativeController, Tag("tilt_car_fourth_derivative")]

@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from functools import lru_cache
 from math import pi
 from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from tiltsim.scenario.table import Angle, Angles2, Angles4, Factor, Period, Positive, Table, example
-from tiltsim.scenario.time_table import GAIT_COLUMNS, Rows, TimeTable
+from tiltsim.models.rotor_table import Multirotor
+from tiltsim.models.vehicle_parts import MAX_ROTORS
+from tiltsim.scenario.table import (
+    Angle,
+    Angles2,
+    AnglesEach,
+    Factor,
+    Period,
+    Positive,
+    Table,
+    example,
+)
+from tiltsim.scenario.time_table import GAIT_COLUMNS, Rows, TimeTable, gait_columns
 from tiltsim_controllers.analysis.two_color_planner import (
     Circle,
     Leg,
@@ -37,7 +49,17 @@ COLOR: Final = (
 )
 """The two colours of ch. 6, for descriptions."""
 
-GaitRow = Annotated[tuple[float, Angle, Angle, Angle, Angle], Field(strict=False)]
+GaitRow = Annotated[tuple[float, ...], Field(strict=False, min_length=2, max_length=17)]
+
+
+AnyVehicle = Vehicle | Multirotor | TiltCar
+
+
+def tilts_of(vehicle: AnyVehicle) -> int:
+    """How many tilt angles a gait of a vehicle plans; the quadrotor's are idle."""
+    if isinstance(vehicle, Multirotor):
+        return vehicle.tilts
+    return 4 if isinstance(vehicle, Vehicle) else 1
 
 
 class GaitTable(Table, ABC):
@@ -53,12 +75,22 @@ class GaitTable(Table, ABC):
         1.0, description="eta, multiplies alpha_3 and alpha_4 (ch. 6) [-]", examples=[0.8]
     )
 
-    def plan(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+    def plan(self, vehicle: AnyVehicle) -> PlannedGait:
         """The gait for a vehicle. Raises ValueError if the numbers do not define one."""
+        needed = tilts_of(vehicle)
+        if self.tilts not in {None, needed} and not isinstance(vehicle, TiltCar):
+            raise ValueError(f"has {self.tilts} tilt angles; the vehicle has {needed}")
+        if self.bias != 1.0 and needed not in {1, 4}:
+            raise ValueError(f"gait.bias needs four tilt angles; the vehicle has {needed}")
         return self._unscaled(vehicle).scaled(1.0 / self.scale).biased(self.bias)
 
+    @property
+    def tilts(self) -> int | None:
+        """Number of tilt angles; None for a gait of any number."""
+        return 4
+
     @abstractmethod
-    def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+    def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
         """The gait before scale and bias."""
 
     @property
@@ -74,13 +106,19 @@ class FixedGait(GaitTable):
     size_key = "angles"
 
     type: Literal["fixed"] = Field("fixed", description="angles that never change")
-    angles: Angles4 = Field(
+    angles: AnglesEach = Field(
         (0.0, 0.0, 0.0, 0.0),
-        description=f"alpha_1..4; {SIGN} [rad]",
+        description=f"alpha_1..4; {SIGN}; a multirotor has one for each of its tilts [rad]",
         examples=[[-0.65, -0.65, 0.65, 0.65]],
     )
 
-    def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+    @property
+    def tilts(self) -> int | None:
+        return len(self.angles) if any(self.angles) else None
+
+    def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
+        if isinstance(vehicle, Multirotor) and self.tilts is None:
+            return plans.fixed((0.0,) * vehicle.tilts)
         return plans.fixed(self.angles)
 
 
@@ -100,7 +138,7 @@ class TrotGait(GaitTable):
     )
     period: Period = Field(description="T, of the whole cycle [s]", examples=[2.0])
 
-    def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+    def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
         trot = plans.instant_trot if self.type == "trot_instant" else plans.continuous_trot
         return trot(self.amplitude, self.period)
 
@@ -122,7 +160,7 @@ class CatGait(GaitTable):
     )
     period: Period = Field(description="T, of one stride [s]", examples=[1.0])
 
-    def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+    def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
         return plans.cat(self.type, self.amplitude, self.period, self.lean)
 
 
@@ -132,8 +170,9 @@ class WaypointGait(GaitTable):
     size_key = "angles"
 
     type: Literal["waypoints"] = Field(description="your own gait")
-    angles: Annotated[tuple[Angles4, ...], Field(min_length=2, strict=False)] = Field(
-        description=f"alpha_1..4 of each waypoint; {SIGN} [rad]",
+    angles: Annotated[tuple[AnglesEach, ...], Field(min_length=2, strict=False)] = Field(
+        description=f"alpha_1..4 of each waypoint; {SIGN}; a multirotor has one for each of its "
+        "tilts [rad]",
         examples=[[[-0.3, -0.1, 0.1, 0.3], [-0.1, -0.3, 0.3, 0.1]]],
     )
     period: Period = Field(description="time to return to the first waypoint [s]", examples=[2.0])
@@ -144,8 +183,12 @@ class WaypointGait(GaitTable):
         examples=[[0.0, 0.4]],
     )
 
-    def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
-        return plans.waypoints(self.angles, self.period, self.phases)
+    @property
+    def tilts(self) -> int:
+        return len(self.angles[0])
+
+    def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
+        return plans.waypoints(self.angles, self.period, self.phases, self.tilts)
 
 
 class TableGait(GaitTable, TimeTable):
@@ -189,7 +232,20 @@ class TableGait(GaitTable, TimeTable):
             )
         return self
 
-    def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+    @classmethod
+    def columns_among(cls, names: Sequence[str]) -> tuple[str, ...]:
+        tilts = [i for i in range(1, MAX_ROTORS + 1) if f"alpha_{i}" in names]
+        return gait_columns(max(tilts, default=4))
+
+    @classmethod
+    def _columns_of_width(cls, width: int) -> tuple[str, ...]:
+        return gait_columns(width - 1)
+
+    @property
+    def tilts(self) -> int:
+        return len(self.table[0]) - 1
+
+    def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
         return _table_gait(self.table, self.repeat)
 
     @property
@@ -260,9 +316,9 @@ class TwoColorGait(GaitTable):
             return Circle(self.color, self.centre, self.radius)
         return Polyline(tuple(Leg(leg.color, leg.vertices) for leg in self.path))
 
-    def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+    def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
         if not isinstance(vehicle, Vehicle):
-            raise ValueError("has four tilt angles; the tilt_car has one")
+            raise ValueError("is a gait of the tiltrotor")
         return four_angle_gait(self.curve, self.period, vehicle)
 
     @property
@@ -275,9 +331,14 @@ class TwoColorGait(GaitTable):
 class TiltCarGait(GaitTable):
     """Base of the tilt-car's gaits, which plan the direction of the thrusts."""
 
-    def _unscaled(self, vehicle: Vehicle | TiltCar) -> PlannedGait:
+    @property
+    def tilts(self) -> None:
+        return None
+
+    def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
         if not isinstance(vehicle, TiltCar):
-            raise ValueError("is a gait of the tilt_car; this vehicle has four tilt angles")
+            number = "four" if isinstance(vehicle, Vehicle) else vehicle.tilts
+            raise ValueError(f"is a gait of the tilt_car; this vehicle has {number} tilt angles")
         # The bottom disc counter-rotates, so that the tilt exceeds the thrusts' rotation.
         return self._tilt(1.0 / turn_per_tilt(vehicle))
 

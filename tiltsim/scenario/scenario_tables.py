@@ -6,23 +6,20 @@ from typing import Annotated, Any, Final
 
 from pydantic import Field, PrivateAttr
 
+from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.claim import ClaimName, ClaimTable, Origin
 from tiltsim.scenario.controller import Controller
 from tiltsim.scenario.expectation import Expectation
 from tiltsim.scenario.gait import FixedGait, Gait
 from tiltsim.scenario.reference import Reference, SetpointReference
+from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
 from tiltsim.scenario.simulation_table import InitialTable, SimulationTable
 from tiltsim.scenario.surroundings import AirTable, Disturbance, Fault, GroundTable, SensorTable
 from tiltsim.scenario.table import Table
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.scenario.time_table import TimeTable
-from tiltsim.scenario.vehicle import (
-    ModelErrorTable,
-    TiltCarTable,
-    TiltServoTable,
-    VehicleTable,
-    VehicleUnion,
-)
+from tiltsim.scenario.vehicle import ModelErrorTable, TiltCarTable, VehicleTable, VehicleUnion
+from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 DESCRIPTIVE: Final = ("title", "source", "without", "ours", "claim", "expect")
@@ -116,7 +113,7 @@ class ScenarioTables(Table):
             ("fault", [fault.type for fault in self.fault], []),
             ("controller.allocation", controller.prioritizes_attitude, False),
         ]
-        if isinstance(vehicle, VehicleTable):
+        if isinstance(vehicle, RotorcraftTable):
             options = [
                 ("vehicle.rotor_time_constant", vehicle.rotor_time_constant, None),
                 ("vehicle.tilt_servo.max_rate", vehicle.tilt_servo.max_rate, None),
@@ -146,7 +143,7 @@ class ScenarioTables(Table):
         Otherwise `tiltsim.laws.layers.on_equations` wraps the controller for the thesis plant.
         """
         vehicle = self.vehicle
-        if not isinstance(vehicle, VehicleTable):
+        if not isinstance(vehicle, RotorcraftTable):
             return True
         return not (
             vehicle.has_rotor_limits
@@ -161,8 +158,30 @@ class ScenarioTables(Table):
     def rotorcraft(self) -> VehicleTable:
         """The vehicle of a tiltrotor or quadrotor. Raises TypeError for other vehicles."""
         if not isinstance(self.vehicle, VehicleTable):
+            raise TypeError(f"the {self.vehicle.model} has no four rotors on a cross")
+        return self.vehicle
+
+    @property
+    def any_rotorcraft(self) -> RotorcraftTable:
+        """The vehicle of any rotorcraft. Raises TypeError for other vehicles."""
+        if not isinstance(self.vehicle, RotorcraftTable):
             raise TypeError(f"the {self.vehicle.model} is not a rotorcraft")
         return self.vehicle
+
+    @property
+    def true_vehicle(self) -> Vehicle | Multirotor:
+        """The parameters of any simulated rotorcraft."""
+        if isinstance(self.vehicle, MultirotorTable):
+            return self.vehicle.resolve()
+        return self.true_rotorcraft
+
+    @property
+    def true_thrust_coefficients(self) -> Values:
+        """K_f (N s^2/rad^2) of each rotor of any simulated rotorcraft."""
+        vehicle = self.true_vehicle
+        if isinstance(vehicle, Vehicle):
+            return (vehicle.thrust_coefficient,) * self.vehicle.rotor_count
+        return vehicle.thrust_coefficients
 
     @property
     def true_rotorcraft(self) -> Vehicle:

@@ -10,8 +10,7 @@ from tiltsim.scenario.table import (
     Angles3,
     NonNegative,
     Positive,
-    Positive2,
-    Positive4,
+    PositiveEach,
     Table,
     Vector3,
     example,
@@ -19,6 +18,9 @@ from tiltsim.scenario.table import (
 
 MAX_STEPS: Final = 100_000_000
 """Largest number of physics steps of a flight, more than a day at one millisecond."""
+
+DEFAULT_ROTOR_SPEED: Final = 300.0
+"""rad/s, of the thesis's flights at time zero."""
 
 MAX_LATENCY_STEPS: Final = 20
 """Largest number of delayed control samples; each takes eight states of the simulation."""
@@ -141,13 +143,15 @@ class InitialTable(Table):
     angular_velocity: Vector3 = Field(
         (0.0, 0.0, 0.0), description="p, q, r about the body axes [rad/s]", examples=[[0, 0, 0.5]]
     )
-    rotor_speed: Positive | Positive4 | Positive2 = Field(
-        300.0,
-        description="absolute value, one for all rotors or one per rotor; rotors 1 and 3 turn "
-        "clockwise seen from above, 2 and 4 counterclockwise [rad/s]",
+    rotor_speed: Positive | PositiveEach | None = Field(
+        None,
+        description="absolute value, one for all rotors or one per rotor; rotors 1 and 3 of "
+        "tiltrotor and quadrotor turn clockwise seen from above, 2 and 4 counterclockwise; "
+        "default: 300, and of a multirotor those of hover at its initial tilts [rad/s]",
+        examples=[300.0],
     )
 
     def rotor_speeds(self, rotors: int) -> tuple[float, ...]:
-        """Absolute rotor speeds (rad/s), one for each of a number of rotors."""
-        speed = self.rotor_speed
+        """Absolute rotor speeds (rad/s), one for each of a number of rotors; by default 300."""
+        speed = DEFAULT_ROTOR_SPEED if self.rotor_speed is None else self.rotor_speed
         return speed if isinstance(speed, tuple) else (speed,) * rotors

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from tiltsim.models.parts import Ground
+from tiltsim.models.vehicle_parts import MAX_ROTORS
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import Angle, Coordinate, NonNegative, Positive, Table, Vector3, example
 
@@ -80,7 +81,12 @@ class SensorTable(Table):
 
 Rotor = Annotated[
     int,
-    Field(ge=1, le=4, description="1 on +x of the body, 2 on +y, 3 on -x, 4 on -y", examples=[2]),
+    Field(
+        ge=1,
+        le=MAX_ROTORS,
+        description="1 on +x of the body, 2 on +y, 3 on -x, 4 on -y; of a multirotor rotor_i",
+        examples=[2],
+    ),
 ]
 FaultTime = Annotated[NonNegative, Field(description="when it fails [s]", examples=[10.0])]
 

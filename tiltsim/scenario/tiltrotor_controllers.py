@@ -29,7 +29,8 @@ from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
-def _attitude_altitude_gain_kind(value: object) -> str:
+def attitude_altitude_gain_kind(value: object) -> str:
+    """The tag of gains that may also be given by poles."""
     if isinstance(value, PolePlacementTable):
         return "poles"
     loops = value.values() if isinstance(value, dict) else ()
@@ -101,6 +102,18 @@ class PolePlacementTable(Table):
         )
 
 
+def resolved_gains(gains: str | GainTable | PolePlacementTable) -> Gains:
+    """Gains from the name of a set, or a table."""
+    if isinstance(gains, GainTable):
+        return gains_from_rows(gains.attitude, gains.altitude, gains.position)
+    return gains.resolve()[0] if isinstance(gains, PolePlacementTable) else GAIN_SETS[gains]
+
+
+def resolved_integral_gains(gains: str | GainTable | PolePlacementTable) -> IntegralGains:
+    """Gains on the integrals, zero unless given by poles."""
+    return gains.resolve()[1] if isinstance(gains, PolePlacementTable) else IntegralGains()
+
+
 FeedforwardTerm = Literal[
     "gait_rates",
     "attitude_rates",
@@ -143,7 +156,7 @@ class AttitudeAltitudeController(ControllerTable):
         Annotated[Literal["ch03", "ch04", "exact", "feedforward"], Tag("named")]
         | Annotated[GainTable, Tag("table")]
         | Annotated[PolePlacementTable, Tag("poles")],
-        Discriminator(_attitude_altitude_gain_kind),
+        Discriminator(attitude_altitude_gain_kind),
     ] = Field(
         "ch04",
         description="a named set, or a table of gains or of poles: ch03 and ch04 are the thesis's, "
@@ -214,17 +227,11 @@ class AttitudeAltitudeController(ControllerTable):
         return self
 
     def resolve_gains(self) -> Gains:
-        if isinstance(self.gains, GainTable):
-            return gains_from_rows(self.gains.attitude, self.gains.altitude, self.gains.position)
-        if isinstance(self.gains, PolePlacementTable):
-            return self.gains.resolve()[0]
-        return GAIN_SETS[self.gains]
+        return resolved_gains(self.gains)
 
     def resolve_integral_gains(self) -> IntegralGains:
         """The gains on the integrals, zero unless given by poles."""
-        if isinstance(self.gains, PolePlacementTable):
-            return self.gains.resolve()[1]
-        return IntegralGains()
+        return resolved_integral_gains(self.gains)
 
     def resolve_supervisor(self, vehicle: Vehicle) -> Supervisor:
         """The supervisor's parameters for a vehicle, thresholds of zero without one."""
@@ -238,7 +245,8 @@ class AttitudeAltitudeController(ControllerTable):
     def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
         if self.gait_rate_feedforward:
             return feedforward_loops(self.resolve_gains(), self.resolve_integral_gains())
-        return error_loops(self.resolve_gains(), vehicle, DECOUPLINGS[self.decoupling])
+        speed = vehicle.hover_rotor_speed
+        return error_loops(self.resolve_gains(), speed, DECOUPLINGS[self.decoupling])
 
     @property
     def loop_name(self) -> str:

@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.rotorcraft import RotorcraftTable
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.simulation_table import SimulationTable
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
@@ -72,7 +73,7 @@ def _check_servo(scenario: ScenarioTables) -> None:
 def _check_rotors(scenario: ScenarioTables) -> None:
     """Refuse a lag of the rotors that is too short for the integrator."""
     vehicle, simulation = scenario.vehicle, scenario.simulation
-    if not isinstance(vehicle, VehicleTable) or vehicle.rotor_time_constant is None:
+    if not isinstance(vehicle, RotorcraftTable) or vehicle.rotor_time_constant is None:
         return
     longest = _largest_rotor_step(simulation) * vehicle.rotor_time_constant
     if simulation.timestep > longest:
@@ -81,8 +82,9 @@ def _check_rotors(scenario: ScenarioTables) -> None:
             f"too long for vehicle.rotor_time_constant = {vehicle.rotor_time_constant:g}; at most "
             f"{longest:.3g} s",
         )
-    if isinstance(scenario.controller, AttitudeAltitudeController):
-        _check_measured_reaction(scenario, vehicle, scenario.controller)
+    controller = scenario.controller
+    if isinstance(controller, AttitudeAltitudeController) and isinstance(vehicle, VehicleTable):
+        _check_measured_reaction(scenario, vehicle, controller)
 
 
 def _largest_rotor_step(simulation: SimulationTable) -> float:

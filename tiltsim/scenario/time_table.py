@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Final, Self
 
@@ -18,7 +18,14 @@ from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Values
 
 REFERENCE_COLUMNS: Final = ("time", "x", "y", "z")
-GAIT_COLUMNS: Final = ("time", "alpha_1", "alpha_2", "alpha_3", "alpha_4")
+
+
+def gait_columns(tilts: int) -> tuple[str, ...]:
+    """The columns of a gait of so many tilt angles."""
+    return ("time", *(f"alpha_{i}" for i in range(1, tilts + 1)))
+
+
+GAIT_COLUMNS: Final = gait_columns(4)
 
 SHORTEST_STEP: Final = 1e-4
 """Seconds between the rows of any table."""
@@ -32,7 +39,7 @@ Rows = tuple[Values, ...]
 class TimeTable(Table):
     """A table over time, from a file or in the scenario itself."""
 
-    columns: ClassVar[tuple[str, ...]]
+    columns: ClassVar[tuple[str, ...]]  # see `columns_among`
     largest: ClassVar[float]  # magnitude of a value
 
     file: str | None = Field(None)
@@ -42,6 +49,16 @@ class TimeTable(Table):
     def table(self) -> Rows:
         """The rows: a time (s) and the values of the other columns."""
         return self._rows
+
+    @classmethod
+    def columns_among(cls, names: Sequence[str]) -> tuple[str, ...]:
+        """The columns that a table with columns of these names has to have."""
+        return cls.columns
+
+    @classmethod
+    def _columns_of_width(cls, width: int) -> tuple[str, ...]:
+        """The columns of rows with so many numbers."""
+        return cls.columns
 
     def in_file(self, name: str) -> Self:
         """The same, to be read from a file of that name."""
@@ -53,7 +70,10 @@ class TimeTable(Table):
 
     def csv(self) -> bytes:
         """The table as a CSV file, with all its digits."""
-        lines = [self.columns, *(map(repr, row) for row in self._rows)]
+        lines = [
+            self._columns_of_width(len(self._rows[0])),
+            *(map(repr, row) for row in self._rows),
+        ]
         return "".join(f"{','.join(line)}\n" for line in lines).encode()
 
     @model_validator(mode="after")
@@ -62,8 +82,9 @@ class TimeTable(Table):
         if (self.file is None) == (given is None):
             raise self.mistake("file", "give one of file and rows")
         try:
-            rows = _read_rows(Path(self.file), self.columns) if self.file is not None else given
-            self._rows = _checked(rows or (), self.columns, self.largest)
+            rows = _read_rows(Path(self.file), self.columns_among) if self.file else given or ()
+            columns = self._columns_of_width(len(rows[0]) if rows else 0)
+            self._rows = _checked(rows, columns, self.largest)
         except InputError as error:
             key, reason = "rows" if self.file is None else "file", str(error)
             raise self.mistake(key, reason.removeprefix(f"{self.file}: ")) from None
@@ -81,18 +102,22 @@ def rows_of_columns(table: Any, columns: Sequence[str]) -> list[Values]:
         raise InputError(f"columns must be numbers, all of one length: {error}") from None
 
 
-def _read_rows(file: Path, columns: Sequence[str]) -> list[Values]:
+ColumnsAmong = Callable[[Sequence[str]], Sequence[str]]
+
+
+def _read_rows(file: Path, columns_among: ColumnsAmong) -> list[Values]:
     """Rows of a CSV or Parquet file."""
     if "\0" in str(file):
         raise InputError("a file name has no NUL")
     if file.exists() and not file.is_file():
         raise InputError("not a file")
     if file.suffix.lower() == ".parquet":
-        return _read_parquet(file, columns)
+        return _read_parquet(file, columns_among)
     if file.suffix.lower() != ".csv":
         raise InputError("must end with .csv or .parquet")
     head, *lines = [row for row in csv.reader(read_text(file).splitlines()) if row] or [[]]
     head = [name.strip() for name in head]
+    columns = columns_among(head)
     _check_names(head, columns)
     places = [head.index(name) for name in columns]
     rows = []
@@ -103,10 +128,11 @@ def _read_rows(file: Path, columns: Sequence[str]) -> list[Values]:
     return rows
 
 
-def _read_parquet(file: Path, columns: Sequence[str]) -> list[Values]:
+def _read_parquet(file: Path, columns_among: ColumnsAmong) -> list[Values]:
     if file.is_file() and file.stat().st_size > MAX_FILE_SIZE:
         raise InputError(f"{file.stat().st_size} bytes; at most {MAX_FILE_SIZE}")
     with open_parquet(file) as opened:
+        columns = columns_among(opened.schema_arrow.names)
         _check_names(opened.schema_arrow.names, columns)
         if opened.metadata.num_rows > MAX_ROWS:
             raise InputError(_too_many(opened.metadata.num_rows))
@@ -147,6 +173,8 @@ def _checked(rows: Sequence[Values], columns: Sequence[str], largest: float) -> 
     before = -SHORTEST_STEP
     for number, (time, *values) in enumerate(rows, start=1):
         where = f"row {number}, column"
+        if len(values) != len(columns) - 1:
+            raise InputError(f"row {number}: {1 + len(values)} values in {len(columns)} columns")
         if number == 1 and time != 0.0:
             raise InputError(f"{where} time = {time!r}: must be 0")
         if not before + SHORTEST_STEP <= time <= 1e9:

@@ -2,63 +2,30 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from math import inf, pi, sqrt
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self
+from math import pi, sqrt
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from tiltsim.models.parts import SERVO_ARMATURE, Pod, TiltServo
+from tiltsim.models.parts import SERVO_ARMATURE, Pod
 from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.rotorcraft import (
+    AnyVehicleTable,
+    MultirotorTable,
+    RotorcraftTable,
+    ServoTable,
+)
 from tiltsim.scenario.table import NonNegative, NotTiny, Positive, Table, example
-from tiltsim_controllers.mathematics.scalar import Quad
+from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, TiltCar
-from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle
+from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
 
 if TYPE_CHECKING:
-    from tiltsim.models.user_vehicle import UserVehicle
+    pass
 
 
 MOMENTS: Final = ("inertia_xx", "inertia_yy", "inertia_zz")
 """The principal moments among the fields of `Vehicle`."""
-
-
-class ServoTable(Table):
-    """A position servo of second order, ideal except for the given keys."""
-
-    model_config = example(natural_frequency=30.0)
-
-    natural_frequency: Positive = Field(
-        TiltServo.natural_frequency, description="bandwidth of the servo [rad/s]", examples=[30.0]
-    )
-    damping_ratio: Positive = Field(
-        TiltServo.damping_ratio, description="1 is critically damped [-]"
-    )
-
-    @property
-    def angle_limit(self) -> float | None:
-        """Largest tilt angle either way, rad; None without mechanical stops."""
-        return None
-
-
-class TiltServoTable(ServoTable):
-    """The servos that tilt the pods."""
-
-    model_config = example(natural_frequency=30.0, max_rate=2.0)
-
-    max_rate: Positive | None = Field(
-        None, description="largest tilt rate; default: unlimited [rad/s]", examples=[2.0]
-    )
-    max_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
-        None,
-        description="mechanical stop to either side, within which the gait must stay; default: "
-        "none [rad]",
-        examples=[1.0],
-    )
-
-    @property
-    def angle_limit(self) -> float | None:
-        return self.max_angle
 
 
 class PodTable(Table):
@@ -91,31 +58,10 @@ def require_physical_inertia(key: str, value: object, moments: tuple[float, ...]
         )
 
 
-class AnyVehicleTable(Table, ABC):
-    """What every vehicle has."""
-
-    table_name = "vehicle"
-    rotor_count: ClassVar[int]
-    is_planar: ClassVar[bool] = False  # moves on a plane, without gravity, air or ground
-
-    model: str
-
-    @property
-    def has_tilting_rotors(self) -> bool:
-        """Whether servos tilt the rotors."""
-        return self.model != "quadrotor"
-
-    @abstractmethod
-    def resolve(self) -> Vehicle | TiltCar:
-        """The physical parameters."""
-
-
-class VehicleTable(AnyVehicleTable):
-    """A rotorcraft: a preset, and the parameters that differ from it."""
+class VehicleTable(RotorcraftTable):
+    """Four rotors on a cross: a preset, and the parameters that differ from it."""
 
     model_config = example(model="tiltrotor", mass=0.5)
-
-    rotor_count = 4
 
     model: Literal["tiltrotor", "quadrotor"] = Field(
         "tiltrotor",
@@ -161,29 +107,11 @@ class VehicleTable(AnyVehicleTable):
     gravity: Positive | None = Field(
         None, description="default: the preset's [m/s^2]", examples=[9.81]
     )
-    min_rotor_speed: NonNegative | None = Field(
-        None,
-        description="smallest absolute value; at 0 a rotor may stop but not reverse; default: "
-        "unlimited [rad/s]",
-        examples=[200.0],
-    )
-    max_rotor_speed: Positive | None = Field(
-        None, description="largest absolute value; default: unlimited [rad/s]", examples=[390.0]
-    )
-    rotor_time_constant: Positive | None = Field(
-        None,
-        description="time constant of the lag between commanded and actual rotor speed; default: "
-        "no lag [s]",
-        examples=[0.04],
-    )
     rotor_inertia: NonNegative = Field(
         0.0,
         description="spin inertia of one rotor about its axis: reaction to its acceleration and "
         "gyroscopic torque [kg m^2]",
         examples=[1e-5],
-    )
-    tilt_servo: TiltServoTable = Field(
-        TiltServoTable(), description="the servos that tilt the rotors"
     )
     pod: PodTable = Field(PodTable(), description="mass properties of the tilting part of an arm")
 
@@ -194,40 +122,30 @@ class VehicleTable(AnyVehicleTable):
         if self.inertia is not None:
             known |= zip(MOMENTS, self.inertia, strict=True)
         user_vehicle = self.user_vehicle
-        base = PRESETS[self.preset] if user_vehicle is None else user_vehicle.vehicle
+        measured = None if user_vehicle is None else user_vehicle.vehicle
+        base = measured if isinstance(measured, Vehicle) else PRESETS[self.preset]
         return base._replace(**known)
 
     @property
-    def speeds_along_spin(self) -> tuple[float, float]:
-        """Lowest and highest speed (rad/s) of a rotor along its spin; infinite without limits."""
-        low, high = self.min_rotor_speed, self.max_rotor_speed
-        highest = inf if high is None else high
-        return -highest if low is None else low, highest
+    def rotor_count(self) -> int:
+        return 4
 
     @property
-    def hinge_inertias(self) -> Quad:
-        """Inertia (kg m^2) of servo and pod about each tilt hinge."""
+    def tilt_count(self) -> int:
+        return 4 if self.model == "tiltrotor" else 0
+
+    @property
+    def spins(self) -> Values:
+        return SPIN
+
+    def tilt_of_rotor(self, rotor: int) -> int:
+        return rotor - 1 if self.has_tilting_rotors else -1
+
+    @property
+    def hinge_inertias(self) -> Values:
         user_vehicle, shipped = self.user_vehicle, SERVO_ARMATURE + self.pod.inertia
         of_file = () if user_vehicle is None else user_vehicle.hinge_inertias
-        first, second, third, fourth = of_file or (shipped,) * 4
-        return first, second, third, fourth
-
-    @property
-    def has_rotor_limits(self) -> bool:
-        """Whether the rotor speeds are limited."""
-        return self.min_rotor_speed is not None or self.max_rotor_speed is not None
-
-    @property
-    def user_vehicle(self) -> UserVehicle | None:
-        """The user's MJCF file as measured; None for the shipped vehicles."""
-        if self.mjcf is None:
-            return None
-        from tiltsim.models.user_vehicle import read_user_vehicle
-
-        try:
-            return read_user_vehicle(self.mjcf, self.model)
-        except ValueError as error:
-            raise self.mistake("mjcf", str(error)) from None
+        return of_file or (shipped,) * 4
 
     @property
     def has_standard_layout(self) -> bool:
@@ -252,16 +170,13 @@ class VehicleTable(AnyVehicleTable):
         if 4.0 * self.rotor_inertia >= moments[2]:
             reason = f"must be below {moments[2] / 4.0:g}: vehicle.inertia includes the four rotors"
             raise self.mistake("rotor_inertia", reason)
-        low, high = self.min_rotor_speed, self.max_rotor_speed
-        if low is not None and high is not None and low >= high:
-            raise self.mistake("min_rotor_speed", f"must be below max_rotor_speed = {high}")
+        self._check_limits()
         return self
 
 
 class TiltCarTable(AnyVehicleTable):
     """The tilt-car of ch. 10; defaults: `tiltsim_controllers.tilt_car.vehicle.THESIS_CAR`."""
 
-    rotor_count = 2
     is_planar = True
 
     model: Literal["tilt_car"] = Field(
@@ -286,6 +201,14 @@ class TiltCarTable(AnyVehicleTable):
     )
     tilt_servo: ServoTable = Field(ServoTable(), description="the servo that turns the top disc")
 
+    @property
+    def rotor_count(self) -> int:
+        return 2
+
+    @property
+    def tilt_count(self) -> int:
+        return 1
+
     def resolve(self) -> TiltCar:
         return TiltCar(**self.model_dump(include={*TiltCar._fields}))
 
@@ -301,7 +224,9 @@ def _model(value: Any) -> str:
 
 
 VehicleUnion = Annotated[
-    Annotated[VehicleTable, Tag("tiltrotor")] | Annotated[TiltCarTable, Tag("tilt_car")],
+    Annotated[VehicleTable, Tag("tiltrotor")]
+    | Annotated[MultirotorTable, Tag("multirotor")]
+    | Annotated[TiltCarTable, Tag("tilt_car")],
     Discriminator(_model),
 ]
 """The ``[vehicle]`` table, discriminated by its model."""

@@ -21,6 +21,11 @@ class Quantity(NamedTuple):
         return f"{self.label} ({unit})" if unit not in {"", "1"} else self.label
 
 
+def subscript(number: int) -> str:
+    """A whole number, 0 or more, as a subscript."""
+    return "".join(SUBSCRIPTS[int(digit)] for digit in str(number))
+
+
 def in_words(name: str) -> str:
     """A name of code, such as ``gait.bias_angle``, in words."""
     return name.replace("_", " ").replace(".", " ").strip()

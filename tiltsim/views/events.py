@@ -14,7 +14,6 @@ from tiltsim.vehicles.saturation import at_lower_limit, at_upper_limit
 from tiltsim.views.attitude_plane import SUPERVISION_THRESHOLD, margin_threshold
 from tiltsim.views.titles import describe_controller, describe_gait
 from tiltsim_controllers.mathematics.scalar import Floats
-from tiltsim_controllers.vehicle.parameters import SPIN
 
 if TYPE_CHECKING:
     from tiltsim.closed_loop.assembly import Assembly
@@ -120,8 +119,8 @@ def rotorcraft_conditions(piece: Flight) -> Iterator[Condition]:
         inside = piece["attitude_zone"] > 0.5
         yield "switched to attitude-altitude control", time, inside
         yield "switched to yaw-position control", time, ~inside
-    vehicle = scenario.rotorcraft
-    for rotor, spin in enumerate(SPIN, start=1):
+    vehicle = scenario.any_rotorcraft
+    for rotor, spin in enumerate(vehicle.spins, start=1):
         speed = spin * piece[f"rotor_speed_{rotor}"]
         yield f"rotor {rotor} reversed", time, speed <= 0.0
         if vehicle.max_rotor_speed is not None:

@@ -63,6 +63,25 @@ class OtherLayoutViews(RotorcraftViews):
         return OTHER_LAYOUT_DISPLAY
 
 
+class MultirotorViews(RotorcraftViews):
+    """Views of a multirotor, whose singular attitudes need not be a curve."""
+
+    def panels(self) -> Mapping[str, Panel]:
+        from tiltsim.views.figures.rotorcraft import MULTIROTOR_PANELS
+
+        return MULTIROTOR_PANELS
+
+    def overlay(self, flight: Flight, height: int) -> Overlay:
+        from tiltsim.views.video.overlay import MarginOverlay
+
+        return MarginOverlay(flight, height)
+
+    def display(self) -> VehicleDisplay:
+        from tiltsim.views.rerun.rotorcraft_display import MULTIROTOR_DISPLAY
+
+        return MULTIROTOR_DISPLAY
+
+
 class TiltCarViews(VehicleViews):
     """Views of the tilt-car."""
 
@@ -82,6 +101,8 @@ class TiltCarViews(VehicleViews):
         return TILT_CAR_DISPLAY
 
 
+MULTIROTOR: Final = MultirotorViews()
+
 VIEWS: Final[dict[VehicleKind, VehicleViews]] = {
     ROTORCRAFT: RotorcraftViews(),
     OTHER_LAYOUT: OtherLayoutViews(),
@@ -90,5 +111,7 @@ VIEWS: Final[dict[VehicleKind, VehicleViews]] = {
 
 
 def views_of(assembly: Assembly) -> VehicleViews:
-    """The views of an assembly's kind of vehicle."""
+    """The views of an assembly's kind of vehicle; each layout of a multirotor is a kind."""
+    if assembly.scenario.vehicle.model == "multirotor":
+        return MULTIROTOR
     return VIEWS[assembly.loop.kind]

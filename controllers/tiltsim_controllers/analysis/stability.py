@@ -11,7 +11,6 @@ if TYPE_CHECKING:
 
     from tiltsim_controllers.laws.attitude_altitude import Gains
     from tiltsim_controllers.laws.gains import IntegralGains
-    from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
 class ErrorLoop(NamedTuple):
@@ -86,13 +85,13 @@ def linear_loop(name: str, gains: Sequence[float]) -> ErrorLoop:
     return ErrorLoop(name, polynomial, False, condition)
 
 
-def error_loops(gains: Gains, vehicle: Vehicle, decoupling: float) -> list[ErrorLoop]:
+def error_loops(gains: Gains, hover_rotor_speed: float, decoupling: float) -> list[ErrorLoop]:
     """The loops of the attitude-altitude controller with a form of the decoupling matrix.
 
     The published matrix lacks the factor ``2 |varpi|`` in its attitude rows, so that factor, taken
     at hover, is an additional gain of the attitude loops.
     """
-    factor = 2.0 * vehicle.hover_rotor_speed if decoupling == PUBLISHED_DECOUPLING else 1.0
+    factor = 2.0 * hover_rotor_speed if decoupling == PUBLISHED_DECOUPLING else 1.0
     third_order = [
         third_order_loop("roll", (gains.roll_1, gains.roll_2, gains.roll_3), factor),
         third_order_loop("pitch", (gains.pitch_1, gains.pitch_2, gains.pitch_3), factor),

@@ -37,15 +37,6 @@ class RotorFault(NamedTuple):
     stuck_angle: float = 0.0  # rad
 
 
-class Faults(NamedTuple):
-    """The faults of every rotor."""
-
-    rotor_1: RotorFault = RotorFault()
-    rotor_2: RotorFault = RotorFault()
-    rotor_3: RotorFault = RotorFault()
-    rotor_4: RotorFault = RotorFault()
-
-
 @scalar
 def thrust_factor(time: float, fault: RotorFault) -> float:
     """Remaining fraction of a rotor's thrust and drag torque at a time (s), 1 without a fault."""

@@ -43,7 +43,7 @@ def largest_real_part(polynomial):
 
 
 def loops(gain_set, decoupling, vehicle=AR_DRONE):
-    found = error_loops(GAIN_SETS[gain_set], vehicle, DECOUPLINGS[decoupling])
+    found = error_loops(GAIN_SETS[gain_set], vehicle.hover_rotor_speed, DECOUPLINGS[decoupling])
     return {loop.name: loop for loop in found}
 
 
@@ -155,7 +155,7 @@ def test_published_matrix_multiplies_the_attitude_loops_by_twice_the_hover_speed
 def test_position_gains_must_both_be_positive(position):
     velocity, place = position
     bad = GAIN_SETS["ch04"]._replace(position_1=velocity, position_2=place)
-    loop = error_loops(bad, AR_DRONE, DECOUPLINGS["published"])[-1]
+    loop = error_loops(bad, AR_DRONE.hover_rotor_speed, DECOUPLINGS["published"])[-1]
     assert not loop.stable
     assert loop.condition == f"position gains [{velocity}, {place}] must both be positive"
 

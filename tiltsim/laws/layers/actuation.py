@@ -1,4 +1,4 @@
-"""Real actuators and sensors around any controller of the tiltrotor.
+"""Real actuators and sensors around any controller that follows a gait.
 
 `with_actuation` puts a layer between controller and vehicle. Each control step goes
 
@@ -15,53 +15,35 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 from math import inf
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, get_type_hints
 
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.laws.layers.delay_line import (
-    COMMANDS,
-    EXTERNAL_COMMANDS,
-    delay_line,
-    first_eight,
-    held_line,
-    undelayed,
-)
+from tiltsim.laws.layers.delay_line import EXTERNAL_COMMANDS, delay_line, held_line, undelayed
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
 from tiltsim.laws.layers.sensing import measured_qpos, measured_qvel, sensor_parameters
-from tiltsim.laws.tiltrotor import four, rotor_thrust_controls, servo_lead
+from tiltsim.laws.tiltrotor import four, servo_lead
 from tiltsim.models.parts import ExtraActuators
+from tiltsim.models.vehicle_parts import CROSSES
 from tiltsim.vehicles.rotorcraft import initial_tilts
-from tiltsim.vehicles.rotorcraft.layout import (
-    ACCELERATION_1,
-    FURTHER_RATES,
-    QW,
-    QX,
-    QY,
-    QZ,
-    ROTOR_STATES,
-    TILT_1,
-)
-from tiltsim_controllers.gaits.tilts import tilt_reference
+from tiltsim.vehicles.rotorcraft.layout import QW, QX, QY, QZ, TILT_1, layout_of
 from tiltsim_controllers.laws.allocation import allocate_accelerations
+from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Values, Vector, clipped, scalar
+from tiltsim_controllers.mathematics.vectors import entries_of, tuple_text, written_out
 from tiltsim_controllers.vehicle.actuators import (
-    Faults,
     RotorFault,
     rate_limited_command,
     servo_command,
     thrust_factor,
 )
-from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle
 from tiltsim_controllers.vehicle.sensors import Sensors
-from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
-
-THRUST_FACTORS: Final = tuple(f"thrust_factor_{rotor}" for rotor in ROTORS)
 
 
 class Allocation(NamedTuple):
@@ -75,7 +57,7 @@ class Allocation(NamedTuple):
 
 
 class Actuation(NamedTuple):
-    """The parameters of the layer."""
+    """The parameters of the layer; `actuation_record` adds the faults of every rotor."""
 
     sensors: Sensors
     allocation: Allocation
@@ -84,7 +66,22 @@ class Actuation(NamedTuple):
     fastest: float
     rotor_pole: float  # 1/s, one over the rotors' time constant; 0 where they follow at once
     servo_reach: float  # rad, see `tiltsim_controllers.vehicle.actuators.rate_limited_command`
-    faults: Faults
+
+
+@cache
+def faults_record(rotors: int) -> Any:
+    """The type of the faults of so many rotors, ``rotor_1`` and so on.
+
+    The fault of a servo is among those of the rotor with its number.
+    """
+    return make_record_type("Faults", **{f"rotor_{i + 1}": RotorFault for i in range(rotors)})
+
+
+@cache
+def actuation_record(rotors: int) -> Any:
+    """The type of the layer's parameters for so many rotors."""
+    own = get_type_hints(Actuation)
+    return make_record_type("Actuation", **own, faults=faults_record(rotors))
 
 
 @scalar
@@ -113,52 +110,72 @@ def allocated_accelerations(
     )
 
 
-@scalar
-def _servo_controls(time: float, qpos: Vector, commands: Vector, actuation: Actuation) -> Quad:
-    """Set points (rad) of the four tilt servos."""
-    a1, a2, a3, a4 = four(qpos, TILT_1)
-    reach, faults = actuation.servo_reach, actuation.faults
-    return (
-        rate_limited_command(servo_command(time, commands[0], faults.rotor_1), a1, reach),
-        rate_limited_command(servo_command(time, commands[1], faults.rotor_2), a2, reach),
-        rate_limited_command(servo_command(time, commands[2], faults.rotor_3), a3, reach),
-        rate_limited_command(servo_command(time, commands[3], faults.rotor_4), a4, reach),
-    )
+class Actuators(NamedTuple):
+    """Scalar code of the actuators of a vehicle; ``actuation`` is the layer's parameters."""
+
+    servos: Callable[..., Values]  # (time, qpos, commands, actuation): their set points, rad
+    thrusts: Callable[..., Values]  # (time, act, faults): thrust controls, reduced by faults
+    motors: Callable[..., Values]
+    """``(act, commands, actuation)``: rotor accelerations (rad/s^2), as commanded or by the lag
+    behind the speed commands. Those are activations; the plant keeps them within the rotors' limits
+    at the end of each step, `clipped` at the stages of an integrator, too."""
 
 
-@scalar
-def thrust_controls(time: float, act: Vector, faults: Faults) -> Quad:
-    """Controls of the four thrust actuators, reduced by faults."""
-    thrust_1, thrust_2, thrust_3, thrust_4 = rotor_thrust_controls(act)
-    return (
-        thrust_1 * thrust_factor(time, faults.rotor_1),
-        thrust_2 * thrust_factor(time, faults.rotor_2),
-        thrust_3 * thrust_factor(time, faults.rotor_3),
-        thrust_4 * thrust_factor(time, faults.rotor_4),
-    )
+@cache
+def actuators_of(spins: Values, tilts: int, first: int) -> Actuators:
+    """The actuators of rotors with these spins, whose speed commands begin at ``first``.
 
-
-@scalar
-def _motor_controls(act: Vector, first: int, commands: Vector, actuation: Actuation) -> Quad:
-    """Rotor accelerations (rad/s^2): as commanded, or by the lag behind the speed commands.
-
-    The speed commands are activations from ``first`` on. The plant keeps them within the rotors'
-    limits at the end of each step, `clipped` at the stages of an integrator, too.
+    Commands are tilt angles (rad), then rotor accelerations (rad/s^2).
     """
-    pole, low, high = actuation.rotor_pole, actuation.slowest, actuation.fastest
-    if pole == 0.0:
-        return four(commands, 4)
-    return (
-        pole * (clipped(act[first], -high, -low) - act[0]),
-        pole * (clipped(act[first + 1], low, high) - act[1]),
-        pole * (clipped(act[first + 2], -high, -low) - act[2]),
-        pole * (clipped(act[first + 3], low, high) - act[3]),
+    senses = "".join("p" if spin > 0.0 else "m" for spin in spins)
+    signs, rotors = ["" if spin > 0.0 else "-" for spin in spins], range(len(spins))
+    stuck = "stuck(time, commands[{0}], actuation.faults.rotor_{1})"
+    servos = written_out(
+        f"servo_controls_{tilts}",
+        "time, qpos, commands, actuation",
+        tuple_text(
+            f"limited({stuck.format(j, j + 1)}, qpos[{TILT_1 + j}], actuation.servo_reach)"
+            for j in range(tilts)
+        ),
+        limited=rate_limited_command,
+        stuck=servo_command,
     )
+    thrusts = written_out(
+        f"faulty_thrusts_{senses}",
+        "time, act, faults",
+        tuple_text(
+            f"{signs[i]}act[{i}] * abs(act[{i}]) * factor(time, faults.rotor_{i + 1})"
+            for i in rotors
+        ),
+        factor=thrust_factor,
+    )
+    limits = ["low, high" if spin > 0.0 else "-high, -low" for spin in spins]
+    lagging: Callable[..., Values] = written_out(
+        f"lagging_rotors_{senses}_{first}",
+        "act, pole, low, high",
+        tuple_text(f"pole * (clipped(act[{first + i}], {limits[i]}) - act[{i}])" for i in rotors),
+        clipped=clipped,
+    )
+    accelerations = entries_of(tilts, len(spins))
+
+    @scalar
+    def motors(act: Vector, commands: Vector, actuation: Any) -> Values:
+        if actuation.rotor_pole == 0.0:
+            return accelerations(commands)
+        return lagging(act, actuation.rotor_pole, actuation.slowest, actuation.fastest)
+
+    return Actuators(servos, thrusts, motors)
+
+
+@scalar
+def _as_demanded(demanded: Values, qpos: Vector, act: Vector, allocation: Allocation) -> Values:
+    """For vehicles without allocation: each rotor stops at its own limit."""
+    return demanded
 
 
 @cache
 def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False) -> ClosedLoop:
-    """A loop around the tiltrotor with real sensors and actuators.
+    """A loop around a rotorcraft with real sensors and actuators.
 
     Args:
         loop: Without them.
@@ -167,17 +184,27 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
             the `EXTERNAL_COMMANDS` along the delay line: speeds jump, which no rate of activations
             can do.
     """
-    law_controls = loop.sampling.controls
-    law_act, law_ctrl = loop.dynamics.sizes.act, loop.dynamics.sizes.ctrl
-    under_way = (EXTERNAL_COMMANDS if external else COMMANDS) * latency_steps
-    line_ctrl = law_ctrl + ROTOR_STATES  # the delay line's controls
+    law_controls, dynamics = loop.sampling.controls, loop.dynamics
+    law_act, law_ctrl = dynamics.sizes.act, dynamics.sizes.ctrl
+    layout = layout_of(dynamics)
+    rotors, tilts = layout
+    size = rotors + tilts  # commands of a controller
+    under_way = (EXTERNAL_COMMANDS if external else size) * latency_steps
+    line_ctrl = law_ctrl + rotors  # the delay line's controls
     memory = line_ctrl + under_way  # the commands in force, last of the controls
     # The delay line follows the speed commands of the motors.
     delivered, line_rates = (
         (undelayed, held_line(under_way))
         if external
-        else delay_line(law_act + ROTOR_STATES, latency_steps)
+        else delay_line(law_act + rotors, latency_steps, size)
     )
+    servos, thrusts, motors = actuators_of(dynamics.spins, tilts, law_act)
+    allocated: Callable[..., Values] = (
+        allocated_accelerations if dynamics.model in CROSSES else _as_demanded
+    )
+    angles_in, demanded_in = entries_of(0, tilts), entries_of(layout.acceleration_1, rotors)
+    accelerations_in, commands_in = entries_of(tilts, rotors), entries_of(memory, size)
+    further = layout.further_rates
 
     @scalar
     def controls(
@@ -187,17 +214,15 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
         seen_qpos = measured_qpos(time, qpos, actuation.sensors)
         seen_qvel = measured_qvel(time, qvel, actuation.sensors)
         ctrl = law_controls(time, seen_qpos, seen_qvel, act, parameters.inner, knots)
-        u1, u2, u3, u4 = allocated_accelerations(
-            four(ctrl, ACCELERATION_1), seen_qpos, act, actuation.allocation
-        )
-        sent = (ctrl[0], ctrl[1], ctrl[2], ctrl[3], u1, u2, u3, u4)
+        demanded = allocated(demanded_in(ctrl), seen_qpos, act, actuation.allocation)
+        sent = (*angles_in(ctrl), *demanded)
         commands = delivered(act, sent)
         return (
-            *_servo_controls(time, qpos, commands, actuation),
-            *thrust_controls(time, act, actuation.faults),
-            *_motor_controls(act, law_act, commands, actuation),
-            *ctrl[FURTHER_RATES:],
-            *four(commands, 4),
+            *servos(time, qpos, commands, actuation),
+            *thrusts(time, act, actuation.faults),
+            *motors(act, commands, actuation),
+            *ctrl[further:],
+            *accelerations_in(commands),
             *line_rates(act, sent, actuation.control_timestep),
             *commands,
         )
@@ -207,33 +232,33 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
         time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: Any
     ) -> Values:
         actuation = parameters.layer
-        commands = first_eight(ctrl[memory:])
+        commands = commands_in(ctrl)
         return (
-            *_servo_controls(time, qpos, commands, actuation),
-            *thrust_controls(time, act, actuation.faults),
-            *_motor_controls(act, law_act, commands, actuation),
-            *ctrl[FURTHER_RATES:law_ctrl],
-            *four(commands, 4),
+            *servos(time, qpos, commands, actuation),
+            *thrusts(time, act, actuation.faults),
+            *motors(act, commands, actuation),
+            *ctrl[further:law_ctrl],
+            *accelerations_in(commands),
             *ctrl[line_ctrl:],
         )
 
     def initial_activations(plan: FlightPlan, _layer: Actuation, inner: Vector) -> Vector:
-        tilts, rotors = initial_tilts(plan)[0], (0.0, 0.0, 0.0, 0.0)
-        waiting = (*tilts, *rotors, 0.0) if external else (*tilts, *rotors)
-        return (*inner[:ROTOR_STATES], *waiting * latency_steps)
+        angles, at_rest = initial_tilts(plan)[0][:tilts], (0.0,) * rotors
+        waiting = (*angles, *at_rest, 0.0) if external else (*angles, *at_rest)
+        return (*inner[:rotors], *waiting * latency_steps)
 
     layer = Layer(
         f"with_actuation.{latency_steps}",
-        Actuation,
+        actuation_record(rotors),
         _actuation,
         controls=controls,
         hold=hold,
         actuators=ExtraActuators(
-            states=ROTOR_STATES + under_way, memories=COMMANDS, begins_with_rotor_speeds=True
+            states=rotors + under_way, memories=size, begins_with_rotor_speeds=True
         ),
         initial_activations=initial_activations,
         derive=_derive,
-        units=dict.fromkeys(THRUST_FACTORS, "1"),
+        units=dict.fromkeys(layout.names("thrust_factor"), "1"),
     )
     return wrap_loop(loop, layer)
 
@@ -242,48 +267,54 @@ def _derive(
     inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
 ) -> dict[str, Floats]:
     time = samples["time"].tolist()
-    faults = zip(THRUST_FACTORS, setup.parameters.layer.faults, strict=True)
+    faults = enumerate(setup.parameters.layer.faults, start=1)
     return {
         **inner(),
-        **{name: np.array([thrust_factor(t, fault) for t in time]) for name, fault in faults},
+        **{
+            f"thrust_factor_{i}": np.array([thrust_factor(t, fault) for t in time])
+            for i, fault in faults
+        },
     }
 
 
-def _actuation(plan: FlightPlan) -> Actuation:
+def _actuation(plan: FlightPlan) -> Any:
     scenario = plan.scenario
-    vehicle, simulation, controller = scenario.rotorcraft, scenario.simulation, scenario.controller
+    simulation, controller = scenario.simulation, scenario.controller
+    vehicle, assumed = scenario.any_rotorcraft, scenario.vehicle.resolve()
     low, high = vehicle.min_rotor_speed, vehicle.max_rotor_speed
     slowest, fastest = vehicle.speeds_along_spin
     max_rate, time_constant = vehicle.tilt_servo.max_rate, vehicle.rotor_time_constant
-    return Actuation(
+    return actuation_record(vehicle.rotor_count)(
         sensors=sensor_parameters(scenario),
         allocation=Allocation(
             active=float(controller.prioritizes_attitude),
             horizon=controller.allocation_window,
             min_speed=low or 0.0,
             max_speed=inf if high is None else high,
-            vehicle=vehicle.resolve(),
+            # A multirotor's rotors are not allocated.
+            vehicle=assumed if isinstance(assumed, Vehicle) else PRESETS["ar_drone_2"],
         ),
         control_timestep=simulation.control_timestep,
         slowest=slowest,
         fastest=fastest,
         rotor_pole=0.0 if time_constant is None else 1.0 / time_constant,
         servo_reach=inf if max_rate is None else servo_lead(vehicle.tilt_servo) * max_rate,
-        faults=_faults(plan),
+        faults=faults_record(vehicle.rotor_count)(*_faults(plan)),
     )
 
 
-def _faults(plan: FlightPlan) -> Faults:
-    faults = [RotorFault()] * ROTOR_STATES
-    gait = plan.gait
+def _faults(plan: FlightPlan) -> tuple[RotorFault, ...]:
+    """Those of the rotors; a servo's are among those of the rotor with its number."""
+    vehicle, gait = plan.scenario.any_rotorcraft, plan.gait
+    faults = [RotorFault()] * vehicle.rotor_count
     for table in plan.scenario.fault:
-        fault = faults[table.rotor - 1]
         if table.type == "stuck_servo":
-            planned = tilt_reference(table.time, gait.parameters, gait.knots)[table.rotor - 1]
+            tilt = vehicle.tilt_of_rotor(table.rotor)
+            planned = float(gait.angles(table.time)[tilt])
             angle = planned if table.angle is None else table.angle
-            fault = fault._replace(stuck_time=table.time, stuck_angle=angle)
+            faults[tilt] = faults[tilt]._replace(stuck_time=table.time, stuck_angle=angle)
         else:
             factor = 0.0 if table.type == "rotor_loss" else table.factor
-            fault = fault._replace(thrust_time=table.time, thrust_factor=factor)
-        faults[table.rotor - 1] = fault
-    return Faults(*faults)
+            index = table.rotor - 1
+            faults[index] = faults[index]._replace(thrust_time=table.time, thrust_factor=factor)
+    return tuple(faults)

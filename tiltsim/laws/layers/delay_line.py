@@ -6,20 +6,12 @@ from collections.abc import Callable
 from functools import cache
 from typing import Final
 
-from tiltsim.laws.tiltrotor import four
 from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
-
-COMMANDS: Final = 8
-"""Commands of a controller: four tilt angles (rad), four rotor accelerations (rad/s^2)."""
+from tiltsim_controllers.mathematics.vectors import componentwise, entries_of
 
 EXTERNAL_COMMANDS: Final = 9
-"""Commands from outside: the last says whether the rotors' are speeds (rad/s), taken at once."""
-
-
-@scalar
-def first_eight(values: Vector) -> Values:
-    """The first eight values."""
-    return (*four(values, 0), *four(values, 4))
+"""Commands from outside: four tilt angles (rad), four of the rotors, and whether these are speeds
+(rad/s), taken at once."""
 
 
 @scalar
@@ -41,35 +33,29 @@ def held_line(size: int) -> Callable[..., Values]:
 
 
 @cache
-def delay_line(first: int, steps: int) -> tuple[Callable[..., Values], Callable[..., Values]]:
+def delay_line(
+    first: int, steps: int, commands: int
+) -> tuple[Callable[..., Values], Callable[..., Values]]:
     """Scalar code of a line of activations that passes commands on by one place per control step.
 
-    The newest commands are at ``first``, the oldest ``8 (steps - 1)`` after them. Returns
+    The newest of so many commands are at ``first``, the oldest last of them all. Returns
     ``delivered(act, sent)``, the commands that arrive, and ``rates(act, sent, control_timestep)``,
     by which each place holds its neighbour's commands at the next control step.
     """
     if steps == 0:
         return undelayed, held_line(0)
-    oldest = first + COMMANDS * (steps - 1)
-    _, older_rates = delay_line(first + COMMANDS, steps - 1)
+    arriving = entries_of(first + commands * (steps - 1), commands)
+    newest = entries_of(first, commands)
+    moved = componentwise("moved", "sent, here, timestep", "(sent# - here#) / timestep", commands)
+    _, older_rates = delay_line(first + commands, steps - 1, commands)
 
     @scalar
     def delivered(act: Vector, sent: Values) -> Values:
-        return first_eight(act[oldest:])
+        return arriving(act)
 
     @scalar
     def rates(act: Vector, sent: Values, control_timestep: float) -> Values:
-        here = first_eight(act[first:])
-        return (
-            (sent[0] - here[0]) / control_timestep,
-            (sent[1] - here[1]) / control_timestep,
-            (sent[2] - here[2]) / control_timestep,
-            (sent[3] - here[3]) / control_timestep,
-            (sent[4] - here[4]) / control_timestep,
-            (sent[5] - here[5]) / control_timestep,
-            (sent[6] - here[6]) / control_timestep,
-            (sent[7] - here[7]) / control_timestep,
-            *older_rates(act, here, control_timestep),
-        )
+        here = newest(act)
+        return (*moved(sent, here, control_timestep), *older_rates(act, here, control_timestep))
 
     return delivered, rates

@@ -1,4 +1,4 @@
-"""The sensors of a tiltrotor, between its state and its controller."""
+"""The sensors of a rotorcraft, between its state and its controller."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ DEFAULT_SAMPLE_TIME: Final = 0.01
 
 @scalar
 def measured_qpos(time: float, qpos: Vector, sensors: Sensors) -> Values:
-    """The tiltrotor's ``qpos`` as its sensors read them; tilts are exact."""
-    x, y, z, qw, qx, qy, qz, alpha_1, alpha_2, alpha_3, alpha_4 = qpos
+    """The vehicle's ``qpos`` as its sensors read them; tilts are exact."""
+    x, y, z, qw, qx, qy, qz = qpos[:7]
     if sensors.active == 0.0:
-        return x, y, z, qw, qx, qy, qz, alpha_1, alpha_2, alpha_3, alpha_4
+        return (x, y, z, qw, qx, qy, qz, *qpos[7:])
     index = reading_index(time, sensors.period)
     ex, ey, ez = reading_error(sensors.position, sensors.seed, 0.0, index)
     roll, pitch, yaw = reading_error(sensors.attitude, sensors.seed, 6.0, index)
     qw, qx, qy, qz = rotate_by_small_angle(qw, qx, qy, qz, roll, pitch, yaw)
-    return x + ex, y + ey, z + ez, qw, qx, qy, qz, alpha_1, alpha_2, alpha_3, alpha_4
+    return (x + ex, y + ey, z + ez, qw, qx, qy, qz, *qpos[7:])
 
 
 @scalar
 def measured_qvel(time: float, qvel: Vector, sensors: Sensors) -> Values:
-    """The tiltrotor's ``qvel`` as its sensors read them.
+    """The vehicle's ``qvel`` as its sensors read them.
 
     Tilt rates are exact, and so is an angular acceleration that follows them.
     """

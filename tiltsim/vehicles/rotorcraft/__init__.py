@@ -1,9 +1,9 @@
-"""Tiltrotor and quadrotor: a free body with four rotors, tilted or not."""
+"""Rotorcraft: a free body with any number of rotors, tilted or not."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from functools import cache
 from math import inf
 from typing import TYPE_CHECKING, Final
 
@@ -23,83 +23,91 @@ from tiltsim.closed_loop.limits import (
 )
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.parts import RotorLimits
-from tiltsim.system.quantity import SUBSCRIPTS, Quantity
-from tiltsim.vehicles.rotorcraft.layout import OBSERVED_FIELDS
+from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.vehicle import VehicleTable
+from tiltsim.system.quantity import Quantity, subscript
+from tiltsim.vehicles.rotorcraft.hover import hover_speeds
+from tiltsim.vehicles.rotorcraft.layout import CROSS, Layout
 from tiltsim.vehicles.rotorcraft.metrics import rotorcraft_metrics
-from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
-from tiltsim_controllers.mathematics.scalar import Floats, Quad, Vector, clipped, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, clipped, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters
-from tiltsim_controllers.vehicle.parameters import SPIN
-from tiltsim_controllers.vehicle.states import ROTORS, SPEED_1, P
+from tiltsim_controllers.vehicle.states import P
 
 if TYPE_CHECKING:
     import mujoco
 
     from tiltsim.models.parts import ExtraActuators
     from tiltsim.scenario.scenario import FlightPlan, Scenario
-    from tiltsim.scenario.vehicle import VehicleTable
-
-COLUMNS: Final = {
-    "time": Quantity("time", "s"),
-    **{axis: Quantity(axis, "m") for axis in "xyz"},
-    **{f"v{axis}": Quantity(f"velocity along {axis}", "m/s") for axis in "xyz"},
-    **{angle: Quantity(angle, "rad") for angle in ("roll", "pitch", "yaw")},
-    **{
-        name: Quantity(f"body rate {name} about {axis}", "rad/s")
-        for name, axis in zip("pqr", "xyz", strict=True)
-    },
-    **{f"alpha_{i}": Quantity(f"tilt angle α{SUBSCRIPTS[i]}", "rad") for i in ROTORS},
-    **{f"alpha_ref_{i}": Quantity(f"planned tilt angle α{SUBSCRIPTS[i]}", "rad") for i in ROTORS},
-    **{
-        f"alpha_rate_{i}": Quantity(f"rate of tilt angle α{SUBSCRIPTS[i]}", "rad/s") for i in ROTORS
-    },
-    **{f"rotor_speed_{i}": Quantity(f"speed of rotor {i}", "rad/s") for i in ROTORS},
-    **{f"thrust_{i}": Quantity(f"thrust of rotor {i}", "N") for i in ROTORS},
-    **{f"{axis}_ref": Quantity(f"reference {axis}", "m") for axis in "xyz"},
-    **{f"{angle}_ref": Quantity(f"reference {angle}", "rad") for angle in ("roll", "pitch", "yaw")},
-    "singularity_margin": Quantity("singularity margin", "rad"),
-    "determinant": Quantity("determinant n · r₃", "1"),
-}
 
 
-@scalar
-def rotorcraft_limit_exceeded(
-    time: float,
-    values: Vector,
-    reference: ReferenceParameters,
-    knots: Vector,
-    follows_position: float,
-) -> int:
-    """The code of the first limit that a sample of a rotorcraft exceeds, `WITHIN_LIMITS` if none.
+def rotorcraft_columns(layout: Layout) -> dict[str, Quantity]:
+    """The columns of every flight, their labels and units, in the order of the file."""
+    tilts, rotors = range(1, layout.tilts + 1), range(1, layout.rotors + 1)
+    angles = ("roll", "pitch", "yaw")
+    return {
+        "time": Quantity("time", "s"),
+        **{axis: Quantity(axis, "m") for axis in "xyz"},
+        **{f"v{axis}": Quantity(f"velocity along {axis}", "m/s") for axis in "xyz"},
+        **{angle: Quantity(angle, "rad") for angle in angles},
+        **{
+            name: Quantity(f"body rate {name} about {axis}", "rad/s")
+            for name, axis in zip("pqr", "xyz", strict=True)
+        },
+        **{f"alpha_{i}": Quantity(f"tilt angle α{subscript(i)}", "rad") for i in tilts},
+        **{f"alpha_ref_{i}": Quantity(f"planned tilt angle α{subscript(i)}", "rad") for i in tilts},
+        **{
+            f"alpha_rate_{i}": Quantity(f"rate of tilt angle α{subscript(i)}", "rad/s")
+            for i in tilts
+        },
+        **{f"rotor_speed_{i}": Quantity(f"speed of rotor {i}", "rad/s") for i in rotors},
+        **{f"thrust_{i}": Quantity(f"thrust of rotor {i}", "N") for i in rotors},
+        **{f"{axis}_ref": Quantity(f"reference {axis}", "m") for axis in "xyz"},
+        **{f"{angle}_ref": Quantity(f"reference {angle}", "rad") for angle in angles},
+    }
 
-    ``values`` begin as `OBSERVED_FIELDS`; ``follows_position`` is 0
-    where the horizontal position is free.
-    """
-    away = follows_position * horizontal_error(time, values, reference, knots)
-    if away > MAX_POSITION_ERROR:
-        return HORIZONTAL_ERROR
-    if altitude_error(time, values, reference, knots) > MAX_POSITION_ERROR:
-        return ALTITUDE_ERROR
-    for axis in range(3):
-        if abs(values[P + axis]) > MAX_BODY_RATE:
-            return BODY_RATE + axis
-    for rotor in range(4):
-        if abs(values[SPEED_1 + rotor]) > MAX_ROTOR_SPEED:
-            return ROTOR_SPEED + rotor
-    return WITHIN_LIMITS
+
+@cache
+def limit_exceeded_of(layout: Layout) -> Callable[..., int]:
+    """Scalar code of the first limit that a sample exceeds; see `VehicleKind.limit_exceeded`."""
+    first, rotors = layout.speed_1, layout.rotors
+
+    @scalar
+    def limit_exceeded(
+        time: float,
+        values: Vector,
+        reference: ReferenceParameters,
+        knots: Vector,
+        follows_position: float,
+    ) -> int:
+        away = follows_position * horizontal_error(time, values, reference, knots)
+        if away > MAX_POSITION_ERROR:
+            return HORIZONTAL_ERROR
+        if altitude_error(time, values, reference, knots) > MAX_POSITION_ERROR:
+            return ALTITUDE_ERROR
+        for axis in range(3):
+            if abs(values[P + axis]) > MAX_BODY_RATE:
+                return BODY_RATE + axis
+        for rotor in range(rotors):
+            if abs(values[first + rotor]) > MAX_ROTOR_SPEED:
+                return ROTOR_SPEED + rotor
+        return WITHIN_LIMITS
+
+    return limit_exceeded
 
 
 def rotor_thrusts(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str, Floats]:
-    """Thrusts (N) of the four rotors, negative where one turns against its spin."""
-    coefficient = scenario.true_rotorcraft.thrust_coefficient
+    """Thrusts (N) of the rotors, negative where one turns against its spin."""
+    vehicle = scenario.any_rotorcraft
+    coefficients = scenario.true_thrust_coefficients
+    rotors = enumerate(zip(coefficients, vehicle.spins, strict=True), start=1)
     return {
         f"thrust_{i}": coefficient
         * sign
         * columns[f"rotor_speed_{i}"]
         * np.abs(columns[f"rotor_speed_{i}"])
         * columns.get(f"thrust_factor_{i}", 1.0)  # of a fault
-        for i, sign in zip(ROTORS, SPIN, strict=True)
+        for i, (coefficient, sign) in rotors
     }
 
 
@@ -115,7 +123,7 @@ def _thrust_factors(scenario: Scenario) -> tuple[float, float]:
 
 def rotor_limits(scenario: Scenario) -> RotorLimits:
     """The limits of a rotorcraft's speeds and thrusts."""
-    vehicle = scenario.rotorcraft
+    vehicle = scenario.any_rotorcraft
     speeds = vehicle.min_rotor_speed, vehicle.max_rotor_speed
     return RotorLimits(*speeds, _thrust_factors(scenario))
 
@@ -130,16 +138,16 @@ def _compile(
     from tiltsim.models.parts import Ground, Pod, TiltServo
     from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 
-    vehicle: VehicleTable = scenario.rotorcraft
+    vehicle = scenario.any_rotorcraft
     simulation, ground = scenario.simulation, scenario.ground
     spec = RotorcraftSpec(
         vehicle.model,
-        scenario.true_rotorcraft,
+        scenario.true_vehicle,
         timestep=simulation.timestep,
         integrator=simulation.integrator,
         userdata_size=userdata_size,
         tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump(exclude={"max_rate"})),
-        pod=Pod(**vehicle.pod.model_dump()),
+        pod=Pod(**vehicle.pod.model_dump()) if isinstance(vehicle, VehicleTable) else Pod(),
         rotor_limits=rotor_limits(scenario),
         law_states=law_states,
         extra_actuators=extra_actuators,
@@ -149,22 +157,30 @@ def _compile(
     return compile_model(spec, visuals=visuals)
 
 
-def initial_tilts(plan: FlightPlan) -> tuple[Quad, Quad]:
-    """Tilt angles (rad) and tilt rates (rad/s) of a tiltrotor at time zero: its gait's.
+def initial_tilts(plan: FlightPlan) -> tuple[Values, Values]:
+    """Tilt angles (rad) and tilt rates (rad/s) at time zero: the gait's.
 
     A flight begins in the midst of its gait, as the thesis has it, whose angles follow the plan
     exactly. So nothing swings in, and no pod is faster than its servo can be.
     """
-    gait = plan.gait
-    a1, a2, a3, a4, *planned = tilt_reference(0.0, gait.parameters, gait.knots)
-    fastest = plan.scenario.rotorcraft.tilt_servo.max_rate or inf
-    rate_1, rate_2, rate_3, rate_4 = (clipped(rate, -fastest, fastest) for rate in planned)
-    return (a1, a2, a3, a4), (rate_1, rate_2, rate_3, rate_4)
+    angles, rates = plan.gait.angles(0.0).tolist(), plan.gait.rates(0.0).tolist()
+    fastest = plan.scenario.any_rotorcraft.tilt_servo.max_rate or inf
+    return tuple(angles), tuple(clipped(rate, -fastest, fastest) for rate in rates)
+
+
+def initial_rotor_speeds(plan: FlightPlan) -> Values:
+    """Signed rotor speeds (rad/s) at time zero: as given, or of a multirotor those of hover."""
+    scenario = plan.scenario
+    vehicle, table = scenario.vehicle.resolve(), scenario.any_rotorcraft
+    if isinstance(vehicle, Multirotor) and scenario.initial.rotor_speed is None:
+        return hover_speeds(vehicle, initial_tilts(plan)[0], table.speeds_along_spin)
+    speeds = scenario.initial.rotor_speeds(table.rotor_count)
+    return tuple(sign * speed for sign, speed in zip(table.spins, speeds, strict=True))
 
 
 def _initial_motion(plan: FlightPlan) -> tuple[Vector, Vector]:
     initial = plan.scenario.initial
-    tilting = plan.scenario.rotorcraft.has_tilting_rotors
+    tilting = plan.scenario.vehicle.has_tilting_rotors
     angles, rates = initial_tilts(plan) if tilting else ((), ())
     return (
         (*initial.position, *quaternion_from_euler(*initial.attitude), *angles),
@@ -172,21 +188,31 @@ def _initial_motion(plan: FlightPlan) -> tuple[Vector, Vector]:
     )
 
 
-ROTORCRAFT: Final = VehicleKind(
-    observed_fields=OBSERVED_FIELDS,
-    columns=COLUMNS,
-    thrusts=rotor_thrusts,
-    compile=_compile,
-    initial_motion=_initial_motion,
-    limit_exceeded=rotorcraft_limit_exceeded,
-    metrics=rotorcraft_metrics,
-)
+@cache
+def rotorcraft_kind(layout: Layout, extra_columns: tuple[str, ...] = ()) -> VehicleKind:
+    """The kind of rotorcraft with so many rotors and hinges; names of `EXTRA_COLUMNS` it has."""
+    return VehicleKind(
+        observed_fields=layout.observed_fields,
+        columns=rotorcraft_columns(layout) | {name: EXTRA_COLUMNS[name] for name in extra_columns},
+        thrusts=rotor_thrusts,
+        compile=_compile,
+        initial_motion=_initial_motion,
+        limit_exceeded=limit_exceeded_of(layout),
+        metrics=rotorcraft_metrics,
+    )
+
+
+EXTRA_COLUMNS: Final = {
+    "singularity_margin": Quantity("singularity margin", "rad"),
+    "determinant": Quantity("determinant n · r₃", "1"),
+}
+"""Columns of controllers that can become singular."""
+
+ROTORCRAFT: Final = rotorcraft_kind(CROSS, tuple(EXTRA_COLUMNS))
 """Tiltrotor and quadrotor."""
 
-SINGULARITY_COLUMNS: Final = ("singularity_margin", "determinant")
+COLUMNS: Final = ROTORCRAFT.columns
+"""The columns of every flight of these."""
 
-OTHER_LAYOUT: Final = replace(
-    ROTORCRAFT,
-    columns={name: what for name, what in COLUMNS.items() if name not in SINGULARITY_COLUMNS},
-)
+OTHER_LAYOUT: Final = rotorcraft_kind(CROSS)
 """A user's rotorcraft without four equal arms at right angles, of which those columns speak."""

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
-from tiltsim_controllers.vehicle.states import ROTORS, TILTROTOR_FIELDS
-
-OBSERVED_FIELDS: Final = (*TILTROTOR_FIELDS, *(f"alpha_rate_{rotor}" for rotor in ROTORS))
-"""A sample of any rotorcraft after its time: rigid body, tilts, rotor speeds, tilt rates.
-
-It begins as `tiltsim_controllers.vehicle.states` counts.
-"""
+from tiltsim.closed_loop.loop import Dynamics, Sizes
+from tiltsim_controllers.vehicle.states import BODY_FIELDS
 
 # Of ``qpos`` and ``qvel``: the quaternion, and the first tilt and tilt rate.
 QW, QX, QY, QZ, TILT_1 = range(3, 8)
@@ -22,3 +17,65 @@ ROTOR_STATES: Final = 4
 # Of ``ctrl``: tilt servos, thrusts, rotor accelerations, rates of further states; the quadrotor has
 # the same without servos.
 TILTROTOR_THRUSTS, QUADROTOR_THRUSTS, ACCELERATION_1, FURTHER_RATES = 4, 0, 8, 12
+
+
+class Layout(NamedTuple):
+    """The layout of a rotorcraft's numbers, by how many rotors and tilt hinges it has."""
+
+    rotors: int
+    tilts: int
+
+    def sizes(self, controller_states: int = 0) -> Sizes:
+        """Lengths of MuJoCo's vectors, the controller's states included."""
+        act = self.rotors + controller_states
+        return Sizes(
+            TILT_1 + self.tilts,
+            TILT_RATE_1 + self.tilts,
+            act,
+            self.further_rates + act - self.rotors,
+        )
+
+    @property
+    def thrust_1(self) -> int:
+        """In ``ctrl``: the thrusts follow the tilt servos."""
+        return self.tilts
+
+    @property
+    def acceleration_1(self) -> int:
+        """In ``ctrl``: the rotor accelerations follow the thrusts."""
+        return self.tilts + self.rotors
+
+    @property
+    def further_rates(self) -> int:
+        """In ``ctrl``: the rates of further states follow the rotor accelerations."""
+        return self.tilts + 2 * self.rotors
+
+    @property
+    def alpha_1(self) -> int:
+        """In the values of a sample: the tilts follow the rigid body."""
+        return len(BODY_FIELDS)
+
+    @property
+    def speed_1(self) -> int:
+        """In the values of a sample: the rotor speeds follow the tilts."""
+        return self.alpha_1 + self.tilts
+
+    def names(self, kind: str) -> tuple[str, ...]:
+        """Names of fields or columns: one a tilt where the kind begins with alpha, else a rotor."""
+        count = self.tilts if kind.startswith(("alpha", "tilt")) else self.rotors
+        return tuple(f"{kind}_{i}" for i in range(1, count + 1))
+
+    @property
+    def observed_fields(self) -> tuple[str, ...]:
+        """A sample after its time: rigid body, tilts, rotor speeds, tilt rates."""
+        kinds = ("alpha", "rotor_speed", "alpha_rate")
+        return (*BODY_FIELDS, *(name for kind in kinds for name in self.names(kind)))
+
+
+def layout_of(dynamics: Dynamics) -> Layout:
+    """The layout of a model's vectors; the quadrotor's have no tilts."""
+    return Layout(len(dynamics.spins), dynamics.sizes.qpos - TILT_1)
+
+
+CROSS: Final = Layout(4, 4)
+"""Of tiltrotor and quadrotor, whose samples are alike; see `tiltsim_controllers.vehicle.states`."""

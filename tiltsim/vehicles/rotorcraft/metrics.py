@@ -7,13 +7,14 @@ from typing import Final
 
 import numpy as np
 
+from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.saturation import at_lower_limit, at_upper_limit, saturation_metrics
 from tiltsim.vehicles.spans import in_last_second, when_settled
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
 from tiltsim_controllers.mathematics.scalar import Floats
-from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
-from tiltsim_controllers.vehicle.states import ROTORS, TILT_FIELDS
+from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.states import TILT_FIELDS
 
 SETTLED_ALTITUDE: Final = 0.005  # m
 
@@ -23,12 +24,12 @@ def rotorcraft_metrics(
 ) -> dict[str, float | bool]:
     """See `tiltsim.closed_loop.vehicle_kind.VehicleKind.metrics`."""
     time = columns["time"]
-    spins = np.array([sign * columns[f"rotor_speed_{i}"] for i, sign in enumerate(SPIN, start=1)])
-    limits = scenario.rotorcraft
+    limits = scenario.any_rotorcraft
+    signs = enumerate(limits.spins, start=1)
+    spins = np.array([sign * columns[f"rotor_speed_{i}"] for i, sign in signs])
     saturated = at_upper_limit(spins, limits.max_rotor_speed)
     saturated |= at_lower_limit(spins, limits.min_rotor_speed)
-    rates = [np.abs(columns[f"alpha_rate_{i}"]).max() for i in ROTORS]
-    vehicle = limits.resolve()
+    rates = [np.abs(rate).max() for name, rate in columns.items() if name.startswith("alpha_rate_")]
     return {
         **_position_metrics(columns, scenario, follows_position),
         **_attitude_metrics(columns, scenario.simulation.timestep),
@@ -36,8 +37,8 @@ def rotorcraft_metrics(
         "max_rotor_speed": float(spins.max()),
         **_altitude_metrics(time, columns["z_ref"] - columns["z"]),
         **_singular_zone_metrics(columns),
-        "max_tilt_rate": float(max(rates)),
-        **_singularity_metrics(columns, vehicle),
+        "max_tilt_rate": float(max(rates, default=0.0)),
+        **_singularity_metrics(columns, limits.resolve()),
         **saturation_metrics(time, saturated),
     }
 
@@ -106,14 +107,16 @@ def _singular_zone_metrics(columns: Mapping[str, Floats]) -> dict[str, float | b
     return metrics
 
 
-def _singularity_metrics(columns: Mapping[str, Floats], vehicle: Vehicle) -> dict[str, float]:
+def _singularity_metrics(
+    columns: Mapping[str, Floats], vehicle: Vehicle | Multirotor
+) -> dict[str, float]:
     """How close the decoupling matrix came to a singular one, where a flight has such columns."""
     if "singularity_margin" not in columns:
         return {}
-    return {
-        "min_singularity_margin": float(columns["singularity_margin"].min()),
-        "min_decoupling_condition": _min_decoupling_condition(columns, vehicle),
-    }
+    metrics = {"min_singularity_margin": float(columns["singularity_margin"].min())}
+    if isinstance(vehicle, Vehicle):
+        metrics["min_decoupling_condition"] = _min_decoupling_condition(columns, vehicle)
+    return metrics
 
 
 def _min_decoupling_condition(columns: Mapping[str, Floats], vehicle: Vehicle) -> float:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltsim.laws.layers.supervision import SUPERVISION
-from tiltsim.system.quantity import SUBSCRIPTS
+from tiltsim.system.quantity import subscript
 from tiltsim.views.attitude_plane import (
     HALF_WIDTH,
     SUPERVISION_THRESHOLD,
@@ -31,8 +31,6 @@ from tiltsim.views.figures.panels import (
     widen,
 )
 from tiltsim_controllers.mathematics.scalar import Floats
-from tiltsim_controllers.vehicle.parameters import SPIN
-from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -75,9 +73,10 @@ def _position_error(axes: Axes, flight: Flight) -> None:
 
 
 def _tilt_angles(axes: Axes, flight: Flight) -> None:
-    for rotor, line in zip(ROTORS, style.ROTOR_LINES, strict=True):
-        name = f"α{SUBSCRIPTS[rotor]}"
-        axes.plot(flight["time"], flight[f"alpha_{rotor}"], label=name, **line)
+    tilts = flight["tilt_angles"].T
+    lines = style.rotor_lines(len(tilts))
+    for i, (tilt, line) in enumerate(zip(tilts, lines, strict=True), start=1):
+        axes.plot(flight["time"], tilt, label=f"α{subscript(i)}", **line)
     show_last_periods(axes, [flight])
     widen(axes, 0.1)
     axes.set_ylabel("rad")
@@ -85,10 +84,11 @@ def _tilt_angles(axes: Axes, flight: Flight) -> None:
 
 
 def _rotor_speeds(axes: Axes, flight: Flight) -> None:
-    for rotor, spin, line in zip(ROTORS, SPIN, style.ROTOR_LINES, strict=True):
+    vehicle = flight.scenario.any_rotorcraft
+    lines = style.rotor_lines(vehicle.rotor_count)
+    for rotor, (spin, line) in enumerate(zip(vehicle.spins, lines, strict=True), start=1):
         speed = spin * flight[f"rotor_speed_{rotor}"]
         axes.plot(flight["time"], speed, label=f"{rotor}", **line)
-    vehicle = flight.scenario.rotorcraft
     for limit in (vehicle.min_rotor_speed, vehicle.max_rotor_speed):
         if limit is not None:
             known = axes.get_legend_handles_labels()[1]
@@ -165,9 +165,14 @@ ROTORCRAFT_PANELS: Final[dict[str, Panel]] = {
     "altitude": of_one(_altitude),
     "margin": of_one(_margin, scaled=True, needs="singularity_margin"),
     "attitude": of_one(_attitude),
-    "tilt_angles": of_one(_tilt_angles),
+    "tilt_angles": of_one(_tilt_angles, needs="alpha_1"),
     "rotor_speeds": of_one(_rotor_speeds),
     "path": of_one(plan_view, over_time=False),
     "attitude_plane": of_one(_roll_pitch_plane, over_time=False, needs="singularity_margin"),
 }
 """The panels of a rotorcraft's page, by name."""
+
+MULTIROTOR_PANELS: Final = {
+    name: panel for name, panel in ROTORCRAFT_PANELS.items() if name != "attitude_plane"
+}
+"""Those of a multirotor, whose singular attitudes need not be a curve."""

@@ -56,6 +56,20 @@ ROTOR_LINES: Final[tuple[dict[str, Any], ...]] = (
 )
 """Styles of the lines of rotors 1 to 4 in one panel."""
 
+
+def rotor_lines(count: int) -> list[dict[str, Any]]:
+    """Styles of the lines of so many rotors: those of `ROTOR_LINES`, then thin ones of all hues."""
+    hues = (GREEN, RED, *(line["color"] for line in ROTOR_LINES))
+    more = [
+        {"color": hues[i % len(hues)], "ls": _ROTOR_DASHES[i % len(_ROTOR_DASHES)], "lw": 1.2}
+        for i in range(count)
+    ]
+    return [*ROTOR_LINES, *more][:count]
+
+
+_ROTOR_DASHES: Final = ("-", (0, (6, 1.5)), (0, (2, 1)), (0, (5, 1, 1, 1)), (0, (1, 2)))
+"""Dashes of further lines; with six hues they repeat after thirty."""
+
 AXIS_LINES: Final[tuple[dict[str, Any], ...]] = (
     {"color": BLUE, "ls": "-", "lw": 1.4},
     {"color": RED, "ls": (0, (5, 1.2)), "lw": 1.4},

@@ -23,8 +23,6 @@ from tiltsim.views.rerun.display import (
 )
 from tiltsim.views.rerun.palette import AMBER, GREEN, GREY, PINK, RED, SKY, dimmed
 from tiltsim.views.rerun.plane import AttitudePlane
-from tiltsim_controllers.vehicle.parameters import SPIN
-from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
     from tiltsim.closed_loop.assembly import Assembly
@@ -43,11 +41,14 @@ _AXIS_COLORS: Final = {"x": RED, "y": GREEN, "z": SKY}
 
 def _spin_speed(rotor: int) -> Callable[[Flight], Floats]:
     """The speed of a rotor along its spin, rad/s."""
-    return lambda flight: SPIN[rotor - 1] * flight[f"rotor_speed_{rotor}"]
+    return lambda flight: (
+        flight.scenario.any_rotorcraft.spins[rotor - 1] * flight[f"rotor_speed_{rotor}"]
+    )
 
 
 def _slowest(flight: Flight) -> Floats:
-    return np.asarray(np.min([_spin_speed(rotor)(flight) for rotor in ROTORS], axis=0))
+    spins = np.array(flight.scenario.any_rotorcraft.spins)
+    return np.asarray((spins * flight["rotor_speeds"]).min(axis=1))
 
 
 def _distance(flight: Flight) -> Floats:
@@ -56,7 +57,7 @@ def _distance(flight: Flight) -> Floats:
 
 def _speed_limits(assembly: Assembly) -> tuple[float, float]:
     """From standstill to twice hover: diverging rotors would make all others a flat line."""
-    vehicle = assembly.scenario.rotorcraft
+    vehicle = assembly.scenario.any_rotorcraft
     return 0.0, max(2.0 * vehicle.resolve().hover_rotor_speed, vehicle.max_rotor_speed or 0.0)
 
 
@@ -105,10 +106,14 @@ def rotorcraft_series(assembly: Assembly) -> list[Series]:
     for angle, color in _ANGLE_COLORS.items():
         series.append(Series(f"attitude/{angle}", angle, color, angle))
         series.append(_reference(f"attitude/{angle}_ref", f"{angle} ref", color))
-    for rotor, color, width in zip(ROTORS, _ROTOR_COLORS, _ROTOR_WIDTHS, strict=True):
+    columns = assembly.loop.kind.columns
+    for rotor in assembly.loop.kind.rotors:
+        color = _ROTOR_COLORS[(rotor - 1) % len(_ROTOR_COLORS)]
+        width = _ROTOR_WIDTHS[min(rotor, len(_ROTOR_WIDTHS)) - 1]
         tilt, speed = f"alpha_{rotor}", _spin_speed(rotor)
-        series.append(Series(f"tilt_angles/{tilt}", f"α{rotor}", color, tilt, width))
-        series.append(_reference(f"tilt_angles/alpha_ref_{rotor}", f"α{rotor} ref", color))
+        if tilt in columns:
+            series.append(Series(f"tilt_angles/{tilt}", f"α{rotor}", color, tilt, width))
+            series.append(_reference(f"tilt_angles/alpha_ref_{rotor}", f"α{rotor} ref", color))
         series.append(Series(f"rotor_speeds/rotor_{rotor}", f"rotor {rotor}", color, speed, width))
     series.append(Series("singularity/margin", "margin", AMBER, "singularity_margin", 2.5))
     if SUPERVISION in assembly.loop.columns.units:
@@ -131,7 +136,7 @@ def rotorcraft_levels(assembly: Assembly) -> list[Level]:
         Level("singularity/threshold", f"threshold {threshold:g}", RED, threshold),
         Level("singularity/singular", "singular", GREY, 0.0),
     ]
-    vehicle = assembly.scenario.rotorcraft
+    vehicle = assembly.scenario.any_rotorcraft
     for name, label, limit in (
         ("min", "lower limit", vehicle.min_rotor_speed),
         ("max", "upper limit", vehicle.max_rotor_speed),
@@ -156,6 +161,9 @@ ROTORCRAFT_DISPLAY: Final = VehicleDisplay(
     up=(0.0, 0.0, 1.0),
     overview=False,
 )
+
+MULTIROTOR_DISPLAY: Final = replace(ROTORCRAFT_DISPLAY, plane=None)
+"""For a multirotor, whose singular attitudes need not be a curve of the roll-pitch plane."""
 
 OTHER_LAYOUT_DISPLAY: Final = replace(
     ROTORCRAFT_DISPLAY,

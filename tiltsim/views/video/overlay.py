@@ -59,7 +59,15 @@ class AttitudeOverlay(Overlay):
         """Paint nothing: without singular attitudes there is no inset."""
 
 
-class RotorcraftOverlay(AttitudeOverlay):
+class MarginOverlay(AttitudeOverlay):
+    """Singularity margin and attitude."""
+
+    def rows(self, sample: int) -> dict[str, str]:
+        margin = abs(self._flight["singularity_margin"][sample])
+        return {"singularity margin": f"{margin:.2f} rad", **super().rows(sample)}
+
+
+class RotorcraftOverlay(MarginOverlay):
     """Singularity margin, attitude, and the roll-pitch plane in the corner."""
 
     def __init__(self, flight: Flight, height: int) -> None:
@@ -71,10 +79,6 @@ class RotorcraftOverlay(AttitudeOverlay):
         self._curve_is_constant = curve_is_constant(flight.scenario)
         self._gap = gap = round(GAP_SHARE * height)
         self.caption = Caption("shaded: unreachable attitudes", gap, self._inset.size + gap)
-
-    def rows(self, sample: int) -> dict[str, str]:
-        margin = abs(self._flight["singularity_margin"][sample])
-        return {"singularity margin": f"{margin:.2f} rad", **super().rows(sample)}
 
     def paint(self, image: Image, sample: int) -> None:
         trail = self._attitude[self._trail_start(sample) : sample + 1 : 2]

@@ -1,0 +1,347 @@
+"""The controller of attitude and force in closed loops with multirotors of any layout.
+
+Native code wants to know how many rotors there are, which tilt together and which way they turn, so
+a loop is made for each such `Layout`, once. All other numbers of the vehicle are data: the table of
+its rotors follows the knots of gait and reference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from tiltsim.closed_loop.loop import (
+    ClosedLoop,
+    Columns,
+    ControlSetup,
+    Dynamics,
+    Equations,
+    Monitoring,
+    Sampling,
+)
+from tiltsim.equations.tiltrotor import body_fields, initial_state
+from tiltsim.laws.tiltrotor import REFERENCE_COLUMNS, reference_columns, servo_lead
+from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.multirotor_controllers import AttitudeForceController
+from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
+from tiltsim.vehicles.rotorcraft.layout import TILT_1, TILT_RATE_1
+from tiltsim.vehicles.rotorcraft.layout import Layout as Places
+from tiltsim_controllers.analysis.singularity import world_up
+from tiltsim_controllers.analysis.torque_free import singularity_margin, torque_free_forces
+from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
+from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS
+from tiltsim_controllers.laws.decouplers import DECOUPLERS
+from tiltsim_controllers.laws.gait_feedforward import INTEGRAL_FIELDS
+from tiltsim_controllers.laws.multirotor import multirotor_law_of
+from tiltsim_controllers.laws.multirotor_steps import ATTITUDE_ERRORS, Parameters, SideGains
+from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
+from tiltsim_controllers.mathematics.vectors import componentwise, entries_of, written_out
+from tiltsim_controllers.references.trajectories import position_reference
+from tiltsim_controllers.vehicle.effectiveness import force_and_torque, layout_of
+from tiltsim_controllers.vehicle.multirotor import BODY_STATES, body_of, equations_of_motion_of
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import FlightPlan, Scenario
+
+NULL_PART: Final = "null_part"
+"""A column: the share of the rotors' ``varpi |varpi|`` that neither force nor torque show."""
+
+STATES: Final = len(INTEGRAL_FIELDS)
+"""The controller's own, after the rotor speeds."""
+
+
+class Layout(NamedTuple):
+    """What a multirotor's compiled code is made for."""
+
+    tilt_of_rotor: tuple[int, ...]  # from 0; -1 for a fixed rotor
+    spins: Values
+
+    @property
+    def places(self) -> Places:
+        """Where its numbers lie."""
+        return Places(len(self.spins), max(self.tilt_of_rotor) + 1)
+
+
+class LoopParameters(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
+    servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
+    law: Parameters
+
+
+def layout_of_vehicle(vehicle: Multirotor) -> Layout:
+    """The layout of a vehicle."""
+    return Layout(layout_of(vehicle.table), vehicle.spins)
+
+
+@scalar
+def _body_state(qpos: Vector, qvel: Vector) -> Values:
+    """The twelve numbers of the rigid body, from MuJoCo's state."""
+    roll, pitch, yaw = euler_from_quaternion(qpos[3], qpos[4], qpos[5], qpos[6])
+    return (
+        qpos[0], qpos[1], qpos[2], qvel[0], qvel[1], qvel[2],
+        roll, pitch, yaw, qvel[3], qvel[4], qvel[5],
+    )  # fmt: skip
+
+
+@cache
+def thrust_controls_of(spins: Values) -> Callable[[Vector], Values]:
+    """Scalar code of the controls of the thrust actuators, ``s varpi |varpi|`` with the spin s."""
+    signs = "".join("+" if spin > 0.0 else "-" for spin in spins)
+    name = f"thrust_controls_{signs.replace('+', 'p').replace('-', 'm')}"
+    terms = (f"{sign}act[{i}] * abs(act[{i}]), " for i, sign in enumerate(signs))
+    controls: Callable[[Vector], Values] = written_out(name, "act", f"({''.join(terms)})")
+    return controls
+
+
+@cache
+def _sampling_of(layout: Layout, law: Callable[..., Values]) -> Sampling:
+    """The control step in MuJoCo of a law with the layout's inputs."""
+    rotors, tilts = layout.places
+    tilts_in, tilt_rates_in = entries_of(TILT_1, tilts), entries_of(TILT_RATE_1, tilts)
+    speeds_in, integrals_in = entries_of(0, rotors), entries_of(rotors, STATES)
+    rates_in = entries_of(0, rotors + STATES)
+    held_servos = entries_of(0, tilts)
+    held_rates = entries_of(layout.places.acceleration_1, rotors + STATES)
+    thrusts, planned = thrust_controls_of(layout.spins), tilt_motion_of(tilts).planned
+    ahead = componentwise("servo_commands", "jets, lead", "jets#[0] + lead * jets#[1]", tilts)
+
+    @scalar
+    def controls(
+        time: float,
+        qpos: Vector,
+        qvel: Vector,
+        act: Vector,
+        parameters: LoopParameters,
+        knots: Vector,
+    ) -> Values:
+        own = parameters.law
+        state = (*_body_state(qpos, qvel), *tilts_in(qpos), *speeds_in(act))
+        rates = law(time, state, tilt_rates_in(qvel), integrals_in(act), own, knots)
+        return (
+            *ahead(planned(time, own.gait, knots), parameters.servo_lead),
+            *thrusts(act),
+            *rates_in(rates),
+        )
+
+    @scalar
+    def hold(
+        time: float,
+        qpos: Vector,
+        qvel: Vector,
+        act: Vector,
+        ctrl: Vector,
+        parameters: LoopParameters,
+    ) -> Values:
+        return (*held_servos(ctrl), *thrusts(act), *held_rates(ctrl))
+
+    return Sampling(controls, hold)
+
+
+@cache
+def _columns_of(layout: Layout, law: Callable[..., Values]) -> Columns:
+    """Samples of flights under a law, and the columns of references, margin and null part."""
+    places = layout.places
+    rotors, tilts = places
+    tilts_in, tilt_rates_in = entries_of(TILT_1, tilts), entries_of(TILT_RATE_1, tilts)
+    speeds_in, integrals_in = entries_of(0, rotors), entries_of(rotors, STATES)
+    fields = (*places.observed_fields, *INTEGRAL_FIELDS)
+    state_in = entries_of(0, len(fields) - tilts - STATES)
+    rates_of_sample = entries_of(len(fields) - tilts - STATES, tilts)
+    integrals_of_sample = entries_of(len(fields) - STATES, STATES)
+    asked_in = entries_of(rotors + STATES, 4)  # roll, pitch, yaw, null part
+    planned = tilt_motion_of(tilts).planned
+    angles = componentwise("angles_of_jets", "jets", "jets#[0]", tilts)
+
+    @scalar
+    def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
+        state = (*_body_state(qpos, qvel), *tilts_in(qpos), *speeds_in(act))
+        return (*state, *tilt_rates_in(qvel), *integrals_in(act))
+
+    @scalar
+    def asked(time: float, values: Vector, parameters: LoopParameters, knots: Vector) -> Values:
+        own = parameters.law
+        x, y, z, _, _, _, _, _, _ = position_reference(time, own.reference, knots)
+        moving, integrals = rates_of_sample(values), integrals_of_sample(values)
+        rates = law(time, state_in(values), moving, integrals, own, knots)
+        return (x, y, z, *asked_in(rates), *angles(planned(time, own.gait, knots)))
+
+    names = (*REFERENCE_COLUMNS, NULL_PART, *places.names("alpha_ref"))
+
+    def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+        return {
+            **reference_columns(asked, fields, samples, setup, names),
+            "singularity_margin": _margin(layout, samples, setup),
+        }
+
+    units = {**dict.fromkeys(INTEGRAL_FIELDS, "m s"), NULL_PART: "1"}
+    return Columns(observe, derive, fields=INTEGRAL_FIELDS, units=units)
+
+
+def _margin(layout: Layout, samples: Mapping[str, Floats], setup: ControlSetup) -> Floats:
+    """Angles (rad) to the nearest singular attitude."""
+    table = setup.knots[int(setup.parameters.law.rotors) :]
+    rows = zip(*(samples[name].tolist() for name in layout.places.names("alpha")), strict=True)
+    pushes = [force_and_torque(table, row) for row in rows] or [force_and_torque(table)]
+    forces = torque_free_forces(*map(np.array, zip(*pushes, strict=True)))
+    return singularity_margin(forces, world_up(samples["roll"], samples["pitch"]))
+
+
+@cache
+def _monitoring_of(layout: Layout, norm: str) -> Monitoring:
+    """In the norm of the speeds the decoupling matrix is singular where a rotor stops."""
+    if norm != "speed":
+        return Monitoring()
+    first, rotors = layout.places.speed_1, layout.places.rotors
+    speeds_in = entries_of(first, rotors)
+    causes = tuple(
+        f"the decoupling matrix became singular: rotor {rotor} came to a stop"
+        for rotor in range(1, rotors + 1)
+    )
+
+    @scalar
+    def speeds(values: Vector, parameters: LoopParameters) -> Values:
+        return speeds_in(values)
+
+    return Monitoring(speeds, lambda _sample: causes)
+
+
+@cache
+def _equations_of(layout: Layout, law: Callable[..., Values]) -> Equations:
+    """The law on the equations of motion, with pods that follow the gait exactly."""
+    rotors, tilts = layout.places
+    motion = equations_of_motion_of(layout.tilt_of_rotor)
+    planned = tilt_motion_of(tilts).planned
+    angles = componentwise("angles_of_jets", "jets", "jets#[0]", tilts)
+    rates = componentwise("rates_of_jets", "jets", "jets#[1]", tilts)
+    speeds_in = entries_of(BODY_STATES, rotors)
+    integrals_in = entries_of(BODY_STATES + rotors, STATES)
+    inputs_in, integral_rates = entries_of(0, rotors + STATES), entries_of(rotors, STATES)
+
+    @scalar
+    def inputs(time: float, state: Vector, parameters: LoopParameters, knots: Vector) -> Values:
+        own = parameters.law
+        jets = planned(time, own.gait, knots)
+        seen = (*body_fields(state), *angles(jets), *speeds_in(state))
+        return inputs_in(law(time, seen, rates(jets), integrals_in(state), own, knots))
+
+    @scalar
+    def state_rates(
+        time: float,
+        state: Vector,
+        inputs: Vector,
+        parameters: LoopParameters,
+        knots: Vector,
+        disturbance: Triple,
+    ) -> Values:
+        own = parameters.law
+        tilts, at = angles(planned(time, own.gait, knots)), int(own.rotors)
+        body = motion(state, tilts, inputs, own.vehicle, knots, at, disturbance, 0.0)
+        return (*body, *integral_rates(inputs))
+
+    @scalar
+    def observe(
+        time: float, state: Vector, inputs: Vector, parameters: LoopParameters, knots: Vector
+    ) -> Values:
+        jets = planned(time, parameters.law.gait, knots)
+        seen = (*body_fields(state), *angles(jets), *speeds_in(state))
+        return (*seen, *rates(jets), *integrals_in(state))
+
+    return Equations(
+        inputs=inputs,
+        inputs_size=rotors + STATES,
+        rates=state_rates,
+        initial=lambda plan, _setup: (
+            *initial_state(plan.scenario, initial_rotor_speeds(plan)),
+            *(0.0,) * STATES,
+        ),
+        observe=observe,
+    )
+
+
+def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
+    scenario, gait = plan.scenario, plan.gait
+    controller, vehicle = scenario.controller, scenario.vehicle.resolve()
+    assert isinstance(controller, AttitudeForceController)
+    assert isinstance(vehicle, Multirotor)
+    dimension = controller.resolve_dimension(vehicle, gait)
+    inertia = np.reshape(vehicle.inertia, (3, 3))
+    law = Parameters(
+        vehicle=body_of(vehicle.mass, inertia, vehicle.gravity),
+        gains=controller.resolve_gains(),
+        integral=controller.resolve_integral_gains(),
+        side=SideGains(*controller.side_gains),
+        max_acceleration=controller.max_acceleration,
+        max_angular_acceleration=controller.max_angular_acceleration,
+        anticipation=min(controller.anticipation, 0.5 * gait.min_segment_time),
+        # The thesis's equations omit the gyroscopic torque.
+        terms=controller.resolve_feedforward_terms(
+            gyroscopic_torque=scenario.simulation.plant != "thesis"
+        ),
+        gait=gait.parameters,
+        reference=plan.reference,
+        decoupler=DECOUPLERS[controller.decoupler],
+        rotors=float(len(plan.knots)),
+        decoupling=DECOUPLINGS[controller.decoupling],
+        attitude=ATTITUDE_ERRORS[controller.attitude_error],
+        restoring=controller.resolve_restoring(len(vehicle.spins), dimension, gait),
+        slowest=controller.slowest_rotor,
+        turn_time=controller.turn_time,
+    )
+    lead = servo_lead(scenario.any_rotorcraft.tilt_servo)
+    return ControlSetup(LoopParameters(signature, lead, law), (*plan.knots, *vehicle.table))
+
+
+def _follows_position(scenario: Scenario) -> bool:
+    controller = scenario.controller
+    assert isinstance(controller, AttitudeForceController)
+    return controller.decoupler != "none"
+
+
+@cache
+def multirotor_loop(layout: Layout, dimension: int, norm: str) -> ClosedLoop:
+    """The controller of attitude and force of all multirotors of a layout.
+
+    Args:
+        layout: Of the vehicles.
+        dimension: How many components of force are controlled, 1 to 3.
+        norm: See `tiltsim_controllers.laws.multirotor.multirotor_law_of`.
+    """
+    places, law = layout.places, multirotor_law_of(layout.tilt_of_rotor, dimension, norm)
+    sampling, equations = _sampling_of(layout, law), _equations_of(layout, law)
+    tilts = "".join(f"_{tilt}" if tilt >= 0 else "_f" for tilt in layout.tilt_of_rotor)
+    senses = "".join("p" if spin > 0.0 else "m" for spin in layout.spins)
+    for step in (sampling.controls, equations.inputs):
+        step.__qualname__ = f"attitude_force_{dimension}_{norm}{tilts}_{senses}"
+    return ClosedLoop(
+        kind=rotorcraft_kind(places, ("singularity_margin",)),
+        parameters=LoopParameters,
+        setup=_setup,
+        dynamics=Dynamics(
+            f"multirotor{tilts}_{senses}",
+            places.sizes(STATES),
+            lambda plan, _setup: (*initial_rotor_speeds(plan), *(0.0,) * STATES),
+            STATES,
+            layout.spins,
+        ),
+        sampling=sampling,
+        columns=_columns_of(layout, law),
+        monitoring=_monitoring_of(layout, norm),
+        equations=equations,
+        follows_position=_follows_position,
+        uses_gait=places.tilts > 0,
+    )
+
+
+def loop_of_multirotor(scenario: Scenario) -> ClosedLoop:
+    """The closed loop of a scenario's multirotor, without layers."""
+    controller, vehicle = scenario.controller, scenario.vehicle.resolve()
+    assert isinstance(controller, AttitudeForceController)
+    assert isinstance(vehicle, Multirotor)
+    dimension = controller.resolve_dimension(vehicle, scenario.gait.plan(vehicle))
+    return multirotor_loop(layout_of_vehicle(vehicle), dimension, controller.norm)

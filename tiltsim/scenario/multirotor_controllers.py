@@ -1,0 +1,177 @@
+"""The ``[controller]`` table of a multirotor."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal, Self
+
+import numpy as np
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.controller_table import ControllerTable
+from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.table import NonNegative, Positive, Vector3, example
+from tiltsim.scenario.tiltrotor_controllers import (
+    FeedforwardTerm,
+    GainTable,
+    PolePlacementTable,
+    attitude_altitude_gain_kind,
+    resolved_gains,
+    resolved_integral_gains,
+)
+from tiltsim_controllers.analysis.stability import (
+    ErrorLoop,
+    error_loops,
+    feedforward_loops,
+    linear_loop,
+)
+from tiltsim_controllers.analysis.torque_free import torque_free_forces
+from tiltsim_controllers.gaits.plans import Gait
+from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING, Gains
+from tiltsim_controllers.laws.gains import IntegralGains
+from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms
+from tiltsim_controllers.vehicle.effectiveness import force_and_torque
+
+RESTORING: Final = 0.5
+"""1/s, the default where rotor speeds would drift."""
+
+
+class AttitudeForceController(ControllerTable):
+    """Attitude and one, two or three components of force of a multirotor."""
+
+    model_config = example(law="attitude_force", dimension=1)
+
+    vehicle_models = ("multirotor",)
+    reference_kinds = ("position", "pose", "attitude_altitude")
+
+    law: Literal["attitude_force"] = Field(
+        description="feedback linearization of a multirotor: its rotor speeds control the attitude "
+        "and as many components of the force as it has; the tilt angles follow the gait"
+    )
+    dimension: Annotated[int, Field(ge=1, le=3)] | None = Field(
+        None,
+        description="how many components of the force are controlled beside the attitude: 1, lift; "
+        "2, one sideways, too; 3, all, so that the vehicle need not lean; default: as many as "
+        "the vehicle has at all angles of its gait [-]",
+        examples=[1],
+    )
+    decoupler: Literal["none", "conventional", "modified", "exact"] = Field(
+        "exact",
+        description="how the vehicle leans to control what its side force leaves of the horizontal "
+        "position: as for the tiltrotor; other than exact needs dimension 1 [-]",
+    )
+    decoupling: Literal["published", "exact"] = Field(
+        "exact",
+        description="form of the decoupling matrix; published lacks the factor 2 |rotor speed| in "
+        "its attitude rows, as the thesis prints it for the tiltrotor",
+    )
+    attitude_error: Literal["rotation", "euler_angles"] = Field(
+        "rotation",
+        description="what the attitude's error is: the rotation that remains, without any singular "
+        "attitude, or roll, pitch and yaw, as in the thesis",
+    )
+    gains: Annotated[
+        Annotated[Literal["ch03", "ch04", "exact", "feedforward"], Tag("named")]
+        | Annotated[GainTable, Tag("table")]
+        | Annotated[PolePlacementTable, Tag("poles")],
+        Discriminator(attitude_altitude_gain_kind),
+    ] = Field("exact", description="a named set, or a table of gains or of poles")
+    side_gains: Vector3 = Field(
+        (12.0, 48.0, 64.0),
+        description="on the errors of acceleration, velocity and position along directions that "
+        "side force moves [1/s, 1/s^2, 1/s^3]",
+    )
+    norm: Literal["speed", "thrust"] = Field(
+        "speed",
+        description="of all rotor accelerations that do the same, those of least norm: of the "
+        "accelerations themselves, for rotors that turn one way, or of the rates of thrust, for "
+        "rotors that reverse",
+    )
+    slowest_rotor: NonNegative = Field(
+        5.0,
+        description="speed below which norm = thrust accelerates a rotor as if it were that fast "
+        "[rad/s]",
+    )
+    restoring: NonNegative | None = Field(
+        None,
+        description="rate towards the rotor speeds of least power among those that do the same; "
+        f"default: {RESTORING:g} where they would drift, which is with moving tilts and more "
+        "rotors than outputs, else 0 [1/s]",
+        examples=[0.5],
+    )
+    turn_time: NonNegative = Field(
+        0.0, description="time in which the reference of roll and pitch is reached, smoothly [s]"
+    )
+    max_acceleration: Positive = Field(
+        3.0,
+        description="limit on the horizontal acceleration of the position feedback, at which its "
+        "integrators stop [m/s^2]",
+    )
+    max_angular_acceleration: Positive = Field(
+        60.0, description="limit on the demanded angular acceleration of each axis [rad/s^2]"
+    )
+    anticipation: NonNegative = Field(
+        0.12,
+        description="time before and after a corner of the gait in which the body turns, at most "
+        "half of the gait's shortest segment [s]",
+    )
+    leave_out: Annotated[tuple[FeedforwardTerm, ...], Field(strict=False)] = Field(
+        (), description="terms of the controller to omit, for comparison", examples=[["gait_rates"]]
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.norm == "speed":
+            self.require_defaults(("slowest_rotor",), 'needs controller.norm = "thrust"')
+        return self
+
+    def resolve_gains(self) -> Gains:
+        return resolved_gains(self.gains)
+
+    def resolve_integral_gains(self) -> IntegralGains:
+        """The gains on the integrals, zero unless given by poles."""
+        return resolved_integral_gains(self.gains)
+
+    def resolve_feedforward_terms(self, *, gyroscopic_torque: bool) -> FeedforwardTerms:
+        """The terms of the law on a plant with or without gyroscopic torque."""
+        terms = FeedforwardTerms(gyroscopic_torque=float(gyroscopic_torque))
+        return terms._replace(**dict.fromkeys(self.leave_out, 0.0))
+
+    def resolve_dimension(self, vehicle: Multirotor, gait: Gait) -> int:
+        """The number of force components, checked over the gait."""
+        least, where = force_dimension(vehicle, gait)
+        if least == 0:
+            raise InvalidValueError("gait.type", gait.name, f"singular at every attitude, {where}")
+        if self.dimension is not None and self.dimension > least:
+            raise self.mistake("dimension", f"the vehicle has {least} only, {where}")
+        return least if self.dimension is None else self.dimension
+
+    def resolve_restoring(self, rotors: int, dimension: int, gait: Gait) -> float:
+        """The restoring rate, 1/s."""
+        if self.restoring is not None:
+            return self.restoring
+        return RESTORING if rotors > 3 + dimension and not gait.is_constant else 0.0
+
+    def error_loops(self, vehicle: Multirotor) -> list[ErrorLoop]:
+        gains = self.resolve_gains()
+        if self.decoupling == "published":
+            speed = vehicle.hover_rotor_speed
+            return error_loops(gains, speed, PUBLISHED_DECOUPLING)
+        side = linear_loop("side", self.side_gains)
+        return [*feedforward_loops(gains, self.resolve_integral_gains()), side]
+
+    @property
+    def linearization(self) -> str:
+        return f"the {self.decoupling} decoupling matrix"
+
+
+def force_dimension(vehicle: Multirotor, gait: Gait) -> tuple[int, str]:
+    """The least dimension of the torque-free forces over a gait, and where, in words."""
+    times = gait.sample_times()
+    angles = gait.angles(times).reshape(len(times), vehicle.tilts)
+    force, torque = zip(*(force_and_torque(vehicle.table, row) for row in angles.tolist()))
+    dimension = torque_free_forces(np.array(force), np.array(torque)).dimension
+    first = int(dimension.argmin())
+    at = ", ".join(f"{angle:.3g}" for angle in angles[first])
+    where = f"at tilt angles ({at}) rad" if vehicle.tilts else "as its rotors are placed"
+    return int(dimension[first]), where

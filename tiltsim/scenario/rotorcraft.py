@@ -1,0 +1,208 @@
+"""Vehicles in general, and those with any number of rotors, in a scenario's ``[vehicle]`` table."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from math import inf, pi
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+
+from pydantic import Field, model_validator
+
+from tiltsim.models.parts import TiltServo
+from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.table import NonNegative, Positive, Table, example
+from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.tilt_car.vehicle import TiltCar
+from tiltsim_controllers.vehicle.effectiveness import layout_of
+from tiltsim_controllers.vehicle.parameters import Vehicle
+
+if TYPE_CHECKING:
+    from tiltsim.models.user_vehicle import UserVehicle
+
+
+class ServoTable(Table):
+    """A position servo of second order, ideal except for the given keys."""
+
+    model_config = example(natural_frequency=30.0)
+
+    natural_frequency: Positive = Field(
+        TiltServo.natural_frequency, description="bandwidth of the servo [rad/s]", examples=[30.0]
+    )
+    damping_ratio: Positive = Field(
+        TiltServo.damping_ratio, description="1 is critically damped [-]"
+    )
+
+    @property
+    def angle_limit(self) -> float | None:
+        """Largest tilt angle either way, rad; None without mechanical stops."""
+        return None
+
+
+class TiltServoTable(ServoTable):
+    """The servos that tilt the pods."""
+
+    model_config = example(natural_frequency=30.0, max_rate=2.0)
+
+    max_rate: Positive | None = Field(
+        None, description="largest tilt rate; default: unlimited [rad/s]", examples=[2.0]
+    )
+    max_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
+        None,
+        description="mechanical stop to either side, within which the gait must stay; default: "
+        "none [rad]",
+        examples=[1.0],
+    )
+
+    @property
+    def angle_limit(self) -> float | None:
+        return self.max_angle
+
+
+class AnyVehicleTable(Table, ABC):
+    """What every vehicle has."""
+
+    table_name = "vehicle"
+    is_planar: ClassVar[bool] = False  # moves on a plane, without gravity, air or ground
+
+    model: str
+
+    @property
+    @abstractmethod
+    def rotor_count(self) -> int:
+        """How many rotors it has."""
+
+    @property
+    @abstractmethod
+    def tilt_count(self) -> int:
+        """How many servos tilt its rotors."""
+
+    @property
+    def has_tilting_rotors(self) -> bool:
+        """Whether servos tilt the rotors."""
+        return self.tilt_count > 0
+
+    @abstractmethod
+    def resolve(self) -> Vehicle | Multirotor | TiltCar:
+        """The physical parameters."""
+
+
+class RotorcraftTable(AnyVehicleTable, ABC):
+    """What every vehicle that flies has."""
+
+    mjcf: str | None
+    min_rotor_speed: NonNegative | None = Field(
+        None,
+        description="smallest absolute value; at 0 a rotor may stop but not reverse; default: "
+        "unlimited [rad/s]",
+        examples=[200.0],
+    )
+    max_rotor_speed: Positive | None = Field(
+        None, description="largest absolute value; default: unlimited [rad/s]", examples=[390.0]
+    )
+    rotor_time_constant: Positive | None = Field(
+        None,
+        description="time constant of the lag between commanded and actual rotor speed; default: "
+        "no lag [s]",
+        examples=[0.04],
+    )
+    tilt_servo: TiltServoTable = Field(
+        TiltServoTable(), description="the servos that tilt the rotors"
+    )
+
+    @abstractmethod
+    def resolve(self) -> Vehicle | Multirotor: ...
+
+    @property
+    @abstractmethod
+    def spins(self) -> Values:
+        """Signs of the rotor speeds."""
+
+    @abstractmethod
+    def tilt_of_rotor(self, rotor: int) -> int:
+        """The number, from 0, of the tilt of a rotor, whose number is from 1; -1: fixed."""
+
+    @property
+    @abstractmethod
+    def hinge_inertias(self) -> Values:
+        """Inertia (kg m^2) of servo and pod about each tilt hinge."""
+
+    @property
+    def speeds_along_spin(self) -> tuple[float, float]:
+        """Lowest and highest speed (rad/s) of a rotor along its spin; infinite without limits."""
+        low, high = self.min_rotor_speed, self.max_rotor_speed
+        highest = inf if high is None else high
+        return -highest if low is None else low, highest
+
+    @property
+    def has_rotor_limits(self) -> bool:
+        """Whether the rotor speeds are limited."""
+        return self.min_rotor_speed is not None or self.max_rotor_speed is not None
+
+    @property
+    def user_vehicle(self) -> UserVehicle | None:
+        """The user's MJCF file as measured; None for the shipped vehicles."""
+        if self.mjcf is None:
+            return None
+        from tiltsim.models.user_vehicle import read_user_vehicle
+
+        try:
+            return read_user_vehicle(self.mjcf, self.model)
+        except ValueError as error:
+            raise self.mistake("mjcf", str(error)) from None
+
+    def _check_limits(self) -> None:
+        low, high = self.min_rotor_speed, self.max_rotor_speed
+        if low is not None and high is not None and low >= high:
+            raise self.mistake("min_rotor_speed", f"must be below max_rotor_speed = {high}")
+
+
+class MultirotorTable(RotorcraftTable):
+    """Any number of rotors, each anywhere, fixed or on a hinge, described by an MJCF file alone."""
+
+    model_config = example(model="multirotor", mjcf="mjcf/hexarotor.xml")
+
+    model: Literal["multirotor"] = Field(
+        description="4 to 16 rotors at any places, with any thrust axes, fixed or tilted about "
+        "hinges of any axes, of which two may share one"
+    )
+    mjcf: str = Field(
+        description="an MJCF file, relative to the scenario's folder, with all parameters",
+        examples=["my_hexarotor.xml"],
+    )
+
+    @property
+    def file(self) -> UserVehicle:
+        """The file as measured."""
+        vehicle = self.user_vehicle
+        assert vehicle is not None  # mjcf is required
+        return vehicle
+
+    def resolve(self) -> Multirotor:
+        vehicle = self.file.vehicle
+        assert isinstance(vehicle, Multirotor)  # as read for this model
+        return vehicle
+
+    @property
+    def rotor_count(self) -> int:
+        return self.file.parts.rotors
+
+    @property
+    def tilt_count(self) -> int:
+        return self.file.parts.tilts
+
+    @property
+    def spins(self) -> Values:
+        return self.resolve().spins
+
+    def tilt_of_rotor(self, rotor: int) -> int:
+        return layout_of(self.resolve().table)[rotor - 1]
+
+    @property
+    def hinge_inertias(self) -> Values:
+        return self.file.hinge_inertias
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        self.resolve()
+        self._check_limits()
+        return self

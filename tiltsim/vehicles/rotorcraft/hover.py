@@ -1,0 +1,66 @@
+"""Rotor speeds with which a multirotor hovers, from statics."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tiltsim.errors import InputError
+from tiltsim.models.rotor_table import Multirotor
+from tiltsim_controllers.analysis.torque_free import hover_direction, torque_free_forces
+from tiltsim_controllers.mathematics.scalar import Floats, Values
+from tiltsim_controllers.vehicle.effectiveness import force_and_torque
+
+TOLERANCE = 1e-9
+"""Relative, of the singular values of force and torque and of the limits."""
+
+
+def hover_speeds(vehicle: Multirotor, tilts: Values, limits: tuple[float, float]) -> Values:
+    """Signed rotor speeds (rad/s) without torque, whose force carries the weight.
+
+    The force is as large as the weight, and as nearly along the body's z axis as the tilt angles
+    allow. Of all inputs ``varpi |varpi|`` that make it, these have the least norm, or the least
+    largest one where the limits exclude those.
+
+    Args:
+        vehicle: The vehicle.
+        tilts: rad.
+        limits: Lowest and highest speed (rad/s) along the spin, the first negative for rotors that
+            reverse.
+
+    Raises:
+        InputError: If there are none within the limits.
+    """
+    force, torque = force_and_torque(vehicle.table, tilts)
+    weight = vehicle.mass * vehicle.gravity
+    direction = hover_direction(torque_free_forces(force, torque))
+    ends = np.outer(vehicle.spins, [speed * abs(speed) for speed in limits])
+    lower, upper = ends.min(axis=1), ends.max(axis=1)
+    inputs = _least_inputs(force, torque, weight * direction)
+    if not _within(inputs, lower, upper):
+        from tiltsim_controllers.analysis.attainable import TiltedRotors
+        from tiltsim_controllers.analysis.hover import hover
+
+        found = hover(TiltedRotors(force, torque, lower, upper, weight))
+        if found is None:
+            raise InputError(
+                "initial.rotor_speed: no rotor speeds within the limits hold the vehicle at its "
+                "initial tilts; give the speeds, or change vehicle.min_rotor_speed, "
+                "vehicle.max_rotor_speed or the gait"
+            )
+        return tuple(found.rotor_speeds.tolist())
+    return tuple((np.sign(inputs) * np.sqrt(np.abs(inputs))).tolist())
+
+
+def _least_inputs(force: Floats, torque: Floats, wanted: Floats) -> Floats:
+    """The shortest ``varpi |varpi|`` that make a force without torque."""
+    # Rows of one size: a force in N and a torque in N m do not compare.
+    sizes = np.abs(force).max(), np.abs(torque).max()
+    rows = np.vstack([force / sizes[0], torque / sizes[1]])
+    values = np.concatenate([wanted / sizes[0], np.zeros(3)])
+    inputs: Floats = np.linalg.pinv(rows, rcond=TOLERANCE) @ values
+    return inputs
+
+
+def _within(inputs: Floats, lower: Floats, upper: Floats) -> bool:
+    slack = TOLERANCE * np.abs(inputs).max()
+    return bool(((inputs >= lower - slack) & (inputs <= upper + slack)).all())
