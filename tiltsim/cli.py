@@ -18,7 +18,16 @@ from tiltsim.system.interrupts import terminations_as_interrupts
 from tiltsim.system.text import printable, without_long_words
 
 FLIGHT_COMMANDS: Final = ("run", "check", "sweep", "list", "view", "plot", "video")
-OTHER_COMMANDS: Final = ("concepts", "gait", "map", "singularity", "report", "bench", "schema")
+OTHER_COMMANDS: Final = (
+    "concepts",
+    "fleet",
+    "gait",
+    "map",
+    "singularity",
+    "report",
+    "bench",
+    "schema",
+)
 
 
 LONGEST_MESSAGE: Final = 1000

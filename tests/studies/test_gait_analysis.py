@@ -68,6 +68,7 @@ def test_report_of_a_red_gait(capsys) -> None:
     assert report["rank"] == 3
     assert len(report["singular_values"]) == 3
     assert report["R_phi"] == report["R_theta"] == 0.0
+    assert (report["torque_free_dimension"], report["singular_attitudes"]) == (1, "great circle")
     assert report["torque_free_direction"] == pytest.approx([0.0, 0.0, 1.0])
     assert report["singularity_margin"] == pytest.approx(np.pi / 2)
     assert report["acceptable_share"] == pytest.approx(1.0)
@@ -84,6 +85,7 @@ def test_report_of_a_blue_gait_warns_of_its_rank(capsys) -> None:
     words = ["gait", "--angles", "0.5,-0.5,-0.165813558,0.165813558"]
     report = run_json(capsys, *words)
     assert report["rank"] == 2
+    assert (report["torque_free_dimension"], report["singular_attitudes"]) == (0, "all")
     assert report["torque_free_direction"] is None
     assert report["singularity_margin"] == 0.0
     assert report["acceptable_share"] == 0.0
@@ -110,7 +112,7 @@ def test_report_of_a_moving_gait_covers_the_period() -> None:
     table = report["time"]
     times = np.array(table["time"])
     assert (times[0], times[-1]) == (0.0, 2.0)
-    for key in ("angles", "rank", "singular_values", "R", "singularity_margin", "rates"):
+    for key in ("angles", "rank", "singular_attitudes", "R", "singularity_margin", "rates"):
         assert len(table[key]) == len(times)
     assert report["angles"] == table["angles"][0]
     assert report["min_singularity_margin"] == min(table["singularity_margin"]) < 0.0

@@ -32,6 +32,8 @@ def add_parser(subparsers: Subparsers) -> None:
     add = parser.add_argument
     add("scenario", nargs="?", metavar="SCENARIO", help="take gait and vehicle from a scenario")
     add("--angles", metavar="A1,A2,A3,A4", help="tilt angles in rad, instead of a scenario")
+    mjcf = "the MJCF file of a vehicle of 4 to 16 rotors; --angles are those of its tilt hinges"
+    add("--mjcf", metavar="FILE", help=mjcf)
     add("--published", metavar="NAME", help="a gait of the thesis, such as ch06_gait_3")
     balance = "the gait of least tilt that hovers level under an acceleration, m/s^2, world"
     add("--balance", metavar="AX,AY,AZ", help=balance)
@@ -49,13 +51,18 @@ def add_parser(subparsers: Subparsers) -> None:
     add("--figure", choices=FIGURES, help=figure)
     case = "for --figure determinant: relation of alpha_1 and alpha_3 (default: equal)"
     add("--case", choices=CASES, help=case)
-    limits = "for --figure attainable: rotor speeds in rad/s (default: those of ch. 9)"
+    limits = """rotor speeds in rad/s: for --figure attainable (default: those of ch. 9), and with
+    --mjcf (default: those of the file)"""
     add("--speed-limits", metavar="MIN,MAX", help=limits)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyze, draw, print."""
+    if arguments.mjcf is not None:
+        from tiltsim.commands.multirotor_gait import run_multirotor
+
+        return run_multirotor(arguments)
     from tiltsim.commands.gait_figures import attainable_warnings, draw_gait
     from tiltsim.commands.gait_selection import select_gait
     from tiltsim.commands.gait_text import gait_text, list_text

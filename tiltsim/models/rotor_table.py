@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import TYPE_CHECKING
 
 from tiltsim_controllers.mathematics.scalar import Floats, Values
@@ -27,6 +28,8 @@ class Multirotor:
         table: Of the rotors; see `tiltsim_controllers.vehicle.effectiveness`.
         thrust_coefficients: K_f of each rotor, N s^2/rad^2.
         spins: Signs of the rotor speeds at positive thrust.
+        speed_ranges: Lowest and highest speed of each rotor, signed, rad/s; infinite where the file
+            gives none.
         tilts: Number of tilt hinges.
     """
 
@@ -36,6 +39,7 @@ class Multirotor:
     table: Values
     thrust_coefficients: Values
     spins: Values
+    speed_ranges: tuple[tuple[float, float], ...]
     tilts: int
 
     @property
@@ -61,6 +65,14 @@ def rotor_table(pose: VehiclePose, parts: Parts, center: Floats) -> Values:
 def spin_of(compiled: mujoco.MjModel, rotor: int) -> float:
     """The sign of a rotor's speed: its drag torque turns against it."""
     return -1.0 if compiled.actuator(f"thrust_{rotor}").gear[5] > 0.0 else 1.0
+
+
+def speed_range(compiled: mujoco.MjModel, rotor: int) -> tuple[float, float]:
+    """A rotor's lowest and highest speed (rad/s): its ``actrange``, else all along its spin."""
+    low, high = compiled.actuator(f"rotor_speed_{rotor}").actrange
+    if low < high:
+        return float(low), float(high)
+    return (0.0, inf) if spin_of(compiled, rotor) > 0.0 else (-inf, 0.0)
 
 
 def _row(pose: VehiclePose, rotor: int, center: Floats) -> Values:

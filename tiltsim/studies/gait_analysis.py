@@ -20,14 +20,17 @@ from tiltsim_controllers.analysis.fault_tolerance import (
 from tiltsim_controllers.analysis.published_gaits import DETERMINANT_CASES, TRIANGLE
 from tiltsim_controllers.analysis.singularity import (
     determinant,
+    force_matrix,
     margin_over_gait,
     rank,
     residuals,
     singular_values,
     singularity_margin,
     torque_free_direction,
+    torque_matrix,
 )
 from tiltsim_controllers.analysis.statics import hover_rotor_speeds
+from tiltsim_controllers.analysis.torque_free import SINGULAR_ATTITUDES, torque_free_forces
 from tiltsim_controllers.analysis.two_color_planner import check_path
 from tiltsim_controllers.analysis.unacceptable_attitudes import (
     acceptable_share,
@@ -299,9 +302,12 @@ def vehicle_name(vehicle: Vehicle) -> str | dict[str, float]:
 def _instant(angles: Floats, vehicle: Vehicle, roll: float, pitch: float) -> dict[str, Any]:
     """The singularity analysis of tilt angles of shape (4,) or (N, 4)."""
     R, R_phi, R_theta = residuals(angles, vehicle)
+    dimension = torque_free_forces(force_matrix(angles), torque_matrix(angles, vehicle)).dimension
     return {
         "angles": angles.tolist(),
         "rank": rank(angles, vehicle).tolist(),
+        "torque_free_dimension": dimension.tolist(),
+        "singular_attitudes": np.take(SINGULAR_ATTITUDES, dimension).tolist(),
         "singular_values": singular_values(angles, vehicle).tolist(),
         "R": R.tolist(),
         "R_phi": R_phi.tolist(),

@@ -129,12 +129,13 @@ class Canvas:
     def draw(self, names: str, values: str, caption: Caption) -> Image:
         """Render the scene, shape (height, width, 3), with a table at the upper left.
 
-        ``names`` and ``values`` are the columns of the table, one line per row.
+        ``names`` and ``values`` are the columns of the table, one line per row; both may be empty.
         """
         self._gl.make_current()  # another canvas may have been in use since
         mujoco.mjr_render(self._frame, self.scene, self._context)
         frame = self._frame
-        self._write(mujoco.mjtGridPos.mjGRID_TOPLEFT, frame, names, values)
+        if names:
+            self._write(mujoco.mjtGridPos.mjGRID_TOPLEFT, frame, names, values)
         corner = mujoco.MjrRect(0, caption.bottom, frame.width - caption.right, frame.height)
         if caption.text:
             self._write(mujoco.mjtGridPos.mjGRID_BOTTOMRIGHT, corner, caption.text, "")

@@ -1,0 +1,66 @@
+"""The vehicles in ``mjcf`` with any number of rotors, and what each can do."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from tiltsim.models.rotor_table import Multirotor
+from tiltsim.models.user_vehicle import read_user_vehicle
+from tiltsim.resources import shipped_folder
+from tiltsim.studies.multirotor_analysis import multirotor_report
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+BY_TURNS: Final = (0.35, -0.35, 0.35, -0.35, 0.35, -0.35)
+"""Tilt angles (rad), about as large as a fixed cant of 20 degrees."""
+
+FLEET: Final[dict[str, tuple[float, ...]]] = {
+    "quadrotor": (),
+    "cant_quadrotor": (),
+    "tiltrotor": (0.0,) * 4,
+    "hexarotor": (),
+    "cant_hexarotor": (),
+    "tilt_hexarotor": BY_TURNS,
+    "tilt_heptarotor": (*BY_TURNS, 0.0),
+    "omni_octorotor": (),
+}
+"""Names of the files, with tilt angles (rad) that show what the vehicle can do."""
+
+KEYS: Final = (
+    "rotors",
+    "tilts",
+    "angles",
+    "torque_free_dimension",
+    "singular_attitudes",
+    "singularity_margin",
+    "side_force_share",
+)
+
+
+def fleet_file(name: str) -> Path:
+    """The MJCF file of a vehicle of the fleet."""
+    return shipped_folder("mjcf") / f"{name}.xml"
+
+
+def fleet_report() -> list[dict[str, Any]]:
+    """The vehicles, in the order of `FLEET` (``tiltsim fleet --json``).
+
+    ``survives`` lists the rotors, from 1, whose loss leaves a hover that can be controlled without
+    other tilt angles.
+    """
+    rows = []
+    for name, angles in FLEET.items():
+        vehicle = read_user_vehicle(str(fleet_file(name)), "multirotor").vehicle
+        assert isinstance(vehicle, Multirotor)
+        report = multirotor_report(vehicle, angles, faults=True)
+        losses = enumerate(report["faults"], start=1)
+        rows.append(
+            {
+                "name": name,
+                **{key: report[key] for key in KEYS},
+                "max_rotor_speed": report["hover"]["max_rotor_speed"],
+                "survives": [rotor for rotor, loss in losses if loss and loss["controllable"]],
+            }
+        )
+    return rows

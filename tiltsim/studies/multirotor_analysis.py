@@ -1,0 +1,170 @@
+"""Analysis of any multirotor at fixed tilt angles, as a plain dict ready for JSON.
+
+Angles are in rad, everything else in SI units and body axes; what does not exist is None.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from tiltsim_controllers.analysis.attainable import (
+    TiltedRotors,
+    attainable_forces,
+    attainable_torques,
+    side_force_share,
+)
+from tiltsim_controllers.analysis.hover import hover, rotor_losses
+from tiltsim_controllers.analysis.singularity import world_up
+from tiltsim_controllers.analysis.torque_free import (
+    SINGULAR_ATTITUDES,
+    hover_direction,
+    singularity_margin,
+    torque_free_forces,
+)
+from tiltsim_controllers.vehicle.effectiveness import force_and_torque
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tiltsim.models.rotor_table import Multirotor
+    from tiltsim_controllers.analysis.attainable import AttainableSet
+    from tiltsim_controllers.analysis.hover import Hover
+
+UNLIMITED: Final = 100.0
+"""Share of the weight that a rotor without a speed limit can carry, in a search for a hover."""
+
+
+def tilted_rotors(
+    vehicle: Multirotor, angles: Sequence[float], limits: tuple[float, float] | None = None
+) -> TiltedRotors:
+    """The rotors of a vehicle at tilt angles (rad).
+
+    Args:
+        vehicle: with the ranges of its rotor speeds
+        angles: one for each tilt hinge, rad
+        limits: minimum and maximum rotor speed (rad/s) in place of those of the file; a rotor that
+            turns either way has the maximum both ways
+    """
+    ranges = np.array(vehicle.speed_ranges)
+    if limits is not None:
+        either_way = (ranges[:, 0] < 0.0) & (ranges[:, 1] > 0.0)
+        along = np.outer(vehicle.spins, limits)
+        ranges = np.sort(along, axis=1)
+        ranges[either_way] = (-limits[1], limits[1])
+    strongest = UNLIMITED * vehicle.mass * vehicle.gravity / min(vehicle.thrust_coefficients)
+    lower, upper = np.clip(ranges * np.abs(ranges), -strongest, strongest).T
+    force, torque = force_and_torque(vehicle.table, angles)
+    return TiltedRotors(force, torque, lower, upper, vehicle.mass * vehicle.gravity)
+
+
+def multirotor_report(
+    vehicle: Multirotor,
+    angles: Sequence[float],
+    *,
+    limits: tuple[float, float] | None = None,
+    roll: float = 0.0,
+    pitch: float = 0.0,
+    faults: bool = False,
+) -> dict[str, Any]:
+    """Singularities, hover and attainable sets (``tiltsim gait --mjcf FILE --json``).
+
+    Args:
+        vehicle: of any number of rotors
+        angles: one for each tilt hinge, rad
+        limits: as for `tilted_rotors`
+        roll, pitch: attitude of the margin, rad
+        faults: whether to add the hovers without each rotor
+
+    Returns:
+        Rotor speeds are along the spins, rad/s. Without rotor speed limits ``attainable`` is None,
+        and ``side_force_share`` where the dimension is 3.
+    """
+    rotors = tilted_rotors(vehicle, angles, limits)
+    forces = torque_free_forces(rotors.force, rotors.torque)
+    dimension, direction = int(forces.dimension), hover_direction(forces)
+    basis = np.linalg.svd(forces.projector)[0][:, :dimension]
+    strongest = np.linalg.norm(rotors.torque, axis=0).max()
+    values = np.linalg.svd(rotors.torque / strongest, compute_uv=False)
+    found = hover(rotors)
+    is_limited = limits is not None or bool(np.isfinite(vehicle.speed_ranges).all())
+    report: dict[str, Any] = {
+        "rotors": len(vehicle.spins),
+        "tilts": vehicle.tilts,
+        "angles": list(angles),
+        "rank": int(forces.rank),
+        "singular_values": values.tolist(),
+        "torque_free_dimension": dimension,
+        "torque_free_forces": basis.T.tolist(),
+        "torque_free_direction": None if np.isnan(direction).any() else direction.tolist(),
+        "singular_attitudes": SINGULAR_ATTITUDES[dimension],
+        "singularity_margin": float(singularity_margin(forces, world_up(roll, pitch))),
+        "roll": roll,
+        "pitch": pitch,
+        "hover_rotor_speeds": None if found is None else _along(found, vehicle),
+        "hover": _hover(found, vehicle),
+        "side_force_share": side_force_share(rotors) if is_limited or dimension < 3 else None,
+        "attainable": _attainable(rotors, found) if is_limited else None,
+    }
+    if faults:
+        report["faults"] = [_hover(loss, vehicle) for loss in rotor_losses(rotors)]
+    report["warnings"] = _warnings(report, is_limited=is_limited)
+    return report
+
+
+def _along(found: Hover, vehicle: Multirotor) -> list[float]:
+    return [float(s * w) for s, w in zip(vehicle.spins, found.rotor_speeds, strict=True)]
+
+
+def _hover(found: Hover | None, vehicle: Multirotor) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {
+        "lean": found.lean,
+        "force": found.force.tolist(),
+        "rotor_speeds": _along(found, vehicle),
+        "max_rotor_speed": found.max_rotor_speed,
+        "controllable": found.controllable,
+    }
+
+
+def _attainable(rotors: TiltedRotors, found: Hover | None) -> dict[str, Any]:
+    """The torque-free forces, and the torques while the lift of the hover carries the weight."""
+    sets = {"forces": attainable_forces(rotors)}
+    if found is not None:
+        sets["torques"] = attainable_torques(rotors, found.force / rotors.weight)
+    return {name: _extent(attainable) for name, attainable in sets.items()}
+
+
+def _extent(attainable: AttainableSet) -> dict[str, Any]:
+    empty = attainable.is_empty
+    return {
+        "dimension": attainable.dimension,
+        "lower": None if empty else attainable.lower.tolist(),
+        "upper": None if empty else attainable.upper.tolist(),
+        "vertices": attainable.vertices.tolist(),
+    }
+
+
+def _warnings(report: dict[str, Any], *, is_limited: bool) -> list[str]:
+    warnings = []
+    if report["rank"] < 3:
+        warnings.append(
+            f"rank of tau is {report['rank']}: the decoupling matrix is singular at every attitude"
+        )
+    elif report["torque_free_dimension"] == 0:
+        warnings.append(
+            "the rotors make no force without torque: the decoupling matrix is singular at every"
+            " attitude"
+        )
+    if report["hover"] is None:
+        warnings.append("no hover within the rotors' limits")
+    elif not report["hover"]["controllable"]:
+        warnings.append("in hover a rotor is at a limit, or tau has lost rank: no full control")
+    if not is_limited:
+        warnings.append(
+            "the file gives no highest rotor speeds (actrange of rotor_speed_i): what the rotors"
+            " can attain is not known; give --speed-limits MIN,MAX"
+        )
+    return warnings
