@@ -18,6 +18,7 @@ from tiltsim.views.figures.multirotor import multirotor_figure
 from tiltsim_controllers.analysis.attainable import TiltedRotors
 from tiltsim_controllers.analysis.singularity import singularity_margin
 from tiltsim_controllers.analysis.statics import hover_rotor_speeds
+from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 FLEET_PAGE = Path(__file__).parents[2] / "docs" / "fleet.md"
@@ -75,18 +76,33 @@ def test_tilting_arms_gain_two_dimensions(capsys):
     assert report(capsys, *words, by_turns)["torque_free_dimension"] == 3
 
 
+def test_tilting_arms_balance_a_gust(capsys):
+    found = report(capsys, "gait", "--mjcf", file_of("tilt_hexarotor"), "--balance", "1,0,0")
+    assert found["angles"] == found["balance"]["angles"]
+    table = read_user_vehicle(file_of("tilt_hexarotor"), "multirotor").vehicle.table
+    speeds = np.array(found["balance"]["rotor_speeds"])
+    spins = np.array([1.0, -1.0] * 3)
+    made = force_and_torque(table, found["angles"])[0] @ (spins * speeds * np.abs(speeds))
+    np.testing.assert_allclose(made, [-1.53, 0.0, 1.53 * 9.81], atol=1e-6)
+
+
 def test_the_summary_is_readable(capsys):
     assert main(["gait", "--mjcf", file_of("omni_octorotor"), "--faults"]) == 0
     text = capsys.readouterr().out
     assert "singular attitudes   none\n" in text
     assert "without rotor 8      level, controllable" in text
+    assert main(["gait", "--mjcf", file_of("tilt_hexarotor"), "--balance", "0,1,0"]) == 0
+    assert "balanced rotor speeds" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         (["--angles", "0,0"], "--angles 0,0: needs 6 angles"),
-        (["--balance", "1,0,0"], "--mjcf: cannot be combined with --balance"),
+        (["--vehicle", "luukkonen"], "--mjcf: cannot be combined with --vehicle"),
+        (["--angles", "0,0", "--balance", "1,0,0"], "--mjcf: give either --angles or --balance"),
+        (["--balance", "1,0"], "--balance 1,0: must be three numbers"),
+        (["--balance", "0,0,9.81"], "--balance 0,0,9.81: no tilt angles up to 1.05 rad"),
         (["x.toml"], "--mjcf: cannot be combined with SCENARIO"),
         (["--list"], "--list: takes no other option than --json"),
         (["--figure", "faults", "--plot", "f.png"], "choose roll_pitch or attainable"),

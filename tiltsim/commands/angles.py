@@ -53,6 +53,15 @@ def _checked(option: str, text: str, value: float) -> float:
     return value
 
 
+def parse_acceleration(text: str) -> tuple[float, float, float]:
+    """The acceleration ``AX,AY,AZ`` of ``--balance``, m/s^2. Raises `InputError`."""
+    try:
+        ax, ay, az = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"--balance {text}: must be three numbers, m/s^2") from None
+    return ax, ay, az
+
+
 def parse_vehicle(text: str | None) -> Vehicle:
     """A vehicle: a preset's name, ``KEY=VALUE`` in place of its parameters, or both.
 

@@ -6,7 +6,7 @@ import argparse
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from tiltsim.commands.angles import parse_angles, parse_vehicle
+from tiltsim.commands.angles import parse_acceleration, parse_angles, parse_vehicle
 from tiltsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -78,12 +78,9 @@ def _balanced(text: str, vehicle: Vehicle) -> Gait:
     from tiltsim_controllers.analysis.balance import balanced_gait
     from tiltsim_controllers.gaits import plans
 
+    acceleration = parse_acceleration(text)
     try:
-        ax, ay, az = (float(part) for part in text.split(","))
-    except ValueError:
-        raise InputError(f"--balance {text}: must be three numbers, m/s^2") from None
-    try:
-        angles = balanced_gait((ax, ay, az), vehicle)
+        angles = balanced_gait(acceleration, vehicle)
     except ValueError as error:
         raise InputError(f"--balance {text}: {error}") from None
     return replace(plans.fixed(angles), source=f"balances {text} m/s^2 at level attitude")

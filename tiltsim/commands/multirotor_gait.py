@@ -6,7 +6,12 @@ import argparse
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
-from tiltsim.commands.angles import parse_angle, parse_angles, parse_speed_limits
+from tiltsim.commands.angles import (
+    parse_acceleration,
+    parse_angle,
+    parse_angles,
+    parse_speed_limits,
+)
 from tiltsim.commands.figure_options import check_plot, save_figure
 from tiltsim.commands.text import aligned, json_text, number, numbers, print_figure_path
 from tiltsim.errors import InputError
@@ -18,7 +23,7 @@ if TYPE_CHECKING:
 FIGURES: Final = ("roll_pitch", "attainable")
 """Values of ``--figure`` for any multirotor."""
 
-OF_FOUR_ROTORS: Final = ("scenario", "published", "balance", "vehicle", "case")
+OF_FOUR_ROTORS: Final = ("scenario", "published", "vehicle", "case")
 """Arguments that are about the thesis's vehicle or a scenario's."""
 
 SETS: Final = {
@@ -33,9 +38,10 @@ def run_multirotor(arguments: argparse.Namespace) -> int:
     """Analyze the file of ``--mjcf``, draw, print."""
     _check_options(arguments)
     vehicle = _read(arguments.mjcf)
-    angles = _tilt_angles(arguments, vehicle)
     text = arguments.speed_limits
     limits = None if text is None else parse_speed_limits(text)
+    balance = None if arguments.balance is None else _balance(arguments.balance, vehicle, limits)
+    angles = _tilt_angles(arguments, vehicle) if balance is None else balance["angles"]
     roll = 0.0 if arguments.roll is None else parse_angle("--roll", arguments.roll)
     pitch = 0.0 if arguments.pitch is None else parse_angle("--pitch", arguments.pitch)
 
@@ -53,6 +59,8 @@ def run_multirotor(arguments: argparse.Namespace) -> int:
             vehicle, angles, limits=limits, roll=roll, pitch=pitch, faults=arguments.faults
         ),
     }
+    if balance is not None:
+        report["balance"] = balance
     print(json_text(report) if arguments.json else multirotor_text(report))
     print_figure_path(arguments)
     return 0
@@ -65,6 +73,8 @@ def _check_options(arguments: argparse.Namespace) -> None:
             raise InputError(f"--mjcf: cannot be combined with {option}")
     if arguments.list:
         raise InputError("--list: takes no other option than --json")
+    if arguments.angles is not None and arguments.balance is not None:
+        raise InputError("--mjcf: give either --angles or --balance")
     kind = arguments.figure
     if kind is not None and kind not in FIGURES:
         raise InputError(f"--figure {kind}: with --mjcf, choose {' or '.join(FIGURES)}")
@@ -95,6 +105,18 @@ def _tilt_angles(arguments: argparse.Namespace, vehicle: Multirotor) -> tuple[fl
     return parse_angles("--angles", text, vehicle.tilts)
 
 
+def _balance(
+    text: str, vehicle: Multirotor, limits: tuple[float, float] | None
+) -> dict[str, list[float]]:
+    """The least tilt angles that hold the vehicle level under the acceleration ``AX,AY,AZ``."""
+    from tiltsim.studies.multirotor_analysis import balance_report
+
+    try:
+        return balance_report(vehicle, parse_acceleration(text), limits)
+    except ValueError as error:
+        raise InputError(f"--balance {text}: {error}") from None
+
+
 def multirotor_text(report: dict[str, Any]) -> str:
     """The analysis in aligned lines."""
     direction, hover = report["torque_free_direction"], report["hover"]
@@ -116,6 +138,9 @@ def multirotor_text(report: dict[str, Any]) -> str:
     if report["side_force_share"] is not None:
         share = f"{100.0 * report['side_force_share']:.4g} % of the weight in every direction"
         rows.append(("level side force", share))
+    if "balance" in report:
+        speeds = numbers(report["balance"]["rotor_speeds"]) + " rad/s along spins"
+        rows.append(("balanced rotor speeds", speeds))
     for name, unit in (("forces", "N without torque"), ("torques", "N m at hover lift")):
         extent = (report["attainable"] or {}).get(name)
         if extent is not None and extent["lower"] is not None:

@@ -16,6 +16,7 @@ from tiltsim_controllers.analysis.attainable import (
     side_force_share,
 )
 from tiltsim_controllers.analysis.hover import hover, rotor_losses
+from tiltsim_controllers.analysis.level_hover import MAX_TILT, level_hover
 from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.torque_free import (
     SINGULAR_ATTITUDES,
@@ -111,6 +112,40 @@ def multirotor_report(
         report["faults"] = [_hover(loss, vehicle) for loss in rotor_losses(rotors)]
     report["warnings"] = _warnings(report, is_limited=is_limited)
     return report
+
+
+def balance_report(
+    vehicle: Multirotor,
+    acceleration: tuple[float, float, float],
+    limits: tuple[float, float] | None = None,
+) -> dict[str, list[float]]:
+    """Tilt angles and rotor speeds that hold the vehicle level under an acceleration (m/s^2).
+
+    Args:
+        vehicle: of any number of rotors
+        acceleration: constant, of the vehicle, world axes at yaw 0
+        limits: as for `tilted_rotors`
+
+    Raises:
+        ValueError: If no tilt angles and rotor speeds within the limits do.
+    """
+    rotors = tilted_rotors(vehicle, (0.0,) * vehicle.tilts, limits)
+    weight = np.array([0.0, 0.0, vehicle.gravity])
+    force = vehicle.mass * (weight - acceleration)
+    possible = force.any() and np.isfinite(force).all()
+    found = level_hover(vehicle.table, force, rotors[2:4]) if possible else None
+    if found is None:
+        raise ValueError(
+            f"no tilt angles up to {MAX_TILT:.3g} rad and rotor speeds within the limits hold the"
+            " vehicle level"
+        )
+    tilts, w = found
+    speeds = np.array(vehicle.spins) * np.copysign(np.sqrt(np.abs(w)), w)
+    return {
+        "acceleration": list(acceleration),
+        "angles": tilts.tolist(),
+        "rotor_speeds": speeds.tolist(),
+    }
 
 
 def _along(found: Hover, vehicle: Multirotor) -> list[float]:

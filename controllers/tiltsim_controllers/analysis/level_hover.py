@@ -1,0 +1,121 @@
+"""Tilt angles of any multirotor that hold it level against a constant acceleration.
+
+The rotors then make no torque and a force that balances weight and acceleration. Of all tilt angles
+for which some rotor speeds within the limits do so, those with the least sum of squares are found
+by sequential quadratic programming over tilts and rotor inputs together, from several starts.
+Without a reserve the least tilts would load some rotors fully and stop others.
+"""
+
+from __future__ import annotations
+
+from math import radians
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from scipy.optimize import minimize
+
+from tiltsim_controllers.vehicle.effectiveness import (
+    ROTOR_FLOATS,
+    SPIN_SIGN,
+    effectiveness_of,
+    layout_of,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tiltsim_controllers.mathematics.scalar import Floats
+
+BALANCED: Final = 1e-9
+"""Force, as a share of the weight, and torque, of that on the longest lever, that count as none."""
+
+RESERVE: Final = 0.25
+"""Share of the mean thrust that every rotor keeps from its limits."""
+
+MAX_TILT: Final = radians(60.0)
+
+STARTS: Final = (0.0, 0.15, 0.4)
+"""Size of the tilt angles (rad) at the starts of the search, with alternating signs too."""
+
+
+def level_hover(
+    table: Sequence[float], force: Floats, box: tuple[Floats, Floats], max_tilt: float = MAX_TILT
+) -> tuple[Floats, Floats] | None:
+    """The least tilt angles with which the rotors make a force without torque.
+
+    Args:
+        table: of the rotors, `tiltsim_controllers.vehicle.effectiveness`
+        force: N, body axes, shape (3,)
+        box: lower and upper bounds of the rotor inputs w, rad^2/s^2, shape (N,) each
+        max_tilt: largest tilt angle, rad
+
+    Returns:
+        Tilt angles (rad) and rotor inputs w; None where no limits are met.
+    """
+    problem = _Problem(table, force)
+    tilts, rotors = problem.tilts, problem.rotors
+    reserve = RESERVE / problem.rotors
+    low, high = box[0] / problem.unit + reserve, box[1] / problem.unit - reserve
+    if (low > high).any():
+        return None
+    bounds = [(-max_tilt, max_tilt)] * tilts + [*zip(low, high, strict=True)]
+    even = np.clip(problem.spins / rotors, low, high)
+    by_turns = (-1.0) ** np.arange(tilts)
+    candidates: list[Floats] = []
+    for size in STARTS:
+        for signs in (np.ones(tilts), by_turns):
+            found = minimize(
+                lambda x: float(x[:tilts] @ x[:tilts]),
+                np.concatenate([size * signs, even]),
+                jac=lambda x: np.concatenate([2.0 * x[:tilts], np.zeros(rotors)]),
+                method="SLSQP",
+                bounds=bounds,
+                constraints={"type": "eq", "fun": problem.imbalance, "jac": problem.slopes},
+                options={"ftol": 1e-14, "maxiter": 200},
+            ).x
+            if np.abs(problem.imbalance(found)).max() < BALANCED:
+                candidates.append(found)
+    if not candidates:
+        return None
+    best = min(candidates, key=lambda x: float(x[:tilts] @ x[:tilts]))
+    return best[:tilts], best[tilts:] * problem.unit
+
+
+class _Problem:
+    """Imbalance of tilts and inputs, in units of the force wanted and its torque on a lever."""
+
+    def __init__(self, table: Sequence[float], force: Floats) -> None:
+        layout = layout_of(table)
+        self._functions = effectiveness_of(layout)
+        self._table = table
+        self.rotors, self.tilts = len(layout), max(layout) + 1
+        self._tilt_of = np.array(layout)
+        self.spins = np.array(table[SPIN_SIGN::ROTOR_FLOATS])
+        rows = self._rows(1.0, *self._turned(np.zeros(self.tilts)))
+        self.unit = float(np.linalg.norm(force) / np.linalg.norm(rows[:3], axis=0).max())
+        lever = np.linalg.norm(rows[3:], axis=0).max() * self.unit
+        self._scale = np.repeat([1.0 / np.linalg.norm(force), 1.0 / lever], 3)
+        self._wanted = np.concatenate([force, np.zeros(3)])
+
+    def _turned(self, tilts: Floats) -> tuple[Floats, Floats]:
+        return np.cos(tilts), np.sin(tilts)
+
+    def _rows(self, constant: float, cosines: Floats, sines: Floats) -> Floats:
+        return np.array(self._functions.rows(constant, cosines, sines, self._table, 0))
+
+    def imbalance(self, x: Floats) -> Floats:
+        """Force less that wanted, and torque, shape (6,)."""
+        cosines, sines = self._turned(x[: self.tilts])
+        wrench = self._rows(1.0, cosines, sines) @ (x[self.tilts :] * self.unit)
+        return np.asarray((wrench - self._wanted) * self._scale)
+
+    def slopes(self, x: Floats) -> Floats:
+        """Its derivatives by tilts and inputs, shape (6, tilts + rotors)."""
+        cosines, sines = self._turned(x[: self.tilts])
+        per_input = self._rows(1.0, cosines, sines) * self.unit
+        turning = self._rows(0.0, -sines, cosines) * (x[self.tilts :] * self.unit)
+        per_tilt = np.zeros((6, self.tilts))
+        for rotor, tilt in enumerate(self._tilt_of):
+            if tilt >= 0:
+                per_tilt[:, tilt] += turning[:, rotor]
+        return np.asarray(np.hstack([per_tilt, per_input]) * self._scale[:, np.newaxis])
