@@ -6,6 +6,7 @@ import ast
 import re
 import subprocess
 import sys
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -24,7 +25,18 @@ FILES = {
     for name, folder in PACKAGES.items()
     for file in sorted(folder.rglob("*.py"))
 }
-TREES = {module: ast.parse(file.read_text(encoding="utf-8")) for module, file in FILES.items()}
+
+
+@cache
+def nodes():
+    """All nodes of the syntax tree of every module, the module itself first."""
+    trees = {module: ast.parse(file.read_text(encoding="utf-8")) for module, file in FILES.items()}
+    return {module: [*ast.walk(tree)] for module, tree in trees.items()}
+
+
+def trees():
+    return {module: tree for module, (tree, *_) in nodes().items()}
+
 
 ORDER = {
     "tiltsim_controllers": ("__init__", *CONTROLLERS),
@@ -33,23 +45,30 @@ ORDER = {
 """Folders and root modules of each package; imports go to the same or to an earlier one."""
 
 FLYING_PREFIXES = tuple(f"tiltsim.{folder}." for folder in FLYING)
-PRESCRIBED = {
-    signature
-    for module, tree in TREES.items()
-    for node in ast.walk(tree)
-    if module.startswith(("tiltsim.closed_loop.", "tiltsim.equations."))
-    if isinstance(node, ast.ClassDef)
-    for signature in re.findall(r"``\((.*?)\) ->", ast.get_docstring(node) or "")
-}
-"""Argument lists of the functions that make a closed loop, as its records document them."""
-
 HEAVY = {"av", "mujoco", "numba", "matplotlib", "rerun", "pyarrow", "dm_control", "pydantic"}
 
 
-def imports(module, tree):
-    """Every module that a module imports anywhere in its text, `TYPE_CHECKING` blocks included."""
+def prescribed():
+    """Argument lists of the functions that make a closed loop, as its records document them."""
+    return {
+        signature
+        for module, found in nodes().items()
+        if module.startswith(("tiltsim.closed_loop.", "tiltsim.equations."))
+        for node in found
+        if isinstance(node, ast.ClassDef)
+        for signature in re.findall(r"``\((.*?)\) ->", ast.get_docstring(node) or "")
+    }
+
+
+def imports(module, found):
+    """Every module that a module imports anywhere in its text, `TYPE_CHECKING` blocks included.
+
+    Args:
+        module: Its name.
+        found: The nodes of its syntax tree.
+    """
     package = module if FILES[module].name == "__init__.py" else module.rpartition(".")[0]
-    for node in ast.walk(tree):
+    for node in found:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -59,10 +78,12 @@ def imports(module, tree):
                 base = ".".join([*parents, *filter(None, [node.module])])
             # ``from tiltsim.plants import plant`` imports the module tiltsim.plants.plant
             names = (f"{base}.{alias.name}" for alias in node.names)
-            yield from (name if name in TREES else base for name in names)
+            yield from (name if name in FILES else base for name in names)
 
 
-IMPORTS = {module: {*imports(module, tree)} for module, tree in TREES.items()}
+@cache
+def imported():
+    return {module: {*imports(module, found)} for module, found in nodes().items()}
 
 
 def place(module):
@@ -71,15 +92,15 @@ def place(module):
     return list(ORDER).index(package), ORDER[package].index(rest[0] if rest else "__init__")
 
 
-def upward(module, imported):
+def upward(module, names):
     """Imports of a module that go to a later folder."""
-    ours = sorted(name for name in imported if name in TREES)
+    ours = sorted(name for name in names if name in FILES)
     return [f"{module} imports {name}" for name in ours if place(name) > place(module)]
 
 
 def roots(module):
     """Names of the packages that a module imports from."""
-    return {name.partition(".")[0] for name in IMPORTS[module]}
+    return {name.partition(".")[0] for name in imported()[module]}
 
 
 def modules_loaded_by(code):
@@ -90,17 +111,16 @@ def modules_loaded_by(code):
     return set(done.stdout.split())
 
 
-CLASSES = {
-    node.name: node
-    for tree in TREES.values()
-    for node in ast.walk(tree)
-    if isinstance(node, ast.ClassDef)
-}
+@cache
+def classes():
+    every = (node for found in nodes().values() for node in found)
+    return {node.name: node for node in every if isinstance(node, ast.ClassDef)}
 
 
 def overrides(class_node, name):
     """Whether a base class of ours defines a member of this name, which documents it."""
-    bases = [CLASSES[base.id] for base in class_node.bases if getattr(base, "id", "") in CLASSES]
+    known = classes()
+    bases = [known[base.id] for base in class_node.bases if getattr(base, "id", "") in known]
     return any(
         any(getattr(member, "name", "") == name for member in base.body) or overrides(base, name)
         for base in bases
@@ -133,19 +153,19 @@ def test_every_folder_and_module_has_its_place_in_the_order():
 
 def test_imports_go_to_the_same_or_an_earlier_folder():
     # The package itself imports its public names on first use.
-    modules = [module for module in TREES if module != "tiltsim"]
-    assert [line for module in modules for line in upward(module, IMPORTS[module])] == []
+    modules = [module for module in FILES if module != "tiltsim"]
+    assert [line for module in modules for line in upward(module, imported()[module])] == []
 
 
 def test_an_upward_import_is_noticed():
     module, text = "tiltsim.scenario.loading", "def f():\n    from tiltsim.plants import plant\n"
-    assert upward(module, {*imports(module, ast.parse(text))}) == [
+    assert upward(module, {*imports(module, ast.walk(ast.parse(text)))}) == [
         "tiltsim.scenario.loading imports tiltsim.plants.plant"
     ]
 
 
 def test_no_modules_import_each_other():
-    ours = {module: IMPORTS[module] & (TREES.keys() - {module}) for module in TREES}
+    ours = {module: imported()[module] & (FILES.keys() - {module}) for module in FILES}
     TopologicalSorter(ours).prepare()  # raises CycleError, which names the circle
 
 
@@ -154,12 +174,12 @@ def test_few_modules_lie_directly_in_the_package():
 
 
 def test_controllers_know_neither_mujoco_nor_the_testbed():
-    modules = [module for module in TREES if module.startswith("tiltsim_controllers")]
+    modules = [module for module in FILES if module.startswith("tiltsim_controllers")]
     assert not set().union(*map(roots, modules)) & {"mujoco", "dm_control", "tiltsim", "numba"}
 
 
 def test_flying_needs_no_library_for_screens():
-    flying = [module for module in TREES if module.startswith(FLYING_PREFIXES)]
+    flying = [module for module in FILES if module.startswith(FLYING_PREFIXES)]
     assert not set().union(*map(roots, flying)) & {"argparse", "av", "matplotlib", "rerun", "tqdm"}
 
 
@@ -198,10 +218,10 @@ def test_an_unknown_name_of_the_package_is_an_attribute_error():
 
 
 def test_every_public_definition_has_a_docstring():
-    assert [module for module, tree in TREES.items() if not ast.get_docstring(tree)] == []
+    assert [module for module, tree in trees().items() if not ast.get_docstring(tree)] == []
     bare = [
         f"{module}.{name}"
-        for module, tree in TREES.items()
+        for module, tree in trees().items()
         for name, node in public_definitions(tree)
         if not ast.get_docstring(node)
     ]
@@ -220,13 +240,13 @@ def documented_arguments(docstring):
 def test_every_public_function_documents_its_arguments():
     """From four arguments on; a signature that a record prescribes is documented there."""
     bare = []
-    for module, tree in TREES.items():
+    for module, tree in trees().items():
         for name, node in public_definitions(tree):
             if isinstance(node, ast.FunctionDef):
                 arguments = node.args.posonlyargs + node.args.args + node.args.kwonlyargs
                 names = [a.arg for a in arguments if a.arg not in {"self", "cls"}]
                 missing = {*names} - documented_arguments(ast.get_docstring(node))
-                if len(names) >= 4 and missing and not PRESCRIBED & {", ".join(names)}:
+                if len(names) >= 4 and missing and not prescribed() & {", ".join(names)}:
                     bare.append(f"{module}.{name}: {', '.join(sorted(missing))}")
     assert bare == []
 
@@ -269,9 +289,9 @@ GUARDED = {
 
 def test_what_only_posix_has_is_guarded():
     found = {}
-    for module, tree in TREES.items():
-        used = IMPORTS[module] & POSIX_ONLY
-        for node in ast.walk(tree):
+    for module, (tree, *inside) in nodes().items():
+        used = imported()[module] & POSIX_ONLY
+        for node in inside:
             if isinstance(node, ast.Attribute):
                 used |= {ast.unparse(node)} & POSIX_ONLY
             elif isinstance(node, ast.Constant) and isinstance(node.value, str):
@@ -279,6 +299,6 @@ def test_what_only_posix_has_is_guarded():
         if used:
             found[module] = used
         top_level = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
-        at_the_top = {*imports(module, ast.Module(top_level, []))}
+        at_the_top = {*imports(module, top_level)}
         assert not at_the_top & POSIX_ONLY, module
     assert found == GUARDED
