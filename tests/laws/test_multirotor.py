@@ -1,0 +1,221 @@
+"""Multirotors in closed loops: as cases of each other, on both plants, level, limited, refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tiltsim
+from tiltsim.errors import InputError
+from tiltsim.resources import shipped_folder
+from tiltsim.vehicles.rotorcraft.hover import hover_speeds
+from tiltsim_controllers.vehicle.effectiveness import force_and_torque
+
+TILTS = {"type": "waypoints", "angles": [[0.2, -0.2] * 3, [0.3, -0.3] * 3], "period": 2.0}
+CIRCLE = {"type": "circle", "radius": 1.0, "angular_frequency": 0.5}
+ON_CIRCLE = {"position": [1.0, 0.0, 0.0], "velocity": [0.0, 0.5, 0.0]}
+
+
+def mjcf(name):
+    return str(shipped_folder("mjcf") / f"{name}.xml")
+
+
+def document(name, vehicle=None, **tables):
+    """A scenario of a shipped vehicle as a multirotor."""
+    tables.setdefault("controller", {"law": "attitude_force"})
+    tables["simulation"] = {"duration": 0.3, "engine": "python", **tables.get("simulation", {})}
+    vehicle = {"model": "multirotor", "mjcf": mjcf(name), **(vehicle or {})}
+    tables["initial"] = {**ON_CIRCLE, **tables.get("initial", {})}
+    return {"vehicle": vehicle, "reference": CIRCLE, **tables}
+
+
+def fly(name, vehicle=None, **tables):
+    flight = tiltsim.simulate(document(name, vehicle, **tables))
+    assert flight.end.kind == "completed", flight.end
+    return flight
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_the_tiltrotor_is_a_multirotor(plant):
+    simulation = {"duration": 0.3, "engine": "python", "plant": plant}
+    gait = {"type": "trot_continuous", "amplitude": 0.3, "period": 2.0}
+    shared = {"reference": CIRCLE, "gait": gait, "initial": ON_CIRCLE}
+    law = {"gait_rate_feedforward": True, "decoupling": "exact", "decoupler": "exact"}
+    special = tiltsim.simulate(
+        {"controller": {**law, "gains": "feedforward"}, "simulation": simulation, **shared}
+    )
+    general = fly(
+        "tiltrotor",
+        controller={
+            "law": "attitude_force",
+            "gains": "feedforward",
+            "attitude_error": "euler_angles",
+        },
+        initial={"rotor_speed": 300.0},
+        simulation=simulation,
+        gait=gait,
+    )
+    for name in ("position", "attitude", "tilt_angles", "reference_attitude"):
+        assert np.abs(general[name] - special[name]).max() < 1e-9, name
+    assert np.abs(general["rotor_speeds"] - special["rotor_speeds"]).max() < 1e-6
+    assert (
+        np.abs(general["singularity_margin"] - np.abs(special["singularity_margin"])).max() < 1e-9
+    )
+    metrics = {"min_decoupling_condition"}
+    assert set(special.metrics()) - set(general.metrics()) == metrics
+
+
+def test_plants_agree_but_for_the_gyroscopic_torque():
+    flights = [
+        fly("tilt_hexarotor", gait=TILTS, simulation={"plant": plant})
+        for plant in ("mujoco", "thesis")
+    ]
+    assert np.abs(flights[0]["position"] - flights[1]["position"]).max() < 1e-6
+    assert flights[0]["tilt_angles"].shape[1] == 6
+    assert np.abs(flights[0]["tilt_angles"] - flights[0]["reference_tilt_angles"]).max() < 2e-3
+
+
+def test_full_force_stays_level_in_a_side_wind():
+    wind = [{"type": "acceleration", "value": [0.0, 1.0, 0.0]}]
+    flight = fly("cant_hexarotor", disturbance=wind)
+    assert np.abs(flight["attitude"]).max() < 1e-6
+    leaning = fly(
+        "cant_hexarotor", disturbance=wind, controller={"law": "attitude_force", "dimension": 1}
+    )
+    assert np.abs(leaning["attitude"]).max() > 1e-3
+
+
+def test_rotors_keep_within_their_limits():
+    flight = fly("hexarotor", {"min_rotor_speed": 530.0, "max_rotor_speed": 545.0})
+    speeds = flight["rotor_speeds"] * flight.scenario.any_rotorcraft.spins
+    assert speeds.min() >= 530.0 - 1e-9
+    assert speeds.max() <= 545.0 + 1e-9
+    assert flight.metrics()["saturated_fraction"] > 0.0
+
+
+ACTUATORS = {
+    "vehicle": {
+        "rotor_time_constant": 0.02,
+        "max_rotor_speed": 900.0,
+        "tilt_servo": {"natural_frequency": 50.0, "max_rate": 2.0},
+    },
+    "simulation": {"control_timestep": 0.004, "control_latency": 0.008},
+    "sensors": {"position_noise": 0.01},
+    "fault": [
+        {"type": "stuck_servo", "rotor": 2, "time": 0.1},
+        {"type": "partial_thrust", "rotor": 6, "time": 0.15, "factor": 0.9},
+    ],
+    "gait": TILTS,
+}
+
+
+def test_actuators_sensors_and_faults_act_on_each_rotor():
+    flight = fly("tilt_hexarotor", **ACTUATORS)
+    assert np.ptp(flight["alpha_2"][flight["time"] > 0.25]) < 1e-4
+    assert np.ptp(flight["alpha_1"][flight["time"] > 0.25]) > 1e-3
+    assert (
+        flight["thrust_factor_6"].tolist() == (np.where(flight["time"] >= 0.15, 0.9, 1.0)).tolist()
+    )
+    assert set(flight["thrust_factor_1"]) == {1.0}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "tables"),
+    [
+        ("tilt_hexarotor", {"gait": TILTS}),
+        ("tilt_hexarotor", {"gait": TILTS, "simulation": {"plant": "thesis"}}),
+        ("tilt_hexarotor", ACTUATORS),
+        ("omni_octorotor", {"controller": {"law": "attitude_force", "norm": "thrust"}}),
+    ],
+)
+def test_engines_fly_the_same_bit_for_bit(name, tables):
+    flown = [
+        fly(name, **{**tables, "simulation": {**tables.get("simulation", {}), "engine": engine}})
+        for engine in ("python", "native")
+    ]
+    for column, values in flown[0].columns.items():
+        np.testing.assert_array_equal(values, flown[1][column], err_msg=column)
+
+
+@pytest.mark.parametrize(
+    "name", ["hexarotor", "tilt_heptarotor", "omni_octorotor", "cant_quadrotor"]
+)
+def test_initial_rotor_speeds_hover(name):
+    vehicle = tiltsim.load_scenario(document(name)).vehicle.resolve()
+    tilts = tuple(0.1 * (-1.0) ** i for i in range(vehicle.tilts))
+    speeds = np.array(hover_speeds(vehicle, tilts, (-np.inf, np.inf)))
+    force, torque = force_and_torque(vehicle.table, tilts)
+    inputs = speeds * np.abs(speeds)
+    assert np.abs(torque @ inputs).max() < 1e-12 * vehicle.mass
+    assert np.linalg.norm(force @ inputs) == pytest.approx(vehicle.mass * vehicle.gravity)
+    limits = np.abs(speeds).min() * 0.5, np.abs(speeds).max() * 0.999
+    if name != "hexarotor" and name != "cant_quadrotor":  # these have one hover only
+        within = np.abs(hover_speeds(vehicle, tilts, (-limits[1], limits[1])))
+        assert within.max() <= limits[1] * (1.0 + 1e-6)
+
+
+HEXAROTOR = {"model": "multirotor", "mjcf": mjcf("hexarotor")}
+
+
+@pytest.mark.parametrize(
+    ("tables", "message"),
+    {
+        "no file": ({"vehicle": {"model": "multirotor"}}, "vehicle.mjcf: missing, and required"),
+        "a law of others": ({"controller": {"law": "attitude_altitude"}}, "choose attitude_force"),
+        "too much force": (
+            {"controller": {"law": "attitude_force", "dimension": 3}},
+            "controller.dimension = 3: the vehicle has 1 only, as its rotors are placed",
+        ),
+        "tilts of fixed rotors": (
+            {"gait": {"type": "fixed", "angles": [0.1] * 6}},
+            "has 6 tilt angles; the vehicle has 0",
+        ),
+        "servos of fixed rotors": (
+            {"vehicle": {**HEXAROTOR, "tilt_servo": {"max_rate": 1.0}}},
+            "vehicle.mjcf has no tilts; remove it",
+        ),
+        "a servo that is not there": (
+            {"fault": [{"type": "stuck_servo", "rotor": 2, "time": 0.1}]},
+            "fault.rotor = 2: is fixed and has no servo",
+        ),
+        "a rotor that is not there": (
+            {"fault": [{"type": "rotor_loss", "rotor": 7, "time": 0.1}]},
+            "fault.rotor = 7: the vehicle has 6 rotors",
+        ),
+        "speeds of other rotors": (
+            {"initial": {"rotor_speed": [500.0] * 4}},
+            "the multirotor has 6 rotors; give one value or one each",
+        ),
+        "a pose without side force": (
+            {"reference": {"type": "setpoint", "roll": 0.2}},
+            "reference.roll = 0.2: is no output with 1 components of force",
+        ),
+        "air": ({"air": {"drag": [0.1, 0.1, 0.1]}}, "aerodynamic effects are not supported"),
+        "a wrong model": (
+            {"model_error": {"mass": 1.1}},
+            "is supported for tiltrotor and quadrotor",
+        ),
+        "limits on equations": (
+            {"vehicle": {**HEXAROTOR, "max_rotor_speed": 900.0}, "simulation": {"plant": "thesis"}},
+            "its equations of a multirotor have ideal rotors and servos; use mujoco",
+        ),
+        "no hover within the limits": (
+            {"vehicle": {**HEXAROTOR, "max_rotor_speed": 400.0}},
+            "initial.rotor_speed",
+        ),
+    }.values(),
+)
+def test_a_mistake_is_one_clear_line(tables, message):
+    with pytest.raises(InputError) as caught:
+        tiltsim.simulate({**document("hexarotor"), **tables})
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_gait_through_angles_of_less_force_says_where():
+    gait = {"type": "waypoints", "angles": [[0.2, -0.2] * 3, [-0.2, 0.2] * 3], "period": 2.0}
+    controller = {"law": "attitude_force", "dimension": 3}
+    with pytest.raises(InputError, match=r"has 1 only, at tilt angles \(0, 0, 0, 0, 0, 0\) rad"):
+        tiltsim.load_scenario(document("tilt_hexarotor", gait=gait, controller=controller))
+    assert tiltsim.load_scenario(document("tilt_hexarotor", gait=gait))
