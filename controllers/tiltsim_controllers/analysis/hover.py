@@ -65,7 +65,7 @@ def hover(rotors: TiltedRotors) -> Hover | None:
 
 def _least_lean(rotors: TiltedRotors, *, controllable: bool) -> Hover | None:
     for force in _candidates(rotors):
-        w = _evenest_inputs(rotors, force)
+        w = evenest_inputs(rotors, force)
         if w is not None:
             lean = acos(min(1.0, max(-1.0, float(force[2]) / rotors.weight)))
             return Hover(lean, force, np.copysign(np.sqrt(np.abs(w)), w), controllable)
@@ -129,7 +129,7 @@ def _highest_on_sphere(corners: Floats, radius: float) -> list[Floats]:
     return [center + reach * uphill / length] if length > INSIDE else []
 
 
-def _evenest_inputs(rotors: TiltedRotors, force: Floats) -> Floats | None:
+def evenest_inputs(rotors: TiltedRotors, force: Floats) -> Floats | None:
     """The w of a torque-free force within the limits whose largest is smallest; None if none."""
     unit = rotors.weight / np.linalg.norm(rotors.force, axis=0).max()
     arm = np.linalg.norm(rotors.torque, axis=0).max() * unit or 1.0

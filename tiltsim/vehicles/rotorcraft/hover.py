@@ -38,16 +38,17 @@ def hover_speeds(vehicle: Multirotor, tilts: Values, limits: tuple[float, float]
     inputs = _least_inputs(force, torque, weight * direction)
     if not _within(inputs, lower, upper):
         from tiltsim_controllers.analysis.attainable import TiltedRotors
-        from tiltsim_controllers.analysis.hover import hover
+        from tiltsim_controllers.analysis.hover import evenest_inputs
 
-        found = hover(TiltedRotors(force, torque, lower, upper, weight))
+        rotors = TiltedRotors(force, torque, lower, upper, weight)
+        found = evenest_inputs(rotors, weight * direction)
         if found is None:
             raise InputError(
                 "initial.rotor_speed: no rotor speeds within the limits hold the vehicle at its "
                 "initial tilts; give the speeds, or change vehicle.min_rotor_speed, "
                 "vehicle.max_rotor_speed or the gait"
             )
-        return tuple(found.rotor_speeds.tolist())
+        inputs = found
     return tuple((np.sign(inputs) * np.sqrt(np.abs(inputs))).tolist())
 
 
