@@ -62,7 +62,8 @@ def test_a_file_with_limits_has_attainable_sets_and_faults(capsys):
     lift = found["attainable"]["forces"]["upper"][2]
     highest = 6.0 * 8.54858e-6 * 838.0**2 * np.cos(np.radians(25.0))
     assert 0.9 * highest < lift < highest  # canted rotors of two spins are not loaded evenly
-    assert [loss is not None for loss in found["faults"]] == [True] * 4 + [False] * 2
+    hovers = [loss["hover"] is not None for loss in found["faults"]]
+    assert hovers == [True] * 4 + [False] * 2
     limited = report(
         capsys, "gait", "--mjcf", file_of("cant_hexarotor"), "--speed-limits", "100,600"
     )
@@ -86,13 +87,31 @@ def test_tilting_arms_balance_a_gust(capsys):
     np.testing.assert_allclose(made, [-1.53, 0.0, 1.53 * 9.81], atol=1e-6)
 
 
+def test_other_tilts_make_the_loss_of_a_rotor_controllable(capsys):
+    found = report(capsys, "gait", "--mjcf", file_of("tilt_hexarotor"), "--faults")
+    table = read_user_vehicle(file_of("tilt_hexarotor"), "multirotor").vehicle.table
+    spins = np.array([1.0, -1.0] * 3)
+    for lost, loss in enumerate(found["faults"]):
+        assert not loss["hover"]["controllable"]
+        free = loss["free_tilts"]
+        assert free["controllable"]
+        speeds = np.array(free["rotor_speeds"])
+        assert (speeds == 0.0).nonzero()[0].tolist() == [lost]
+        force, torque = force_and_torque(table, free["angles"])
+        np.testing.assert_allclose(torque @ (spins * speeds**2), 0.0, atol=1e-7)
+        np.testing.assert_allclose(force @ (spins * speeds**2), [0.0, 0.0, 1.53 * 9.81], atol=1e-6)
+
+
 def test_the_summary_is_readable(capsys):
     assert main(["gait", "--mjcf", file_of("omni_octorotor"), "--faults"]) == 0
     text = capsys.readouterr().out
     assert "singular attitudes   none\n" in text
     assert "without rotor 8      level, controllable" in text
-    assert main(["gait", "--mjcf", file_of("tilt_hexarotor"), "--balance", "0,1,0"]) == 0
-    assert "balanced rotor speeds" in capsys.readouterr().out
+    words = "--balance", "0,1,0", "--faults"
+    assert main(["gait", "--mjcf", file_of("tilt_hexarotor"), *words]) == 0
+    text = capsys.readouterr().out
+    assert "balanced rotor speeds" in text
+    assert "level, controllable, at 0, " in text
 
 
 @pytest.mark.parametrize(
@@ -128,8 +147,6 @@ def test_a_file_that_is_none_and_angles_that_turn_nothing(capsys):
     ("name", "kind", "titles"),
     [
         ("tiltrotor", "roll_pitch", ["Singular attitudes: great circle", ""]),
-        ("cant_hexarotor", "roll_pitch", ["Singular attitudes: none", ""]),
-        ("hexarotor", "attainable", ["Force without torque, by weight", TORQUE]),
         ("omni_octorotor", "attainable", ["Force without torque, by weight", TORQUE]),
     ],
 )
@@ -155,6 +172,7 @@ def test_plot_is_written(capsys, tmp_path):
     assert file.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_the_page_has_the_table_that_the_command_prints(capsys):
     assert main(["fleet", "--markdown"]) == 0
     assert capsys.readouterr().out.strip() in FLEET_PAGE.read_text(), "run tiltsim fleet --markdown"

@@ -149,12 +149,20 @@ def multirotor_text(report: dict[str, Any]) -> str:
                 f"{number(low, '.4g')}..{number(high, '.4g')}" for low, high in bounds
             )
             rows.append((f"attainable {name}", f"{ranges} {unit} (x, y, z)"))
-    for rotor, loss in enumerate(report.get("faults", ()), start=1):
-        rows.append((f"without rotor {rotor}", "no hover" if loss is None else _hover_text(loss)))
+    for loss in report.get("faults", ()):
+        hover = loss["hover"]
+        text = "no hover" if hover is None else _hover_text(hover)
+        rows.append((f"without rotor {loss['rotor']}", text))
+        if loss["free_tilts"] is not None:
+            control = _control(loss["free_tilts"])
+            rows.append(("", f"level, {control}, at {numbers(loss['free_tilts']['angles'])} rad"))
     return "\n".join([*aligned(rows), *(f"warning: {text}" for text in report["warnings"])])
 
 
 def _hover_text(hover: dict[str, Any]) -> str:
     level = "level" if hover["lean"] < 1e-6 else f"leaning by {number(hover['lean'], '.4g')} rad"
-    control = "controllable" if hover["controllable"] else "not controllable"
-    return f"{level}, {control}, up to {hover['max_rotor_speed']:.4g} rad/s"
+    return f"{level}, {_control(hover)}, up to {hover['max_rotor_speed']:.4g} rad/s"
+
+
+def _control(hover: dict[str, Any]) -> str:
+    return "controllable" if hover["controllable"] else "not controllable"

@@ -46,21 +46,25 @@ def fleet_file(name: str) -> Path:
 def fleet_report() -> list[dict[str, Any]]:
     """The vehicles, in the order of `FLEET` (``tiltsim fleet --json``).
 
-    ``survives`` lists the rotors, from 1, whose loss leaves a hover that can be controlled without
-    other tilt angles.
+    ``survives`` lists the rotors, from 1, whose loss leaves a hover that can be controlled, if need
+    be with other tilt angles.
     """
     rows = []
     for name, angles in FLEET.items():
         vehicle = read_user_vehicle(str(fleet_file(name)), "multirotor").vehicle
         assert isinstance(vehicle, Multirotor)
         report = multirotor_report(vehicle, angles, faults=True)
-        losses = enumerate(report["faults"], start=1)
         rows.append(
             {
                 "name": name,
                 **{key: report[key] for key in KEYS},
                 "max_rotor_speed": report["hover"]["max_rotor_speed"],
-                "survives": [rotor for rotor, loss in losses if loss and loss["controllable"]],
+                "survives": [loss["rotor"] for loss in report["faults"] if _survives(loss)],
             }
         )
     return rows
+
+
+def _survives(loss: dict[str, Any]) -> bool:
+    hovers = [hover for hover in (loss["hover"], loss["free_tilts"]) if hover is not None]
+    return any(hover["controllable"] for hover in hovers)

@@ -24,7 +24,7 @@ from tiltsim_controllers.analysis.torque_free import (
     singularity_margin,
     torque_free_forces,
 )
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque
+from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, force_and_torque
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -76,7 +76,7 @@ def multirotor_report(
         angles: one for each tilt hinge, rad
         limits: as for `tilted_rotors`
         roll, pitch: attitude of the margin, rad
-        faults: whether to add the hovers without each rotor
+        faults: whether to add the hovers without each rotor, and with other tilt angles
 
     Returns:
         Rotor speeds are along the spins, rad/s. Without rotor speed limits ``attainable`` is None,
@@ -109,9 +109,38 @@ def multirotor_report(
         "attainable": _attainable(rotors, found) if is_limited else None,
     }
     if faults:
-        report["faults"] = [_hover(loss, vehicle) for loss in rotor_losses(rotors)]
+        report["faults"] = [
+            {
+                "rotor": lost + 1,
+                "hover": _hover(found, vehicle),
+                "free_tilts": _free_tilts(vehicle, rotors, lost) if vehicle.tilts else None,
+            }
+            for lost, found in enumerate(rotor_losses(rotors))
+        ]
     report["warnings"] = _warnings(report, is_limited=is_limited)
     return report
+
+
+def _free_tilts(vehicle: Multirotor, rotors: TiltedRotors, lost: int) -> dict[str, Any] | None:
+    """The least tilt angles that hover level without a rotor, given by its index."""
+    first = lost * ROTOR_FLOATS
+    table = vehicle.table[:first] + vehicle.table[first + ROTOR_FLOATS :]
+    remaining = rotors.without(lost)
+    found = level_hover(table, np.array([0.0, 0.0, rotors.weight]), remaining[2:4])
+    if found is None:
+        return None
+    # The last pods may have lost their rotors.
+    tilts = [*np.round(found[0], 9).tolist(), *[0.0] * vehicle.tilts][: vehicle.tilts]
+    force, torque = force_and_torque(table, tilts)
+    hovering = hover(remaining._replace(force=force, torque=torque))
+    assert hovering is not None
+    spins = np.delete(vehicle.spins, lost)
+    speeds = spins * np.copysign(np.sqrt(np.abs(found[1])), found[1])
+    return {
+        "angles": tilts,
+        "rotor_speeds": np.insert(speeds, lost, 0.0).tolist(),
+        "controllable": hovering.controllable,
+    }
 
 
 def balance_report(

@@ -41,6 +41,9 @@ HOVER_THRUST: Final = 4.2
 
 _INSIDE: Final = 1e-9
 
+ALMOST_FLAT: Final = "QJ"
+"""Lets Qhull move the points within rounding, so that it accepts sets that are almost flat."""
+
 FORCES: Final = ("F_X (N)", "F_Y (N)", "F_Z (N)")
 TORQUES: Final = ("tau_L (N m)", "tau_M (N m)", "tau_N (N m)")
 
@@ -250,7 +253,10 @@ def side_force_share(rotors: TiltedRotors) -> float:
     found = level_side_forces(rotors)
     if found.dimension < 2:
         return 0.0
-    share = -ConvexHull(found.vertices).equations[:, -1].max() / rotors.weight
+    share = (
+        -ConvexHull(found.vertices, qhull_options=ALMOST_FLAT).equations[:, -1].max()
+        / rotors.weight
+    )
     return max(0.0, float(share))
 
 
@@ -266,7 +272,8 @@ def _image_of_slice(
         box_slice_vertices(*box, *independent) if independent else np.empty((0, image.shape[1]))
     )
     points = inputs @ image.T
-    keep, dimension = _hull(points)
+    reach = np.abs(image) @ np.abs(box).max(axis=0)
+    keep, dimension = _hull(points, _INSIDE * reach)
     return AttainableSet(labels, points[keep], inputs[keep], dimension)
 
 
@@ -284,15 +291,18 @@ def _independent(rows: Floats, values: Floats) -> tuple[Floats, Floats] | None:
     return base[:rank], along[:rank] / factors[:rank]
 
 
-def _hull(points: Floats) -> tuple[NDArray[np.int_], int]:
-    """Indices of the hull's vertices and the affine dimension of a set of points (N, d)."""
+def _hull(points: Floats, rounding: Floats) -> tuple[NDArray[np.int_], int]:
+    """Indices of the hull's vertices and the affine dimension of a set of points (N, d).
+
+    Coordinates that nowhere exceed ``rounding``, shape (d,), are zero.
+    """
     from scipy.spatial import ConvexHull
 
     if not len(points):
         return np.empty(0, dtype=int), -1
     centred = points - points.mean(axis=0)
     spread = np.abs(points).max(axis=0)
-    scaled = centred / np.where(spread > 0.0, spread, 1.0)
+    scaled = centred / np.where(spread > rounding, spread, np.inf)
     _, values, axes = np.linalg.svd(scaled, full_matrices=False)
     dimension = int((values > 1e-9 * np.sqrt(len(points))).sum())
     flat = scaled @ axes[:dimension].T

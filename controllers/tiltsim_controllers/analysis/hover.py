@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
-from tiltsim_controllers.analysis.attainable import TiltedRotors, attainable_forces
+from tiltsim_controllers.analysis.attainable import ALMOST_FLAT, TiltedRotors, attainable_forces
 from tiltsim_controllers.analysis.torque_free import torque_free_forces
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def _faces(found: AttainableSet) -> Iterator[Floats]:
     if found.dimension == 2:  # its vertices are in order
         triangles = [(0, i, i + 1) for i in range(1, len(found.vertices) - 1)]
     else:
-        triangles = ConvexHull(found.vertices).simplices.tolist()
+        triangles = ConvexHull(found.vertices, qhull_options=ALMOST_FLAT).simplices.tolist()
     yield from (found.vertices[list(triangle)] for triangle in triangles)
     edges = {tuple(sorted(edge)) for triangle in triangles for edge in combinations(triangle, 2)}
     yield from (found.vertices[list(edge)] for edge in edges)

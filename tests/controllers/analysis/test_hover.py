@@ -80,14 +80,14 @@ def test_the_hover_leans_least_of_all_directions(dimension):
     """A linear program says for each of many directions whether the rotors can hover along it."""
     rng = np.random.default_rng(dimension)
     hovers = 0
-    for _ in range(6):
+    for _ in range(4):
         given = random_rotors(rng, 3 + dimension, lift=4.0)
         found = hover(given)
         if found is not None and found.controllable:
             reserve = RESERVE * WEIGHT / (given.lower.size * THRUST)
             given = given._replace(lower=given.lower + reserve, upper=given.upper - reserve)
         rows = np.vstack([given.torque, given.force])
-        directions = rng.normal(size=(40, 3)) @ np.linalg.svd(given.force)[0]
+        directions = rng.normal(size=(15, 3)) @ np.linalg.svd(given.force)[0]
         directions = [up / np.linalg.norm(up) for up in directions]
         if found is not None:
             hovers += 1

@@ -8,7 +8,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltsim.views.figures import style
-from tiltsim_controllers.analysis.attainable import attainable_forces, attainable_torques
+from tiltsim_controllers.analysis.attainable import (
+    ALMOST_FLAT,
+    attainable_forces,
+    attainable_torques,
+)
 from tiltsim_controllers.analysis.hover import hover
 from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.torque_free import (
@@ -79,7 +83,8 @@ def _polytope(space: Any, found: AttainableSet, unit: float, label: str) -> None
         space.text2D(0.5, 0.5, "none", transform=space.transAxes, ha="center")
         return
     if found.dimension == 3:
-        faces = [vertices[simplex] for simplex in ConvexHull(vertices).simplices]
+        hull = ConvexHull(vertices, qhull_options=ALMOST_FLAT)
+        faces = [vertices[simplex] for simplex in hull.simplices]
         space.add_collection3d(
             Poly3DCollection(faces, facecolor=style.SKY, edgecolor=style.BLUE, lw=0.2, alpha=0.25)
         )
