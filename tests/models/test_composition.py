@@ -18,14 +18,18 @@ from tests.models.test_user_vehicle import (
 )
 from tiltsim.models import mjcf_editing, rotorcraft, tilt_car
 from tiltsim.models.parts import ExtraActuators, Ground, Pod, RotorLimits, TiltServo
-from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
+from tiltsim.models.rotorcraft import MODELS, RotorcraftSpec, compile_model
 from tiltsim.models.tilt_car import TiltCarSpec, compile_tilt_car
 from tiltsim.models.user_vehicle import read_user_vehicle
+from tiltsim.resources import shipped_folder
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 FILE_NAMES = {"paths", "npaths", "mesh_pathadr", "tex_pathadr", "nbuffer"}
 """What differs where a file names meshes or textures: dm_control gives these files new names."""
+
+MJCF = shipped_folder("mjcf")
+FLEET = sorted({path.stem for path in MJCF.glob("*.xml")} - {"scene", "tilt_car", *MODELS})
 
 LAYERS = (
     ExtraActuators(states=5, begins_with_rotor_speeds=True, memories=3, wrench=True),
@@ -158,6 +162,16 @@ def test_users_vehicles_are_equal(both_ways, write, tmp_path, name):
     heavier = own.vehicle._replace(mass=0.9, inertia_xx=4e-3, inertia_yy=5e-3, inertia_zz=8e-3)
     spec = RotorcraftSpec("tiltrotor", heavier, user_vehicle=own, **RICH, **STOPS)
     assert differences(both_ways(spec)) <= (FILE_NAMES if name == "mesh" else set())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "path", [MJCF / f"{name}.xml" for name in FLEET], ids=lambda path: path.stem
+)
+def test_the_fleet_is_equal(both_ways, path):
+    own = read_user_vehicle(str(path), "multirotor")
+    spec = RotorcraftSpec("multirotor", own.vehicle, user_vehicle=own, law_states=2)
+    assert not differences(both_ways(spec))
 
 
 def test_what_dm_control_cannot_read_is_composed_all_the_same(both_ways, write):
