@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import Future
+from itertools import cycle
 
 import pyarrow.parquet as pq
 import pytest
@@ -191,25 +192,15 @@ def test_boundaries_are_found_to_their_tolerance(tmp_path):
         assert row["initial.attitude"] == [row["roll"], 0.0, 2 * row["roll"]]
 
 
-@pytest.mark.slow
-def test_killed_at_random_moments_it_continues_to_the_same_dataset(tmp_path):
-    file = short_sweep(tmp_path / "sweep.toml", count=40, chunk_size=2)
-    whole = run_sweep(load_sweep(file), tmp_path / "whole")
-    folder = tmp_path / "killed"
-    for moment in (1.4, 2.4):
-        fly_until_killed(command(file, folder, "--jobs=2"), folder, moment)
-    subprocess.run(command(file, folder, "--jobs=2"), check=True)
-    assert (folder / "sweep.parquet").read_bytes() == whole.read_bytes()
-
-
 @pytest.mark.slow(longest=True)
 def test_two_thousand_flights_killed_twenty_times(tmp_path):
     file = short_sweep(tmp_path / "sweep.toml", count=1000, chunk_size=20)
     whole = run_sweep(load_sweep(file), tmp_path / "whole", jobs=2)
     chance, folder, progress = random.Random(2000), tmp_path / "killed", []
-    for parts in sorted(chance.sample(range(85), 20)):
-        moment = chance.uniform(0.0, 0.3)
-        assert fly_until_killed(command(file, folder, "--jobs=2"), folder, moment, parts) != 0
+    for jobs, parts in zip(cycle((1, 2)), [0, *sorted(chance.sample(range(1, 85), 19))]):
+        moment = chance.uniform(0.0, 0.3 if parts else 2.0)
+        arguments = command(file, folder, f"--jobs={jobs}")
+        assert fly_until_killed(arguments, folder, moment, parts) != 0
         progress.append(parts_in(folder))
     assert progress == sorted(progress)  # nothing finished is lost
     assert progress[-1] > 0
