@@ -153,8 +153,10 @@ def callable_natively(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def _decorator_of_inner(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     def decorate(function: Callable[..., Any]) -> Any:
-        dispatcher = njit(**options)(function)
-        return dispatcher if function.__closure__ else _cached(dispatcher, function)
+        if function.__closure__:
+            # Made for few callers, with long tuples: to pass those costs as much as to use them.
+            return njit(forceinline=True, **options)(function)
+        return _cached(njit(**options)(function), function)
 
     return decorate
 

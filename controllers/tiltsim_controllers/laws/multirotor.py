@@ -166,7 +166,9 @@ def _by_leaning_of(layout: Layout) -> Callable[..., Horizontal]:
         errors, accelerations = tracking
         up = (rotation[6], rotation[7], rotation[8])
         force = moving_direction(time, up, direction, parameters, knots)
-        jerk = jerk_along(force, forces[0], omega, parameters.terms.gait_rates)
+        jerk = (0.0, 0.0, 0.0)  # counts only for the attitude's rates
+        if parameters.terms.attitude_rates != 0.0:
+            jerk = jerk_along(force, forces[0], omega, parameters.terms.gait_rates)
         x, y, x_rate, y_rate = horizontal_control(
             errors, accelerations, to_world(rotation, jerk), integrals, parameters
         )

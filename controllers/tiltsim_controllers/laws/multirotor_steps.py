@@ -11,6 +11,7 @@ from tiltsim_controllers.laws.decouplers import (
     CONVENTIONAL,
     EXACT,
     conventional_decoupler,
+    exact_decoupler,
     modified_decoupler,
 )
 from tiltsim_controllers.laws.feedback import attitude_jerk, force_control
@@ -173,14 +174,16 @@ def lean(force: Jets3, x: Jet, y: Jet, z: Jet, yaw: Jet, parameters: Any) -> tup
         yaw: rad
         parameters: of the controller
     """
-    if parameters.decoupler == EXACT:
-        return decoupled_attitude(x, y, z, yaw, force, parameters)
     gravity = parameters.vehicle.gravity
-    if parameters.decoupler == CONVENTIONAL:
-        roll, pitch = conventional_decoupler(x[0], y[0], yaw[0], gravity)
-        return (roll, 0.0, 0.0), (pitch, 0.0, 0.0)
     n = (force[0][0], force[1][0], force[2][0])
-    roll, pitch = modified_decoupler(x[0], y[0], yaw[0], gravity, n)
+    if parameters.decoupler == EXACT:
+        if parameters.terms.attitude_rates != 0.0:
+            return decoupled_attitude(x, y, z, yaw, force, parameters)
+        roll, pitch = exact_decoupler(x[0], y[0], z[0], yaw[0], gravity, n)
+    elif parameters.decoupler == CONVENTIONAL:
+        roll, pitch = conventional_decoupler(x[0], y[0], yaw[0], gravity)
+    else:
+        roll, pitch = modified_decoupler(x[0], y[0], yaw[0], gravity, n)
     return (roll, 0.0, 0.0), (pitch, 0.0, 0.0)
 
 
