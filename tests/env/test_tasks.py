@@ -100,6 +100,15 @@ def test_a_short_training_beats_zero_actions_whatever_the_number_of_processes(tm
     assert printed[0] == printed[1] > mean + 3.0 * deviation
 
 
+@pytest.mark.slow
+def test_environments_in_processes_fly_as_alone():
+    several = gymnasium.make_vec("tiltsim/Hover-v0", num_envs=2, vectorization_mode="async")
+    observations, _ = several.reset(seed=3)
+    for seed, observation in zip((3, 4), observations, strict=True):
+        np.testing.assert_array_equal(observation, make("Hover").reset(seed=seed)[0])
+    several.close()
+
+
 def test_time_truncates_and_divergence_terminates():
     env = make("Circle", max_episode_steps=3)
     env.reset(seed=0)
