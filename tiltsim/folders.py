@@ -23,6 +23,7 @@ FLYING: Final = (
     "vehicles",
     "equations",
     "engines",
+    "arrays",
     "laws",
     "plants",
     "flight",

@@ -15,7 +15,7 @@ import mujoco
 from tiltsim.closed_loop.loop import ClosedLoop, Sizes
 from tiltsim.closed_loop.userdata import HEADER_SIZE
 
-EngineName = Literal["python", "native"]
+EngineName = Literal["python", "native", "jax"]
 
 Callback = Callable[[mujoco.MjModel, mujoco.MjData], None]
 

@@ -32,12 +32,13 @@ def compile_stepper(loop: ClosedLoop) -> tuple[Any, Any]:
         same arguments, and stops when the recording is over. Neither holds Python's lock.
     """
     announce_native_code(loop.native_name("thesis"))
-    register_scalar_functions()
     assert loop.equations is not None
+    stepper = make_stepper(loop.equations)  # defines a scalar function
+    register_scalar_functions()
     inputs, observe = loop.equations.inputs, loop.equations.observe
     watch = loop.monitoring.sign_check_values
     limit_exceeded = loop.kind.limit_exceeded
-    stepper = register_jitable(**INNER)(make_stepper(loop.equations))
+    stepper = register_jitable(**INNER)(stepper)
 
     @compiled
     def advance(step_index, state, held, steps, integration):  # type: ignore[no-untyped-def]

@@ -42,6 +42,11 @@ class ThesisPlant(Plant):
 
             self._advance, self._record = compile_stepper(loop)
             record: tuple[Any, Any] = native_record(loop, setup.userdata)
+        elif self.engine == "jax":
+            from tiltsim.arrays.flying import course_of, stepper_on_arrays
+
+            self._advance = stepper_on_arrays(course_of(assembly))
+            record = setup
         else:
             self._advance = make_stepper(self._equations)
             record = slotted(setup.parameters), setup.knots

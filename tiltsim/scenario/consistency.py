@@ -41,6 +41,16 @@ def check_consistency(scenario: ScenarioTables) -> None:
     _check_rotor_limits(scenario)
     _check_ground(scenario)
     _check_claims(scenario)
+    _check_engine(scenario)
+
+
+def _check_engine(scenario: ScenarioTables) -> None:
+    simulation = scenario.simulation
+    if simulation.engine == "jax":
+        reason = 'simulation.engine = "jax" is supported on the thesis plant only'
+        scenario.require("simulation.plant", "thesis", reason)
+    elif simulation.precision != "float64":
+        raise scenario.mistake("simulation.precision", 'needs simulation.engine = "jax"')
 
 
 def _check_law(scenario: ScenarioTables) -> None:
@@ -154,7 +164,7 @@ def _check_layout(scenario: ScenarioTables) -> None:
 def _check_external(scenario: ScenarioTables) -> None:
     reason = 'law = "python" is supported on the {} only'
     scenario.require("simulation.plant", "mujoco", reason.format("mujoco plant"))
-    if scenario.simulation.engine == "native":
+    if scenario.simulation.engine not in ("auto", "python"):
         raise scenario.mistake("simulation.engine", reason.format("python engine"))
 
 

@@ -53,10 +53,13 @@ class SimulationTable(Table):
         "0.01 [s]",
         examples=[0.02],
     )
-    engine: Literal["auto", "python", "native"] = Field(
+    engine: Literal["auto", "python", "native", "jax"] = Field(
         "auto",
         description="evaluates the control law as Python or as compiled code, with bit-identical "
-        "flights; auto compiles for long flights",
+        "flights; auto compiles for long flights; jax flies many on arrays, on the thesis plant",
+    )
+    precision: Literal["float64", "float32"] = Field(
+        "float64", description="numbers of the jax engine; the others always have float64"
     )
     plant: Literal["mujoco", "thesis"] = Field(
         "mujoco",

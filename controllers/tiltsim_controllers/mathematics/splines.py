@@ -26,14 +26,13 @@ def row_at(position: float, rows: int, begin: int, size: int, knots: Vector) -> 
         size: floats per row, of which the first is where it begins
         knots: contains the rows
     """
-    low, high = 0, rows
-    while high - low > 1:
-        middle = (low + high) // 2
-        if knots[begin + size * middle] <= position:
-            low = middle
-        else:
-            high = middle
-    return low
+    row, left = 0, rows  # the row is one of so many
+    while left > 1:
+        half = left // 2
+        if knots[begin + size * (row + half)] <= position:
+            row = row + half
+        left = left - half
+    return row
 
 
 @scalar

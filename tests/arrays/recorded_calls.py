@@ -1,0 +1,132 @@
+"""Calls of scalar functions as they occur in flights, to be repeated on arrays."""
+
+from __future__ import annotations
+
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+
+import tiltsim
+from tests.laws.layers.test_actuation import EVERYTHING
+from tests.laws.layers.test_air import STORM
+from tests.laws.test_laws import GUST, LAWS
+from tests.simulation.test_batch import CAR, CAR_GAITS, EXACT, GAITS
+from tiltsim.scenario.loading import merge
+from tiltsim_controllers.mathematics.scalar import scalar_functions
+
+LATE = {"control_timestep": 0.004, "control_latency": 0.008}
+SUPERVISED = {
+    strategy: {
+        "controller": {**EXACT, "supervisor": {"strategy": strategy, "min_margin": 1.2}},
+        "gait": {"type": "trot_continuous", "amplitude": 0.9, "period": 1.0},
+    }
+    for strategy in ("scale", "hold", "return_to_red")
+}
+HEAVY = {"rotor_time_constant": 0.02, "rotor_inertia": 1e-5}
+MEASURED = {"angular_acceleration": "measured"}
+LAYERED = {
+    "yaw_position in air": {**LAWS["yaw_position"], "air": STORM},
+    "full_pose in air": {**LAWS["full_pose"], "air": STORM},
+    "full_pose without rotor 2": merge(
+        LAWS["full_pose"], {"controller": {"failed_rotor": 2}, "vehicle": HEAVY}
+    ),
+} | {
+    f"{kind} {name}": merge(LAWS[name], tables)
+    for name in ("attitude_altitude", "gait_feedforward")
+    for kind, tables in {
+        "everything": {**EVERYTHING, "air": STORM},
+        "heavy": {"vehicle": HEAVY},
+        "measured": {"vehicle": HEAVY, "controller": MEASURED},
+    }.items()
+}
+"""Controllers inside layers."""
+
+REFERENCES = {
+    "line": {"velocity": [0.5, 0.0, 0.1]},
+    "circle": {"radius": 1.0, "angular_frequency": 0.5},
+    "attitude_altitude": {"roll": 0.1, "altitude": 0.2},
+    "lissajous": {"amplitude": [1.0, 0.5, 0.1], "angular_frequency": [0.5, 0.7, 0.2]},
+    "figure_eight": {"length": 1.0, "width": 0.5, "angular_frequency": 0.6},
+    "waypoints": {"positions": [[0, 0, 0], [1, 0, 0], [1, 1, 0.2]], "times": [0.0, 2.0, 4.0]},
+    "table": {"rows": [[0, 0, 0, 0], [1, 0.2, 0, 0], [2, 0.3, 0.1, 0], [3, 0.3, 0.2, 0.1]]},
+}
+"""References by type."""
+
+
+def flown(tables, **simulation):
+    """A short flight in Python."""
+    simulation = {"duration": 0.02, "engine": "python", "record_timestep": 0.01, **simulation}
+    return tiltsim.simulate(tiltsim.parse_scenario({**tables, "simulation": simulation}))
+
+
+def short_flights():
+    """Flights of every controller, gait, reference and layer."""
+    for law in LAWS.values():
+        for plant in ("thesis", "mujoco"):
+            yield {**law, "disturbance": GUST}, {"plant": plant}
+            yield law, {"plant": plant, "control_timestep": 0.004}
+    for name, table in GAITS.items():
+        yield {"gait": {"type": name, **table}, "controller": EXACT}, {"plant": "thesis"}
+    for name, table in CAR_GAITS.items():
+        yield {**CAR, "gait": {"type": name, **table}}, {"plant": "thesis"}
+    for name, table in REFERENCES.items():
+        controller = {**EXACT, "decoupler": "none" if "altitude" in name else "exact"}
+        yield {"reference": {"type": name, **table}, "controller": controller}, {"plant": "thesis"}
+    for tables in SUPERVISED.values():
+        yield tables, {"plant": "thesis"}
+    for name, tables in LAYERED.items():
+        for plant in ("thesis", "mujoco"):
+            yield tables, {"plant": plant}
+            if "yaw" not in name:
+                yield tables, {"plant": plant, **LATE}
+
+
+def record(action, calls, most=2):
+    """Add the arguments of scalar functions called by an action, at most so many each."""
+    known = {}
+
+    def notice(frame, event, _argument):
+        code = frame.f_code
+        if event != "call" or not code.co_filename.endswith(".py"):
+            return
+        if code not in known:
+            known[code] = [f for f in scalar_functions() if f.__code__ is code]
+        here = frame.f_locals
+        for function in known[code] or ():
+            cells = [cell.cell_contents for cell in function.__closure__ or ()]
+            if all(here.get(n) is c for n, c in zip(code.co_freevars, cells)):
+                found = calls.setdefault(function, [])
+                if len(found) < most:
+                    found.append(tuple(map(frozen, (here[n] for n in code.co_varnames[: code.co_argcount]))))
+                return
+
+    sys.setprofile(notice)
+    try:
+        action()
+    finally:
+        sys.setprofile(None)
+
+
+def frozen(value):
+    """An argument that later code cannot change."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return list(value) if isinstance(value, list) else value
+
+
+def mapped(change, value, name=""):
+    """A value with every number changed by ``change(number, name of its field)``."""
+    if hasattr(value, "_fields"):
+        return type(value)(*(mapped(change, v, n) for n, v in zip(value._fields, value)))
+    if hasattr(value, "__slots__") and not isinstance(value, tuple | list | float | int):
+        return SimpleNamespace(**{n: mapped(change, getattr(value, n), n) for n in value.__slots__})
+    if isinstance(value, tuple | list):
+        return type(value)(mapped(change, v, name) for v in value)
+    return change(value, name)
+
+
+def described(function):
+    """What distinguishes a scalar function from closures of the same source."""
+    cells = [cell.cell_contents for cell in function.__closure__ or ()]
+    return function.__code__, *(c.__qualname__ if callable(c) else repr(c) for c in cells)

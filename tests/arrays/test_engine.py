@@ -1,0 +1,100 @@
+"""Flights in JAX are those of the other engines."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+import tiltsim
+from tests.arrays.recorded_calls import LAYERED, REFERENCES, SUPERVISED
+from tests.laws.test_laws import GUST, LAWS
+from tests.simulation.test_batch import CAR, CAR_GAITS, EXACT, GAITS
+from tiltsim.errors import InputError
+
+needs_jax = pytest.mark.skipif(
+    "not __import__('importlib').util.find_spec('jax')", reason="JAX is not installed"
+)
+LATE = {"control_timestep": 0.004}
+EVERY = {
+    **{law: {**tables, "disturbance": GUST} for law, tables in LAWS.items()},
+    **{f"gait {n}": {"gait": {"type": n, **t}, "controller": EXACT} for n, t in GAITS.items()},
+    **{f"gait {n}": {**CAR, "gait": {"type": n, **t}} for n, t in CAR_GAITS.items()},
+    **{
+        f"reference {n}": {
+            "reference": {"type": n, **t},
+            "controller": {**EXACT, "decoupler": "none" if "altitude" in n else "exact"},
+        }
+        for n, t in REFERENCES.items()
+    },
+    **{f"supervisor {n}": tables for n, tables in SUPERVISED.items()},
+    **LAYERED,
+}
+"""Every controller, gait, reference and layer."""
+
+
+def fly(tables, engine, **simulation):
+    simulation = {"plant": "thesis", "duration": 0.3, "engine": engine, **simulation}
+    return tiltsim.simulate(tiltsim.parse_scenario({**tables, "simulation": simulation}))
+
+
+def largest_difference(tables, **simulation):
+    """The largest difference of any sample from Python's, relative to one."""
+    flown, python = (fly(tables, engine, **simulation) for engine in ("jax", "python"))
+    assert flown.engine == "jax"
+    assert flown.end == python.end
+    scale = np.maximum(1.0, np.abs(python.samples))
+    return np.max(np.abs(flown.samples - python.samples) / scale)
+
+
+@needs_jax
+def test_a_flight_in_jax_is_the_one_in_python():
+    tables = {**LAWS["tilt_car_planned_direction"], "disturbance": GUST}
+    assert largest_difference(tables, control_timestep=0.004) < 1e-12
+
+
+@needs_jax
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("timing", [{}, LATE], ids=["continuous", "held"])
+def test_whatever_flies_on_the_equations_flies_the_same_in_jax(name, timing):
+    assert largest_difference(EVERY[name], **timing) < 1e-9
+
+
+@needs_jax
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "address",
+    [
+        "ch04_tracking/circle#continuous_t2_modified",
+        "ch04_tracking/setpoint#rho_065_modified",
+        "beyond/exact_circle",
+    ],
+)
+def test_flights_of_20_s_differ_by_less_than_a_nanometre_from_native_ones(address):
+    changes = {"expect": [], "simulation.plant": "thesis", "simulation.duration": 20.0}
+    scenario = tiltsim.load_scenario(address, changes)
+    flown, native = (
+        tiltsim.simulate(scenario.replace({"simulation.engine": engine}))
+        for engine in ("jax", "native")
+    )
+    assert len(flown) == len(native)
+    for axis in "xyz":
+        np.testing.assert_allclose(flown[axis], native[axis], rtol=0, atol=1e-9)
+
+
+def test_the_jax_engine_needs_the_thesis_plant():
+    with pytest.raises(InputError, match='simulation.plant = "mujoco": simulation.engine = "jax"'):
+        tiltsim.parse_scenario({"simulation": {"engine": "jax"}})
+
+
+def test_single_precision_is_for_the_jax_engine():
+    with pytest.raises(InputError, match='precision = "float32": needs simulation.engine = "jax"'):
+        tiltsim.parse_scenario({"simulation": {"precision": "float32"}})
+
+
+def test_without_jax_the_message_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "jax", None)
+    with pytest.raises(InputError, match=r"needs jax.*pip install 'tiltsim\[jax\]'"):
+        fly({}, "jax")

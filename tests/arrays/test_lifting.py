@@ -1,0 +1,123 @@
+"""Scalar functions on JAX's arrays have the values that they have in Python."""
+
+from __future__ import annotations
+
+from math import isfinite, nan, sqrt
+
+import numpy as np
+import pytest
+
+from tests.arrays.recorded_calls import (
+    LAYERED,
+    SUPERVISED,
+    described,
+    flown,
+    mapped,
+    record,
+    short_flights,
+)
+from tests.laws.test_laws import LAWS
+from tiltsim.arrays.flying import CODES, double_precision
+from tiltsim.arrays.jax_arrays import JaxArrays
+from tiltsim.arrays.lifting import Lifting, LiftError
+from tiltsim_controllers.mathematics.scalar import scalar_functions
+
+jax = pytest.importorskip("jax")
+
+ROWS = 4
+ROUNDING = 1e-12
+"""Relative to the largest of the values: a few hundred roundings."""
+
+
+@pytest.fixture(autouse=True)
+def _double_precision():
+    with double_precision():
+        yield
+
+
+def numbers(values):
+    """The numbers of nested tuples, lists and records."""
+    if isinstance(values, tuple | list):
+        for value in values:
+            yield from numbers(value)
+    else:
+        yield values
+
+
+def varies(value, name):
+    return isinstance(value, float) and isfinite(value) and name not in CODES
+
+
+def fields(value):
+    """Every number of a value with the name of its field."""
+    found = []
+    mapped(lambda number, name: found.append((number, name)), value)
+    return found
+
+
+def differences(function, arguments, rng):
+    """What is wrong with a lifted function at arguments and near them, in a batch."""
+    found = [value for value, name in fields(arguments) if varies(value, name)]
+
+    def filled(row):
+        """The arguments with the numbers of a row in place of those found."""
+        following = iter(range(len(found)))
+        return mapped(lambda v, name: row[next(following)] if varies(v, name) else v, arguments)
+
+    near = 1.0 + 1e-3 * rng.standard_normal((ROWS, len(found)))
+    near[0] = 1.0
+    rows = np.array(found) * near
+    lifted = Lifting(JaxArrays("float64"))(function)
+
+    def on_arrays(row):
+        return [jax.numpy.asarray(v, float) for v in numbers(lifted(*filled(row)))]
+
+    try:
+        results = np.array(jax.vmap(on_arrays, axis_size=ROWS)(jax.numpy.asarray(rows))).T
+    except LiftError as error:
+        return str(error)
+    for row, result in zip(rows.tolist(), results, strict=True):
+        try:
+            expected = np.array([float(v) for v in numbers(function(*filled(row)))])
+        except (ArithmeticError, ValueError):  # where arrays have NaN
+            continue
+        size = np.abs(expected[np.isfinite(expected)]).max(initial=0.0)
+        if not np.allclose(result, expected, rtol=ROUNDING, atol=ROUNDING * size, equal_nan=True):
+            return f"{result} instead of {expected}"
+    return None
+
+
+def all_differences(flights):
+    """Compare what the flights call; returns failures by function, and the functions called."""
+    calls, rng = {}, np.random.default_rng(0)
+    for tables, simulation in flights:
+        record(lambda: flown(tables, **simulation).metrics(), calls)  # noqa: B023
+    wrong = {}
+    for function, several in {described(function): (function, c) for function, c in calls.items()}.values():
+        for arguments in several:
+            reason = differences(function, arguments, rng)
+            if reason is not None:
+                wrong[f"{function.__module__}.{function.__qualname__}"] = reason
+    return wrong, calls
+
+
+def test_functions_of_a_controller_have_the_same_values_on_arrays():
+    wrong, calls = all_differences([(LAWS["attitude_altitude"], {"plant": "thesis"})])
+    assert wrong == {}
+    assert len(calls) > 30
+
+
+NEVER_CALLED = {"decoupling_matrix", "attitude_altitude_thrust_rate", "tilt_states"}
+
+
+@pytest.mark.slow
+def test_every_scalar_function_has_the_same_values_on_arrays():
+    wrong, calls = all_differences(short_flights())
+    assert wrong == {}
+    codes = {function.__code__ for function in calls}
+    missing = {
+        f.__name__
+        for f in scalar_functions()
+        if f.__code__ not in codes and not f.__module__.endswith("laws.commanded")
+    }
+    assert missing == NEVER_CALLED

@@ -1,0 +1,1 @@
+"""Scalar code on arrays and symbols: lifted functions, and flights in JAX."""

@@ -1,0 +1,222 @@
+"""Flights on the thesis's equations in JAX: the scalar step and sample of a loop, lifted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from functools import lru_cache
+from typing import Any, Final, NamedTuple
+
+from tiltsim.arrays.jax_arrays import JaxArrays, require_jax
+from tiltsim.arrays.lifting import Lifting
+from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.closed_loop.limits import SINGULAR, WITHIN_LIMITS
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
+from tiltsim.equations.ode3 import Integration, Stepper, make_step
+from tiltsim.system.locks import one_thread_at_a_time
+from tiltsim_controllers.mathematics.records import flatten, unflatten
+from tiltsim_controllers.mathematics.scalar import Triple, Values
+
+CODES: Final = frozenset(
+    {
+        "signature",
+        "type",
+        "keyframes",
+        "repeats",
+        "color",
+        "segments",
+        "offset",
+        "decoupler",
+        "decoupling",
+        "strategy",
+        "active",
+        "rotor",
+        "extension",
+    }
+)
+"""Fields of records that choose code or count; they are the same for all flights of a batch."""
+
+
+@contextmanager
+def double_precision() -> Iterator[None]:
+    """JAX with 64-bit numbers, which it has not by default."""
+    import jax
+
+    with jax.enable_x64(True):
+        yield
+
+
+class Course(NamedTuple):
+    """What flights of a batch have in common."""
+
+    loop: ClosedLoop
+    timestep: float  # s
+    control_steps: int
+    record_steps: int
+    steps: int
+    follows_position: bool
+    dtype: str
+
+
+class Carried(NamedTuple):
+    """The state of a flight on arrays."""
+
+    index: Any  # of the step
+    state: tuple[Any, ...]
+    held: tuple[Any, ...]  # inputs since the last control sample
+
+
+class Kernel:
+    """Step and sample of a loop's equations on arrays, for one flight.
+
+    Args:
+        course: What is flown.
+        setup: Parameters and knots, which may be arrays.
+        disturbance: m/s^2, world axes.
+        guarded: See `Lifting`.
+    """
+
+    def __init__(
+        self, course: Course, setup: ControlSetup, disturbance: Triple, *, guarded: bool = False
+    ) -> None:
+        import jax
+        import jax.numpy as jnp
+
+        loop, equations = course.loop, course.loop.equations
+        assert equations is not None  # other loops do not fly on equations
+        self._jax, self._numpy, self.course, self.setup = jax, jnp, course, setup
+        self._arrays = arrays = JaxArrays(course.dtype)
+        lifting = Lifting(arrays, guarded=guarded)
+        self._step, self._inputs = lifting(make_step(equations)), lifting(equations.inputs)
+        self._observe = lifting(equations.observe)
+        self._check = lifting(loop.monitoring.sign_check_values)
+        self._limit = lifting(loop.kind.limit_exceeded)
+        self._integration = Integration(
+            course.timestep, course.control_steps, setup.parameters, setup.knots, disturbance
+        )
+        self._inputs_size = equations.inputs_size
+
+    def _floats(self, values: Iterable[Any]) -> tuple[Any, ...]:
+        return tuple(self._numpy.asarray(value, self.course.dtype) for value in values)
+
+    def start(self, state: Iterable[Any]) -> Carried:
+        """A flight at time zero."""
+        return self.at(0, state, [0.0] * self._inputs_size)
+
+    def at(self, index: int, state: Iterable[Any], held: Iterable[Any]) -> Carried:
+        """A flight at a step."""
+        whole = self._numpy.asarray(index, "int32")
+        return Carried(whole, self._floats(state), self._floats(held))
+
+    def time(self, index: Any) -> Any:
+        """The time (s) of a step, exact before it is rounded."""
+        exact = index.astype(self._numpy.result_type(float)) * self.course.timestep
+        return exact.astype(self.course.dtype)
+
+    def _with_sampling(self, index: Any, act: Callable[[bool], Any]) -> Any:
+        """What ``act(samples)`` returns at a step, at which the controller samples or not."""
+        every = self.course.control_steps
+        if every == 0:
+            return act(True)
+        return self._jax.lax.cond(index % every == 0, lambda: act(True), lambda: act(False))
+
+    def step(self, carried: Carried) -> Carried:
+        """One step later."""
+
+        def take(samples: bool) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+            time = self.time(carried.index)
+            state, held = self._step(
+                time, list(carried.state), carried.held, samples, self._integration
+            )
+            return self._floats(state), self._floats(held)
+
+        return Carried(carried.index + 1, *self._with_sampling(carried.index, take))
+
+    def steps(self, carried: Carried, count: int) -> Carried:
+        """So many steps later."""
+        if count == 1:
+            return self.step(carried)
+        return self._jax.lax.scan(lambda c, _: (self.step(c), None), carried, length=count)[0]
+
+    def sample(self, carried: Carried) -> Any:
+        """The fields of a sample, shape (fields,)."""
+        time, (parameters, knots) = self.time(carried.index), self.setup
+
+        def take(samples: bool) -> Any:
+            held = carried.held
+            if samples:
+                held = self._inputs(time, carried.state, parameters, knots)
+            values = self._observe(time, carried.state, held, parameters, knots)
+            return self._arrays.vector((time, *values))
+
+        return self._with_sampling(carried.index, take)
+
+    def sides(self, sample: Any) -> Any:
+        """The signs of the numbers that must keep them, 0 where one vanishes."""
+        checked = self._arrays.vector(self._check(tuple(sample[1:]), self.setup.parameters))
+        return self._numpy.where(abs(checked) < SINGULAR, 0.0, self._numpy.sign(checked))
+
+    def goes_on(self, sample: Any, sides: Any, reference: Any) -> Any:
+        """Whether a flight with this sample goes on; ``sides`` are those of its first sample."""
+        now = self.sides(sample)
+        kept = ((now == sides) & (now != 0.0)).all()
+        follows = self.course.follows_position
+        code = self._limit(sample[0], tuple(sample[1:]), reference, self.setup.knots, follows)
+        return self._numpy.isfinite(sample).all() & kept & (code == WITHIN_LIMITS)
+
+
+def kernel_of(
+    course: Course, leaves: Iterable[Any], knots: Any, disturbance: Any, *, guarded: bool = False
+) -> Kernel:
+    """A kernel whose parameters are given as the floats or arrays of their record."""
+    parameters = unflatten(course.loop.parameters, leaves)
+    return Kernel(course, ControlSetup(parameters, knots), tuple(disturbance), guarded=guarded)
+
+
+def course_of(assembly: Assembly) -> Course:
+    """The course of a planned flight, and of all that may share a batch with it."""
+    simulation = assembly.scenario.simulation
+    return Course(
+        assembly.loop,
+        simulation.timestep,
+        simulation.control_steps,
+        simulation.record_steps,
+        simulation.steps,
+        assembly.follows_position,
+        simulation.precision,
+    )
+
+
+@one_thread_at_a_time
+@lru_cache(maxsize=64)
+def _compiled_steps(
+    course: Course, leaves: tuple[float, ...], knots: tuple[float, ...], disturbance: Triple
+) -> tuple[Kernel, Callable[[Carried, int], Carried]]:
+    import jax
+
+    kernel = kernel_of(course, leaves, knots, disturbance)
+
+    def many(carried: Carried, steps: Any) -> Carried:
+        return jax.lax.fori_loop(0, steps, lambda _, now: kernel.step(now), carried)
+
+    return kernel, jax.jit(many)
+
+
+def stepper_on_arrays(course: Course) -> Stepper:
+    """The solver for one flight in JAX, as `tiltsim.equations.ode3.make_stepper` makes it."""
+    require_jax('simulation.engine = "jax"')
+
+    def advance(
+        step_index: int, state: list[float], held: Values, steps: int, integration: Integration
+    ) -> tuple[list[float], Values]:
+        import jax
+
+        _, _, parameters, knots, disturbance = integration
+        with double_precision():
+            kernel, many = _compiled_steps(
+                course, tuple(flatten(parameters)), tuple(knots), disturbance
+            )
+            _, state, held = jax.device_get(many(kernel.at(step_index, state, held), steps))
+        return list(map(float, state)), tuple(map(float, held))
+
+    return advance
