@@ -109,10 +109,8 @@ def record(action, calls, most=2):
 
 
 def frozen(value):
-    """An argument that later code cannot change."""
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    return list(value) if isinstance(value, list) else value
+    """An argument that later code cannot change, of Python's own numbers."""
+    return mapped(lambda number, name: number, value)
 
 
 def mapped(change, value, name=""):
@@ -121,6 +119,8 @@ def mapped(change, value, name=""):
         return type(value)(*(mapped(change, v, n) for n, v in zip(value._fields, value)))
     if hasattr(value, "__slots__") and not isinstance(value, tuple | list | float | int):
         return SimpleNamespace(**{n: mapped(change, getattr(value, n), n) for n in value.__slots__})
+    if isinstance(value, np.ndarray | np.generic):
+        return mapped(change, value.tolist(), name)
     if isinstance(value, tuple | list):
         return type(value)(mapped(change, v, name) for v in value)
     return change(value, name)

@@ -81,6 +81,8 @@ def differences(function, arguments, rng):
             expected = np.array([float(v) for v in numbers(function(*filled(row)))])
         except (ArithmeticError, ValueError):  # where arrays have NaN
             continue
+        except TypeError as error:
+            return f"in Python: {error}"
         size = np.abs(expected[np.isfinite(expected)]).max(initial=0.0)
         if not np.allclose(result, expected, rtol=ROUNDING, atol=ROUNDING * size, equal_nan=True):
             return f"{result} instead of {expected}"

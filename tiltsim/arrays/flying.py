@@ -14,8 +14,9 @@ from tiltsim.closed_loop.limits import SINGULAR, WITHIN_LIMITS
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.equations.ode3 import Integration, Stepper, make_step
 from tiltsim.system.locks import one_thread_at_a_time
-from tiltsim_controllers.mathematics.records import flatten, unflatten
+from tiltsim_controllers.mathematics.records import flatten, record_size, unflatten
 from tiltsim_controllers.mathematics.scalar import Triple, Values
+from tiltsim_controllers.references.trajectories import ReferenceParameters
 
 CODES: Final = frozenset(
     {
@@ -64,6 +65,14 @@ class Carried(NamedTuple):
     index: Any  # of the step
     state: tuple[Any, ...]
     held: tuple[Any, ...]  # inputs since the last control sample
+
+
+class Recording(NamedTuple):
+    """Samples of a flight on arrays."""
+
+    samples: Any  # (samples, fields), the first at time zero
+    alive: Any  # whether the flight had not ended at each sample but the first
+    last: Carried  # the state at the last sample before its end
 
 
 class Kernel:
@@ -165,12 +174,91 @@ class Kernel:
         return self._numpy.isfinite(sample).all() & kept & (code == WITHIN_LIMITS)
 
 
+    def record(self, state: Iterable[Any], reference: Any) -> Recording:
+        """A whole flight, as if nothing ended it."""
+        jax, course, start = self._jax, self.course, self.start(state)
+        first = self.sample(start)
+        sides = self.sides(first)
+        Progress = tuple[Carried, Any, Carried]
+
+        def interval(progress: Progress, steps: int) -> tuple[Progress, tuple[Any, Any]]:
+            now, alive, last = progress
+            now = self.steps(now, steps)
+            sample = self.sample(now)
+            alive = alive & self.goes_on(sample, sides, reference)
+            last = jax.tree.map(lambda new, old: self._numpy.where(alive, new, old), now, last)
+            return (now, alive, last), (sample, alive)
+
+        full, rest = divmod(course.steps, course.record_steps)
+        progress = (start, self._numpy.isfinite(first).all(), start)
+        progress, (samples, alive) = jax.lax.scan(
+            lambda p, _: interval(p, course.record_steps), progress, length=full
+        )
+        if rest:
+            progress, (sample, on) = interval(progress, rest)
+            samples = self._numpy.concatenate((samples, sample[None]))
+            alive = self._numpy.append(alive, on)
+        return Recording(self._numpy.concatenate((first[None], samples)), alive, progress[2])
+
+    def approach(self, carried: Carried) -> Any:
+        """Samples after each step of a recording interval, shape (steps, fields)."""
+
+        def one(now: Carried, _: None) -> tuple[Carried, Any]:
+            now = self.step(now)
+            return now, self.sample(now)
+
+        return self._jax.lax.scan(one, carried, length=self.course.record_steps)[1]
+
+
 def kernel_of(
     course: Course, leaves: Iterable[Any], knots: Any, disturbance: Any, *, guarded: bool = False
 ) -> Kernel:
     """A kernel whose parameters are given as the floats or arrays of their record."""
     parameters = unflatten(course.loop.parameters, leaves)
     return Kernel(course, ControlSetup(parameters, knots), tuple(disturbance), guarded=guarded)
+
+
+class Batch:
+    """Flights of one course that differ in numbers, as functions of arrays with a row a flight.
+
+    Args:
+        course: What they have in common.
+        numbers: Parameters of the loop and of the reference, disturbance and initial state, one
+            after the other; None where rows differ.
+        knots: Common to all, or None.
+    """
+
+    def __init__(
+        self, course: Course, numbers: tuple[float | None, ...], knots: tuple[float, ...] | None
+    ) -> None:
+        import jax
+
+        self.course, self._numbers, self._knots = course, numbers, knots
+        axes = (0, 0 if knots is None else None)
+        self.record = jax.jit(jax.vmap(self._record, axes))
+        self.approach = jax.jit(jax.vmap(self._approach, (*axes, 0)))
+
+    def _kernel(self, row: Any, knots: Any) -> tuple[Kernel, list[Any], ReferenceParameters]:
+        """The kernel of a flight, its initial state and its reference."""
+        own = iter(row)
+        numbers = [next(own) if number is None else number for number in self._numbers]
+        parameters = record_size(self.course.loop.parameters)
+        reference = parameters + record_size(ReferenceParameters)
+        state = reference + 3
+        knots = knots if self._knots is None else self._knots
+        kernel = kernel_of(self.course, numbers[:parameters], knots, numbers[reference:state])
+        return kernel, numbers[state:], ReferenceParameters(*numbers[parameters:reference])
+
+    def _record(self, row: Any, knots: Any) -> Recording:
+        kernel, state, reference = self._kernel(row, knots)
+        return kernel.record(state, reference)
+
+    def _approach(self, row: Any, knots: Any, carried: Carried) -> Any:
+        return self._kernel(row, knots)[0].approach(carried)
+
+
+compile_batch = lru_cache(maxsize=64)(Batch)
+"""`Batch`, whose compiled code is kept."""
 
 
 def course_of(assembly: Assembly) -> Course:

@@ -64,15 +64,15 @@ def fly(
     Args:
         scenarios: What to fly, each anything that `tiltsim.load_scenario` takes; they may differ in
             anything. Those with one closed loop in MuJoCo that do not request the Python engine are
-            flown in batches if they are long enough together.
+            flown in batches if they are long enough together, those of the jax engine always.
         threads: Maximum number of threads; None takes all cores.
         keep_samples: Whether results hold their flights. Without them memory does not grow with the
             number of scenarios.
         progress: True for a bar; or a function, called with the number of finished flights.
 
     Yields:
-        Bit-identical to `tiltsim.simulate` of the scenario except ``realtime_factor``, which is
-        computed from the time that the flight took of all threads together.
+        Bit-identical to `tiltsim.simulate` of the scenario, but for rounding with the jax engine;
+        ``realtime_factor`` is computed from the time that the flight took of all threads together.
 
     Raises:
         InputError: At once, if an argument or a scenario is invalid; later, if a vehicle cannot be
@@ -129,6 +129,10 @@ def _fly_window(
         flown: Iterator[tuple[int, FlightResult]]
         if way == "alone":
             flown = ((index, result(simulate_assembly(a))) for index, a in enumerate(chosen))
+        elif chosen[0].scenario.simulation.engine == "jax":
+            from tiltsim.simulation.array_batch import ArrayBatch
+
+            flown = ArrayBatch(chosen, threads, pool, result).results()
         elif way == "thesis":
             for one_of_each in {assembly.loop: assembly for assembly in chosen}.values():
                 make_plant(one_of_each, engine="native")  # prepares native code before threads do
@@ -150,6 +154,10 @@ def _way_to_fly(assembly: Assembly, native: bool) -> object:
     """``alone``, ``thesis`` for threads with the thesis plant, or what a batch has in common."""
     scenario, loop = assembly.scenario, assembly.loop
     simulation = scenario.simulation
+    if simulation.engine == "jax":
+        from tiltsim.simulation.array_batch import batch_key
+
+        return batch_key(assembly)
     natively = simulation.engine == "native" or (simulation.engine == "auto" and native)
     if not natively or scenario.controller.is_external:
         return "alone"

@@ -1,0 +1,166 @@
+"""Flights on the thesis's equations in JAX, many at once as rows of arrays.
+
+Rows of a batch have one closed loop, one time step and one duration; they may differ in any number
+of the scenario. All fly to the end of the duration; a row that ends early is cut there, and its
+last interval is repeated step by step to find the step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from time import perf_counter
+from typing import Any, Final, Generic, TypeVar
+
+import numpy as np
+
+from tiltsim.arrays.flying import (
+    CODES,
+    Batch,
+    Recording,
+    compile_batch,
+    course_of,
+    double_precision,
+)
+from tiltsim.arrays.jax_arrays import require_jax
+from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.flight.end import End
+from tiltsim.flight.flight import Flight
+from tiltsim.plants.flight_model import disturbance_acceleration
+from tiltsim.simulation.monitor import TerminationMonitor
+from tiltsim.simulation.simulate import simulate_assembly
+from tiltsim_controllers.mathematics.scalar import Floats
+
+MEMORY: Final = 256 * 2**20
+"""Bytes of the samples of all rows that fly together."""
+
+Result = TypeVar("Result")
+
+
+class _Sound:
+    """A plant that reports no fault, for the `TerminationMonitor`."""
+
+    def fault(self) -> str:
+        return ""
+
+
+def _named(record: Any, name: str = "") -> Iterator[tuple[str, float]]:
+    """The numbers of a record with the names of their fields."""
+    for field, value in zip(record._fields, record):
+        if isinstance(value, tuple):
+            yield from _named(value, field)
+        else:
+            yield field, float(value)
+
+
+def numbers_of(assembly: Assembly) -> tuple[float, ...]:
+    """What `tiltsim.arrays.flying.Batch` takes of a flight, knots aside."""
+    equations = assembly.loop.equations
+    assert equations is not None  # refused otherwise
+    return (
+        *(value for _, value in _named(assembly.setup.parameters)),
+        *map(float, assembly.reference),
+        *disturbance_acceleration(assembly.scenario),
+        *map(float, equations.initial(assembly, assembly.setup)),
+    )
+
+
+def batch_key(assembly: Assembly) -> object:
+    """Equal for flights that may share a batch."""
+    parameters, knots = assembly.setup
+    records = (*_named(parameters), *_named(assembly.reference))
+    return course_of(assembly), len(knots), tuple(v for name, v in records if name in CODES)
+
+
+class ArrayBatch(Generic[Result]):
+    """Flights with one `batch_key`.
+
+    Args:
+        assemblies: The flights.
+        threads: How many parts of them fly at once.
+        pool: Runs the threads.
+        finish: Turns a flight into a result; samples are freed unless it keeps them.
+    """
+
+    def __init__(
+        self,
+        assemblies: Sequence[Assembly],
+        threads: int,
+        pool: ThreadPoolExecutor,
+        finish: Callable[[Flight], Result],
+    ) -> None:
+        require_jax('simulation.engine = "jax"')
+        self._assemblies, self._threads, self._pool = assemblies, threads, pool
+        self._finish = finish
+        self._course = course = course_of(assemblies[0])
+        self._numbers = np.array([numbers_of(assembly) for assembly in assemblies])
+        self._knots = np.array([assembly.setup.knots for assembly in assemblies])
+        first = self._numbers[0]
+        self._varies = (self._numbers != first).any(axis=0)
+        common = tuple(None if v else float(n) for v, n in zip(self._varies, first))
+        one_plan = (self._knots == self._knots[0]).all()
+        self._batch: Batch = compile_batch(
+            course, common, tuple(assemblies[0].setup.knots) if one_plan else None
+        )
+        samples = 2 + course.steps // course.record_steps
+        row = samples * len(course.loop.sample_fields) * 8
+        self._most = max(1, MEMORY // row // threads)
+
+    def results(self) -> Iterator[tuple[int, Result]]:
+        """Index and result of each flight, in order."""
+        count = len(self._assemblies)
+        size = min(self._most, -(-count // self._threads))
+        parts = [range(start, min(start + size, count)) for start in range(0, count, size)]
+        for start in range(0, len(parts), self._threads):
+            began = perf_counter()
+            together = parts[start : start + self._threads]
+            flown = list(self._pool.map(lambda part: self._fly(part, size), together))
+            share = (perf_counter() - began) / sum(map(len, together))
+            for part, (recording, closer) in zip(together, flown, strict=True):
+                for row, index in enumerate(part):
+                    flight = self._flight(index, row, recording, closer, share)
+                    yield index, self._finish(flight)
+
+    def _fly(self, part: range, size: int) -> tuple[Recording, Floats]:
+        """Samples of some flights, and steps of the intervals in which some of them ended."""
+        import jax
+
+        rows = [*part, *[part[-1]] * (size - len(part))]  # one shape is compiled once
+        with double_precision():
+            numbers = self._numbers[rows][:, self._varies].astype(self._course.dtype)
+            knots = self._knots[rows].astype(self._course.dtype)
+            recording = self._batch.record(numbers, knots)
+            alive = np.asarray(recording.alive)[: len(part), -1]
+            closer = np.empty(0)
+            if not alive.all():
+                closer = np.asarray(self._batch.approach(numbers, knots, recording.last), float)
+            return jax.device_get(recording), closer
+
+    def _flight(
+        self, index: int, row: int, recording: Recording, closer: Floats, seconds: float
+    ) -> Flight:
+        assembly, course = self._assemblies[index], self._course
+        samples = np.array(recording.samples[row], float)
+        steps = np.minimum(np.arange(len(samples)) * course.record_steps, course.steps)
+        samples[:, 0] = steps * course.timestep  # not rounded
+        monitor, sound = TerminationMonitor(assembly), _Sound()
+        end = monitor.check(sound, samples[0])  # type: ignore[arg-type]
+        alive = recording.alive[row]
+        count = 1 if end else 1 + int(np.count_nonzero(alive))
+        kept = list(samples[:count])
+        if end is None and not alive.all():
+            closer = closer[row].copy()
+            closer[:, 0] = (recording.last.index[row] + 1 + np.arange(len(closer))) * course.timestep
+            end = next(filter(None, (self._end(monitor, s, kept) for s in closer)), None)
+            if end is None:  # rounding: the limit is reached later
+                return simulate_assembly(assembly)
+        end = end or End("completed", float(samples[-1, 0]))
+        return Flight(assembly, np.array(kept), end, "jax", seconds)
+
+    @staticmethod
+    def _end(monitor: TerminationMonitor, sample: Floats, kept: list[Floats]) -> End | None:
+        """The end that a sample implies, which is kept if it is finite."""
+        end = monitor.check(_Sound(), sample)  # type: ignore[arg-type]
+        if end is not None and np.isfinite(sample).all():
+            kept.append(sample)
+        return end
