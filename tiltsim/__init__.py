@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from tiltsim.simulation.batch import fly
     from tiltsim.simulation.simulate import simulate
     from tiltsim.simulation.stepwise import Simulation
+    from tiltsim.simulation.symbolic import symbolic
+    from tiltsim.simulation.vectorized import vectorized
     from tiltsim.sweeps.sweep import sweep
     from tiltsim.views.figures.plot import plot
     from tiltsim.views.rerun.viewer import view
@@ -46,6 +48,8 @@ _HOMES = {
     "plot": "views.figures.plot",
     "show_progress": "commands.progress",  # for progress=True
     "sweep": "sweeps.sweep",
+    "symbolic": "simulation.symbolic",
+    "vectorized": "simulation.vectorized",
     "video": "views.video.making",
     "view": "views.rerun.viewer",
 }
@@ -66,6 +70,8 @@ __all__ = [
     "plot",
     "simulate",
     "sweep",
+    "symbolic",
+    "vectorized",
     "video",
     "view",
 ]

@@ -82,8 +82,8 @@ def short_flights():
                 yield tables, {"plant": plant, **LATE}
 
 
-def record(action, calls, most=2):
-    """Add the arguments of scalar functions called by an action, at most so many each."""
+def record(action, calls):
+    """Add the arguments of the first call of each scalar function by an action."""
     known = {}
 
     def notice(frame, event, _argument):
@@ -96,9 +96,9 @@ def record(action, calls, most=2):
         for function in known[code] or ():
             cells = [cell.cell_contents for cell in function.__closure__ or ()]
             if all(here.get(n) is c for n, c in zip(code.co_freevars, cells)):
-                found = calls.setdefault(function, [])
-                if len(found) < most:
-                    found.append(tuple(map(frozen, (here[n] for n in code.co_varnames[: code.co_argcount]))))
+                if function not in calls:
+                    names = code.co_varnames[: code.co_argcount]
+                    calls[function] = tuple(frozen(here[name]) for name in names)
                 return
 
     sys.setprofile(notice)

@@ -173,6 +173,22 @@ class Kernel:
         code = self._limit(sample[0], tuple(sample[1:]), reference, self.setup.knots, follows)
         return self._numpy.isfinite(sample).all() & kept & (code == WITHIN_LIMITS)
 
+    def samples(self, carried: Carried) -> Any:
+        """Samples from a state to the end of the duration, shape (samples, fields)."""
+        first, (full, rest) = (
+            self.sample(carried),
+            divmod(self.course.steps, self.course.record_steps),
+        )
+
+        def interval(now: Carried, _: None) -> tuple[Carried, Any]:
+            now = self.steps(now, self.course.record_steps)
+            return now, self.sample(now)
+
+        carried, samples = self._jax.lax.scan(interval, carried, length=full)
+        parts = [first[None], samples]
+        if rest:
+            parts.append(self.sample(self.steps(carried, rest))[None])
+        return self._numpy.concatenate(parts)
 
     def record(self, state: Iterable[Any], reference: Any) -> Recording:
         """A whole flight, as if nothing ended it."""

@@ -50,8 +50,8 @@ def evaluations_per_step(model: mujoco.MjModel) -> int:
 
 def disturbance_acceleration(scenario: Scenario) -> Triple:
     """The sum of a scenario's disturbances, m/s^2, world."""
-    x, y, z = (sum(d.value[axis] for d in scenario.disturbance) for axis in range(3))
-    return float(x), float(y), float(z)
+    x, y, z = (sum((d.value[axis] for d in scenario.disturbance), 0.0) for axis in range(3))
+    return x, y, z
 
 
 def build_model(

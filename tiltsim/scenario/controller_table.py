@@ -155,6 +155,10 @@ class ControllerTable(Table):
         """Time (s) for which prioritized allocation keeps within the rotor limits."""
         return 1.0
 
+    def in_full(self) -> Self:
+        """The same with numbers in place of the name of a set of gains."""
+        return self
+
     @property
     def measures_angular_acceleration(self) -> bool:
         """Whether the law feeds back the plant's angular acceleration, not its model's."""

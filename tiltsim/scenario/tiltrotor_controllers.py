@@ -229,6 +229,15 @@ class AttitudeAltitudeController(ControllerTable):
     def resolve_gains(self) -> Gains:
         return resolved_gains(self.gains)
 
+    def in_full(self) -> Self:
+        if not isinstance(self.gains, str):
+            return self
+        values = (*self.resolve_gains(),)
+        first, second, third = zip(values[:3], values[3:6], values[6:9], strict=True)
+        attitude = (first, second, third)
+        table = GainTable(attitude=attitude, altitude=values[9:12], position=values[12:])
+        return self.model_copy(update={"gains": table})
+
     def resolve_integral_gains(self) -> IntegralGains:
         """The gains on the integrals, zero unless given by poles."""
         return resolved_integral_gains(self.gains)

@@ -150,7 +150,9 @@ class ArrayBatch(Generic[Result]):
         kept = list(samples[:count])
         if end is None and not alive.all():
             closer = closer[row].copy()
-            closer[:, 0] = (recording.last.index[row] + 1 + np.arange(len(closer))) * course.timestep
+            closer[:, 0] = (
+                recording.last.index[row] + 1 + np.arange(len(closer))
+            ) * course.timestep
             end = next(filter(None, (self._end(monitor, s, kept) for s in closer)), None)
             if end is None:  # rounding: the limit is reached later
                 return simulate_assembly(assembly)

@@ -1,0 +1,65 @@
+"""A scenario as CasADi functions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tiltsim
+from tests.laws.test_laws import LAWS
+from tests.simulation.test_batch import EXACT, GAITS
+from tiltsim.errors import InputError, TiltsimError
+from tiltsim.laws.assembling import assemble
+from tiltsim_controllers.vehicle.parameters import PRESETS
+
+casadi = pytest.importorskip("casadi")
+
+THESIS = {"simulation": {"plant": "thesis", "duration": 0.1}}
+LOOPS = LAWS | {
+    f"gait {name}": {"gait": {"type": name, **table}, "controller": EXACT}
+    for name, table in GAITS.items()
+}
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_closed_loops_are_those_of_python(name):
+    scenario = tiltsim.parse_scenario({**LOOPS[name], **THESIS})
+    model, assembly = tiltsim.symbolic(scenario), assemble(scenario)
+    equations, (parameters, knots) = assembly.loop.equations, assembly.setup
+    state = np.array(model.initial) + 0.01
+    arguments = 0.037, state.tolist(), parameters, knots
+    inputs = equations.inputs(*arguments)
+    rates = equations.rates(0.037, state.tolist(), inputs, parameters, knots, (0.0, 0.0, 0.0))
+    for function, expected, given in (
+        (model.controller, inputs, {}),
+        (model.closed_loop, rates, {}),
+        (model.dynamics, rates, {"inputs": inputs}),
+    ):
+        (result,) = function(time=0.037, state=state, **given).values()
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(result.full().ravel(), expected, rtol=1e-12, atol=1e-12 * size)
+    sample = equations.observe(0.037, state.tolist(), inputs, parameters, knots)
+    np.testing.assert_allclose(model.sample(0.037, state).full().ravel(), sample, rtol=1e-12, atol=1e-12)
+    assert len(model.fields) == len(sample)
+
+
+def test_its_jacobian_has_the_poles_of_the_gains():
+    """A hover with exact decoupling is linear, with the poles of its gains."""
+    model = tiltsim.symbolic({**THESIS, "controller": {**EXACT, "decoupler": "none"},
+        "reference": {"type": "attitude_altitude"},
+        "initial": {"rotor_speed": PRESETS["ar_drone_2"].hover_rotor_speed}})  # fmt: skip
+    state = casadi.SX.sym("state", len(model.initial))
+    jacobian = casadi.Function(
+        "jacobian", [state], [casadi.jacobian(model.closed_loop(0.0, state), state)]
+    )
+    poles = np.linalg.eigvals(jacobian(model.initial).full())
+    for pole in np.roots([1.0, 40.0, 600.0, 4000.0]):
+        assert np.abs(poles - pole).min() < 1e-3
+
+
+def test_it_refuses_what_has_no_symbolic_form():
+    with pytest.raises(InputError, match='plant = "mujoco": symbolic supports "thesis" only'):
+        tiltsim.symbolic({})
+    noisy = {**THESIS, "sensors": {"position_noise": 0.1}}
+    with pytest.raises(TiltsimError, match=r"noise.uniform, line \d+: .*as random ones"):
+        tiltsim.symbolic(noisy)

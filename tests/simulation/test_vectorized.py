@@ -1,0 +1,142 @@
+"""A scenario as pure functions: values and gradients."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tiltsim
+from tests.laws.test_laws import LAWS
+from tiltsim.arrays.flying import double_precision
+from tiltsim.errors import InputError
+from tiltsim.scenario.loading import merge
+
+jax = pytest.importorskip("jax")
+
+THESIS = {"simulation": {"plant": "thesis", "duration": 0.1}}
+PERTURBED = {"initial": {"attitude": [0.05, -0.04, 0.03], "velocity": [0.1, 0.2, -0.1]}}
+
+
+@pytest.fixture(autouse=True)
+def _double_precision():
+    with double_precision():
+        yield
+
+
+def test_the_flight_is_that_of_the_engine_and_steps_make_it():
+    scenario = tiltsim.parse_scenario({**LAWS["tilt_car_planned_direction"], **THESIS})
+    flown = tiltsim.vectorized(scenario)
+    changes = {"vehicle": {"mass": 1.1}, "gait": {"period": 0.45}}
+    samples = jax.jit(flown.fly)(changes)
+    flight = tiltsim.simulate(
+        scenario.replace({"vehicle.mass": 1.1, "gait.period": 0.45, "simulation.engine": "python"})
+    )
+    for name in ("time", "x", "y", "rotor_speed_1"):
+        np.testing.assert_allclose(samples[name], flight[name], rtol=1e-12, atol=1e-12)
+    step = jax.jit(flown.step)
+    state = flown.initial(changes)
+    for _ in range(10):
+        state = step(state, changes)
+    assert flown.observe(state, changes)["x"] == pytest.approx(flight["x"][1], abs=1e-12)
+
+
+def test_parameters_are_the_numbers_that_a_flight_depends_on():
+    flown = tiltsim.vectorized(tiltsim.parse_scenario({**LAWS["attitude_altitude"], **THESIS}))
+    assert flown.parameters["vehicle"]["mass"] == 0.429
+    assert flown.parameters["controller"]["gains"]["altitude"] == (10.0, 15.0, 10.0)
+    assert flown.parameters["gait"] == {"scale": 1.0, "bias": 1.0, "amplitude": 0.4, "period": 1.0}
+    with pytest.raises(InputError, match=r"parameters.air: no parameter of this scenario; choose"):
+        flown.fly({"air": {"density": 1.0}})
+
+
+def test_it_needs_the_thesis_plant():
+    with pytest.raises(InputError, match='plant = "mujoco".*vectorized supports "thesis" only'):
+        tiltsim.vectorized({})
+
+
+def flat(tree, keys):
+    """Some numbers of a tree by (path, index)."""
+    found = []
+    for path, index in keys:
+        value = tree
+        for name in path.split("."):
+            value = value[name]
+        found.append(value if index is None else np.asarray(value)[index])
+    return np.array(found, dtype=float)
+
+
+def replaced(tree, keys, values):
+    changed = jax.tree.map(lambda value: value, tree)
+    for (path, index), value in zip(keys, values):
+        *tables, name = path.split(".")
+        table = changed
+        for each in tables:
+            table = table[each]
+        if index is None:
+            table[name] = value
+        else:
+            array = jax.numpy.asarray(table[name], float).at[index].set(value)
+            table[name] = jax.tree.map(lambda v: v, tuple(array)) if array.ndim == 1 else tuple(
+                tuple(row) for row in array
+            )
+    return changed
+
+
+ROTORCRAFT = [("vehicle.mass", None), ("vehicle.inertia", 0), ("vehicle.gravity", None)]
+GRADIENTS = {
+    "attitude_altitude": [
+        *ROTORCRAFT,
+        ("vehicle.arm_length", None),
+        ("gait.amplitude", None),
+        ("gait.period", None),
+        ("controller.gains.attitude", (1, 0)),
+        ("controller.gains.attitude", (2, 1)),
+        ("controller.gains.altitude", 0),
+        ("initial.attitude", 1),
+    ],
+    "full_pose": [
+        *ROTORCRAFT,
+        ("vehicle.thrust_coefficient", None),
+        ("gait.angles", 0),
+        ("gait.angles", 2),
+        ("controller.gains.position", 1),
+        ("controller.gains.attitude", 0),
+        ("controller.gains.attitude", 2),
+        ("initial.rotor_speed", None),
+    ],
+    "gait_feedforward": [
+        *ROTORCRAFT,
+        ("vehicle.drag_coefficient", None),
+        ("gait.amplitude", None),
+        ("gait.period", None),
+        ("controller.gains.attitude.bandwidth", None),
+        ("controller.gains.altitude.bandwidth", None),
+        ("controller.gains.altitude.integral", None),
+        ("reference.radius", None),
+    ],
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", GRADIENTS)
+def test_gradients_are_those_of_central_differences(law):
+    keys = GRADIENTS[law]
+    flown = tiltsim.vectorized(tiltsim.parse_scenario(merge({**LAWS[law], **THESIS}, PERTURBED)))
+    base = flat(flown.parameters, keys)
+
+    @jax.jit
+    def cost(factors):
+        samples = flown.fly(replaced(flown.parameters, keys, base * factors))
+        errors = [samples[name] for name in ("x", "y", "z", "roll", "pitch", "yaw")]
+        return sum(((error - 0.3) * (error - 0.3)).mean() for error in errors)
+
+    ones = np.ones(len(keys))
+    gradient = np.asarray(jax.jit(jax.grad(cost))(ones))
+    assert np.isfinite(gradient).all()
+    for index, exact in enumerate(gradient):
+        # Of five points: the error of the method is of fourth order.
+        h = 1e-3
+        values = [float(cost(ones + k * h * np.eye(len(keys))[index])) for k in (-2, -1, 1, 2)]
+        far_below, below, above, far_above = values
+        difference = (8.0 * (above - below) - (far_above - far_below)) / (12.0 * h)
+        assert exact == pytest.approx(difference, rel=1e-6, abs=1e-9), keys[index]

@@ -1,0 +1,281 @@
+"""The values of the expressions of a function on arrays; see `tiltsim.arrays.lifting`."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import operator
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from types import CodeType, FunctionType
+from typing import TYPE_CHECKING, Any, Final
+
+from tiltsim.arrays.values import Function, LiftError
+
+if TYPE_CHECKING:
+    from tiltsim.arrays.lifting import Lifting
+
+DATA_LENGTH: Final = "the length of a loop depends on arrays"
+
+BINARY: Final[dict[type[ast.operator], Function]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.FloorDiv: operator.floordiv,
+    ast.Mod: operator.mod,
+    ast.Pow: operator.pow,
+    ast.BitAnd: operator.and_,
+    ast.BitXor: operator.xor,
+    ast.LShift: operator.lshift,
+    ast.RShift: operator.rshift,
+}
+COMPARISONS: Final[dict[type[ast.cmpop], Function]] = {
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+}
+STRUCTURAL: Final = {range, zip, len, list, tuple, bool, enumerate}
+"""Builtins that work on the structure of the values, whatever they are."""
+
+
+class Borrowed(list[Any]):
+    """A list of the caller, which a lifted function may read and copy but not change."""
+
+
+@cache
+def _definitions(file: str) -> dict[int, list[ast.FunctionDef | ast.Lambda]]:
+    """The functions of a source file by their first line."""
+    tree = ast.parse(Path(file).read_text(encoding="utf-8"))
+    found: dict[int, list[ast.FunctionDef | ast.Lambda]] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.Lambda):
+            decorators = getattr(node, "decorator_list", [])
+            found.setdefault(min(n.lineno for n in [node, *decorators]), []).append(node)
+    return found
+
+
+@cache
+def _definition(code: CodeType) -> ast.FunctionDef | ast.Lambda:
+    try:
+        nodes = _definitions(code.co_filename).get(code.co_firstlineno, [])
+    except OSError:
+        nodes = []
+    for node in nodes:
+        if getattr(node, "name", "<lambda>") == code.co_name:
+            return node
+    raise LiftError(f"{code.co_name}: its source is not in {code.co_filename}")
+
+
+class Expressions:
+    """The call of a function that is being evaluated: its names, and values of expressions.
+
+    Args:
+        lifting: What it is lifted to.
+        function: Written in Python, in a file.
+    """
+
+    def __init__(self, lifting: Lifting, function: FunctionType) -> None:
+        self.lifting, self.function = lifting, function
+        self.node = _definition(function.__code__)
+        cells = zip(function.__code__.co_freevars, function.__closure__ or ())
+        self.outer = {
+            **vars(builtins),
+            **function.__globals__,
+            **{name: cell.cell_contents for name, cell in cells},
+        }
+        self.line = self.node.lineno
+
+    def error(self, message: str) -> LiftError:
+        name = f"{self.function.__module__}.{self.function.__name__}"
+        return LiftError(f"{name}, line {self.line}: {message}")
+
+    def plain(self, node: ast.expr, variables: dict[str, Any], message: str) -> Any:
+        """A value that must not be an array, nor arise from one."""
+        try:
+            value = self.value(node, variables)
+        except TypeError:
+            raise self.error(message) from None
+        if self.lifting.arrays.is_array(value):
+            raise self.error(message)
+        return value
+
+    def value(self, node: ast.expr, variables: dict[str, Any]) -> Any:
+        lifting, arrays = self.lifting, self.lifting.arrays
+        match node:
+            case ast.Constant(value=value):
+                return value
+            case ast.Name(id=name):
+                return variables[name] if name in variables else self.outer[name]
+            case ast.Attribute(value=record, attr=name):
+                return lifting.attribute(self.value(record, variables), name)
+            case ast.BinOp(left=left, op=op, right=right):
+                first = self.value(left, variables)
+                return self.binary(op, first, self.value(right, variables))
+            case ast.UnaryOp(op=ast.Not(), operand=operand):
+                return lifting.negation(self.value(operand, variables))
+            case ast.UnaryOp(op=op, operand=operand):
+                value = self.value(operand, variables)
+                return -value if isinstance(op, ast.USub) else +value
+            case ast.Compare():
+                return self.comparison(node, variables)
+            case ast.BoolOp(op=op, values=values):
+                return self.connected(isinstance(op, ast.And), values, variables)
+            case ast.IfExp(test=test, body=body, orelse=orelse):
+                condition = self.value(test, variables)
+                if not arrays.is_array(condition):
+                    return self.value(body if condition else orelse, variables)
+                with lifting.under(condition):
+                    yes = self.value(body, variables)
+                with lifting.under(arrays.negated(condition)):
+                    no = self.value(orelse, variables)
+                return lifting.select(condition, yes, no)
+            case ast.Tuple(elts=elements):
+                return tuple(self.elements(elements, variables))
+            case ast.List(elts=elements):
+                return self.elements(elements, variables)
+            case ast.Subscript(value=vector, slice=place):
+                return self.entry(self.value(vector, variables), place, variables)
+            case ast.Call():
+                return self.called(node, variables)
+            case ast.JoinedStr(values=parts):  # of a name or a message
+                return "".join(str(self.value(part, variables)) for part in parts)
+            case ast.FormattedValue(value=value):
+                return self.value(value, variables)
+            case ast.ListComp(elt=element) | ast.GeneratorExp(elt=element):
+                return [self.value(element, inner) for inner in self.items(node, variables)]
+            case ast.DictComp(key=key, value=value):
+                return {
+                    self.value(key, inner): self.value(value, inner)
+                    for inner in self.items(node, variables)
+                }
+        raise self.error(f"{type(node).__name__} has no form on arrays")
+
+    def items(
+        self, node: ast.ListComp | ast.GeneratorExp | ast.DictComp, variables: dict[str, Any]
+    ) -> Iterator[dict[str, Any]]:
+        """The variables of each round of a comprehension."""
+        if len(node.generators) > 1:
+            raise self.error("nested comprehensions have no form on arrays")
+        (one,) = node.generators
+        for item in list(self.value(one.iter, variables)):
+            inner = dict(variables)
+            self.assign(one.target, item, inner)
+            if all(self.plain(test, inner, DATA_LENGTH) for test in one.ifs):
+                yield inner
+
+    def binary(self, op: ast.operator, left: Any, right: Any) -> Any:
+        if isinstance(left, tuple | list):  # joined, or repeated
+            return BINARY[type(op)](left, right)
+        if type(op) not in BINARY:
+            raise self.error(f"{type(op).__name__} has no form on arrays")
+        return self.lifting.apply(BINARY[type(op)], left, right)
+
+    def comparison(self, node: ast.Compare, variables: dict[str, Any]) -> Any:
+        result, left = True, self.value(node.left, variables)
+        for op, right_node in zip(node.ops, node.comparators):
+            right = self.value(right_node, variables)
+            result = self.lifting.conjunction(result, self.compared(op, left, right))
+            if result is False:
+                return False
+            left = right
+        return result
+
+    def compared(self, op: ast.cmpop, left: Any, right: Any) -> Any:
+        if isinstance(op, ast.Is | ast.IsNot):
+            return (left is right) == isinstance(op, ast.Is)
+        if isinstance(op, ast.In | ast.NotIn):
+            return (left in right) == isinstance(op, ast.In)
+        if isinstance(left, tuple | list) and isinstance(right, tuple | list):
+            equal: Any = True
+            for a, b in zip(left, right, strict=True):
+                equal = self.lifting.conjunction(equal, self.compared(ast.Eq(), a, b))
+            return equal if isinstance(op, ast.Eq) else self.lifting.negation(equal)
+        result = self.lifting.apply(COMPARISONS[type(op)], left, right)
+        return result if self.lifting.arrays.is_array(result) else bool(result)
+
+    def connected(self, both: bool, nodes: list[ast.expr], variables: dict[str, Any]) -> Any:
+        """A chain of ``and``, or of ``or``, which ends where a plain value decides."""
+        arrays, result = self.lifting.arrays, None
+        for node in nodes:
+            value = self.value(node, variables)
+            if not arrays.is_array(value):
+                if bool(value) != both:
+                    return value
+                continue
+            connect = arrays.both if both else arrays.either
+            result = value if result is None else connect(result, value)
+        return both if result is None else result
+
+    def elements(self, nodes: Iterable[ast.expr], variables: dict[str, Any]) -> list[Any]:
+        made: list[Any] = []
+        for node in nodes:
+            if isinstance(node, ast.Starred):
+                made += list(self.value(node.value, variables))
+            else:
+                made.append(self.value(node, variables))
+        return made
+
+    def entry(self, vector: Any, place: ast.expr, variables: dict[str, Any]) -> Any:
+        if isinstance(place, ast.Slice):
+            lower, upper = (
+                None if bound is None else self.plain(bound, variables, "slice by an array")
+                for bound in (place.lower, place.upper)
+            )
+            return vector[lower:upper]
+        index = self.value(place, variables)
+        if self.lifting.arrays.is_array(index):
+            return self.lifting.arrays.take(vector, index)
+        return vector[index]
+
+    def called(self, node: ast.Call, variables: dict[str, Any]) -> Any:
+        function = self.value(node.func, variables)
+        args = self.elements(node.args, variables)
+        keywords: dict[str, Any] = {}
+        for keyword in node.keywords:
+            value = self.value(keyword.value, variables)
+            keywords |= {keyword.arg: value} if keyword.arg else dict(value)
+        return self.invoked(function, args, keywords)
+
+    def invoked(self, function: Any, args: list[Any], keywords: Mapping[str, Any]) -> Any:
+        lifting = self.lifting
+        if isinstance(function, FunctionType) and lifting.is_scalar(function):
+            return lifting.run(function, args, keywords)
+        if function in STRUCTURAL or (isinstance(function, type) and issubclass(function, tuple)):
+            return function(*args, **keywords)
+        if function is map:
+            return [self.invoked(args[0], [item], {}) for item in list(args[1])]
+        if function in lifting.arrays.functions:
+            return lifting.apply(function, *args)
+        if lifting.planning:
+            return lifting.plan(function, args, keywords)
+        raise self.error(f"calls {function.__name__}, which is no scalar code")
+
+    def assign(self, target: ast.expr, value: Any, variables: dict[str, Any]) -> None:
+        match target:
+            case ast.Name(id=name):
+                variables[name] = value
+            case ast.Tuple(elts=targets) | ast.List(elts=targets):
+                values = list(value)
+                starred = [i for i, each in enumerate(targets) if isinstance(each, ast.Starred)]
+                for place in starred:
+                    rest = len(values) - len(targets) + 1
+                    values[place : place + rest] = [values[place : place + rest]]
+                    targets = [
+                        each.value if isinstance(each, ast.Starred) else each for each in targets
+                    ]
+                if len(values) != len(targets):
+                    raise self.error(f"{len(values)} values for {len(targets)} names")
+                for each, item in zip(targets, values):
+                    self.assign(each, item, variables)
+            case ast.Subscript(value=vector, slice=place):
+                into = self.value(vector, variables)
+                if not isinstance(into, list) or isinstance(into, Borrowed):
+                    raise self.error(f"changes {ast.unparse(vector)}, which it did not make")
+                into[self.plain(place, variables, "writes to an index that is an array")] = value
+            case _:
+                raise self.error(f"assignment to {ast.unparse(target)}")

@@ -1,0 +1,51 @@
+"""What scalar functions are lifted to: arrays of JAX, symbols of CasADi."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Protocol
+
+from tiltsim.errors import TiltsimError
+
+Function = Callable[..., Any]
+
+
+class LiftError(TiltsimError):
+    """A function that has no form on arrays; the message names function and line."""
+
+
+class Arrays(Protocol):
+    """The values that scalar functions are lifted to."""
+
+    @property
+    def functions(self) -> Mapping[Function, Function]:
+        """Counterparts of the functions of ``math`` and of builtins."""
+
+    @property
+    def domains(self) -> Mapping[Function, float]:
+        """Of those that are defined on a part of the reals only, a number in that part."""
+
+    def is_array(self, value: Any) -> bool:
+        """Whether a value is known only when the lifted function runs."""
+
+    def where(self, condition: Any, yes: Any, no: Any) -> Any:
+        """Select by a condition, entry by entry."""
+
+    def take(self, values: Any, index: Any) -> Any:
+        """The entry of a vector at an index that is an array."""
+
+    def both(self, first: Any, second: Any) -> Any:
+        """Conjunction."""
+
+    def either(self, first: Any, second: Any) -> Any:
+        """Disjunction."""
+
+    def negated(self, condition: Any) -> Any:
+        """Negation."""
+
+
+def rebuilt(like: Any, values: Iterable[Any]) -> Any:
+    """A tuple, list or record as another one, with other values."""
+    if hasattr(like, "_fields"):
+        return type(like)(*values)
+    return list(values) if isinstance(like, list) else tuple(values)
