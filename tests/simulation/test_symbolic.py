@@ -39,7 +39,9 @@ def test_closed_loops_are_those_of_python(name):
         size = np.abs(expected).max()
         np.testing.assert_allclose(result.full().ravel(), expected, rtol=1e-12, atol=1e-12 * size)
     sample = equations.observe(0.037, state.tolist(), inputs, parameters, knots)
-    np.testing.assert_allclose(model.sample(0.037, state).full().ravel(), sample, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(
+        model.sample(0.037, state).full().ravel(), sample, rtol=1e-12, atol=1e-12
+    )
     assert len(model.fields) == len(sample)
 
 

@@ -50,7 +50,7 @@ def test_parameters_are_the_numbers_that_a_flight_depends_on():
 
 
 def test_it_needs_the_thesis_plant():
-    with pytest.raises(InputError, match='plant = "mujoco".*vectorized supports "thesis" only'):
+    with pytest.raises(InputError, match=r'plant = "mujoco".*vectorized supports "thesis" only'):
         tiltsim.vectorized({})
 
 
@@ -76,8 +76,10 @@ def replaced(tree, keys, values):
             table[name] = value
         else:
             array = jax.numpy.asarray(table[name], float).at[index].set(value)
-            table[name] = jax.tree.map(lambda v: v, tuple(array)) if array.ndim == 1 else tuple(
-                tuple(row) for row in array
+            table[name] = (
+                jax.tree.map(lambda v: v, tuple(array))
+                if array.ndim == 1
+                else tuple(tuple(row) for row in array)
             )
     return changed
 

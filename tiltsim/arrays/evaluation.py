@@ -19,6 +19,7 @@ class Frame(Expressions):
     """The evaluation of one call."""
 
     def call(self, args: Iterable[Any], keywords: Mapping[str, Any]) -> Any:
+        """The value of the function."""
         bound = inspect.signature(self.function).bind(*args, **keywords)
         bound.apply_defaults()
         variables = {
@@ -35,6 +36,7 @@ class Frame(Expressions):
         return list(value) if isinstance(value, Borrowed) else value
 
     def block(self, statements: list[ast.stmt], variables: dict[str, Any]) -> Ends:
+        """Evaluate statements one after the other."""
         ends: Ends = {NEXT: (True, variables)}
         for statement in statements:
             if NEXT not in ends:
@@ -65,6 +67,7 @@ class Frame(Expressions):
         return joined
 
     def statement(self, node: ast.stmt, variables: dict[str, Any]) -> Ends:
+        """Evaluate one statement."""
         match node:
             case ast.Return(value=value):
                 return {RETURN: (True, None if value is None else self.value(value, variables))}
@@ -107,6 +110,7 @@ class Frame(Expressions):
         return {NEXT: (True, variables)}
 
     def branches(self, node: ast.If, variables: dict[str, Any]) -> Ends:
+        """Evaluate one branch of an ``if``, or both."""
         condition = self.value(node.test, variables)
         if not self.lifting.arrays.is_array(condition):
             return self.block(node.body if condition else node.orelse, variables)

@@ -8,13 +8,10 @@ import operator
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from types import CodeType, FunctionType
-from typing import TYPE_CHECKING, Any, Final
+from types import FunctionType
+from typing import Any, Final
 
 from tiltsim.arrays.values import Function, LiftError
-
-if TYPE_CHECKING:
-    from tiltsim.arrays.lifting import Lifting
 
 DATA_LENGTH: Final = "the length of a loop depends on arrays"
 
@@ -60,12 +57,13 @@ def _definitions(file: str) -> dict[int, list[ast.FunctionDef | ast.Lambda]]:
 
 
 @cache
-def _definition(code: CodeType) -> ast.FunctionDef | ast.Lambda:
-    try:
-        nodes = _definitions(code.co_filename).get(code.co_firstlineno, [])
-    except OSError:
-        nodes = []
-    for node in nodes:
+def _definition(function: FunctionType) -> ast.FunctionDef | ast.Lambda:
+    code, text = function.__code__, getattr(function, "__source__", None)
+    if text is not None:  # written by `tiltsim_controllers.mathematics.vectors`
+        (node,) = ast.parse(text).body
+        assert isinstance(node, ast.FunctionDef)
+        return node
+    for node in _definitions(code.co_filename).get(code.co_firstlineno, []):
         if getattr(node, "name", "<lambda>") == code.co_name:
             return node
     raise LiftError(f"{code.co_name}: its source is not in {code.co_filename}")
@@ -75,13 +73,13 @@ class Expressions:
     """The call of a function that is being evaluated: its names, and values of expressions.
 
     Args:
-        lifting: What it is lifted to.
+        lifting: A `tiltsim.arrays.lifting.Lifting`.
         function: Written in Python, in a file.
     """
 
-    def __init__(self, lifting: Lifting, function: FunctionType) -> None:
+    def __init__(self, lifting: Any, function: FunctionType) -> None:
         self.lifting, self.function = lifting, function
-        self.node = _definition(function.__code__)
+        self.node = _definition(function)
         cells = zip(function.__code__.co_freevars, function.__closure__ or ())
         self.outer = {
             **vars(builtins),
@@ -91,6 +89,7 @@ class Expressions:
         self.line = self.node.lineno
 
     def error(self, message: str) -> LiftError:
+        """An error that names function and line."""
         name = f"{self.function.__module__}.{self.function.__name__}"
         return LiftError(f"{name}, line {self.line}: {message}")
 
@@ -105,6 +104,7 @@ class Expressions:
         return value
 
     def value(self, node: ast.expr, variables: dict[str, Any]) -> Any:
+        """The value of an expression."""
         lifting, arrays = self.lifting, self.lifting.arrays
         match node:
             case ast.Constant(value=value):
@@ -169,6 +169,7 @@ class Expressions:
                 yield inner
 
     def binary(self, op: ast.operator, left: Any, right: Any) -> Any:
+        """Two values joined by an operator."""
         if isinstance(left, tuple | list):  # joined, or repeated
             return BINARY[type(op)](left, right)
         if type(op) not in BINARY:
@@ -176,6 +177,7 @@ class Expressions:
         return self.lifting.apply(BINARY[type(op)], left, right)
 
     def comparison(self, node: ast.Compare, variables: dict[str, Any]) -> Any:
+        """A chain of comparisons."""
         result, left = True, self.value(node.left, variables)
         for op, right_node in zip(node.ops, node.comparators):
             right = self.value(right_node, variables)
@@ -186,6 +188,7 @@ class Expressions:
         return result
 
     def compared(self, op: ast.cmpop, left: Any, right: Any) -> Any:
+        """Two values compared; tuples are equal if their entries are."""
         if isinstance(op, ast.Is | ast.IsNot):
             return (left is right) == isinstance(op, ast.Is)
         if isinstance(op, ast.In | ast.NotIn):
@@ -212,6 +215,7 @@ class Expressions:
         return both if result is None else result
 
     def elements(self, nodes: Iterable[ast.expr], variables: dict[str, Any]) -> list[Any]:
+        """Values of a tuple or list, or of arguments."""
         made: list[Any] = []
         for node in nodes:
             if isinstance(node, ast.Starred):
@@ -221,6 +225,7 @@ class Expressions:
         return made
 
     def entry(self, vector: Any, place: ast.expr, variables: dict[str, Any]) -> Any:
+        """An entry or a slice of a vector."""
         if isinstance(place, ast.Slice):
             lower, upper = (
                 None if bound is None else self.plain(bound, variables, "slice by an array")
@@ -233,6 +238,7 @@ class Expressions:
         return vector[index]
 
     def called(self, node: ast.Call, variables: dict[str, Any]) -> Any:
+        """The value of a call."""
         function = self.value(node.func, variables)
         args = self.elements(node.args, variables)
         keywords: dict[str, Any] = {}
@@ -242,6 +248,7 @@ class Expressions:
         return self.invoked(function, args, keywords)
 
     def invoked(self, function: Any, args: list[Any], keywords: Mapping[str, Any]) -> Any:
+        """The value of a function at arguments."""
         lifting = self.lifting
         if isinstance(function, FunctionType) and lifting.is_scalar(function):
             return lifting.run(function, args, keywords)
@@ -256,6 +263,7 @@ class Expressions:
         raise self.error(f"calls {function.__name__}, which is no scalar code")
 
     def assign(self, target: ast.expr, value: Any, variables: dict[str, Any]) -> None:
+        """Give a value to a name, to several, or to an entry of a list made here."""
         match target:
             case ast.Name(id=name):
                 variables[name] = value

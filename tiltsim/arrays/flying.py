@@ -145,7 +145,9 @@ class Kernel:
         """So many steps later."""
         if count == 1:
             return self.step(carried)
-        return self._jax.lax.scan(lambda c, _: (self.step(c), None), carried, length=count)[0]
+        now: Carried
+        now, _ = self._jax.lax.scan(lambda c, _: (self.step(c), None), carried, length=count)
+        return now
 
     def sample(self, carried: Carried) -> Any:
         """The fields of a sample, shape (fields,)."""
@@ -229,7 +231,15 @@ class Kernel:
 def kernel_of(
     course: Course, leaves: Iterable[Any], knots: Any, disturbance: Any, *, guarded: bool = False
 ) -> Kernel:
-    """A kernel whose parameters are given as the floats or arrays of their record."""
+    """A kernel whose parameters are given as the floats or arrays of their record.
+
+    Args:
+        course: What is flown.
+        leaves: The floats or arrays of the loop's record, in order.
+        knots: Those of the flight.
+        disturbance: m/s^2, world axes.
+        guarded: See `Lifting`.
+    """
     parameters = unflatten(course.loop.parameters, leaves)
     return Kernel(course, ControlSetup(parameters, knots), tuple(disturbance), guarded=guarded)
 
@@ -301,7 +311,8 @@ def _compiled_steps(
     kernel = kernel_of(course, leaves, knots, disturbance)
 
     def many(carried: Carried, steps: Any) -> Carried:
-        return jax.lax.fori_loop(0, steps, lambda _, now: kernel.step(now), carried)
+        now: Carried = jax.lax.fori_loop(0, steps, lambda _, now: kernel.step(now), carried)
+        return now
 
     return kernel, jax.jit(many)
 

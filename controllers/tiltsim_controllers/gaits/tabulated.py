@@ -20,7 +20,7 @@ ROW: Final = 1 + 4 * COEFFICIENTS
 @scalar
 def segment_jet(since: float, start: int, knots: Vector) -> Jet:
     """A tilt angle with rate and acceleration, ``since`` seconds into its polynomial's segment."""
-    value, rate, acceleration, _, _ = polynomial_motion(since, start, start + COEFFICIENTS, knots)
+    value, rate, acceleration, _, _ = polynomial_motion(since, start, COEFFICIENTS, knots)
     return value, rate, acceleration
 
 

@@ -37,22 +37,23 @@ def row_at(position: float, rows: int, begin: int, size: int, knots: Vector) -> 
 
 @scalar
 def polynomial_motion(
-    since: float, start: int, stop: int, knots: Vector
+    since: float, start: int, coefficients: int, knots: Vector
 ) -> tuple[float, float, float, float, float]:
     """A polynomial and its first four derivatives.
 
     Args:
         since: its beginning, s
-        start, stop: indices of its first coefficient, that of the highest power, and after its last
+        start: index of its first coefficient, that of the highest power
+        coefficients: how many
         knots: contains the coefficients
     """
     value = first = second = third = fourth = 0.0
-    for index in range(start, stop):
+    for place in range(coefficients):
         fourth = fourth * since + third
         third = third * since + second
         second = second * since + first
         first = first * since + value
-        value = value * since + knots[index]
+        value = value * since + knots[start + place]
     return value, first, 2.0 * second, 6.0 * third, 24.0 * fourth
 
 

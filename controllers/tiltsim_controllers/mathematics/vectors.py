@@ -36,6 +36,7 @@ def written_out(name: str, arguments: str, result: str, **functions: Callable[..
     space: dict[str, Any] = {"__name__": __name__, **functions}
     text = f"def {name}({arguments}):\n    return {result}\n"
     exec(compile(text, __file__, "exec"), space)
+    space[name].__source__ = text  # which no file has
     return scalar(space[name])
 
 

@@ -38,9 +38,9 @@ def waypoint_motion(time: float, rows: float, offset: float, knots: Vector) -> V
     row = begin + ROW * row_at(time, int(rows), begin, ROW, knots)
     x, y, z = row + 1, row + 1 + COEFFICIENTS, row + 1 + 2 * COEFFICIENTS
     since = max(0.0, time - knots[row])
-    x0, x1, x2, x3, x4 = polynomial_motion(since, x, y, knots)
-    y0, y1, y2, y3, y4 = polynomial_motion(since, y, z, knots)
-    z0, z1, z2, z3, z4 = polynomial_motion(since, z, row + ROW, knots)
+    x0, x1, x2, x3, x4 = polynomial_motion(since, x, COEFFICIENTS, knots)
+    y0, y1, y2, y3, y4 = polynomial_motion(since, y, COEFFICIENTS, knots)
+    z0, z1, z2, z3, z4 = polynomial_motion(since, z, COEFFICIENTS, knots)
     return x0, y0, z0, x1, y1, z1, x2, y2, z2, x3, y3, z3, x4, y4, z4
 
 
