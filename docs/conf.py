@@ -26,6 +26,7 @@ suppress_warnings = ["ref.python"]  # a name of several modules, written without
 CONTROLLERS = Path(tiltsim_controllers.__file__).parent
 INCLUDED = {
     "README.md": "index.md",
+    "CHANGELOG.md": "changelog.md",
     "CONTRIBUTING.md": "contributing.md",
     "SECURITY.md": "security.md",
 }
