@@ -22,7 +22,9 @@ from tiltsim_controllers.vehicle.effectiveness import (
     tilts_of,
 )
 from tiltsim_controllers.vehicle.multirotor import body_of, equations_of_motion_of
+from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
 
+FOUR = PRESETS["ar_drone_2"]
 HEXAROTOR = body_of(1.53, np.diag((0.0348, 0.0459, 0.08)), 9.81)
 SMALL = body_of(1.0, 0.012 * np.eye(3), 9.81)
 
@@ -58,6 +60,28 @@ class Vehicle(NamedTuple):
     body: object
     dimension: int
     norm: str = "speed"
+
+
+def tiltrotor():
+    """Ch. 3's vehicle as a table of rotors."""
+    table = []
+    for i, (x, y) in enumerate(((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))):
+        place = (FOUR.arm_length * x, FOUR.arm_length * y, 0.0)
+        table += rotor_entries(
+            place, (0.0, 0.0, 1.0), FOUR.thrust_coefficient, FOUR.drag_coefficient, SPIN[i],
+            tilt=i, hinge=place, hinge_axis=(x, y, 0.0),
+        )  # fmt: skip
+    inertia = np.diag((FOUR.inertia_xx, FOUR.inertia_yy, FOUR.inertia_zz))
+    return Vehicle(tuple(table), body_of(FOUR.mass, inertia, FOUR.gravity), 1)
+
+
+def random_states(count):
+    """States of the tiltrotor near and far from hover, with their times."""
+    rng = np.random.default_rng(1)
+    for _ in range(count):
+        body = (*rng.normal(size=6), *rng.uniform(-0.4, 0.4, 3), *rng.normal(size=3))
+        speeds = rng.uniform(100.0, 500.0, 4) * SPIN
+        yield rng.uniform(0.0, 30.0), (*body, *rng.uniform(-1.2, 1.2, 4).tolist(), *speeds.tolist())
 
 
 def parameters_of(vehicle, gait=None, reference=None, **changes):

@@ -8,13 +8,16 @@ import numpy as np
 import pytest
 
 from tests.controllers.multirotors import (
+    FOUR,
     HEXAROTOR,
     SMALL,
     Vehicle,
     fly,
     octorotor,
     parameters_of,
+    random_states,
     ring,
+    tiltrotor,
 )
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.laws import attitude_altitude, gait_feedforward
@@ -24,39 +27,14 @@ from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms
 from tiltsim_controllers.laws.multirotor import multirotor_law_of
 from tiltsim_controllers.laws.multirotor_steps import EULER_ANGLES, SideGains
 from tiltsim_controllers.references.trajectories import CIRCLE, SETPOINT, ReferenceParameters
-from tiltsim_controllers.vehicle.effectiveness import layout_of, rotor_entries
-from tiltsim_controllers.vehicle.multirotor import body_of
-from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
+from tiltsim_controllers.vehicle.effectiveness import layout_of
 
-FOUR = PRESETS["ar_drone_2"]
 ON_CIRCLE = ReferenceParameters(
     CIRCLE, x=0.3, y=-0.2, z=0.1, radius=2.0, angular_frequency=0.5, yaw=0.4,
     acceleration_feedforward=1.0,
 )  # fmt: skip
 AS_PUBLISHED = FeedforwardTerms(0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 """Only the reference's acceleration: the four-rotor law of ch. 4 has none of the other terms."""
-
-
-def tiltrotor():
-    """Ch. 3's vehicle as a table of rotors."""
-    table = []
-    for i, (x, y) in enumerate(((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))):
-        place = (FOUR.arm_length * x, FOUR.arm_length * y, 0.0)
-        table += rotor_entries(
-            place, (0.0, 0.0, 1.0), FOUR.thrust_coefficient, FOUR.drag_coefficient, SPIN[i],
-            tilt=i, hinge=place, hinge_axis=(x, y, 0.0),
-        )  # fmt: skip
-    inertia = np.diag((FOUR.inertia_xx, FOUR.inertia_yy, FOUR.inertia_zz))
-    return Vehicle(tuple(table), body_of(FOUR.mass, inertia, FOUR.gravity), 1)
-
-
-def random_states(count):
-    """States of the tiltrotor near and far from hover, with their times."""
-    rng = np.random.default_rng(1)
-    for _ in range(count):
-        body = (*rng.normal(size=6), *rng.uniform(-0.4, 0.4, 3), *rng.normal(size=3))
-        speeds = rng.uniform(100.0, 500.0, 4) * SPIN
-        yield rng.uniform(0.0, 30.0), (*body, *rng.uniform(-1.2, 1.2, 4).tolist(), *speeds.tolist())
 
 
 def differences(todays, general):
