@@ -22,10 +22,17 @@ from tests.controllers.multirotors import (
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.laws import attitude_altitude, gait_feedforward
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
+from tiltsim_controllers.laws.full_pose import attitude_error
 from tiltsim_controllers.laws.gains import GAIN_SETS, Poles, gains_from_poles
 from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms
 from tiltsim_controllers.laws.multirotor import multirotor_law_of
-from tiltsim_controllers.laws.multirotor_steps import EULER_ANGLES, SideGains
+from tiltsim_controllers.laws.multirotor_steps import (
+    EULER_ANGLES,
+    SideGains,
+    rotation_control,
+    turned,
+)
+from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.references.trajectories import CIRCLE, SETPOINT, ReferenceParameters
 from tiltsim_controllers.vehicle.effectiveness import layout_of
 
@@ -167,3 +174,43 @@ def test_an_octorotor_turns_upside_down_and_hovers_there():
     assert flight.up[-1, 2] < -1.0 + 1e-6
     assert np.abs(flight.position).max() < 1e-3
     assert (np.diff(np.sign(flight.speeds), axis=0) != 0).any(axis=0).all()  # every rotor reverses
+
+
+def test_attitude_control_feeds_the_motion_of_its_reference_forward():
+    """Rates by differences of rotations, seen from a body behind its reference; yaw is at rest."""
+    law, _ = parameters_of(CANTED, reference=ReferenceParameters(SETPOINT, yaw=0.5))
+    now, step = 0.5, 1e-4
+
+    def desired(time):
+        roll, pitch = turned(time, 0.8, 1.0), turned(time, -0.6, 1.3)
+        return np.reshape(rotation_from_euler(roll[0], pitch[0], 0.5), (3, 3))
+
+    def body(time):
+        return desired(time - 0.2)
+
+    def rate(vectors, time):
+        return (vectors(time + step) - vectors(time - step)) / (2.0 * step)
+
+    def seen_from_body(rotation):
+        """Its rates, in axes of the body, as a function of time."""
+
+        def omega(time):
+            skew = rate(rotation, time) @ rotation(time).T
+            return body(time).T @ (skew[2, 1], skew[0, 2], skew[1, 0])
+
+        return omega
+
+    present, wanted = seen_from_body(body), seen_from_body(desired)
+    error = attitude_error(tuple(body(now).ravel()), tuple(desired(now).ravel()))
+    gains = law.gains
+    expected = (
+        np.array((gains.roll_1, gains.pitch_1, gains.yaw_1))
+        * (rate(wanted, now) - rate(present, now))
+        + np.array((gains.roll_2, gains.pitch_2, gains.yaw_2)) * (wanted(now) - present(now))
+        + np.array((gains.roll_3, gains.pitch_3, gains.yaw_3)) * error
+    )
+    motion = tuple(body(now).ravel()), tuple(present(now)), tuple(rate(present, now))
+    references = turned(now, 0.8, 1.0), turned(now, -0.6, 1.3)
+    found = rotation_control(*references, *motion, law)
+    # The differences are wrong by 1e-6 at most, which gains multiply by up to 2e3.
+    np.testing.assert_allclose(found, expected, atol=2e-3)
