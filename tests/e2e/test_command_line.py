@@ -241,8 +241,9 @@ def test_bad_input_is_one_clear_line_and_exit_2(capsys, arguments, words):
 
 def test_unwritable_output_is_noticed_before_the_flight(tmp_path, capsys):
     (tmp_path / "file").write_text("in the way")
-    assert main(["run", SETPOINT, "--out", str(tmp_path / "file" / "out")]) == 2
-    assert "--out" in capsys.readouterr().err
+    out = tmp_path / "file" / "out"
+    assert main(["run", SETPOINT, "--out", str(out)]) == 2
+    assert capsys.readouterr().err.startswith(f"tiltsim: {out}: cannot be created: ")
 
 
 def test_lost_flight_exits_3_with_cause_and_time_and_keeps_its_log(tmp_path, capsys):

@@ -152,7 +152,7 @@ def test_a_folder_that_cannot_be_made_is_an_input_error(tmp_path):
         with pytest.raises(InputError) as caught:
             prepare_folder(folder)
         line = str(caught.value)
-        assert line.startswith(f"--out {folder}: {reason}")
+        assert line.startswith(f"{folder}: {reason}")
         assert len(line.splitlines()) == 1
 
 

@@ -603,6 +603,38 @@ def test_a_mistake_in_an_override_is_one_line(write, key, value, shown, allowed)
     assert allowed in line
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"gait.angles[0]": 0.1, "gait.angles": [0.0] * 4},
+        {"gait.angles": [0.0] * 4, "gait": {"type": "fixed"}},
+        {"gait": {"angles": [0.0] * 4}, "gait.type": "fixed"},  # a type is set before the others
+    ],
+)
+def test_overrides_that_would_replace_another_are_refused(write, changes):
+    path = write("gait = { type = 'fixed', angles = [0.1, 0.2, 0.3, 0.4] }")
+    whole, part = sorted(changes, key=len)
+    assert f"{path}: {whole} = " in (line := refusal(path, changes))
+    assert line.endswith(f": would replace {part}, which is given, too; give one of them")
+
+
+def test_an_entry_of_a_list_that_is_set_may_be_set_after_it(write):
+    path = write("gait = { type = 'fixed', angles = [0.1, 0.2, 0.3, 0.4] }")
+    gait = load_scenario(path, {"gait.angles": [0.0] * 4, "gait.angles[0]": 0.1}).gait
+    assert gait.angles == (0.1, 0.0, 0.0, 0.0)
+
+
+def test_a_mistake_knows_the_keys_that_are_missing():
+    for gait, missing in (
+        ({"type": "walk"}, {"gait.amplitude", "gait.period"}),
+        ({"period": 1.0}, {"gait.type"}),
+        ({"type": "walk", "amplitude": 0.1, "period": "long"}, set()),
+    ):
+        with pytest.raises(InputError) as caught:
+            parse_scenario({"gait": gait})
+        assert caught.value.missing == missing
+
+
 # --- the way back, and the library -------------------------------------------------------------
 
 

@@ -103,8 +103,9 @@ def test_axes_give_the_keys_that_the_base_lacks(points_of, amplitudes, first):
     )
     values = sweep.point(0)
     assert sweep.scenario(values | {"gait.amplitude": 0.25}).gait.amplitude == 0.25
-    with pytest.raises(InputError, match=r"drops the other keys of gait; also set gait.amp"):
+    with pytest.raises(InputError, match=r"drops the other keys of gait; also set gait.amp") as one:
         points_of(TROT + PERIODS)
+    assert one.value.missing == {"gait.amplitude"}
 
 
 def test_a_relative_axis_multiplies_a_value_that_is_set(points_of):

@@ -45,7 +45,7 @@ def test_a_durable_file_replaces_another_only_once_it_is_on_disk(tmp_path, monke
 @pytest.mark.parametrize(
     ("attempt", "begins"),
     [
-        (prepare_folder, "--out a\0b"),
+        (prepare_folder, "a\0b"),
         (lambda path: prepare_file("--junit", path), "--junit a\0b"),
         (lambda path: prepare_file("--junit", path / "file"), "--junit a\0b/file"),
         (lambda path: replacing(path).__enter__(), "a\0b"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from difflib import SequenceMatcher, get_close_matches
 from math import pi
 from pathlib import Path
@@ -108,6 +108,17 @@ def one_line_message(
     more = f" and {len(others) - MAX_OTHERS} more" if len(others) > MAX_OTHERS else ""
     kind = "missing" if all(missing[other] for other in others) else "wrong"
     return f"{line} (also {kind}: {', '.join(others[:MAX_OTHERS])}{more})"
+
+
+def missing_keys(
+    error: ValidationError, document: Mapping[str, Any], schema: type[BaseModel]
+) -> Iterator[str]:
+    """The dotted keys that a document lacks; the arguments are those of `one_line_message`."""
+    for detail in error.errors(include_url=False):
+        if detail["type"] == "missing":
+            yield _mistake(detail, document)
+        elif detail["type"] == "union_tag_not_found":
+            yield f"{_locate(detail['loc'], document)[0]}.{_tags(schema, detail['loc'])[0]}"
 
 
 def _dropped_keys(

@@ -16,7 +16,7 @@ from pydantic import ConfigDict, Field, ValidationError, model_validator
 from tiltsim.errors import InputError
 from tiltsim.scenario.arguments import leaves
 from tiltsim.scenario.consistency import check_consistency
-from tiltsim.scenario.messages import one_line_message, show
+from tiltsim.scenario.messages import missing_keys, one_line_message, show
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE, ScenarioTables
 from tiltsim.scenario.table import Table
 from tiltsim.scenario.time_steps import check_time_steps
@@ -34,7 +34,8 @@ def _in_one_line(address: str, document: Any, emptied: Collection[str] = ()) -> 
         yield
     except ValidationError as error:
         message = one_line_message(error, document, Scenario, emptied)
-        raise InputError(f"{address}: {message}") from None
+        missing = missing_keys(error, document, Scenario)
+        raise InputError(f"{address}: {message}", missing) from None
 
 
 class Scenario(ScenarioTables):

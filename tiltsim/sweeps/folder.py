@@ -62,7 +62,7 @@ class SweepFolder:
             differing = {field.name for field in {*found} ^ {*expected}}
             if differing:
                 raise InputError(
-                    f"--out {self.path}: made by another version of tiltsim: {file.name} "
+                    f"{self.path}: made by another version of tiltsim: {file.name} "
                     f"differs in column {min(differing)}; choose another folder, or delete this one"
                 )
         self.is_joined = self._has_dataset()
@@ -120,7 +120,7 @@ def open_sweep_folder(path: Path, points: SweepPoints) -> Iterator[SweepFolder]:
         try:
             stack.enter_context(locked(path / LOCK, wait=False))
         except BlockingIOError:
-            raise InputError(f"--out {path}: another tiltsim sweep is using it") from None
+            raise InputError(f"{path}: another tiltsim sweep is using it") from None
         _require_new_or_same(path, points)  # another sweep may have begun meanwhile
         opened = SweepFolder(path, points)
         opened.check()
@@ -142,12 +142,12 @@ def _require_new_or_same(path: Path, points: SweepPoints) -> None:
         return
     for name in (LOCK, DEFINITION, DATASET, PARTS, FLIGHTS):
         if (path / name).is_symlink():
-            raise InputError(f"--out {path}: {name} is a link; choose another folder")
+            raise InputError(f"{path}: {name} is a link; choose another folder")
     if (path / DEFINITION).exists():
         difference = read_definition(path / DEFINITION).difference(points.definition)
         if difference:
             raise InputError(
-                f"--out {path}: contains another sweep: {difference}; choose another folder, "
+                f"{path}: contains another sweep: {difference}; choose another folder, "
                 "or delete this one"
             )
         return
@@ -156,9 +156,7 @@ def _require_new_or_same(path: Path, points: SweepPoints) -> None:
         foreign.add(path / LOCK)  # a sweep's own is empty
     for file in sorted(foreign):
         if file.exists():
-            raise InputError(
-                f"--out {path}: contains other results: {file.name}; choose another folder"
-            )
+            raise InputError(f"{path}: contains other results: {file.name}; choose another folder")
 
 
 def read_definition(file: Path) -> SweepDefinition:

@@ -162,8 +162,7 @@ def _base(sweep: Sweep, folder: Path | None, address: str) -> dict[str, Any]:
         return _scenario(sweep, sweep.set, folder, address)
     except InputError as error:
         first = _first_values(sweep)
-        dropped = str(error).partition("; also set ")[2]
-        if not any(f"{key}: missing" in str(error) or key in dropped for key in first):
+        if error.missing.isdisjoint(first):
             raise
         return _scenario(sweep, sweep.set | first, folder, address)
 
@@ -197,7 +196,7 @@ def _scenario(
         try:
             scenario = load_scenario(path + (f"#{variant}" if variant else ""), values or None)
         except InputError as error:
-            raise InputError(f"{address}: scenario: {error}") from None
+            raise InputError(f"{address}: scenario: {error}", error.missing) from None
     else:
         document = deepcopy(sweep.scenario)
         _locate(document, folder, f"{address}: scenario")

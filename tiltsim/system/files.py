@@ -48,15 +48,15 @@ def is_folder(path: str | Path) -> bool:
 
 def prepare_folder(folder: Path) -> None:
     """Create a folder for results before the flight. Raises `InputError` if that is impossible."""
-    _require_possible_name("--out ", folder)
+    _require_possible_name("", folder)
     if folder.is_file():
-        raise InputError(f"--out {folder}: is a file; give a folder")
+        raise InputError(f"{folder}: is a file; give a folder")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"--out {folder}: cannot be created: {reason(error)}") from error
+        raise InputError(f"{folder}: cannot be created: {reason(error)}") from error
     if not os.access(folder, os.W_OK):
-        raise InputError(f"--out {folder}: not writable")
+        raise InputError(f"{folder}: not writable")
 
 
 def prepare_file(option: str, file: Path, suffixes: Sequence[str] = ()) -> None:
