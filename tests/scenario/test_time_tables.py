@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from math import cos, pi, sin
 
 import numpy as np
@@ -14,6 +15,7 @@ from tiltsim.errors import InputError
 from tiltsim.flight.flight import Flight
 from tiltsim.scenario.limits import MAX_ROWS
 from tiltsim.scenario.loading import load_scenario
+from tiltsim.sweeps.loading import load_sweep
 from tiltsim_controllers.references.waypoints import waypoint_motion
 
 SHORT = {"simulation": {"duration": 0.4}, "controller": {"decoupling": "exact", "gains": "exact"}}
@@ -64,17 +66,21 @@ def test_every_way_to_give_a_table_gives_the_same_rows(files, monkeypatch):
     ("content", "words"),
     [
         (HEAD + "1,abc,0,0\n", "row 2, column x = 'abc': no number"),
-        (HEAD + "1,0,nan,0\n", "row 2, column y = nan: must be from -1e+06 to 1e+06"),
+        (HEAD + "1,0,nan,0\n", "row 2, column y = nan: must be a finite number"),
         (HEAD + "1,0,0,2e6\n", "row 2, column z = 2000000.0: must be from"),
         (HEAD + "0,0,0,0\n", "row 2, column time = 0.0: must be at least 0.0001 s after"),
         (HEAD + "nan,0,0,0\n", "row 2, column time = nan: must be at least 0.0001 s after"),
         ("time,x,y,z\n1,0,0,0\n", "1 row; at least 2"),
         ("time,x,y,z\n1,0,0,0\n2,0,0,0\n", "row 1, column time = 1.0: must be 0"),
         (HEAD + "1,0,0\n", "row 2: 3 values in 4 columns"),
-        ("", "no column time; needs one each of time, x, y, z"),
+        ("", "no column time; needs one each of time, x, y, z; found []"),
+        (
+            "t,x,y,z\n",
+            "no column time; needs one each of time, x, y, z; found ['t', 'x', 'y', 'z']",
+        ),
         ("time,x,x,y,z\n", "2 columns x; needs one each"),
         ("time,x,y,z,yaw\n", "column yaw: the heading cannot vary"),
-        (HEAD + "".join(f"{i},0,0,0\n" for i in range(1, MAX_ROWS + 1)), "10001 rows; at most"),
+        (HEAD + "1,0,0,0\n" * (MAX_ROWS + 1), "10002 rows; at most 10000: keep every second"),
         (b"\xff\xfe", "not UTF-8 text"),
     ],
 )
@@ -92,7 +98,7 @@ def test_a_mistake_in_a_file_is_named_by_row_column_and_value(tmp_path, content,
     ("column", "words"),
     [
         (["a"] * 9, "column x is of type string; choose double, float"),
-        ([None, *TIMES[1:]], "row 1, column x = nan: must be from"),
+        ([None, *TIMES[1:]], "row 1, column x = nan: must be a finite number"),
     ],
 )
 def test_a_parquet_file_has_numbers(tmp_path, column, words):
@@ -130,12 +136,36 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path, name, words):
         ({"reference": 3}, "reference = 3: must be a function of time, the name of a CSV"),
         ({"gait": [1, 2]}, r"gait = \[1, 2\]: must be a function .* alpha_4"),
         ({"gait": COLUMNS}, "gait: no column alpha_1"),
-        ({"reference": {**COLUMNS, "x": ["a"] * 9}}, "reference: columns must be numbers"),
-        ({"reference": {**COLUMNS, "x": TIMES[1:]}}, "reference: columns must be numbers, all of"),
+        (
+            {"reference": {**COLUMNS, "x": ["a"] * 9}},
+            "reference: column x must be numbers: of type <U1",
+        ),
+        ({"reference": {**COLUMNS, "x": ["1.5"] * 9}}, "reference: column x must be numbers"),
+        ({"reference": {**COLUMNS, "x": [True] * 9}}, "column x must be numbers: of type bool"),
+        ({"reference": {**COLUMNS, "x": 1j * TIMES}}, "column x must be numbers: of type complex"),
+        ({"reference": {**COLUMNS, "x": 0.0}}, "column x = 0.0: must be a list of numbers"),
+        ({"reference": {**COLUMNS, "x": [[1.0], []]}}, "column x must be numbers: "),
+        (
+            {"reference": {**COLUMNS, "y": TIMES[1:]}},
+            "one number of rows; time has 9, x has 9, y has 8, z has 9",
+        ),
+        *(
+            ({"reference": {**COLUMNS, "time": (1e9 * TIMES).astype(kind)}}, "column time must be")
+            for kind in ("m8[ns]", "M8[ns]")
+        ),
+        ({"reference": {**COLUMNS, "x": [np.timedelta64(1, "s")] * 9}}, "column x must be numbers"),
         ({"reference": lambda t: (t, t)}, r"reference\(0\) = \(0.0, 0.0\): must be 3 finite"),
         ({"gait": lambda t: [1 / (t < 0.1)] * 4}, r"gait\(0.1\) raised ZeroDivisionError"),
         ({"gait": lambda t: [4.0] * 4}, "row 1, column alpha_1 = 4.0: must be from -3.14159 to"),
         ({"reference": lambda t: "abc"}, "reference.0. = 'abc': must be 3 finite numbers"),
+        ({"reference": lambda t: (t, t, 1j)}, "must be 3 finite numbers"),
+        ({"reference": lambda t: (t, t, t, 0.1)}, "a yaw cannot vary, set reference.yaw"),
+        (
+            {"gait": "walk"},
+            """gait = 'walk': must be your own gait; override {"gait.type": "walk"}""",
+        ),
+        ({"gait": {"type": "trot_instant"}}, 'own gait; override {"gait.type": "trot_instant"}'),
+        ({"reference": "circle"}, 'own reference; override {"reference.type": "circle"}'),
     ],
 )
 def test_a_wrong_argument_is_one_line(arguments, words):
@@ -231,3 +261,104 @@ def test_a_smooth_gait_as_a_function_flies_as_itself_and_corners_are_rounded():
     jump = 2 * 4 * 0.3 / 0.5
     assert 0.01 / 13 < error.max() / jump < 0.01 / 11
     assert error[np.abs(times - 0.25) > 0.1].max() < 1e-6
+
+
+def moving(time):
+    return 0.1 * time, 0.0, 0.0
+
+
+def swinging(time):
+    return [0.1 * sin(time)] * 4
+
+
+def last_row(scenario, name):
+    return getattr(scenario, name).table[-1]
+
+
+@pytest.mark.parametrize(("name", "function"), [("reference", moving), ("gait", swinging)])
+def test_a_function_is_sampled_over_whatever_the_duration_becomes(name, function):
+    scenario = load_scenario(SHORT, **{name: function})
+    longer = scenario.replace({"simulation.duration": 0.8})
+    assert last_row(longer, name) == (0.8, *function(0.8))
+    assert longer == load_scenario(SHORT, {"simulation.duration": 0.8}, **{name: function})
+    assert scenario.replace({"vehicle.mass": 0.4}).replace({"simulation.duration": 0.8}) == (
+        longer.replace({"vehicle.mass": 0.4})
+    )
+    assert last_row(longer.replace({"simulation.duration": 0.2}), name)[0] == 0.2
+
+
+def test_a_sampled_function_never_ends_before_the_flight_in_silence():
+    scenario = pickle.loads(pickle.dumps(load_scenario(SHORT, reference=moving)))
+    with pytest.raises(InputError, match=r"duration = 0\.8: the reference ends at 0\.4 s; give"):
+        scenario.replace({"simulation.duration": 0.8})
+    held = scenario.replace({"simulation.duration": 0.8, "reference.hold": True})
+    assert last_row(held, "reference") == last_row(scenario, "reference")
+    sweep = {
+        "scenario": scenario,
+        "axis": [{"type": "list", "key": "simulation.duration", "values": [0.2, 0.8]}],
+    }
+    with pytest.raises(InputError, match="the reference ends at"):
+        load_sweep(sweep)
+
+
+def test_a_table_takes_the_place_of_a_function():
+    scenario = load_scenario(SHORT, reference=moving)
+    rows = [[0.0, 0.0, 0.0, 0.0], [0.2, 1.0, 0.0, 0.0]]
+    for other in (
+        load_scenario(scenario, reference=COLUMNS),
+        scenario.replace({"reference.type": "setpoint"}),
+        scenario.replace({"reference.rows": rows, "reference.hold": True}),
+    ):
+        longer = other.replace({"simulation.duration": 0.8})
+        assert longer.reference == other.reference
+
+
+@pytest.mark.parametrize("given", [COLUMNS, moving])
+def test_overrides_are_those_of_the_table_that_is_given(given):
+    keys = {"reference.interpolation": "cubic", "reference.yaw": 0.2}
+    scenario = load_scenario(SHORT, keys, reference=given)
+    assert (scenario.reference.interpolation, scenario.reference.yaw) == ("cubic", 0.2)
+    assert scenario.replace({"simulation.duration": 0.3}).reference.interpolation == "cubic"
+
+
+@pytest.mark.parametrize(
+    ("overrides", "given", "words"),
+    [
+        ({"reference.interpolation": "foo"}, {"reference": moving}, "choose minimum_snap or cubic"),
+        ({"reference.nonsense": 1}, {"reference": COLUMNS}, "nonsense = 1: unknown key"),
+        ({"gait.foo": 1}, {"gait": swinging}, "foo = 1: unknown key"),
+        ({"gait.repeat": True}, {"gait": swinging}, "repeat = true: the angles of the last row"),
+        (
+            {"reference.type": "setpoint"},
+            {"reference": moving},
+            r"reference\.type = 'setpoint': contradicts the given reference <function moving",
+        ),
+        ({"gait.rows[0]": [0.0] * 5}, {"gait": "a.csv"}, "contradicts the given gait 'a.csv'"),
+        ({"gait": {"type": "fixed"}}, {"gait": swinging}, "contradicts the given gait"),
+    ],
+)
+def test_overrides_that_do_not_fit_the_table_are_refused(overrides, given, words):
+    with pytest.raises(InputError, match=words):
+        load_scenario(SHORT, overrides, **given)
+
+
+def test_a_flight_is_not_titled_by_what_was_replaced_in_it():
+    address = "ch04_tracking/setpoint#rho_0_modified"
+    scenario = load_scenario(address)
+    own = load_scenario(scenario, reference=moving)
+    assert (own.title, own.source) == ("Own reference", "")
+    assert load_scenario(address, gait=swinging).title == "Own gait"
+    assert load_scenario(own, gait=swinging).title == "Own reference, gait"
+    assert load_scenario(address, {"title": "Mine"}, reference=moving).title == "Mine"
+    mine = scenario.replace({"title": "Mine"})
+    assert load_scenario(mine, controller=moving).title == "Mine"
+    assert load_scenario(own, controller=moving).title == "Own controller moving, reference"
+    assert load_scenario({"title": "Mine"}, reference=moving).title == "Mine"
+
+
+def test_a_gait_that_repeats_goes_on():
+    rows = [[0, 0, 0, 0, 0], [0.1, 0.1, 0, 0, 0], [0.2, 0, 0, 0, 0]]
+    table = {"type": "table", "rows": rows, "hold": False}
+    with pytest.raises(InputError, match=r"gait ends at 0\.2 s; .*gait\.hold = true"):
+        load_scenario({**SHORT, "gait": table})
+    assert load_scenario({**SHORT, "gait": {**table, "repeat": True}}).gait.repeat

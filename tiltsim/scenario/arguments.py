@@ -33,14 +33,35 @@ def controller_name(controller: object) -> str:
     return f"{named.__module__}.{named.__qualname__}"
 
 
-def check_one_controller(overrides: Mapping[str, Any], controller: object) -> None:
-    """Raise `InputError` if overrides name another controller than the one that is given."""
-    for key in ("controller", "controller.law", "controller.function"):
-        if key in overrides:
+def given_keys(name: str) -> set[str]:
+    """The keys of a scenario that a controller, reference or gait given in Python stands for."""
+    keys = ("law", "function") if name == "controller" else ("type", "file", "rows")
+    return {name, *(f"{name}.{key}" for key in keys)}
+
+
+def check_no_other(overrides: Mapping[str, Any], given: Mapping[str, object]) -> None:
+    """Raise `InputError` if overrides name another controller, reference or gait than is given."""
+    for name, value in given.items():
+        for key in overrides:
+            if key.partition("[")[0] not in given_keys(name):
+                continue
+            shown = controller_name(value) if name == "controller" else short_repr(value)
             raise InputError(
-                f"{key} = {short_repr(overrides[key])}: contradicts the given controller "
-                f"{shortened(controller_name(controller))}; leave one of them out"
+                f"{key} = {short_repr(overrides[key])}: contradicts the given {name} "
+                f"{shortened(shown)}; leave one of them out"
             )
+
+
+def own_title(document: Mapping[str, Any]) -> str:
+    """A title for a flight with parts that were given in Python; empty if there are none."""
+    controller, *tables = (document.get(name) for name in ("controller", "reference", "gait"))
+    parts = []
+    if isinstance(controller, Mapping) and isinstance(name := controller.get("function"), str):
+        parts.append(f"controller {name.rpartition(':')[2].rpartition('.')[2]}")
+    for name, table in zip(("reference", "gait"), tables, strict=True):
+        if isinstance(table, Mapping) and table.get("type") == "table":
+            parts.append(name)
+    return f"Own {', '.join(parts)}" if parts else ""
 
 
 def plain(value: Any, depth: int = 0) -> Any:

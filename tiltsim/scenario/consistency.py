@@ -38,6 +38,7 @@ def check_consistency(scenario: ScenarioTables) -> None:
     _check_model_error(scenario)
     _check_gait(scenario)
     _check_reference(scenario)
+    _check_time_tables(scenario)
     _check_rotor_limits(scenario)
     _check_ground(scenario)
     _check_claims(scenario)
@@ -249,6 +250,18 @@ def _check_reference(scenario: ScenarioTables) -> None:
                 "controller.decoupler",
                 f"reference.type = {reference.type!r} needs "
                 + ("none" if needs_none else "conventional, modified or exact"),
+            )
+
+
+def _check_time_tables(scenario: ScenarioTables) -> None:
+    duration = scenario.simulation.duration
+    for name, table in scenario.time_tables.items():
+        if table.ends_before(duration):
+            last = table.table[-1][0]
+            raise scenario.mistake(
+                "simulation.duration",
+                f"the {name} ends at {last:g} s; give its function again, {name}= of "
+                f"tiltsim.load_scenario, or hold its last row: {name}.hold = true",
             )
 
 

@@ -227,9 +227,8 @@ class TableGait(GaitTable, TimeTable):
     def _check(self) -> Self:
         (_, *first), (_, *last) = self.table[0], self.table[-1]
         if self.repeat and first != last:
-            raise self.mistake(
-                "repeat", f"the angles of the last row, {last}, must equal the first, {first}"
-            )
+            reason = f"the angles of the last row, {last}, must equal the first, {first}"
+            raise self.mistake("repeat", reason)
         return self
 
     @classmethod

@@ -13,13 +13,18 @@ from pydantic import ValidationError
 
 from tiltsim.errors import InputError
 from tiltsim.models.mjcf_files import check_mjcf
-from tiltsim.scenario.arguments import check_keys, check_one_controller, controller_name, plain
+from tiltsim.scenario.arguments import check_keys, check_no_other, controller_name, own_title, plain
 from tiltsim.scenario.controller import DEFAULT_LAW
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.limits import check_limits
 from tiltsim.scenario.messages import choose, did_you_mean, has_same_keys, one_line_message, show
 from tiltsim.scenario.override_keys import split_key
-from tiltsim.scenario.own_tables import replace_tables
+from tiltsim.scenario.own_parts import (
+    drop_what_own_controllers_ignore,
+    kept_functions,
+    replace_tables,
+    sample_functions,
+)
 from tiltsim.scenario.scenario import Scenario, Variant
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.system.text import short_repr, shortened, valid_unicode
@@ -57,44 +62,50 @@ def load_scenario(
             checked; the overrides then have no other law or function. It is a function from
             `tiltsim.Observation` to `tiltsim.Command`, an object with ``__call__`` and, if it has a
             memory, ``reset(scenario)``, a class of such objects, or ``"FILE.py:NAME"``.
-        reference: A motion of your own in place of the scenario's, whose attitude and
-            acceleration_feedforward stay: a function of time (s) that returns a position ``(x, y,
-            z)`` (m), sampled over the duration of the flight every 0.01 s; or a table with the
-            columns time, x, y and z: of pandas or Arrow, a dict of arrays, or the name of a CSV or
-            Parquet file.
-        gait: A gait of your own in place of the scenario's, as the reference: a function that
-            returns four tilt angles (rad), or a table with the columns time and alpha_1 to alpha_4.
+        reference: A motion of your own in place of the scenario's ``[reference]``, of which roll,
+            pitch, yaw and acceleration_feedforward stay: a function of time (s) that returns a
+            position ``(x, y, z)`` (m), sampled every 0.01 s over the duration of the flight, also
+            of one with another duration that is made of this scenario; or a table with the columns
+            time, x, y and z: of pandas or Arrow, a dict of arrays, or the name of a CSV or Parquet
+            file. The overrides are those of the new table, such as ``{"reference.interpolation":
+            "cubic"}``.
+        gait: A gait of your own in place of the scenario's ``[gait]``, as the reference: a function
+            that returns four tilt angles (rad), or a table with the columns time and alpha_1 to
+            alpha_4.
 
     Raises:
         InputError: In one line: the file, the key, the value and what is allowed.
     """
-    if overrides is not None:
-        check_keys("overrides", overrides)
-    changed = bool(overrides) or controller is not None
-    document, address = _document(source, with_base=changed)
+    overrides = {} if overrides is None else overrides
+    check_keys("overrides", overrides)
+    parts = {"controller": controller, "reference": reference, "gait": gait}
+    given = {name: part for name, part in parts.items() if part is not None}
+    document, address = _document(source, with_base=bool(overrides) or controller is not None)
+    check_no_other(overrides, given)
+    title_before = own_title(document)
     if controller is not None:
         document["controller"] = {"law": "python", "function": controller_name(controller)}
-        check_one_controller(overrides or {}, controller)
-    emptied = apply_overrides(document, overrides or {}, address)
+    replace_tables(document, given)
+    if given and document.get("title", "") in (title_before, _title_in_file(source, address)):
+        document["title"] = own_title(document)
+        document.pop("source", None)
+    emptied = apply_overrides(document, overrides, address)
     if controller is not None or "controller.law" in emptied:
-        _drop_what_own_controllers_ignore(document, overrides or {})
-    replace_tables(document, reference=reference, gait=gait)
+        drop_what_own_controllers_ignore(document, overrides)
+    own = kept_functions(source, overrides, given)
+    sample_functions(document, own)
     locate_named_files(document, Path())
     scenario = parse_scenario(document, address, emptied)
-    if controller is None and isinstance(source, Scenario):
-        controller = source.own_controller if source.controller == scenario.controller else None
-    scenario._own_controller = None if isinstance(controller, str) else controller
+    scenario._own = own
     return scenario
 
 
-def _drop_what_own_controllers_ignore(
-    document: dict[str, Any], overrides: Mapping[str, Any]
-) -> None:
-    """Leave it to a controller of one's own which derivatives it uses, unless overrides say it."""
-    law, reference = document["controller"]["law"], document.get("reference")
-    is_given = "reference.acceleration_feedforward" in overrides
-    if law == "python" and isinstance(reference, dict) and not is_given:
-        reference.pop("acceleration_feedforward", None)
+def _title_in_file(source: object, address: str) -> object:
+    """The title in the file of a scenario; empty if it is of no file, as that of a dict."""
+    if not isinstance(source, Mapping):
+        with suppress(InputError):
+            return _document(address, with_base=True)[0].get("title", "")
+    return ""
 
 
 def as_scenario(source: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Scenario:

@@ -28,6 +28,9 @@ class InvalidValueError(ValueError):
         super().__init__(f"{key} = {show(value)}: {allowed}")
 
 
+ALIKE: Final = 0.85
+"""Names whose words are this like those of another are close to it, whatever else they have."""
+
 MAX_OTHERS: Final = 5
 """So many keys with further mistakes are named."""
 
@@ -58,6 +61,7 @@ def did_you_mean(name: object, names: Iterable[str]) -> str:
     given = shortened(str(name))
     names = list(names)
     close = get_close_matches(given, names, n=max(1, len(names)))
+    close += [known for known in names if _shared_words(given, known) > ALIKE]
     # Of close names, final_position_error_x shares more words with final_eror_x than final_roll.
     best = max(close, key=lambda known: _shared_words(given, known), default="")
     return f"did you mean {best}? " if best else ""
@@ -183,7 +187,7 @@ def _describe(
     if kind in {"union_tag_invalid", "union_tag_not_found"}:
         if not isinstance(value, dict):
             return f"{key} = {show(value)}: must be a table"
-        tag, tags = _tags(schema, detail["loc"])
+        tag, tags = tags_of(schema, detail["loc"])
         allowed = ", ".join(tags)
         if tag not in value:
             return f"{key}.{tag}: missing; choose {allowed}"
@@ -248,7 +252,7 @@ def _locate(
     return shortened(key) or "scenario", value
 
 
-def _tags(schema: Any, location: tuple[Any, ...]) -> tuple[str, list[str]]:
+def tags_of(schema: Any, location: tuple[Any, ...]) -> tuple[str, list[str]]:
     """The key that discriminates the tables of a union under a location, and its values."""
     for part in location:
         schema = _member(schema, part)

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Self
 from pydantic import ConfigDict, Field, ValidationError, model_validator
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.arguments import leaves
+from tiltsim.scenario.arguments import check_keys, leaves
 from tiltsim.scenario.consistency import check_consistency
 from tiltsim.scenario.messages import missing_keys, one_line_message, show
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE, ScenarioTables
@@ -81,14 +81,19 @@ class Scenario(ScenarioTables):
         Raises:
             InputError: In one line: the key, the value and what is allowed.
         """
+        check_keys("changes", changes)
         changed: Scenario = public("load_scenario")(self, changes)
         return changed
 
     def __repr__(self) -> str:
-        """Address and title, in one line; `str` has all keys."""
+        """Address and title, in one line."""
         return (
             f"<Scenario {': '.join(filter(None, (self.address, self.title))) or 'without title'}>"
         )
+
+    def __str__(self) -> str:
+        """The same; `model_dump` has all keys."""
+        return repr(self)
 
     def _repr_html_(self) -> str:
         """What is not left at its default, as a table for notebooks."""

@@ -79,7 +79,7 @@ class ScenarioTables(Table):
     claim: dict[ClaimName, ClaimTable] = Field({}, description="statements of the source")
 
     _address: str = PrivateAttr("")
-    _own_controller: Any = PrivateAttr(None)
+    _own: dict[str, Any] = PrivateAttr({})  # what was given in Python, by name
 
     @property
     def address(self) -> str:
@@ -89,12 +89,12 @@ class ScenarioTables(Table):
     @property
     def own_controller(self) -> Any:
         """The controller given in Python; None for a built-in one and for one in a file."""
-        return self._own_controller
+        return self._own.get("controller")
 
     def __getstate__(self) -> dict[Any, Any]:
-        """Without the controller: other processes need not be able to import a notebook's."""
+        """Without functions: other processes need not be able to import those of a notebook."""
         state = super().__getstate__()
-        private = {**(state["__pydantic_private__"] or {}), "_own_controller": None}
+        private = {**(state["__pydantic_private__"] or {}), "_own": {}}
         return {**state, "__pydantic_private__": private}
 
     @property

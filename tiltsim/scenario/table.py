@@ -55,6 +55,12 @@ class Table(BaseModel):
             raise InvalidValueError(key, value, "not valid Unicode")
         return value
 
+    def __dir__(self) -> list[str]:
+        """Names to complete: without what is pydantic's, except to copy and to dump."""
+        inherited = {name for name in dir(BaseModel) if not name.startswith("_")}
+        useful = {"model_copy", "model_dump", "model_dump_json"}
+        return sorted({*super().__dir__()} - (inherited - useful))
+
     def __setattr__(self, name: str, value: Any) -> None:
         """Refuse to change a key, in words that help."""
         if name.startswith("_"):

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Any, ClassVar, Final, Self
 
-import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.limits import MAX_FILE_SIZE, MAX_ROWS, read_text
 from tiltsim.scenario.table import Table
+from tiltsim.system.numbers import real_array
 from tiltsim.system.parquet import open_parquet
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Values
@@ -43,6 +44,11 @@ class TimeTable(Table):
     largest: ClassVar[float]  # magnitude of a value
 
     file: str | None = Field(None)
+    hold: bool = Field(
+        True,
+        description="after the last row, hold it; false: the flight must not be longer than the "
+        "table, as where a function of time in Python was sampled",
+    )
     _rows: Rows = PrivateAttr(())
 
     @property
@@ -59,6 +65,11 @@ class TimeTable(Table):
     def _columns_of_width(cls, width: int) -> tuple[str, ...]:
         """The columns of rows with so many numbers."""
         return cls.columns
+
+    def ends_before(self, time: float) -> bool:
+        """Whether the table says nothing about a time (s)."""
+        goes_on = self.hold or dict(self).get("repeat", False)
+        return not goes_on and time > self._rows[-1][0]
 
     def in_file(self, name: str) -> Self:
         """The same, to be read from a file of that name."""
@@ -95,11 +106,23 @@ def rows_of_columns(table: Any, columns: Sequence[str]) -> list[Values]:
     """Rows of a table of another library. Raises `InputError` in one line."""
     names = getattr(table, "column_names", getattr(table, "columns", table))
     _check_names([*map(str, names)], columns)
+    values = {name: _column(name, table[name]) for name in columns}
+    lengths = {name: len(column) for name, column in values.items()}
+    if len({*lengths.values()}) > 1:
+        counts = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        raise InputError(f"columns must have one number of rows; {counts}")
+    return [*zip(*values.values(), strict=True)]
+
+
+def _column(name: str, given: Any) -> list[float]:
     try:
-        values = [np.asarray(table[column], dtype=float).tolist() for column in columns]
-        return [*zip(*values, strict=True)]
+        column = real_array(given)
     except (TypeError, ValueError) as error:
-        raise InputError(f"columns must be numbers, all of one length: {error}") from None
+        raise InputError(f"column {name} must be numbers: {error}") from None
+    if column.ndim != 1:
+        raise InputError(f"column {name} = {short_repr(given)}: must be a list of numbers")
+    values: list[float] = column.tolist()
+    return values
 
 
 ColumnsAmong = Callable[[Sequence[str]], Sequence[str]]
@@ -119,9 +142,10 @@ def _read_rows(file: Path, columns_among: ColumnsAmong) -> list[Values]:
     head = [name.strip() for name in head]
     columns = columns_among(head)
     _check_names(head, columns)
+    _check_count(len(lines))
     places = [head.index(name) for name in columns]
     rows = []
-    for number, line in enumerate(lines[: MAX_ROWS + 1], start=1):
+    for number, line in enumerate(lines, start=1):
         if len(line) != len(head):
             raise InputError(f"row {number}: {len(line)} values in {len(head)} columns")
         rows.append(tuple(_number(line[place], number, head[place]) for place in places))
@@ -134,8 +158,7 @@ def _read_parquet(file: Path, columns_among: ColumnsAmong) -> list[Values]:
     with open_parquet(file) as opened:
         columns = columns_among(opened.schema_arrow.names)
         _check_names(opened.schema_arrow.names, columns)
-        if opened.metadata.num_rows > MAX_ROWS:
-            raise InputError(_too_many(opened.metadata.num_rows))
+        _check_count(opened.metadata.num_rows)
         for name in columns:  # text could be long beyond any limit once it is decompressed
             if (kind := str(opened.schema_arrow.field(name).type)) not in _NUMBERS:
                 raise InputError(f"column {name} is of type {kind}; choose {', '.join(_NUMBERS)}")
@@ -149,8 +172,9 @@ def _check_names(names: Sequence[str], columns: Sequence[str]) -> None:
         )
     for name in columns:
         if (count := names.count(name)) != 1:
-            found = f"{count} columns" if count else "no column"
-            raise InputError(f"{found} {name}; needs one each of {', '.join(columns)}")
+            problem = f"{count} columns" if count else "no column"
+            needed, found = ", ".join(columns), short_repr([*names])
+            raise InputError(f"{problem} {name}; needs one each of {needed}; found {found}")
 
 
 def _number(text: str, row: int, column: str) -> float:
@@ -160,14 +184,15 @@ def _number(text: str, row: int, column: str) -> float:
         raise InputError(f"row {row}, column {column} = {short_repr(text)}: no number") from None
 
 
-def _too_many(rows: int) -> str:
-    return f"{rows} rows; at most {MAX_ROWS}"
+def _check_count(rows: int) -> None:
+    if rows > MAX_ROWS:
+        every = "every second" if rows <= 2 * MAX_ROWS else f"one in {-(-rows // MAX_ROWS)}"
+        raise InputError(f"{rows} rows; at most {MAX_ROWS}: keep {every}")
 
 
 def _checked(rows: Sequence[Values], columns: Sequence[str], largest: float) -> Rows:
     """Rows whose numbers are allowed. Raises `InputError` for the first that is not."""
-    if len(rows) > MAX_ROWS:
-        raise InputError(_too_many(len(rows)))
+    _check_count(len(rows))
     if len(rows) < 2:
         raise InputError(f"{len(rows)} row{'s' * (len(rows) != 1)}; at least 2")
     before = -SHORTEST_STEP
@@ -182,7 +207,9 @@ def _checked(rows: Sequence[Values], columns: Sequence[str], largest: float) -> 
             raise InputError(f"{where} time = {time!r}: {allowed}")
         for name, value in zip(columns[1:], values, strict=True):
             if not abs(value) <= largest:
-                allowed = f"must be from {-largest:g} to {largest:g}"
-                raise InputError(f"{where} {name} = {value!r}: {allowed}")
+                allowed = (
+                    f"from {-largest:g} to {largest:g}" if isfinite(value) else "a finite number"
+                )
+                raise InputError(f"{where} {name} = {value!r}: must be {allowed}")
         before = time
     return tuple(rows)

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from math import isfinite
+from numbers import Real
 from operator import index
 from typing import Any, TypeGuard
 
+import numpy as np
+
 from tiltsim.errors import InputError
 from tiltsim.system.text import short_repr
+from tiltsim_controllers.mathematics.scalar import Floats
 
 
 def is_number(value: object) -> TypeGuard[int | float]:
@@ -18,6 +22,25 @@ def is_number(value: object) -> TypeGuard[int | float]:
 def is_finite(value: object) -> TypeGuard[int | float]:
     """Whether a value is a number other than NaN and infinity."""
     return is_number(value) and isfinite(value)
+
+
+def real_array(values: Any) -> Floats:
+    """Numbers as an array of floats.
+
+    Raises TypeError or ValueError for what only converts to numbers: dates and times, whose unit
+    would be lost, true and false, complex numbers, text.
+    """
+    array = np.asarray(values)
+    if array.dtype == object and all(_is_real(value) for value in array.flat):
+        array = array.astype(float)
+    if array.dtype.kind not in "iuf":
+        raise TypeError(f"of type {array.dtype}")
+    return array.astype(float, copy=False)
+
+
+def _is_real(value: object) -> bool:
+    # numpy counts durations among its integers
+    return isinstance(value, Real) and not isinstance(value, bool | np.timedelta64)
 
 
 def whole_number(name: str, value: Any) -> int:

@@ -1,0 +1,135 @@
+"""Parts of a scenario given in Python: controllers, references and gaits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from math import ceil
+from os import PathLike
+from typing import Any, Final
+
+import numpy as np
+
+from tiltsim.errors import InputError
+from tiltsim.scenario.arguments import given_keys
+from tiltsim.scenario.limits import MAX_ROWS
+from tiltsim.scenario.messages import tags_of
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.simulation_table import SimulationTable
+from tiltsim.scenario.time_table import GAIT_COLUMNS, REFERENCE_COLUMNS, rows_of_columns
+from tiltsim.system.numbers import is_finite, real_array
+from tiltsim.system.text import short_repr
+from tiltsim_controllers.mathematics.scalar import Values
+
+SAMPLING_STEP: Final = 0.01
+"""Seconds between the rows of a function of time, unless the flight is too long for that."""
+
+COLUMNS: Final = {"reference": REFERENCE_COLUMNS, "gait": GAIT_COLUMNS}
+"""What can be given as a table over time, and its columns."""
+
+KEPT_KEYS: Final = ("roll", "pitch", "yaw", "acceleration_feedforward")
+"""Keys of a reference that stay when another motion is given."""
+
+
+def replace_tables(document: dict[str, Any], given: Mapping[str, object]) -> None:
+    """Replace a scenario's reference and gait by tables; those of functions have no rows yet.
+
+    Args:
+        document: Changed in place.
+        given: Reference and gait by name; see `tiltsim.load_scenario`.
+
+    Raises:
+        InputError: In one line: the argument, the value and what is allowed.
+    """
+    for name in filter(given.__contains__, COLUMNS):
+        old, kept = document.get(name), KEPT_KEYS if name == "reference" else ()
+        stays = {key: old[key] for key in kept if key in old} if isinstance(old, dict) else {}
+        document[name] = _table(name, given[name]) | stays
+
+
+def drop_what_own_controllers_ignore(
+    document: Mapping[str, Any], overrides: Mapping[str, Any]
+) -> None:
+    """Leave it to a controller of one's own which derivatives it uses, unless overrides say it."""
+    law, reference = document["controller"]["law"], document.get("reference")
+    is_given = "reference.acceleration_feedforward" in overrides
+    if law == "python" and isinstance(reference, dict) and not is_given:
+        reference.pop("acceleration_feedforward", None)
+
+
+def kept_functions(
+    source: object, overrides: Mapping[str, Any], given: Mapping[str, object]
+) -> dict[str, Any]:
+    """The functions and controllers of a scenario by name: its source's, unless replaced, and new.
+
+    Args:
+        source, overrides: See `tiltsim.load_scenario`.
+        given: Its other arguments.
+    """
+    keys = {key.partition("[")[0] for key in overrides}
+    own = source._own if isinstance(source, Scenario) else {}
+    kept = {n: part for n, part in own.items() if n not in given and not given_keys(n) & keys}
+    return kept | {name: part for name, part in given.items() if callable(part)}
+
+
+def sample_functions(document: Mapping[str, Any], own: Mapping[str, Any]) -> None:
+    """Sample functions of time over the flight, into the rows of their tables.
+
+    Args:
+        document: A scenario's, changed in place.
+        own: What `kept_functions` returned.
+    """
+    simulation = document.get("simulation")
+    duration = simulation.get("duration") if isinstance(simulation, Mapping) else None
+    if not is_finite(duration) or duration <= 0.0:  # is refused where all is checked
+        duration = SimulationTable.model_fields["duration"].default
+    # A flight of less than ten steps is sampled beyond its end.
+    span = max(duration, 10 * SAMPLING_STEP)
+    for name in filter(own.__contains__, COLUMNS):
+        table = document.get(name)
+        rows = table.get("rows") if isinstance(table, Mapping) else None
+        if isinstance(rows, list) and (not rows or rows[-1][0] != span):
+            rows[:] = _samples(name, own[name], len(COLUMNS[name]) - 1, span)
+
+
+def _table(name: str, value: Any) -> dict[str, Any]:
+    """The table of a scenario for an argument."""
+    columns = COLUMNS[name]
+    kind = value.get("type") if isinstance(value, Mapping) else value
+    if isinstance(kind, str) and kind in tags_of(Scenario, (name,))[1]:
+        hint = f'override {{"{name}.type": "{kind}"}} for one of the built-in types'
+        raise InputError(f"{name} = {short_repr(value)}: must be your own {name}; {hint}")
+    if isinstance(value, str | PathLike):
+        return {"type": "table", "file": value}
+    if callable(value):
+        return {"type": "table", "rows": [], "hold": False}
+    if not (isinstance(value, Mapping) or hasattr(value, "columns")):
+        raise InputError(
+            f"{name} = {short_repr(value)}: must be a function of time, the name of a CSV or "
+            f"Parquet file, or a table with the columns {', '.join(columns)}"
+        )
+    try:
+        return {"type": "table", "rows": rows_of_columns(value, columns)}
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
+
+
+def _samples(
+    name: str, function: Callable[[float], Any], size: int, span: float
+) -> Iterator[Values]:
+    """Rows of a function of time in even steps."""
+    steps = min(MAX_ROWS - 1, ceil(span / SAMPLING_STEP))
+    for time in np.linspace(0.0, span, steps + 1).tolist():
+        try:
+            returned = function(time)
+        except Exception as error:
+            what = " ".join(f"{type(error).__name__}: {error}".split())
+            raise InputError(f"{name}({time:g}) raised {what}") from error
+        try:
+            values = real_array(returned)
+        except (TypeError, ValueError):
+            values = np.array(np.nan)
+        if values.shape != (size,) or not np.isfinite(values).all():
+            shown = short_repr(returned)
+            yaw = "; a yaw cannot vary, set reference.yaw" if values.size > size == 3 else ""
+            raise InputError(f"{name}({time:g}) = {shown}: must be {size} finite numbers{yaw}")
+        yield (time, *values.tolist())
