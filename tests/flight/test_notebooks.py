@@ -95,6 +95,7 @@ def test_the_files_of_a_controller_from_python_say_how_to_fly_it_again(own_fligh
 def test_a_controller_of_a_cell_that_fails_is_told_by_its_function_and_line():
     names = {}
     exec(compile("def law(observation):\n    return observation.positon", "cell", "exec"), names)
-    failed = tiltsim.simulate({"simulation": {"duration": 0.02}}, controller=names["law"])
+    with pytest.warns(RuntimeWarning, match="line 2 of law"):
+        failed = tiltsim.simulate({"simulation": {"duration": 0.02}}, controller=names["law"])
     assert failed.end.cause.endswith("no attribute 'positon' (line 2 of law)")
     assert "failed at 0 s (the controller" in repr(failed)

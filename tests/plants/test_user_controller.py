@@ -545,6 +545,10 @@ def returning(value):
             returning(Command(thrusts=[1] * 4, tilt_angles=[0, 0, 0, np.inf])),
             ["tilt_angles[3] = inf"],
         ),
+        (
+            returning(Command(thrusts=[1] * 4, tilt_angles=[0, 0, 3.2, 10])),
+            ["returned tilt_angles[2] = 3.2; angles are in rad, from -3.14159 to 3.14159"],
+        ),
         (returning(Command(thrusts=[10**400] * 4)), ["; expected 4 numbers"]),
         (returning(MuteError()), ["returned a MuteError; expected a tiltsim.Command"]),
         (leaves, ["leaves raised SystemExit: 5"]),
@@ -552,7 +556,10 @@ def returning(value):
     ],
 )
 def test_a_failing_controller_ends_the_flight_with_one_line_and_a_log(law, words):
-    flight = tiltsim.simulate(scenario({"control_timestep": 0.005}), controller=law)
+    with pytest.warns(RuntimeWarning, match=r"t = 0\.035 s \(failed\)") as shown:
+        flight = tiltsim.simulate(scenario({"control_timestep": 0.005}), controller=law)
+    (warning,) = shown
+    assert (str(warning.message), warning.filename) == (flight.end.message, __file__)
     assert (flight.end.kind, flight.end.time) == ("failed", pytest.approx(0.035))
     assert flight.end.cause.startswith("the controller ")
     assert "\n" not in flight.end.cause
@@ -566,7 +573,8 @@ def test_failing_at_a_recorded_sample_does_not_record_it_twice():
     def law(observation):
         raise RuntimeError
 
-    flight = tiltsim.simulate(scenario(), controller=law)
+    with pytest.warns(RuntimeWarning):
+        flight = tiltsim.simulate(scenario(), controller=law)
     assert flight.end.cause.partition(" (")[0].endswith("law raised RuntimeError")
     assert len(flight) == 1
     assert flight.metrics()["duration"] == 0.0
@@ -580,15 +588,26 @@ def test_a_failing_reset_is_reported_like_a_failing_controller():
         def __call__(self, observation):
             return STILL
 
-    assert "raised KeyError: 'gain'" in tiltsim.simulate(scenario(), controller=Law()).end.cause
+    with pytest.warns(RuntimeWarning, match="raised KeyError: 'gain'"):
+        tiltsim.simulate(scenario(), controller=Law())
+
+
+def test_of_many_flights_the_first_that_fails_is_told():
+    fails = scenario().replace({"simulation.duration": 0.05})
+    fails = tiltsim.load_scenario(fails, controller=returning(None))
+    flies = tiltsim.load_scenario(fails, controller=lambda _: STILL)
+    with pytest.warns(RuntimeWarning, match="flight 2: .*expected a tiltsim.Command") as shown:
+        ends = [result.end.kind for result in tiltsim.fly([flies, fails, fails])]
+    assert ends == ["completed", "failed", "failed"]
+    assert [warning.filename for warning in shown] == [__file__]
 
 
 def test_the_quadrotor_has_no_tilt_servos():
-    flight = tiltsim.simulate(
-        scenario(vehicle={"model": "quadrotor"}),
-        controller=lambda _: Command(thrusts=[1.0] * 4, tilt_angles=[0.0] * 4),
-    )
-    assert "tilt_angles; this vehicle has no tilt servos" in flight.end.cause
+    with pytest.warns(RuntimeWarning, match="tilt_angles; this vehicle has no tilt servos"):
+        tiltsim.simulate(
+            scenario(vehicle={"model": "quadrotor"}),
+            controller=lambda _: Command(thrusts=[1.0] * 4, tilt_angles=[0.0] * 4),
+        )
 
 
 def test_an_interrupt_within_the_controller_interrupts_the_flight():

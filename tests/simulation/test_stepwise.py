@@ -58,6 +58,25 @@ def test_steps_follow_a_motion_and_a_gait_of_ones_own():
     assert flight["x_ref"][-1] == pytest.approx(0.1 * np.sin(0.02), abs=1e-9)
 
 
+def test_a_simulation_is_complete_at_its_duration_and_goes_on_as_far_as_its_functions():
+    simulation = tiltsim.Simulation(TROT, reference=lambda time: (0.1 * time, 0.0, 0.0))
+    simulation.step(19)
+    assert simulation.flight().end.kind == "interrupted"
+    simulation.step()
+    assert simulation.flight().end == tiltsim.simulate(TROT).end
+    simulation.step(80)  # functions are sampled for 0.1 s at least
+    assert simulation.flight().end.kind == "completed"
+    with pytest.raises(tiltsim.InputError, match=r"reference ends at 0\.1 s; make"):
+        simulation.step()
+
+
+def test_a_state_that_is_not_finite_is_not_blamed_on_the_control_law():
+    simulation = tiltsim.Simulation(TROT)
+    simulation.data.qpos[:] = np.nan
+    simulation.step(10)
+    assert simulation.end.cause == "positions are NaN or beyond 1e10"
+
+
 @pytest.mark.parametrize("layers", LAYERS)
 def test_the_built_in_command_as_a_controller_of_ones_own_flies_the_same_flight(layers):
     shipped = tiltsim.load_scenario(LAYERS[layers])
@@ -146,7 +165,8 @@ def test_a_simulation_ends_where_its_controller_fails_as_a_flight_does():
     simulation.step(10)
     with pytest.raises(tiltsim.TiltsimError, match="too late"):
         simulation.step(10)
-    alone = tiltsim.simulate(tables, controller=failing)
+    with pytest.warns(RuntimeWarning, match="too late"):
+        alone = tiltsim.simulate(tables, controller=failing)
     assert simulation.end == alone.end
     np.testing.assert_array_equal(simulation.flight().samples, alone.samples)
     with pytest.raises(tiltsim.TiltsimError, match=r"too late.*begin again with reset"):

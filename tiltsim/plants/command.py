@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, pi
 from typing import Any, Final
 
 import numpy as np
@@ -62,8 +62,8 @@ class Command:
         thrusts: (4,), N, along each rotor's axis; they set its speed.
         rotor_speeds: (4,), rad/s, positive along each rotor's spin.
         rotor_accelerations: (4,), rad/s^2, likewise, held until the next sample.
-        tilt_angles: (4,), rad, for the tilt servos; default: the planned gait. The quadrotor has
-            none.
+        tilt_angles: (4,), rad, from -pi to pi, for the tilt servos; default: the planned gait. The
+            quadrotor has none.
     """
 
     thrusts: npt.ArrayLike | None = None
@@ -94,8 +94,8 @@ def check_command(command: object, *, tilting: bool) -> CheckedCommand:
 
     Raises:
         ControllerError: If it is not a `Command`, does not give exactly one of `ROTOR_COMMANDS`,
-            has an entry of the wrong shape or a non-finite one, or gives tilt angles to a vehicle
-            that is not ``tilting``.
+            has an entry of the wrong shape or a non-finite one, gives tilt angles beyond a half
+            turn, or any to a vehicle that is not ``tilting``.
     """
     if not isinstance(command, Command):
         raise ControllerError(f"returned {short_repr(command)}; expected a tiltsim.Command")
@@ -106,6 +106,12 @@ def check_command(command: object, *, tilting: bool) -> CheckedCommand:
     if command.tilt_angles is not None and not tilting:
         raise ControllerError("returned tilt_angles; this vehicle has no tilt servos")
     tilts = None if command.tilt_angles is None else _four("tilt_angles", command.tilt_angles)
+    for index, angle in enumerate(tilts or ()):
+        if abs(angle) > pi:
+            raise ControllerError(
+                f"returned tilt_angles[{index}] = {angle:g}; angles are in rad, from {-pi:g} to "
+                f"{pi:g}"
+            )
     return CheckedCommand(given[0], _four(given[0], getattr(command, given[0])), tilts)
 
 

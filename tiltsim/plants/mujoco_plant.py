@@ -185,9 +185,10 @@ class MujocoPlant(Plant):
 
 
 _INTEGRATION: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+# MuJoCo checks the state first, and a control law cannot do anything with a bad one.
 _WARNINGS: Final = {
-    mujoco.mjtWarning.mjWARN_BADCTRL: "the control law returned NaN or a value beyond 1e10",
     mujoco.mjtWarning.mjWARN_BADQPOS: "positions are NaN or beyond 1e10",
     mujoco.mjtWarning.mjWARN_BADQVEL: "velocities are NaN or beyond 1e10",
+    mujoco.mjtWarning.mjWARN_BADCTRL: "the control law returned NaN or a value beyond 1e10",
     mujoco.mjtWarning.mjWARN_BADQACC: "accelerations are NaN or beyond 1e10",
 }

@@ -9,6 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any, Final
+from warnings import warn
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.errors import InputError
@@ -46,6 +47,11 @@ class FlightResult:
     metrics: dict[str, float | bool]
     flight: Flight | None = None
 
+    @property
+    def has_failed(self) -> bool:
+        """Whether the controller failed, and was given in Python: see the warning of `simulate`."""
+        return self.end.kind == "failed" and self.scenario.own_controller is not None
+
     def __repr__(self) -> str:
         """The scenario and the end, in one line."""
         name = self.scenario.address or self.scenario.title
@@ -73,6 +79,7 @@ def fly(
     Yields:
         Bit-identical to `tiltsim.simulate` of the scenario, but for rounding with the jax engine;
         ``realtime_factor`` is computed from the time that the flight took of all threads together.
+        Of the first whose own controller fails Python warns as there.
 
     Raises:
         InputError: At once, if an argument or a scenario is invalid; later, if a vehicle cannot be
@@ -91,8 +98,12 @@ def _with_progress(
     results: Iterator[FlightResult], total: int, progress: Report | bool | None
 ) -> Iterator[FlightResult]:
     with reported(progress, "flights", total) as report:
+        warned = False
         for done, result in enumerate(results, start=1):
             report(done)
+            if result.has_failed and not warned:
+                warned = True
+                warn(f"flight {done}: {result.end.message}", RuntimeWarning, stacklevel=2)
             yield result
 
 

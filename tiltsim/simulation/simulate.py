@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from os import PathLike
 from time import perf_counter
 from typing import Any, Final
+from warnings import warn
 
 import numpy as np
 
@@ -65,7 +66,8 @@ def simulate(
         All samples up to the end. A flight that diverges or reaches a singular decoupling matrix is
         a result, not an error: its log is complete up to there, and ``flight.end`` gives the cause
         and, to one physics step, the time. The same holds for a flight that is interrupted, or
-        whose controller of your own raises an exception or returns an invalid command.
+        whose controller of your own raises an exception or returns an invalid command: Python also
+        warns of that, with a RuntimeWarning, if the controller is not in a file.
 
     Raises:
         InputError: If the scenario or an argument is invalid, the vehicle cannot be built, or your
@@ -73,12 +75,16 @@ def simulate(
         KeyboardInterrupt: If interrupted before the first sample.
     """
     if observer is not None and not callable(observer):
-        raise InputError(f"observer = {short_repr(observer)}: must be callable")
+        hint = "; overrides are for load_scenario" if isinstance(observer, Mapping) else ""
+        raise InputError(f"observer = {short_repr(observer)}: must be callable{hint}")
     replaced = any(own is not None for own in (controller, reference, gait))
     if replaced or not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario, controller=controller, reference=reference, gait=gait)
     with reported(progress, "flight", scenario.simulation.duration) as report:
-        return simulate_assembly(assemble(scenario), observer, report=report)
+        flight = simulate_assembly(assemble(scenario), observer, report=report)
+    if flight.end.kind == "failed" and scenario.own_controller is not None:
+        warn(flight.end.message, RuntimeWarning, stacklevel=2)
+    return flight
 
 
 def simulate_assembly(

@@ -35,7 +35,7 @@ class Simulation:
     """A flight in MuJoCo, stepped by its caller.
 
     Steps are bit for bit those of `tiltsim.simulate`, as long as you do not change `data`. It may
-    go on beyond ``simulation.duration``.
+    go on beyond ``simulation.duration``, unless a function of time was sampled up to there.
 
     Args:
         scenario: Anything that `tiltsim.load_scenario` takes.
@@ -99,12 +99,14 @@ class Simulation:
             steps: How many; at least 1.
 
         Raises:
-            InputError: If that is no such number, or the flight has ended (see `end`).
+            InputError: If that is no such number, the flight has ended (see `end`), or it would go
+                on beyond a table that does not hold.
             ControllerError: If a controller of your own fails, which is then the `end`.
         """
         steps = whole_number("steps", steps)
         if self._end is not None:
             raise InputError(f"step: {self._end.message}; begin again with reset()")
+        self._check_tables(self._plant.steps_taken + steps)
         start = perf_counter()
         samples: Iterable[Floats] = ()
         try:
@@ -116,6 +118,16 @@ class Simulation:
         finally:
             self._samples += samples
             self._wall_time += perf_counter() - start
+
+    def _check_tables(self, steps: int) -> None:
+        """Raise `InputError` if a table ends before so many steps have been taken."""
+        simulation = self.scenario.simulation
+        for name, table in self.scenario.time_tables.items():
+            if steps > simulation.steps and table.ends_before(steps * simulation.timestep):
+                raise InputError(
+                    f"step: the {name} ends at {table.table[-1][0]:g} s; make simulation.duration "
+                    f"longer, or set {name}.hold = true"
+                )
 
     @property
     def time(self) -> float:
@@ -160,7 +172,11 @@ class Simulation:
 
     def flight(self) -> Flight:
         """The flight so far, with one sample at the beginning and one after every `step`."""
-        end = self._end or End("interrupted", self.time, "the simulation has not ended")
+        end = self._end
+        if end is None and self._plant.steps_taken >= self.scenario.simulation.steps:
+            end = End("completed", self.time)
+        elif end is None:
+            end = End("interrupted", self.time, "the simulation has not ended")
         samples = np.array(self._samples)
         return Flight(self._assembly, samples, end, self._plant.engine, self._wall_time)
 
