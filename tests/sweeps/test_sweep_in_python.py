@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 
 import numpy as np
@@ -34,6 +35,12 @@ def test_the_rows_are_the_flights(results):
     ]
     expected = [flight.metrics()["max_rotor_speed"] for flight in flights]
     assert table["max_rotor_speed"].to_pylist() == expected
+
+
+def test_a_row_flies_again(results):
+    scenario = tiltsim.load_scenario(json.loads(results["scenario"][1]))
+    assert scenario.vehicle.mass == 0.45
+    assert tiltsim.simulate(scenario).metrics()["max_rotor_speed"] == results["max_rotor_speed"][1]
 
 
 def test_the_rows_as_a_data_frame(results):

@@ -68,6 +68,10 @@ class SweepResults:
         ends = ", ".join(f"{n} {end}" for end, n in Counter(self.columns["end"]).most_common())
         return f"{len(self)} rows of {len(self.table.column_names)} columns; {ends}"
 
+    def __getitem__(self, name: str) -> Column:
+        """The same as `values`."""
+        return self.values(name)
+
     def to_arrow(self) -> pyarrow.Table:
         """The rows as an Arrow table: values of the axes, how the flight ended, metrics."""
         return self.table
@@ -94,7 +98,7 @@ class SweepResults:
             )
         except ValueError as error:
             address = self.points.definition.address
-            raise InputError(f"{address}: plot: {show(expression)}: {error}") from None
+            raise InputError(f"{address}: {show(expression)}: {error}") from None
 
 
 def is_sweep_folder(path: Path) -> bool:
@@ -102,10 +106,11 @@ def is_sweep_folder(path: Path) -> bool:
     return is_file(path / DEFINITION)
 
 
-def load_results(folder: Path) -> SweepResults:
+def load_results(folder: Path, *, scenarios: bool = False) -> SweepResults:
     """Read the dataset in a sweep's folder, or the finished chunks of an unfinished sweep.
 
-    Raises `InputError` if there is nothing yet, or it cannot be read.
+    ``scenarios`` reads the column ``scenario``, too, a few kB a row. Raises `InputError` if there
+    is nothing yet, or it cannot be read.
     """
     import pyarrow as pa
 
@@ -120,7 +125,7 @@ def load_results(folder: Path) -> SweepResults:
         files = {folder / DATASET: range(len(points))}
     if not files:
         raise InputError(f"{folder}: no chunk of this sweep is finished yet")
-    tables = [read_rows(file, points, rows, scenarios=False) for file, rows in files.items()]
+    tables = [read_rows(file, points, rows, scenarios=scenarios) for file, rows in files.items()]
     for file, part in zip(files, tables):
         if part.schema != tables[0].schema:
             raise InputError(f"{file}: has other columns than {next(iter(files)).name}; delete it")

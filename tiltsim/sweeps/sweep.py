@@ -59,4 +59,4 @@ def sweep(
     ):
         folder = Path(temporary if out is None else out)
         run_sweep(definition, folder, jobs=jobs, report=report, trusted=trusted)
-        return load_results(folder)
+        return load_results(folder, scenarios=True)
