@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from types import SimpleNamespace
 
@@ -36,7 +37,11 @@ def widgets(monkeypatch):
 
 def test_a_notebook_shows_the_viewer_in_the_cell(in_a_notebook, widgets, monkeypatch):
     monkeypatch.setattr(viewer, "view_flights", None)  # opens no window
+    asset = "RERUN_NOTEBOOK_ASSET"
+    monkeypatch.setenv(asset, "")
+    monkeypatch.delenv(asset)
     assert flight("fixed").view() is widgets[0]
+    assert os.environ[asset] == "serve-local", "no viewer from a website"
     assert tiltsim.view([flight("fixed"), flight("trot")]) is widgets[1]
     one, two = (len(widget.content.drain_as_bytes()) for widget in widgets)
     assert 10_000 < one < two

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.messages import choose
+from tiltsim.scenario.messages import did_you_mean
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.views.figures import style
 
@@ -59,7 +59,8 @@ def relabel(
         if not found:
             said_now = [_said(text).partition(" (")[0] for text in texts]
             known = [*dict.fromkeys([*said_now, *(panels or ())])]
-            raise InputError(f"label {name!r}: {choose(name, known)}")
+            says = ", ".join(map(repr, known))
+            raise InputError(f"label {name!r}: {did_you_mean(name, known)}the figure says {says}")
 
 
 def _said(text: Text) -> str:

@@ -6,6 +6,8 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any, Final
@@ -40,7 +42,9 @@ def view(flights: Flight | Sequence[Flight], *, url: str | None = None) -> Any:
     Args:
         flights: One or several.
         url: Of a viewer that is open, such as ``"rerun+http://127.0.0.1:9876/proxy"``; default: in
-            a notebook the viewer is part of the cell, elsewhere one is opened.
+            a notebook the viewer is part of the cell, and served to the browser by this machine
+            unless the environment variable RERUN_NOTEBOOK_ASSET says otherwise; elsewhere one is
+            opened.
 
     Returns:
         In a notebook, what the cell has to end with: Rerun's widget. Else None.
@@ -66,7 +70,10 @@ def _in_notebook() -> bool:
 
 def _inline_viewer(flights: Sequence[Flight]) -> Any:
     """Rerun's widget for notebooks, which has got the flights."""
-    optional_package("rerun_notebook", "Rerun in a notebook", "'rerun-sdk[notebook]'")
+    # The browser gets the viewer from this machine: by default it would be from Rerun's website.
+    os.environ.setdefault("RERUN_NOTEBOOK_ASSET", "serve-local")
+    with redirect_stdout(StringIO()):  # which tells how it is served
+        optional_package("rerun_notebook", "Rerun in a notebook", "'rerun-sdk[notebook]'")
     from rerun.notebook import Viewer
 
     from tiltsim.views.rerun.blueprint import flight_blueprint

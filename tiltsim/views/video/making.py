@@ -142,6 +142,8 @@ def _format(options: _Options, flight_end: float, suffix: str) -> VideoFormat:
     start, end = options.number("start", 0.0), inf
     if options.given("end") is not None:
         end = options.number("end", 0.0)
+    if flight_end == 0.0:
+        raise InputError("the flight ended at 0 s, so that there is nothing to show")
     if start >= min(flight_end, end):
         reason = f"is not before the end {end:g}" if end < flight_end else "is not in it"
         raise options.mistake("start", f"{reason}; the flight ends at {flight_end:g} s")
