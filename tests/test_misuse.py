@@ -59,6 +59,15 @@ MISUSES = {
         lambda: tiltsim.simulate("beyond/sweeps/monte_carlo"),
         "this is a sweep",
     ),
+    "nothing to replace": (lambda: scenario().replace(None), "changes = None: must be a dict"),
+    "overrides in the place of the observer": (
+        lambda: tiltsim.simulate(SHORT, {"simulation.duration": 1}),
+        "must be callable; overrides are for load_scenario",
+    ),
+    "a part of the name of a type": (
+        lambda: scenario().replace({"gait.type": "trott"}),
+        "did you mean trot_instant?",
+    ),
     "an unknown key": (lambda: tiltsim.simulate({"gaits": {}}), "gaits = {}: unknown key"),
     "a key that is no text": (lambda: tiltsim.simulate({3: 4}), "key 3: must be text"),
     "a nested key that is no text": (lambda: tiltsim.simulate({"gait": {3: 4}}), "scenario: "),
@@ -185,7 +194,18 @@ MISUSES = {
         lambda: flight("fixed").plot(panels="margin", size=(3, 0.5)),
         "13 mm is too low for 1 panel; at least",
     ),
-    "labels of other words": (lambda: flight("fixed").plot(labels={"no": "x"}), "no"),
+    "labels of other words": (
+        lambda: flight("fixed").plot(labels={"Positon error": "x"}),
+        "label 'Positon error': did you mean Position error? the figure says 'm', 'Position error'",
+    ),
+    "a metric that there is not": (
+        lambda: flight("fixed").metrics()["final_eror_x"],
+        "'final_eror_x': no metric of this flight; did you mean final_position_error_x?",
+    ),
+    "a metric of another vehicle": (
+        lambda: flight("fixed").metrics()["max_lyapunov"],
+        "'max_lyapunov': no metric of this flight; it has no value",
+    ),
     "a scenario to view": (lambda: tiltsim.view(scenario()), "must be a tiltsim.Flight"),
     "no flights to view": (lambda: tiltsim.view([]), "flights = []: must be"),
     "a number as viewer": (lambda: flight("fixed").view(url=3), "url = 3: must be"),
@@ -198,6 +218,10 @@ MISUSES = {
     ),
     "a list as quality": (lambda: flight("fixed").video("x.mp4", quality=[]), "quality []: choose"),
     "a video of a wrong format": (lambda: flight("fixed").video("x.avi"), "choose .mp4, .gif"),
+    "a video of an instant": (
+        lambda: tiltsim.Simulation(SHORT).flight().video("x.mp4"),
+        "the flight ended at 0 s, so that there is nothing to show",
+    ),
     "a video of nothing": (lambda: flight("fixed").video("x.mp4", start=9), "start 9: is not in"),
 }
 

@@ -123,5 +123,13 @@ def test_a_scenario_in_itself_is_too_deep():
         tiltsim.load_scenario(tables)
 
 
+def test_a_scenario_prints_in_a_line_and_completes_to_what_is_of_use():
+    scenario = tiltsim.load_scenario(ADDRESS)
+    assert str(scenario) == repr(scenario)
+    names = dir(scenario)
+    assert {"replace", "gait", "model_copy", "own_controller"} <= {*names}
+    assert not {"parse_raw", "dict", "json", "copy", "model_fields_set"} & {*names}
+
+
 def test_the_type_of_a_scenario_is_public():
     assert tiltsim.Scenario is Scenario

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from tiltsim.errors import InputError
-from tiltsim.flight.metrics import compute_metrics
+from tiltsim.flight.metrics import Metrics, compute_metrics
 from tiltsim.flight.vectors import VECTORS, components
 from tiltsim.flight.writing import write_flight
 from tiltsim.laws.assembling import assemble
@@ -138,13 +138,13 @@ class Flight:
         return {name: known[name] for name in self.units}
 
     @cached_property
-    def _metrics(self) -> dict[str, float | bool]:
+    def _metrics(self) -> Metrics:
         with _overflow_ignored():
             return compute_metrics(self.columns, self.assembly, self.end, self.wall_time)
 
-    def metrics(self) -> dict[str, float | bool]:
+    def metrics(self) -> Metrics:
         """The metrics of the flight by name; see `tiltsim.scenario.metric_names.METRICS`."""
-        return dict(self._metrics)
+        return Metrics(self._metrics)
 
     def plot(self, panels: str | Sequence[str] = (), **options: Any) -> Any:
         """A matplotlib Figure of this flight; see `tiltsim.plot` for the options."""
