@@ -239,7 +239,7 @@ def test_without_opengl_one_line_says_what_to_install(monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"observations": {"speed": 1.0}}, "'speed': choose position, velocity, "),
+        ({"observations": {"speed": 1.0}}, r"'speed': did you mean rotor_speeds\? choose position"),
         ({"observations": {"velocty": 1.0}}, "'velocty': did you mean velocity"),
         ({"observations": ["velocity"]}, "must be a dict from names to bounds"),
         ({"observations": {"velocity": 0.0}}, r"\['velocity'\] = 0.0: must be a number above 0"),
