@@ -9,7 +9,7 @@ import numpy as np
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
-from tiltsim.laws.layers.actuation import Actuation, allocated_accelerations
+from tiltsim.laws.layers.actuation import allocated_accelerations
 from tiltsim.laws.layers.measured_acceleration import Motion, plant_angular_acceleration
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.laws.layers.sensing import measured_qpos, measured_qvel
@@ -38,7 +38,7 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
             ctrl = within.sampling.controls(time, qpos, (*qvel, 0.0, 0.0, 0.0), act, inner, knots)
             loads = read_actuators(within.dynamics)[1](ctrl)
             qvel = (*qvel, *plant_angular_acceleration(qpos, qvel, ctrl, loads, layer))
-        elif isinstance(layer, Actuation):
+        elif hasattr(layer, "allocation"):  # of actuation: a record for the number of rotors
             qpos = measured_qpos(time, qpos, layer.sensors)
             qvel = measured_qvel(time, qvel, layer.sensors)
             allocation = layer.allocation
