@@ -17,6 +17,7 @@ from tiltsim.laws.tiltrotor import four
 from tiltsim.plants.command import Command, Observation
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import flip_by_spin
+from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.rotorcraft.layout import ACCELERATION_1, QUADROTOR_THRUSTS
 from tiltsim_controllers.mathematics.scalar import Quad, Values
@@ -61,12 +62,14 @@ class BuiltInController:
         scenario: With a built-in controller.
 
     Raises:
-        InputError: If the controller is your own, or feeds back what is not observed.
+        InputError: If the controller is your own or feeds back what is not observed, or its vehicle
+            is neither a tiltrotor nor a quadrotor.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         controller, simulation = scenario.controller, scenario.simulation
-        if controller.is_external or controller.measures_angular_acceleration:
+        observed = scenario.vehicle.model in PythonController.vehicle_models
+        if not observed or controller.is_external or controller.measures_angular_acceleration:
             raise InputError("controller: must be a built-in one that needs observations only")
         self._assembly = assembly = assemble(scenario)
         loop, parameters = assembly.loop, assembly.setup.parameters

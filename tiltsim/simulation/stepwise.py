@@ -22,6 +22,7 @@ from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import Observer
 from tiltsim.plants.plant import take_sample
 from tiltsim.plants.user_controller import UserControlledPlant
+from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.monitor import TerminationMonitor
@@ -152,7 +153,7 @@ class Simulation:
     def observation(self) -> Observation:
         """The state as a controller sees it now, through the scenario's sensors.
 
-        Raises `InputError` for the tilt-car, which has none.
+        Raises `InputError` for vehicles that have none, the tilt-car and multirotors.
         """
         self._require_rotorcraft("observation")
         values = dict(zip(self._assembly.loop.sample_fields[1:], self._plant.observe()))
@@ -163,7 +164,7 @@ class Simulation:
         """What the built-in controller would command now, before latency, servos and motors.
 
         Rotor accelerations and tilt angles of the tiltrotor, thrusts of the quadrotor. Raises
-        `InputError` for the tilt-car, and if the scenario's controller is your own.
+        `InputError` for other vehicles, and if the scenario's controller is your own.
         """
         self._require_rotorcraft("command")
         if self.scenario.controller.is_external:
@@ -181,5 +182,5 @@ class Simulation:
         return Flight(self._assembly, samples, end, self._plant.engine, self._wall_time)
 
     def _require_rotorcraft(self, name: str) -> None:
-        if self.scenario.vehicle.is_planar:
+        if self.scenario.vehicle.model not in PythonController.vehicle_models:
             raise InputError(f"{name}: not supported for the {self.scenario.vehicle.model}")
