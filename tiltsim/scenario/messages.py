@@ -122,7 +122,7 @@ def missing_keys(
         if detail["type"] == "missing":
             yield _mistake(detail, document)
         elif detail["type"] == "union_tag_not_found":
-            yield f"{_locate(detail['loc'], document)[0]}.{_tags(schema, detail['loc'])[0]}"
+            yield f"{_locate(detail['loc'], document)[0]}.{tags_of(schema, detail['loc'])[0]}"
 
 
 def _dropped_keys(
