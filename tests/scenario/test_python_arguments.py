@@ -59,7 +59,7 @@ def test_a_dict_is_not_changed():
 
 def test_overrides_are_not_changed():
     table = {"gait": {"type": "fixed", "angles": [0.0, 0.0, 0.0, 0.0]}}
-    file = {"controller.law": "python", "controller": {"law": "python", "function": "own.py:f"}}
+    file = {"controller": {"law": "python", "function": "own.py:f"}}
     scenario = tiltsim.load_scenario(ADDRESS, {**table, "gait.angles[0]": 0.2})
     assert scenario.gait.angles[0] == 0.2
     scenario.replace(file)
