@@ -11,7 +11,11 @@ import tiltsim
 from tests.arrays.recorded_calls import LAYERED, REFERENCES, SUPERVISED
 from tests.laws.test_laws import GUST, LAWS
 from tests.simulation.test_batch import CAR, CAR_GAITS, EXACT, GAITS
+from tiltsim.arrays.flying import Kernel, course_of, double_precision
+from tiltsim.equations.ode3 import Integration, make_stepper
 from tiltsim.errors import InputError
+from tiltsim.laws.assembling import assemble
+from tiltsim.plants.flight_model import disturbance_acceleration
 
 needs_jax = pytest.mark.skipif(
     "not __import__('importlib').util.find_spec('jax')", reason="JAX is not installed"
@@ -52,6 +56,28 @@ def largest_difference(tables, **simulation):
 def test_a_flight_in_jax_is_the_one_in_python():
     tables = {**LAWS["tilt_car_planned_direction"], "disturbance": GUST}
     assert largest_difference(tables, control_timestep=0.004) < 1e-12
+
+
+@needs_jax
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EVERY)
+def test_steps_of_whatever_flies_on_the_equations_are_those_in_python(name):
+    """Not compiled: XLA takes ten times as long to compile a step as this takes to run three."""
+    simulation = {"plant": "thesis", "duration": 0.3}
+    assembly = assemble(tiltsim.parse_scenario({**EVERY[name], "simulation": simulation}))
+    equations, disturbance = assembly.loop.equations, disturbance_acceleration(assembly.scenario)
+    start = [float(value) for value in equations.initial(assembly, assembly.setup)]
+    with double_precision():
+        kernel = Kernel(course_of(assembly), assembly.setup, disturbance)
+        carried = kernel.start(start)
+        for _ in range(3):
+            carried = kernel.step(carried)
+        state = np.array(carried.state)
+    integration = Integration(0.001, 0, *assembly.setup, disturbance)
+    held = (0.0,) * equations.inputs_size
+    python, _ = make_stepper(equations)(0, start, held, 3, integration)
+    scale = np.maximum(1.0, np.abs(python))
+    np.testing.assert_array_less(np.abs(state - python) / scale, 1e-11)
 
 
 @needs_jax

@@ -37,25 +37,36 @@ def numbers(values):
         yield values
 
 
+COUNTS = {"rows", "size", "start", "offset"}
+"""Arguments that choose an entry or a length, as `CODES` among the fields."""
+
+
 def varies(value, name):
-    return isinstance(value, float) and isfinite(value) and name not in CODES
+    return isinstance(value, float) and isfinite(value) and name not in CODES | COUNTS
 
 
-def fields(value):
-    """Every number of a value with the name of its field."""
+def changed(change, function, arguments):
+    """The arguments with every number changed by ``change(number, name of its field)``."""
+    names = function.__code__.co_varnames
+    return [mapped(change, argument, name) for argument, name in zip(arguments, names)]
+
+
+def fields(function, arguments):
+    """Every number of the arguments with the name of its field."""
     found = []
-    mapped(lambda number, name: found.append((number, name)), value)
+    changed(lambda number, name: found.append((number, name)), function, arguments)
     return found
 
 
 def differences(function, arguments, rng):
     """What is wrong with a lifted function at arguments and near them, in a batch."""
-    found = [value for value, name in fields(arguments) if varies(value, name)]
+    found = [value for value, name in fields(function, arguments) if varies(value, name)]
 
     def filled(row):
         """The arguments with the numbers of a row in place of those found."""
         following = iter(range(len(found)))
-        return mapped(lambda v, name: row[next(following)] if varies(v, name) else v, arguments)
+        change = lambda v, name: row[next(following)] if varies(v, name) else v  # noqa: E731
+        return changed(change, function, arguments)
 
     near = 1.0 + 1e-3 * rng.standard_normal((ROWS, len(found)))
     near[0] = 1.0

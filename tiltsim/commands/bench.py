@@ -24,6 +24,8 @@ def add_parser(subparsers: Subparsers) -> None:
     instead("--vehicles", type=int, metavar="N", help=vehicles)
     accuracy = "instead print RK4's position error and speed for several time steps"
     instead("--accuracy", action="store_true", help=accuracy)
+    arrays = "instead time batches of 1 to 16384 vehicles in JAX, on the thesis plant"
+    instead("--arrays", action="store_true", help=arrays)
     add = parser.add_argument
     add("--duration", type=float, default=10.0, help="with --vehicles, s")
     add("--timestep", type=float, default=0.001, help="with --vehicles, s")
@@ -48,6 +50,10 @@ def run(arguments: argparse.Namespace) -> int:
             )
         elif arguments.accuracy:
             rows = bench_accuracy()
+        elif arguments.arrays:
+            from tiltsim.studies.array_benchmark import bench_arrays
+
+            rows = bench_arrays()
         else:
             rows = run_benchmark(partial(progress.tell, "comparisons"))
     if arguments.json:
@@ -57,6 +63,8 @@ def run(arguments: argparse.Namespace) -> int:
         _print_flights(rows[0])
     elif arguments.accuracy:
         _print_accuracy(rows)
+    elif arguments.arrays:
+        _print_arrays(rows)
     else:
         _print_ratios(rows)
     return 0
@@ -98,4 +106,16 @@ def _print_accuracy(rows: list[dict[str, Any]]) -> None:
     print(
         f"\nRK4 against a step of 0.1 ms; {rows[0]['vehicles']} vehicles on "
         f"{rows[0]['threads']} threads, metrics included"
+    )
+
+
+def _print_arrays(rows: list[dict[str, Any]]) -> None:
+    print(f"{'precision':<11}{'vehicles':>9}{'steps/s':>12}{'x real time':>13}{'compile, s':>12}")
+    for row in rows:
+        print(
+            f"{row['precision']:<11}{row['vehicles']:>9}{row['steps_per_second']:>12.3g}"
+            f"{row['realtime_factor']:>13.0f}{row['compile_seconds']:>12.1f}"
+        )
+    print(
+        f"\node3 at 1 ms on {rows[-1]['threads']} threads; best of three runs, without compilation"
     )
