@@ -45,8 +45,9 @@ ORDER = {
 """Folders and root modules of each package; imports go to the same or to an earlier one."""
 
 FLYING_PREFIXES = tuple(f"tiltsim.{folder}." for folder in FLYING)
-HEAVY = {"av", "mujoco", "numba", "matplotlib", "rerun", "pyarrow", "dm_control", "pydantic"} | {
-    "gymnasium"
+HEAVY = {
+    *("av", "casadi", "dm_control", "gymnasium", "jax", "matplotlib", "mujoco"),
+    *("numba", "pyarrow", "pydantic", "rerun"),
 }
 
 

@@ -54,6 +54,8 @@ MISUSES = {
         lambda: delattr(scenario().simulation, "duration"),
         "simulation.duration: a scenario stays as it is",
     ),
+    "vectorized in MuJoCo": (lambda: tiltsim.vectorized({}), 'vectorized supports "thesis" only'),
+    "symbolic in MuJoCo": (lambda: tiltsim.symbolic({}), 'symbolic supports "thesis" only'),
     "a family without a member": (lambda: tiltsim.simulate("ch04_tracking/setpoint"), "choose a"),
     "a sweep as scenario": (
         lambda: tiltsim.simulate("beyond/sweeps/monte_carlo"),

@@ -97,10 +97,10 @@ class Vectorized:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        self._jax = jax = require_jax("tiltsim.vectorized")
         if scenario.simulation.plant != "thesis":
             plant = scenario.simulation.plant
             raise InputError(f'simulation.plant = "{plant}": vectorized supports "thesis" only')
+        self._jax = jax = require_jax("tiltsim.vectorized")
         self.scenario = scenario
         self._full = _in_full(scenario)
         self._assembly = assemble(self._full)
