@@ -95,7 +95,8 @@ def check_toml(text, folder):
         else:
             Sweep.model_validate({"scenario": "ch04_tracking/circle#fixed_modified", **document})
         return
-    document.get("vehicle", {}).pop("mjcf", None)  # the page's own file; `test_pages_run` flies it
+    if document.get("vehicle", {}).get("model") != "multirotor":
+        document.get("vehicle", {}).pop("mjcf", None)  # the page's own; `test_pages_run` flies it
     if "file" in document.get("gait", {}):  # a reader's own
         table = folder / document["gait"]["file"]
         table.write_text("time,alpha_1,alpha_2,alpha_3,alpha_4\n0,0,0,0,0\n1,0,0,0,0\n")

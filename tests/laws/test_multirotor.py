@@ -226,3 +226,26 @@ def test_a_gait_through_angles_of_less_force_says_where():
     with pytest.raises(InputError, match=r"has 1 only, at tilt angles \(0, 0, 0, 0, 0, 0\) rad"):
         tiltsim.load_scenario(document("tilt_hexarotor", gait=gait, controller=controller))
     assert tiltsim.load_scenario(document("tilt_hexarotor", gait=gait))
+
+
+@pytest.mark.parametrize("name", ["tilt_hexarotor", "hexarotor"])
+def test_stepwise_simulation_observes_and_commands_each_rotor(name):
+    simulation = tiltsim.Simulation(document(name, sensors={"position_noise": 0.1}))
+    exact = tiltsim.Simulation(document(name))
+    for one in (simulation, exact):
+        one.step(5)
+    seen, command = simulation.observation(), simulation.command()
+    rotors, tilts = 6, 6 * (name == "tilt_hexarotor")
+    assert seen.rotor_speeds.shape == command.rotor_accelerations.shape == (rotors,)
+    assert seen.tilt_angles.shape == seen.reference.tilt_angles.shape == (tilts,)
+    assert np.size(command.tilt_angles) == tilts or command.tilt_angles is None
+    noisy, clean = command.rotor_accelerations, exact.command().rotor_accelerations
+    assert np.abs(noisy - clean).max() > 1.0
+
+
+def test_a_gait_of_ones_own_has_an_angle_for_each_tilt():
+    own = document("tilt_hexarotor")
+    flight = tiltsim.simulate(own, gait=lambda time: [0.1 + 0.1 * time, -0.1] * 3)
+    assert flight["alpha_ref_5"][-1] == pytest.approx(0.11)
+    with pytest.raises(InputError, match="has 4 tilt angles; the vehicle has 6"):
+        tiltsim.simulate(own, gait=lambda time: [0.1] * 4)

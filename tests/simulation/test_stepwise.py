@@ -8,7 +8,6 @@ import pytest
 
 import tiltsim
 from tests.flights import TILT_CAR
-from tiltsim.resources import shipped_folder
 
 TROT = {
     "simulation": {"duration": 0.02, "control_timestep": 0.002, "record_timestep": 0.01},
@@ -102,15 +101,6 @@ def test_the_built_in_command_as_a_controller_of_ones_own_flies_the_same_flight(
     assert own.end.kind == "completed", own.end.cause
     for name in ("position", "attitude", "tilt_angles", "rotor_speeds"):
         np.testing.assert_array_equal(own[name], ours[name])
-
-
-def test_multirotors_have_no_observation_and_no_command_for_four_rotors():
-    vehicle = {"model": "multirotor", "mjcf": str(shipped_folder("mjcf") / "hexarotor.xml")}
-    controller = {"law": "attitude_force"}
-    simulation = tiltsim.Simulation({"vehicle": vehicle, "controller": controller})
-    for ask in (simulation.observation, simulation.command):
-        with pytest.raises(tiltsim.InputError, match="not supported for the multirotor"):
-            ask()
 
 
 def test_the_quadrotors_command_is_its_thrusts():

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.closed_loop.loop import Dynamics
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.layers.actuation import allocated_accelerations
@@ -14,12 +15,13 @@ from tiltsim.laws.layers.measured_acceleration import Motion, plant_angular_acce
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.laws.layers.sensing import measured_qpos, measured_qvel
 from tiltsim.laws.tiltrotor import four
+from tiltsim.models.vehicle_parts import CROSSES
 from tiltsim.plants.command import Command, Observation
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import flip_by_spin
 from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.vehicles.rotorcraft.layout import ACCELERATION_1, QUADROTOR_THRUSTS
+from tiltsim.vehicles.rotorcraft.layout import ACCELERATION_1, QUADROTOR_THRUSTS, layout_of
 from tiltsim_controllers.mathematics.scalar import Quad, Values
 
 
@@ -47,6 +49,8 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
     ctrl = loop.sampling.controls(time, qpos, qvel, act, parameters, knots)
     if loop.dynamics.model == "quadrotor":
         return _quadrotor_command(assembly, ctrl)
+    if loop.dynamics.model not in CROSSES:
+        return _multirotor_command(loop.dynamics, ctrl)
     rates = four(ctrl, ACCELERATION_1)
     if allocation is not None:
         rates = allocated_accelerations(rates, qpos, act, allocation)
@@ -107,6 +111,13 @@ def _tiltrotor_command(accelerations: Quad, ctrl: Values) -> Command:
         rotor_accelerations=np.array(flip_by_spin(accelerations)),
         tilt_angles=np.array(four(ctrl, 0)),
     )
+
+
+def _multirotor_command(dynamics: Dynamics, ctrl: Values) -> Command:
+    layout = layout_of(dynamics)
+    rates = np.array(ctrl[layout.acceleration_1 : layout.further_rates])
+    angles = np.array(ctrl[: layout.tilts]) if layout.tilts else None
+    return Command(rotor_accelerations=np.array(dynamics.spins) * rates, tilt_angles=angles)
 
 
 def _quadrotor_command(assembly: Assembly, ctrl: Values) -> Command:

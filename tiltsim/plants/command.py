@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tiltsim.errors import TiltsimError
+from tiltsim.models.rotor_table import Multirotor
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats, Quad
 from tiltsim_controllers.vehicle.parameters import Vehicle
@@ -28,7 +29,7 @@ class Reference:
     acceleration: Floats  # (3,), m/s^2
     attitude: Floats  # (3,), roll, pitch, yaw, rad
     tilt_angles: Floats  # (4,), rad, of the planned gait; zeros for the quadrotor
-    tilt_rates: Floats  # (4,), rad/s
+    tilt_rates: Floats  # (4,), rad/s; of a multirotor both (M,), one for each tilt
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +37,7 @@ class Observation:
     """The input of a controller: the vehicle's state, its reference and its parameters.
 
     The state is as measured by the scenario's sensors. The arrays are copies: a controller may keep
-    or change them.
+    or change them. Those of tilts and rotors have one entry for each that the vehicle has.
     """
 
     time: float  # s
@@ -49,7 +50,7 @@ class Observation:
     tilt_rates: Floats  # (4,), rad/s
     rotor_speeds: Floats  # (4,), rad/s, positive along each rotor's spin
     reference: Reference
-    vehicle: Vehicle  # mass, inertia, arm length, rotor coefficients, gravity
+    vehicle: Vehicle | Multirotor  # mass, inertia, arm length, rotor coefficients, gravity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

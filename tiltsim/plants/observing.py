@@ -10,7 +10,7 @@ from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.laws.layers.sensing import measured_qpos, measured_qvel, sensor_parameters
 from tiltsim.plants.command import Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant
-from tiltsim_controllers.gaits.tilts import tilt_reference
+from tiltsim.scenario.gait import tilts_of
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Quad
 from tiltsim_controllers.references.trajectories import reference_derivatives
@@ -25,20 +25,21 @@ class Observer:
     """
 
     def __init__(self, assembly: Assembly) -> None:
-        vehicle = assembly.scenario.rotorcraft
+        vehicle = assembly.scenario.any_rotorcraft
         self._vehicle, self._tilting = vehicle.resolve(), vehicle.has_tilting_rotors
+        self._tilts, self._spins = tilts_of(self._vehicle), np.array(vehicle.spins)
         self._assembly, self._sensors = assembly, sensor_parameters(assembly.scenario)
 
     def observe(self, plant: MujocoPlant, rotor_speeds: Sequence[float]) -> Observation:
         """The plant's present state as a controller sees it, through the scenario's sensors.
 
-        ``rotor_speeds`` are signed, shape (4,), rad/s.
+        ``rotor_speeds`` are signed, one for each rotor, rad/s.
         """
         time, qpos, qvel = plant.evaluation_time, plant.data.qpos, plant.data.qvel
         if self._sensors.active:
             qpos = np.array(measured_qpos(time, qpos.tolist(), self._sensors))
             qvel = np.array(measured_qvel(time, qvel.tolist(), self._sensors))
-        tilts, tilt_rates = qpos[7:11], qvel[6:10]
+        tilts, tilt_rates = qpos[7 : 7 + self._tilts], qvel[6 : 6 + self._tilts]
         return Observation(
             time=plant.time,
             position=qpos[:3].copy(),
@@ -46,9 +47,9 @@ class Observer:
             attitude=np.array(euler_from_quaternion(*qpos[3:7].tolist())),
             quaternion=qpos[3:7].copy(),
             body_rates=qvel[3:6].copy(),
-            tilt_angles=tilts.copy() if self._tilting else np.zeros(4),
-            tilt_rates=tilt_rates.copy() if self._tilting else np.zeros(4),
-            rotor_speeds=np.array(flip_by_spin(rotor_speeds)),
+            tilt_angles=tilts.copy() if self._tilting else np.zeros(self._tilts),
+            tilt_rates=tilt_rates.copy() if self._tilting else np.zeros(self._tilts),
+            rotor_speeds=self._spins * rotor_speeds,
             reference=self._reference(time),
             vehicle=self._vehicle,
         )
@@ -56,16 +57,16 @@ class Observer:
     def _reference(self, time: float) -> Reference:
         knots, reference = self._assembly.knots, self._assembly.reference
         motion = np.array(reference_derivatives(time, reference, knots)[:9])
-        planned = np.zeros(8)
+        angles, rates = np.zeros((2, self._tilts))
         if self._tilting:
-            planned[:] = tilt_reference(time, self._assembly.gait.parameters, knots)
+            angles, rates = self._assembly.gait.angles(time), self._assembly.gait.rates(time)
         return Reference(
             position=motion[:3],
             velocity=motion[3:6],
             acceleration=motion[6:],
             attitude=np.array((reference.roll, reference.pitch, reference.yaw)),
-            tilt_angles=planned[:4],
-            tilt_rates=planned[4:],
+            tilt_angles=angles.copy(),
+            tilt_rates=rates.copy(),
         )
 
 

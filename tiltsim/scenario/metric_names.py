@@ -110,6 +110,11 @@ METRICS: Final = {
         "",
         "smallest over largest singular value of [tau/(L Kf); r3 F/Kf]",
     ),
+    "max_null_part": Metric(
+        "largest null part of the rotor speeds",
+        "",
+        "largest share of varpi |varpi| that neither force nor torque show (multirotor)",
+    ),
     "saturated_fraction": Metric(
         "share of time with a saturated rotor",
         "",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import ceil
 from os import PathLike
 from typing import Any, Final
@@ -10,7 +10,9 @@ from typing import Any, Final
 import numpy as np
 
 from tiltsim.errors import InputError
+from tiltsim.models.vehicle_parts import MAX_ROTORS
 from tiltsim.scenario.arguments import given_keys
+from tiltsim.scenario.gait import TableGait
 from tiltsim.scenario.limits import MAX_ROWS
 from tiltsim.scenario.messages import tags_of
 from tiltsim.scenario.scenario import Scenario
@@ -43,7 +45,7 @@ def replace_tables(document: dict[str, Any], given: Mapping[str, object]) -> Non
     for name in filter(given.__contains__, COLUMNS):
         old, kept = document.get(name), KEPT_KEYS if name == "reference" else ()
         stays = {key: old[key] for key in kept if key in old} if isinstance(old, dict) else {}
-        document[name] = _table(name, given[name]) | stays
+        document[name] = _table(name, given[name], _is_multirotor(document)) | stays
 
 
 def drop_what_own_controllers_ignore(
@@ -88,12 +90,32 @@ def sample_functions(document: Mapping[str, Any], own: Mapping[str, Any]) -> Non
         table = document.get(name)
         rows = table.get("rows") if isinstance(table, Mapping) else None
         if isinstance(rows, list) and (not rows or rows[-1][0] != span):
-            rows[:] = _samples(name, own[name], len(COLUMNS[name]) - 1, span)
+            size = len(COLUMNS[name]) - 1
+            if name == "gait" and _is_multirotor(document):
+                size = _tilts_of(own[name])
+            rows[:] = _samples(name, own[name], size, span)
 
 
-def _table(name: str, value: Any) -> dict[str, Any]:
+def _is_multirotor(document: Mapping[str, Any]) -> bool:
+    """Whether the number of tilts of a gait is its vehicle's."""
+    vehicle = document.get("vehicle")
+    return isinstance(vehicle, Mapping) and vehicle.get("model") == "multirotor"
+
+
+def _tilts_of(gait: Callable[[float], Any]) -> int:
+    """How many tilt angles a function of time gives; 4 where it gives no such vector."""
+    try:
+        angles = real_array(gait(0.0))
+    except Exception:
+        return 4
+    return angles.size if angles.ndim == 1 and 1 <= angles.size <= MAX_ROTORS else 4
+
+
+def _table(name: str, value: Any, multirotor: bool) -> dict[str, Any]:
     """The table of a scenario for an argument."""
-    columns = COLUMNS[name]
+    columns: Sequence[str] = COLUMNS[name]
+    if name == "gait" and multirotor and (isinstance(value, Mapping) or hasattr(value, "columns")):
+        columns = TableGait.columns_among([*map(str, getattr(value, "columns", value))])
     kind = value.get("type") if isinstance(value, Mapping) else value
     if isinstance(kind, str) and kind in tags_of(Scenario, (name,))[1]:
         hint = f'override {{"{name}.type": "{kind}"}} for one of the built-in types'

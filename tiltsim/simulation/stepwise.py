@@ -22,7 +22,6 @@ from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import Observer
 from tiltsim.plants.plant import take_sample
 from tiltsim.plants.user_controller import UserControlledPlant
-from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.monitor import TerminationMonitor
@@ -153,18 +152,18 @@ class Simulation:
     def observation(self) -> Observation:
         """The state as a controller sees it now, through the scenario's sensors.
 
-        Raises `InputError` for vehicles that have none, the tilt-car and multirotors.
+        Raises `InputError` for the tilt-car, which has none.
         """
         self._require_rotorcraft("observation")
         values = dict(zip(self._assembly.loop.sample_fields[1:], self._plant.observe()))
-        speeds = [values[f"rotor_speed_{rotor}"] for rotor in (1, 2, 3, 4)]
+        speeds = [values[f"rotor_speed_{rotor}"] for rotor in self._assembly.loop.kind.rotors]
         return Observer(self._assembly).observe(self._plant, speeds)
 
     def command(self) -> Command:
         """What the built-in controller would command now, before latency, servos and motors.
 
-        Rotor accelerations and tilt angles of the tiltrotor, thrusts of the quadrotor. Raises
-        `InputError` for other vehicles, and if the scenario's controller is your own.
+        Rotor accelerations and tilt angles, of the quadrotor thrusts. Raises
+        `InputError` for the tilt-car, and if the scenario's controller is your own.
         """
         self._require_rotorcraft("command")
         if self.scenario.controller.is_external:
@@ -182,5 +181,5 @@ class Simulation:
         return Flight(self._assembly, samples, end, self._plant.engine, self._wall_time)
 
     def _require_rotorcraft(self, name: str) -> None:
-        if self.scenario.vehicle.model not in PythonController.vehicle_models:
+        if self.scenario.vehicle.is_planar:
             raise InputError(f"{name}: not supported for the {self.scenario.vehicle.model}")

@@ -39,6 +39,7 @@ def rotorcraft_metrics(
         **_singular_zone_metrics(columns),
         "max_tilt_rate": float(max(rates, default=0.0)),
         **_singularity_metrics(columns, limits.resolve()),
+        **_null_metrics(columns),
         **saturation_metrics(time, saturated),
     }
 
@@ -105,6 +106,12 @@ def _singular_zone_metrics(columns: Mapping[str, Floats]) -> dict[str, float | b
         if switches.size:
             metrics["first_switch_time"] = float(columns["time"][switches[0] + 1])
     return metrics
+
+
+def _null_metrics(columns: Mapping[str, Floats]) -> dict[str, float]:
+    if "null_part" not in columns:
+        return {}
+    return {"max_null_part": float(columns["null_part"].max())}
 
 
 def _singularity_metrics(
