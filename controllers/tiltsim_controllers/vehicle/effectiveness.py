@@ -95,7 +95,7 @@ class Effectiveness(NamedTuple):
     rows: Callable[..., Rows]
     """``(constant, cosines, sines, table, at)``: ``constant A + B cosines + C sines``; derivatives
     have the constant 0 and the derivatives of cosines and sines."""
-    squares: Callable[..., Values]  # (speeds): w = varpi |varpi| of every rotor
+    squares: Callable[..., Values]  # (speeds): squares with sign, w, of every rotor
     wrench: Callable[..., Values]  # (tilts, squares, table, at): force (N) and torque (N m)
 
 
