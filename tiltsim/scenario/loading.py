@@ -18,7 +18,7 @@ from tiltsim.scenario.controller import DEFAULT_LAW
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.limits import check_limits
 from tiltsim.scenario.messages import choose, did_you_mean, has_same_keys, one_line_message, show
-from tiltsim.scenario.override_keys import split_key
+from tiltsim.scenario.override_keys import refuse_replaced, split_key
 from tiltsim.scenario.own_parts import (
     drop_what_own_controllers_ignore,
     kept_functions,
@@ -240,7 +240,7 @@ def apply_overrides(
         InputError: If a key does not exist, or one would replace the table or list of another.
     """
     given = _kinds_first(plain(overrides))  # a copy, as entries of lists are set in it
-    _refuse_replaced(given, address)
+    refuse_replaced(given, address)
     return [key for key, value in given if _override(address, document, key, value)]
 
 
@@ -330,18 +330,6 @@ def _has_other_keys(path: Sequence[str | int], old: object, new: object) -> bool
 def _kinds_first(overrides: Mapping[str, Any]) -> list[tuple[str, Any]]:
     """Overrides with those of `KIND_KEYS` first: a new kind empties its table."""
     return sorted(overrides.items(), key=lambda item: item[0].rpartition(".")[2] not in KIND_KEYS)
-
-
-def _refuse_replaced(given: Sequence[tuple[str, Any]], address: str) -> None:
-    """Raise `InputError` if a value replaces the whole table or list of which another is a part."""
-    paths = [split_key(key) for key, _ in given]
-    for i, (path, (key, value)) in enumerate(zip(paths, given)):
-        for inner, (part, _) in zip(paths[:i], given):
-            if len(inner) > len(path) and inner[: len(path)] == path:
-                raise InputError(
-                    f"{address}: {key} = {show(value)}: would replace {part}, which is given, too; "
-                    "give one of them"
-                )
 
 
 def _override(address: str, document: dict[str, Any], key: str, value: object) -> bool:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Sequence
 from typing import Any
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.limits import MAX_DEPTH, check_limits
+from tiltsim.scenario.messages import show
 
 
 def split_key(key: str) -> list[str | int]:
@@ -25,6 +27,18 @@ def split_key(key: str) -> list[str | int]:
                 )
             steps.append(int(position[:-1]))
     return steps
+
+
+def refuse_replaced(given: Sequence[tuple[str, Any]], address: str) -> None:
+    """Raise `InputError` if a value replaces the whole table or list of which another is a part."""
+    paths = [split_key(key) for key, _ in given]
+    for i, (path, (key, value)) in enumerate(zip(paths, given)):
+        for inner, (part, _) in zip(paths[:i], given):
+            if len(inner) > len(path) and inner[: len(path)] == path:
+                raise InputError(
+                    f"{address}: {key} = {show(value)}: would replace {part}, which is given, too; "
+                    "give one of them"
+                )
 
 
 def parse_override(text: str) -> tuple[str, Any]:
