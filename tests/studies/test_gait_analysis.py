@@ -612,10 +612,11 @@ def test_the_legend_explains_only_what_is_drawn(gait, marks, bar) -> None:
 
 
 def test_equal_figures_give_equal_files(tmp_path) -> None:
+    figures = [gait_figure(plans.fixed([0.1, 0.2, 0.3, 0.4]), AR_DRONE) for _ in range(2)]
     for ending in style.FORMATS:
         files = [tmp_path / f"{index}{ending}" for index in range(2)]
-        for file in files:
-            style.save(gait_figure(plans.fixed([0.1, 0.2, 0.3, 0.4]), AR_DRONE), file)
+        for figure, file in zip(figures, files):
+            style.save(figure, file)
         assert files[0].read_bytes() == files[1].read_bytes()
 
 

@@ -123,10 +123,12 @@ def test_the_command_writes_the_format_of_the_ending(ending, tmp_path, capsys):
     assert capsys.readouterr().out == f"figure written to {file}\n"
 
 
-@pytest.mark.parametrize("path", ["", "flight.parquet"])
-def test_the_figure_lies_beside_the_flight_by_default(path, tmp_path):
+@pytest.mark.parametrize(
+    ("path", "options"), [("", []), ("flight.parquet", ["--panels", "margin"])]
+)
+def test_the_figure_lies_beside_the_flight_by_default(path, options, tmp_path):
     folder = saved("fixed", tmp_path)
-    assert main(["plot", str(folder / path)]) == 0
+    assert main(["plot", str(folder / path), *options]) == 0
     assert (folder / "flight.png").stat().st_size > 10_000
 
 

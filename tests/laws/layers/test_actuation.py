@@ -236,7 +236,7 @@ def test_a_lagging_rotor_leaves_its_limit_as_soon_as_one_without_lag(plant, timi
     past = []
     for lag in ({}, {"rotor_time_constant": 0.02}):
         flight = fly(
-            simulation={"duration": 6.0, "timestep": 0.002, "plant": plant, **timing},
+            simulation={"duration": 5.4, "timestep": 0.002, "plant": plant, **timing},
             vehicle={"min_rotor_speed": 200.0, "max_rotor_speed": 390.0, **lag},
             gait={"amplitude": 0.0},
             initial={"position": [0.0, 0.0, -6.0]},
