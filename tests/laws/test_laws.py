@@ -383,6 +383,10 @@ MISTAKES = {
         {**LAWS["yaw_position"], "reference": {"type": "setpoint", "pitch": 0.1}},
         "reference.pitch = 0.1: roll and pitch are not outputs of the yaw_position law",
     ),
+    "upside down for a law of Euler angles": (
+        {"controller": {"law": "full_pose"}, "reference": {"type": "setpoint", "roll": 2.0}},
+        "reference.roll = 2.0: the full_pose law cannot turn it over; must be below pi/2",
+    ),
     "reference of another law": (
         {**LAWS["yaw_position"], "reference": {"type": "attitude_altitude"}},
         'reference.type = "attitude_altitude": the yaw_position law cannot track it',

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from math import pi
 from typing import Final
 
 from tiltsim.models.rotor_table import Multirotor
@@ -234,6 +235,9 @@ def _check_reference(scenario: ScenarioTables) -> None:
             reason = f"roll and pitch are not outputs of the {controller.law} law"
             raise scenario.mistake(f"reference.{key}", reason)
         raise scenario.mistake("reference.type", f"the {controller.law} law cannot track it")
+    if abs(reference.roll) >= 0.5 * pi and not isinstance(controller, AttitudeForceController):
+        reason = f"the {controller.law} law cannot turn it over; must be below pi/2"
+        raise scenario.mistake("reference.roll", reason)
     if reference.type in {"waypoints", "table"} and scenario.vehicle.is_planar:
         raise scenario.mistake("reference.type", "the tilt_car's laws cannot track it")
     if reference.adds_acceleration and not controller.omits_reference_acceleration:

@@ -18,6 +18,7 @@ from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, Referen
 from tiltsim_controllers.references.waypoints import minimum_snap_knots, table_knots
 
 Tilt = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
+Roll = Annotated[float, Field(ge=-pi, le=pi)]
 ReferenceRow = Annotated[tuple[float, Coordinate, Coordinate, Coordinate], Field(strict=False)]
 
 
@@ -56,9 +57,10 @@ class _Reference(Table, ABC):
 class _PositionReference(_Reference):
     """A position, and the attitude at it."""
 
-    roll: Tilt = Field(
+    roll: Roll = Field(
         0.0,
-        description="angle to hold; for controller.law full_pose, switching or python [rad]",
+        description="angle to hold; for controller.law attitude_force, which alone takes pi/2 and "
+        "more, full_pose, switching or python [rad]",
         examples=[0.2],
     )
     pitch: Tilt = Field(0.0, description="as roll [rad]", examples=[0.2])
