@@ -1,4 +1,4 @@
-"""Hexarotors that have lost a rotor fly, or not, as statics predicts."""
+"""Hexarotors without a rotor fly, or not, as statics predicts; seven swaying arms drift."""
 
 from __future__ import annotations
 
@@ -116,3 +116,16 @@ def test_tilting_hexarotor_hovers_level_with_other_tilts_without_a_rotor(tmp_pat
     assert not metrics["diverged"]
     for metric in ("position_error_x", "position_error_y", "position_error_z", "roll", "pitch"):
         assert abs(metrics[f"final_{metric}"]) < 1e-3
+
+
+@pytest.mark.slow
+def test_seven_swaying_arms_drift_unseen_unless_they_are_restored():
+    overrides = {"simulation.duration": 25.0}
+    drifting, restored = (
+        tiltsim.simulate(tiltsim.load_scenario(f"fleet/state_drift#{name}", overrides)).metrics()
+        for name in ("drifting", "restored")
+    )
+    for metrics in (drifting, restored):
+        assert metrics["sup_position_error_after_20s"] < 1e-9
+    assert drifting["min_rotor_speed"] < 205.0
+    assert restored["min_rotor_speed"] > 225.0

@@ -1,4 +1,4 @@
-"""Findings about the tilt-car."""
+"""Findings about the tilt-car, and about the state drift of other vehicles."""
 
 from __future__ import annotations
 
@@ -61,6 +61,29 @@ FINDINGS: Final = (
         ),
         pictures=("drift",),
         numbers=_drift_numbers,
+    ),
+    Finding(
+        key="arms",
+        title="Multirotors with more rotors than outputs drift, too, if their pods move",
+        chapters="beyond ch. 10",
+        text=(
+            "Six outputs, attitude and force, leave one direction of seven rotors' inputs free. "
+            "With fixed rotors nothing changes along it. If the pods sway, the rotor speeds move "
+            "along it from one period to the next, until one nearly stops, while position and "
+            "attitude do not notice. A restoring rate along the free direction, towards the inputs "
+            "of least power, ends this and costs nothing; it is on by default where pods move and "
+            "rotors are more than outputs.",
+        ),
+        proof="The least-norm law keeps the part of the inputs in the null space of `[τ; F]` "
+        "constant. If the null space is fixed, so is that part. If it turns with the pods and "
+        "returns, the part has been transported along a closed path of null spaces and need not "
+        "return: a holonomy, as the tilt-car's.",
+        tests={
+            "simulation/test_fleet.py": (
+                "test_seven_swaying_arms_drift_unseen_unless_they_are_restored",
+            )
+        },
+        flights=("fleet/state_drift#drifting", "fleet/state_drift#restored"),
     ),
     Finding(
         key="tilt-column",
