@@ -8,6 +8,7 @@ import tomllib
 from tests.docs.pages import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+INSTALLATION = (ROOT / "docs" / "installation.md").read_text()
 CITATION = (ROOT / "CITATION.cff").read_text()
 
 
@@ -16,6 +17,14 @@ def test_the_version_is_that_of_the_project_everywhere():
     assert heading[1] == PROJECT["version"]
     assert f"\nversion: {PROJECT['version']}\n" in CITATION
     assert f"\nlicense: {PROJECT['license']}\n" in CITATION
+
+
+def test_every_extra_is_described():
+    table = INSTALLATION.partition("## Extras")[2].partition("```")[0]
+    rows = re.findall(r"^\| (`.*?) \|", table, re.MULTILINE)
+    assert sorted(re.findall(r"`(\w+)`", " ".join(rows))) == sorted(
+        PROJECT["optional-dependencies"]
+    )
 
 
 def test_the_pythons_that_it_names_are_those_that_are_tested():
