@@ -180,12 +180,12 @@ MISTAKES = {
     "three angles": (
         fixed("[0.1, 0.2, 0.3]"),
         "gait.angles = [0.1, 0.2, 0.3]",
-        "must have 4 entries",
+        "has 3 tilt angles; the vehicle has 4",
     ),
     "five angles": (
         fixed("[0.1, 0.2, 0.3, 0.4, 0.5]"),
         "gait.angles = [0.1, 0.2, 0.3, 0.4, 0.5]",
-        "must have 4 entries",
+        "has 5 tilt angles; the vehicle has 4",
     ),
     "unknown gait": (
         '[gait]\ntype = "trott"',
