@@ -279,7 +279,7 @@ def multirotor_law_of(layout: Layout, dimension: int, norm: str = "speed") -> Ca
 
     It returns the rotor accelerations (rad/s^2), the rates of the integrals (m), the references of
     roll, pitch and yaw (rad) and the null part: the share, from 0 to 1, of ``w`` that the outputs
-    do not see and that ``restoring`` takes to zero. NaN where the decoupling matrix is singular.
+    do not see; ``restoring`` keeps it near its least. NaN where the decoupling matrix is singular.
 
     Args:
         layout: of the table of rotors, four or more
@@ -291,7 +291,7 @@ def multirotor_law_of(layout: Layout, dimension: int, norm: str = "speed") -> Ca
     squares, pushing = effectiveness_of(layout).squares, pushing_of(layout)
     scaled_rows, factors_of_rows = scaled_rows_of(length, norm), factors_of(length, dimension)
     control, solution = _control_of(layout, dimension), solution_of(length, dimension, norm)
-    null_part = null_part_of(length, 3 + dimension)
+    null_part = null_part_of(length, dimension)
 
     @scalar
     def inputs(
@@ -319,8 +319,10 @@ def multirotor_law_of(layout: Layout, dimension: int, norm: str = "speed") -> Ca
             omega_rate = body_acceleration(body, (tx, ty, tz), omega, terms.gyroscopic_torque)
         else:
             omega_rate = measured
+        up = (rotation[6], rotation[7], rotation[8])
+        unseen = null_part(rows, up, w)
         rows, pushes = scaled_rows(rows, speeds, parameters.decoupling)
-        factors = factors_of_rows(rows, pushes, (rotation[6], rotation[7], rotation[8]))
+        factors = factors_of_rows(rows, pushes, up)
         jerk, angular_jerk, rates, roll_ref, pitch_ref = control(
             time,
             state,
@@ -348,6 +350,6 @@ def multirotor_law_of(layout: Layout, dimension: int, norm: str = "speed") -> Ca
             parameters,
         )
         references = (roll_ref, pitch_ref, parameters.reference.yaw)
-        return (*accelerations, *rates, *references, null_part(factors[2], w))
+        return (*accelerations, *rates, *references, unseen)
 
     return inputs

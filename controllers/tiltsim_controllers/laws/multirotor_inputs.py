@@ -11,7 +11,7 @@ from math import nan, sqrt
 from typing import Any, Final
 
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
-from tiltsim_controllers.laws.force_directions import Factors, Force
+from tiltsim_controllers.laws.force_directions import Factors, Force, factors_of
 from tiltsim_controllers.laws.least_norm import nearest_of, shares_of
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import componentwise, vectors_of
@@ -171,17 +171,23 @@ def solution_of(length: int, dimension: int, norm: str) -> Callable[..., Values]
 
 
 @cache
-def null_part_of(length: int, equations: int) -> Callable[..., float]:
-    """Scalar code of the share of ``w`` that the outputs do not see: ``(units, w)``."""
+def null_part_of(length: int, dimension: int) -> Callable[..., float]:
+    """Scalar code of the share of ``w`` that the outputs do not see, whatever the norm.
+
+    ``(rows, up, w)``: ``rows`` of F and tau per unit of ``w``, ``up`` is world up in body axes. In
+    the norm of rotor accelerations a rotor that comes to rest would take the share with it.
+    """
+    equations = 3 + dimension
+    factors_of_rows, dot = factors_of(length, dimension), vectors_of(length).dot
     shares, squared = shares_of(length, equations), vectors_of(equations).dot
-    dot = vectors_of(length).dot
 
     @scalar
-    def none(units: tuple[Values, ...], w: Values) -> float:
+    def none(rows: Rows, up: Triple, w: Values) -> float:
         return 0.0
 
     @scalar
-    def null_part(units: tuple[Values, ...], w: Values) -> float:
+    def null_part(rows: Rows, up: Triple, w: Values) -> float:
+        _, _, units, _ = factors_of_rows(rows, (rows[0], rows[1], rows[2]), up)
         seen, whole = shares(units, w), dot(w, w)
         return sqrt(max(0.0, 1.0 - squared(seen, seen) / whole)) if whole > 0.0 else 0.0
 
