@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from tests.views.recordings import entities
-from tiltsim.models.rotorcraft import MODELS, RotorcraftSpec, compile_model
+from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
+from tiltsim.models.vehicle_parts import CROSSES
 from tiltsim.views.rerun.geometry import geom_archetypes, log_geometry
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
@@ -51,7 +52,7 @@ def test_every_shape_of_any_model_is_drawn_or_named(tmp_path):
     assert not names & {"ground", "hidden", "hill"}
 
 
-@pytest.mark.parametrize("vehicle", MODELS)
+@pytest.mark.parametrize("vehicle", CROSSES)
 def test_every_visible_geom_of_a_vehicle_is_drawn(vehicle, tmp_path):
     import rerun as rr
 
