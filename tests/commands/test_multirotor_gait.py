@@ -102,6 +102,19 @@ def test_other_tilts_make_the_loss_of_a_rotor_controllable(capsys):
         np.testing.assert_allclose(force @ (spins * speeds**2), [0.0, 0.0, 1.53 * 9.81], atol=1e-6)
 
 
+def test_a_scenario_has_its_vehicle_and_gait(capsys):
+    found = report(capsys, "gait", "fleet/state_drift#restored")
+    assert (found["rotors"], found["torque_free_dimension"]) == (7, 3)
+    table = found["time"]
+    assert found["angles"] == pytest.approx(table["angles"][0])
+    assert found["min_torque_free_dimension"] == min(table["torque_free_dimension"]) == 3
+    assert found["min_singularity_margin"] == min(table["singularity_margin"])
+    assert len(table["time"]) == len(table["rank"]) == len(table["singular_attitudes"])
+    assert main(["gait", "fleet/state_drift#restored"]) == 0
+    assert "dimension 3 or more\n" in capsys.readouterr().out
+    assert "time" not in report(capsys, "gait", "fleet/hexarotor#hover")
+
+
 def test_the_summary_is_readable(capsys):
     assert main(["gait", "--mjcf", file_of("omni_octorotor"), "--faults"]) == 0
     text = capsys.readouterr().out

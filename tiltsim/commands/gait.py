@@ -59,9 +59,9 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyze, draw, print."""
-    if arguments.mjcf is not None:
-        from tiltsim.commands.multirotor_gait import run_multirotor
+    from tiltsim.commands.multirotor_gait import flies_multirotor, run_multirotor
 
+    if arguments.mjcf is not None:
         return run_multirotor(arguments)
     from tiltsim.commands.gait_figures import attainable_warnings, draw_gait
     from tiltsim.commands.gait_selection import select_gait
@@ -73,6 +73,8 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     if arguments.figure == "determinant":
         return _run_determinant(arguments)
+    if flies_multirotor(arguments.scenario):
+        return run_multirotor(arguments)
     selected = select_gait(arguments)
     roll = None if arguments.roll is None else parse_angle("--roll", arguments.roll)
     pitch = None if arguments.pitch is None else parse_angle("--pitch", arguments.pitch)

@@ -18,7 +18,10 @@ from tiltsim.errors import InputError
 from tiltsim.system.text import printable
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from tiltsim.models.rotor_table import Multirotor
+    from tiltsim_controllers.gaits.plans import Gait
 
 FIGURES: Final = ("roll_pitch", "attainable")
 """Values of ``--figure`` for any multirotor."""
@@ -34,18 +37,31 @@ SETS: Final = {
 }
 
 
+def flies_multirotor(scenario: str | None) -> bool:
+    """Whether a scenario, by its address, is of a multirotor."""
+    from tiltsim.scenario.loading import load_scenario
+
+    return scenario is not None and load_scenario(scenario).vehicle.model == "multirotor"
+
+
 def run_multirotor(arguments: argparse.Namespace) -> int:
-    """Analyze the file of ``--mjcf``, draw, print."""
+    """Analyze the file of ``--mjcf`` or the scenario's vehicle, draw, print."""
     _check_options(arguments)
-    vehicle = _read(arguments.mjcf)
     text = arguments.speed_limits
     limits = None if text is None else parse_speed_limits(text)
-    balance = None if arguments.balance is None else _balance(arguments.balance, vehicle, limits)
-    angles = _tilt_angles(arguments, vehicle) if balance is None else balance["angles"]
+    balance = gait = None
+    if arguments.mjcf is None:
+        vehicle, gait = _of_scenario(arguments.scenario)
+        angles: Sequence[float] = gait.angles(0.0).tolist()
+    else:
+        vehicle = _read(arguments.mjcf)
+        if arguments.balance is not None:
+            balance = _balance(arguments.balance, vehicle, limits)
+        angles = _tilt_angles(arguments, vehicle) if balance is None else balance["angles"]
     roll = 0.0 if arguments.roll is None else parse_angle("--roll", arguments.roll)
     pitch = 0.0 if arguments.pitch is None else parse_angle("--pitch", arguments.pitch)
 
-    from tiltsim.studies.multirotor_analysis import multirotor_report, tilted_rotors
+    from tiltsim.studies.multirotor_analysis import multirotor_report, period_report, tilted_rotors
 
     if arguments.plot is not None:
         from tiltsim.views.figures.multirotor import multirotor_figure
@@ -54,13 +70,15 @@ def run_multirotor(arguments: argparse.Namespace) -> int:
         draw = partial(multirotor_figure, rotors, arguments.figure or FIGURES[0])
         save_figure(draw, arguments.plot, arguments)
     report = {
-        "vehicle": arguments.mjcf,
+        "vehicle": arguments.mjcf or arguments.scenario,
         **multirotor_report(
             vehicle, angles, limits=limits, roll=roll, pitch=pitch, faults=arguments.faults
         ),
     }
     if balance is not None:
         report["balance"] = balance
+    if gait is not None and not gait.is_constant:
+        report |= period_report(vehicle, gait, roll, pitch)
     print(json_text(report) if arguments.json else multirotor_text(report))
     print_figure_path(arguments)
     return 0
@@ -68,7 +86,7 @@ def run_multirotor(arguments: argparse.Namespace) -> int:
 
 def _check_options(arguments: argparse.Namespace) -> None:
     for name in OF_FOUR_ROTORS:
-        if getattr(arguments, name) is not None:
+        if arguments.mjcf is not None and getattr(arguments, name) is not None:
             option = "SCENARIO" if name == "scenario" else f"--{name}"
             raise InputError(f"--mjcf: cannot be combined with {option}")
     if arguments.list:
@@ -77,7 +95,7 @@ def _check_options(arguments: argparse.Namespace) -> None:
         raise InputError("--mjcf: give either --angles or --balance")
     kind = arguments.figure
     if kind is not None and kind not in FIGURES:
-        raise InputError(f"--figure {kind}: with --mjcf, choose {' or '.join(FIGURES)}")
+        raise InputError(f"--figure {kind}: of a multirotor, choose {' or '.join(FIGURES)}")
     if kind is not None and arguments.plot is None:
         raise InputError(f"--figure {kind}: needs --plot FILE")
     check_plot(arguments)
@@ -93,6 +111,16 @@ def _read(path: str) -> Multirotor:
         raise InputError(f"--mjcf {path}: {error}") from None
     assert isinstance(vehicle, Multirotor)
     return vehicle
+
+
+def _of_scenario(address: str) -> tuple[Multirotor, Gait]:
+    from tiltsim.models.rotor_table import Multirotor
+    from tiltsim.scenario.loading import load_scenario
+
+    scenario = load_scenario(address)
+    vehicle = scenario.vehicle.resolve()
+    assert isinstance(vehicle, Multirotor)
+    return vehicle, scenario.gait.plan(vehicle)
 
 
 def _tilt_angles(arguments: argparse.Namespace, vehicle: Multirotor) -> tuple[float, ...]:
@@ -131,6 +159,7 @@ def multirotor_text(report: dict[str, Any]) -> str:
         ("", "nearest to the z axis: " + numbers(direction) if direction else "none upward"),
         ("singular attitudes", SETS[report["singular_attitudes"]]),
         ("singularity margin", f"{number(report['singularity_margin'])} rad at {attitude}"),
+        *_period_rows(report),
         ("hover", "none" if hover is None else _hover_text(hover)),
     ]
     if hover is not None:
@@ -157,6 +186,17 @@ def multirotor_text(report: dict[str, Any]) -> str:
             control = _control(loss["free_tilts"])
             rows.append(("", f"level, {control}, at {numbers(loss['free_tilts']['angles'])} rad"))
     return "\n".join([*aligned(rows), *(f"warning: {text}" for text in report["warnings"])])
+
+
+def _period_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
+    """The worst of a moving gait, whose other values are those at time zero."""
+    if "time" not in report:
+        return []
+    margin = number(report["min_singularity_margin"])
+    return [
+        ("over the gait", f"dimension {report['min_torque_free_dimension']} or more"),
+        ("", f"margin {margin} rad or more; all else at t = 0"),
+    ]
 
 
 def _hover_text(hover: dict[str, Any]) -> str:

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from tiltsim.models.rotor_table import Multirotor
     from tiltsim_controllers.analysis.attainable import AttainableSet
     from tiltsim_controllers.analysis.hover import Hover
+    from tiltsim_controllers.gaits.plans import Gait
 
 UNLIMITED: Final = 100.0
 """Share of the weight that a rotor without a speed limit can carry, in a search for a hover."""
@@ -119,6 +120,37 @@ def multirotor_report(
         ]
     report["warnings"] = _warnings(report, is_limited=is_limited)
     return report
+
+
+def period_report(
+    vehicle: Multirotor, gait: Gait, roll: float, pitch: float, samples: int = 201
+) -> dict[str, Any]:
+    """The singularities of a moving gait over its period: a table of arrays, and their worst.
+
+    Args:
+        vehicle: of any number of rotors
+        gait: its tilt angles over time
+        roll, pitch: attitude of the margins, rad
+        samples: of the table
+    """
+    times = gait.sample_times(samples)
+    angles = gait.angles(times)
+    pairs = [force_and_torque(vehicle.table, row) for row in angles.tolist()]
+    force, torque = (np.array(matrices) for matrices in zip(*pairs, strict=True))
+    forces = torque_free_forces(force, torque)
+    margin = singularity_margin(forces, world_up(roll, pitch))
+    return {
+        "min_torque_free_dimension": int(forces.dimension.min()),
+        "min_singularity_margin": float(margin.min()),
+        "time": {
+            "time": times.tolist(),
+            "angles": angles.tolist(),
+            "rank": forces.rank.tolist(),
+            "torque_free_dimension": forces.dimension.tolist(),
+            "singular_attitudes": np.take(SINGULAR_ATTITUDES, forces.dimension).tolist(),
+            "singularity_margin": margin.tolist(),
+        },
+    }
 
 
 def _free_tilts(vehicle: Multirotor, rotors: TiltedRotors, lost: int) -> dict[str, Any] | None:
