@@ -6,7 +6,7 @@ import ast
 import builtins
 import operator
 from collections.abc import Iterable, Iterator, Mapping
-from functools import cache
+from functools import cache, reduce
 from pathlib import Path
 from types import FunctionType
 from typing import Any, Final
@@ -138,6 +138,8 @@ class Expressions:
                 return tuple(self.elements(elements, variables))
             case ast.List(elts=elements):
                 return self.elements(elements, variables)
+            case ast.Set(elts=elements):
+                return set(self.elements(elements, variables))
             case ast.Subscript(value=vector, slice=place):
                 return self.entry(self.value(vector, variables), place, variables)
             case ast.Call():
@@ -256,6 +258,10 @@ class Expressions:
             return function(*args, **keywords)
         if function is map:
             return [self.invoked(args[0], [item], {}) for item in list(args[1])]
+        if function in (any, all) and any(map(lifting.arrays.is_array, args[0])):
+            return reduce(
+                lifting.arrays.either if function is any else lifting.arrays.both, args[0]
+            )
         if function in lifting.arrays.functions:
             return lifting.apply(function, *args)
         if lifting.planning:

@@ -137,8 +137,10 @@ class Lifting:
             return rebuilt(yes, (self.select(condition, a, b) for a, b in zip(yes, no)))
         if is_dataclass(yes) and type(yes) is type(no):
             return replace(yes, **self.select(condition, vars(yes), vars(no)))  # type: ignore[type-var]
-        if isinstance(yes, str):  # the name of a plan
+        if isinstance(yes, str) or yes is None:  # the name of a plan, or nothing known of it
             return no
+        if no is None:
+            return yes
         constant = not (self.arrays.is_array(yes) or self.arrays.is_array(no))
         if constant and type(yes) is type(no) and yes == no:
             return yes

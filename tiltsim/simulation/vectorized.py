@@ -19,6 +19,7 @@ from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import FlightPlan, Scenario, plan_flight
 from tiltsim.scenario.vehicle import VehicleTable
+from tiltsim_controllers.vehicle.parameters import Vehicle
 
 Tree = dict[str, Any]
 
@@ -41,8 +42,9 @@ FIXED: Final = frozenset({"sample_time", "tilt_servo", "pod"})
 def _in_full(scenario: Scenario) -> Scenario:
     """A scenario whose vehicle and gains are numbers, not the names of sets."""
     vehicle, controller = scenario.vehicle, scenario.controller
-    if isinstance(vehicle, VehicleTable) and vehicle.mjcf is None:
-        values = vehicle.resolve()._asdict()
+    resolved = vehicle.resolve()
+    if isinstance(vehicle, VehicleTable) and isinstance(resolved, Vehicle):
+        values = resolved._asdict()
         inertia = tuple(values.pop(f"inertia_{axis}") for axis in ("xx", "yy", "zz"))
         vehicle = vehicle.model_copy(update={**values, "inertia": inertia})
     return scenario.model_copy(update={"vehicle": vehicle, "controller": controller.in_full()})
