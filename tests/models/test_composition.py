@@ -135,6 +135,7 @@ MESH = """
 USERS = {
     "as documented": (),
     "degrees, other parts": (
+        (' model="my_tiltrotor"', ""),
         ('angle="radian"', 'eulerseq="zyx" balanceinertia="true"'),
         (IMU, IMU + BALL),
         (END, PARTS + END),

@@ -42,6 +42,7 @@ def parse_mjcf(path: Path) -> Any:
 def _with_inclusions(path: Path) -> bytes:
     """The MJCF of a file with what it includes in place, which dm_control would put at the end."""
     tree = ElementTree.fromstring(path.read_bytes())
+    tree.attrib.setdefault("model", "MuJoCo Model")  # as MuJoCo calls it
     pending = [tree]
     while pending:
         element = pending.pop()
