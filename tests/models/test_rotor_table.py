@@ -8,7 +8,10 @@ import mujoco
 import numpy as np
 import pytest
 
+import tiltsim
+from tiltsim.laws.assembling import assemble
 from tiltsim.models.user_vehicle import read_user_vehicle
+from tiltsim.plants.flight_model import build_model
 from tiltsim.resources import shipped_folder
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
@@ -105,3 +108,22 @@ def test_a_wrong_file_is_refused_by_name(old, new, message, tmp_path):
     with pytest.raises(ValueError, match=re.escape(message)) as caught:
         read_user_vehicle(str(path), "multirotor")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("body", ["", '<geom size="0.1" mass="0.5"/>', '<geom size="0.1"/>'])
+def test_flights_leave_out_what_is_only_drawn(body, tmp_path):
+    text = odd_vehicle()
+    if "mass" in body:  # its geom is the vehicle's mass
+        first = text.index("<inertial")
+        text = text.replace(text[first : text.index("/>", first) + 2], body)
+    else:
+        text = text.replace('<site name="rotor_1"', f'{body}<site name="rotor_1"')
+    path = tmp_path / "odd.xml"
+    path.write_text(text, encoding="utf-8")
+    vehicle = {"model": "multirotor", "mjcf": str(path)}
+    controller = {"law": "attitude_force", "dimension": 1, "allow_unstable": True}
+    scenario = tiltsim.load_scenario({"vehicle": vehicle, "controller": controller})
+    flown, shown = (build_model(assemble(scenario), visuals=visuals) for visuals in (False, True))
+    assert shown.ngeom == (body != "")
+    assert flown.ngeom == ("mass" in body)
+    assert (flown.body_mass == shown.body_mass).all()

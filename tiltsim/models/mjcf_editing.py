@@ -82,7 +82,7 @@ def remove_visuals(root: Any, *, contacts: bool) -> None:
     """
     root.option.flag.spring = root.option.flag.damper = "disable"
     for geom in root.find_all("geom"):
-        if not contacts or not geom.name.endswith(("collision", "ground")):
+        if not contacts or not (geom.name or "").endswith(("collision", "ground")):
             geom.remove()
     for kind in ("camera", "light", "sensor"):
         for element in root.find_all(kind):

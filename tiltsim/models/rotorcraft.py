@@ -12,6 +12,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
 from tiltsim.models.mjcf_editing import (
     Compile,
     add_hinge_torques,
@@ -222,10 +224,27 @@ def _compose(spec: RotorcraftSpec) -> tuple[Compile, Compile]:
     if spec.ground is not None:
         _set_ground(root, spec.ground)
     complete = compiler_of(root)
-    if user_vehicle is not None:
+    if user_vehicle is not None and spec.model != "multirotor":
         return complete, complete
     remove_visuals(root, contacts=contacts)
-    return complete, compiler_of(root)
+    bare = compiler_of(root)
+    return complete, bare if user_vehicle is None or _moves_alike(complete, bare) else complete
+
+
+def _moves_alike(complete: Compile, bare: Compile) -> bool:
+    """Whether what is drawn and measured gives a user's vehicle no mass, spring or damper."""
+    try:
+        with mujoco_hooks():
+            models = complete(), bare()
+    except ValueError:  # a body is left without mass
+        return False
+    with_visuals, without = models
+    medium = np.array([with_visuals.opt.density, with_visuals.opt.viscosity])  # drags shapes
+    passive = (with_visuals.jnt_stiffness, with_visuals.dof_damping, medium)
+    return not any(part.any() for part in passive) and all(
+        (getattr(with_visuals, name) == getattr(without, name)).all()
+        for name in ("body_mass", "body_inertia", "body_ipos", "body_iquat", "dof_armature")
+    )
 
 
 def _scale_lengths(root: Any, arm_length: float) -> None:
