@@ -25,7 +25,7 @@ from tiltsim.errors import InputError
 TIME_LIMIT = 30
 """Seconds per input."""
 
-MEMORY_LIMIT = 2**30
+MEMORY_LIMIT = 2**30  # bytes beyond the largest that the process had before
 """Bytes of the process."""
 
 
@@ -80,7 +80,7 @@ def run_one(number, seed, folder):
     place.mkdir()
     run = KINDS[number % len(KINDS)](random, place)
     out, err, native = io.StringIO(), io.StringIO(), []
-    start = perf_counter()
+    start, before = perf_counter(), _peak_memory()
     try:
         with (
             _native_output(native),
@@ -106,7 +106,8 @@ def run_one(number, seed, folder):
         shutil.rmtree(place)
     if any(native):
         return f"native code prints {native[0][:500]!r}"
-    return _wrong_output(out.getvalue(), err.getvalue(), perf_counter() - start)
+    grown = _peak_memory() - before
+    return _wrong_output(out.getvalue(), err.getvalue(), perf_counter() - start, grown)
 
 
 @contextmanager
@@ -131,8 +132,11 @@ def _native_output(found):
             found.append(file.read().decode(errors="replace"))
 
 
-def _wrong_output(out, err, seconds):
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+def _peak_memory():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def _wrong_output(out, err, seconds, memory):
     if memory > MEMORY_LIMIT:
         return f"{memory / 2**20:.0f} MiB of memory"
     if err.count("\n") > 1:

@@ -75,9 +75,10 @@ FINDINGS: Final = (
             "rotors are more than outputs.",
         ),
         proof="The least-norm law keeps the part of the inputs in the null space of `[τ; F]` "
-        "constant, with the norm of rotor speeds that of their logarithms. If the null space is fixed, so is that part. If it turns with the pods and "
-        "returns, the part has been transported along a closed path of null spaces and need not "
-        "return: a holonomy, as the tilt-car's.",
+        "constant, with the norm of rotor speeds that of their logarithms. If the null space is "
+        "fixed, so is that part. If it turns with the pods and returns, the part has been "
+        "transported along a closed path of null spaces and need not return: a holonomy, as the "
+        "tilt-car's.",
         tests={
             "simulation/test_fleet.py": (
                 "test_seven_swaying_arms_drift_unseen_unless_they_are_restored",
