@@ -95,27 +95,7 @@ GRADIENTS = {
         ("controller.gains.attitude", (2, 1)),
         ("controller.gains.altitude", 0),
         ("initial.attitude", 1),
-    ],
-    "full_pose": [
-        *ROTORCRAFT,
-        ("vehicle.thrust_coefficient", None),
-        ("controller.gains.position", 0),
-        ("controller.gains.position", 1),
-        ("controller.gains.position", 2),
-        ("controller.gains.attitude", 0),
-        ("controller.gains.attitude", 2),
-        ("controller.max_tilt_rate", None),
-    ],
-    "gait_feedforward": [
-        *ROTORCRAFT,
-        ("vehicle.drag_coefficient", None),
-        ("gait.amplitude", None),
-        ("gait.period", None),
-        ("controller.gains.attitude.bandwidth", None),
-        ("controller.gains.altitude.bandwidth", None),
-        ("controller.gains.altitude.integral", None),
-        ("reference.radius", None),
-    ],
+    ]
 }
 
 
