@@ -96,9 +96,9 @@ def record(action, calls):
         for function in known[code] or ():
             cells = [cell.cell_contents for cell in function.__closure__ or ()]
             if all(here.get(n) is c for n, c in zip(code.co_freevars, cells)):
-                if function not in calls:
-                    names = code.co_varnames[: code.co_argcount]
-                    calls[function] = tuple(frozen(here[name]) for name in names)
+                arguments = [here[name] for name in code.co_varnames[: code.co_argcount]]
+                if function not in calls and not any(map(of_many_samples, arguments)):
+                    calls[function] = tuple(map(frozen, arguments))
                 return
 
     sys.setprofile(notice)
@@ -106,6 +106,13 @@ def record(action, calls):
         action()
     finally:
         sys.setprofile(None)
+
+
+def of_many_samples(argument):
+    """Whether NumPy's arrays are where one sample has numbers, as in the analysis of a flight."""
+    return isinstance(argument, tuple) and any(
+        isinstance(entry, np.ndarray) or of_many_samples(entry) for entry in argument
+    )
 
 
 def frozen(value):

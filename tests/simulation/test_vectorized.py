@@ -49,6 +49,17 @@ def test_parameters_are_the_numbers_that_a_flight_depends_on():
         flown.fly({"air": {"density": 1.0}})
 
 
+def test_a_gait_has_derivatives_by_its_scale_and_bias_where_they_are_one():
+    tables = {"gait": {"type": "trot_continuous", "amplitude": 0.4, "period": 1.0}}
+    flown = tiltsim.vectorized(tiltsim.parse_scenario({**tables, **THESIS}))
+
+    def alpha_3(gait):
+        return flown.observe(flown.initial({"gait": gait}), {"gait": gait})["alpha_3"]
+
+    slopes = jax.jacfwd(alpha_3)({"scale": 1.0, "bias": 1.0})
+    assert slopes == {"scale": pytest.approx(0.4), "bias": pytest.approx(0.4)}
+
+
 def test_it_needs_the_thesis_plant():
     with pytest.raises(InputError, match=r'plant = "mujoco".*vectorized supports "thesis" only'):
         tiltsim.vectorized({})

@@ -152,17 +152,16 @@ class Gait:
         """
         if not (isfinite(divisor) and divisor > 0.0):
             raise ValueError(f"scale 1/{divisor}: must be positive and finite")
-        if divisor == 1.0:
-            return self
+        # Also where the number is 1: the result depends on it, which gradients need.
         parameters = self.parameters._replace(scale=self.parameters.scale / divisor)
-        return replace(self, name=f"{self.name} / {divisor:g}", parameters=parameters)
+        name = self.name if divisor == 1.0 else f"{self.name} / {divisor:g}"
+        return replace(self, name=name, parameters=parameters)
 
     def biased(self, eta: float) -> Gait:
         """The gait with ``alpha_3`` and ``alpha_4`` multiplied by ``eta`` (ch. 6, Eqs. 12-15)."""
-        if eta == 1.0:
-            return self
         parameters = self.parameters._replace(bias=self.parameters.bias * eta)
-        return replace(self, name=f"{self.name}, biased {eta:.0%}", parameters=parameters)
+        name = self.name if eta == 1.0 else f"{self.name}, biased {eta:.0%}"
+        return replace(self, name=name, parameters=parameters)
 
     def _rows(self) -> Floats | None:
         """The keyframes as flown, shape (N, 1 + tilts); None for gaits without them."""

@@ -396,8 +396,8 @@ def test_the_shortest_line_of_every_kind_of_gait():
 
 def test_a_scale_or_bias_of_one_is_the_gait_itself():
     gait = plans.continuous_trot(0.4, 2.0)
-    assert gait.scaled(1.0) is gait
-    assert gait.biased(1.0) is gait
+    assert gait.scaled(1.0) == gait
+    assert gait.biased(1.0) == gait
 
 
 def test_a_slow_gait_has_a_small_maximum_rate():
