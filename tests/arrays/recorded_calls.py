@@ -11,6 +11,7 @@ import tiltsim
 from tests.laws.layers.test_actuation import EVERYTHING
 from tests.laws.layers.test_air import STORM
 from tests.laws.test_laws import GUST, LAWS
+from tests.laws.test_multirotor import TILTS, document
 from tests.simulation.test_batch import CAR, CAR_GAITS, EXACT, GAITS
 from tiltsim.scenario.loading import merge
 from tiltsim_controllers.mathematics.scalar import scalar_functions
@@ -54,6 +55,17 @@ REFERENCES = {
 """References by type."""
 
 
+MULTIROTORS = {
+    "leaning": document("hexarotor"),
+    "euler angles": document(
+        "hexarotor", controller={"law": "attitude_force", "attitude_error": "euler_angles"}
+    ),
+    "tilting": document("tilt_hexarotor", gait=TILTS),
+    "by thrust": document("cant_hexarotor", controller={"law": "attitude_force", "norm": "thrust"}),
+}
+"""The controller of multirotors."""
+
+
 def flown(tables, **simulation):
     """A short flight in Python."""
     simulation = {"duration": 0.02, "engine": "python", "record_timestep": 0.01, **simulation}
@@ -75,6 +87,10 @@ def short_flights():
         yield {"reference": {"type": name, **table}, "controller": controller}, {"plant": "thesis"}
     for tables in SUPERVISED.values():
         yield tables, {"plant": "thesis"}
+    for tables in MULTIROTORS.values():
+        bare = {name: table for name, table in tables.items() if name != "simulation"}
+        yield bare, {"plant": "thesis"}
+        yield bare, {"plant": "mujoco", **LATE}
     for name, tables in LAYERED.items():
         for plant in ("thesis", "mujoco"):
             yield tables, {"plant": plant}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from math import isfinite
 
 import numpy as np
@@ -114,7 +115,14 @@ def test_functions_of_a_controller_have_the_same_values_on_arrays():
     assert len(calls) > 30
 
 
-NEVER_CALLED = {"decoupling_matrix", "attitude_altitude_thrust_rate", "tilt_states"}
+NEVER_CALLED = {
+    *("decoupling_matrix", "attitude_altitude_thrust_rate", "tilt_states"),
+    *("_quadrotor_loads", "_spin_rates", "_with_body_rates_ahead"),  # of layers in MuJoCo only
+    # Vehicles whose torque-free forces are a plane, and these gaits with more than four tilts:
+    *("unit_vector", "jet_cross", "_jet_dot", "desired_direction", "nearest_in_plane"),
+    *("normal_of_rows", "_fixed_jet", "_rounded", "_table_jet"),
+}
+"""Functions of modules that none of these flights calls."""
 
 
 @pytest.mark.slow
@@ -125,6 +133,8 @@ def test_every_scalar_function_has_the_same_values_on_arrays():
     missing = {
         f.__name__
         for f in scalar_functions()
-        if f.__code__ not in codes and not f.__module__.endswith("laws.commanded")
+        if f.__code__ not in codes
+        and getattr(sys.modules[f.__module__], f.__name__, None) is f  # not made by a factory
+        and not f.__module__.endswith("laws.commanded")
     }
     assert missing == NEVER_CALLED
