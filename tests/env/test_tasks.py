@@ -102,7 +102,12 @@ def test_a_short_training_beats_zero_actions_whatever_the_number_of_processes(tm
 
 @pytest.mark.slow
 def test_environments_in_processes_fly_as_alone():
-    several = gymnasium.make_vec("tiltsim/Hover-v0", num_envs=2, vectorization_mode="async")
+    several = gymnasium.make_vec(
+        "tiltsim.env:tiltsim/Hover-v0",
+        num_envs=2,
+        vectorization_mode="async",
+        vector_kwargs={"context": "spawn"},  # JAX in this process must not be forked
+    )
     observations, _ = several.reset(seed=3)
     for seed, observation in zip((3, 4), observations, strict=True):
         np.testing.assert_array_equal(observation, make("Hover").reset(seed=seed)[0])
