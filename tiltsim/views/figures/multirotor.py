@@ -25,6 +25,7 @@ from tiltsim_controllers.analysis.torque_free import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     from tiltsim_controllers.analysis.attainable import AttainableSet, TiltedRotors
 
@@ -38,7 +39,7 @@ def multirotor_figure(rotors: TiltedRotors, kind: str) -> Figure:
             figure = style.new_figure(4.4, 3.6)
             _margins(figure.subplots(), rotors)
             return figure
-        figure = style.new_figure(8.0, 3.9)
+        figure = style.new_figure(8.0, 3.4)
         spaces: Any = [figure.add_subplot(1, 2, i, projection="3d") for i in (1, 2)]
         spaces[0].set_title("Force without torque, by weight")
         _polytope(spaces[0], attainable_forces(rotors), rotors.weight, "$F_{}/mg$")
@@ -75,7 +76,6 @@ def _margins(axes: Axes, rotors: TiltedRotors) -> None:
 def _polytope(space: Any, found: AttainableSet, unit: float, label: str) -> None:
     """The faces of a set, or the polygon or line that it is; its coordinates are over ``unit``."""
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-    from scipy.spatial import ConvexHull
 
     vertices = found.vertices / unit
     if found.is_empty:
@@ -83,20 +83,39 @@ def _polytope(space: Any, found: AttainableSet, unit: float, label: str) -> None
         space.text2D(0.5, 0.5, "none", transform=space.transAxes, ha="center")
         return
     if found.dimension == 3:
-        hull = ConvexHull(vertices, qhull_options=ALMOST_FLAT)
-        faces = [vertices[simplex] for simplex in hull.simplices]
-        space.add_collection3d(
-            Poly3DCollection(faces, facecolor=style.SKY, edgecolor=style.BLUE, lw=0.2, alpha=0.25)
-        )
+        faces = Poly3DCollection(_faces(vertices), facecolor=style.SKY, alpha=0.25)
+        faces.set_edgecolor(style.BLUE)
+        faces.set_linewidth(0.6)
+        space.add_collection3d(faces)
     elif found.dimension == 2:
         space.add_collection3d(Poly3DCollection([vertices], facecolor=style.BLUE, alpha=0.45))
     else:
         space.plot(*vertices.T, color=style.BLUE, lw=2.2)
-    space.scatter(*vertices.T, s=3, color=style.BLUE, depthshade=False)
     low, high = (bound / unit for bound in (found.lower, found.upper))
     across = max(1.1 * float(np.abs([low[:2], high[:2]]).max()), 0.05 * float(high[2] - low[2]))
     space.set(xlim=(-across, across), ylim=(-across, across))
+    space.set_zlim(float(low[2]) - 0.05 * across, float(high[2]) + 0.05 * across)
     space.set(**{f"{axis}label": label.format(axis) for axis in "xyz"})
     space.locator_params(nbins=5)
     space.view_init(elev=18, azim=-60)
-    space.set_box_aspect(None, zoom=0.82)
+    space.set_box_aspect(None, zoom=0.95)
+
+
+def _faces(vertices: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """The polygons that bound a convex body, each with its corners in order.
+
+    Args:
+        vertices: of the body, shape (n, 3).
+    """
+    from scipy.spatial import ConvexHull
+
+    size = np.abs(vertices).max(axis=0)
+    hull = ConvexHull(vertices / size, qhull_options=ALMOST_FLAT)
+    planes, face_of = np.unique(hull.equations.round(6), axis=0, return_inverse=True)
+    faces = []
+    for face, plane in enumerate(planes):
+        corners = np.unique(hull.simplices[face_of == face])
+        points = hull.points[corners] - hull.points[corners].mean(axis=0)
+        across, along = np.linalg.svd(plane[None, :3])[2][1:]
+        faces.append(vertices[corners[np.argsort(np.arctan2(points @ along, points @ across))]])
+    return faces
