@@ -18,7 +18,7 @@ BY_TURNS: Final = (0.35, -0.35, 0.35, -0.35, 0.35, -0.35)
 FLEET: Final[dict[str, tuple[float, ...]]] = {
     "quadrotor": (),
     "cant_quadrotor": (),
-    "tiltrotor": (0.0,) * 4,
+    "tiltrotor": (-0.65, -0.65, 0.65, 0.65),
     "hexarotor": (),
     "cant_hexarotor": (),
     "tilt_hexarotor": BY_TURNS,
