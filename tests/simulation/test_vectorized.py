@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 
 import tiltsim
 from tests.laws.test_laws import LAWS
 from tiltsim.arrays.flying import double_precision
+from tiltsim.arrays.values import LiftError
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import merge
+from tiltsim.scenario.scenario import plan_flight
 
 jax = pytest.importorskip("jax")
 
@@ -47,6 +51,26 @@ def test_parameters_are_the_numbers_that_a_flight_depends_on():
     assert flown.parameters["gait"] == {"scale": 1.0, "bias": 1.0, "amplitude": 0.4, "period": 1.0}
     with pytest.raises(InputError, match=r"parameters.air: no parameter of this scenario; choose"):
         flown.fly({"air": {"density": 1.0}})
+
+
+def test_a_parameter_may_vary_unless_its_plan_needs_it_as_a_number():
+    tables = {
+        "gait": {"type": "walk", "amplitude": 0.1, "period": 0.8},
+        "reference": {"type": "waypoints", "positions": [[0, 0, 0], [1, 0, 0]], "times": [0, 2]},
+    }
+    parameters = tiltsim.vectorized(tiltsim.parse_scenario({**tables, **THESIS})).parameters
+    assert set(parameters["gait"]) == {"scale", "bias", "amplitude", "lean", "period"}
+    assert "positions" not in parameters["reference"]  # NumPy solves for their polynomials
+
+
+def test_a_plan_that_cannot_be_lifted_hides_no_parameter(monkeypatch):
+    def plan_in_a_context(scenario):
+        with nullcontext():
+            return plan_flight(scenario) if scenario.vehicle.mass > 0.1 else None
+
+    monkeypatch.setattr("tiltsim.simulation.vectorized.plan_flight", plan_in_a_context)
+    with pytest.raises(LiftError, match=r"plan_in_a_context.*With has no form on arrays"):
+        tiltsim.vectorized(tiltsim.parse_scenario({**LAWS["attitude_altitude"], **THESIS}))
 
 
 def test_a_gait_has_derivatives_by_its_scale_and_bias_where_they_are_one():

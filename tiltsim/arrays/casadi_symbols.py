@@ -21,6 +21,11 @@ class CasadiSymbols:
         self.where, self.both = casadi.if_else, casadi.logic_and
         self.either, self.negated = casadi.logic_or, casadi.logic_not
 
+    @property
+    def refusals(self) -> tuple[type[Exception], ...]:
+        """What symbols raise where a plain number is needed; CasADi has no error for that."""
+        return ()
+
     def is_array(self, value: Any) -> bool:
         """Whether a value is a symbol or an expression of symbols."""
         return isinstance(value, self.casadi.SX)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from tiltsim.arrays.expressions import DATA_LENGTH, Borrowed, Expressions
+from tiltsim.arrays.values import LiftError, PlainNumberError
 
 Ends = dict[str, tuple[Any, Any]]
 """How a block of code may end: by what, under which condition, with which variables or value."""
@@ -48,8 +49,10 @@ class Frame(Expressions):
                     later = self.statement(statement, variables)
                     ends = self.follow(ends, condition, later)
                 except (ArithmeticError, LookupError, TypeError, ValueError) as error:
-                    text = str(error).partition("\n")[0]
-                    raise self.error(f"{type(error).__name__}: {text}") from error
+                    text = f"{type(error).__name__}: {error}".partition("\n")[0]
+                    refused = isinstance(error, self.lifting.arrays.refusals)
+                    kind = PlainNumberError if refused else LiftError
+                    raise self.error(text, kind) from error
         return ends
 
     def follow(self, ends: Ends, condition: Any, later: Ends) -> Ends:

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any, Final
 
-from tiltsim.arrays.values import Function, LiftError
+from tiltsim.arrays.values import Function, LiftError, PlainNumberError
 
 DATA_LENGTH: Final = "the length of a loop depends on arrays"
 
@@ -88,19 +88,19 @@ class Expressions:
         }
         self.line = self.node.lineno
 
-    def error(self, message: str) -> LiftError:
+    def error(self, message: str, kind: type[LiftError] = LiftError) -> LiftError:
         """An error that names function and line."""
         name = f"{self.function.__module__}.{self.function.__name__}"
-        return LiftError(f"{name}, line {self.line}: {message}")
+        return kind(f"{name}, line {self.line}: {message}")
 
     def plain(self, node: ast.expr, variables: dict[str, Any], message: str) -> Any:
         """A value that must not be an array, nor arise from one."""
         try:
             value = self.value(node, variables)
         except TypeError:
-            raise self.error(message) from None
+            raise self.error(message, PlainNumberError) from None
         if self.lifting.arrays.is_array(value):
-            raise self.error(message)
+            raise self.error(message, PlainNumberError)
         return value
 
     def value(self, node: ast.expr, variables: dict[str, Any]) -> Any:
@@ -140,6 +140,12 @@ class Expressions:
                 return self.elements(elements, variables)
             case ast.Set(elts=elements):
                 return set(self.elements(elements, variables))
+            case ast.Dict(keys=keys, values=values) if None not in keys:
+                return {
+                    self.value(key, variables): self.value(value, variables)
+                    for key, value in zip(keys, values)
+                    if key is not None
+                }
             case ast.Subscript(value=vector, slice=place):
                 return self.entry(self.value(vector, variables), place, variables)
             case ast.Call():
@@ -149,26 +155,26 @@ class Expressions:
             case ast.FormattedValue(value=value):
                 return self.value(value, variables)
             case ast.ListComp(elt=element) | ast.GeneratorExp(elt=element):
-                return [self.value(element, inner) for inner in self.items(node, variables)]
+                rounds = self.items(node.generators, variables)
+                return [self.value(element, inner) for inner in rounds]
             case ast.DictComp(key=key, value=value):
-                return {
-                    self.value(key, inner): self.value(value, inner)
-                    for inner in self.items(node, variables)
-                }
+                rounds = self.items(node.generators, variables)
+                return {self.value(key, inner): self.value(value, inner) for inner in rounds}
         raise self.error(f"{type(node).__name__} has no form on arrays")
 
     def items(
-        self, node: ast.ListComp | ast.GeneratorExp | ast.DictComp, variables: dict[str, Any]
+        self, loops: list[ast.comprehension], variables: dict[str, Any]
     ) -> Iterator[dict[str, Any]]:
-        """The variables of each round of a comprehension."""
-        if len(node.generators) > 1:
-            raise self.error("nested comprehensions have no form on arrays")
-        (one,) = node.generators
+        """The variables of each round of a comprehension with one loop or several."""
+        if not loops:
+            yield variables
+            return
+        one, *others = loops
         for item in list(self.value(one.iter, variables)):
             inner = dict(variables)
             self.assign(one.target, item, inner)
             if all(self.plain(test, inner, DATA_LENGTH) for test in one.ifs):
-                yield inner
+                yield from self.items(others, inner)
 
     def binary(self, op: ast.operator, left: Any, right: Any) -> Any:
         """Two values joined by an operator."""

@@ -42,6 +42,7 @@ class JaxArrays:
         self.where, self.both = jnp.where, jnp.logical_and
         self.either, self.negated = jnp.logical_or, jnp.logical_not
         self.functions = _functions()
+        self.refusals = jax.errors.ConcretizationTypeError, jax.errors.TracerArrayConversionError
 
     def is_array(self, value: Any) -> bool:
         """Whether JAX computes a value."""

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from tiltsim.arrays.evaluation import Frame
-from tiltsim.arrays.values import Arrays, Function, rebuilt
+from tiltsim.arrays.values import Arrays, Function, PlainNumberError, rebuilt
 from tiltsim_controllers.mathematics.scalar import scalar_functions
 
 
@@ -65,10 +65,10 @@ class Lifting:
         args = list(args)
         try:
             return function(*args, **keywords)
-        except TypeError:
+        except TypeError as error:
             source = getattr(function, "__func__", function)
-            if not isinstance(source, FunctionType):
-                raise
+            if not isinstance(source, FunctionType):  # of NumPy, or one that caches its results
+                raise PlainNumberError(f"{source.__name__}: {error}") from error
             bound = [function.__self__] if isinstance(function, MethodType) else []
             return self.run(source, [*bound, *args], keywords)
 

@@ -14,6 +14,10 @@ class LiftError(TiltsimError):
     """A function that has no form on arrays; the message names function and line."""
 
 
+class PlainNumberError(LiftError):
+    """Code that decides or computes by plain numbers was given an array."""
+
+
 class Arrays(Protocol):
     """The values that scalar functions are lifted to."""
 
@@ -24,6 +28,10 @@ class Arrays(Protocol):
     @property
     def domains(self) -> Mapping[Function, float]:
         """Of those that are defined on a part of the reals only, a number in that part."""
+
+    @property
+    def refusals(self) -> tuple[type[Exception], ...]:
+        """What arrays raise where a plain number is needed."""
 
     def is_array(self, value: Any) -> bool:
         """Whether a value is known only when the lifted function runs."""

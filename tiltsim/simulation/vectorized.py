@@ -12,8 +12,9 @@ from pydantic import BaseModel
 from tiltsim.arrays.flying import Carried, Kernel, course_of
 from tiltsim.arrays.jax_arrays import JaxArrays, require_jax
 from tiltsim.arrays.lifting import Lifting
+from tiltsim.arrays.values import PlainNumberError
 from tiltsim.closed_loop.loop import ControlSetup
-from tiltsim.errors import InputError, TiltsimError
+from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.scenario.loading import load_scenario
@@ -117,10 +118,14 @@ class Vectorized:
                     self.parameters.setdefault(table, {})[key] = jax.tree.map(float, value)
 
     def _matters(self, tree: Tree) -> bool:
-        """Whether a flight depends on numbers, and can be planned with arrays in their place."""
+        """Whether a flight depends on numbers, and its plan can have arrays in their place.
+
+        Raises:
+            LiftError: If code of the plan has no form on arrays, whatever numbers it is given.
+        """
         try:
             traced = self._jax.make_jaxpr(lambda t: self._planned(t)[1:])(tree).jaxpr
-        except (TypeError, TiltsimError):
+        except PlainNumberError:
             return False
         reached = {*map(id, traced.invars)}
         for equation in traced.eqns:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from tiltsim_controllers.gaits import tabulated
-from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
+from tiltsim_controllers.gaits.any_tilts import Jets, tilt_motion_of
 from tiltsim_controllers.gaits.cat import FOOTFALLS, cat_keyframes
 from tiltsim_controllers.gaits.parameters import (
     FIXED,
@@ -123,6 +123,10 @@ class Gait:
             return float(np.diff(rows[:, 0]).min()) * self.parameters.period
         return 0.5 * self.parameters.period if self.parameters.type == TROT_CONTINUOUS else inf
 
+    def jets(self, time: float) -> Jets:
+        """Tilt angles (rad), rates (rad/s) and accelerations (rad/s^2) at a time (s), by tilt."""
+        return tilt_motion_of(self.tilts).planned(time, self.parameters, self.knots)
+
     def angles(self, time: ArrayLike) -> Floats:
         """Tilt angles (rad) at times (s) of shape (...), as an array of shape (..., tilts)."""
         return self._evaluate(time)[..., 0]
@@ -187,8 +191,7 @@ class Gait:
 
     def _evaluate(self, time: ArrayLike) -> Floats:
         times = np.asarray(time, dtype=float)
-        planned = tilt_motion_of(self.tilts).planned
-        jets = [planned(t, self.parameters, self.knots) for t in times.ravel().tolist()]
+        jets = [self.jets(t) for t in times.ravel().tolist()]
         return np.reshape(np.asarray(jets, dtype=float), (*times.shape, self.tilts, 3))
 
 
@@ -266,8 +269,7 @@ def waypoints(
     if len(phases) != count:
         raise ValueError(f"{count} waypoints but {len(phases)} phases")
     rows = [(phase, *point) for phase, point in zip(phases, angles, strict=True)]
-    if rows:
-        rows.append((1.0, *rows[0][1:]))
+    rows += [(1.0, *point) for _, *point in rows[:1]]
     return keyframes(rows, period, name="waypoints", tilts=tilts)
 
 

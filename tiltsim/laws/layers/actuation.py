@@ -310,7 +310,7 @@ def _faults(plan: FlightPlan) -> tuple[RotorFault, ...]:
     for table in plan.scenario.fault:
         if table.type == "stuck_servo":
             tilt = vehicle.tilt_of_rotor(table.rotor)
-            planned = float(gait.angles(table.time)[tilt])
+            planned = gait.jets(table.time)[tilt][0]
             angle = planned if table.angle is None else table.angle
             faults[tilt] = faults[tilt]._replace(stuck_time=table.time, stuck_angle=angle)
         else:

@@ -163,9 +163,10 @@ def initial_tilts(plan: FlightPlan) -> tuple[Values, Values]:
     A flight begins in the midst of its gait, as the thesis has it, whose angles follow the plan
     exactly. So nothing swings in, and no pod is faster than its servo can be.
     """
-    angles, rates = plan.gait.angles(0.0).tolist(), plan.gait.rates(0.0).tolist()
+    jets = plan.gait.jets(0.0)
     fastest = plan.scenario.any_rotorcraft.tilt_servo.max_rate or inf
-    return tuple(angles), tuple(clipped(rate, -fastest, fastest) for rate in rates)
+    angles = tuple(angle for angle, _, _ in jets)
+    return angles, tuple(clipped(rate, -fastest, fastest) for _, rate, _ in jets)
 
 
 def initial_rotor_speeds(plan: FlightPlan) -> Values:
