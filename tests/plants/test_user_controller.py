@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import tomllib
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -20,8 +21,11 @@ from tiltsim.flight.reading import load_flight
 from tiltsim.laws.assembling import assemble, loop_of
 from tiltsim.laws.commanded import COMMANDED_LOOPS
 from tiltsim.laws.tiltrotor import tiltrotor_state
+from tiltsim.plants.built_in_command import BuiltInController
 from tiltsim.plants.command import Command, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
+from tiltsim.studies.fleet import fleet_file
+from tiltsim.vehicles.rotorcraft.layout import CROSS
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.attitude_altitude import Parameters, rotor_accelerations
 from tiltsim_controllers.references.trajectories import reference_derivatives
@@ -205,6 +209,57 @@ def test_a_shipped_law_flown_as_a_users_own_flies_the_same_flight(layers):
     if layers != "ideal":
         apart = np.abs(tiltsim.simulate(ideal)["z"] - theirs["z"]).max()
         assert apart > 1e-6
+
+
+def multirotor(name, **tables):
+    vehicle = {"model": "multirotor", "mjcf": str(fleet_file(name))}
+    simulation = {"duration": 0.05, "control_timestep": 0.002, "engine": "python"}
+    tables.setdefault("controller", {"law": "attitude_force"})
+    return merged({"vehicle": vehicle, "simulation": simulation}, tables)
+
+
+@pytest.mark.parametrize("layers", [[], [LAG, NOISE, FAULTS]], ids=["ideal", "real"])
+def test_a_multirotors_law_flown_as_a_users_own_flies_the_same_flight(layers):
+    gait = {"type": "waypoints", "angles": [[0.2, -0.2] * 3, [0.3, -0.3] * 3], "period": 2.0}
+    initial = {"position": [0.01, 0.02, -0.01], "attitude": [0.01, 0.0, 0.02]}
+    tables = multirotor("tilt_hexarotor", gait=gait, initial=initial)
+    shipped = tiltsim.parse_scenario(merged(tables, *layers))
+    law = BuiltInController(shipped)
+
+    def own(observation):
+        time = evaluation_time(round(observation.time / 0.001), 1.0, 0.001)
+        return law(replace(observation, time=time))
+
+    ours, theirs = tiltsim.simulate(shipped), tiltsim.simulate(shipped, controller=own)
+    assert ours.end.kind == theirs.end.kind == "completed"
+    for column in ("position", "attitude", "tilt_angles", "rotor_speeds", "singularity_margin"):
+        np.testing.assert_array_equal(ours[column], theirs[column], err_msg=column)
+
+
+def test_a_multirotors_commands_are_for_each_of_its_rotors():
+    seen = []
+
+    def hover(observation):
+        seen.append(observation)
+        weight = observation.vehicle.mass * observation.vehicle.gravity
+        return Command(thrusts=[weight / 6] * 5 + [1e3])
+
+    document = multirotor("hexarotor", vehicle={"max_rotor_speed": 838.0})
+    flight = tiltsim.simulate(document, controller=hover)
+    assert seen[0].rotor_speeds.shape == (6,)
+    assert seen[0].tilt_angles.shape == (0,)
+    speeds = flight["rotor_speeds"][-1] * seen[0].vehicle.spins
+    lift = seen[0].vehicle.thrust_coefficients[0] * speeds[0] ** 2
+    assert lift == pytest.approx(seen[0].vehicle.mass * seen[0].vehicle.gravity / 6)
+    assert speeds[5] == 838.0
+
+    def failure(command):
+        with pytest.warns(RuntimeWarning):
+            return tiltsim.simulate(document, controller=lambda _: command).end.message
+
+    few, tilted = Command(thrusts=[1.0] * 4), Command(thrusts=[1.0] * 6, tilt_angles=[0.0] * 6)
+    assert "thrusts of shape (4,); expected shape (6,)" in failure(few)
+    assert "no tilt servos" in failure(tilted)
 
 
 @pytest.mark.parametrize("command", ["thrusts", "rotor_speeds"])
@@ -474,9 +529,9 @@ def test_a_saved_state_restarts_under_held_accelerations(layers):
 
     def tell(speed):
         sent = Command(rotor_speeds=[speed] * 4, tilt_angles=[0.1, 0.0, 0.0, speed / 1e4])
-        plant.apply(check_command(sent, tilting=True))
+        plant.apply(check_command(sent, CROSS))
         plant.advance(2)
-        plant.apply(check_command(Command(rotor_accelerations=[5.0, -5.0, 3.0, 1.0]), tilting=True))
+        plant.apply(check_command(Command(rotor_accelerations=[5.0, -5.0, 3.0, 1.0]), CROSS))
         plant.advance(1)
 
     for speed in (300.0, 310.0, 320.0):

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from dm_env import specs
 
-from tiltsim.env.arrays import clip_action, has_tilts
+from tiltsim.env.arrays import clip_action
 from tiltsim.env.domain import Domain
 from tiltsim.env.task import Reward, Task, hover_reward
 from tiltsim.errors import InputError
@@ -191,7 +191,7 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
         Raises `ControllerError` if the command is invalid or gives rotor accelerations.
         """
         plant = self._begun()
-        return plant.thrusts_and_tilts(check_command(command, tilting=has_tilts(self._scenario)))
+        return plant.thrusts_and_tilts(check_command(command, plant.layout))
 
     def _begun(self) -> CommandedPlant:
         if self._plant is None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.laws.attitude_altitude import MEASURED_TILTROTOR, TILTROTOR
-from tiltsim.laws.commanded import COMMANDED_LOOPS, OTHER_LAYOUT_LOOPS
+from tiltsim.laws.commanded import commanded_loop
 from tiltsim.laws.full_pose import FULL_POSE
 from tiltsim.laws.gait_feedforward import GAIT_FEEDFORWARD, MEASURED_GAIT_FEEDFORWARD
 from tiltsim.laws.layers.actuation import with_actuation
@@ -60,8 +60,7 @@ def loop_of(scenario: Scenario) -> ClosedLoop:
     on_plant = scenario.simulation.plant == "mujoco" or by_controls
     measured = on_plant and controller.measures_angular_acceleration
     if external:
-        standard = scenario.rotorcraft.has_standard_layout
-        loop = (COMMANDED_LOOPS if standard else OTHER_LAYOUT_LOOPS)[scenario.vehicle.model]
+        loop = commanded_loop(scenario)
     elif scenario.vehicle.model == "multirotor":
         loop = loop_of_multirotor(scenario)
     else:

@@ -1,194 +1,169 @@
-"""Vehicles under commands from outside: from a user's controller or an environment.
+"""Rotorcraft under commands from outside: from a user's controller or an environment.
 
-The control law is to hold a `HeldCommand`; layers treat it as any controller's commands. The rotor
-speeds of both vehicles are states here, so that commands may be speeds, thrusts or accelerations.
+The control law is to hold a command; layers treat it as any controller's commands. The rotor speeds
+of all vehicles are states here, so that commands may be speeds, thrusts or accelerations.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from functools import cache
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, Columns, ControlSetup, Dynamics, Sampling, Sizes
-from tiltsim.laws.full_pose import TILT_COMMANDS
-from tiltsim.laws.quadrotor import constant_attitude_references, rigid_body_state, upright_margin
-from tiltsim.laws.tiltrotor import (
-    TILT_REFERENCE_COLUMNS,
-    four,
-    gait_servo_commands,
-    initial_signed_rotor_speeds,
-    observe_tiltrotor,
-    refreshed_controls,
-    rotor_thrust_controls,
-    servo_lead,
-    singularity_columns,
-    tiltrotor_dynamics,
+from tiltsim.closed_loop.loop import ClosedLoop, Columns, ControlSetup, Dynamics, Sampling
+from tiltsim.closed_loop.vehicle_kind import VehicleKind
+from tiltsim.laws.quadrotor import constant_attitude_references, upright_margin
+from tiltsim.laws.rotorcraft import (
+    body_state,
+    held_controls_of,
+    margin_column,
+    servo_commands_of,
+    thrust_controls_of,
 )
-from tiltsim.vehicles.rotorcraft import OTHER_LAYOUT, ROTORCRAFT
+from tiltsim.laws.tiltrotor import servo_lead, singularity_columns
+from tiltsim.models.rotor_table import Multirotor
+from tiltsim.vehicles.rotorcraft import (
+    OTHER_LAYOUT,
+    ROTORCRAFT,
+    initial_rotor_speeds,
+    rotorcraft_kind,
+)
+from tiltsim.vehicles.rotorcraft.layout import TILT_1, TILT_RATE_1, Layout
 from tiltsim_controllers.gaits.parameters import GaitParameters
+from tiltsim_controllers.mathematics.records import make_record_type, vector_of
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
+from tiltsim_controllers.mathematics.vectors import entries_of
 from tiltsim_controllers.references.trajectories import ReferenceParameters
-from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS
+from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan, Scenario
 
-
-class HeldCommand(NamedTuple):
-    """The last command."""
-
-    tilt_1: float = 0.0  # rad, for the servos
-    tilt_2: float = 0.0
-    tilt_3: float = 0.0
-    tilt_4: float = 0.0
-    acceleration_1: float = 0.0  # rad/s^2, of the rotors, with their signs
-    acceleration_2: float = 0.0
-    acceleration_3: float = 0.0
-    acceleration_4: float = 0.0
+Singularity = Callable[[Mapping[str, Floats], Any], dict[str, Floats]]
+"""``(samples, vehicle) -> columns``: how close a vehicle is to a singular attitude."""
 
 
-class LoopParameters(NamedTuple):
-    """The head of `userdata`."""
-
-    signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
-    servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
-    vehicle: Vehicle
-    gait: GaitParameters
-    reference: ReferenceParameters
-    command: HeldCommand = HeldCommand()  # the plant replaces it in its copy of the record
-
-
-@scalar
-def _commanded_tiltrotor_controls(
-    time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
-) -> Values:
-    """All twelve controls of the tiltrotor."""
-    command = parameters.command
-    return (
-        command.tilt_1,
-        command.tilt_2,
-        command.tilt_3,
-        command.tilt_4,
-        *rotor_thrust_controls(act),
-        command.acceleration_1,
-        command.acceleration_2,
-        command.acceleration_3,
-        command.acceleration_4,
+@cache
+def _parameters_of(layout: Layout, vehicle: type) -> Any:
+    """The head of `userdata`; the plant replaces the ``command`` in its copy of the record."""
+    command = make_record_type(
+        "HeldCommand",
+        tilts=vector_of(layout.tilts),  # rad, for the servos
+        accelerations=vector_of(layout.rotors),  # rad/s^2, of the rotors, with their signs
+    )
+    return make_record_type(
+        "LoopParameters",
+        signature=float,  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
+        servo_lead=float,  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
+        vehicle=vehicle,
+        gait=GaitParameters,
+        reference=ReferenceParameters,
+        command=command,
     )
 
 
-@scalar
-def _commanded_quadrotor_controls(
-    time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: LoopParameters, knots: Vector
-) -> Values:
-    """All eight controls of the quadrotor."""
-    command = parameters.command
-    return (
-        *rotor_thrust_controls(act),
-        command.acceleration_1,
-        command.acceleration_2,
-        command.acceleration_3,
-        command.acceleration_4,
-    )
-
-
-@scalar
-def _refreshed_quadrotor_controls(
-    time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: LoopParameters
-) -> Values:
-    """Held controls with the thrusts of the present rotor speeds."""
-    return (*rotor_thrust_controls(act), ctrl[4], ctrl[5], ctrl[6], ctrl[7])
-
-
-def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
-    rotorcraft, gait = plan.scenario.rotorcraft, plan.gait.parameters
-    lead = servo_lead(rotorcraft.tilt_servo)
-    held = HeldCommand(*gait_servo_commands(0.0, lead, gait, plan.knots))
-    parameters = LoopParameters(signature, lead, rotorcraft.resolve(), gait, plan.reference, held)
-    return ControlSetup(parameters, plan.knots)
-
-
-def commanded_parameters(parameters: Any) -> LoopParameters:
+def commanded_parameters(parameters: Any) -> Any:
     """The parameters of the vehicle under commands within those of its layers."""
-    if isinstance(parameters, LoopParameters):
-        return parameters
-    return commanded_parameters(parameters.inner)
+    inner = getattr(parameters, "inner", None)
+    return parameters if inner is None else commanded_parameters(inner)
 
 
-def with_command(parameters: Any, command: HeldCommand) -> Any:
-    """Parameters of a vehicle under commands, within any layers, with this command."""
-    if isinstance(parameters, LoopParameters):
-        return parameters._replace(command=command)
-    return parameters._replace(inner=with_command(parameters.inner, command))
+def with_command(parameters: Any, command: Values) -> Any:
+    """Parameters of a vehicle under commands, within any layers, with this command.
+
+    ``command`` are tilt angles (rad), then accelerations of the rotors (rad/s^2).
+    """
+    if hasattr(parameters, "inner"):
+        return parameters._replace(inner=with_command(parameters.inner, command))
+    held = parameters.command
+    tilts = len(held.tilts)
+    return parameters._replace(command=type(held)(command[:tilts], command[tilts:]))
 
 
-@scalar
-def _observe_commanded_quadrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-    """The rigid body, no tilt, the rotor speeds, which are states here, no tilt rates."""
-    body = rigid_body_state(qpos, qvel, 0.0, 0.0)[:12]
-    return (*body, 0.0, 0.0, 0.0, 0.0, *four(act, 0), 0.0, 0.0, 0.0, 0.0)
+def _commanded_loop(
+    model: str,
+    spins: Values,
+    tilts: int,
+    kind: VehicleKind,
+    vehicle: type,
+    singularity: Singularity,
+) -> ClosedLoop:
+    """The loop of a vehicle.
+
+    Args:
+        model: See `Dynamics`.
+        spins: Signs of its rotor speeds.
+        tilts: Number of its hinges.
+        kind: Its kind, whose samples may have tilts that are idle.
+        vehicle: The type of its parameters.
+        singularity: Columns of the margin.
+    """
+    layout = Layout(len(spins), tilts)
+    planned, fields = layout.names("alpha_ref"), layout.names("tilt_command")
+    idle = (0.0,) * ((len(kind.observed_fields) - len(layout.observed_fields)) // 2)
+    tilts_in, tilt_rates_in = entries_of(TILT_1, tilts), entries_of(TILT_RATE_1, tilts)
+    speeds_in, commands_in = entries_of(0, layout.rotors), entries_of(0, tilts)
+    thrusts, servo_commands = thrust_controls_of(spins), servo_commands_of(tilts)
+
+    @scalar
+    def controls(
+        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
+    ) -> Values:
+        command = parameters.command
+        return (*command.tilts, *thrusts(act), *command.accelerations)
+
+    @scalar
+    def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
+        seen = (*body_state(qpos, qvel), *tilts_in(qpos), *idle, *speeds_in(act))
+        return (*seen, *tilt_rates_in(qvel), *idle, *commands_in(ctrl))
+
+    def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+        return {
+            **constant_attitude_references(samples, setup.parameters.reference, setup.knots),
+            **{column: samples[name] for column, name in zip(planned, fields, strict=True)},
+            **singularity(samples, setup.parameters.vehicle),
+        }
+
+    def setup(plan: FlightPlan, signature: float) -> ControlSetup:
+        table, gait = plan.scenario.any_rotorcraft, plan.gait.parameters
+        own, lead = table.resolve(), servo_lead(table.tilt_servo)
+        record = _parameters_of(layout, vehicle)
+        held = servo_commands(0.0, lead, gait, plan.knots), (0.0,) * layout.rotors
+        command = record.__annotations__["command"](*held)
+        flown = vehicle(own.table) if isinstance(own, Multirotor) else own
+        return ControlSetup(
+            record(signature, lead, flown, gait, plan.reference, command), plan.knots
+        )
+
+    return ClosedLoop(
+        kind=kind,
+        parameters=_parameters_of(layout, vehicle),
+        setup=setup,
+        dynamics=Dynamics(
+            model, layout.sizes(), lambda plan, _setup: initial_rotor_speeds(plan), spins=spins
+        ),
+        sampling=Sampling(controls, held_controls_of(spins, tilts)),
+        columns=Columns(observe, derive, fields=fields, units=dict.fromkeys(fields, "rad")),
+        follows_position=lambda scenario: scenario.reference.kind != "attitude_altitude",
+        uses_gait=tilts > 0,
+    )
 
 
-@scalar
-def _observe_commanded_tiltrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-    """A sample of any tiltrotor, and the commands of its servos."""
-    return (*observe_tiltrotor(qpos, qvel, act, ctrl), *four(ctrl, 0))
+def _upright(samples: Mapping[str, Floats], _vehicle: Vehicle) -> dict[str, Floats]:
+    """Determinant of the quadrotor's attitude-altitude law, and its margin."""
+    return {"determinant": np.cos(samples["roll"]), "singularity_margin": upright_margin(samples)}
 
 
-def _derive_tiltrotor(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    commands = zip(TILT_REFERENCE_COLUMNS, TILT_COMMANDS, strict=True)
-    return {
-        **constant_attitude_references(samples, setup.parameters.reference, setup.knots),
-        **{column: samples[name] for column, name in commands},
-        **singularity_columns(samples, setup.parameters.vehicle),
-    }
-
-
-def _derive_quadrotor(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    return {
-        **constant_attitude_references(samples, setup.parameters.reference, setup.knots),
-        "determinant": np.cos(samples["roll"]),  # of the attitude-altitude law
-        "singularity_margin": upright_margin(samples),
-    }
-
-
-def _follows_position(scenario: Scenario) -> bool:
-    return scenario.reference.kind != "attitude_altitude"
-
-
-TILTROTOR: Final = ClosedLoop(
-    kind=ROTORCRAFT,
-    parameters=LoopParameters,
-    setup=_setup,
-    dynamics=tiltrotor_dynamics(),
-    sampling=Sampling(_commanded_tiltrotor_controls, refreshed_controls),
-    columns=Columns(
-        _observe_commanded_tiltrotor,
-        _derive_tiltrotor,
-        fields=TILT_COMMANDS,
-        units=dict.fromkeys(TILT_COMMANDS, "rad"),
-    ),
-    follows_position=_follows_position,
+TILTROTOR: Final = _commanded_loop(
+    "tiltrotor", SPIN, len(SPIN), ROTORCRAFT, Vehicle, singularity_columns
 )
 """The tiltrotor under commands; those of its servos are part of a sample."""
 
-QUADROTOR: Final = ClosedLoop(
-    kind=ROTORCRAFT,
-    parameters=LoopParameters,
-    setup=_setup,
-    dynamics=Dynamics(
-        "quadrotor",
-        Sizes(qpos=7, qvel=6, act=4, ctrl=8),
-        lambda plan, _setup: initial_signed_rotor_speeds(plan.scenario),
-    ),
-    sampling=Sampling(_commanded_quadrotor_controls, _refreshed_quadrotor_controls),
-    columns=Columns(_observe_commanded_quadrotor, _derive_quadrotor),
-    follows_position=_follows_position,
-    uses_gait=False,
-)
+QUADROTOR: Final = _commanded_loop("quadrotor", SPIN, 0, ROTORCRAFT, Vehicle, _upright)
 """The quadrotor under commands."""
 
 COMMANDED_LOOPS: Final[dict[str, ClosedLoop]] = {"tiltrotor": TILTROTOR, "quadrotor": QUADROTOR}
@@ -198,3 +173,24 @@ OTHER_LAYOUT_LOOPS: Final = {
     model: replace(loop, kind=OTHER_LAYOUT) for model, loop in COMMANDED_LOOPS.items()
 }
 """Those of a user's vehicle with another layout."""
+
+
+@cache
+def _commanded_multirotor(spins: Values, tilts: int) -> ClosedLoop:
+    layout = Layout(len(spins), tilts)
+    table = make_record_type("Rotors", table=vector_of(ROTOR_FLOATS * layout.rotors))
+
+    def singularity(samples: Mapping[str, Floats], rotors: Any) -> dict[str, Floats]:
+        return {"singularity_margin": margin_column(layout, rotors.table, samples)}
+
+    kind = rotorcraft_kind(layout, ("singularity_margin",))
+    return _commanded_loop(f"multirotor_{tilts}", spins, tilts, kind, table, singularity)
+
+
+def commanded_loop(scenario: Scenario) -> ClosedLoop:
+    """The loop of a scenario's rotorcraft under commands, without layers."""
+    table = scenario.any_rotorcraft
+    if table.model not in COMMANDED_LOOPS:
+        return _commanded_multirotor(table.spins, table.tilt_count)
+    loops = COMMANDED_LOOPS if scenario.rotorcraft.has_standard_layout else OTHER_LAYOUT_LOOPS
+    return loops[table.model]

@@ -23,25 +23,29 @@ from tiltsim.closed_loop.loop import (
     Sampling,
 )
 from tiltsim.equations.tiltrotor import body_fields, initial_state
+from tiltsim.laws.rotorcraft import (
+    body_state,
+    held_controls_of,
+    margin_column,
+    servo_commands_of,
+    thrust_controls_of,
+)
 from tiltsim.laws.tiltrotor import REFERENCE_COLUMNS, reference_columns, servo_lead
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
 from tiltsim.vehicles.rotorcraft.layout import TILT_1, TILT_RATE_1
 from tiltsim.vehicles.rotorcraft.layout import Layout as Places
-from tiltsim_controllers.analysis.singularity import world_up
-from tiltsim_controllers.analysis.torque_free import singularity_margin, torque_free_forces
 from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
 from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.gait_feedforward import INTEGRAL_FIELDS
 from tiltsim_controllers.laws.multirotor import multirotor_law_of
 from tiltsim_controllers.laws.multirotor_steps import ATTITUDE_ERRORS, Parameters, SideGains
-from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import componentwise, entries_of, written_out
+from tiltsim_controllers.mathematics.vectors import componentwise, entries_of
 from tiltsim_controllers.references.trajectories import position_reference
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque, layout_of
+from tiltsim_controllers.vehicle.effectiveness import layout_of
 from tiltsim_controllers.vehicle.multirotor import BODY_STATES, body_of, equations_of_motion_of
 
 if TYPE_CHECKING:
@@ -79,26 +83,6 @@ def layout_of_vehicle(vehicle: Multirotor) -> Layout:
     return Layout(layout_of(vehicle.table), vehicle.spins)
 
 
-@scalar
-def _body_state(qpos: Vector, qvel: Vector) -> Values:
-    """The twelve numbers of the rigid body, from MuJoCo's state."""
-    roll, pitch, yaw = euler_from_quaternion(qpos[3], qpos[4], qpos[5], qpos[6])
-    return (
-        qpos[0], qpos[1], qpos[2], qvel[0], qvel[1], qvel[2],
-        roll, pitch, yaw, qvel[3], qvel[4], qvel[5],
-    )  # fmt: skip
-
-
-@cache
-def thrust_controls_of(spins: Values) -> Callable[[Vector], Values]:
-    """Scalar code of the controls of the thrust actuators, ``s varpi |varpi|`` with the spin s."""
-    signs = "".join("+" if spin > 0.0 else "-" for spin in spins)
-    name = f"thrust_controls_{signs.replace('+', 'p').replace('-', 'm')}"
-    terms = (f"{sign}act[{i}] * abs(act[{i}]), " for i, sign in enumerate(signs))
-    controls: Callable[[Vector], Values] = written_out(name, "act", f"({''.join(terms)})")
-    return controls
-
-
 @cache
 def _sampling_of(layout: Layout, law: Callable[..., Values]) -> Sampling:
     """The control step in MuJoCo of a law with the layout's inputs."""
@@ -106,10 +90,7 @@ def _sampling_of(layout: Layout, law: Callable[..., Values]) -> Sampling:
     tilts_in, tilt_rates_in = entries_of(TILT_1, tilts), entries_of(TILT_RATE_1, tilts)
     speeds_in, integrals_in = entries_of(0, rotors), entries_of(rotors, STATES)
     rates_in = entries_of(0, rotors + STATES)
-    held_servos = entries_of(0, tilts)
-    held_rates = entries_of(layout.places.acceleration_1, rotors + STATES)
-    thrusts, planned = thrust_controls_of(layout.spins), tilt_motion_of(tilts).planned
-    ahead = componentwise("servo_commands", "jets, lead", "jets#[0] + lead * jets#[1]", tilts)
+    thrusts, servo_commands = thrust_controls_of(layout.spins), servo_commands_of(tilts)
 
     @scalar
     def controls(
@@ -121,26 +102,15 @@ def _sampling_of(layout: Layout, law: Callable[..., Values]) -> Sampling:
         knots: Vector,
     ) -> Values:
         own = parameters.law
-        state = (*_body_state(qpos, qvel), *tilts_in(qpos), *speeds_in(act))
+        state = (*body_state(qpos, qvel), *tilts_in(qpos), *speeds_in(act))
         rates = law(time, state, tilt_rates_in(qvel), integrals_in(act), own, knots)
         return (
-            *ahead(planned(time, own.gait, knots), parameters.servo_lead),
+            *servo_commands(time, parameters.servo_lead, own.gait, knots),
             *thrusts(act),
             *rates_in(rates),
         )
 
-    @scalar
-    def hold(
-        time: float,
-        qpos: Vector,
-        qvel: Vector,
-        act: Vector,
-        ctrl: Vector,
-        parameters: LoopParameters,
-    ) -> Values:
-        return (*held_servos(ctrl), *thrusts(act), *held_rates(ctrl))
-
-    return Sampling(controls, hold)
+    return Sampling(controls, held_controls_of(layout.spins, tilts, STATES))
 
 
 @cache
@@ -160,7 +130,7 @@ def _columns_of(layout: Layout, law: Callable[..., Values]) -> Columns:
 
     @scalar
     def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-        state = (*_body_state(qpos, qvel), *tilts_in(qpos), *speeds_in(act))
+        state = (*body_state(qpos, qvel), *tilts_in(qpos), *speeds_in(act))
         return (*state, *tilt_rates_in(qvel), *integrals_in(act))
 
     @scalar
@@ -176,20 +146,16 @@ def _columns_of(layout: Layout, law: Callable[..., Values]) -> Columns:
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
         return {
             **reference_columns(asked, fields, samples, setup, names),
-            "singularity_margin": _margin(layout, samples, setup),
+            "singularity_margin": margin_column(places, _table(setup), samples),
         }
 
     units = {**dict.fromkeys(INTEGRAL_FIELDS, "m s"), NULL_PART: "1"}
     return Columns(observe, derive, fields=INTEGRAL_FIELDS, units=units)
 
 
-def _margin(layout: Layout, samples: Mapping[str, Floats], setup: ControlSetup) -> Floats:
-    """Angles (rad) to the nearest singular attitude."""
-    table = setup.knots[int(setup.parameters.law.rotors) :]
-    rows = zip(*(samples[name].tolist() for name in layout.places.names("alpha")), strict=True)
-    pushes = [force_and_torque(table, row) for row in rows] or [force_and_torque(table)]
-    forces = torque_free_forces(*map(np.array, zip(*pushes, strict=True)))
-    return singularity_margin(forces, world_up(samples["roll"], samples["pitch"]))
+def _table(setup: ControlSetup) -> Values:
+    """The table of the rotors, after the knots of gait and reference."""
+    return setup.knots[int(setup.parameters.law.rotors) :]
 
 
 @cache

@@ -21,8 +21,8 @@ from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import flip_by_spin
 from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.vehicles.rotorcraft.layout import ACCELERATION_1, QUADROTOR_THRUSTS, layout_of
-from tiltsim_controllers.mathematics.scalar import Quad, Values
+from tiltsim.vehicles.rotorcraft.layout import layout_of
+from tiltsim_controllers.mathematics.scalar import Values
 
 
 def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
@@ -47,14 +47,11 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
             allocation = layer.allocation
         loop, parameters = within, inner
     ctrl = loop.sampling.controls(time, qpos, qvel, act, parameters, knots)
-    if loop.dynamics.model == "quadrotor":
-        return _quadrotor_command(assembly, ctrl)
-    if loop.dynamics.model not in CROSSES:
-        return _multirotor_command(loop.dynamics, ctrl)
-    rates = four(ctrl, ACCELERATION_1)
-    if allocation is not None:
-        rates = allocated_accelerations(rates, qpos, act, allocation)
-    return _tiltrotor_command(rates, ctrl)
+    if allocation is not None and loop.dynamics.model in CROSSES:
+        layout = layout_of(loop.dynamics)
+        rates = allocated_accelerations(four(ctrl, layout.acceleration_1), qpos, act, allocation)
+        ctrl = (*ctrl[: layout.acceleration_1], *rates)
+    return _command(assembly, loop.dynamics, ctrl)
 
 
 class BuiltInController:
@@ -67,7 +64,7 @@ class BuiltInController:
 
     Raises:
         InputError: If the controller is your own or feeds back what is not observed, or its vehicle
-            is neither a tiltrotor nor a quadrotor.
+            is no rotorcraft.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -90,36 +87,28 @@ class BuiltInController:
     def __call__(self, seen: Observation) -> Command:
         """Its command, before latency, servos and motors: see `built_in_command`."""
         loop, knots = self._loop, self._assembly.setup.knots
-        tilting = loop.dynamics.model == "tiltrotor"
         qpos, qvel = [*seen.position, *seen.quaternion], [*seen.velocity, *seen.body_rates]
-        if tilting:
+        if layout_of(loop.dynamics).tilts:
             qpos, qvel = [*qpos, *seen.tilt_angles], [*qvel, *seen.tilt_rates]
-        act = [*flip_by_spin(seen.rotor_speeds.tolist())[: self._speeds], *self._states]
+        speeds = flip_by_spin(seen.rotor_speeds.tolist(), loop.dynamics.spins)
+        act = [*speeds[: self._speeds], *self._states]
         vectors = list(map(float, qpos)), list(map(float, qvel)), act
         ctrl = loop.sampling.controls(seen.time, *vectors, self._parameters, knots)
         rates = ctrl[len(ctrl) - self._count :]
         self._states = [
             state + self._period * rate for state, rate in zip(self._states, rates, strict=True)
         ]
-        if not tilting:
-            return _quadrotor_command(self._assembly, ctrl)
-        return _tiltrotor_command(four(ctrl, ACCELERATION_1), ctrl)
+        return _command(self._assembly, loop.dynamics, ctrl)
 
 
-def _tiltrotor_command(accelerations: Quad, ctrl: Values) -> Command:
-    return Command(
-        rotor_accelerations=np.array(flip_by_spin(accelerations)),
-        tilt_angles=np.array(four(ctrl, 0)),
-    )
-
-
-def _multirotor_command(dynamics: Dynamics, ctrl: Values) -> Command:
+def _command(assembly: Assembly, dynamics: Dynamics, ctrl: Values) -> Command:
+    """The command by a controller's controls; the quadrotor's laws command thrusts."""
     layout = layout_of(dynamics)
-    rates = np.array(ctrl[layout.acceleration_1 : layout.further_rates])
-    angles = np.array(ctrl[: layout.tilts]) if layout.tilts else None
-    return Command(rotor_accelerations=np.array(dynamics.spins) * rates, tilt_angles=angles)
-
-
-def _quadrotor_command(assembly: Assembly, ctrl: Values) -> Command:
-    coefficient = assembly.scenario.rotorcraft.resolve().thrust_coefficient
-    return Command(thrusts=coefficient * np.array(four(ctrl, QUADROTOR_THRUSTS)))
+    if dynamics.model == "quadrotor":
+        coefficients = np.array(assembly.scenario.any_rotorcraft.thrust_coefficients)
+        return Command(thrusts=coefficients * np.array(ctrl[: layout.rotors]))
+    rates = ctrl[layout.acceleration_1 : layout.further_rates]
+    return Command(
+        rotor_accelerations=np.array(flip_by_spin(rates, dynamics.spins)),
+        tilt_angles=np.array(ctrl[: layout.tilts]) if layout.tilts else None,
+    )

@@ -13,7 +13,8 @@ import numpy.typing as npt
 from tiltsim.errors import TiltsimError
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.system.text import short_repr
-from tiltsim_controllers.mathematics.scalar import Floats, Quad
+from tiltsim.vehicles.rotorcraft.layout import Layout
+from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 ROTOR_COMMANDS: Final = ("thrusts", "rotor_speeds", "rotor_accelerations")
@@ -28,8 +29,8 @@ class Reference:
     velocity: Floats  # (3,), m/s
     acceleration: Floats  # (3,), m/s^2
     attitude: Floats  # (3,), roll, pitch, yaw, rad
-    tilt_angles: Floats  # (4,), rad, of the planned gait; zeros for the quadrotor
-    tilt_rates: Floats  # (4,), rad/s; of a multirotor both (M,), one for each tilt
+    tilt_angles: Floats  # (M,), rad, of the planned gait; four zeros for the quadrotor
+    tilt_rates: Floats  # (M,), rad/s
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +38,7 @@ class Observation:
     """The input of a controller: the vehicle's state, its reference and its parameters.
 
     The state is as measured by the scenario's sensors. The arrays are copies: a controller may keep
-    or change them. Those of tilts and rotors have one entry for each that the vehicle has.
+    or change them. Those of tilts (M) and rotors (N) have one entry for each that the vehicle has.
     """
 
     time: float  # s
@@ -46,11 +47,11 @@ class Observation:
     attitude: Floats  # (3,), roll, pitch, yaw, rad
     quaternion: Floats  # (4,), body to world, scalar first
     body_rates: Floats  # (3,), p, q, r, rad/s, body axes
-    tilt_angles: Floats  # (4,), rad; zeros for the quadrotor
-    tilt_rates: Floats  # (4,), rad/s
-    rotor_speeds: Floats  # (4,), rad/s, positive along each rotor's spin
+    tilt_angles: Floats  # (M,), rad; four zeros for the quadrotor
+    tilt_rates: Floats  # (M,), rad/s
+    rotor_speeds: Floats  # (N,), rad/s, positive along each rotor's spin
     reference: Reference
-    vehicle: Vehicle | Multirotor  # mass, inertia, arm length, rotor coefficients, gravity
+    vehicle: Vehicle | Multirotor  # mass, inertia, gravity, and what its rotors do
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,11 +61,11 @@ class Command:
     It takes effect after the scenario's latency; speeds then at once, or with the rotors' lag.
 
     Attributes:
-        thrusts: (4,), N, along each rotor's axis; they set its speed.
-        rotor_speeds: (4,), rad/s, positive along each rotor's spin.
-        rotor_accelerations: (4,), rad/s^2, likewise, held until the next sample.
-        tilt_angles: (4,), rad, from -pi to pi, for the tilt servos; default: the planned gait. The
-            quadrotor has none.
+        thrusts: (N,), N, along each rotor's axis; they set its speed.
+        rotor_speeds: (N,), rad/s, positive along each rotor's spin.
+        rotor_accelerations: (N,), rad/s^2, likewise, held until the next sample.
+        tilt_angles: (M,), rad, from -pi to pi, for the tilt servos; default: the planned gait. A
+            vehicle whose rotors are fixed has none.
     """
 
     thrusts: npt.ArrayLike | None = None
@@ -86,17 +87,17 @@ class CheckedCommand:
     """A valid command, from the controller to the rotors and servos."""
 
     kind: str  # of `ROTOR_COMMANDS`
-    rotors: Quad  # N, rad/s or rad/s^2, along each rotor's spin
-    tilt_angles: Quad | None  # rad; None follows the planned gait
+    rotors: Values  # N, rad/s or rad/s^2, along each rotor's spin
+    tilt_angles: Values | None  # rad; None follows the planned gait
 
 
-def check_command(command: object, *, tilting: bool) -> CheckedCommand:
-    """Check what a controller returned, for a vehicle with or without tilt servos.
+def check_command(command: object, layout: Layout) -> CheckedCommand:
+    """Check what a controller returned, for a vehicle with so many rotors and tilt servos.
 
     Raises:
         ControllerError: If it is not a `Command`, does not give exactly one of `ROTOR_COMMANDS`,
             has an entry of the wrong shape or a non-finite one, gives tilt angles beyond a half
-            turn, or any to a vehicle that is not ``tilting``.
+            turn, or any to a vehicle without servos.
     """
     if not isinstance(command, Command):
         raise ControllerError(f"returned {short_repr(command)}; expected a tiltsim.Command")
@@ -104,28 +105,32 @@ def check_command(command: object, *, tilting: bool) -> CheckedCommand:
     if len(given) != 1:
         what = " and ".join(given) if given else "nothing for the rotors"
         raise ControllerError(f"returned {what}; expected one of {', '.join(ROTOR_COMMANDS)}")
-    if command.tilt_angles is not None and not tilting:
-        raise ControllerError("returned tilt_angles; this vehicle has no tilt servos")
-    tilts = None if command.tilt_angles is None else _four("tilt_angles", command.tilt_angles)
+    tilts = None
+    if command.tilt_angles is not None:
+        if layout.tilts == 0:
+            raise ControllerError("returned tilt_angles; this vehicle has no tilt servos")
+        tilts = _checked("tilt_angles", command.tilt_angles, layout.tilts)
     for index, angle in enumerate(tilts or ()):
         if abs(angle) > pi:
             raise ControllerError(
                 f"returned tilt_angles[{index}] = {angle:g}; angles are in rad, from {-pi:g} to "
                 f"{pi:g}"
             )
-    return CheckedCommand(given[0], _four(given[0], getattr(command, given[0])), tilts)
+    rotors = _checked(given[0], getattr(command, given[0]), layout.rotors)
+    return CheckedCommand(given[0], rotors, tilts)
 
 
-def _four(name: str, value: Any) -> Quad:
+def _checked(name: str, value: Any, size: int) -> Values:
+    """The numbers of a command."""
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
-        text = f"returned {name} = {short_repr(value)}; expected 4 numbers"
+        text = f"returned {name} = {short_repr(value)}; expected {size} numbers"
         raise ControllerError(text) from None
-    if array.shape != (4,):
-        raise ControllerError(f"returned {name} of shape {array.shape}; expected shape (4,)")
-    first, second, third, fourth = values = array.tolist()
+    if array.shape != (size,):
+        raise ControllerError(f"returned {name} of shape {array.shape}; expected shape ({size},)")
+    values = tuple(array.tolist())
     for index, number in enumerate(values):
         if not isfinite(number):
             raise ControllerError(f"returned {name}[{index}] = {number}; must be finite")
-    return first, second, third, fourth
+    return values

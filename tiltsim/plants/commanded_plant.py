@@ -8,8 +8,7 @@ that they take at once.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import nan, sqrt
-from typing import Final
+from math import inf, nan, sqrt
 
 import mujoco
 import numpy as np
@@ -17,19 +16,16 @@ import numpy as np
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.userdata import EVALUATIONS
 from tiltsim.engines.callback import control_callback
-from tiltsim.laws.commanded import COMMANDED_LOOPS, HeldCommand, commanded_parameters, with_command
-from tiltsim.laws.layers.delay_line import EXTERNAL_COMMANDS
-from tiltsim.laws.tiltrotor import gait_servo_commands
+from tiltsim.laws.commanded import commanded_parameters, with_command
+from tiltsim.laws.rotorcraft import servo_commands_of
 from tiltsim.plants.command import CheckedCommand, ControllerError, Observation
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import Observer, flip_by_spin
-from tiltsim.vehicles.rotorcraft.layout import ROTOR_STATES, TILT_1
+from tiltsim.vehicles.rotorcraft.layout import TILT_1, layout_of
 from tiltsim_controllers.mathematics.records import slotted
-from tiltsim_controllers.mathematics.scalar import Floats, Quad, Values, clipped
+from tiltsim_controllers.mathematics.scalar import Floats, Values, clipped
 from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines
 from tiltsim_controllers.vehicle.rotor_inertia import sum_along_thrust_axes
-
-_NONE: Final = (0.0, 0.0, 0.0, 0.0)
 
 
 class CommandedPlant(MujocoPlant):
@@ -41,26 +37,38 @@ class CommandedPlant(MujocoPlant):
 
     def __init__(self, assembly: Assembly, model: mujoco.MjModel | None = None) -> None:
         super().__init__(assembly, model, engine="python")
-        vehicle = assembly.scenario.rotorcraft
-        self.tilting = vehicle.has_tilting_rotors
-        self._min_speed, self._max_speed = vehicle.speeds_along_spin
+        vehicle, simulation = assembly.scenario.any_rotorcraft, assembly.scenario.simulation
+        self.layout = layout = layout_of(self._loop.dynamics)
+        rotors = layout.rotors
+        self._spins, self._coefficients = vehicle.spins, vehicle.thrust_coefficients
+        # Along the spin, from the model: the scenario's limits, or those of a user's file.
+        self._limits = [self._limits_along_spin(i, spin) for i, spin in enumerate(vehicle.spins, 1)]
         self._commanded = commanded_parameters(self._setup.parameters)
+        self._servo_commands = servo_commands_of(layout.tilts)
         self._observer = Observer(assembly)
         self._slotted = slotted(self._setup.parameters)
-        self._layered = self._loop is not COMMANDED_LOOPS[vehicle.model]
-        first = 8 if self.tilting else 4  # after servos and thrusts
-        self._rates = slice(first, first + 4)
-        # The activations that a commanded speed is written to: where rotors lag behind it, the one
-        # that the layer keeps after the four rotor speeds.
+        self._layered = self._loop.within is not None
+        self._rates = slice(layout.acceleration_1, layout.further_rates)
+        # The activations that a commanded speed is written to: where rotors lag behind it, the ones
+        # that the layer keeps after the rotor speeds.
         self._lagging = vehicle.rotor_time_constant is not None
-        self._rotor_inertia = vehicle.rotor_inertia
-        first = 4 if self._lagging else 0
-        self._speeds = slice(first, first + 4)
-        # The delay line in ``act``, the newest command first; without latency it is empty.
-        steps, first = assembly.scenario.simulation.latency_steps, 2 * ROTOR_STATES
-        line = self.data.act[first : first + EXTERNAL_COMMANDS * steps]
-        self._line = line.reshape(steps, EXTERNAL_COMMANDS)
-        self._hold_command(self._commanded.command)
+        has_inertia = assembly.scenario.has_rotor_inertia
+        self._rotor_inertia = assembly.scenario.rotorcraft.rotor_inertia if has_inertia else 0.0
+        first = rotors if self._lagging else 0
+        self._speeds = slice(first, first + rotors)
+        # The delay line in ``act``, the newest command first; without latency it is empty. A
+        # command is tilts, rotors and whether these are speeds.
+        steps, first, size = simulation.latency_steps, 2 * rotors, layout.tilts + rotors + 1
+        self._line = self.data.act[first : first + size * steps].reshape(steps, size)
+        self._hold_command((*self._commanded.command.tilts, *(0.0,) * rotors))
+
+    def _limits_along_spin(self, rotor: int, spin: float) -> tuple[float, float]:
+        """Lowest and highest speed (rad/s) of a rotor along its spin."""
+        actuator = self.model.actuator(f"rotor_speed_{rotor}")
+        if not actuator.actlimited[0]:
+            return -inf, inf
+        low, high = sorted(spin * actuator.actrange)
+        return float(low), float(high)
 
     def _prepare_engine(self) -> None:
         """Build none: `advance` holds the commands by a callback of its own."""
@@ -76,15 +84,17 @@ class CommandedPlant(MujocoPlant):
             self._line[1:] = self._line[:-1].copy()
             self._line[0] = newest
         if are_speeds:
-            self._set_speeds(np.array(arrived[4:]))
-            arrived[4:] = _NONE
-        self._hold_command(HeldCommand(*arrived))
+            tilts = self.layout.tilts
+            self._set_speeds(np.array(arrived[tilts:]))
+            arrived[tilts:] = [0.0] * self.layout.rotors
+        self._hold_command(tuple(arrived))
 
     def _set_speeds(self, speeds: Floats) -> None:
         """Command signed rotor speeds (rad/s). A jump of the rotors' momentum turns the body."""
         model, data = self.model, self.data
         if self._rotor_inertia > 0.0 and not self._lagging:
-            tilts = data.qpos[TILT_1 : TILT_1 + 4].tolist() if self.tilting else _NONE
+            tilting = self.layout.tilts > 0
+            tilts = data.qpos[TILT_1 : TILT_1 + 4].tolist() if tilting else (0.0,) * 4
             trig, jump = sines_and_cosines(*tilts), (speeds - data.act[:4]).tolist()
             impulse, turned = np.zeros((1, model.nv)), np.empty((1, model.nv))
             impulse[0, 3:6] = sum_along_thrust_axes(trig, jump)
@@ -94,15 +104,20 @@ class CommandedPlant(MujocoPlant):
         data.act[self._speeds] = speeds
 
     def _external_command(self, command: CheckedCommand) -> Values:
-        """The `EXTERNAL_COMMANDS` that a command amounts to."""
-        tilts = command.tilt_angles
-        if tilts is None:
-            tilts = self._gait_servo_commands() if self.tilting else _NONE
+        """Tilts, rotors with their signs, and whether these are speeds, of a command."""
         are_speeds = command.kind != "rotor_accelerations"
         rotors = self._limited_speeds(command) if are_speeds else command.rotors
-        return (*tilts, *flip_by_spin(rotors), float(are_speeds))
+        tilts = self._tilts_of(command)
+        return (*tilts, *flip_by_spin(rotors, self._spins), float(are_speeds))
 
-    def _hold_command(self, command: HeldCommand) -> None:
+    def _tilts_of(self, command: CheckedCommand) -> Values:
+        """The commanded tilt angles, rad; by default the planned gait."""
+        if command.tilt_angles is not None:
+            return command.tilt_angles
+        lead, gait = self._commanded.servo_lead, self._commanded.gait
+        return self._servo_commands(self.evaluation_time, lead, gait, self._setup.knots)
+
+    def _hold_command(self, command: Values) -> None:
         data, knots = self.data, self._setup.knots
         state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
         parameters = with_command(self._setup.parameters, command)
@@ -114,36 +129,26 @@ class CommandedPlant(MujocoPlant):
             data.ctrl[:] = nan  # as the engines do; MuJoCo reports it
 
     def thrusts_and_tilts(self, command: CheckedCommand) -> Floats:
-        """A command as thrusts (N) and tilt angles (rad), shape (8,) or (4,).
+        """A command as thrusts (N), then tilt angles (rad) if the vehicle has any.
 
         Raises:
             ControllerError: If it commands accelerations, which have no thrust yet.
         """
         if command.kind == "rotor_accelerations":
             raise ControllerError("commanded rotor_accelerations; expected thrusts or rotor_speeds")
-        coefficient = self._commanded.vehicle.thrust_coefficient
-        thrusts = [coefficient * speed * abs(speed) for speed in self._limited_speeds(command)]
-        if not self.tilting:
-            return np.array(thrusts)
-        return np.array([*thrusts, *(command.tilt_angles or self._gait_servo_commands())])
+        speeds = zip(self._coefficients, self._limited_speeds(command), strict=True)
+        thrusts = [coefficient * speed * abs(speed) for coefficient, speed in speeds]
+        return np.array([*thrusts, *self._tilts_of(command)])
 
-    def _gait_servo_commands(self) -> Quad:
-        lead, gait = self._commanded.servo_lead, self._commanded.gait
-        return gait_servo_commands(self.evaluation_time, lead, gait, self._setup.knots)
-
-    def _limited_speeds(self, command: CheckedCommand) -> Quad:
+    def _limited_speeds(self, command: CheckedCommand) -> Values:
         """Commanded speeds along the spin (rad/s), within the rotors' limits."""
         speeds: Sequence[float] = command.rotors
         if command.kind == "thrusts":
-            coefficient = self._commanded.vehicle.thrust_coefficient
             speeds = [
                 sqrt(abs(thrust) / coefficient) * (1.0 if thrust >= 0.0 else -1.0)
-                for thrust in command.rotors
+                for coefficient, thrust in zip(self._coefficients, command.rotors, strict=True)
             ]
-        first, second, third, fourth = (
-            clipped(speed, self._min_speed, self._max_speed) for speed in speeds
-        )
-        return first, second, third, fourth
+        return tuple(clipped(s, *limits) for s, limits in zip(speeds, self._limits, strict=True))
 
     def advance(self, steps: int) -> None:
         moving = self._layered or self.data.ctrl[self._rates].any()
@@ -167,4 +172,4 @@ class CommandedPlant(MujocoPlant):
 
     def observation(self) -> Observation:
         """The present state as a controller sees it, through the scenario's sensors."""
-        return self._observer.observe(self, self.data.act[:4].tolist())
+        return self._observer.observe(self, self.data.act[: self.layout.rotors].tolist())

@@ -12,9 +12,8 @@ from tiltsim.plants.command import Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.gait import tilts_of
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
-from tiltsim_controllers.mathematics.scalar import Quad
+from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.references.trajectories import reference_derivatives
-from tiltsim_controllers.vehicle.parameters import SPIN
 
 
 class Observer:
@@ -70,7 +69,6 @@ class Observer:
         )
 
 
-def flip_by_spin(values: Sequence[float]) -> Quad:
+def flip_by_spin(values: Sequence[float], spins: Sequence[float]) -> Values:
     """Speeds along the spin from signed ones, and back."""
-    first, second, third, fourth = values
-    return SPIN[0] * first, SPIN[1] * second, SPIN[2] * third, SPIN[3] * fourth
+    return tuple(spin * value for spin, value in zip(spins, values, strict=True))

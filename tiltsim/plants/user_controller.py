@@ -29,6 +29,7 @@ from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.files import is_file
+from tiltsim.vehicles.rotorcraft.layout import Layout
 
 
 class UserController:
@@ -43,11 +44,11 @@ class UserController:
         if reset is not None:
             self._call(reset, scenario)
 
-    def command(self, observation: Observation, *, tilting: bool) -> CheckedCommand:
+    def command(self, observation: Observation, layout: Layout) -> CheckedCommand:
         """The checked command for an observation. Raises `ControllerError`."""
         command = self._call(self._controller, observation)
         try:
-            return check_command(command, tilting=tilting)
+            return check_command(command, layout)
         except ControllerError as error:
             raise ControllerError(f"the controller {self._name} {error}") from None
 
@@ -182,6 +183,6 @@ class UserControlledPlant(CommandedPlant):
             self._was_reset = True
             self._controller.reset(self._scenario)
         if step not in self._commands:
-            command = self._controller.command(self.observation(), tilting=self.tilting)
+            command = self._controller.command(self.observation(), self.layout)
             self._commands[step] = command
         return self._commands[step]

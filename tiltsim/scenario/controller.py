@@ -28,7 +28,7 @@ DEFAULT_LAW: Final = "attitude_altitude"
 class PythonController(ControllerTable):
     """A user's own controller in Python; see `tiltsim.plants.user_controller`."""
 
-    vehicle_models = ("tiltrotor", "quadrotor")
+    vehicle_models = ("tiltrotor", "quadrotor", "multirotor")
     reference_kinds = ("position", "pose", "attitude_altitude")
     is_external = True
 

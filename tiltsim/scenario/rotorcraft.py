@@ -117,6 +117,11 @@ class RotorcraftTable(AnyVehicleTable, ABC):
     def spins(self) -> Values:
         """Signs of the rotor speeds."""
 
+    @property
+    @abstractmethod
+    def thrust_coefficients(self) -> Values:
+        """K_f of each rotor, N s^2/rad^2."""
+
     @abstractmethod
     def tilt_of_rotor(self, rotor: int) -> int:
         """The number, from 0, of the tilt of a rotor, whose number is from 1; -1: fixed."""
@@ -193,6 +198,10 @@ class MultirotorTable(RotorcraftTable):
     @property
     def spins(self) -> Values:
         return self.resolve().spins
+
+    @property
+    def thrust_coefficients(self) -> Values:
+        return self.resolve().thrust_coefficients
 
     def tilt_of_rotor(self, rotor: int) -> int:
         return layout_of(self.resolve().table)[rotor - 1]

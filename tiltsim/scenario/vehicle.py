@@ -138,6 +138,10 @@ class VehicleTable(RotorcraftTable):
     def spins(self) -> Values:
         return SPIN
 
+    @property
+    def thrust_coefficients(self) -> Values:
+        return (self.resolve().thrust_coefficient,) * self.rotor_count
+
     def tilt_of_rotor(self, rotor: int) -> int:
         return rotor - 1 if self.has_tilting_rotors else -1
 

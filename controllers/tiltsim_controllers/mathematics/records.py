@@ -1,14 +1,16 @@
 """Parameter records: one declaration read by name in Python and in native code.
 
-A record is a ``NamedTuple`` whose fields are floats or further records. Flattened, it fills the
-head of MuJoCo's ``userdata``, so the parameters of a flight are part of its state. Through
-`record_dtype` the same numbers are a struct whose fields native code reads by the same names.
+A record is a ``NamedTuple`` whose fields are floats, vectors (`vector_of`) or further records.
+Flattened, it fills the head of MuJoCo's ``userdata``, so the parameters of a flight are part of its
+state. Through `record_dtype` the same numbers are a struct whose fields native code reads by the
+same names.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import cache
+from itertools import islice
 from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
@@ -36,9 +38,9 @@ def slotted(record: Any) -> Any:
 
     For the parameters of a controller that is evaluated a hundred thousand times.
     """
-    if not isinstance(record, tuple):
+    if not _is_record(type(record)):
         return record
-    fields: tuple[str, ...] = record._fields  # type: ignore[attr-defined]
+    fields: tuple[str, ...] = record._fields
     view = type(type(record).__name__, (), {"__slots__": fields})()
     for name, value in zip(fields, record):
         setattr(view, name, slotted(value))
@@ -51,13 +53,18 @@ def make_record_type(name: str, **fields: type) -> Any:
     return made
 
 
-def _take(record_type: Any, values: Iterator[float]) -> Any:
-    return record_type(
-        *(
-            _take(kind, values) if _is_record(kind) else next(values)
-            for kind in _fields(record_type).values()
-        )
-    )
+@cache
+def vector_of(length: int) -> type:
+    """The type of a field with so many floats: a tuple in Python, an array in native code."""
+    return type(f"Vector{length}", (tuple,), {"length": length})
+
+
+def _take(kind: Any, values: Iterator[float]) -> Any:
+    if _is_record(kind):
+        return kind(*(_take(field, values) for field in _fields(kind).values()))
+    if issubclass(kind, tuple):
+        return tuple(islice(values, kind.length))
+    return next(values)
 
 
 @cache
@@ -69,12 +76,13 @@ def _fields(record_type: type[tuple[Any, ...]]) -> dict[str, Any]:
 @cache
 def record_dtype(record_type: type[tuple[Any, ...]]) -> np.dtype[np.void]:
     """Return the structured dtype (all float64, no padding) with the record's field names."""
-    return np.dtype(
-        [
-            (name, record_dtype(kind) if _is_record(kind) else np.float64)
-            for name, kind in _fields(record_type).items()
-        ]
-    )
+    return np.dtype([(name, *_format(kind)) for name, kind in _fields(record_type).items()])
+
+
+def _format(kind: Any) -> tuple[Any, ...]:
+    if _is_record(kind):
+        return (record_dtype(kind),)
+    return (np.float64, (kind.length,)) if issubclass(kind, tuple) else (np.float64,)
 
 
 def record_size(record_type: type[tuple[Any, ...]]) -> int:
@@ -83,4 +91,4 @@ def record_size(record_type: type[tuple[Any, ...]]) -> int:
 
 
 def _is_record(kind: type) -> bool:
-    return isinstance(kind, type) and issubclass(kind, tuple)
+    return issubclass(kind, tuple) and hasattr(kind, "_fields")

@@ -15,6 +15,7 @@ from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.plants.factory import make_plant
 from tiltsim.plants.flight_model import build_model
 from tiltsim.resources import shipped_folder
+from tiltsim.vehicles.rotorcraft.layout import Layout
 from tiltsim_controllers.vehicle.parameters import PRESETS
 from tiltsim_controllers.vehicle.rotor_inertia import acceleration_within_limits
 
@@ -265,7 +266,7 @@ def test_commanded_speeds_take_their_momentum_from_the_body(model):
     plant = CommandedPlant(assemble(tiltsim.parse_scenario(tables)))
     speeds = Command(rotor_speeds=[310.0, 340.0, 280.0, 420.0])
     before, rates = angular_momentum(plant), plant.data.qvel[3:6].copy()
-    command = check_command(speeds, tilting=model == "tiltrotor")
+    command = check_command(speeds, Layout(4, 4 * (model == "tiltrotor")))
     calls = []  # of the callback of a flight in another thread, as it were
     with control_callback(lambda *flight: calls.append(flight)):
         plant.apply(command)

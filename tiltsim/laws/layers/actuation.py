@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, get_type_hints
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.laws.layers.delay_line import EXTERNAL_COMMANDS, delay_line, held_line, undelayed
+from tiltsim.laws.layers.delay_line import delay_line, held_line, undelayed
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
 from tiltsim.laws.layers.sensing import measured_qpos, measured_qvel, sensor_parameters
 from tiltsim.laws.tiltrotor import four, servo_lead
@@ -180,16 +180,16 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
     Args:
         loop: Without them.
         latency_steps: Control steps between a reading and its command taking effect.
-        external: Whether commands come from outside. Then `tiltsim.plants.commanded_plant` moves
-            the `EXTERNAL_COMMANDS` along the delay line: speeds jump, which no rate of activations
-            can do.
+        external: Whether commands come from outside: with one number more, whether those of the
+            rotors are speeds (rad/s), which they take at once. `tiltsim.plants.commanded_plant`
+            moves these along the delay line, as no rate of activations makes a speed jump.
     """
     law_controls, dynamics = loop.sampling.controls, loop.dynamics
     law_act, law_ctrl = dynamics.sizes.act, dynamics.sizes.ctrl
     layout = layout_of(dynamics)
     rotors, tilts = layout
     size = rotors + tilts  # commands of a controller
-    under_way = (EXTERNAL_COMMANDS if external else size) * latency_steps
+    under_way = (size + external) * latency_steps
     line_ctrl = law_ctrl + rotors  # the delay line's controls
     memory = line_ctrl + under_way  # the commands in force, last of the controls
     # The delay line follows the speed commands of the motors.

@@ -4,14 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Final
 
 from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import componentwise, entries_of
-
-EXTERNAL_COMMANDS: Final = 9
-"""Commands from outside: four tilt angles (rad), four of the rotors, and whether these are speeds
-(rad/s), taken at once."""
 
 
 @scalar
