@@ -28,4 +28,4 @@ class Assembly(FlightPlan):
 
     def sign_check_values(self, values: Vector) -> Values:
         """The numbers of `Monitoring.sign_check_values`, from the ``values`` of a sample."""
-        return self.loop.monitoring.sign_check_values(values, self.setup.parameters)
+        return self.loop.monitoring.sign_check_values(values, *self.setup)

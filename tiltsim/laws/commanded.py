@@ -19,9 +19,9 @@ from tiltsim.laws.quadrotor import constant_attitude_references, upright_margin
 from tiltsim.laws.rotorcraft import (
     body_state,
     held_controls_of,
-    margin_column,
     servo_commands_of,
     thrust_controls_of,
+    torque_free_columns,
 )
 from tiltsim.laws.tiltrotor import servo_lead, singularity_columns
 from tiltsim.models.rotor_table import Multirotor
@@ -181,7 +181,7 @@ def _commanded_multirotor(spins: Values, tilts: int) -> ClosedLoop:
     table = make_record_type("Rotors", table=vector_of(ROTOR_FLOATS * layout.rotors))
 
     def singularity(samples: Mapping[str, Floats], rotors: Any) -> dict[str, Floats]:
-        return {"singularity_margin": margin_column(layout, rotors.table, samples)}
+        return torque_free_columns(layout, rotors.table, samples)
 
     kind = rotorcraft_kind(layout, ("singularity_margin",))
     return _commanded_loop(f"multirotor_{tilts}", spins, tilts, kind, table, singularity)

@@ -86,7 +86,7 @@ def _observe_full_pose(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) ->
 
 
 @scalar
-def sign_check_values(values: Vector, parameters: LoopParameters) -> Quad:
+def sign_check_values(values: Vector, parameters: LoopParameters, knots: Vector) -> Quad:
     """The rotor speeds along their spin."""
     return rotor_speeds_along_spin(values)
 

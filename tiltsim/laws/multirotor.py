@@ -24,29 +24,39 @@ from tiltsim.closed_loop.loop import (
 )
 from tiltsim.equations.tiltrotor import body_fields, initial_state
 from tiltsim.laws.rotorcraft import (
+    CONDITION,
     body_state,
     held_controls_of,
-    margin_column,
     servo_commands_of,
     thrust_controls_of,
+    torque_free_columns,
 )
-from tiltsim.laws.tiltrotor import REFERENCE_COLUMNS, reference_columns, servo_lead
+from tiltsim.laws.tiltrotor import (
+    REFERENCE_COLUMNS,
+    reference_columns,
+    rotor_stops,
+    servo_lead,
+    singular_attitude,
+)
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController
+from tiltsim.scenario.multirotor_controllers import AttitudeForceController, upper_side
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
 from tiltsim.vehicles.rotorcraft.layout import TILT_1, TILT_RATE_1
 from tiltsim.vehicles.rotorcraft.layout import Layout as Places
 from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
-from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS
+from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS, PUBLISHED_DECOUPLING
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.gait_feedforward import INTEGRAL_FIELDS
 from tiltsim_controllers.laws.multirotor import multirotor_law_of
+from tiltsim_controllers.laws.multirotor_inputs import independence_of
 from tiltsim_controllers.laws.multirotor_steps import ATTITUDE_ERRORS, Parameters, SideGains
+from tiltsim_controllers.mathematics.rotation import world_up_in_body
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import componentwise, entries_of
 from tiltsim_controllers.references.trajectories import position_reference
 from tiltsim_controllers.vehicle.effectiveness import layout_of
 from tiltsim_controllers.vehicle.multirotor import BODY_STATES, body_of, equations_of_motion_of
+from tiltsim_controllers.vehicle.states import PITCH, ROLL
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan, Scenario
@@ -70,12 +80,21 @@ class Layout(NamedTuple):
         return Places(len(self.spins), max(self.tilt_of_rotor) + 1)
 
 
+class Direction(NamedTuple):
+    """A vector in body axes."""
+
+    x: float
+    y: float
+    z: float
+
+
 class LoopParameters(NamedTuple):
     """The head of `userdata`."""
 
     signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
     servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
     law: Parameters
+    upper_side: Direction  # see `tiltsim.scenario.multirotor_controllers.upper_side`
 
 
 def layout_of_vehicle(vehicle: Multirotor) -> Layout:
@@ -114,7 +133,7 @@ def _sampling_of(layout: Layout, law: Callable[..., Values]) -> Sampling:
 
 
 @cache
-def _columns_of(layout: Layout, law: Callable[..., Values]) -> Columns:
+def _columns_of(layout: Layout, dimension: int, law: Callable[..., Values]) -> Columns:
     """Samples of flights under a law, and the columns of references, margin and null part."""
     places = layout.places
     rotors, tilts = places
@@ -146,10 +165,10 @@ def _columns_of(layout: Layout, law: Callable[..., Values]) -> Columns:
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
         return {
             **reference_columns(asked, fields, samples, setup, names),
-            "singularity_margin": margin_column(places, _table(setup), samples),
+            **torque_free_columns(places, _table(setup), samples, dimension),
         }
 
-    units = {**dict.fromkeys(INTEGRAL_FIELDS, "m s"), NULL_PART: "1"}
+    units = {**dict.fromkeys(INTEGRAL_FIELDS, "m s"), NULL_PART: "1", CONDITION: "1"}
     return Columns(observe, derive, fields=INTEGRAL_FIELDS, units=units)
 
 
@@ -159,22 +178,28 @@ def _table(setup: ControlSetup) -> Values:
 
 
 @cache
-def _monitoring_of(layout: Layout, norm: str) -> Monitoring:
-    """In the norm of the speeds the decoupling matrix is singular where a rotor stops."""
-    if norm != "speed":
-        return Monitoring()
-    first, rotors = layout.places.speed_1, layout.places.rotors
-    speeds_in = entries_of(first, rotors)
-    causes = tuple(
-        f"the decoupling matrix became singular: rotor {rotor} came to a stop"
-        for rotor in range(1, rotors + 1)
-    )
+def _monitoring_of(layout: Layout, dimension: int, norm: str) -> Monitoring:
+    """Where the outputs depend on each other or, in the norm of the speeds, a rotor stops."""
+    places = layout.places
+    tilts_in = entries_of(places.alpha_1, places.tilts)
+    speeds_in = entries_of(places.speed_1, places.rotors if norm == "speed" else 0)
+    independence, names = independence_of(layout.tilt_of_rotor, dimension), places.names("alpha")
+    stops = rotor_stops(places.rotors if norm == "speed" else 0)
+    harmless = (1.0,) * len(stops)  # as published, the factor 2 |varpi| is in rows of force only
 
     @scalar
-    def speeds(values: Vector, parameters: LoopParameters) -> Values:
-        return speeds_in(values)
+    def sign_check_values(values: Vector, parameters: LoopParameters, knots: Vector) -> Values:
+        own, side = parameters.law, parameters.upper_side
+        up, to_side = world_up_in_body(values[ROLL], values[PITCH]), (side.x, side.y, side.z)
+        share = independence(tilts_in(values), up, to_side, knots, int(own.rotors))
+        if own.decoupling == PUBLISHED_DECOUPLING:
+            return (share, *harmless)
+        return (share, *speeds_in(values))
 
-    return Monitoring(speeds, lambda _sample: causes)
+    def causes(sample: Mapping[str, float]) -> tuple[str, ...]:
+        return (singular_attitude(sample, names), *stops)
+
+    return Monitoring(sign_check_values, causes)
 
 
 @cache
@@ -260,7 +285,9 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
         turn_time=controller.turn_time,
     )
     lead = servo_lead(scenario.any_rotorcraft.tilt_servo)
-    return ControlSetup(LoopParameters(signature, lead, law), (*plan.knots, *vehicle.table))
+    side = Direction(*upper_side(vehicle, gait))
+    parameters = LoopParameters(signature, lead, law, side)
+    return ControlSetup(parameters, (*plan.knots, *vehicle.table))
 
 
 def _follows_position(scenario: Scenario) -> bool:
@@ -296,8 +323,8 @@ def multirotor_loop(layout: Layout, dimension: int, norm: str) -> ClosedLoop:
             layout.spins,
         ),
         sampling=sampling,
-        columns=_columns_of(layout, law),
-        monitoring=_monitoring_of(layout, norm),
+        columns=_columns_of(layout, dimension, law),
+        monitoring=_monitoring_of(layout, dimension, norm),
         equations=equations,
         follows_position=_follows_position,
         uses_gait=places.tilts > 0,

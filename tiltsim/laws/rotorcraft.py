@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cache
+from typing import Final
 
 import numpy as np
 
 from tiltsim.vehicles.rotorcraft.layout import Layout
 from tiltsim_controllers.analysis.singularity import world_up
-from tiltsim_controllers.analysis.torque_free import singularity_margin, torque_free_forces
+from tiltsim_controllers.analysis.torque_free import (
+    controlled_axes,
+    decoupling_condition,
+    margin_over_flight,
+    torque_free_forces,
+)
 from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
@@ -82,9 +88,28 @@ def servo_commands_of(tilts: int) -> Callable[..., Values]:
     return servo_commands
 
 
-def margin_column(layout: Layout, table: Vector, samples: Mapping[str, Floats]) -> Floats:
-    """Angles (rad) to the nearest singular attitude, by the table of the vehicle's rotors."""
-    rows = zip(*(samples[name].tolist() for name in layout.names("alpha")), strict=True)
-    pushes = [force_and_torque(table, row) for row in rows] or [force_and_torque(table)]
-    forces = torque_free_forces(*map(np.array, zip(*pushes, strict=True)))
-    return singularity_margin(forces, world_up(samples["roll"], samples["pitch"]))
+CONDITION: Final = "decoupling_condition"
+"""A column: smallest over largest singular value of the decoupling matrix."""
+
+
+def torque_free_columns(
+    layout: Layout, table: Vector, samples: Mapping[str, Floats], dimension: int | None = None
+) -> dict[str, Floats]:
+    """Angle (rad) to the nearest singular attitude, and how well the decoupling matrix inverts.
+
+    Args:
+        layout: Of the vehicle.
+        table: Of its rotors.
+        samples: By field.
+        dimension: How many components of force the controller controls; None for a controller
+            without a decoupling matrix.
+    """
+    names = layout.names("alpha")
+    angles = np.reshape([samples[name] for name in names], (len(names), len(samples["time"]))).T
+    pushing, up = force_and_torque(table, angles), world_up(samples["roll"], samples["pitch"])
+    forces = torque_free_forces(*pushing)
+    columns = {"singularity_margin": margin_over_flight(forces, up)}
+    if dimension is not None:
+        axes = controlled_axes(forces, up, dimension)
+        columns[CONDITION] = decoupling_condition(*pushing, axes)
+    return columns

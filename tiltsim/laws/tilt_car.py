@@ -93,7 +93,7 @@ ROTORS_AT_REST: Final = "the decoupling matrix became singular: both rotors came
 
 
 @scalar
-def sum_of_squared_speeds(values: Vector, parameters: object) -> tuple[float]:
+def sum_of_squared_speeds(values: Vector, parameters: object, knots: Vector) -> tuple[float]:
     """Zero where the decoupling matrix loses rank."""
     return (values[SPEED_1] * values[SPEED_1] + values[SPEED_2] * values[SPEED_2],)
 

@@ -227,9 +227,15 @@ def reference_columns(
     return dict(zip(names, rows.T, strict=True))
 
 
-ROTOR_STOPS: Final = tuple(
-    f"the decoupling matrix became singular: rotor {rotor} came to a stop" for rotor in ROTORS
-)
+def rotor_stops(rotors: int) -> tuple[str, ...]:
+    """Causes of an end where the speed of a rotor reaches zero, one a rotor."""
+    return tuple(
+        f"the decoupling matrix became singular: rotor {rotor} came to a stop"
+        for rotor in range(1, rotors + 1)
+    )
+
+
+ROTOR_STOPS: Final = rotor_stops(4)
 """Causes for `rotor_speeds_along_spin`: the decoupling matrix has the factor ``2 |varpi|``."""
 
 
@@ -252,7 +258,7 @@ def scaled_determinant(values: Vector, vehicle: Vehicle) -> float:
 
 
 @scalar
-def determinant_and_speeds(values: Vector, parameters: Any) -> Values:
+def determinant_and_speeds(values: Vector, parameters: Any, knots: Vector) -> Values:
     """`scaled_determinant` and `rotor_speeds_along_spin`."""
     determinant = scaled_determinant(values, parameters.law.vehicle)
     return (determinant, *rotor_speeds_along_spin(values))
@@ -260,9 +266,13 @@ def determinant_and_speeds(values: Vector, parameters: Any) -> Values:
 
 def determinant_and_speed_causes(sample: Mapping[str, float]) -> tuple[str, ...]:
     """Causes for `determinant_and_speeds`."""
-    angles = ", ".join(f"{sample[name]:.3g}" for name in TILT_FIELDS)
-    determinant = (
+    return (singular_attitude(sample, TILT_FIELDS), *ROTOR_STOPS)
+
+
+def singular_attitude(sample: Mapping[str, float], tilts: tuple[str, ...]) -> str:
+    """Cause of an end at an attitude and tilt angles, which have these names."""
+    angles = ", ".join(f"{sample[name]:.3g}" for name in tilts)
+    return (
         f"the decoupling matrix became singular at roll = {sample['roll']:.3g} rad, "
-        f"pitch = {sample['pitch']:.3g} rad, tilt angles ({angles}) rad"
+        f"pitch = {sample['pitch']:.3g} rad" + (f", tilt angles ({angles}) rad" if tilts else "")
     )
-    return (determinant, *ROTOR_STOPS)

@@ -108,7 +108,8 @@ METRICS: Final = {
     "min_decoupling_condition": Metric(
         "smallest σ₃/σ₁ of the decoupling matrix",
         "",
-        "smallest over largest singular value of [tau/(L Kf); r3 F/Kf]",
+        "smallest over largest singular value of [tau/(L Kf); r3 F/Kf], for a multirotor with "
+        "all components of force that its controller controls",
     ),
     "max_null_part": Metric(
         "largest null part of the rotor speeds",

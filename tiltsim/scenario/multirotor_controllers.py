@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated, Final, Literal, Self
 
-import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from tiltsim.models.rotor_table import Multirotor
@@ -25,11 +24,12 @@ from tiltsim_controllers.analysis.stability import (
     feedforward_loops,
     linear_loop,
 )
-from tiltsim_controllers.analysis.torque_free import torque_free_forces
+from tiltsim_controllers.analysis.torque_free import hover_direction, torque_free_forces
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING, Gains
 from tiltsim_controllers.laws.gains import IntegralGains
 from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms
+from tiltsim_controllers.mathematics.scalar import Floats, Triple
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
 RESTORING: Final = 0.5
@@ -165,12 +165,28 @@ class AttitudeForceController(ControllerTable):
         return f"the {self.decoupling} decoupling matrix"
 
 
+def _gait_angles(vehicle: Multirotor, gait: Gait) -> Floats:
+    times = gait.sample_times()
+    return gait.angles(times).reshape(len(times), vehicle.tilts)
+
+
+def upper_side(vehicle: Multirotor, gait: Gait) -> Triple:
+    """The side (unit vector, body axes) on which level attitude starts, if there are two.
+
+    That is so where the singular directions of world up are a great circle all over the gait;
+    zero elsewhere.
+    """
+    forces = torque_free_forces(*force_and_torque(vehicle.table, _gait_angles(vehicle, gait)))
+    if not (forces.dimension == 1).all():
+        return 0.0, 0.0, 0.0
+    x, y, z = hover_direction(forces)[0].tolist()
+    return x, y, z
+
+
 def force_dimension(vehicle: Multirotor, gait: Gait) -> tuple[int, str]:
     """The least dimension of the torque-free forces over a gait, and where, in words."""
-    times = gait.sample_times()
-    angles = gait.angles(times).reshape(len(times), vehicle.tilts)
-    force, torque = zip(*(force_and_torque(vehicle.table, row) for row in angles.tolist()))
-    dimension = torque_free_forces(np.array(force), np.array(torque)).dimension
+    angles = _gait_angles(vehicle, gait)
+    dimension = torque_free_forces(*force_and_torque(vehicle.table, angles)).dimension
     first = int(dimension.argmin())
     at = ", ".join(f"{angle:.3g}" for angle in angles[first])
     where = f"at tilt angles ({at}) rad" if vehicle.tilts else "as its rotors are placed"

@@ -77,6 +77,68 @@ def singularity_margin(forces: TorqueFreeForces, up: ArrayLike = LEVEL) -> Float
     return np.asarray(np.arcsin(np.minimum(1.0, np.linalg.norm(along, axis=-1))))
 
 
+def margin_over_flight(forces: TorqueFreeForces, up: ArrayLike) -> Floats:
+    """Margin (rad) along a flight, shape (N,), negative beyond a singularity.
+
+    A great circle of singular directions has two sides, and world up starts on the positive one:
+    that of level attitude at the first sample. Elsewhere a flight goes past what is singular, and
+    this is `singularity_margin`.
+
+    Args:
+        forces: in order of time
+        up: world up in body axes, unit vectors of shape (N, 3)
+    """
+    margin = singularity_margin(forces, up)
+    if not (forces.dimension == 1).all():
+        return margin
+    square = np.diagonal(forces.projector, axis1=-2, axis2=-1)
+    along = square.argmax(axis=-1)[:, np.newaxis, np.newaxis]
+    direction = np.take_along_axis(forces.projector, along, axis=-1)[..., 0]
+    turns = np.einsum("ki,ki->k", direction[1:], direction[:-1])
+    first = -1.0 if len(direction) and direction[0, 2] < 0.0 else 1.0
+    sides = np.cumprod([first, *np.where(turns < 0.0, -1.0, 1.0)])[: len(direction)]
+    side = sides * np.einsum("ki,ki->k", direction, np.asarray(up, float))
+    return np.where(side < 0.0, -margin, margin)
+
+
+def controlled_axes(forces: TorqueFreeForces, up: ArrayLike, dimension: int) -> Floats:
+    """Directions of force that a controller of so many components controls, shape (..., k, 3).
+
+    Args:
+        forces: of the vehicle
+        up: world up in body axes, unit vectors of shape (..., 3)
+        dimension: 1, along ``up``; 2, and across it within the torque-free forces; 3, all
+    """
+    up = np.asarray(up, float)
+    if dimension == 3:
+        return np.broadcast_to(np.eye(3), (*up.shape, 3))
+    if dimension == 1:
+        return up[..., np.newaxis, :]
+    normal = np.linalg.eigh(forces.projector)[1][..., 0]
+    across = np.cross(normal, up)
+    length = np.linalg.norm(across, axis=-1, keepdims=True)
+    return np.stack([up, across / np.where(length > 0.0, length, 1.0)], axis=-2)
+
+
+def decoupling_condition(force: ArrayLike, torque: ArrayLike, axes: ArrayLike) -> Floats:
+    """Smallest over largest singular value of ``[tau; axes F]``, of shape (...).
+
+    Forces count in units of the strongest rotor's, torques in units of what the longest lever makes
+    of a rotor's force.
+
+    Args:
+        force, torque: F and tau, shape (..., 3, N)
+        axes: directions of the force that are controlled, body axes, shape (..., k, 3)
+    """
+    force, torque = np.asarray(force, float), np.asarray(torque, float)
+    thrusts = np.linalg.norm(force, axis=-2)
+    levers = np.linalg.norm(np.cross(force, torque, axis=-2), axis=-2) / thrusts
+    scaled = torque / levers.max(axis=-1)[..., np.newaxis, np.newaxis]
+    lifts = np.asarray(axes, float) @ (force / thrusts.max(axis=-1)[..., np.newaxis, np.newaxis])
+    values = np.linalg.svd(np.concatenate([scaled, lifts], axis=-2), compute_uv=False)
+    return np.asarray(values[..., -1] / values[..., 0])
+
+
 def hover_direction(forces: TorqueFreeForces) -> Floats:
     """The torque-free direction nearest to the body's z axis, shape (..., 3); NaN where none is.
 

@@ -11,7 +11,7 @@ from math import nan, sqrt
 from typing import Any, Final
 
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
-from tiltsim_controllers.laws.force_directions import Factors, Force, factors_of
+from tiltsim_controllers.laws.force_directions import Factors, Force, combination_of, factors_of
 from tiltsim_controllers.laws.least_norm import nearest_of, shares_of
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import componentwise, vectors_of
@@ -168,6 +168,35 @@ def solution_of(length: int, dimension: int, norm: str) -> Callable[..., Values]
         return reached(rates, speeds, parameters.slowest)
 
     return of_speed if norm == "speed" else of_thrust
+
+
+@cache
+def independence_of(layout: Layout, dimension: int) -> Callable[..., float]:
+    """Scalar code of how independent the outputs are: ``(tilts, up, side, table, at)``.
+
+    1 at best and 0 where the decoupling matrix is singular: the share of the force's rows that
+    remains without those of the torque, and without each other. ``up`` is world up, ``side`` a
+    direction of the force, in body axes; where one component is controlled and lift pushes against
+    ``side``, the number is negative.
+    """
+    cosines, sines, effect, _, _ = effectiveness_of(layout)
+    factors_of_rows, dot = factors_of(len(layout), dimension), vectors_of(len(layout)).dot
+    combination = combination_of(len(layout))
+
+    @scalar
+    def independence(tilts: Values, up: Triple, side: Triple, table: Vector, at: int) -> float:
+        rows = effect(1.0, cosines(tilts), sines(tilts), table, at)
+        forces = rows[0], rows[1], rows[2]
+        _, lifts, units, _ = factors_of_rows(rows, forces, up)
+        share = 1.0
+        for k in range(dimension):
+            share *= dot(lifts[k], units[3 + k]) / sqrt(dot(lifts[k], lifts[k]))
+        if not share > 0.0:
+            return 0.0
+        against = dimension == 1 and dot(units[3], combination(side, *forces)) < 0.0
+        return -share if against else share
+
+    return independence
 
 
 @cache

@@ -132,8 +132,17 @@ def effectiveness_of(layout: Layout) -> Effectiveness:
     return Effectiveness(cosines, sines, rows, squares, wrench)
 
 
-def force_and_torque(table: Sequence[float], tilts: Sequence[float] = ()) -> tuple[Floats, Floats]:
-    """F and tau at tilt angles (rad), shape (3, N) each, per unit of ``w``, body axes."""
-    functions = effectiveness_of(layout_of(table))
-    rows = functions.rows(1.0, functions.cosines(tilts), functions.sines(tilts), table, 0)
-    return np.array(rows[:3]), np.array(rows[3:])
+def force_and_torque(table: Sequence[float], tilts: ArrayLike = ()) -> tuple[Floats, Floats]:
+    """F and tau at tilt angles (rad), shape (..., 3, N) each, per unit of ``w``, body axes.
+
+    Args:
+        table: of the rotors
+        tilts: shape (..., tilts)
+    """
+    angles = np.moveaxis(np.asarray(tilts, float), -1, 0)
+    # The scalar functions: those of arrays differ in the last bit.
+    cosines, sines = (np.frompyfunc(f, 1, 1)(angles).astype(float) for f in (cos, sin))
+    rows = effectiveness_of(layout_of(table)).rows(1.0, cosines, sines, table, 0)
+    entries = [[np.broadcast_to(entry, angles.shape[1:]) for entry in row] for row in rows]
+    wrenches = np.moveaxis(np.array(entries), (0, 1), (-2, -1))
+    return wrenches[..., :3, :], wrenches[..., 3:, :]

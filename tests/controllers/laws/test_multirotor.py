@@ -19,6 +19,11 @@ from tests.controllers.multirotors import (
     ring,
     tiltrotor,
 )
+from tiltsim_controllers.analysis.torque_free import (
+    controlled_axes,
+    hover_direction,
+    torque_free_forces,
+)
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.laws import attitude_altitude, gait_feedforward
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
@@ -26,6 +31,7 @@ from tiltsim_controllers.laws.full_pose import attitude_error
 from tiltsim_controllers.laws.gains import GAIN_SETS, Poles, gains_from_poles
 from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms
 from tiltsim_controllers.laws.multirotor import multirotor_law_of
+from tiltsim_controllers.laws.multirotor_inputs import independence_of
 from tiltsim_controllers.laws.multirotor_steps import (
     EULER_ANGLES,
     SideGains,
@@ -34,7 +40,7 @@ from tiltsim_controllers.laws.multirotor_steps import (
 )
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.references.trajectories import CIRCLE, SETPOINT, ReferenceParameters
-from tiltsim_controllers.vehicle.effectiveness import layout_of
+from tiltsim_controllers.vehicle.effectiveness import force_and_torque, layout_of
 
 ON_CIRCLE = ReferenceParameters(
     CIRCLE, x=0.3, y=-0.2, z=0.1, radius=2.0, angular_frequency=0.5, yaw=0.4,
@@ -111,6 +117,30 @@ def test_gait_feedforward_is_a_case(gait):
 
 
 CANTED = Vehicle(ring(6, 0.44), HEXAROTOR, 3)
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+def test_independence_is_what_the_other_outputs_leave_of_the_force(dimension):
+    vehicle = (tiltrotor(), Vehicle(ring(6, 0.35, along=(1.0, 0.0, 0.0)), HEXAROTOR, 2), CANTED)
+    table = vehicle[dimension - 1].table
+    tilts = (0.3, -0.2, 0.1, 0.4) if dimension == 1 else ()
+    force, torque = force_and_torque(table, tilts)
+    forces = torque_free_forces(force, torque)
+    share = independence_of(layout_of(table), dimension)
+    side = tuple(hover_direction(forces).tolist())
+    for up in np.random.default_rng(2).normal(size=(5, 3)):
+        up /= np.linalg.norm(up)
+        axes, rows, expected = controlled_axes(forces, up, dimension), torque, 1.0
+        for lift in axes @ force:
+            left = lift - np.linalg.pinv(rows) @ rows @ lift
+            expected *= np.linalg.norm(left) / np.linalg.norm(lift)
+            rows = np.vstack([rows, lift])
+        sign = np.sign(up @ side) if dimension == 1 else 1.0
+        found = share(tilts, tuple(up.tolist()), side, table, 0)
+        assert found == pytest.approx(sign * expected, abs=1e-12)
+    across = tuple(np.cross(side, (0.6, 0.8, 0.0)).tolist())
+    singular = share(tilts, across, side, table, 0)
+    assert abs(singular) < 1e-15 if dimension == 1 else singular > 0.1
 
 
 def test_a_hexarotor_with_canted_rotors_flies_a_circle_level():

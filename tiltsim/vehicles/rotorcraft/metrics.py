@@ -121,7 +121,9 @@ def _singularity_metrics(
     if "singularity_margin" not in columns:
         return {}
     metrics = {"min_singularity_margin": float(columns["singularity_margin"].min())}
-    if isinstance(vehicle, Vehicle):
+    if "decoupling_condition" in columns:
+        metrics["min_decoupling_condition"] = float(columns["decoupling_condition"].min())
+    elif isinstance(vehicle, Vehicle):
         metrics["min_decoupling_condition"] = _min_decoupling_condition(columns, vehicle)
     return metrics
 
