@@ -9,6 +9,7 @@ import tiltsim
 from tiltsim.errors import InputError
 from tiltsim.resources import shipped_folder
 from tiltsim.vehicles.rotorcraft.hover import hover_speeds
+from tiltsim_controllers.analysis.torque_free import torque_free_forces
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
 TILTS = {"type": "waypoints", "angles": [[0.2, -0.2] * 3, [0.3, -0.3] * 3], "period": 2.0}
@@ -82,6 +83,12 @@ def test_full_force_stays_level_in_a_side_wind():
         "cant_hexarotor", disturbance=wind, controller={"law": "attitude_force", "dimension": 1}
     )
     assert np.abs(leaning["attitude"]).max() > 1e-3
+    both = [{"type": "acceleration", "value": [0.5, 1.0, 0.0]}]
+    forward = fly(
+        "cant_hexarotor", disturbance=both, controller={"law": "attitude_force", "dimension": 2}
+    )
+    assert np.abs(forward["pitch"]).max() < 1e-6
+    assert np.abs(forward["roll"]).max() > 1e-3
 
 
 BEYOND_THE_SIDE: dict[str, dict[str, object]] = {
@@ -179,6 +186,25 @@ def test_initial_rotor_speeds_within_limits_are_the_evenest():
     limited = np.abs(hover_speeds(vehicle, (0.0,) * 7, (0.0, 0.999 * free.max())))
     assert limited.max() < 0.995 * free.max()
     assert np.linalg.norm(free**2) < np.linalg.norm(limited**2)
+
+
+def test_a_controller_of_lift_starts_with_all_rotors_along_their_spins():
+    vehicle = tiltsim.load_scenario(document("tilt_heptarotor")).vehicle.resolve()
+    sway = tuple(0.1 * np.sin(2.0 * np.pi * np.arange(7) / 7.0))
+    limits = -np.inf, np.inf
+    assert min(np.multiply(hover_speeds(vehicle, sway, limits), vehicle.spins)) < -300.0
+    speeds = np.array(hover_speeds(vehicle, sway, limits, 1))
+    assert min(speeds * vehicle.spins) > 300.0
+    force, torque = force_and_torque(vehicle.table, sway)
+    inputs = speeds * np.abs(speeds)
+    assert np.abs(torque @ inputs).max() < 1e-12 * vehicle.mass
+    assert np.linalg.norm(force @ inputs) == pytest.approx(vehicle.mass * vehicle.gravity)
+    forces = torque_free_forces(force, torque)
+    assert forces.dimension == 3
+    assert abs((force @ inputs)[0]) > 1e-3  # it leans
+    # Least norm: nothing of them in the null space of torque and lift.
+    rows = np.vstack([torque, force[2]])
+    np.testing.assert_allclose(np.linalg.pinv(rows) @ rows @ inputs, inputs, rtol=1e-9)
 
 
 HEXAROTOR = {"model": "multirotor", "mjcf": mjcf("hexarotor")}

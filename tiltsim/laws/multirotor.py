@@ -39,7 +39,7 @@ from tiltsim.laws.tiltrotor import (
     singular_attitude,
 )
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController, upper_side
+from tiltsim.scenario.multirotor_controllers import AttitudeForceController, UsedForce, upper_side
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
 from tiltsim.vehicles.rotorcraft.layout import TILT_1, TILT_RATE_1
 from tiltsim.vehicles.rotorcraft.layout import Layout as Places
@@ -178,12 +178,12 @@ def _table(setup: ControlSetup) -> Values:
 
 
 @cache
-def _monitoring_of(layout: Layout, dimension: int, norm: str) -> Monitoring:
+def _monitoring_of(layout: Layout, uses: UsedForce, norm: str) -> Monitoring:
     """Where the outputs depend on each other or, in the norm of the speeds, a rotor stops."""
     places = layout.places
     tilts_in = entries_of(places.alpha_1, places.tilts)
     speeds_in = entries_of(places.speed_1, places.rotors if norm == "speed" else 0)
-    independence, names = independence_of(layout.tilt_of_rotor, dimension), places.names("alpha")
+    independence, names = independence_of(layout.tilt_of_rotor, *uses), places.names("alpha")
     stops = rotor_stops(places.rotors if norm == "speed" else 0)
     harmless = (1.0,) * len(stops)  # as published, the factor 2 |varpi| is in rows of force only
 
@@ -260,7 +260,7 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
     controller, vehicle = scenario.controller, scenario.vehicle.resolve()
     assert isinstance(controller, AttitudeForceController)
     assert isinstance(vehicle, Multirotor)
-    dimension = controller.resolve_dimension(vehicle, gait)
+    dimension, _ = controller.resolve_force(vehicle, gait)
     inertia = np.reshape(vehicle.inertia, (3, 3))
     law = Parameters(
         vehicle=body_of(vehicle.mass, inertia, vehicle.gravity),
@@ -297,20 +297,23 @@ def _follows_position(scenario: Scenario) -> bool:
 
 
 @cache
-def multirotor_loop(layout: Layout, dimension: int, norm: str) -> ClosedLoop:
+def multirotor_loop(layout: Layout, uses: UsedForce, norm: str) -> ClosedLoop:
     """The controller of attitude and force of all multirotors of a layout.
 
     Args:
         layout: Of the vehicles.
-        dimension: How many components of force are controlled, 1 to 3.
+        uses: The components of force that are controlled.
         norm: See `tiltsim_controllers.laws.multirotor.multirotor_law_of`.
     """
-    places, law = layout.places, multirotor_law_of(layout.tilt_of_rotor, dimension, norm)
+    places, law = (
+        layout.places,
+        multirotor_law_of(layout.tilt_of_rotor, uses.dimension, norm, uses.forward),
+    )
     sampling, equations = _sampling_of(layout, law), _equations_of(layout, law)
     tilts = "".join(f"_{tilt}" if tilt >= 0 else "_f" for tilt in layout.tilt_of_rotor)
     senses = "".join("p" if spin > 0.0 else "m" for spin in layout.spins)
     for step in (sampling.controls, equations.inputs):
-        step.__qualname__ = f"attitude_force_{dimension}_{norm}{tilts}_{senses}"
+        step.__qualname__ = f"attitude_force_{uses.name}_{norm}{tilts}_{senses}"
     return ClosedLoop(
         kind=rotorcraft_kind(places, ("singularity_margin",)),
         parameters=LoopParameters,
@@ -323,8 +326,8 @@ def multirotor_loop(layout: Layout, dimension: int, norm: str) -> ClosedLoop:
             layout.spins,
         ),
         sampling=sampling,
-        columns=_columns_of(layout, dimension, law),
-        monitoring=_monitoring_of(layout, dimension, norm),
+        columns=_columns_of(layout, uses.dimension, law),
+        monitoring=_monitoring_of(layout, uses, norm),
         equations=equations,
         follows_position=_follows_position,
         uses_gait=places.tilts > 0,
@@ -336,5 +339,5 @@ def loop_of_multirotor(scenario: Scenario) -> ClosedLoop:
     controller, vehicle = scenario.controller, scenario.vehicle.resolve()
     assert isinstance(controller, AttitudeForceController)
     assert isinstance(vehicle, Multirotor)
-    dimension = controller.resolve_dimension(vehicle, scenario.gait.plan(vehicle))
-    return multirotor_loop(layout_of_vehicle(vehicle), dimension, controller.norm)
+    uses = controller.resolve_force(vehicle, scenario.gait.plan(vehicle))
+    return multirotor_loop(layout_of_vehicle(vehicle), uses, controller.norm)

@@ -312,7 +312,7 @@ def _check_dimension(
     """Refuse more components of force than a multirotor has, and a pose that it cannot take."""
     vehicle = scenario.vehicle.resolve()
     assert isinstance(vehicle, Multirotor)
-    dimension = controller.resolve_dimension(vehicle, gait)
+    dimension, _ = controller.resolve_force(vehicle, gait)
     reference = scenario.reference
     if (reference.kind == "attitude_altitude") != (controller.decoupler == "none"):
         raise scenario.mistake(

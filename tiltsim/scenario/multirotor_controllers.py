@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Final, Literal, NamedTuple, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -36,6 +36,18 @@ RESTORING: Final = 0.5
 """1/s, the default where rotor speeds would drift."""
 
 
+class UsedForce(NamedTuple):
+    """The components of force that a controller uses."""
+
+    dimension: int
+    forward: bool  # two along the x and z axes, of a vehicle that has three
+
+    @property
+    def name(self) -> str:
+        """For file names."""
+        return f"{self.dimension}{'_forward' * self.forward}"
+
+
 class AttitudeForceController(ControllerTable):
     """Attitude and one, two or three components of force of a multirotor."""
 
@@ -51,8 +63,8 @@ class AttitudeForceController(ControllerTable):
     dimension: Annotated[int, Field(ge=1, le=3)] | None = Field(
         None,
         description="how many components of the force are controlled beside the attitude: 1, lift; "
-        "2, one sideways, too; 3, all, so that the vehicle need not lean; default: as many as "
-        "the vehicle has at all angles of its gait [-]",
+        "2, one sideways, too, of a vehicle with three that along its x axis; 3, all, so that the "
+        "vehicle need not lean; default: as many as the vehicle has at all angles of its gait [-]",
         examples=[1],
     )
     decoupler: Literal["none", "conventional", "modified", "exact"] = Field(
@@ -137,14 +149,14 @@ class AttitudeForceController(ControllerTable):
         terms = FeedforwardTerms(gyroscopic_torque=float(gyroscopic_torque))
         return terms._replace(**dict.fromkeys(self.leave_out, 0.0))
 
-    def resolve_dimension(self, vehicle: Multirotor, gait: Gait) -> int:
-        """The number of force components, checked over the gait."""
+    def resolve_force(self, vehicle: Multirotor, gait: Gait) -> UsedForce:
+        """The components of force that are controlled, checked over the gait."""
         least, where = force_dimension(vehicle, gait)
         if least == 0:
             raise InvalidValueError("gait.type", gait.name, f"singular at every attitude, {where}")
         if self.dimension is not None and self.dimension > least:
             raise self.mistake("dimension", f"the vehicle has {least} only, {where}")
-        return least if self.dimension is None else self.dimension
+        return UsedForce(self.dimension or least, self.dimension == 2 and least == 3)
 
     def resolve_restoring(self, rotors: int, dimension: int, gait: Gait) -> float:
         """The restoring rate, 1/s."""

@@ -107,14 +107,16 @@ def controlled_axes(forces: TorqueFreeForces, up: ArrayLike, dimension: int) -> 
     Args:
         forces: of the vehicle
         up: world up in body axes, unit vectors of shape (..., 3)
-        dimension: 1, along ``up``; 2, and across it within the torque-free forces; 3, all
+        dimension: 1, along ``up``; 2, and across it within the torque-free forces, or in the x-z
+            plane where these are all; 3, all
     """
     up = np.asarray(up, float)
     if dimension == 3:
         return np.broadcast_to(np.eye(3), (*up.shape, 3))
     if dimension == 1:
         return up[..., np.newaxis, :]
-    normal = np.linalg.eigh(forces.projector)[1][..., 0]
+    least = np.linalg.eigh(forces.projector)[1][..., 0]
+    normal = np.where(forces.dimension[..., np.newaxis] == 3, (0.0, 1.0, 0.0), least)
     across = np.cross(normal, up)
     length = np.linalg.norm(across, axis=-1, keepdims=True)
     return np.stack([up, across / np.where(length > 0.0, length, 1.0)], axis=-2)

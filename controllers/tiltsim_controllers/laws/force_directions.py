@@ -107,12 +107,13 @@ def combination_of(length: int) -> Callable[..., Values]:
 
 
 @cache
-def factors_of(length: int, dimension: int) -> Callable[..., Factors]:
+def factors_of(length: int, dimension: int, forward: bool = False) -> Callable[..., Factors]:
     """Orthogonal factors of the decoupling matrix: scalar code ``(rows, pushes, up) -> Factors``.
 
     ``rows`` are those of force and torque, ``pushes`` those of the force in the unknowns of the
     torque's, which differ in the published matrix; ``up`` is world up in body axes. NaN where the
-    rank is too low.
+    rank is too low. The plane of two components is that of the torque-free forces; ``forward``
+    takes the body's x-z plane, for rotors that push in all directions without torque.
     """
     rejected, unit, orthonormal, remainder = orthogonal_of(length)
     combination, normal_of, dot = combination_of(length), _normal_of(length), vectors_of(length).dot
@@ -131,7 +132,7 @@ def factors_of(length: int, dimension: int) -> Callable[..., Factors]:
         fx, fy, fz, tx, ty, tz = rows
         units = orthonormal(tx, ty, tz)
         gx, gy, gz = remainder(fx, units), remainder(fy, units), remainder(fz, units)
-        normal = normal_of(gx, gy, gz)
+        normal = (0.0, 1.0, 0.0) if forward else normal_of(gx, gy, gz)
         x, y, z = cross(normal, up)
         across = unit_vector(x, y, z)
         lift, side = combination(up, fx, fy, fz), combination(across, fx, fy, fz)

@@ -5,7 +5,8 @@ the outputs are the attitude and that many components of force:
 
 - 1: along world up. The horizontal position is controlled by leaning; with four rotors this is the
   attitude-altitude controller of ch. 3 and 4;
-- 2: along world up, and across it within V. What V leaves is controlled by leaning;
+- 2: along world up, and across it within V. What V leaves is controlled by leaning. A vehicle with
+  all three that is to use two (``forward``) pushes within its x-z plane;
 - 3: all of it. The attitude is free: the vehicle flies level, or as it is told.
 
 The decoupling matrix ``[tau; b^T F]`` with the directions ``b`` of the force has rank 3 + dimension
@@ -95,9 +96,9 @@ def direction_at_rest(
 
 
 @cache
-def _direction_of(layout: Layout, dimension: int) -> Callable[..., Jets3]:
+def _direction_of(layout: Layout, dimension: int, forward: bool = False) -> Callable[..., Jets3]:
     """Scalar code of the ``direction`` with derivatives, as `direction_at_rest`."""
-    if not tilts_of(layout):
+    if forward or not tilts_of(layout):
         return direction_at_rest
     planned = direction_jet_of(layout, dimension)
 
@@ -179,9 +180,9 @@ def _by_leaning_of(layout: Layout) -> Callable[..., Horizontal]:
 
 
 @cache
-def _by_both_of(layout: Layout) -> Callable[..., Horizontal]:
+def _by_both_of(layout: Layout, forward: bool) -> Callable[..., Horizontal]:
     """`by_force` with a force of dimension 2: it leans as far as the force is not enough."""
-    moving_direction = _direction_of(layout, 2)
+    moving_direction = _direction_of(layout, 2, forward)
 
     @scalar
     def by_both(
@@ -218,7 +219,7 @@ def _by_both_of(layout: Layout) -> Callable[..., Horizontal]:
 
 
 @cache
-def _control_of(layout: Layout, dimension: int) -> Callable[..., tuple[Any, ...]]:
+def _control_of(layout: Layout, dimension: int, forward: bool) -> Callable[..., tuple[Any, ...]]:
     """Scalar code of position and attitude control.
 
     ``(time, state, motion, direction, forces, integrals, parameters, knots)``; it returns the
@@ -227,7 +228,7 @@ def _control_of(layout: Layout, dimension: int) -> Callable[..., tuple[Any, ...]
     """
     horizontal = by_force
     if dimension < 3:
-        horizontal = _by_leaning_of(layout) if dimension == 1 else _by_both_of(layout)
+        horizontal = _by_leaning_of(layout) if dimension == 1 else _by_both_of(layout, forward)
 
     @scalar
     def control(
@@ -265,7 +266,9 @@ def _control_of(layout: Layout, dimension: int) -> Callable[..., tuple[Any, ...]
 
 
 @cache
-def multirotor_law_of(layout: Layout, dimension: int, norm: str = "speed") -> Callable[..., Values]:
+def multirotor_law_of(
+    layout: Layout, dimension: int, norm: str = "speed", forward: bool = False
+) -> Callable[..., Values]:
     """The control law of vehicles of a layout.
 
     A scalar function ``(time, state, tilt_rates, integrals, parameters, knots, measured)``:
@@ -285,13 +288,20 @@ def multirotor_law_of(layout: Layout, dimension: int, norm: str = "speed") -> Ca
         layout: of the table of rotors, four or more
         dimension: how many components of force are outputs, 1 to 3
         norm: in `NORMS`
+        forward: two components are those along x and z, of a vehicle that has three
     """
     length, tilts = len(layout), tilts_of(layout)
     tilts_in, speeds_in = entries_of(12, tilts), entries_of(12 + tilts, length)
     squares, pushing = effectiveness_of(layout).squares, pushing_of(layout)
-    scaled_rows, factors_of_rows = scaled_rows_of(length, norm), factors_of(length, dimension)
-    control, solution = _control_of(layout, dimension), solution_of(length, dimension, norm)
-    null_part = null_part_of(length, dimension)
+    scaled_rows, factors_of_rows = (
+        scaled_rows_of(length, norm),
+        factors_of(length, dimension, forward),
+    )
+    control, solution = (
+        _control_of(layout, dimension, forward),
+        solution_of(length, dimension, norm),
+    )
+    null_part = null_part_of(length, dimension, forward)
 
     @scalar
     def inputs(

@@ -171,7 +171,7 @@ def solution_of(length: int, dimension: int, norm: str) -> Callable[..., Values]
 
 
 @cache
-def independence_of(layout: Layout, dimension: int) -> Callable[..., float]:
+def independence_of(layout: Layout, dimension: int, forward: bool = False) -> Callable[..., float]:
     """Scalar code of how independent the outputs are: ``(tilts, up, side, table, at)``.
 
     1 at best and 0 where the decoupling matrix is singular: the share of the force's rows that
@@ -180,8 +180,8 @@ def independence_of(layout: Layout, dimension: int) -> Callable[..., float]:
     ``side``, the number is negative.
     """
     cosines, sines, effect, _, _ = effectiveness_of(layout)
-    factors_of_rows, dot = factors_of(len(layout), dimension), vectors_of(len(layout)).dot
-    combination = combination_of(len(layout))
+    factors_of_rows = factors_of(len(layout), dimension, forward)
+    dot, combination = vectors_of(len(layout)).dot, combination_of(len(layout))
 
     @scalar
     def independence(tilts: Values, up: Triple, side: Triple, table: Vector, at: int) -> float:
@@ -200,14 +200,14 @@ def independence_of(layout: Layout, dimension: int) -> Callable[..., float]:
 
 
 @cache
-def null_part_of(length: int, dimension: int) -> Callable[..., float]:
+def null_part_of(length: int, dimension: int, forward: bool = False) -> Callable[..., float]:
     """Scalar code of the share of ``w`` that the outputs do not see, whatever the norm.
 
     ``(rows, up, w)``: ``rows`` of F and tau per unit of ``w``, ``up`` is world up in body axes. In
     the norm of rotor accelerations a rotor that comes to rest would take the share with it.
     """
     equations = 3 + dimension
-    factors_of_rows, dot = factors_of(length, dimension), vectors_of(length).dot
+    factors_of_rows, dot = factors_of(length, dimension, forward), vectors_of(length).dot
     shares, squared = shares_of(length, equations), vectors_of(equations).dot
 
     @scalar

@@ -24,6 +24,7 @@ from tiltsim.closed_loop.limits import (
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.parts import RotorLimits
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.system.quantity import Quantity, subscript
 from tiltsim.vehicles.rotorcraft.hover import hover_speeds
@@ -174,7 +175,10 @@ def initial_rotor_speeds(plan: FlightPlan) -> Values:
     scenario = plan.scenario
     vehicle, table = scenario.vehicle.resolve(), scenario.any_rotorcraft
     if isinstance(vehicle, Multirotor) and scenario.initial.rotor_speed is None:
-        return hover_speeds(vehicle, initial_tilts(plan)[0], table.speeds_along_spin)
+        controller, dimension = scenario.controller, 3
+        if isinstance(controller, AttitudeForceController):
+            dimension, _ = controller.resolve_force(vehicle, plan.gait)
+        return hover_speeds(vehicle, initial_tilts(plan)[0], table.speeds_along_spin, dimension)
     speeds = scenario.initial.rotor_speeds(table.rotor_count)
     return tuple(sign * speed for sign, speed in zip(table.spins, speeds, strict=True))
 

@@ -6,7 +6,12 @@ import numpy as np
 
 from tiltsim.errors import InputError
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim_controllers.analysis.torque_free import hover_direction, torque_free_forces
+from tiltsim_controllers.analysis.torque_free import (
+    LEVEL,
+    controlled_axes,
+    hover_direction,
+    torque_free_forces,
+)
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
@@ -14,25 +19,35 @@ TOLERANCE = 1e-9
 """Relative, of the singular values of force and torque and of the limits."""
 
 
-def hover_speeds(vehicle: Multirotor, tilts: Values, limits: tuple[float, float]) -> Values:
+def hover_speeds(
+    vehicle: Multirotor, tilts: Values, limits: tuple[float, float], dimension: int = 3
+) -> Values:
     """Signed rotor speeds (rad/s) without torque, whose force carries the weight.
 
     The force is as large as the weight, and as nearly along the body's z axis as the tilt angles
-    allow. Of all inputs ``varpi |varpi|`` that make it, these have the least norm, or the least
-    largest one where the limits exclude those.
+    allow; a controller of fewer components of force leans instead of forcing the rest. Of all
+    inputs ``varpi |varpi|`` that make it, these have the least norm, or the least largest one where
+    the limits exclude those.
 
     Args:
         vehicle: The vehicle.
         tilts: rad.
         limits: Lowest and highest speed (rad/s) along the spin, the first negative for rotors that
             reverse.
+        dimension: How many components of the force are controlled.
 
     Raises:
         InputError: If there are none within the limits.
     """
     force, torque = force_and_torque(vehicle.table, tilts)
     weight = vehicle.mass * vehicle.gravity
-    direction = hover_direction(torque_free_forces(force, torque))
+    forces = torque_free_forces(force, torque)
+    if dimension < forces.dimension:
+        axes = controlled_axes(forces, LEVEL, dimension)
+        wanted = force @ _least_inputs(axes @ force, torque, weight * axes[:, 2])
+        direction = wanted / np.linalg.norm(wanted)
+    else:
+        direction = hover_direction(forces)
     ends = np.outer(vehicle.spins, [speed * abs(speed) for speed in limits])
     lower, upper = ends.min(axis=1), ends.max(axis=1)
     inputs = _least_inputs(force, torque, weight * direction)
@@ -53,7 +68,7 @@ def hover_speeds(vehicle: Multirotor, tilts: Values, limits: tuple[float, float]
 
 
 def _least_inputs(force: Floats, torque: Floats, wanted: Floats) -> Floats:
-    """The shortest ``varpi |varpi|`` that make a force without torque."""
+    """The shortest ``varpi |varpi|`` that make a force, or components of it, without torque."""
     # Rows of one size: a force in N and a torque in N m do not compare.
     sizes = np.abs(force).max(), np.abs(torque).max()
     rows = np.vstack([force / sizes[0], torque / sizes[1]])
