@@ -14,7 +14,9 @@ from tiltsim.arrays.flying import CODES, double_precision
 from tiltsim.arrays.jax_arrays import JaxArrays
 from tiltsim.arrays.lifting import Lifting
 from tiltsim.arrays.values import LiftError
-from tiltsim_controllers.mathematics.scalar import scalar_functions
+from tiltsim.closed_loop.loop import Equations
+from tiltsim.equations.ode3 import Integration, make_step
+from tiltsim_controllers.mathematics.scalar import scalar, scalar_functions
 
 jax = pytest.importorskip("jax")
 
@@ -113,6 +115,32 @@ def test_functions_of_a_controller_have_the_same_values_on_arrays():
     wrong, calls = all_differences([(LAWS["attitude_altitude"], {"plant": "thesis"})])
     assert wrong == {}
     assert len(calls) > 30
+
+
+def test_stages_of_a_step_do_not_multiply_the_operations():
+    @scalar
+    def rates(time, state, held, parameters, knots, disturbance):
+        x, y, z = state
+        size = x * x + y * y + z * z
+        return [size * y, size * z, size * x]
+
+    @scalar
+    def inputs(time, state, parameters, knots):
+        return ()
+
+    step = make_step(Equations(inputs, 0, rates, initial=None, observe=None))
+    integration = Integration(0.1, 0, None, (), (0.0, 0.0, 0.0))
+    start = np.linspace(0.1, 0.3, 3 * ROWS).reshape(3, ROWS)
+
+    def fly(separate, state):
+        lifting = Lifting(JaxArrays("float64"), separate=separate)
+        return lifting(step)(0.0, [*state], (), True, integration)[0]
+
+    made = jax.jit(fly, static_argnums=0).lower((rates,), start).compile()
+    products = 3 * 3 * 4 + 3 + 3 + 3 * 4  # each of three results of each stage; stages; their sum
+    assert made.as_text().count(" multiply(") <= products
+    expected = [step(0.0, [*column], (), True, integration)[0] for column in start.T.tolist()]
+    np.testing.assert_allclose(np.transpose(made(start)), expected, rtol=ROUNDING)
 
 
 NEVER_CALLED = {

@@ -36,6 +36,10 @@ class CasadiSymbols:
         entries = enumerate(others, start=1)
         return reduce(lambda found, e: self.where(index == e[0], e[1], found), entries, first)
 
+    def separately(self, function: Function, args: Any, key: Any) -> Any:
+        """Call a function; a symbol that is used twice is computed once."""
+        return function(*args)
+
     @cached_property
     def functions(self) -> Mapping[Function, Function]:
         """Counterparts of the functions of ``math`` and of builtins."""

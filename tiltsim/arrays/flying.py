@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
-from tiltsim.arrays.jax_arrays import JaxArrays, require_jax
+from tiltsim.arrays.jax_arrays import JaxArrays, recomputes, require_jax
 from tiltsim.arrays.lifting import Lifting
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.limits import SINGULAR, WITHIN_LIMITS
@@ -95,7 +95,8 @@ class Kernel:
         assert equations is not None  # other loops do not fly on equations
         self._jax, self._numpy, self.course, self.setup = jax, jnp, course, setup
         self._arrays = arrays = JaxArrays(course.dtype)
-        lifting = Lifting(arrays, guarded=guarded)
+        separate = (equations.inputs, equations.rates) if recomputes() else ()
+        lifting = Lifting(arrays, guarded=guarded, separate=separate)
         self._step, self._inputs = lifting(make_step(equations)), lifting(equations.inputs)
         self._observe = lifting(equations.observe)
         self._check = lifting(loop.monitoring.sign_check_values)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+import os
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, Final
@@ -16,6 +17,17 @@ Function = Callable[..., Any]
 def require_jax(purpose: str) -> Any:
     """JAX. Raises `InputError`, which begins with the purpose, unless it is installed."""
     return optional_package("jax", purpose, "'tiltsim[jax]'")
+
+
+MERGES_LOOPS: Final = "xla_cpu_use_multi_output_fusion"
+"""An option of XLA, with which it computes an intermediate value once for several results."""
+
+
+def recomputes() -> bool:
+    """Whether XLA computes an intermediate value anew wherever it is used."""
+    import jax
+
+    return jax.default_backend() == "cpu" and MERGES_LOOPS not in os.environ.get("XLA_FLAGS", "")
 
 
 class JaxArrays:
@@ -37,7 +49,8 @@ class JaxArrays:
         import jax
         import jax.numpy as jnp
 
-        self.dtype = dtype
+        self.dtype, self._jax = dtype, jax
+        self._separate: dict[Any, tuple[Function, list[Any]]] = {}
         self._array, self._numpy = jax.Array, jnp
         self.where, self.both = jnp.where, jnp.logical_and
         self.either, self.negated = jnp.logical_or, jnp.logical_not
@@ -51,6 +64,51 @@ class JaxArrays:
     def take(self, values: Any, index: Any) -> Any:
         """The entry of a vector at an index that is an array."""
         return self.vector(values)[index]
+
+    def separately(self, function: Function, args: Any, key: Any) -> Any:
+        """A call that XLA compiles on its own and does not merge into its caller.
+
+        Where XLA `recomputes`, operations multiply over the stages of a solver: in a step of ode3
+        to seven times those of one stage.
+
+        Args:
+            function: Depends on nothing but its arguments.
+            args: Its arguments: arrays and other values, which may be nested.
+            key: Equal for the same function.
+        """
+        from jax.experimental.xla_metadata import set_xla_metadata
+
+        jax = self._jax
+        leaves, tree = jax.tree.flatten(args)
+        fixed = tuple(None if self.is_array(leaf) else leaf for leaf in leaves)
+        key = key, tree, fixed
+        if key not in self._separate:
+            self._separate[key] = self._compiled_alone(function, tree, fixed)
+        call, results = self._separate[key]
+        with set_xla_metadata(inlineable="false"):
+            made = iter(call(*filter(self.is_array, leaves)))
+        values, tree = results[0]
+        return jax.tree.unflatten(tree, [next(made) if v is None else v for v in values])
+
+    def _compiled_alone(
+        self, function: Function, tree: Any, fixed: tuple[Any, ...]
+    ) -> tuple[Function, list[Any]]:
+        """A function of the arrays among arguments, and how its results are arranged."""
+        from jax.experimental.xla_metadata import set_xla_metadata
+
+        results: list[Any] = []
+
+        def call(*arrays: Any) -> list[Any]:
+            following = iter(arrays)
+            args = [next(following) if value is None else value for value in fixed]
+            with set_xla_metadata(inlineable=None):  # calls within are merged
+                found, shape = self._jax.tree.flatten(
+                    function(*self._jax.tree.unflatten(tree, args))
+                )
+            results[:] = [([None if self.is_array(value) else value for value in found], shape)]
+            return list(filter(self.is_array, found))
+
+        return self._jax.jit(call), results
 
     def vector(self, values: Any) -> Any:
         """Numbers as an array of one dimension."""
