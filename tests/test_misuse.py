@@ -55,6 +55,12 @@ MISUSES = {
         "simulation.duration: a scenario stays as it is",
     ),
     "vectorized in MuJoCo": (lambda: tiltsim.vectorized({}), 'vectorized supports "thesis" only'),
+    "linearize a moving gait": (
+        lambda: tiltsim.linearize("ch04_tracking/circle#continuous_t2_modified"),
+        "with no common multiple",
+    ),
+    "linearize another loop": (lambda: tiltsim.linearize({}, loop="half"), "choose closed or open"),
+    "stability of nothing": (lambda: tiltsim.stability(None), "scenario = None: must be"),
     "symbolic in MuJoCo": (lambda: tiltsim.symbolic({}), 'symbolic supports "thesis" only'),
     "a family without a member": (lambda: tiltsim.simulate("ch04_tracking/setpoint"), "choose a"),
     "a sweep as scenario": (

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from tiltsim.flight.end import End
     from tiltsim.flight.flight import Flight
     from tiltsim.flight.reading import load_flight
+    from tiltsim.linear.linearization import linearize
+    from tiltsim.linear.stability import stability
     from tiltsim.plants.command import Command, Observation
     from tiltsim.scenario.loading import load_scenario, parse_scenario
     from tiltsim.scenario.scenario import Scenario
@@ -41,12 +43,14 @@ _HOMES = {
     "Simulation": "simulation.stepwise",
     "TiltsimError": "errors",
     "fly": "simulation.batch",
+    "linearize": "linear.linearization",
     "load_flight": "flight.reading",
     "load_scenario": "scenario.loading",
     "parse_scenario": "scenario.loading",
     "simulate": "simulation.simulate",
     "plot": "views.figures.plot",
     "show_progress": "commands.progress",  # for progress=True
+    "stability": "linear.stability",
     "sweep": "sweeps.sweep",
     "symbolic": "simulation.symbolic",
     "vectorized": "simulation.vectorized",
@@ -64,11 +68,13 @@ __all__ = [
     "Simulation",
     "TiltsimError",
     "fly",
+    "linearize",
     "load_flight",
     "load_scenario",
     "parse_scenario",
     "plot",
     "simulate",
+    "stability",
     "sweep",
     "symbolic",
     "vectorized",

@@ -24,6 +24,7 @@ OTHER_COMMANDS: Final = (
     "gait",
     "map",
     "singularity",
+    "stability",
     "report",
     "bench",
     "schema",

@@ -26,6 +26,8 @@ from tiltsim.scenario.scenario import plan_flight
 from tiltsim.system.locks import one_thread_at_a_time
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from tiltsim.closed_loop.loop import ClosedLoop
     from tiltsim.scenario.scenario import Scenario
 
@@ -49,9 +51,18 @@ MEASURED_LOOPS: Final = {
 """Those that feed back the angular acceleration of the plant."""
 
 
+def _unchanged(loop: ClosedLoop) -> ClosedLoop:
+    return loop
+
+
 @one_thread_at_a_time
-def loop_of(scenario: Scenario) -> ClosedLoop:
-    """The closed loop of a scenario: its controller inside layers for all that is not ideal."""
+def loop_of(
+    scenario: Scenario, adapted: Callable[[ClosedLoop], ClosedLoop] = _unchanged
+) -> ClosedLoop:
+    """The closed loop of a scenario: its controller inside layers for all that is not ideal.
+
+    ``adapted`` may change the controller before layers go around it.
+    """
     controller, external = scenario.controller, scenario.controller.is_external
     by_controls = (
         scenario.simulation.plant == "thesis" and not scenario.has_ideal_actuators_in_still_air
@@ -65,7 +76,7 @@ def loop_of(scenario: Scenario) -> ClosedLoop:
         loop = loop_of_multirotor(scenario)
     else:
         loop = (MEASURED_LOOPS if measured else LOOPS)[controller.loop_name]
-    supervisor = controller.supervision
+    loop, supervisor = adapted(loop), controller.supervision
     if supervisor is not None:
         loop = with_supervisor(loop, supervisor.strategy)
     if scenario.needs_actuation_layer:
@@ -79,9 +90,11 @@ def loop_of(scenario: Scenario) -> ClosedLoop:
     return on_equations(loop) if by_controls else loop
 
 
-def assemble(scenario: Scenario) -> Assembly:
-    """Plan the flight of a scenario and set up its closed loop."""
-    plan, loop = plan_flight(scenario), loop_of(scenario)
+def assemble(
+    scenario: Scenario, adapted: Callable[[ClosedLoop], ClosedLoop] = _unchanged
+) -> Assembly:
+    """Plan the flight of a scenario and set up its closed loop; see `loop_of`."""
+    plan, loop = plan_flight(scenario), loop_of(scenario, adapted)
     return Assembly(
         **vars(plan),
         loop=loop,

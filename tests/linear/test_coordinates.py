@@ -1,0 +1,51 @@
+"""Minimal coordinates of states with a rotation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tiltsim.linear.coordinates import MATRIX, QUATERNION, ROTATION_NAMES, Coordinates
+from tiltsim_controllers.mathematics.rotation import rotation_from_quaternion
+
+NAMES = ("x", *ROTATION_NAMES, "speed")
+
+
+def random_states(entries, count):
+    """Coordinates, and states with a rotation of so many entries, and vectors of coordinates."""
+    generator = np.random.default_rng(7)
+    coordinates = Coordinates(NAMES, ("",) * len(NAMES), entries, 1)
+    for _ in range(count):
+        quaternion = generator.normal(size=4)
+        quaternion /= np.linalg.norm(quaternion)
+        rotation = quaternion
+        if entries == MATRIX:
+            rotation = rotation_from_quaternion(*quaternion.tolist())
+        state = np.array((generator.normal(), *rotation, generator.normal()))
+        yield coordinates, state, generator.uniform(-1.7, 1.7, size=5)
+
+
+@pytest.mark.parametrize("entries", [MATRIX, QUATERNION])
+def test_between_undoes_moved(entries):
+    for coordinates, state, by in random_states(entries, 20):
+        moved = coordinates.moved(state, by)
+        assert coordinates.between(state, moved) == pytest.approx(by, abs=1e-12)
+        assert coordinates.between(state, state) == pytest.approx(np.zeros(5), abs=1e-15)
+
+
+def test_both_forms_of_a_rotation_turn_alike():
+    for (matrix, state, by), (quaternion, other, _) in zip(
+        random_states(MATRIX, 5), random_states(QUATERNION, 5), strict=True
+    ):
+        turned = quaternion.moved(other, by)[1:5]
+        expected = rotation_from_quaternion(*turned.tolist())
+        assert matrix.moved(state, by)[1:10] == pytest.approx(expected, abs=1e-12)
+
+
+def test_rates_are_those_of_the_coordinates():
+    """A turn in body axes for a short time has its rates."""
+    step = 1e-6
+    for coordinates, state, by in random_states(MATRIX, 5):
+        ahead, behind = coordinates.moved(state, step * by), coordinates.moved(state, -step * by)
+        derivative = (ahead - behind) / (2.0 * step)
+        assert coordinates.rates(state, derivative) == pytest.approx(by, abs=1e-9)

@@ -1,0 +1,227 @@
+"""Rest points, their poles and their linear systems."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tiltsim
+from tiltsim.linear.equilibrium import equilibrium_of
+from tiltsim.linear.modes import exponents, is_stable, modes_of
+from tiltsim.linear.motion import make_motion
+from tiltsim.linear.newton import derivative_at
+from tiltsim_controllers.analysis.stability import error_loops
+
+SETPOINT = "ch04_tracking/setpoint#rho_065_modified"
+THESIS = {"simulation.plant": "thesis"}
+
+
+def random_hover(seed):
+    """A level hover with random tilts, vehicle and gains, under the exact matrix."""
+    draw = np.random.default_rng(seed).uniform
+    fast = draw(6.0, 12.0, 3)
+    rho = float(draw(0.3, 0.8))
+    return tiltsim.parse_scenario(
+        {
+            "simulation": {"plant": "thesis"},
+            "vehicle": {"mass": float(draw(0.3, 0.6))},
+            "initial": {"rotor_speed": 380.0},
+            "controller": {
+                "law": "attitude_altitude",
+                "decoupling": "exact",
+                "decoupler": "none",
+                "gains": {
+                    "attitude": [fast.tolist(), (5.0 * fast).tolist(), (8.0 * fast).tolist()],
+                    "altitude": draw([8.0, 5.0, 8.0], [12.0, 9.0, 10.0]).tolist(),
+                    "position": [1.0, 1.0],
+                },
+            },
+            "gait": {"type": "fixed", "angles": [rho, -rho, rho, -rho]},
+            "reference": {"type": "attitude_altitude", "altitude": 1.0},
+        }
+    )
+
+
+def routh_roots(scenario):
+    """The poles of the error loops that the law follows, in closed form."""
+    loops = error_loops(scenario.controller.resolve_gains(), 1.0, 1.0)
+    return np.concatenate([np.roots(loop.polynomial) for loop in loops if loop.name != "position"])
+
+
+def distance(found, expected):
+    """The largest distance of an expected value to the found ones, each taken once."""
+    left, far = list(found), 0.0
+    for value in expected:
+        nearest = min(left, key=lambda other: abs(other - value))
+        left.remove(nearest)
+        far = max(far, abs(nearest - value))
+    return far
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_poles_are_the_roots_of_the_routh_polynomials(seed):
+    """Under the exact matrix; nothing follows the horizontal position, two double integrators."""
+    scenario = random_hover(seed)
+    found = tiltsim.stability(scenario)
+    moving = found.poles[np.abs(found.poles) > 1e-3]
+    assert len(moving) == 12
+    assert distance(moving, routh_roots(scenario)) < 1e-8
+    assert found.kind == "rest"
+    assert found.residual < 1e-9
+    assert not found.stable  # its place drifts
+
+
+@pytest.mark.parametrize("plant", ["thesis", "mujoco"])
+def test_poles_are_those_of_the_flown_step(plant):
+    """A step multiplies a mode by the solver's polynomial of time step times pole."""
+    scenario = tiltsim.load_scenario(SETPOINT, {"simulation.plant": plant})
+    found = equilibrium_of(scenario)
+    motion, state = found.motion, found.root.state
+    coordinates, timestep = motion.coordinates, scenario.simulation.timestep
+
+    step = derivative_at(
+        lambda at: coordinates.between(state, motion.flown(0, at, 1)), coordinates, state
+    )
+    poles = tiltsim.stability(scenario).poles
+    # Of the servos' double poles the differences give no more than half the digits.
+    z = timestep * poles[np.abs(poles + 300.0) > 1.0]
+    growth = 1.0 + z + z**2 / 2.0 + z**3 / 6.0 + (z**4 / 24.0 if plant == "mujoco" else 0.0)
+    assert distance(np.linalg.eigvals(step), growth) < 1e-5 * timestep
+
+
+def test_the_plants_have_the_same_poles_but_for_the_servos():
+    """Pods of 1e-9 kg move the other poles by less than a millionth."""
+    thesis = tiltsim.stability(tiltsim.load_scenario(SETPOINT, THESIS)).poles
+    mujoco = tiltsim.stability(SETPOINT)
+    assert distance(mujoco.poles / 800.0, thesis / 800.0) < 1e-6
+    servos = next(mode for mode in mujoco.modes if mode.name == "tilt servos")
+    assert (servos.count, servos.frequency) == (8, pytest.approx(300.0, rel=1e-4))
+
+
+def test_the_differences_are_as_good_as_symbolic_derivatives():
+    casadi = pytest.importorskip("casadi")
+    scenario = tiltsim.load_scenario(SETPOINT, THESIS)
+    system = tiltsim.linearize(scenario)
+    found = equilibrium_of(scenario)
+    coordinates, at = found.motion.coordinates, found.root.state
+    symbolic = tiltsim.symbolic(scenario)
+    state = casadi.SX.sym("state", len(at))
+    jacobian = casadi.jacobian(symbolic.closed_loop(0.0, state), state)
+    exact = casadi.Function("jacobian", [state], [jacobian])(at).full()
+    lift = derivative_at(lambda moved: moved, coordinates, at)
+    columns = [coordinates.rates(at, column) for column in (exact @ lift).T]
+    assert pytest.approx(np.array(columns).T, rel=1e-8, abs=1e-7) == system.A
+
+
+def test_a_linear_system_predicts_a_flight():
+    """A small step of a rotor's acceleration, in MuJoCo, to the square of its size."""
+    system = tiltsim.linearize(SETPOINT)
+    motion = make_motion(tiltsim.load_scenario(SETPOINT), "python")
+    found = equilibrium_of(motion.scenario)
+    start, coordinates = found.root.state, motion.coordinates
+    motion.offsets[1] = 1e-2
+    steps = 20
+    moved = coordinates.between(start, motion.flown(0, start, steps))
+    time = steps * motion.scenario.simulation.timestep
+    whole = np.block([[system.A, system.B[:, 1:2]], [np.zeros((1, len(moved) + 1))]])
+    powers = np.eye(len(whole))
+    expected = np.zeros(len(whole))
+    start_at = np.array((*np.zeros(len(moved)), 1e-2))
+    for order in range(1, 60):  # the exponential series
+        powers = powers @ whole * (time / order)
+        expected = expected + powers @ start_at
+    assert moved == pytest.approx(expected[:-1], rel=1e-4, abs=1e-9)
+
+
+def test_the_open_loop_is_the_vehicle():
+    """Integrators only; with the feedback it is the closed loop."""
+    closed = tiltsim.linearize(SETPOINT, loop="closed")
+    vehicle = tiltsim.linearize(tiltsim.load_scenario(SETPOINT, THESIS), loop="open")
+    assert vehicle.A[12:] == pytest.approx(0.0, abs=1e-7)  # rotors turn as they are told
+    assert np.linalg.matrix_power(vehicle.A, 6) == pytest.approx(0.0, abs=1e-3)
+    opened = closed.opened()
+    assert opened.A + opened.B @ closed.feedback == pytest.approx(closed.A, abs=1e-9)
+    assert [signal.text for signal in vehicle.inputs] == [
+        f"rotor_acceleration_{rotor} [rad/s^2]" for rotor in (1, 2, 3, 4)
+    ]
+    assert vehicle.state["x"] == pytest.approx(0.38, abs=1e-2)  # as published, behind by 0.38 m
+
+
+def test_to_control_names_the_signals():
+    pytest.importorskip("control")
+    system = tiltsim.linearize(random_hover(0))
+    space = system.to_control()
+    assert space.state_labels == [signal.name for signal in system.states]
+    assert space.input_labels == [signal.name for signal in system.inputs]
+    assert space.output_labels[:3] == ["x", "y", "z"]
+    assert pytest.approx(system.A) == space.A
+    assert space.dt == 0
+
+
+def test_a_sampled_controller_gives_a_system_in_discrete_time():
+    """On a set point of slow gains, sampled at 10 ms: near the continuous one."""
+    slow = random_hover(1)
+    sampled = slow.replace({"simulation.control_timestep": 0.01})
+    system = tiltsim.linearize(sampled)
+    assert system.timestep == pytest.approx(0.01)
+    poles = exponents(system.poles, system.timestep)
+    continuous = tiltsim.linearize(slow).poles
+    assert 1e-3 < distance(poles, continuous) < 0.5
+    assert tiltsim.stability(sampled).poles.real.max() < 1e-3
+
+
+def test_neutral_states_are_counted_but_do_not_grow():
+    """A hexarotor's rotors have two combinations that move nothing."""
+    found = tiltsim.stability("fleet/hexarotor#hover")
+    assert (found.stable, found.neutral) == (True, 2)
+    assert found.modes[0].name == "rotors"
+    assert "integral_x" not in found.states  # without a gain
+
+
+AT_REST = {"reference.type": "setpoint"}
+
+
+def test_a_frame_moves_with_a_line():
+    line = {"reference.type": "line", "reference.velocity": [0.5, -0.2, 0.1]}
+    moving = tiltsim.load_scenario(SETPOINT, {**THESIS, **line})
+    found = tiltsim.stability(moving)
+    assert distance(found.poles, tiltsim.stability(moving.replace(AT_REST)).poles) < 1e-6
+    assert found.residual < 1e-9
+
+
+def test_double_integrators_are_not_stable_but_single_ones_are():
+    for matrix, timestep in ((np.array([[0.0, 1.0], [0.0, 0.0]]), None), (np.eye(2), 0.1)):
+        poles = exponents(np.linalg.eigvals(matrix), timestep)
+        assert is_stable(matrix, poles, timestep) == (timestep is not None)
+
+
+def test_modes_group_equal_poles_and_name_their_states():
+    block = np.array([[-1.0, 2.0], [-2.0, -1.0]])
+    matrix = np.kron(np.eye(2), block)
+    (mode,) = modes_of(matrix, ("x", "vx", "rotor_speed_1", "rotor_speed_2"), None)
+    assert (mode.count, mode.name) == (4, "x")
+    assert (mode.frequency, mode.damping) == (pytest.approx(5**0.5), pytest.approx(5**-0.5))
+
+
+REFUSED = {
+    "noise": ({"sensors.position_noise": 0.1}, "sensors.position_noise: with noise"),
+    "a moving gait": (
+        {"gait.type": "trot_continuous", "gait.amplitude": 0.5, "gait.period": 2.0},
+        "period of 2 s",
+    ),
+    "way-points": (
+        {
+            "reference.type": "waypoints",
+            "reference.positions": [[0, 0, 0], [1, 0, 0]],
+            "reference.times": [0.0, 2.0],
+        },
+        'reference.type = "waypoints": the flight is neither at rest nor periodic',
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_refusals(case):
+    changes, message = REFUSED[case]
+    with pytest.raises(tiltsim.InputError, match=message):
+        tiltsim.linearize(tiltsim.load_scenario(SETPOINT, {**THESIS, **changes}))

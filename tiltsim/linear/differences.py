@@ -1,0 +1,44 @@
+"""Derivatives of functions of a vector by central differences of sixth order.
+
+The functions are smooth code on doubles. A stencil of sixth order leaves of its step of 5e-3 a
+relative error of some 1e-16, and rounding one of 1e-12 to 1e-10: on every plant and with every
+layer, derivatives about as good as exact ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from tiltsim_controllers.mathematics.scalar import Floats
+
+STEP: Final = 5e-3
+"""For coordinates of order one; larger ones are moved by this share of them."""
+
+HALF_STENCIL: Final = ((1.0, 3.0 / 4.0), (2.0, -3.0 / 20.0), (3.0, 1.0 / 60.0))
+"""Offsets in steps, and weights; those on the other side are the negative ones."""
+
+
+def steps_at(values: Floats) -> Floats:
+    """Steps of the differences for coordinates near these values."""
+    return np.asarray(STEP * np.maximum(1.0, np.abs(values)))
+
+
+def jacobian(function: Callable[[Floats], Floats], steps: Floats) -> Floats:
+    """Derivative at zero of a function of a vector, shape (values, len(steps)).
+
+    Args:
+        function: Of a vector as long as ``steps``.
+        steps: By which each entry is moved.
+    """
+    columns = []
+    for index, step in enumerate(steps.tolist()):
+        moved = np.zeros(len(steps))
+        column: Floats = np.zeros(1)
+        for offset, weight in HALF_STENCIL:
+            moved[index] = offset * step
+            column = column + weight / step * (function(moved) - function(-moved))
+        columns.append(column)
+    return np.array(columns).T

@@ -1,0 +1,236 @@
+"""Rest points and periodic orbits of closed loops."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from math import ceil
+from typing import Any, Final
+
+import numpy as np
+
+from tiltsim.engines.base import EngineName
+from tiltsim.errors import InputError
+from tiltsim.laws.assembling import assemble
+from tiltsim.linear.forcing import Forcing, forcing_of
+from tiltsim.linear.motion import Motion, make_motion
+from tiltsim.linear.newton import Root, solve
+from tiltsim.plants.engine_choice import native_pays_off
+from tiltsim.scenario.scenario import Scenario
+from tiltsim_controllers.mathematics.scalar import Floats
+
+REST: Final = 1e-6
+"""Largest rate, in SI units, that counts as rest; solutions end far below."""
+
+ORBIT: Final = 1e-7
+"""Largest difference after a period, in SI units, that counts as periodic."""
+
+SETTLING_TIME: Final = 40.0  # s, flown at most to approach an orbit or a rest point
+FLIGHTS: Final = 150  # over a period, that an orbit takes to find
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """A state to which a closed loop returns: at once, after a control sample or after a period.
+
+    Attributes:
+        motion: The closed loop on its plant.
+        forcing: What drives it.
+        root: The state at ``step``, what is left of its rates or of its change over ``steps``, and
+            their derivative.
+        step: The physics step at which it is considered.
+        steps: After which it returns; 0 where it rests in continuous time.
+    """
+
+    motion: Motion
+    forcing: Forcing
+    root: Root
+    step: int
+    steps: int
+
+    @property
+    def time(self) -> float:
+        """When it is considered, s."""
+        return self.step * self.motion.assembly.scenario.simulation.timestep
+
+    @property
+    def timestep(self) -> float | None:
+        """Seconds after which it returns; None where it rests in continuous time."""
+        timestep = self.motion.assembly.scenario.simulation.timestep
+        return self.steps * timestep if self.steps else None
+
+    @property
+    def is_orbit(self) -> bool:
+        """Whether it is a periodic orbit, not a rest point."""
+        return self.forcing.period is not None
+
+    @cached_property
+    def kept(self) -> Any:
+        """Indices of the coordinates but those that nothing depends on.
+
+        Such are integrals without a gain; a position counts, though, even if no law follows it.
+        """
+        names, derivative = self.motion.coordinates.names, self.root.derivative
+        used = [name in "xyz" or column.any() for name, column in zip(names, derivative.T)]
+        return np.flatnonzero(used)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the coordinates kept."""
+        return tuple(self.motion.coordinates.names[index] for index in self.kept)
+
+    @property
+    def matrix(self) -> Floats:
+        """The linear system: rates by coordinates, or in discrete time the state by the last."""
+        change: Floats = self.root.derivative[np.ix_(self.kept, self.kept)]
+        return change if not self.steps else change + np.eye(len(change))
+
+
+def equilibrium_of(scenario: Scenario, *, at_rest: bool = False) -> Equilibrium:
+    """The rest point or the periodic orbit of a scenario; ``at_rest`` demands the former.
+
+    Raises:
+        InputError: If it has none.
+    """
+    forcing = forcing_of(assemble(scenario))
+    if forcing.period is not None:
+        if at_rest:
+            raise InputError(
+                f"{scenario.address or 'scenario'}: moves with a period of {forcing.period:g} s; "
+                "a linear system needs a fixed gait and a set point or a line (tiltsim.stability "
+                "takes periodic flights, too)"
+            )
+        scenario = _in_whole_steps(scenario, forcing.period)
+    simulation = scenario.simulation
+    steps = simulation.control_steps
+    if forcing.period is not None:
+        steps = round(forcing.period / simulation.timestep)
+    flights = FLIGHTS if forcing.period is not None else 1
+    settling = ceil(min(SETTLING_TIME, simulation.duration) / simulation.timestep)
+    motion = make_motion(scenario, _engine(scenario, max(settling, flights * steps)))
+    step = ceil(forcing.start / simulation.timestep - 1e-9)
+    step = ceil(step / steps) * steps if steps else step
+    search = _Search(motion, forcing, step, steps, max(1, settling // max(1, steps)))
+    return Equilibrium(motion, forcing, search.root(), step, steps)
+
+
+def _engine(scenario: Scenario, steps: int) -> EngineName:
+    """The engine for so many steps."""
+    engine = scenario.simulation.engine
+    if engine == "python" or engine == "native":
+        return engine
+    duration = steps * scenario.simulation.timestep
+    longer = scenario.simulation.model_copy(update={"duration": duration})
+    flown = scenario.model_copy(update={"simulation": longer})
+    return "native" if native_pays_off([flown]) else "python"
+
+
+def _in_whole_steps(scenario: Scenario, period: float) -> Scenario:
+    """The scenario with time steps that divide a period: all shorter by less than one in it."""
+    simulation = scenario.simulation
+    whole = simulation.control_timestep or simulation.timestep
+    count = ceil(period / whole - 1e-6)
+    keys = ("timestep", "control_timestep", "control_latency")
+    shorter = {key: getattr(simulation, key) * period / (count * whole) for key in keys}
+    changed = simulation.model_copy(update=shorter)
+    return scenario.model_copy(update={"simulation": changed})
+
+
+class _Search:
+    """The search for a state that returns.
+
+    Args:
+        motion, forcing, step, steps: As in `Equilibrium`.
+        returns: How often the flight may return until it has settled.
+    """
+
+    def __init__(
+        self, motion: Motion, forcing: Forcing, step: int, steps: int, returns: int
+    ) -> None:
+        self._motion, self._forcing, self._step, self._steps = motion, forcing, step, steps
+        self._returns = returns
+        self._timestep = motion.assembly.scenario.simulation.timestep
+        self._start = step * self._timestep
+        self._sides = self._signs(motion.initial)
+
+    def root(self) -> Root:
+        """The state, or an `InputError`."""
+        tolerance = ORBIT if self._forcing.period is not None else REST
+        best = None
+        for state in self._starts():
+            root = self._solve(state, tolerance)
+            if root is not None and root.residual <= tolerance:
+                return root
+            if root is not None and (best is None or root.residual < best.residual):
+                best = root
+        address = self._motion.assembly.scenario.address or "scenario"
+        what = "rest point" if self._forcing.period is None else "periodic orbit"
+        left = "" if best is None else f" (the best leaves {best.residual:.2g}, in SI units)"
+        raise InputError(f"{address}: found no {what} near its flight{left}")
+
+    def _solve(self, state: Floats, tolerance: float) -> Root | None:
+        root = solve(self._change, self._motion.coordinates, state, 1e-4 * tolerance)
+        regular = np.array_equal(self._signs(root.state), self._sides)
+        if not (regular and np.isfinite(root.derivative).all()):
+            return None  # beyond a singular attitude, or with a rotor that turns backwards
+        return root
+
+    def _starts(self) -> Iterator[Floats]:
+        """States to start from: of an orbit one where the flight has settled."""
+        initial = self._motion.initial
+        if self._forcing.period is None:
+            yield initial
+        yield self._settled()
+        if self._forcing.period is not None:
+            yield initial
+
+    def _settled(self) -> Floats:
+        """The state at which the flight changes least from one return to the next."""
+        state, step = self._motion.initial, 0
+        between = self._steps or ceil(1.0 / self._timestep)
+        count = self._returns if self._steps else ceil(self._returns / between)
+        best, least = state, np.inf
+        for _ in range(count):
+            after = self._motion.flown(step, state, between)
+            moved = self._frame(step * self._timestep, (step + between) * self._timestep)
+            change = np.linalg.norm(self._motion.coordinates.between(state, after) - moved)
+            step += between
+            state = after
+            if not np.isfinite(change):
+                break
+            if change < least:
+                best, least = self._back(after, step * self._timestep), float(change)
+            if change < ORBIT:
+                break
+        return best
+
+    def _frame(self, start: float, end: float) -> Floats:
+        """How the moving frame moves from one time (s) to another."""
+        return self._forcing.motion(self._motion.coordinates.names, start, end)
+
+    def _back(self, state: Floats, time: float) -> Floats:
+        """A state in the moving frame, where it was at the time of the search."""
+        return self._motion.coordinates.moved(state, self._frame(time, self._start))
+
+    def _change(self, state: Floats) -> Floats:
+        """Rates, or the change over the steps, in the moving frame."""
+        motion, start = self._motion, self._start
+        try:
+            if self._steps == 0:
+                names = motion.coordinates.names
+                return motion.rates(start, state) - self._forcing.rates(names, start)
+            after = motion.flown(self._step, state, self._steps)
+        except (ArithmeticError, ValueError):
+            return np.full(motion.coordinates.size, np.nan)
+        moved = self._frame(start, start + self._steps * self._timestep)
+        return motion.coordinates.between(state, after) - moved
+
+    def _signs(self, state: Floats) -> Floats:
+        """Signs that the flight keeps: of the determinant and of the rotors' speeds."""
+        try:
+            sample = self._motion.observed(self._start, state)
+            values = self._motion.assembly.sign_check_values(tuple(sample.tolist()))
+        except (ArithmeticError, ValueError):
+            return np.full(1, np.nan)
+        return np.sign(values)

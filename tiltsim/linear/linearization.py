@@ -1,0 +1,173 @@
+"""Linear systems of scenarios at rest, for control design."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from os import PathLike
+from typing import Any, Final, Literal, NamedTuple
+
+import numpy as np
+
+from tiltsim.errors import InputError
+from tiltsim.linear.coordinates import QUATERNION
+from tiltsim.linear.differences import jacobian, steps_at
+from tiltsim.linear.equilibrium import Equilibrium, equilibrium_of
+from tiltsim.linear.naming import unit_of
+from tiltsim.linear.newton import derivative_at
+from tiltsim.scenario.loading import load_scenario
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.system.optional import optional_package
+from tiltsim_controllers.mathematics.scalar import Floats
+
+INPUT_SCALE: Final = 100.0
+"""Rotor accelerations (rad/s^2) are of this order; their steps in differences are, too."""
+
+
+class Signal(NamedTuple):
+    """A state, input or output of a linear system."""
+
+    name: str
+    unit: str
+
+    @property
+    def text(self) -> str:
+        """With the unit in brackets."""
+        return f"{self.name} [{self.unit or '-'}]"
+
+
+@dataclass(frozen=True, eq=False)
+class Linearization:
+    """A scenario at its rest point as a linear system ``x' = A x + B u``, ``y = C x + D u``.
+
+    States, inputs and outputs are deviations from the rest point. A rotation has three states, the
+    vector of a small turn in body axes. The inputs are added to what the controller asks of the
+    vehicle, so ``u = feedback x + disturbance`` closes the loop. Of a sampled controller it is the
+    system from one sample to the next, ``x[k+1] = A x[k] + B u[k]``.
+
+    Attributes:
+        A: Of the closed loop, shape (states, states), or of the vehicle alone.
+        B: Shape (states, inputs).
+        C: Shape (outputs, states).
+        D: Shape (outputs, inputs).
+        feedback: The controller, shape (inputs, states): commands of the vehicle's inputs.
+        states, inputs, outputs: Their names and units.
+        timestep: Of the sampled system, s; None in continuous time.
+        state: The states at rest by name: the turn of a rotation is from level attitude.
+        command: The inputs at rest by name.
+        loop: ``"closed"`` or ``"open"``.
+    """
+
+    A: Floats
+    B: Floats
+    C: Floats
+    D: Floats
+    feedback: Floats
+    states: tuple[Signal, ...]
+    inputs: tuple[Signal, ...]
+    outputs: tuple[Signal, ...]
+    timestep: float | None
+    state: dict[str, float]
+    command: dict[str, float]
+    loop: str
+
+    @property
+    def poles(self) -> Floats:
+        """Eigenvalues of A, complex."""
+        return np.linalg.eigvals(self.A).astype(complex)
+
+    def opened(self) -> Linearization:
+        """The vehicle without the controller; its controller's states, if any, keep their input."""
+        if self.loop == "open":
+            return self
+        a, c = self.A - self.B @ self.feedback, self.C - self.D @ self.feedback
+        return replace(self, A=a, C=c, loop="open")
+
+    def to_control(self) -> Any:
+        """The system as `control.StateSpace`, its signals named. Needs ``tiltsim[control]``."""
+        control = optional_package("control", "to_control", "'tiltsim[control]'")
+        names = {
+            kind: [signal.name for signal in getattr(self, kind)]
+            for kind in ("states", "inputs", "outputs")
+        }
+        timestep = 0 if self.timestep is None else self.timestep
+        return control.ss(self.A, self.B, self.C, self.D, timestep, **names)
+
+
+def linearize(
+    scenario: Scenario | str | PathLike[str] | Mapping[str, Any],
+    *,
+    loop: Literal["closed", "open"] = "closed",
+) -> Linearization:
+    """A scenario at its rest point as a linear system.
+
+    Args:
+        scenario: Anything that `tiltsim.load_scenario` takes, at rest: a fixed gait and a set
+            point, or a line, in whose frame it rests.
+        loop: ``"closed"``, or ``"open"`` for the vehicle without the controller.
+
+    Raises:
+        InputError: If it is invalid or has no rest point.
+    """
+    if loop not in ("closed", "open"):
+        raise InputError(f"loop = {loop!r}: choose closed or open")
+    found = equilibrium_of(load_scenario(scenario), at_rest=True)
+    closed = linearization_at(found)
+    return closed if loop == "closed" else closed.opened()
+
+
+def linearization_at(found: Equilibrium) -> Linearization:
+    """The closed loop at a rest point."""
+    motion, state, time = found.motion, found.root.state, found.time
+    closed_loop = motion.assembly.loop
+
+    def varied(offsets: Floats) -> Floats:
+        motion.offsets[:] = offsets
+        try:
+            if not found.steps:
+                moved = motion.rates(time, state)
+            else:
+                after = motion.flown(found.step, state, found.steps)
+                moved = motion.coordinates.between(state, after)
+            return np.concatenate((moved, motion.observed(time, state)))
+        finally:
+            motion.offsets[:] = 0.0
+
+    coordinates = motion.coordinates
+    count = coordinates.size
+    by_input = jacobian(varied, INPUT_SCALE * steps_at(np.zeros(len(motion.inputs))))
+    observed = derivative_at(lambda at: motion.observed(time, at), coordinates, state)
+    feedback = derivative_at(lambda at: motion.commanded(time, at), coordinates, state)
+    level = coordinates.between(_level(found), state)
+    names = found.names
+    fields = closed_loop.sample_fields[1:]
+
+    def signals(of: tuple[str, ...]) -> tuple[Signal, ...]:
+        return tuple(Signal(name, unit_of(name, closed_loop)) for name in of)
+
+    return Linearization(
+        A=found.matrix,
+        B=by_input[:count][found.kept],
+        C=observed[:, found.kept],
+        D=by_input[count:],
+        feedback=feedback[:, found.kept],
+        states=signals(names),
+        inputs=signals(motion.inputs),
+        outputs=signals(fields),
+        timestep=found.timestep,
+        state=dict(zip(names, level[found.kept].tolist(), strict=True)),
+        command=dict(zip(motion.inputs, motion.commanded(time, state).tolist(), strict=True)),
+        loop="closed",
+    )
+
+
+def _level(found: Equilibrium) -> Floats:
+    """The state whose coordinates are all zero: level at the origin."""
+    coordinates = found.motion.coordinates
+    state = np.zeros(len(found.root.state))
+    first = coordinates.first
+    if coordinates.rotation == QUATERNION:
+        state[first] = 1.0
+    elif coordinates.rotation:
+        state[[first, first + 4, first + 8]] = 1.0
+    return state

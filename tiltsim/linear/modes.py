@@ -1,0 +1,130 @@
+"""Modes of a linear system: eigenvalues with the states that take part in them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from tiltsim_controllers.mathematics.scalar import Floats
+
+EQUAL: Final = 1e-4
+"""Poles within this share of their size belong to one mode: rounding splits a multiple pole by the
+root of its error."""
+
+NEUTRAL: Final = 1e-6  # rad/s
+"""Poles below this are zero."""
+
+SHARE: Final = 0.1
+"""States with less than this share of the largest part in a mode are not listed."""
+
+WORDS: Final = {
+    **dict.fromkeys(("x", "vx", "integral_x"), "x"),
+    **dict.fromkeys(("y", "vy", "integral_y"), "y"),
+    **dict.fromkeys(("z", "vz", "integral_z"), "altitude"),
+    **dict.fromkeys(("rotation_x", "roll", "p"), "roll"),
+    **dict.fromkeys(("rotation_y", "pitch", "q"), "pitch"),
+    **dict.fromkeys(("rotation_z", "yaw", "r"), "yaw"),
+}
+"""Names of modes by their states."""
+
+KINDS: Final = {
+    "alpha": "tilt servos",
+    "rotor": "rotors",
+    "speed": "rotors",
+    "tilt": "actuators",
+    "layer": "actuators",
+    "law": "controller",
+}
+"""Names of modes by the kind of their states."""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A pole, or a pair or group of equal ones.
+
+    Attributes:
+        name: By the states that take the largest part.
+        frequency: Magnitude of the pole, rad/s.
+        damping: Ratio, 1 for a stable real pole, negative where it grows.
+        states: Names, the largest part first.
+        count: How many poles, a pair counted as two.
+    """
+
+    name: str
+    frequency: float
+    damping: float
+    states: tuple[str, ...]
+    count: int
+
+    def report(self) -> dict[str, Any]:
+        """As JSON."""
+        return {**vars(self), "states": list(self.states)}
+
+
+def exponents(eigenvalues: Floats, timestep: float | None) -> Floats:
+    """The poles (rad/s) of a system's eigenvalues.
+
+    In discrete time they are ``log(eigenvalue) / timestep``, minus infinity for states that are
+    forgotten at once.
+    """
+    if timestep is None:
+        return eigenvalues
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.log(eigenvalues.astype(complex)) / timestep)
+
+
+def is_stable(matrix: Floats, poles: Floats, timestep: float | None) -> bool:
+    """Whether small disturbances stay small.
+
+    No pole has a positive real part, and those at zero have an eigenvector each, so that the states
+    along them stay where they are put but do not grow.
+    """
+    if (poles.real > NEUTRAL).any():
+        return False
+    count = int((np.abs(poles) <= NEUTRAL).sum())
+    if count == 0:
+        return bool((poles.real < -NEUTRAL).all())
+    moving = matrix if timestep is None else (matrix - np.eye(len(matrix))) / timestep
+    singular_values = np.linalg.svd(moving, compute_uv=False)
+    return int((singular_values <= NEUTRAL * max(1.0, singular_values[0])).sum()) >= count
+
+
+def modes_of(matrix: Floats, names: Sequence[str], timestep: float | None) -> tuple[Mode, ...]:
+    """The modes of a system, the slowest first.
+
+    Args:
+        matrix: Of the system.
+        names: Of its states.
+        timestep: s; None in continuous time.
+    """
+    eigenvalues, vectors = np.linalg.eig(matrix)
+    poles, left = exponents(eigenvalues, timestep), np.linalg.pinv(vectors)
+    left_over = [
+        int(i) for i in np.argsort(np.abs(poles)) if poles[i].imag >= 0.0 and np.isfinite(poles[i])
+    ]
+    found = []
+    while left_over:
+        pole = poles[left_over[0]]
+        near = EQUAL * max(abs(pole), NEUTRAL / EQUAL)
+        group = [i for i in left_over if abs(poles[i] - pole) <= near]
+        left_over = [i for i in left_over if i not in group]
+        part = np.abs(np.einsum("ik,ki->i", vectors[:, group], left[group]))
+        count = len(group) * (2 if pole.imag > 0.0 else 1)
+        found.append(_mode(pole, part, names, count))
+    return tuple(found)
+
+
+def _mode(pole: complex, part: Floats, names: Sequence[str], count: int) -> Mode:
+    order = [int(i) for i in np.argsort(-part, kind="stable") if part[i] >= SHARE * part.max()]
+    states = tuple(names[i] for i in order)
+    words = [WORDS.get(name) or KINDS.get(name.partition("_")[0], name) for name in states]
+    # Rotors take part in all motions that they make: they name a mode only where they are alone.
+    moving = [word for word in dict.fromkeys(words) if word not in KINDS.values()]
+    name = ", ".join(moving[:3] or words[:1])
+    frequency = float(abs(pole))
+    if frequency <= NEUTRAL:
+        return Mode(name, 0.0, 0.0, states, count)
+    return Mode(name, frequency, float(-pole.real / frequency), states, count)

@@ -1,0 +1,216 @@
+"""A closed loop on its plant as functions of its state, for derivatives.
+
+The state is a vector of the plant's own numbers. Whichever plant, `Motion` gives the rates of its
+minimal coordinates at a time, and the state some physics steps later, as flights have it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from tiltsim.closed_loop.loop import ClosedLoop, Equations
+from tiltsim.closed_loop.userdata import EVALUATIONS, EVALUATIONS_PER_STEP, HEADER_SIZE
+from tiltsim.engines.base import EngineName
+from tiltsim.engines.callback import control_callback
+from tiltsim.laws.assembling import assemble
+from tiltsim.linear.coordinates import Coordinates
+from tiltsim.linear.naming import (
+    control_names,
+    equation_coordinates,
+    equation_inputs,
+    mujoco_coordinates,
+)
+from tiltsim.plants.flight_model import disturbance_acceleration
+from tiltsim.plants.mujoco_plant import MujocoPlant
+from tiltsim.plants.thesis_plant import ThesisPlant
+from tiltsim.scenario.scenario import Scenario
+from tiltsim_controllers.mathematics.scalar import Floats, Values
+
+
+class Motion(ABC):
+    """A closed loop on its plant.
+
+    Attributes:
+        assembly: The flight; its controller adds the offsets to what it asks of the vehicle.
+        coordinates: Of its state.
+        inputs: Names of the vehicle's inputs.
+        offsets: Added to the inputs; zero unless they are varied.
+    """
+
+    def __init__(self, scenario: Scenario, engine: EngineName | None) -> None:
+        self.scenario, self.engine = scenario, engine
+        self._asked: Values = ()
+        self._places: list[int] = []
+        self.offsets = np.zeros(0)
+        self.assembly = assemble(scenario, self._adapted)
+        self.coordinates, inputs = self._names()
+        self.inputs = tuple(name for name, _ in inputs)
+        self._places = [index for _, index in inputs]
+        self.offsets = np.zeros(len(inputs))
+
+    def _adapted(self, loop: ClosedLoop) -> ClosedLoop:
+        """A controller without layers, to whose inputs of the vehicle the offsets are added."""
+        sampling, equations = loop.sampling, loop.equations
+        if equations is not None:
+            equations = replace(equations, inputs=self._with_offsets(equations.inputs))
+        controls = self._with_offsets(sampling.controls)
+        return replace(loop, sampling=replace(sampling, controls=controls), equations=equations)
+
+    def _with_offsets(self, function: Callable[..., Values]) -> Callable[..., Values]:
+        """A control step that adds the offsets and remembers what was asked for without them."""
+
+        def step(*args: Any) -> Values:
+            self._asked = function(*args)
+            values = list(self._asked)
+            for place, offset in zip(self._places, self.offsets.tolist(), strict=True):
+                values[place] += offset
+            return tuple(values)
+
+        return step
+
+    def commanded(self, time: float, state: Floats) -> Floats:
+        """The inputs that the controller asks for, shape (inputs,)."""
+        self.observed(time, state)
+        return np.array(self._asked)[self._places]
+
+    @abstractmethod
+    def _names(self) -> tuple[Coordinates, tuple[tuple[str, int], ...]]:
+        """The coordinates, and names and places of the inputs among those of the controller."""
+
+    @property
+    @abstractmethod
+    def initial(self) -> Floats:
+        """The state at time zero."""
+
+    @abstractmethod
+    def rates(self, time: float, state: Floats) -> Floats:
+        """Rates of the coordinates at a time, shape (coordinates,)."""
+
+    @abstractmethod
+    def flown(self, step: int, state: Floats, steps: int) -> Floats:
+        """The state some physics steps after a step."""
+
+    @abstractmethod
+    def observed(self, time: float, state: Floats) -> Floats:
+        """The fields of a sample after its time."""
+
+
+class EquationMotion(Motion):
+    """On the thesis's equations."""
+
+    def _names(self) -> tuple[Coordinates, tuple[tuple[str, int], ...]]:
+        inputs = equation_inputs(self.assembly, self._equations.inputs_size)
+        return equation_coordinates(self.assembly, len(self.initial)), inputs
+
+    @cached_property
+    def _equations(self) -> Equations:
+        equations = self.assembly.loop.equations
+        assert equations is not None  # on the thesis plant there are some
+        return equations
+
+    @cached_property
+    def _plant(self) -> ThesisPlant:
+        return ThesisPlant(assemble(self.scenario), self.engine)
+
+    @cached_property
+    def _varied(self) -> ThesisPlant:
+        return ThesisPlant(self.assembly, "python")
+
+    @property
+    def initial(self) -> Floats:
+        return np.array(self._equations.initial(self.assembly, self.assembly.setup), dtype=float)
+
+    def rates(self, time: float, state: Floats) -> Floats:
+        parameters, knots = self.assembly.setup
+        values, disturbance = state.tolist(), disturbance_acceleration(self.scenario)
+        inputs = self._equations.inputs(time, values, parameters, knots)
+        moved = self._equations.rates(time, values, inputs, parameters, knots, disturbance)
+        return self.coordinates.rates(state, np.array(moved))
+
+    def flown(self, step: int, state: Floats, steps: int) -> Floats:
+        plant = self._varied if self.offsets.any() else self._plant
+        held = self._equations.inputs_size
+        plant.state = np.array((step, *(0.0,) * held, *state))  # a sample is due
+        plant.advance(steps)
+        return plant.state[1 + held :]
+
+    def observed(self, time: float, state: Floats) -> Floats:
+        values, setup = state.tolist(), self.assembly.setup
+        inputs = self._equations.inputs(time, values, *setup)
+        return np.array(self._equations.observe(time, values, inputs, *setup))
+
+
+class MujocoMotion(Motion):
+    """In MuJoCo; a state is `qpos`, `qvel` and `act`."""
+
+    def _names(self) -> tuple[Coordinates, tuple[tuple[str, int], ...]]:
+        return mujoco_coordinates(self.assembly.loop), control_names(self.assembly.loop)
+
+    @cached_property
+    def _varied(self) -> MujocoPlant:
+        return MujocoPlant(self.assembly, engine="python")
+
+    @cached_property
+    def _plant(self) -> MujocoPlant:
+        return MujocoPlant(assemble(self.scenario), self._varied.model, self.engine)
+
+    @cached_property
+    def _whole(self) -> Floats:
+        """An integration state: time, `qpos`, `qvel`, `act` and more."""
+        return self._varied.state
+
+    @cached_property
+    def initial(self) -> Floats:
+        return self._whole[self._part]
+
+    @property
+    def _part(self) -> slice:
+        sizes = self.assembly.loop.dynamics.sizes
+        return slice(1, 1 + sizes.qpos + sizes.qvel + sizes.act)
+
+    def _split(self, state: Floats) -> list[Floats]:
+        sizes = self.assembly.loop.dynamics.sizes
+        return np.split(state, (sizes.qpos, sizes.qpos + sizes.qvel))
+
+    def _controls(self, time: float, state: Floats) -> Values:
+        parts = (part.tolist() for part in self._split(state))
+        return self.assembly.loop.sampling.controls(time, *parts, *self.assembly.setup)
+
+    def rates(self, time: float, state: Floats) -> Floats:
+        import mujoco
+
+        plant, (qpos, qvel, act) = self._varied, self._split(state)
+        data = plant.data
+        data.qpos[:], data.qvel[:], data.act[:] = qpos, qvel, act
+        data.ctrl[:] = self._controls(time, state)
+        with control_callback(None):
+            mujoco.mj_forward(plant.model, data)
+        return np.concatenate((qvel, data.qacc, data.act_dot))
+
+    def flown(self, step: int, state: Floats, steps: int) -> Floats:
+        plant = self._varied if self.offsets.any() else self._plant
+        whole = self._whole.copy()
+        whole[self._part] = state
+        header = whole[plant.header_offset :][:HEADER_SIZE]
+        header[EVALUATIONS] = step * header[EVALUATIONS_PER_STEP]
+        plant.state = whole
+        plant.advance(steps)
+        return plant.state[self._part]
+
+    def observed(self, time: float, state: Floats) -> Floats:
+        parts = [part.tolist() for part in self._split(state)]
+        controls = self._controls(time, state)
+        return np.array(self.assembly.loop.columns.observe(*parts, controls))
+
+
+def make_motion(scenario: Scenario, engine: EngineName | None = None) -> Motion:
+    """The motion of a scenario on the plant that it requests."""
+    if scenario.simulation.plant == "thesis":
+        return EquationMotion(scenario, engine)
+    return MujocoMotion(scenario, engine)

@@ -1,0 +1,150 @@
+"""Names and units of the states and inputs of a closed loop on its plant."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.closed_loop.loop import ClosedLoop
+from tiltsim.equations.actuator_level import ACTUATOR_PLANTS
+from tiltsim.linear.coordinates import MATRIX, QUATERNION, ROTATION_NAMES, Coordinates
+from tiltsim_controllers.vehicle.states import BODY_FIELDS
+
+POSITION: Final = BODY_FIELDS[:3]
+VELOCITY: Final = BODY_FIELDS[3:6]
+BODY_RATES: Final = BODY_FIELDS[9:]
+PLANE: Final = ("x", "y", "vx", "vy")
+UNITS: Final = {
+    **dict.fromkeys(POSITION, "m"),
+    **dict.fromkeys(VELOCITY, "m/s"),
+    **dict.fromkeys((*ROTATION_NAMES, "roll", "pitch", "yaw"), "rad"),
+    **dict.fromkeys(BODY_RATES, "rad/s"),
+    **dict.fromkeys(("squared_speed_1", "squared_speed_2"), "rad^2/s^2"),
+    "force": "N",
+    **dict.fromkeys(("torque_x", "torque_y", "torque_z"), "N m"),
+}
+ROTOR_INPUT: Final = "rotor_acceleration"
+KINDS: Final = {
+    "alpha_rate": "rad/s",
+    "alpha": "rad",
+    "rotor_speed": "rad/s",
+    "speed_command": "rad/s",
+    ROTOR_INPUT: "rad/s^2",
+    "thrust": "rad^2/s^2",
+    "tilt_command": "rad",
+}
+"""Units of numbered quantities."""
+
+
+def unit_of(name: str, loop: ClosedLoop) -> str:
+    """The unit of a state, input or output; empty where it is not known."""
+    known = UNITS.get(name) or loop.units.get(name)
+    kinds = (unit for kind, unit in KINDS.items() if name.startswith(kind))
+    return known or next(kinds, "")
+
+
+def numbered(kind: str, count: int) -> tuple[str, ...]:
+    """``kind_1``, ``kind_2`` and so on."""
+    return tuple(f"{kind}_{index}" for index in range(1, count + 1))
+
+
+def activation_names(loop: ClosedLoop) -> tuple[str, ...]:
+    """Rotor speeds, the controller's own states, and those of the layers, as in `act`.
+
+    A layer of actuators has the speeds that it asks of the rotors, and the commands under way, the
+    newest first: ``_late_1`` arrives last.
+    """
+    inner = loop
+    while inner.within is not None:
+        inner = inner.within
+    dynamics, names = loop.dynamics, inner.columns.fields
+    own = dynamics.controller_states
+    if len(names) != own:
+        names = numbered("law", own)
+    rotors = dynamics.sizes.act - own - sum(extra.states for extra in dynamics.extra_actuators)
+    layers: list[str] = []
+    for index, extra in enumerate(dynamics.extra_actuators):
+        if extra.begins_with_rotor_speeds:
+            layers += numbered("speed_command", rotors)
+            tilts = numbered("tilt_command", extra.memories - rotors)
+            sent = (*tilts, *numbered(ROTOR_INPUT, rotors))
+            places = (extra.states - rotors) // extra.memories
+            layers += [f"{name}_late_{place + 1}" for place in range(places) for name in sent]
+        else:
+            layers += numbered(f"layer_{index}_state", extra.states)
+    return (*numbered("rotor_speed", rotors), *names, *layers)
+
+
+def mujoco_coordinates(loop: ClosedLoop) -> Coordinates:
+    """Those of `qpos`, `qvel` and `act`."""
+    sizes = loop.dynamics.sizes
+    if loop.dynamics.model == "tilt_car":
+        names = ("x", "y", "yaw", "alpha", "vx", "vy", "r", "alpha_rate")
+        return _coordinates((*names, *activation_names(loop)), loop, 0)
+    tilts = sizes.qpos - len(POSITION) - QUATERNION
+    places = (*POSITION, *ROTATION_NAMES, *numbered("alpha", tilts))
+    speeds = (*VELOCITY, *BODY_RATES, *numbered("alpha_rate", tilts))
+    return _coordinates((*places, *speeds, *activation_names(loop)), loop, QUATERNION)
+
+
+def equation_coordinates(assembly: Assembly, size: int) -> Coordinates:
+    """Those of a state of the thesis's equations with so many numbers."""
+    loop, model = assembly.loop, assembly.scenario.vehicle.model
+    rotation = 0 if model in {"quadrotor", "tilt_car"} else MATRIX
+    body = BODY_FIELDS
+    if rotation:
+        body = (*POSITION, *VELOCITY, *ROTATION_NAMES, *BODY_RATES)
+    if loop.dynamics.model in ACTUATOR_PLANTS and loop.within is not None:
+        tilts = 4 if rotation else 0
+        servos = (*numbered("alpha", tilts), *numbered("alpha_rate", tilts))
+        names = (*body, *servos, *activation_names(loop))
+    elif model == "tilt_car":
+        driven = ("alpha", "rotor_speed_1", "rotor_speed_2")
+        names = (*PLANE, *(driven if size > len(PLANE) else ()))
+    else:
+        rotors = numbered("rotor_speed", len(loop.dynamics.spins)) if rotation else ()
+        names = (*body, *rotors)
+    further = size - len(names) - (rotation - 3 if rotation else 0)
+    own = loop.columns.fields if len(loop.columns.fields) == further else numbered("law", further)
+    return _coordinates((*names, *own), loop, rotation)
+
+
+def _coordinates(names: tuple[str, ...], loop: ClosedLoop, rotation: int) -> Coordinates:
+    first = names.index(ROTATION_NAMES[0]) if rotation else 0
+    return Coordinates(names, tuple(unit_of(name, loop) for name in names), rotation, first)
+
+
+def control_names(loop: ClosedLoop) -> tuple[tuple[str, int], ...]:
+    """Inputs of the vehicle among the controls of its model: names and indices."""
+    dynamics = loop.dynamics
+    rotors, sizes = len(dynamics.spins), dynamics.sizes
+    if dynamics.model == "tilt_car":
+        rotors = 2
+        named: tuple[str, ...] = ("tilt_command",)
+    else:
+        named = numbered("tilt_command", sizes.qpos - len(POSITION) - QUATERNION)
+    tilts = len(named)
+    driven = loop.kind.rotors and dynamics.model != "quadrotor"
+    kind = ROTOR_INPUT if driven else "thrust"
+    first = tilts + rotors if driven else tilts
+    speeds = ((name, first + index) for index, name in enumerate(numbered(kind, rotors)))
+    return (*speeds, *((name, index) for index, name in enumerate(named)))
+
+
+def equation_inputs(assembly: Assembly, size: int) -> tuple[tuple[str, int], ...]:
+    """Inputs of the vehicle among those of the thesis's equations: names and indices."""
+    loop, model = assembly.loop, assembly.scenario.vehicle.model
+    if loop.dynamics.model in ACTUATOR_PLANTS and loop.within is not None:
+        return control_names(loop)
+    if model == "quadrotor":
+        names: tuple[str, ...] = ("force", "torque_x", "torque_y", "torque_z")
+    elif model == "tilt_car":
+        names = ("squared_speed_1", "squared_speed_2")
+        if size > len(names):
+            names = (*numbered(ROTOR_INPUT, 2), "alpha_rate")
+    else:
+        rotors = len(loop.dynamics.spins)
+        names = numbered(ROTOR_INPUT, rotors)
+        if size == 2 * rotors:
+            names = (*names, *numbered("alpha_rate", rotors))
+    return tuple((name, index) for index, name in enumerate(names))

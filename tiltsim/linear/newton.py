@@ -1,0 +1,80 @@
+"""Newton's method on states with rotations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from tiltsim.linear.coordinates import Coordinates
+from tiltsim.linear.differences import jacobian, steps_at
+from tiltsim_controllers.mathematics.scalar import Floats
+
+ITERATIONS: Final = 30
+HALVINGS: Final = 12
+NEUTRAL: Final = 1e-9
+"""Directions in which the function changes less than this share of the largest are left alone."""
+
+
+class Root(NamedTuple):
+    """A state, the value there, and the function's derivative by coordinates."""
+
+    state: Floats
+    value: Floats
+    derivative: Floats
+
+    @property
+    def residual(self) -> float:
+        """The largest entry of the value."""
+        return float(np.abs(self.value).max())
+
+
+def derivative_at(
+    function: Callable[[Floats], Floats], coordinates: Coordinates, state: Floats
+) -> Floats:
+    """Derivative of a function of the state by its coordinates."""
+    steps = _steps(coordinates, state)
+    return jacobian(lambda by: function(coordinates.moved(state, by)), steps)
+
+
+def _steps(coordinates: Coordinates, state: Floats) -> Floats:
+    """Steps of the differences; a turn is of order one whatever the attitude."""
+    values = state
+    if coordinates.rotation:
+        first, after = coordinates.first, coordinates.first + coordinates.rotation
+        values = np.concatenate((state[:first], np.zeros(3), state[after:]))
+    return steps_at(values)
+
+
+def solve(
+    function: Callable[[Floats], Floats], coordinates: Coordinates, state: Floats, tolerance: float
+) -> Root:
+    """A state near another at which a function of it vanishes, or nearly so.
+
+    Steps are those of least norm, so that states along which nothing changes stay as they are, and
+    are halved until the value shrinks. Ends where it is below the tolerance or shrinks no more.
+
+    Args:
+        function: Of a state; as many values as coordinates, NaN where it is not defined.
+        coordinates: Of the state.
+        state: Where to begin.
+        tolerance: Of the largest entry of the value.
+    """
+    value = function(state)
+    for _ in range(ITERATIONS):
+        derivative = derivative_at(function, coordinates, state)
+        if np.abs(value).max() <= tolerance or not np.isfinite(derivative).all():
+            break
+        scale = _steps(coordinates, state)
+        step = scale * np.linalg.lstsq(derivative * scale, -value, rcond=NEUTRAL)[0]
+        for _ in range(HALVINGS):
+            moved = coordinates.moved(state, step)
+            its_value = function(moved)
+            if np.linalg.norm(its_value) < np.linalg.norm(value):
+                break
+            step = 0.5 * step
+        else:
+            break
+        state, value = moved, its_value
+    return Root(state, value, derivative)

@@ -1,0 +1,101 @@
+"""Stability of a scenario's rest point or periodic orbit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from tiltsim.linear.equilibrium import Equilibrium, equilibrium_of
+from tiltsim.linear.modes import Mode, exponents, is_stable, modes_of
+from tiltsim.scenario.loading import load_scenario
+from tiltsim.scenario.scenario import Scenario
+from tiltsim_controllers.mathematics.scalar import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Stability:
+    """Whether small disturbances of a rest point or of a periodic orbit die out.
+
+    Attributes:
+        kind: ``"rest"`` or ``"orbit"``.
+        period: Of the orbit, s; None at rest.
+        residual: What is left of the rates (rest) or of the change over a period, largest entry in
+            SI units.
+        stable: Whether small disturbances stay small.
+        neutral: Number of poles at zero or multipliers of one: states that stay where they are put.
+        poles: At rest, rad/s, complex, the slowest first; of a sampled controller
+            ``log(mu) / control_timestep``. None of an orbit.
+        multipliers: Of an orbit, complex, the largest first; None at rest.
+        modes: The slowest first.
+        states: Names of the coordinates.
+        matrix: Of the linear system, shape (states, states): rates by coordinates, or the
+            coordinates after a control sample or period by those before.
+        equilibrium: The state itself.
+    """
+
+    kind: str
+    period: float | None
+    residual: float
+    stable: bool
+    neutral: int
+    poles: Floats | None
+    multipliers: Floats | None
+    modes: tuple[Mode, ...]
+    states: tuple[str, ...]
+    matrix: Floats
+    equilibrium: Equilibrium
+
+    def report(self) -> dict[str, Any]:
+        """As JSON."""
+        name = "poles" if self.multipliers is None else "multipliers"
+        values = self.poles if self.multipliers is None else self.multipliers
+        assert values is not None
+        return {
+            "kind": self.kind,
+            "period": self.period,
+            "residual": self.residual,
+            "stable": self.stable,
+            "neutral": self.neutral,
+            name: [[float(value.real), float(value.imag)] for value in values],
+            "modes": [mode.report() for mode in self.modes],
+            "states": list(self.states),
+        }
+
+
+def stability(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Stability:
+    """Poles of a scenario's rest point, or Floquet multipliers of its periodic orbit.
+
+    Args:
+        scenario: Anything that `tiltsim.load_scenario` takes.
+
+    Raises:
+        InputError: If it is invalid, neither at rest nor periodic, or has no such state nearby.
+    """
+    return stability_at(equilibrium_of(load_scenario(scenario)))
+
+
+def stability_at(found: Equilibrium) -> Stability:
+    """The stability of a rest point or orbit."""
+    matrix, timestep = found.matrix, found.timestep
+    eigenvalues = np.linalg.eigvals(matrix).astype(complex)
+    eigenvalues = eigenvalues[np.argsort(-np.abs(eigenvalues), kind="stable")]
+    poles = exponents(eigenvalues, timestep)
+    finite = poles[np.isfinite(poles)]
+    modes = modes_of(matrix, found.names, timestep)
+    return Stability(
+        kind="orbit" if found.is_orbit else "rest",
+        period=found.timestep if found.is_orbit else None,
+        residual=found.root.residual,
+        stable=is_stable(matrix, poles, timestep),
+        neutral=sum(mode.count for mode in modes if mode.frequency == 0.0),
+        poles=None if found.is_orbit else finite[np.argsort(np.abs(finite), kind="stable")],
+        multipliers=eigenvalues if found.is_orbit else None,
+        modes=modes,
+        states=found.names,
+        matrix=matrix,
+        equilibrium=found,
+    )

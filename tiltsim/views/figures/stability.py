@@ -1,0 +1,64 @@
+"""Figures of stability: poles and multipliers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tiltsim.linear.stability import Stability
+from tiltsim.views.figures import style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tiltsim_controllers.mathematics.scalar import Floats
+
+
+def stability_figure(found: Stability) -> Figure:
+    """The poles of a rest point in the complex plane, or the multipliers of an orbit."""
+    with style.paper_style():
+        figure = style.new_figure(5.2, 4.2)
+        axes: Any = figure.subplots()
+        if found.poles is not None:
+            _draw_poles(axes, found.poles)
+        else:
+            assert found.multipliers is not None  # it is an orbit
+            _draw_multipliers(axes, found.multipliers)
+        verdict = "stable" if found.stable else "unstable"
+        if found.period is None:
+            axes.set_title(f"Poles of the rest point: {verdict}")
+        else:
+            axes.set_title(f"Multipliers of the orbit of {found.period:.4g} s: {verdict}")
+        return figure
+
+
+def _draw_poles(axes: Any, poles: Floats) -> None:
+    grows = poles.real > 0.0
+    left = min(-2.0, 1.5 * float(poles.real.min()))
+    right = max(1.0, 1.5 * float(poles.real.max()))
+    up = max(2.0, 1.5 * float(poles.imag.max()))
+    axes.axvspan(0.0, right, color=style.UNREACHABLE, lw=0)
+    _mark(axes, poles[~grows], style.BLUE, "x")
+    _mark(axes, poles[grows], style.RED, "X")
+    # Slow and fast poles differ by a factor of a thousand.
+    axes.set_xscale("symlog", linthresh=1.0)
+    axes.set_yscale("symlog", linthresh=1.0)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter("{x:g}")
+    axes.set(xlim=(left, right), xlabel="real part (rad/s)")
+    axes.set(ylim=(-up, up), ylabel="imaginary part (rad/s)")
+    axes.axvline(0.0, color=style.INK, lw=0.8)
+
+
+def _draw_multipliers(axes: Any, multipliers: Floats) -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 361)
+    axes.plot(np.cos(angle), np.sin(angle), color=style.INK, lw=0.8)
+    grows = np.abs(multipliers) > 1.0
+    _mark(axes, multipliers[~grows], style.BLUE, "x")
+    _mark(axes, multipliers[grows], style.RED, "X")
+    axes.set(xlabel="real part", ylabel="imaginary part", aspect="equal")
+
+
+def _mark(axes: Any, values: Floats, color: str, marker: str) -> None:
+    axes.plot(values.real, values.imag, marker, color=color, ms=6.0, mew=1.4)
