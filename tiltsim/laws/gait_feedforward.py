@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from tiltsim.closed_loop.loop import (
     ClosedLoop,
@@ -36,6 +36,7 @@ from tiltsim.laws.tiltrotor import (
     tiltrotor_state,
     with_measured_inputs,
 )
+from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim.vehicles.rotorcraft.layout import TILT_RATE_1
@@ -107,25 +108,32 @@ def _gait_feedforward_controls(
     )
 
 
+def tracking_fields(plan: FlightPlan) -> dict[str, Any]:
+    """The parameters that controllers with feed-forward of the gait share, by name."""
+    controller, gait = plan.scenario.controller, plan.gait
+    assert isinstance(controller, (AttitudeAltitudeController, AttitudeForceController))
+    # The thesis's equations omit the gyroscopic torque.
+    gyroscopic_torque = plan.scenario.simulation.plant != "thesis"
+    return {
+        "gains": controller.resolve_gains(),
+        "integral": controller.resolve_integral_gains(),
+        "max_acceleration": controller.max_acceleration,
+        "max_angular_acceleration": controller.max_angular_acceleration,
+        "anticipation": min(controller.anticipation, 0.5 * gait.min_segment_time),
+        "terms": controller.resolve_feedforward_terms(gyroscopic_torque=gyroscopic_torque),
+        "gait": gait.parameters,
+        "reference": plan.reference,
+        "decoupler": DECOUPLERS[controller.decoupler],
+    }
+
+
 def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
-    scenario, gait = plan.scenario, plan.gait
-    controller = scenario.controller
+    scenario, controller = plan.scenario, plan.scenario.controller
     assert isinstance(controller, AttitudeAltitudeController)
     vehicle, spin_inertia = scenario.rotorcraft.resolve(), scenario.rotorcraft.rotor_inertia
     law = Parameters(
         vehicle=vehicle,
-        gains=controller.resolve_gains(),
-        integral=controller.resolve_integral_gains(),
-        max_acceleration=controller.max_acceleration,
-        max_angular_acceleration=controller.max_angular_acceleration,
-        anticipation=min(controller.anticipation, 0.5 * gait.min_segment_time),
-        # The thesis's equations omit the gyroscopic torque.
-        terms=controller.resolve_feedforward_terms(
-            gyroscopic_torque=scenario.simulation.plant != "thesis"
-        ),
-        gait=gait.parameters,
-        reference=plan.reference,
-        decoupler=DECOUPLERS[controller.decoupler],
+        **tracking_fields(plan),
         supervisor=controller.resolve_supervisor(vehicle),
         rotor_inertia=spin_inertia if controller.rotor_inertia_feedforward else 0.0,
     )

@@ -23,6 +23,7 @@ from tiltsim.closed_loop.loop import (
     Sampling,
 )
 from tiltsim.equations.tiltrotor import body_fields, initial_state
+from tiltsim.laws.gait_feedforward import tracking_fields
 from tiltsim.laws.rotorcraft import (
     CONDITION,
     body_state,
@@ -45,7 +46,6 @@ from tiltsim.vehicles.rotorcraft.layout import TILT_1, TILT_RATE_1
 from tiltsim.vehicles.rotorcraft.layout import Layout as Places
 from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
 from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS, PUBLISHED_DECOUPLING
-from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.gait_feedforward import INTEGRAL_FIELDS
 from tiltsim_controllers.laws.multirotor import multirotor_law_of
 from tiltsim_controllers.laws.multirotor_inputs import independence_of
@@ -264,19 +264,8 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
     inertia = np.reshape(vehicle.inertia, (3, 3))
     law = Parameters(
         vehicle=body_of(vehicle.mass, inertia, vehicle.gravity),
-        gains=controller.resolve_gains(),
-        integral=controller.resolve_integral_gains(),
+        **tracking_fields(plan),
         side=SideGains(*controller.side_gains),
-        max_acceleration=controller.max_acceleration,
-        max_angular_acceleration=controller.max_angular_acceleration,
-        anticipation=min(controller.anticipation, 0.5 * gait.min_segment_time),
-        # The thesis's equations omit the gyroscopic torque.
-        terms=controller.resolve_feedforward_terms(
-            gyroscopic_torque=scenario.simulation.plant != "thesis"
-        ),
-        gait=gait.parameters,
-        reference=plan.reference,
-        decoupler=DECOUPLERS[controller.decoupler],
         rotors=float(len(plan.knots)),
         decoupling=DECOUPLINGS[controller.decoupling],
         attitude=ATTITUDE_ERRORS[controller.attitude_error],
@@ -305,10 +294,8 @@ def multirotor_loop(layout: Layout, uses: UsedForce, norm: str) -> ClosedLoop:
         uses: The components of force that are controlled.
         norm: See `tiltsim_controllers.laws.multirotor.multirotor_law_of`.
     """
-    places, law = (
-        layout.places,
-        multirotor_law_of(layout.tilt_of_rotor, uses.dimension, norm, uses.forward),
-    )
+    places = layout.places
+    law = multirotor_law_of(layout.tilt_of_rotor, uses.dimension, norm, uses.forward)
     sampling, equations = _sampling_of(layout, law), _equations_of(layout, law)
     tilts = "".join(f"_{tilt}" if tilt >= 0 else "_f" for tilt in layout.tilt_of_rotor)
     senses = "".join("p" if spin > 0.0 else "m" for spin in layout.spins)

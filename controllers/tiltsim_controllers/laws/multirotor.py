@@ -96,9 +96,9 @@ def direction_at_rest(
 
 
 @cache
-def _direction_of(layout: Layout, dimension: int, forward: bool = False) -> Callable[..., Jets3]:
+def _direction_of(layout: Layout, dimension: int, forward: bool) -> Callable[..., Jets3]:
     """Scalar code of the ``direction`` with derivatives, as `direction_at_rest`."""
-    if forward or not tilts_of(layout):
+    if dimension == 3 or forward or not tilts_of(layout):
         return direction_at_rest
     planned = direction_jet_of(layout, dimension)
 
@@ -114,42 +114,13 @@ def _direction_of(layout: Layout, dimension: int, forward: bool = False) -> Call
     return over_gait
 
 
-@scalar
-def by_force(
-    time: float,
-    motion: Motion,
-    direction: Triple,
-    tracking: Tracking,
-    forces: Forces,
-    yaw: Jet,
-    integrals: Triple,
-    parameters: Any,
-    knots: Vector,
-) -> Horizontal:
-    """What moves x and y with a force of dimension 3: the force, at the attitude that is told.
-
-    Args:
-        time: s
-        motion: of the body
-        direction: the ``direction`` of the factors, where the dimension is below 3
-        tracking: errors and accelerations
-        forces: of the rotors
-        yaw: rad, with derivatives, for the decoupler
-        integrals: of the position errors, m s
-        parameters, knots: of the controller
-    """
-    roll, pitch = told_attitude(time, parameters)
-    jerk_x, jerk_y, x_rate, y_rate = side_control(tracking[0], tracking[1], integrals, parameters)
-    return roll, pitch, jerk_x, jerk_y, x_rate, y_rate
-
-
 @cache
-def _by_leaning_of(layout: Layout) -> Callable[..., Horizontal]:
-    """`by_force` with a force of dimension 1: the whole vehicle leans."""
-    moving_direction = _direction_of(layout, 1)
+def _horizontal_of(layout: Layout, dimension: int, forward: bool) -> Callable[..., Horizontal]:
+    """Scalar code of what moves x and y: force as far as it is controlled, and leaning."""
+    moving_direction = _direction_of(layout, dimension, forward)
 
     @scalar
-    def by_leaning(
+    def horizontal(
         time: float,
         motion: Motion,
         direction: Triple,
@@ -160,62 +131,48 @@ def _by_leaning_of(layout: Layout) -> Callable[..., Horizontal]:
         parameters: Any,
         knots: Vector,
     ) -> Horizontal:
-        if parameters.decoupler == NONE:
-            roll, pitch = told_attitude(time, parameters)
-            return roll, pitch, 0.0, 0.0, 0.0, 0.0
-        rotation, omega, _ = motion
+        """The attitude that is asked for, and what force does at this attitude.
+
+        Args:
+            time: s
+            motion: of the body
+            direction: the ``direction`` of the factors, where the dimension is below 3
+            tracking: errors and accelerations
+            forces: of the rotors
+            yaw: rad, with derivatives, for the decoupler
+            integrals: of the position errors, m s
+            parameters, knots: of the controller
+        """
         errors, accelerations = tracking
-        up = (rotation[6], rotation[7], rotation[8])
-        force = moving_direction(time, up, direction, parameters, knots)
-        jerk = (0.0, 0.0, 0.0)  # counts only for the attitude's rates
-        if parameters.terms.attitude_rates != 0.0:
-            jerk = jerk_along(force, forces[0], omega, parameters.terms.gait_rates)
-        x, y, x_rate, y_rate = horizontal_control(
-            errors, accelerations, to_world(rotation, jerk), integrals, parameters
-        )
-        roll, pitch = lean(force, x, y, accelerations[2], yaw, parameters)
-        return roll, pitch, 0.0, 0.0, x_rate, y_rate
-
-    return by_leaning
-
-
-@cache
-def _by_both_of(layout: Layout, forward: bool) -> Callable[..., Horizontal]:
-    """`by_force` with a force of dimension 2: it leans as far as the force is not enough."""
-    moving_direction = _direction_of(layout, 2, forward)
-
-    @scalar
-    def by_both(
-        time: float,
-        motion: Motion,
-        direction: Triple,
-        tracking: Tracking,
-        forces: Forces,
-        yaw: Jet,
-        integrals: Triple,
-        parameters: Any,
-        knots: Vector,
-    ) -> Horizontal:
-        errors, accelerations = tracking
-        jerk_x, jerk_y, x_rate, y_rate = side_control(errors, accelerations, integrals, parameters)
-        if parameters.decoupler == NONE:
+        jerk_x = jerk_y = x_rate = y_rate = 0.0
+        if dimension > 1:
+            jerk_x, jerk_y, x_rate, y_rate = side_control(
+                errors, accelerations, integrals, parameters
+            )
+        if dimension == 3 or parameters.decoupler == NONE:
             roll, pitch = told_attitude(time, parameters)
             return roll, pitch, jerk_x, jerk_y, x_rate, y_rate
         rotation, omega, _ = motion
         up = (rotation[6], rotation[7], rotation[8])
-        normal = moving_direction(time, up, direction, parameters, knots)
-        force, rate = forces
-        swept = cross(omega, force)
-        jerk = to_world(rotation, (swept[0] + rate[0], swept[1] + rate[1], swept[2] + rate[2]))
-        x, y, x_rate, y_rate = horizontal_control(
-            errors, accelerations, jerk, integrals, parameters
+        force = moving_direction(time, up, direction, parameters, knots)
+        jerk = (0.0, 0.0, 0.0)  # counts only for the attitude's rates
+        if dimension == 2:
+            x, y, z = cross(omega, forces[0])
+            jerk = (x + forces[1][0], y + forces[1][1], z + forces[1][2])
+        elif parameters.terms.attitude_rates != 0.0:
+            jerk = jerk_along(force, forces[0], omega, parameters.terms.gait_rates)
+        along_x, along_y, x_rate, y_rate = horizontal_control(
+            errors, accelerations, to_world(rotation, jerk), integrals, parameters
         )
-        z = accelerations[2]
-        desired = desired_direction(x, y, z, yaw, parameters.vehicle.gravity)
-        roll, pitch = lean(nearest_in_plane(desired, normal), x, y, z, yaw, parameters)
+        along_z = accelerations[2]
+        if dimension == 2:
+            gravity = parameters.vehicle.gravity
+            desired = desired_direction(along_x, along_y, along_z, yaw, gravity)
+            force = nearest_in_plane(desired, force)
+        roll, pitch = lean(force, along_x, along_y, along_z, yaw, parameters)
         return roll, pitch, jerk_x, jerk_y, x_rate, y_rate
 
-    return by_both
+    return horizontal
 
 
 @cache
@@ -226,9 +183,7 @@ def _control_of(layout: Layout, dimension: int, forward: bool) -> Callable[..., 
     desired jerk (m/s^3, world axes), the desired second derivatives of the body rates (rad/s^3),
     the rates of the integrals (m) and the references of roll and pitch (rad).
     """
-    horizontal = by_force
-    if dimension < 3:
-        horizontal = _by_leaning_of(layout) if dimension == 1 else _by_both_of(layout, forward)
+    horizontal = _horizontal_of(layout, dimension, forward)
 
     @scalar
     def control(
