@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -297,3 +299,53 @@ def test_a_gait_of_ones_own_has_an_angle_for_each_tilt():
     assert flight["alpha_ref_5"][-1] == pytest.approx(0.11)
     with pytest.raises(InputError, match="has 4 tilt angles; the vehicle has 6"):
         tiltsim.simulate(own, gait=lambda time: [0.1] * 4)
+
+
+CHAPTER_4 = {
+    "law": "attitude_force",
+    "decoupling": "published",
+    "attitude_error": "euler_angles",
+    "gains": "ch04",
+    "leave_out": [
+        "gait_rates",
+        "attitude_rates",
+        "reference_derivatives",
+        "euler_rates",
+        "gyroscopic_torque",
+        "integral_action",
+    ],
+    # Ch. 4 has no limits.
+    "max_acceleration": 1e6,
+    "max_angular_acceleration": 1e6,
+}
+"""The controller of ch. 4 as one of multirotors."""
+
+
+@pytest.mark.slow
+def test_the_28_tracking_flights_of_chapter_4_are_flights_of_a_multirotor():
+    """Their first second, with jumps of the instant gaits; their full length differs by 4e-13 m."""
+    gaits = (
+        "fixed",
+        *(f"{kind}_t{period}" for kind in ("instant", "continuous") for period in "123"),
+    )
+    changes = {"simulation.duration": 1.1, "simulation.engine": "native"}
+    for reference, gait, decoupler in product(
+        ("line", "circle"), gaits, ("conventional", "modified")
+    ):
+        address = f"ch04_tracking/{reference}#{gait}_{decoupler}"
+        scenario = tiltsim.load_scenario(address, changes)
+        tables = {
+            name: getattr(scenario, name).model_dump()
+            for name in ("gait", "reference", "simulation")
+        }
+        general = document(
+            "tiltrotor",
+            controller={**CHAPTER_4, "decoupler": decoupler},
+            initial={**scenario.initial.model_dump(), "rotor_speed": 300.0},
+            **tables,
+        )
+        flights = tiltsim.simulate(scenario), tiltsim.simulate({**general, **tables})
+        assert flights[0].end == flights[1].end, address
+        apart = np.abs(flights[0]["position"] - flights[1]["position"]).max()
+        assert apart < 1e-9, address
+        assert np.abs(flights[0]["attitude"] - flights[1]["attitude"]).max() < 1e-9, address
