@@ -13,6 +13,7 @@ FLEET = {
     "cant_hexarotor": (6, 0),
     "tilt_hexarotor": (6, 6),
     "tilt_heptarotor": (7, 7),
+    "tilt_octorotor": (8, 8),
     "omni_octorotor": (8, 0),
     "cant_quadrotor": (4, 0),
 }

@@ -23,6 +23,7 @@ FLEET: Final[dict[str, tuple[float, ...]]] = {
     "cant_hexarotor": (),
     "tilt_hexarotor": BY_TURNS,
     "tilt_heptarotor": (*BY_TURNS, 0.0),
+    "tilt_octorotor": (*BY_TURNS, 0.35, -0.35),
     "omni_octorotor": (),
 }
 """Names of the files, with tilt angles (rad) that show what the vehicle can do."""

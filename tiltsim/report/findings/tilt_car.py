@@ -73,6 +73,8 @@ FINDINGS: Final = (
             "attitude do not notice. A restoring rate along the free direction, towards the inputs "
             "of least power, ends this and costs nothing; it is on by default where pods move and "
             "rotors are more than outputs.",
+            "Eight arms that sway twice as far leave two directions free, and the drift turns "
+            "round in their plane: 388 to 574 rad/s in the second circle, 386 to 574 in the ninth.",
         ),
         proof="The least-norm law keeps the part of the inputs in the null space of `[τ; F]` "
         "constant, with the norm of rotor speeds that of their logarithms. If the null space is "
@@ -84,7 +86,12 @@ FINDINGS: Final = (
                 "test_seven_swaying_arms_drift_unseen_unless_they_are_restored",
             )
         },
-        flights=("fleet/state_drift#drifting", "fleet/state_drift#restored"),
+        flights=(
+            "fleet/state_drift#drifting",
+            "fleet/state_drift#restored",
+            "fleet/state_drift_eight#drifting",
+            "fleet/state_drift_eight#restored",
+        ),
     ),
     Finding(
         key="tilt-column",
