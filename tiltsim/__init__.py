@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from tiltsim.linear.stability import stability
     from tiltsim.plants.command import Command, Observation
     from tiltsim.scenario.loading import load_scenario, parse_scenario
+    from tiltsim.scenario.scalar_controller import Airframe, ScalarController, scalar
     from tiltsim.scenario.scenario import Scenario
     from tiltsim.simulation.batch import fly
     from tiltsim.simulation.simulate import simulate
@@ -34,11 +35,13 @@ if TYPE_CHECKING:
     from tiltsim.views.video.making import video
 
 _HOMES = {
+    "Airframe": "scenario.scalar_controller",
     "Command": "plants.command",
     "End": "flight.end",
     "Flight": "flight.flight",
     "InputError": "errors",
     "Observation": "plants.command",
+    "ScalarController": "scenario.scalar_controller",
     "Scenario": "scenario.scenario",
     "Simulation": "simulation.stepwise",
     "TiltsimError": "errors",
@@ -47,6 +50,7 @@ _HOMES = {
     "load_flight": "flight.reading",
     "load_scenario": "scenario.loading",
     "parse_scenario": "scenario.loading",
+    "scalar": "scenario.scalar_controller",
     "simulate": "simulation.simulate",
     "plot": "views.figures.plot",
     "show_progress": "commands.progress",  # for progress=True
@@ -59,11 +63,13 @@ _HOMES = {
 }
 
 __all__ = [
+    "Airframe",
     "Command",
     "End",
     "Flight",
     "InputError",
     "Observation",
+    "ScalarController",
     "Scenario",
     "Simulation",
     "TiltsimError",
@@ -73,6 +79,7 @@ __all__ = [
     "load_scenario",
     "parse_scenario",
     "plot",
+    "scalar",
     "simulate",
     "stability",
     "sweep",

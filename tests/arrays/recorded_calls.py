@@ -10,6 +10,7 @@ import numpy as np
 import tiltsim
 from tests.laws.layers.test_actuation import EVERYTHING
 from tests.laws.layers.test_air import STORM
+from tests.laws.test_baselines import BASELINES
 from tests.laws.test_laws import GUST, LAWS
 from tests.laws.test_multirotor import TILTS, document
 from tests.simulation.test_batch import CAR, CAR_GAITS, EXACT, GAITS
@@ -91,6 +92,9 @@ def short_flights():
         bare = {name: table for name, table in tables.items() if name != "simulation"}
         yield bare, {"plant": "thesis"}
         yield bare, {"plant": "mujoco", **LATE}
+    for tables in BASELINES.values():
+        yield tables, {"plant": "thesis"}
+        yield tables, {"plant": "mujoco", "control_timestep": 0.004}
     for name, tables in LAYERED.items():
         for plant in ("thesis", "mujoco"):
             yield tables, {"plant": plant}

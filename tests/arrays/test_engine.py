@@ -9,6 +9,7 @@ import pytest
 
 import tiltsim
 from tests.arrays.recorded_calls import LAYERED, REFERENCES, SUPERVISED
+from tests.laws.test_baselines import BASELINES
 from tests.laws.test_laws import GUST, LAWS
 from tests.simulation.test_batch import CAR, CAR_GAITS, EXACT, GAITS
 from tiltsim.arrays.flying import Kernel, course_of, double_precision
@@ -33,6 +34,7 @@ EVERY = {
         for n, t in REFERENCES.items()
     },
     **{f"supervisor {n}": tables for n, tables in SUPERVISED.items()},
+    **BASELINES,
     **LAYERED,
 }
 """Every controller, gait, reference and layer."""

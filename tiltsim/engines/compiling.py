@@ -108,7 +108,8 @@ class NativeCodeCache(FunctionCache):  # type: ignore[misc]
 
 def _cached(compiled: Any, function: Callable[..., Any]) -> Any:
     """Give a dispatcher or C callback our cache, if its folder may be used."""
-    if native_code_is_cacheable():
+    in_file = Path(function.__code__.co_filename).is_file()  # not in a notebook
+    if native_code_is_cacheable() and in_file:
         compiled._cache = NativeCodeCache(function)
     return compiled
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.controller import PythonController
+from tiltsim.scenario.controller import OwnFunctionController
 from tiltsim.scenario.loading import scenario_toml
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.files import digest, file_digests, prepare_folder, replacing
@@ -99,10 +99,10 @@ def _resolved_files(scenario: Scenario, folder: Path) -> dict[str, bytes]:
     lines = "".join(_COPIED[suffix].format(one) for one, suffix in sorted(copies.items()))
     tables = scenario.time_tables
     changes: dict[str, Any] = {name: own.in_file(f"{name}.csv") for name, own in tables.items()}
-    if controller is not None and isinstance(table, PythonController):
+    if controller is not None and isinstance(table, OwnFunctionController):
         function = f"{controller.name}:{table.attribute}"
         changes["controller"] = table.model_copy(update={"function": function})
-    elif isinstance(table, PythonController):
+    elif isinstance(table, OwnFunctionController):
         lines += _UNWRITTEN.format(printable(table.function))
     text = lines + scenario_toml(scenario.model_copy(update=changes))
     return {**files, SCENARIO: (_WRITTEN.format(digest(text.encode())) + text).encode()}
@@ -118,7 +118,7 @@ def _named_files(scenario: Scenario) -> dict[str, bytes]:
 def _controller_file(scenario: Scenario) -> Path | None:
     """The file of a user's controller, if the scenario names one that exists."""
     table = scenario.controller
-    file = table.file if isinstance(table, PythonController) else None
+    file = table.file if isinstance(table, OwnFunctionController) else None
     return file if file is not None and file.is_file() else None
 
 

@@ -17,11 +17,13 @@ from tiltsim.laws.layers.rotor_inertia import with_rotor_inertia
 from tiltsim.laws.layers.supervision import with_supervisor
 from tiltsim.laws.multirotor import loop_of_multirotor
 from tiltsim.laws.quadrotor_attitude_altitude import QUADROTOR_ATTITUDE_ALTITUDE
+from tiltsim.laws.scalar_law import loop_of_scalar_law
 from tiltsim.laws.switching import SWITCHING
 from tiltsim.laws.tilt_car_fourth_derivative import FOURTH_DERIVATIVE
 from tiltsim.laws.tilt_car_planned_direction import PLANNED_DIRECTION
 from tiltsim.laws.tilt_car_third_derivative import THIRD_DERIVATIVE
 from tiltsim.laws.yaw_position import YAW_POSITION
+from tiltsim.scenario.scalar_controller import ScalarController
 from tiltsim.scenario.scenario import plan_flight
 from tiltsim.system.locks import one_thread_at_a_time
 
@@ -72,6 +74,8 @@ def loop_of(
     measured = on_plant and controller.measures_angular_acceleration
     if external:
         loop = commanded_loop(scenario)
+    elif isinstance(controller, ScalarController):
+        loop = loop_of_scalar_law(scenario)
     elif scenario.vehicle.model == "multirotor":
         loop = loop_of_multirotor(scenario)
     else:

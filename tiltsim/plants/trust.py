@@ -6,7 +6,7 @@ import os
 from typing import Final
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.controller import PythonController
+from tiltsim.scenario.controller import OwnFunctionController
 from tiltsim.scenario.messages import show
 from tiltsim.scenario.scenario import Scenario
 
@@ -25,7 +25,7 @@ def require_trust(scenario: Scenario, trusted: bool) -> None:
     For commands that fly many scenarios, whose files nobody has to have read.
     """
     table = scenario.controller
-    if not trusted and isinstance(table, PythonController):
+    if not trusted and isinstance(table, OwnFunctionController):
         raise InputError(
             f"{scenario.address or 'scenario'}: controller.function = {show(table.function)}: is "
             f"Python code to execute; allow it with --trust or {VARIABLE}=1"

@@ -7,11 +7,7 @@ command is held until the next.
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-import traceback
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -27,8 +23,8 @@ from tiltsim.plants.command import (
 )
 from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.scenario.controller import PythonController
+from tiltsim.scenario.own_code import describe, load_function
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.system.files import is_file
 from tiltsim.vehicles.rotorcraft.layout import Layout
 
 
@@ -57,32 +53,8 @@ class UserController:
             return function(argument)
         except (Exception, SystemExit) as error:
             raise ControllerError(
-                f"the controller {self._name} raised {_describe(error)}"
+                f"the controller {self._name} raised {describe(error)}"
             ) from error
-
-
-def _describe(error: BaseException) -> str:
-    """An error in one line: its type, its message, and the line of the controller's code."""
-    try:
-        text = " ".join(str(error).split())[:200]
-    except Exception:
-        text = ""
-    return f"{type(error).__name__}{f': {text}' if text else ''}{_place(error)}"
-
-
-def _place(error: BaseException) -> str:
-    """The innermost file and line of the controller's own code in an error's traceback.
-
-    The function instead of the file where there is none, as in a notebook.
-    """
-    frames = traceback.extract_tb(error.__traceback__)[1:]  # without our own call
-    if not frames:
-        return ""
-    last = [frame for frame in frames if frame.filename == frames[0].filename][-1]
-    file = Path(last.filename)
-    if not is_file(file):
-        return f" (line {last.lineno} of {last.name})"
-    return f" ({file.name}, line {last.lineno})"
 
 
 def load_controller(scenario: Scenario) -> UserController:
@@ -94,56 +66,16 @@ def load_controller(scenario: Scenario) -> UserController:
     assert isinstance(table, PythonController)
     name = table.function
     if controller is None:
-        controller = _load(scenario.address or "scenario", table)
+        controller = load_function(scenario.address or "scenario", table)
         name = f"{table.file.name}:{table.attribute}" if table.file is not None else name
     if isinstance(controller, type):
         try:
             controller = controller()
         except (Exception, SystemExit) as error:
             raise InputError(
-                f"controller {name}: raised when it was made: {_describe(error)}"
+                f"controller {name}: raised when it was made: {describe(error)}"
             ) from error
     return UserController(controller, name)
-
-
-def _load(address: str, table: PythonController) -> Any:
-    """The callable that a file defines under a name."""
-    start = f'{address}: controller.function = "{table.function}"'
-    if table.file is None:
-        raise InputError(
-            f"{start}: a controller that was given in Python, which no file holds; give it again "
-            "as controller= to tiltsim.load_scenario or simulate, or write FILE.py:NAME"
-        )
-    if not is_file(table.file):
-        raise InputError(f"{start}: no such file")
-    module = _run_file(start, table.file)
-    found = getattr(module, table.attribute, None)
-    if not callable(found):
-        own = [
-            name
-            for name, value in vars(module).items()
-            if callable(value) and getattr(value, "__module__", "") == module.__name__
-        ]
-        what = "is not callable" if hasattr(module, table.attribute) else "is not in the file"
-        raise InputError(f"{start}: {table.attribute} {what}; it has {', '.join(own) or 'none'}")
-    return found
-
-
-def _run_file(start: str, file: Path) -> Any:
-    """The module of a file, executed anew for every flight."""
-    spec = importlib.util.spec_from_file_location(f"tiltsim_controller_{file.stem}", file)
-    assert spec is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses and pickles look their module up
-    try:
-        # Compiled from its text, because cached bytecode may be older than a quick edit.
-        exec(compile(file.read_bytes(), str(file), "exec"), module.__dict__)
-    except SyntaxError as error:
-        line = f", line {error.lineno}" if error.lineno else ""
-        raise InputError(f"{start}: {error.msg} ({file.name}{line})") from None
-    except (Exception, SystemExit) as error:
-        raise InputError(f"{start}: raised {_describe(error)}") from error
-    return module
 
 
 class UserControlledPlant(CommandedPlant):

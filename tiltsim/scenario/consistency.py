@@ -44,6 +44,7 @@ def check_consistency(scenario: ScenarioTables) -> None:
     _check_ground(scenario)
     _check_claims(scenario)
     _check_engine(scenario)
+    scenario.controller.check_scenario(scenario)
 
 
 def _check_engine(scenario: ScenarioTables) -> None:
@@ -97,7 +98,7 @@ def _check_multirotor(scenario: ScenarioTables, vehicle: MultirotorTable) -> Non
 def _check_fixed_rotors(scenario: ScenarioTables) -> None:
     keys = {"gait.type": "fixed", "gait": FixedGait()}
     keys |= {"vehicle.tilt_servo": TiltServoTable(), "vehicle.pod": PodTable()}
-    if not scenario.controller.is_external:  # external commands act on rotors with a speed
+    if not scenario.controller.rotors_have_speeds:
         keys |= {"vehicle.min_rotor_speed": None, "vehicle.max_rotor_speed": None}
         keys["vehicle.rotor_inertia"] = 0.0
         keys["initial.rotor_speed"] = InitialTable().rotor_speed

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import reduce
+from operator import or_
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from tiltsim.scenario.baseline_controllers import GeometricController
+from tiltsim.scenario.controller_packages import installed_controllers
 from tiltsim.scenario.controller_table import ControllerTable
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
@@ -15,6 +20,8 @@ from tiltsim.scenario.quadrotor_controllers import (
     SwitchingController,
     YawPositionController,
 )
+from tiltsim.scenario.scalar_controller import Airframe, TiltingController
+from tiltsim.scenario.table import example
 from tiltsim.scenario.tilt_car_controllers import (
     FourthDerivativeController,
     PlannedDirectionController,
@@ -25,14 +32,9 @@ from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController, F
 DEFAULT_LAW: Final = "attitude_altitude"
 
 
-class PythonController(ControllerTable):
-    """A user's own controller in Python; see `tiltsim.plants.user_controller`."""
+class OwnFunctionController(ControllerTable):
+    """A function of the user's."""
 
-    vehicle_models = ("tiltrotor", "quadrotor", "multirotor")
-    reference_kinds = ("position", "pose", "attitude_altitude")
-    is_external = True
-
-    law: Literal["python"] = Field(description="your own controller")
     function: str = Field(
         description="FILE.py:NAME of a function or class; FILE in the scenario's folder",
         examples=["my_controller.py:hover"],
@@ -44,7 +46,7 @@ class PythonController(ControllerTable):
         if isinstance(value, dict) and "function" not in value:
             raise InvalidValueError(
                 "controller.law",
-                "python",
+                value.get("law"),
                 "needs controller.function = FILE.py:NAME; a controller of your own in Python is "
                 "the argument controller= of tiltsim.load_scenario and simulate",
             )
@@ -62,6 +64,37 @@ class PythonController(ControllerTable):
         return self.function.rpartition(":")[2]
 
 
+class PythonController(OwnFunctionController):
+    """A user's own controller in Python; see `tiltsim.plants.user_controller`."""
+
+    vehicle_models = ("tiltrotor", "quadrotor", "multirotor")
+    reference_kinds = ("position", "pose", "attitude_altitude")
+    is_external = True
+    rotors_have_speeds = True
+
+    law: Literal["python"] = Field(description="your own controller")
+
+
+class ScalarFunctionController(OwnFunctionController, TiltingController):
+    """A user's own scalar function; see docs/controller_package.md."""
+
+    model_config = example(law="scalar", function="my_law.py:hover")
+
+    reference_kinds = ("position", "pose", "attitude_altitude")
+
+    law: Literal["scalar"] = Field(
+        description="your own function marked @tiltsim.scalar, which flies as compiled code"
+    )
+    states: dict[Annotated[str, Field(pattern="^state_[a-z0-9_]+$")], str] = Field(
+        {},
+        description="the law's own states, zero at the start: their names and units",
+        examples=[{"state_integral": "m s"}],
+    )
+
+    def state_units(self, airframe: Airframe) -> Mapping[str, str]:
+        return self.states
+
+
 def _law(value: Any) -> str:
     if isinstance(value, ControllerTable):
         return value.law
@@ -69,23 +102,32 @@ def _law(value: Any) -> str:
     return law if isinstance(law, str) else ""
 
 
-Controller = Annotated[
-    Annotated[AttitudeAltitudeController, Tag("attitude_altitude")]
-    | Annotated[FullPoseController, Tag("full_pose")]
-    | Annotated[YawPositionController, Tag("yaw_position")]
-    | Annotated[SwitchingController, Tag("switching")]
-    | Annotated[QuadrotorAttitudeAltitudeController, Tag("quadrotor_attitude_altitude")]
-    | Annotated[AttitudeForceController, Tag("attitude_force")]
-    | Annotated[PythonController, Tag("python")]
-    | Annotated[ThirdDerivativeController, Tag("tilt_car_third_derivative")]
-    | Annotated[FourthDerivativeController, Tag("tilt_car_fourth_derivative")]
-    | Annotated[PlannedDirectionController, Tag("tilt_car_planned_direction")],
-    Discriminator(_law),
-]
+_BUILT_IN: Final[dict[str, type[ControllerTable]]] = {
+    "attitude_altitude": AttitudeAltitudeController,
+    "full_pose": FullPoseController,
+    "yaw_position": YawPositionController,
+    "switching": SwitchingController,
+    "quadrotor_attitude_altitude": QuadrotorAttitudeAltitudeController,
+    "attitude_force": AttitudeForceController,
+    "geometric": GeometricController,
+    "python": PythonController,
+    "scalar": ScalarFunctionController,
+    "tilt_car_third_derivative": ThirdDerivativeController,
+    "tilt_car_fourth_derivative": FourthDerivativeController,
+    "tilt_car_planned_direction": PlannedDirectionController,
+}
+
+CONTROLLERS: Final = _BUILT_IN | installed_controllers(_BUILT_IN)
+"""The tables of all laws by their names: built-in ones, then those of installed packages."""
+
+if TYPE_CHECKING:
+    Controller = ControllerTable
+else:
+    tagged = (Annotated[table, Tag(law)] for law, table in CONTROLLERS.items())
+    Controller = Annotated[reduce(or_, tagged), Discriminator(_law)]
 """The ``[controller]`` table, discriminated by its law."""
 
 
 def laws_for(model: str) -> list[str]:
     """The laws that control a vehicle, given ``vehicle.model``."""
-    options = [get_args(option) for option in get_args(get_args(Controller)[0])]
-    return [tag.tag for table, tag in options if model in table.vehicle_models]
+    return [law for law, table in CONTROLLERS.items() if model in table.vehicle_models]

@@ -111,6 +111,7 @@ class ControllerTable(Table):
     loop_gains: ClassVar[LoopGains] = ()  # of independent linear loops
     is_external: ClassVar[bool] = False  # commands come from Python code, not from a built-in law
     commands_tilts: ClassVar[bool] = False  # the tilt angles are inputs, not planned by a gait
+    rotors_have_speeds: ClassVar[bool] = False  # of the quadrotor, too, whose laws make thrusts
 
     allow_unstable: bool = Field(
         False, description="accept gains that fail the Routh-Hurwitz criterion of stability"
@@ -124,6 +125,9 @@ class ControllerTable(Table):
     def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
         """The linear closed loops that the gains make around a vehicle's parameters."""
         return linear_loops(self.resolve_gains(), self.loop_gains)
+
+    def check_scenario(self, scenario: Any) -> None:
+        """Refuse the controller in a scenario, otherwise consistent. Raises `mistake`."""
 
     @property
     def linearization(self) -> str:

@@ -28,6 +28,7 @@ from tiltsim.scenario.own_parts import (
 from tiltsim.scenario.scenario import Scenario, Variant
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.system.text import short_repr, shortened, valid_unicode
+from tiltsim_controllers.mathematics.scalar import is_scalar
 
 KIND_KEYS: Final = {"type": None, "law": DEFAULT_LAW}
 """Keys that decide which other keys a table may have, with their defaults."""
@@ -60,8 +61,9 @@ def load_scenario(
             a dict. A family without ``#variant`` needs them or a controller, and is its base then.
         controller: A controller of your own, which replaces the scenario's before anything is
             checked; the overrides then have no other law or function. It is a function from
-            `tiltsim.Observation` to `tiltsim.Command`, an object with ``__call__`` and, if it has a
-            memory, ``reset(scenario)``, a class of such objects, or ``"FILE.py:NAME"``.
+            `tiltsim.Observation` to `tiltsim.Command`, or one marked `tiltsim.scalar`, an object
+            with ``__call__`` and, if it has a memory, ``reset(scenario)``, a class of such objects,
+            or ``"FILE.py:NAME"``.
         reference: A motion of your own in place of the scenario's ``[reference]``, of which roll,
             pitch, yaw and acceleration_feedforward stay: a function of time (s) that returns a
             position ``(x, y, z)`` (m), sampled every 0.01 s over the duration of the flight, also
@@ -84,7 +86,8 @@ def load_scenario(
     check_no_other(overrides, given)
     title_before = own_title(document)
     if controller is not None:
-        document["controller"] = {"law": "python", "function": controller_name(controller)}
+        law = "scalar" if is_scalar(controller) else "python"
+        document["controller"] = {"law": law, "function": controller_name(controller)}
     replace_tables(document, given)
     if given and document.get("title", "") in (title_before, _title_in_file(source, address)):
         document["title"] = own_title(document)

@@ -54,7 +54,7 @@ def drop_what_own_controllers_ignore(
     """Leave it to a controller of one's own which derivatives it uses, unless overrides say it."""
     law, reference = document["controller"]["law"], document.get("reference")
     is_given = "reference.acceleration_feedforward" in overrides
-    if law == "python" and isinstance(reference, dict) and not is_given:
+    if law in ("python", "scalar") and isinstance(reference, dict) and not is_given:
         reference.pop("acceleration_feedforward", None)
 
 

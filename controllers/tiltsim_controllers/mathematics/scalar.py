@@ -38,6 +38,11 @@ def scalar_functions() -> tuple[Callable[..., Any], ...]:
     return tuple(_registry)
 
 
+def is_scalar(function: object) -> bool:
+    """Whether a function is registered."""
+    return any(function is known for known in _registry)
+
+
 @scalar
 def clipped(value: float, low: float, high: float) -> float:
     """Limit ``value`` to the interval from ``low`` to ``high``; NaN stays NaN."""

@@ -6,7 +6,7 @@ integrator stage and restarted anywhere.
 
 from __future__ import annotations
 
-from math import inf
+from math import exp, inf
 from typing import NamedTuple
 
 from tiltsim_controllers.mathematics.scalar import scalar
@@ -47,3 +47,11 @@ def thrust_factor(time: float, fault: RotorFault) -> float:
 def servo_command(time: float, command: float, fault: RotorFault) -> float:
     """The angle (rad) that a tilt servo turns to at a time (s): its command unless it is stuck."""
     return fault.stuck_angle if time >= fault.stuck_time else command
+
+
+def held_gain(bandwidth: float, step: float) -> float:
+    """The gain (1/s) of a rate that is held over a step (s), 0 if continuous.
+
+    At the end of each step the value is where a lag of this bandwidth (1/s) would be.
+    """
+    return (1.0 - exp(-bandwidth * step)) / step if step > 0.0 else bandwidth

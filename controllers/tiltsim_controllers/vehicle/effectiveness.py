@@ -77,6 +77,13 @@ def rotor_entries(
     return tuple(map(float, (tilt, spin, *np.concatenate(wrenches))))
 
 
+def table_per_newton(table: Sequence[float], coefficients: Sequence[float]) -> Values:
+    """A table in which force and torque are those of a thrust of 1 N, given K_f of each rotor."""
+    rows = np.reshape(np.array(table, float), (-1, ROTOR_FLOATS))
+    rows[:, CONSTANT:] /= (rows[:, SPIN_SIGN] * coefficients)[:, np.newaxis]
+    return tuple(rows.ravel().tolist())
+
+
 def layout_of(table: Sequence[float]) -> Layout:
     """The layout of a table."""
     return tuple(int(tilt) for tilt in table[TILT::ROTOR_FLOATS])

@@ -1,0 +1,142 @@
+"""Scalar laws of scenarios: those of tables, and functions of the user's, checked before flights.
+
+Compiled code of a law from outside this package is kept by a checksum of its source.
+"""
+
+from __future__ import annotations
+
+import traceback
+import zlib
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from tiltsim.errors import InputError
+from tiltsim.laws.multirotor import layout_of_vehicle
+from tiltsim.laws.scalar_loop import Key, airframe_of, scalar_loop
+from tiltsim.scenario.controller import ScalarFunctionController
+from tiltsim.scenario.own_code import describe, load_scalar_function
+from tiltsim.scenario.scalar_controller import ScalarController
+from tiltsim.scenario.scenario import plan_flight
+from tiltsim.vehicles.rotorcraft import initial_tilts
+from tiltsim_controllers.laws.observed import Observed
+from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
+from tiltsim_controllers.mathematics.scalar import Values, is_scalar, scalar
+
+if TYPE_CHECKING:
+    from tiltsim.closed_loop.loop import ClosedLoop
+    from tiltsim.scenario.scenario import FlightPlan, Scenario
+
+
+def foreign_code(law: Callable[..., Any]) -> str:
+    """A checksum of a law's code outside this package, by which compiled code is kept; else none.
+
+    It covers the files of all scalar functions that the law may call.
+    """
+    found: dict[str, bytes] = {}
+    _collect(law, found)
+    return f"_{zlib.crc32(b''.join(found.values())):08x}" if found else ""
+
+
+def _collect(function: Callable[..., Any], found: dict[str, bytes]) -> None:
+    """Add the code of a function and of those that it calls, by file or by name without one."""
+    if function.__module__.startswith(("tiltsim.", "tiltsim_controllers.")):
+        return
+    code = function.__code__
+    name, file = f"{code.co_filename}:{code.co_qualname}", Path(code.co_filename)
+    if name in found:
+        return
+    text = getattr(function, "__source__", "").encode()
+    found[name] = text or (file.read_bytes() if file.is_file() else b"")
+    known = [function.__globals__.get(name) for name in code.co_names]
+    known += [cell.cell_contents for cell in function.__closure__ or ()]
+    modules = [value for value in known if isinstance(value, ModuleType)]
+    known += [getattr(module, name, None) for module in modules for name in code.co_names]
+    for value in known:
+        if value is not None and is_scalar(value):
+            _collect(value, found)
+
+
+@cache
+def _without_parameters(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A user's function of what it sees as a law with parameters, of which it has none."""
+
+    @scalar
+    def own_law(observed: Observed, parameters: Any) -> tuple[Values, Values, Values]:
+        return function(observed)  # type: ignore[no-any-return]
+
+    return own_law
+
+
+@cache
+def _with_checksum(law: Callable[..., Any], checksum: str) -> Callable[..., Any]:
+    """The law under a name with its checksum, so that stale compiled code is not found."""
+    if not checksum:
+        return law
+
+    @scalar
+    def checked(observed: Observed, parameters: Any) -> tuple[Values, Values, Values]:
+        return law(observed, parameters)  # type: ignore[no-any-return]
+
+    checked.__qualname__ = checked.__name__ = f"law{checksum}"
+    return checked
+
+
+def loop_of_scalar_law(scenario: Scenario) -> ClosedLoop:
+    """The closed loop of a scenario's scalar law, without layers.
+
+    Raises `InputError` for a law of a package or of the user's that does not return what it should.
+    """
+    plan = plan_flight(scenario)
+    controller, airframe = scenario.controller, airframe_of(plan)
+    assert isinstance(controller, ScalarController)
+    if isinstance(controller, ScalarFunctionController):
+        address = scenario.address or "scenario"
+        function = load_scalar_function(address, controller, scenario.own_controller)
+        law, checksum = _without_parameters(function), foreign_code(function)
+    else:
+        law = controller.scalar_law(airframe)
+        checksum = foreign_code(law)
+    key = Key(
+        scenario.vehicle.model,
+        layout_of_vehicle(airframe.vehicle),
+        _with_checksum(law, checksum),
+        f"{controller.law}{checksum}",
+        type(controller.law_parameters(airframe)),
+        tuple(controller.state_units(airframe).items()),
+        controller.commands_tilts,
+    )
+    loop = scalar_loop(key)
+    if checksum:
+        _try_once(loop, plan)
+    return loop
+
+
+def _try_once(loop: ClosedLoop, plan: FlightPlan) -> None:
+    """Evaluate a control step at time zero, so that mistakes in a law are found before the flight.
+
+    Raises `InputError`.
+    """
+    scenario, setup = plan.scenario, loop.setup(plan, loop.signature)
+    initial = scenario.initial
+    tilts, rates = initial_tilts(plan) if scenario.vehicle.has_tilting_rotors else ((), ())
+    qpos = (*initial.position, *quaternion_from_euler(*initial.attitude), *tilts)
+    qvel = (*initial.velocity, *initial.angular_velocity, *rates)
+    act = tuple(map(float, loop.dynamics.initial_activations(plan, setup)))
+    start = f'{scenario.address or "scenario"}: controller.law = "{scenario.controller.law}"'
+    rotors, states = len(loop.dynamics.spins), loop.dynamics.controller_states
+    wanted = (
+        f"{start}: the law must return {rotors} thrusts (N), the tilts (rad) if it commands them, "
+        f"and the rates of its states: three tuples of floats"
+    )
+    try:
+        ctrl = loop.sampling.controls(0.0, qpos, qvel, act, setup.parameters, setup.knots)
+    except Exception as error:
+        calls = 4 + isinstance(scenario.controller, ScalarFunctionController)  # before the law
+        if len(traceback.extract_tb(error.__traceback__)) <= calls:
+            raise InputError(wanted) from error
+        raise InputError(f"{start}: the law raised {describe(error, calls)}") from error
+    if len(ctrl) != loop.dynamics.sizes.ctrl or not all(isinstance(v, float) for v in ctrl):
+        raise InputError(f"{wanted}; with {states} states they make {len(ctrl)} controls")

@@ -1,0 +1,44 @@
+"""The tiltrotor and the quadrotor of the thesis as multirotors."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Final
+
+import numpy as np
+
+from tiltsim.models.rotor_table import Multirotor
+from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.vehicle.effectiveness import rotor_entries
+from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
+
+ARMS: Final = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
+"""Directions of the arms of rotors 1 to 4, about which the pods of the tiltrotor turn."""
+
+
+def as_multirotor(vehicle: Vehicle | Multirotor, *, tilting: bool) -> Multirotor:
+    """A vehicle with four equal arms at right angles, as a table of its rotors.
+
+    Args:
+        vehicle: Its parameters; a multirotor is returned as it is.
+        tilting: Whether every rotor turns about its arm.
+    """
+    if isinstance(vehicle, Multirotor):
+        return vehicle
+    table: Values = ()
+    for rotor, (arm, spin) in enumerate(zip(ARMS, SPIN, strict=True)):
+        place = vehicle.arm_length * np.array(arm)
+        coefficients = vehicle.thrust_coefficient, vehicle.drag_coefficient
+        hinge = {"tilt": rotor, "hinge": place, "hinge_axis": arm} if tilting else {}
+        table += rotor_entries(place, (0.0, 0.0, 1.0), *coefficients, spin, **hinge)  # type: ignore[arg-type]
+    inertia = np.diag((vehicle.inertia_xx, vehicle.inertia_yy, vehicle.inertia_zz))
+    return Multirotor(
+        mass=vehicle.mass,
+        gravity=vehicle.gravity,
+        inertia=tuple(inertia.ravel().tolist()),
+        table=table,
+        thrust_coefficients=(vehicle.thrust_coefficient,) * len(ARMS),
+        spins=SPIN,
+        speed_ranges=((-inf, inf),) * len(ARMS),
+        tilts=len(ARMS) if tilting else 0,
+    )

@@ -1,0 +1,107 @@
+"""Python code of the user's that scenario files name: loading it, and its errors in one line."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+import traceback
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from tiltsim.errors import InputError
+from tiltsim.system.files import digest, is_file
+from tiltsim_controllers.mathematics.scalar import is_scalar
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.controller import OwnFunctionController
+
+
+def describe(error: BaseException, own_frames: int = 1) -> str:
+    """An error in one line: its type, its message, and the line of the controller's code.
+
+    The first ``own_frames`` calls of its traceback are ours.
+    """
+    try:
+        text = " ".join(str(error).split())[:200]
+    except Exception:
+        text = ""
+    return f"{type(error).__name__}{f': {text}' if text else ''}{_place(error, own_frames)}"
+
+
+def _place(error: BaseException, own_frames: int) -> str:
+    """The innermost file and line of the controller's own code in an error's traceback.
+
+    The function instead of the file where there is none, as in a notebook.
+    """
+    frames = traceback.extract_tb(error.__traceback__)[own_frames:]
+    if not frames:
+        return ""
+    last = [frame for frame in frames if frame.filename == frames[0].filename][-1]
+    file = Path(last.filename)
+    if not is_file(file):
+        return f" (line {last.lineno} of {last.name})"
+    return f" ({file.name}, line {last.lineno})"
+
+
+def load_function(address: str, table: OwnFunctionController) -> Any:
+    """The callable that a file defines under a name."""
+    start = f'{address}: controller.function = "{table.function}"'
+    if table.file is None:
+        raise InputError(
+            f"{start}: a controller that was given in Python, which no file holds; give it again "
+            "as controller= to tiltsim.load_scenario or simulate, or write FILE.py:NAME"
+        )
+    if not is_file(table.file):
+        raise InputError(f"{start}: no such file")
+    module = _run_file(start, table.file)
+    found = getattr(module, table.attribute, None)
+    if not callable(found):
+        own = [
+            name
+            for name, value in vars(module).items()
+            if callable(value) and getattr(value, "__module__", "") == module.__name__
+        ]
+        what = "is not callable" if hasattr(module, table.attribute) else "is not in the file"
+        raise InputError(f"{start}: {table.attribute} {what}; it has {', '.join(own) or 'none'}")
+    return found
+
+
+def _run_file(start: str, file: Path) -> Any:
+    """The module of a file, executed anew for every flight."""
+    spec = importlib.util.spec_from_file_location(f"tiltsim_controller_{file.stem}", file)
+    assert spec is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses and pickles look their module up
+    try:
+        # Compiled from its text, because cached bytecode may be older than a quick edit.
+        exec(compile(file.read_bytes(), str(file), "exec"), module.__dict__)
+    except SyntaxError as error:
+        line = f", line {error.lineno}" if error.lineno else ""
+        raise InputError(f"{start}: {error.msg} ({file.name}{line})") from None
+    except (Exception, SystemExit) as error:
+        raise InputError(f"{start}: raised {describe(error)}") from error
+    return module
+
+
+def load_scalar_function(address: str, table: OwnFunctionController, given: Any) -> Any:
+    """The scalar function of a law ``scalar``: given in Python, or in a file.
+
+    Raises `InputError` if there is none, or it is not marked as scalar code.
+    """
+    function = given
+    if given is None:
+        content = table.file.read_bytes() if table.file and is_file(table.file) else b""
+        known = str(table.file), table.attribute, digest(content)
+        if known not in _loaded:
+            _loaded[known] = load_function(address, table)
+        function = _loaded[known]
+    if not is_scalar(function):
+        raise InputError(
+            f'{address}: controller.function = "{table.function}": is not marked with '
+            '@tiltsim.scalar; controller.law = "python" flies any function'
+        )
+    return function
+
+
+_loaded: Final[dict[tuple[str, str, str], Any]] = {}
+"""Scalar functions by file, name and digest of the file, since each is compiled once."""
