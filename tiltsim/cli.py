@@ -12,6 +12,7 @@ from io import TextIOWrapper
 from traceback import walk_tb
 from typing import Final, NoReturn
 
+from tiltsim.arrays.jax_arrays import MERGES_LOOPS
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT, TERMINATED
 from tiltsim.system.interrupts import terminations_as_interrupts
@@ -89,10 +90,22 @@ def reduce_garbage_collection() -> None:
     atexit.register(gc.freeze)
 
 
+def let_xla_merge_loops() -> None:
+    """Have JAX compute values once for several results, in this process and those it starts.
+
+    The option doubles the speed of flights on arrays. It is not set where tiltsim is a library:
+    XLA may fail with it on programs that are not ours.
+    """
+    flags = os.environ.get("XLA_FLAGS", "")
+    if "xla_backend_extra_options" not in flags:
+        os.environ["XLA_FLAGS"] = f"{flags} --xla_backend_extra_options={MERGES_LOOPS}=true"
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run one command, by default that of ``sys.argv``, and return its exit code."""
     if arguments is None:
         reduce_garbage_collection()
+        let_xla_merge_loops()
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # as Python has it for standard error
     with terminations_as_interrupts() as terminated:

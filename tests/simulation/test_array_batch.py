@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
 import tiltsim
 from tests.laws.test_laws import LAWS
 from tests.simulation.test_batch import EXACT, without_speed
+from tiltsim import cli
+from tiltsim.arrays import jax_arrays
 from tiltsim.scenario.loading import merge
+from tiltsim.simulation.array_batch import _padded
 
 pytest.importorskip("jax")
 
@@ -67,3 +72,20 @@ def test_single_precision_is_near_double_precision():
     difference = np.abs(first.samples[:, 1:4] - second.samples[:, 1:4]).max()
     assert 0.0 < difference < 1e-4
     np.testing.assert_array_equal(first["time"], second["time"])
+
+
+def test_batches_have_few_sizes_since_each_is_compiled():
+    sizes = [_padded(rows) for rows in range(1, 5000)]
+    assert sorted({*sizes}) == [*(2**n for n in range(10)), 1024, 2048, 3072, 4096, 5120]
+    assert all(size >= rows for rows, size in enumerate(sizes, start=1))
+
+
+def test_the_command_line_adds_its_option_to_those_of_the_user(monkeypatch):
+    monkeypatch.setenv("XLA_FLAGS", "--xla_dump_to=here")
+    cli.let_xla_merge_loops()
+    assert os.environ["XLA_FLAGS"].split() == [
+        "--xla_dump_to=here",
+        f"--xla_backend_extra_options={jax_arrays.MERGES_LOOPS}=true",
+    ]
+    cli.let_xla_merge_loops()
+    assert os.environ["XLA_FLAGS"].count("xla_backend_extra_options") == 1

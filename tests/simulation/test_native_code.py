@@ -128,6 +128,9 @@ def test_all_that_processes_fly_with_is_compiled_for_them_once(monkeypatch):
     assert shared_engine.shared_engine(flights, 99_999) is None
     assert shared_engine.shared_engine(flights, 100_000) == "native"
     assert calls == ["thesis", "record", "advance"]
+    on_arrays = [flight.replace({"simulation.engine": "jax"}) for flight in flights]
+    shared_engine.shared_engine(on_arrays, 100_000)
+    assert len(calls) == 3
 
 
 def test_only_loops_that_fly_long_are_compiled_together(monkeypatch, tmp_path):

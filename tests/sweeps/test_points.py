@@ -72,6 +72,15 @@ def test_axes_are_crossed_the_last_one_fastest(points_of):
     assert sorted(i for n in range(sweep.chunks) for i in sweep.chunk(n)) == list(range(25))
 
 
+def test_chunks_of_sweeps_on_arrays_fill_arrays(points_of):
+    masses = MASS.replace("[[axis]]", "[sample]\ncount = 5000\n[[axis]]")
+    assert points_of(masses).chunk_size == 32
+    on_arrays = {"simulation.plant": "thesis", "simulation.engine": "jax"}
+    assert points_of(masses, on_arrays).chunk_size == 1024
+    few = masses.replace("5000", "400")
+    assert points_of(few, on_arrays).chunk_size == 100
+
+
 TROT = """
 scenario = "ch04_tracking/circle#fixed_modified"
 [set]

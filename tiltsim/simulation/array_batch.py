@@ -34,6 +34,9 @@ from tiltsim_controllers.mathematics.scalar import Floats
 MEMORY: Final = 256 * 2**20
 """Bytes of the samples of all rows that fly together."""
 
+ROUND_ROWS: Final = 1024
+"""Large numbers of rows are multiples of it; it is also what fits the caches of a core."""
+
 Result = TypeVar("Result")
 
 
@@ -70,6 +73,11 @@ def batch_key(assembly: Assembly) -> object:
     parameters, knots = assembly.setup
     records = (*_named(parameters), *_named(assembly.reference))
     return course_of(assembly), len(knots), tuple(v for name, v in records if name in CODES)
+
+
+def _padded(rows: int) -> int:
+    """As many rows or more: a number of which there are few, as each is compiled."""
+    return min(1 << (rows - 1).bit_length(), -(-rows // ROUND_ROWS) * ROUND_ROWS)
 
 
 class ArrayBatch(Generic[Result]):
@@ -109,7 +117,7 @@ class ArrayBatch(Generic[Result]):
     def results(self) -> Iterator[tuple[int, Result]]:
         """Index and result of each flight, in order."""
         count = len(self._assemblies)
-        size = min(self._most, -(-count // self._threads))
+        size = min(self._most, _padded(-(-count // self._threads)))
         parts = [range(start, min(start + size, count)) for start in range(0, count, size)]
         for start in range(0, len(parts), self._threads):
             began = perf_counter()

@@ -27,7 +27,7 @@ from tiltsim.system.numbers import whole_number
 from tiltsim.system.progress import Report, check_progress, reported
 from tiltsim.system.text import short_repr
 
-WINDOW: Final = 512
+WINDOW: Final = 2048
 """How many scenarios are grouped together into those that share a batch."""
 
 

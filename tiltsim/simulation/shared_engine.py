@@ -84,9 +84,12 @@ def _name(scenario: Scenario) -> str:
 
 
 def _examples(scenarios: Sequence[Scenario]) -> dict[str, Scenario]:
-    """A scenario of each loop that can fly natively, by its name."""
-    flown = (scenario for scenario in scenarios if not scenario.controller.is_external)
-    return {_name(scenario): scenario for scenario in flown}
+    """A scenario of each loop that may fly natively, by its name."""
+    return {
+        _name(scenario): scenario
+        for scenario in scenarios
+        if scenario.simulation.engine in ("auto", "native") and not scenario.controller.is_external
+    }
 
 
 def _compile(scenarios: Sequence[Scenario]) -> None:

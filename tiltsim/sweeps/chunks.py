@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -90,6 +90,7 @@ def _fly_values(
 ) -> list[ScenarioResult]:
     """Results for values of the axes, "invalid" where they do not make a scenario."""
     results: dict[int, ScenarioResult] = {}
+    asked: dict[int, Scenario] = {}
     scenarios: dict[int, Scenario] = {}
     for position, values in enumerate(batch):
         try:
@@ -98,11 +99,13 @@ def _fly_values(
             results[position] = ScenarioResult({}, "invalid", None, str(error))
             continue
         require_trust(scenario, trusted)
+        asked[position] = scenario
         if engine is not None and scenario.simulation.engine == "auto":
             scenario = with_engine(scenario, engine)
         scenarios[position] = scenario
     flown = fly_scenarios(list(scenarios.values()), keep_flights=points.sweep.keep_flights)
-    results |= dict(zip(scenarios, flown, strict=True))
+    for position, result in zip(scenarios, flown, strict=True):
+        results[position] = replace(result, scenario=asked[position])
     return [results[position] for position in range(len(batch))]
 
 

@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from tiltsim.errors import InputError
 from tiltsim.scenario.loading import without_none
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS
 from tiltsim.sweeps.definition import VERSIONS
@@ -42,10 +41,10 @@ def make_row(
         values: Those that the axes set, by key.
         result: Of the flight with these values.
     """
-    try:
-        document = without_none(points.scenario(values).model_dump(mode="json"))
-    except InputError:
+    if result.scenario is None:
         document = points.document(values)  # not valid, but it shows the mistake
+    else:
+        document = without_none(result.scenario.model_dump(mode="json"))
     return {
         "index": index,
         **values,

@@ -24,6 +24,7 @@ class ScenarioResult:
     end_time: float | None  # s
     cause: str
     flight: bytes | None = None  # flight.parquet, if the sweep keeps flights
+    scenario: Scenario | None = None  # as the sweep has it; None if invalid
 
 
 def fly_scenarios(

@@ -12,6 +12,7 @@ from functools import cached_property
 from math import prod
 from typing import Any, Final
 
+from tiltsim.errors import InputError
 from tiltsim.scenario.loading import apply_overrides, merge, parse_scenario
 from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
 from tiltsim.scenario.override_keys import split_key
@@ -35,6 +36,9 @@ from tiltsim_controllers.mathematics.scalar import Floats
 MAX_POINTS: Final = 10_000_000
 LARGEST_CHUNK: Final = 32
 """Points per chunk unless the file sets it: few enough that little is lost when killed."""
+
+LARGEST_ARRAY: Final = 1024
+"""The same with the jax engine, which flies a chunk at once: as many as its caches hold."""
 
 
 class SweepPoints:
@@ -66,7 +70,15 @@ class SweepPoints:
         """Points per chunk."""
         if self.sweep.chunk_size is not None:
             return self.sweep.chunk_size
-        return max(1, min(LARGEST_CHUNK, len(self) // 64))
+        largest, parts = (LARGEST_ARRAY, 4) if self._on_arrays else (LARGEST_CHUNK, 64)
+        return max(1, min(largest, len(self) // parts))
+
+    @cached_property
+    def _on_arrays(self) -> bool:
+        try:
+            return self.scenario(self.point(0)).simulation.engine == "jax"
+        except InputError:  # told when it is flown
+            return False
 
     @property
     def chunks(self) -> int:
