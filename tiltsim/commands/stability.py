@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import argparse
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.commands.figure_options import add_plot, check_plot, save_figure
 from tiltsim.commands.options import Subparsers, add_json, add_overrides
 from tiltsim.commands.text import aligned, json_text, number, print_figure_path, table
+from tiltsim.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from tiltsim.linear.stability import Stability
+    from tiltsim.linear.sweeping import Point
+    from tiltsim.scenario.scenario import Scenario
+
+
+SHORT_KEYS: Final = {"period": "gait.period", "amplitude": "gait.amplitude"}
+POINTS: Final = 16
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -21,10 +30,14 @@ def add_parser(subparsers: Subparsers) -> None:
     sampling and latency included, on the plant of the scenario."""
     summary = "poles of a rest point or multipliers of a periodic flight"
     parser = subparsers.add_parser("stability", help=summary, description=description)
-    parser.add_argument("scenario", metavar="SCENARIO", help="a TOML file or a library name")
+    scenarios = "TOML files or library names; several only with --sweep"
+    parser.add_argument("scenario", nargs="+", metavar="SCENARIO", help=scenarios)
+    sweep = """how the largest multiplier moves with a number: period, amplitude or any key;
+    default: from half to twice its value at 16 points, spaced evenly by ratio"""
+    parser.add_argument("--sweep", metavar="KEY[=FROM:TO[:POINTS]]", help=sweep)
     add_overrides(parser, "the scenario", "gait.period=1.5")
     add_json(parser)
-    add_plot(parser, "the poles or multipliers")
+    add_plot(parser, "the poles or multipliers, or the sweep")
     parser.set_defaults(run=run)
 
 
@@ -35,21 +48,98 @@ def run(arguments: argparse.Namespace) -> int:
 
     check_plot(arguments)
     overrides = dict(parse_override(text) for text in arguments.overrides)
-    scenario = load_scenario(arguments.scenario, overrides)
+    scenarios = [load_scenario(address, overrides) for address in arguments.scenario]
+    if arguments.sweep is not None:
+        return _run_sweep(arguments, scenarios)
+    if len(scenarios) > 1:
+        raise InputError(f"stability: {len(scenarios)} scenarios need --sweep KEY")
 
     from tiltsim.linear.stability import stability
 
-    found = stability(scenario)
+    found = stability(scenarios[0])
     if arguments.plot is not None:
         from tiltsim.views.figures.stability import stability_figure
 
         save_figure(partial(stability_figure, found), arguments.plot, arguments)
+    print(json_text(found.report()) if arguments.json else stability_text(found))
+    print_figure_path(arguments)
+    return 0
+
+
+def parse_sweep(text: str, scenarios: Sequence[Scenario]) -> tuple[str, list[float]]:
+    """The key and the values of ``--sweep``."""
+    name, _, span = text.partition("=")
+    key = SHORT_KEYS.get(name, name)
+    parts = span.split(":") if span else []
+    try:
+        points = int(parts[2]) if len(parts) == 3 else POINTS
+        first, last = (float(part) for part in parts[:2]) if parts else (0.0, 0.0)
+    except ValueError:
+        raise InputError(f"--sweep {text}: write KEY=FROM:TO or KEY=FROM:TO:POINTS") from None
+    if not parts:
+        value: Any = scenarios[0].model_dump()
+        for part in key.split("."):
+            value = value.get(part) if isinstance(value, dict) else None
+        if not isinstance(value, float) or value == 0.0:
+            raise InputError(
+                f"--sweep {text}: {key} has no value to start from; write {name}=FROM:TO"
+            )
+        first, last = 0.5 * value, 2.0 * value
+    if len(parts) not in {0, 2, 3} or points < 2 or first == last:
+        raise InputError(f"--sweep {text}: write KEY=FROM:TO, with 2 or more :POINTS")
+    shares = [index / (points - 1) for index in range(points)]
+    if first > 0.0 and last > 0.0:
+        return key, [first * (last / first) ** share for share in shares]
+    return key, [first + (last - first) * share for share in shares]
+
+
+def _run_sweep(arguments: argparse.Namespace, scenarios: Sequence[Scenario]) -> int:
+    """Sweep, draw, print."""
+    from tiltsim.linear.sweeping import crossings, sweep_stability
+
+    key, values = parse_sweep(arguments.sweep, scenarios)
+    sweeps = {one.address: sweep_stability(one, key, values) for one in scenarios}
+    if arguments.plot is not None:
+        from tiltsim.views.figures.stability import sweep_figure
+
+        save_figure(partial(sweep_figure, key, sweeps), arguments.plot, arguments)
     if arguments.json:
-        print(json_text(found.report()))
+        report = [
+            {
+                "scenario": address,
+                "key": key,
+                "points": [point.report() for point in points],
+                "crossings": [crossing.report() for crossing in crossings(points)],
+            }
+            for address, points in sweeps.items()
+        ]
+        print(json_text(report))
     else:
-        print(stability_text(found))
+        print("\n\n".join(_sweep_text(key, *item) for item in sweeps.items()))
         print_figure_path(arguments)
     return 0
+
+
+def _sweep_text(key: str, address: str, points: Sequence[Point]) -> str:
+    from tiltsim.linear.sweeping import crossings
+
+    rows = [
+        (
+            number(point.value, ".4g"),
+            "-" if point.largest is None else number(point.largest, ".4f"),
+            {True: "stable", False: "unstable", None: point.reason}[
+                None if point.found is None else point.found.stable
+            ],
+        )
+        for point in points
+    ]
+    lines = [
+        f"{key} = {number(crossing.value, '.4g')}: the largest multiplier "
+        f"{'leaves' if crossing.leaves else 'enters'} the unit circle {crossing.how}"
+        for crossing in crossings(points)
+    ]
+    header = (key, "largest multiplier", "verdict")
+    return "\n".join([address, table(header, rows, frozenset({0, 1})), *lines])
 
 
 def stability_text(found: Stability) -> str:

@@ -13,6 +13,8 @@ from tiltsim_controllers.mathematics.scalar import Floats
 
 ITERATIONS: Final = 30
 HALVINGS: Final = 12
+GOOD: Final = 0.1  # a step that shrinks the value to this share needs no new derivative
+NEAR: Final = 1e-5  # steps of the differences; so near the derivative is the same
 NEUTRAL: Final = 1e-9
 """Directions in which the function changes less than this share of the largest are left alone."""
 
@@ -53,7 +55,8 @@ def solve(
     """A state near another at which a function of it vanishes, or nearly so.
 
     Steps are those of least norm, so that states along which nothing changes stay as they are, and
-    are halved until the value shrinks. Ends where it is below the tolerance or shrinks no more.
+    are halved until the value shrinks. Ends where it is below the tolerance or shrinks no more. The
+    derivative is computed anew only where that pays off.
 
     Args:
         function: Of a state; as many values as coordinates, NaN where it is not defined.
@@ -61,10 +64,14 @@ def solve(
         state: Where to begin.
         tolerance: Of the largest entry of the value.
     """
-    value = function(state)
+    value, derived_at = function(state), state
+    derivative, renew = derivative_at(function, coordinates, state), False
     for _ in range(ITERATIONS):
-        derivative = derivative_at(function, coordinates, state)
-        if np.abs(value).max() <= tolerance or not np.isfinite(derivative).all():
+        if np.abs(value).max() <= tolerance:
+            break
+        if renew:
+            derived_at, derivative = state, derivative_at(function, coordinates, state)
+        if not np.isfinite(derivative).all():
             break
         scale = _steps(coordinates, state)
         step = scale * np.linalg.lstsq(derivative * scale, -value, rcond=NEUTRAL)[0]
@@ -75,6 +82,12 @@ def solve(
                 break
             step = 0.5 * step
         else:
-            break
+            if renew or derived_at is state:
+                break
+            renew = True
+            continue
+        renew = bool(np.linalg.norm(its_value) > GOOD * np.linalg.norm(value))
         state, value = moved, its_value
+    if np.abs(coordinates.between(derived_at, state) / _steps(coordinates, state)).max() > NEAR:
+        derivative = derivative_at(function, coordinates, state)
     return Root(state, value, derivative)

@@ -49,6 +49,19 @@ class Stability:
     matrix: Floats
     equilibrium: Equilibrium
 
+    @property
+    def growth(self) -> float:
+        """What is left of the slowest disturbance after a period, at rest after one second."""
+        if self.multipliers is not None:
+            return float(np.abs(self.multipliers).max())
+        assert self.poles is not None  # it is a rest point
+        return float(np.exp(self.poles.real.max()))
+
+    @property
+    def rate(self) -> float:
+        """The growth rate (1/s) of the slowest disturbance, negative where it decays."""
+        return float(np.log(self.growth)) / (self.period or 1.0)
+
     def report(self) -> dict[str, Any]:
         """As JSON."""
         name = "poles" if self.multipliers is None else "multipliers"

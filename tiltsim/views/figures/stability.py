@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tiltsim.linear.stability import Stability
+from tiltsim.system.quantity import in_words
 from tiltsim.views.figures import style
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from matplotlib.figure import Figure
 
+    from tiltsim.linear.sweeping import Point
     from tiltsim_controllers.mathematics.scalar import Floats
 
 
@@ -30,6 +35,34 @@ def stability_figure(found: Stability) -> Figure:
             axes.set_title(f"Poles of the rest point: {verdict}")
         else:
             axes.set_title(f"Multipliers of the orbit of {found.period:.4g} s: {verdict}")
+        return figure
+
+
+def sweep_figure(key: str, sweeps: Mapping[str, Sequence[Point]]) -> Figure:
+    """The largest multiplier over a key, and its rate, a line for each scenario."""
+    with style.paper_style():
+        figure = style.new_figure(6.4, 6.0)
+        upper, lower = figure.subplots(2, 1, sharex=True)
+        looks = zip(cycle(style.CYCLE), cycle(style.DASHES), cycle(style.MARKERS))
+        for (address, points), (color, dashes, marker) in zip(sweeps.items(), looks):
+            known = [(p.value, p.found.growth, p.found.rate) for p in points if p.found is not None]
+            if not known:
+                continue
+            values, largest, rates = np.array(known).T
+            label = address.rpartition("/")[2]
+            line: Any = {"color": color, "ls": dashes, "marker": marker, "ms": 3.5, "label": label}
+            upper.plot(values, largest, **line)
+            lower.plot(values, rates, **line)
+        for axes, limit in ((upper, 1.0), (lower, 0.0)):
+            low, high = axes.get_ylim()
+            axes.set_ylim(low, max(high, limit + 0.1 * (limit - low)))
+            axes.axhspan(limit, axes.get_ylim()[1], color=style.UNREACHABLE, lw=0, zorder=0)
+            axes.axhline(limit, color=style.INK, lw=0.8)
+            axes.margins(x=0.02)
+        upper.set(ylabel="largest multiplier", title="What is left of a disturbance after a period")
+        lower.set(ylabel="growth rate (1/s)", xlabel=in_words(key), title="The same per second")
+        handles, labels = upper.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=2)
         return figure
 
 

@@ -1,0 +1,147 @@
+"""Periodic orbits and their multipliers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tiltsim
+from tests.linear.test_rest import SETPOINT, distance
+from tiltsim.laws.assembling import assemble
+from tiltsim.linear.equilibrium import equilibrium_of
+from tiltsim.linear.forcing import forcing_of
+from tiltsim.linear.newton import derivative_at
+from tiltsim.linear.stability import stability_at
+from tiltsim.linear.sweeping import Point, crossings, sweep_stability
+from tiltsim_controllers.tilt_car.penguin_cycle import Swing, limit_cycle, multipliers
+from tiltsim_controllers.tilt_car.planned_direction import GAIN_SETS
+
+QUICK = {"simulation.engine": "python", "simulation.duration": 1.0}
+"""A short flight that needs nothing compiled."""
+
+
+def gait(kind, plant="thesis", **keys):
+    """The published controller at a set point with a quick gait."""
+    gait = {"gait.type": kind, "gait.amplitude": 0.5, "gait.period": 0.1, **keys}
+    return tiltsim.load_scenario(
+        SETPOINT, {"simulation.plant": plant, "simulation.timestep": 0.0025, **QUICK, **gait}
+    )
+
+
+@pytest.fixture(scope="module")
+def continuous():
+    """The orbit of a continuous trot on the thesis's equations."""
+    return equilibrium_of(gait("trot_continuous"))
+
+
+def test_the_multipliers_are_those_of_the_product_of_exact_steps(continuous):
+    """Symbolic Jacobians of ode3's steps along the orbit, one after the other."""
+    casadi = pytest.importorskip("casadi")
+    motion, state = continuous.motion, continuous.root.state
+    closed_loop = tiltsim.symbolic(motion.scenario).closed_loop
+    at, time = casadi.SX.sym("at", len(state)), casadi.SX.sym("time")
+    step = motion.scenario.simulation.timestep
+    k1 = closed_loop(time, at)
+    k2 = closed_loop(time + 0.5 * step, at + 0.5 * step * k1)
+    k3 = closed_loop(time + 0.75 * step, at + 0.75 * step * k2)
+    after = at + step * (2.0 * k1 + 3.0 * k2 + 4.0 * k3) / 9.0
+    exact = casadi.Function("step", [time, at], [after, casadi.jacobian(after, at)])
+    product = derivative_at(lambda moved: moved, motion.coordinates, state)
+    for index in range(continuous.steps):
+        state, jacobian = (value.full() for value in exact(index * step, state))
+        product = jacobian @ product
+    end = state.ravel()
+    columns = [motion.coordinates.rates(end, column) for column in product.T]
+    expected = np.linalg.eigvals(np.array(columns).T)
+    assert distance(stability_at(continuous).multipliers, expected) < 1e-7
+
+
+@pytest.mark.parametrize(
+    ("kind", "plant"),
+    [
+        ("trot_instant", "thesis"),
+        pytest.param("walk", "thesis", marks=pytest.mark.slow),
+        pytest.param("trot_continuous", "mujoco", marks=pytest.mark.slow),
+        pytest.param("trot_instant", "mujoco", marks=pytest.mark.slow),
+    ],
+)
+def test_a_disturbance_decays_by_the_largest_multiplier(kind, plant):
+    """Measured along its eigenvector over two periods, to a thousandth."""
+    found = equilibrium_of(gait(kind, plant))
+    motion, start = found.motion, found.root.state
+    values, left = np.linalg.eig(found.matrix.T)
+    largest = int(np.argmax(np.abs(values)))
+    along = left[:, largest]
+    direction = np.zeros(motion.coordinates.size)
+    direction[found.kept] = 1e-4 * (along / np.abs(along).max()).real
+    disturbed = motion.coordinates.moved(start, direction)
+    before = abs(along @ direction[found.kept])
+    after = motion.coordinates.between(start, motion.flown(0, disturbed, 2 * found.steps))
+    assert abs(along @ after[found.kept]) / before == pytest.approx(
+        abs(values[largest]) ** 2, rel=1e-3
+    )
+    assert found.root.residual < 1e-9
+
+
+def test_the_penguin_gait_agrees_with_the_map_of_half_a_period():
+    """Its mirrored map has 0.2199 +- 0.1942i.
+
+    Steps of 5 ms do not end where a rotor stops: an error of first order in the step.
+    """
+    scenario = tiltsim.load_scenario(
+        "ch11_penguin/straight_line#large",
+        {"simulation.plant": "thesis", "simulation.timestep": 0.005, **QUICK},
+    )
+    found = tiltsim.stability(scenario)
+    swing = Swing(half_angle=np.pi / 6.0, half_period=1.0, gains=GAIN_SETS["ch11"])
+    half = multipliers(swing, limit_cycle(swing))
+    assert found.period == pytest.approx(2.0)
+    assert distance(np.sqrt(found.multipliers), half) < 2e-3
+    assert found.report()["kind"] == "orbit"
+
+
+def test_a_flight_repeats_when_gait_and_circle_share_a_period():
+    """Three trots of 0.1 s on a circle of 0.3 s; with an irrational ratio nothing repeats."""
+    circle = {"reference.type": "circle", "reference.radius": 0.1}
+    turning = {"reference.angular_frequency": 2.0 * np.pi / 0.3}
+    scenario = gait("trot_continuous", **circle, **turning)
+    assert forcing_of(assemble(scenario)).period == pytest.approx(0.3)
+    with pytest.raises(tiltsim.InputError, match="no common multiple"):
+        tiltsim.stability(scenario.replace({"gait.period": 0.1 * 2.0**0.5}))
+
+
+def with_altitude_gain(gain):
+    """The stability at rest with another third gain of the altitude loop, s^3 + 2 s^2 + 1.5 s."""
+    gains = {
+        "attitude": [[1, 1, 1], [10, 10, 1], [50, 50, 1]],
+        "altitude": [2.0, 1.5, gain],
+        "position": [1, 1],
+    }
+    changes = {"simulation.plant": "thesis", "controller.gains": gains}
+    scenario = tiltsim.load_scenario(SETPOINT, {**changes, "controller.allow_unstable": True})
+    return Point(gain, tiltsim.stability(scenario))
+
+
+def test_crossings_tell_where_stability_is_lost():
+    """By Routh's criterion where the third gain is the product of the others."""
+    (crossing,) = crossings([with_altitude_gain(gain) for gain in (2.0, 2.9, 3.1)])
+    assert crossing.leaves
+    assert crossing.value == pytest.approx(3.0, abs=0.01)
+
+
+def test_a_sweep_keeps_what_is_found_and_why_nothing_is():
+    scenario = tiltsim.load_scenario(SETPOINT, {"simulation.plant": "thesis"})
+    noisy = scenario.replace({"sensors.velocity_noise": 0.1})
+    (found,) = sweep_stability(scenario, "vehicle.mass", [0.5])
+    (refused,) = sweep_stability(noisy, "vehicle.mass", [0.5])
+    assert found.report()["stable"]
+    assert 0.0 < found.largest < 1.0
+    assert (refused.largest, refused.report()["stable"]) == (None, None)
+    assert "noise" in refused.reason
+
+
+def test_what_does_not_return_is_refused():
+    """A gait that reaches singular attitudes."""
+    lost = gait("trot_continuous").replace({"gait.amplitude": 1.5})
+    with pytest.raises(tiltsim.InputError, match="found no periodic orbit near its flight"):
+        tiltsim.stability(lost)
