@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import tiltsim
 from tests.laws.test_laws import GUST
 from tests.laws.test_multirotor import TILTS, mjcf
+from tiltsim.laws.airframe import airframe_of
+from tiltsim.laws.assembling import assemble
+from tiltsim.scenario.scenario import plan_flight
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 
 CIRCLE = {"type": "circle", "radius": 1.0, "angular_frequency": 0.5}
 ON_CIRCLE = {"position": [1.0, 0.0, 0.0], "velocity": [0.0, 0.5, 0.0]}
 TROT = {"type": "trot_continuous", "amplitude": 0.3, "period": 1.0}
+HOVER = (0.429 * 9.8 / (4 * 8.048e-6)) ** 0.5  # rad/s, of the tiltrotor
 FREE = {"law": "geometric", "tilts": "free"}
 BASELINES = {
     "geometric": {"controller": {"law": "geometric"}, "gait": TROT, "disturbance": GUST},
@@ -22,6 +27,13 @@ BASELINES = {
         "controller": {"law": "geometric"},
         "vehicle": {"model": "multirotor", "mjcf": mjcf("tilt_hexarotor")},
         "gait": TILTS,
+    },
+    "pid": {"controller": {"law": "pid"}, "gait": TROT, "disturbance": GUST},
+    "indi": {"controller": {"law": "indi"}, "gait": TROT, "disturbance": GUST},
+    "lqr": {
+        "controller": {"law": "lqr"},
+        "gait": {"type": "fixed", "angles": [0.1, -0.2, 0.1, 0.2]},
+        "disturbance": GUST,
     },
 }
 
@@ -44,7 +56,7 @@ def test_the_plants_agree(name):
     assert np.abs(mujoco["position"] - thesis["position"]).max() < bound
 
 
-NATIVE = ("geometric", "geometric free")
+NATIVE = ("geometric", "geometric free", "pid", "indi", "lqr")
 
 
 @pytest.mark.slow
@@ -108,6 +120,86 @@ def test_geometric_attitude_ends_at_the_slow_pole_of_its_linearization(turned_ov
     assert slope == pytest.approx(slow, rel=0.01)
 
 
+def test_indi_follows_a_step_of_yaw_as_designed():
+    """Smeur et al. 2016: with equal filters, ``s^2 + A k_Omega s + A k_Omega k_eta``, A the lag."""
+    step, lag, rate, attitude = 0.002, 100.0, 27.0, 9.0
+    tables = {
+        "controller": {"law": "indi"},
+        "reference": {"type": "setpoint", "yaw": step},
+        "initial": {"rotor_speed": HOVER},
+    }
+    yaw = fly(tables, plant="thesis", duration=1.0)["attitude"][:, 2]
+    # Yaw, its rate and the angular acceleration that the rotors make.
+    system = np.array(
+        [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-lag * rate * attitude, -lag * rate, -lag]]
+    )
+    designed = [step * (1.0 - expm(system * t)[0, 0]) for t in 0.01 * np.arange(len(yaw))]
+    # Speeds, not thrusts, follow with the lag: thrusts change by up to 1.5 % here, and the sine of
+    # the error by its third power.
+    assert np.abs(yaw - designed).max() < 0.015 * step
+
+
+@pytest.fixture(scope="module")
+def regulated():
+    """The regulator's problem, its solution, and a flight from beside hover."""
+    tilts = [0.1, -0.2, 0.1, 0.2]
+    tables = {
+        "controller": {"law": "lqr"},
+        "gait": {"type": "fixed", "angles": tilts},
+        "reference": {"type": "setpoint"},
+    }
+    scenario = tiltsim.load_scenario({**tables, "simulation": {"plant": "thesis"}})
+    airframe = airframe_of(plan_flight(scenario))
+    table = scenario.controller
+    return assemble(scenario), table.hover(airframe), table.solution(airframe), airframe
+
+
+def test_lqr_closes_the_loop_with_the_poles_of_the_riccati_solution(regulated):
+    assembly, (system, thrusts, lean), (gains, _), airframe = regulated
+    size = len(system)
+    a, b = system[:, :size], system[:, size:]
+    designed = np.linalg.eigvals(a - b @ gains)
+    assert designed.real.max() < -0.1
+
+    equations, setup = assembly.loop.equations, assembly.setup
+    speeds = np.sqrt(thrusts / airframe.vehicle.thrust_coefficients) * airframe.vehicle.spins
+    rest = np.r_[np.zeros(6), rotation_from_euler(*lean, 0.0), np.zeros(3), speeds]
+
+    def rates(state):
+        state = state.tolist()
+        inputs = equations.inputs(0.0, state, setup.parameters, setup.knots)
+        found = equations.rates(0.0, state, inputs, setup.parameters, setup.knots, (0.0, 0.0, 0.0))
+        return np.array(found)
+
+    assert np.abs(rates(rest)).max() < 1e-9
+    # On the nine entries of the rotation: the tangent space is invariant, so its poles are among
+    # those found.
+    steps = 1e-5 * np.maximum(1.0, np.abs(rest))
+    jacobian = [
+        (rates(rest + h * e) - rates(rest - h * e)) / (2 * h)
+        for h, e in zip(steps, np.eye(len(rest)), strict=True)
+    ]
+    found = np.linalg.eigvals(np.array(jacobian).T)
+    nearest = np.abs(designed[:, None] - found[None, :]).min(axis=1)
+    assert (nearest < 1e-4 * np.maximum(1.0, np.abs(designed))).all(), nearest
+
+
+def test_lqr_cost_decreases():
+    tables = {
+        "controller": {"law": "lqr"},
+        "reference": {"type": "setpoint", "position": [0.02, -0.01, 0.01]},
+        "initial": {"rotor_speed": HOVER},
+    }
+    flight = fly(tables, plant="thesis", duration=1.0)
+    airframe = airframe_of(plan_flight(flight.scenario))
+    _, cost = flight.scenario.controller.solution(airframe)
+    errors = flight["position"] - flight["reference_position"]
+    pushed = flight["thrusts"] - 0.25 * 0.429 * 9.8
+    x = np.hstack([errors, flight["velocity"], flight["attitude"], flight["body_rates"], pushed])
+    value = np.einsum("ni,ij,nj->n", x, cost, x)
+    assert (np.diff(value) < 0.0).all()
+
+
 def test_free_tilts_hold_a_pose_that_a_gait_cannot():
     tables = {
         "controller": FREE,
@@ -127,6 +219,11 @@ def test_free_tilts_hold_a_pose_that_a_gait_cannot():
         (
             {"controller": {"law": "geometric"}, "reference": {"type": "setpoint", "roll": 0.1}},
             "is an output of the law with controller.tilts = free only",
+        ),
+        ({"controller": {"law": "lqr"}, "gait": TROT}, 'gait.type = "trot_continuous": .* fixed'),
+        (
+            {"controller": {"law": "pid", "velocity_gains": [1.0, -1.0]}},
+            "velocity k2 = -1 must be positive",
         ),
         (
             {"controller": {"law": "geometric", "tilt_bandwidth": 5.0}},

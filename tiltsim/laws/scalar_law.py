@@ -14,8 +14,9 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.errors import InputError
+from tiltsim.laws.airframe import airframe_of
 from tiltsim.laws.multirotor import layout_of_vehicle
-from tiltsim.laws.scalar_loop import Key, airframe_of, scalar_loop
+from tiltsim.laws.scalar_loop import Key, scalar_loop
 from tiltsim.scenario.controller import ScalarFunctionController
 from tiltsim.scenario.own_code import describe, load_scalar_function
 from tiltsim.scenario.scalar_controller import ScalarController

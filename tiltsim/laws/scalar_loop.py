@@ -23,6 +23,7 @@ from tiltsim.closed_loop.loop import (
     Sampling,
 )
 from tiltsim.equations.tiltrotor import body_fields, initial_state
+from tiltsim.laws.airframe import airframe_of, initial_states
 from tiltsim.laws.multirotor import Layout
 from tiltsim.laws.rotorcraft import (
     body_state,
@@ -32,9 +33,8 @@ from tiltsim.laws.rotorcraft import (
     torque_free_columns,
 )
 from tiltsim.laws.tiltrotor import REFERENCE_COLUMNS, reference_columns, servo_lead
-from tiltsim.models.cross import as_multirotor
-from tiltsim.scenario.scalar_controller import Airframe, ScalarController
-from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, initial_tilts, rotorcraft_kind
+from tiltsim.scenario.scalar_controller import ScalarController
+from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
 from tiltsim.vehicles.rotorcraft.layout import CROSS, TILT_1, TILT_RATE_1
 from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
 from tiltsim_controllers.gaits.parameters import GaitParameters
@@ -322,7 +322,7 @@ def _equations(key: Key) -> Equations:
         return (*seen, *rates, *idle, *states_in(state))
 
     def initial(plan: FlightPlan, _setup: ControlSetup) -> Vector:
-        return (*initial_state(plan.scenario, initial_rotor_speeds(plan)), *_initial(plan))
+        return (*initial_state(plan.scenario, initial_rotor_speeds(plan)), *initial_states(plan))
 
     return Equations(
         inputs=equation_inputs,
@@ -332,30 +332,6 @@ def _equations(key: Key) -> Equations:
         observe=observe,
         tilts=tilts_of if key.model == "tiltrotor" else None,
     )
-
-
-def airframe_of(plan: FlightPlan) -> Airframe:
-    """What the controller may know."""
-    scenario = plan.scenario
-    table = scenario.any_rotorcraft
-    vehicle, tilting = table.resolve(), table.has_tilting_rotors
-    speeds = initial_rotor_speeds(plan)
-    return Airframe(
-        as_multirotor(vehicle, tilting=tilting),
-        plan.gait,
-        initial_tilts(plan)[0] if tilting else (),
-        tuple(spin * speed for spin, speed in zip(table.spins, speeds, strict=True)),
-        # The thesis's equations omit the gyroscopic torque but for the quadrotor's.
-        float(scenario.simulation.plant != "thesis" or table.model == "quadrotor"),
-    )
-
-
-def _initial(plan: FlightPlan) -> Values:
-    """The states of the controller at time zero."""
-    controller, airframe = plan.scenario.controller, airframe_of(plan)
-    assert isinstance(controller, ScalarController)
-    tilts = airframe.initial_tilts if controller.commands_tilts else ()
-    return (*controller.initial_states(airframe), *tilts)
 
 
 def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
@@ -401,7 +377,7 @@ def scalar_loop(key: Key) -> ClosedLoop:
         dynamics=Dynamics(
             f"multirotor{tilts}_{senses}" if multirotor else key.model,
             places.sizes(states),
-            lambda plan, _setup: (*initial_rotor_speeds(plan), *_initial(plan)),
+            lambda plan, _setup: (*initial_rotor_speeds(plan), *initial_states(plan)),
             states,
             layout.spins,
         ),

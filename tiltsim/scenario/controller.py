@@ -10,7 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from tiltsim.scenario.baseline_controllers import GeometricController
+from tiltsim.scenario.baseline_controllers import (
+    GeometricController,
+    IndiController,
+    LqrController,
+    PidController,
+)
 from tiltsim.scenario.controller_packages import installed_controllers
 from tiltsim.scenario.controller_table import ControllerTable
 from tiltsim.scenario.messages import InvalidValueError
@@ -110,6 +115,9 @@ _BUILT_IN: Final[dict[str, type[ControllerTable]]] = {
     "quadrotor_attitude_altitude": QuadrotorAttitudeAltitudeController,
     "attitude_force": AttitudeForceController,
     "geometric": GeometricController,
+    "pid": PidController,
+    "indi": IndiController,
+    "lqr": LqrController,
     "python": PythonController,
     "scalar": ScalarFunctionController,
     "tilt_car_third_derivative": ThirdDerivativeController,

@@ -18,6 +18,7 @@ from pydantic import Field
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.controller_table import ControllerTable, ReferenceKind
 from tiltsim.scenario.table import Positive
+from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.mathematics.scalar import scalar as register
@@ -82,6 +83,13 @@ class ScalarController(ControllerTable):
         description="of the rotors' speed controllers: the speeds approach the commanded ones as "
         "a lag of first order [1/s]",
     )
+
+    def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
+        return [linear_loop("rotor speed", (self.rotor_bandwidth,))]
+
+    @property
+    def linearization(self) -> str:
+        return "exact allocation"
 
     def scalar_law(self, airframe: Airframe) -> Callable[..., tuple[Values, Values, Values]]:
         """The law, a function marked `scalar`."""

@@ -155,7 +155,7 @@ def _check_stability(scenario: ScenarioTables) -> None:
     for loop in controller.error_loops(vehicle):
         if not loop.stable:
             raise scenario.mistake(
-                "controller.gains",
+                "controller.gains" if hasattr(controller, "gains") else "controller.law",
                 f"fails the Routh-Hurwitz criterion under {controller.linearization}: "
                 f"{loop.condition}; change the gains or set controller.allow_unstable = true",
             )

@@ -1,0 +1,37 @@
+"""What scalar laws know when a flight is planned."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tiltsim.models.cross import as_multirotor
+from tiltsim.scenario.scalar_controller import Airframe, ScalarController
+from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, initial_tilts
+from tiltsim_controllers.mathematics.scalar import Values
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import FlightPlan
+
+
+def airframe_of(plan: FlightPlan) -> Airframe:
+    """What the controller may know."""
+    scenario = plan.scenario
+    table = scenario.any_rotorcraft
+    vehicle, tilting = table.resolve(), table.has_tilting_rotors
+    speeds = initial_rotor_speeds(plan)
+    return Airframe(
+        as_multirotor(vehicle, tilting=tilting),
+        plan.gait,
+        initial_tilts(plan)[0] if tilting else (),
+        tuple(spin * speed for spin, speed in zip(table.spins, speeds, strict=True)),
+        # The thesis's equations omit the gyroscopic torque but for the quadrotor's.
+        float(scenario.simulation.plant != "thesis" or table.model == "quadrotor"),
+    )
+
+
+def initial_states(plan: FlightPlan) -> Values:
+    """The states of the controller at time zero."""
+    controller, airframe = plan.scenario.controller, airframe_of(plan)
+    assert isinstance(controller, ScalarController)
+    tilts = airframe.initial_tilts if controller.commands_tilts else ()
+    return (*controller.initial_states(airframe), *tilts)
