@@ -55,6 +55,8 @@ class Dynamics:
         sizes: Lengths of its vectors, the controller's own states among the activations.
         initial_activations: ``(plan, setup) -> act`` at time zero.
         spins: Signs of the rotor speeds.
+        tilt_of_rotor: The number, from 0, of each rotor's tilt, -1 for a fixed one; empty for
+            vehicles whose rotors lie on a cross.
         controller_states: Number of activations that are states of the controller.
         extra_actuators: Actuators that layers around the controller append to the model, innermost
             first.
@@ -65,6 +67,7 @@ class Dynamics:
     initial_activations: Callable[[FlightPlan, ControlSetup], Vector]
     controller_states: int = 0
     spins: Values = SPIN
+    tilt_of_rotor: tuple[int, ...] = ()
     extra_actuators: tuple[ExtraActuators, ...] = ()
 
 

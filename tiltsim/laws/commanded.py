@@ -31,13 +31,13 @@ from tiltsim.vehicles.rotorcraft import (
     initial_rotor_speeds,
     rotorcraft_kind,
 )
-from tiltsim.vehicles.rotorcraft.layout import TILT_1, TILT_RATE_1, Layout
+from tiltsim.vehicles.rotorcraft.layout import CROSS, TILT_1, TILT_RATE_1, Layout
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.mathematics.records import make_record_type, vector_of
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import entries_of
 from tiltsim_controllers.references.trajectories import ReferenceParameters
-from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS
+from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, tilts_of
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 
 if TYPE_CHECKING:
@@ -86,27 +86,27 @@ def with_command(parameters: Any, command: Values) -> Any:
 
 def _commanded_loop(
     model: str,
-    spins: Values,
-    tilts: int,
+    layout: Layout,
     kind: VehicleKind,
     vehicle: type,
     singularity: Singularity,
+    spins: Values = SPIN,
+    tilt_of_rotor: tuple[int, ...] = (),
 ) -> ClosedLoop:
     """The loop of a vehicle.
 
     Args:
-        model: See `Dynamics`.
-        spins: Signs of its rotor speeds.
-        tilts: Number of its hinges.
+        model, spins, tilt_of_rotor: See `Dynamics`.
+        layout: Of its numbers.
         kind: Its kind, whose samples may have tilts that are idle.
         vehicle: The type of its parameters.
         singularity: Columns of the margin.
     """
-    layout = Layout(len(spins), tilts)
+    rotors, tilts = layout
     planned, fields = layout.names("alpha_ref"), layout.names("tilt_command")
     idle = (0.0,) * ((len(kind.observed_fields) - len(layout.observed_fields)) // 2)
     tilts_in, tilt_rates_in = entries_of(TILT_1, tilts), entries_of(TILT_RATE_1, tilts)
-    speeds_in, commands_in = entries_of(0, layout.rotors), entries_of(0, tilts)
+    speeds_in, commands_in = entries_of(0, rotors), entries_of(0, tilts)
     thrusts, servo_commands = thrust_controls_of(spins), servo_commands_of(tilts)
 
     @scalar
@@ -132,7 +132,7 @@ def _commanded_loop(
         table, gait = plan.scenario.any_rotorcraft, plan.gait.parameters
         own, lead = table.resolve(), servo_lead(table.tilt_servo)
         record = _parameters_of(layout, vehicle)
-        held = servo_commands(0.0, lead, gait, plan.knots), (0.0,) * layout.rotors
+        held = servo_commands(0.0, lead, gait, plan.knots), (0.0,) * rotors
         command = record.__annotations__["command"](*held)
         flown = vehicle(own.table) if isinstance(own, Multirotor) else own
         return ControlSetup(
@@ -144,7 +144,11 @@ def _commanded_loop(
         parameters=_parameters_of(layout, vehicle),
         setup=setup,
         dynamics=Dynamics(
-            model, layout.sizes(), lambda plan, _setup: initial_rotor_speeds(plan), spins=spins
+            model,
+            layout.sizes(),
+            lambda plan, _setup: initial_rotor_speeds(plan),
+            spins=spins,
+            tilt_of_rotor=tilt_of_rotor,
         ),
         sampling=Sampling(controls, held_controls_of(spins, tilts)),
         columns=Columns(observe, derive, fields=fields, units=dict.fromkeys(fields, "rad")),
@@ -158,12 +162,12 @@ def _upright(samples: Mapping[str, Floats], _vehicle: Vehicle) -> dict[str, Floa
     return {"determinant": np.cos(samples["roll"]), "singularity_margin": upright_margin(samples)}
 
 
-TILTROTOR: Final = _commanded_loop(
-    "tiltrotor", SPIN, len(SPIN), ROTORCRAFT, Vehicle, singularity_columns
-)
+TILTROTOR: Final = _commanded_loop("tiltrotor", CROSS, ROTORCRAFT, Vehicle, singularity_columns)
 """The tiltrotor under commands; those of its servos are part of a sample."""
 
-QUADROTOR: Final = _commanded_loop("quadrotor", SPIN, 0, ROTORCRAFT, Vehicle, _upright)
+QUADROTOR: Final = _commanded_loop(
+    "quadrotor", CROSS._replace(tilts=0), ROTORCRAFT, Vehicle, _upright
+)
 """The quadrotor under commands."""
 
 COMMANDED_LOOPS: Final[dict[str, ClosedLoop]] = {"tiltrotor": TILTROTOR, "quadrotor": QUADROTOR}
@@ -176,21 +180,22 @@ OTHER_LAYOUT_LOOPS: Final = {
 
 
 @cache
-def _commanded_multirotor(spins: Values, tilts: int) -> ClosedLoop:
-    layout = Layout(len(spins), tilts)
+def _commanded_multirotor(spins: Values, tilt_of_rotor: tuple[int, ...]) -> ClosedLoop:
+    layout = Layout(len(spins), tilts_of(tilt_of_rotor))
     table = make_record_type("Rotors", table=vector_of(ROTOR_FLOATS * layout.rotors))
 
     def singularity(samples: Mapping[str, Floats], rotors: Any) -> dict[str, Floats]:
         return torque_free_columns(layout, rotors.table, samples)
 
     kind = rotorcraft_kind(layout, ("singularity_margin",))
-    return _commanded_loop(f"multirotor_{tilts}", spins, tilts, kind, table, singularity)
+    model = f"multirotor_{layout.tilts}"
+    return _commanded_loop(model, layout, kind, table, singularity, spins, tilt_of_rotor)
 
 
 def commanded_loop(scenario: Scenario) -> ClosedLoop:
     """The loop of a scenario's rotorcraft under commands, without layers."""
-    table = scenario.any_rotorcraft
-    if table.model not in COMMANDED_LOOPS:
-        return _commanded_multirotor(table.spins, table.tilt_count)
+    vehicle = scenario.vehicle.resolve()
+    if isinstance(vehicle, Multirotor):
+        return _commanded_multirotor(vehicle.spins, vehicle.tilt_of_rotor)
     loops = COMMANDED_LOOPS if scenario.rotorcraft.has_standard_layout else OTHER_LAYOUT_LOOPS
-    return loops[table.model]
+    return loops[scenario.vehicle.model]

@@ -311,6 +311,7 @@ def multirotor_loop(layout: Layout, uses: UsedForce, norm: str) -> ClosedLoop:
             lambda plan, _setup: (*initial_rotor_speeds(plan), *(0.0,) * STATES),
             STATES,
             layout.spins,
+            layout.tilt_of_rotor,
         ),
         sampling=sampling,
         columns=_columns_of(layout, uses.dimension, law),

@@ -151,14 +151,14 @@ def _add_idle_actuators(root: Any, name: str, count: int, **attributes: str) -> 
         _add_actuator(root, f"{name}_{index}", joint=joint, gainprm=[0.0], **attributes)
 
 
-def add_wrench(root: Any, name: str) -> None:
-    """Append a force and a torque on the body at its centre, in body axes."""
+def add_wrench(root: Any, name: str, site: str) -> None:
+    """Append a force and a torque at a site, along its axes."""
     for index, axis in enumerate(
         ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z")
     ):
         gear = [0.0] * 6
         gear[index] = 1.0
-        _add_actuator(root, f"{name}_{axis}", site="imu", gear=gear)
+        _add_actuator(root, f"{name}_{axis}", site=site, gear=gear)
     _extend_keyframes(root, ctrl=6)
 
 

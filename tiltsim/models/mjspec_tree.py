@@ -107,8 +107,11 @@ class _Body(_Element):
     def inertial(self) -> _Inertial | None:
         return _Inertial(self.spec, self.own) if self.own.explicitinertial else None
 
-    def add(self, _inertial: str, **attributes: Any) -> None:
-        """Give the body, which has none, an ``inertial``."""
+    def add(self, kind: str, **attributes: Any) -> None:
+        """Give the body a site, or an ``inertial``, which it does not have."""
+        if kind == "site":
+            self.own.add_site(**attributes)
+            return
         self.own.explicitinertial = True
         _set(_Inertial(self.spec, self.own), attributes)
 

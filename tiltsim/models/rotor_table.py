@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf
 from typing import TYPE_CHECKING
 
-from tiltsim_controllers.mathematics.scalar import Floats, Values
-from tiltsim_controllers.vehicle.effectiveness import layout_of, rotor_entries
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
+from tiltsim_controllers.vehicle.effectiveness import Rotor
 
 if TYPE_CHECKING:
     import mujoco
@@ -25,9 +26,7 @@ class Multirotor:
         gravity: m/s^2.
         inertia: About the centre of mass, untilted, everything on board included: nine entries,
             rows first, kg m^2.
-        table: Of the rotors; see `tiltsim_controllers.vehicle.effectiveness`.
-        thrust_coefficients: K_f of each rotor, N s^2/rad^2.
-        spins: Signs of the rotor speeds at positive thrust.
+        rotors: Where they are and what they do.
         speed_ranges: Lowest and highest speed of each rotor, signed, rad/s; infinite where the file
             gives none.
         tilts: Number of tilt hinges.
@@ -36,11 +35,29 @@ class Multirotor:
     mass: float
     gravity: float
     inertia: Values
-    table: Values
-    thrust_coefficients: Values
-    spins: Values
+    rotors: tuple[Rotor, ...]
     speed_ranges: tuple[tuple[float, float], ...]
     tilts: int
+
+    @cached_property
+    def table(self) -> Values:
+        """Of the rotors; see `tiltsim_controllers.vehicle.effectiveness`."""
+        return tuple(entry for rotor in self.rotors for entry in rotor.entries)
+
+    @property
+    def tilt_of_rotor(self) -> tuple[int, ...]:
+        """The number, from 0, of each rotor's tilt; -1: fixed."""
+        return tuple(rotor.tilt for rotor in self.rotors)
+
+    @property
+    def thrust_coefficients(self) -> Values:
+        """K_f of each rotor, N s^2/rad^2."""
+        return tuple(rotor.thrust for rotor in self.rotors)
+
+    @property
+    def spins(self) -> Values:
+        """Signs of the rotor speeds at positive thrust."""
+        return tuple(rotor.spin for rotor in self.rotors)
 
     @property
     def hover_rotor_speed(self) -> float:
@@ -48,18 +65,18 @@ class Multirotor:
         return float((self.mass * self.gravity / sum(self.thrust_coefficients)) ** 0.5)
 
 
-def rotor_table(pose: VehiclePose, parts: Parts, center: Floats) -> Values:
-    """The rotors' table, with torques about the point ``center`` (m, body axes).
+def read_rotors(pose: VehiclePose, parts: Parts, center: Floats) -> tuple[Rotor, ...]:
+    """The rotors, with places from the point ``center`` (m, body axes).
 
     Raises:
         ValueError: If more than one hinge is between a rotor and the body, or a hinge has no rotor.
     """
-    table = tuple(entry for i in range(1, parts.rotors + 1) for entry in _row(pose, i, center))
-    used = layout_of(table)
+    rotors = tuple(_rotor(pose, i, center) for i in range(1, parts.rotors + 1))
+    used = [rotor.tilt for rotor in rotors]
     for tilt in range(parts.tilts):
         if tilt not in used:
             raise ValueError(f"joint 'tilt_{tilt + 1}' tilts no rotor")
-    return table
+    return rotors
 
 
 def spin_of(compiled: mujoco.MjModel, rotor: int) -> float:
@@ -75,25 +92,30 @@ def speed_range(compiled: mujoco.MjModel, rotor: int) -> tuple[float, float]:
     return (0.0, inf) if spin_of(compiled, rotor) > 0.0 else (-inf, 0.0)
 
 
-def _row(pose: VehiclePose, rotor: int, center: Floats) -> Values:
+def _rotor(pose: VehiclePose, number: int, center: Floats) -> Rotor:
     compiled, data = pose.compiled, pose.data
-    site, gear = data.site(f"rotor_{rotor}"), compiled.actuator(f"thrust_{rotor}").gear
-    rotating = (
-        pose.point(site.xpos) - center,
-        pose.direction(site.xmat.reshape(3, 3)[:, 2]),
+    site, gear = data.site(f"rotor_{number}"), compiled.actuator(f"thrust_{number}").gear
+    rotor = Rotor(
+        _triple(pose.point(site.xpos) - center),
+        _triple(pose.direction(site.xmat.reshape(3, 3)[:, 2])),
         float(gear[2]),
         abs(float(gear[5])),
-        spin_of(compiled, rotor),
+        spin_of(compiled, number),
     )
-    joint = _hinge(pose, rotor)
+    joint = _hinge(pose, number)
     if joint is None:
-        return rotor_entries(*rotating)
-    return rotor_entries(
-        *rotating,
+        return rotor
+    return rotor._replace(
         tilt=int(compiled.joint(joint).name.removeprefix("tilt_")) - 1,
-        hinge=pose.point(data.xanchor[joint]) - center,
-        hinge_axis=pose.direction(data.xaxis[joint]),
+        hinge=_triple(pose.point(data.xanchor[joint]) - center),
+        hinge_axis=_triple(pose.direction(data.xaxis[joint])),
     )
+
+
+def _triple(vector: Floats) -> Triple:
+    """Three numbers of an array."""
+    x, y, z = vector.tolist()
+    return x, y, z
 
 
 def _hinge(pose: VehiclePose, rotor: int) -> int | None:

@@ -212,13 +212,14 @@ def _compose(spec: RotorcraftSpec) -> tuple[Compile, Compile]:
             inertias = user_vehicle.hinge_inertias
         set_servos(root, hinges, servo, inertias)
     add_states(root, "law", spec.law_states)
+    center = _center_site(root, spec)
     for index, extra in enumerate(spec.extra_actuators, start=1):
         add_states(root, f"layer_{index}_state", extra.states)
         if extra.begins_with_rotor_speeds:
             _limit_speeds(root, f"layer_{index}_state", spec)
         add_memories(root, f"layer_{index}_memory", extra.memories)
         if extra.wrench:
-            add_wrench(root, f"layer_{index}")
+            add_wrench(root, f"layer_{index}", center)
         if extra.hinge_torques:
             add_hinge_torques(root, f"layer_{index}")
     if spec.ground is not None:
@@ -229,6 +230,16 @@ def _compose(spec: RotorcraftSpec) -> tuple[Compile, Compile]:
     remove_visuals(root, contacts=contacts)
     bare = compiler_of(root)
     return complete, bare if user_vehicle is None or _moves_alike(complete, bare) else complete
+
+
+def _center_site(root: Any, spec: RotorcraftSpec) -> str:
+    """The name of a site in the centre of mass, along the body's axes, added if necessary."""
+    if spec.user_vehicle is None or isinstance(spec.vehicle, Vehicle):
+        return "imu"
+    name = "layer_center"
+    if any(extra.wrench for extra in spec.extra_actuators):
+        root.find("body", "vehicle").add("site", name=name, pos=spec.user_vehicle.center)
+    return name
 
 
 def _moves_alike(complete: Compile, bare: Compile) -> bool:

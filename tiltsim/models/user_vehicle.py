@@ -16,7 +16,7 @@ import numpy as np
 
 from tiltsim.models.mjcf_files import mjcf_version
 from tiltsim.models.pose import Moments, VehiclePose, parallel_axis
-from tiltsim.models.rotor_table import Multirotor, rotor_table, speed_range, spin_of
+from tiltsim.models.rotor_table import Multirotor, read_rotors, speed_range
 from tiltsim.models.vehicle_parts import CROSSES, Parts, check_parts
 from tiltsim.system.hooks import mujoco_hooks
 from tiltsim.system.locks import one_thread_at_a_time
@@ -215,9 +215,7 @@ def _multirotor(
         mass,
         gravity,
         tuple(inertia.ravel().tolist()),
-        rotor_table(pose, parts, center),
-        tuple(float(pose.compiled.actuator(f"thrust_{i}").gear[2]) for i in rotors),
-        tuple(spin_of(pose.compiled, i) for i in rotors),
+        read_rotors(pose, parts, center),
         tuple(speed_range(pose.compiled, i) for i in rotors),
         parts.tilts,
     )

@@ -113,7 +113,7 @@ def _check_fixed_rotors(scenario: ScenarioTables) -> None:
 
 def _check_actuators(scenario: ScenarioTables) -> None:
     vehicle = scenario.vehicle
-    if scenario.has_air and not isinstance(vehicle, VehicleTable):
+    if scenario.has_air and vehicle.is_planar:
         raise scenario.mistake(
             "vehicle.model", "aerodynamic effects are not supported; remove [air]"
         )

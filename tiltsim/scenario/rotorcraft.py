@@ -13,7 +13,6 @@ from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.table import NonNegative, Positive, Table, example
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.tilt_car.vehicle import TiltCar
-from tiltsim_controllers.vehicle.effectiveness import layout_of
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
@@ -204,7 +203,7 @@ class MultirotorTable(RotorcraftTable):
         return self.resolve().thrust_coefficients
 
     def tilt_of_rotor(self, rotor: int) -> int:
-        return layout_of(self.resolve().table)[rotor - 1]
+        return self.resolve().tilt_of_rotor[rotor - 1]
 
     @property
     def hinge_inertias(self) -> Values:

@@ -22,7 +22,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import (
     componentwise,
     tuple_text,
@@ -36,11 +36,55 @@ ROTOR_FLOATS: Final = 20
 TILT, SPIN_SIGN, CONSTANT, COSINE, SINE = 0, 1, 2, 8, 14
 """Where in them its tilt, its spin, A, B and C begin."""
 
+VECTOR_FLOATS: Final = 9
+"""Floats of a vector that turns with a rotor's pod, as its place and its thrust axis do: constant,
+cosine and sine, x, y, z each."""
+
 Layout = tuple[int, ...]
 """The number of every rotor's tilt, from 0; -1: fixed. Scalar code is made for a layout."""
 
 Rows = tuple[Values, Values, Values, Values, Values, Values]
 """Force x, y, z and torque x, y, z by rotor."""
+
+
+class Rotor(NamedTuple):
+    """A rotor at zero tilt, in body axes; the arguments of `rotor_entries`."""
+
+    place: Triple  # m, from the centre of mass
+    axis: Triple  # of its thrust, a unit vector
+    thrust: float  # K_f, N s^2/rad^2
+    drag: float  # K_m, N m s^2/rad^2
+    spin: float
+    tilt: int = -1
+    hinge: Triple = (0.0, 0.0, 0.0)
+    hinge_axis: Triple = (0.0, 0.0, 0.0)
+
+    @property
+    def entries(self) -> Values:
+        """Its part of the table."""
+        *rotating, tilt, hinge, hinge_axis = self
+        return rotor_entries(*rotating, tilt=tilt, hinge=hinge, hinge_axis=hinge_axis)
+
+    @property
+    def place_entries(self) -> Values:
+        """Its place as `VECTOR_FLOATS`."""
+        arm = np.asarray(self.hinge)
+        constant, cosine, sine = _turning(
+            np.asarray(self.place) - arm, np.asarray(self.hinge_axis), self.tilt
+        )
+        return tuple(map(float, (*(constant + arm), *cosine, *sine)))
+
+    @property
+    def axis_entries(self) -> Values:
+        """Its thrust axis as `VECTOR_FLOATS`."""
+        parts = _turning(np.asarray(self.axis), np.asarray(self.hinge_axis), self.tilt)
+        return tuple(map(float, np.concatenate(parts)))
+
+
+def _turning(vector: Floats, along: Floats, tilt: int) -> tuple[Floats, Floats, Floats]:
+    """Constant, cosine and sine of a vector that turns with a pod about ``along``."""
+    constant = along * (along @ vector) if tilt >= 0 else vector
+    return constant, vector - constant, np.cross(along, vector)
 
 
 def rotor_entries(
@@ -69,10 +113,7 @@ def rotor_entries(
     force = spin * thrust * n
     # About the point of the hinge; turns with the pod as the force does.
     torque = np.cross(np.asarray(place, float) - arm, force) - drag * n
-    parts = []
-    for vector in (force, torque):
-        constant = along * (along @ vector) if tilt >= 0 else vector
-        parts.append((constant, vector - constant, np.cross(along, vector)))
+    parts = _turning(force, along, tilt), _turning(torque, along, tilt)
     wrenches = [np.r_[f, t + np.cross(arm, f)] for f, t in zip(*parts)]
     return tuple(map(float, (tilt, spin, *np.concatenate(wrenches))))
 
@@ -112,17 +153,7 @@ def effectiveness_of(layout: Layout) -> Effectiveness:
     name = "_".join(str(tilt) if tilt >= 0 else "f" for tilt in layout)
     tilts = tilts_of(layout)
 
-    def entry(rotor: int, component: int) -> str:
-        first, tilt = rotor * ROTOR_FLOATS + component, layout[rotor]
-        text = f"constant * table[at + {first + CONSTANT}]"
-        if tilt < 0:
-            return text
-        cosine = f"cosines[{tilt}] * table[at + {first + COSINE}]"
-        return f"{text} + {cosine} + sines[{tilt}] * table[at + {first + SINE}]"
-
-    rotors = range(len(layout))
-    all_rows = tuple_text(tuple_text(entry(i, k) for i in rotors) for k in range(6))
-    rows = written_out(f"rows_{name}", "constant, cosines, sines, table, at", all_rows)
+    rows = written_out(f"rows_{name}", _ROW_ARGUMENTS, _rows(layout, ROTOR_FLOATS, CONSTANT, 6))
     cosines = componentwise("cosines", "tilts", "cos(tilts#)", tilts, cos=cos)
     sines = componentwise("sines", "tilts", "sin(tilts#)", tilts, sin=sin)
     squares = componentwise("squares", "speeds", "speeds# * abs(speeds#)", len(layout))
@@ -137,6 +168,37 @@ def effectiveness_of(layout: Layout) -> Effectiveness:
         )
 
     return Effectiveness(cosines, sines, rows, squares, wrench)
+
+
+@cache
+def turning_vectors_of(layout: Layout) -> Callable[..., tuple[Values, Values, Values]]:
+    """As `Effectiveness.rows`, of a table of `VECTOR_FLOATS`: x, y and z by rotor."""
+    name = "_".join(str(tilt) if tilt >= 0 else "f" for tilt in layout)
+    vectors: Callable[..., tuple[Values, Values, Values]] = written_out(
+        f"vectors_{name}", _ROW_ARGUMENTS, _rows(layout, VECTOR_FLOATS, 0, 3)
+    )
+    return vectors
+
+
+_ROW_ARGUMENTS: Final = "constant, cosines, sines, table, at"
+
+
+def _rows(layout: Layout, size: int, first: int, components: int) -> str:
+    """The text of components by rotor, from a table of so many floats a rotor.
+
+    The constants of a rotor begin at ``first``; its cosines and sines follow.
+    """
+
+    def entry(rotor: int, component: int) -> str:
+        at, tilt = rotor * size + first + component, layout[rotor]
+        text = f"constant * table[at + {at}]"
+        if tilt < 0:
+            return text
+        cosine = f"cosines[{tilt}] * table[at + {at + components}]"
+        return f"{text} + {cosine} + sines[{tilt}] * table[at + {at + 2 * components}]"
+
+    rotors = range(len(layout))
+    return tuple_text(tuple_text(entry(i, k) for i in rotors) for k in range(components))
 
 
 def force_and_torque(table: Sequence[float], tilts: ArrayLike = ()) -> tuple[Floats, Floats]:

@@ -63,6 +63,17 @@ def inertia_times(body: Body, vector: Triple) -> Triple:
 
 
 @scalar
+def inverse_inertia_times(body: Body, vector: Triple) -> Triple:
+    """The inverse of the inertia matrix times a vector."""
+    x, y, z = vector
+    return (
+        body.inverse_xx * x + body.inverse_xy * y + body.inverse_xz * z,
+        body.inverse_xy * x + body.inverse_yy * y + body.inverse_yz * z,
+        body.inverse_xz * x + body.inverse_yz * y + body.inverse_zz * z,
+    )
+
+
+@scalar
 def body_acceleration(body: Body, torque: Triple, omega: Triple, gyroscopic: float) -> Triple:
     """The angular acceleration ``I^-1 (torque - gyroscopic omega x I omega)`` (rad/s^2).
 
@@ -74,11 +85,8 @@ def body_acceleration(body: Body, torque: Triple, omega: Triple, gyroscopic: flo
     """
     cx, cy, cz = cross(omega, inertia_times(body, omega))
     x, y, z = torque
-    x, y, z = x - gyroscopic * cx, y - gyroscopic * cy, z - gyroscopic * cz
-    return (
-        body.inverse_xx * x + body.inverse_xy * y + body.inverse_xz * z,
-        body.inverse_xy * x + body.inverse_yy * y + body.inverse_yz * z,
-        body.inverse_xz * x + body.inverse_yz * y + body.inverse_zz * z,
+    return inverse_inertia_times(
+        body, (x - gyroscopic * cx, y - gyroscopic * cy, z - gyroscopic * cz)
     )
 
 

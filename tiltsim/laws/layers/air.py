@@ -10,25 +10,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 from math import atan2, hypot
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
-from tiltsim.laws.tiltrotor import four
+from tiltsim.laws.layers.rotors import rotor_code, true_rotors
 from tiltsim.models.parts import ExtraActuators
-from tiltsim.vehicles.rotorcraft.layout import (
-    QUADROTOR_THRUSTS,
-    QW,
-    QX,
-    QY,
-    QZ,
-    TILT_1,
-    TILTROTOR_THRUSTS,
-)
+from tiltsim.vehicles.rotorcraft.layout import QW, QX, QY, QZ, TILT_1, layout_of
+from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.rotation import rotation_from_quaternion
-from tiltsim_controllers.mathematics.scalar import Floats, Quad, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
+from tiltsim_controllers.mathematics.vectors import componentwise, entries_of
 from tiltsim_controllers.vehicle.air import (
     DRYDEN_STATES,
     Air,
@@ -43,8 +37,7 @@ from tiltsim_controllers.vehicle.air import (
     low_altitude_turbulence,
     stationary_states,
 )
-from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines
-from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.rotor_code import RotorCode
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
@@ -53,49 +46,18 @@ AIR_COLUMNS: Final = ("air_vx", "air_vy", "air_vz")
 DRYDEN_FIELDS: Final = tuple(f"dryden_{index}" for index in range(1, DRYDEN_STATES + 1))
 
 
-class Surroundings(NamedTuple):
-    """The parameters of the layer."""
-
-    air: Air
-    vehicle: Vehicle
-
-
 @scalar
-def pod_tilts(qpos: Vector) -> Quad:
-    """Tilt angles of the tiltrotor."""
-    return four(qpos, TILT_1)
-
-
-@scalar
-def no_tilts(qpos: Vector) -> Quad:
-    """Tilt angles of a vehicle whose rotors do not tilt."""
-    return 0.0, 0.0, 0.0, 0.0
-
-
-@scalar
-def air_wrench(
-    time: float,
-    qpos: Vector,
-    qvel: Vector,
-    states: Values,
-    tilts: Quad,
-    thrusts: Quad,
-    surroundings: Surroundings,
-) -> Values:
-    """Force (N) and torque (N m) of the air, body axes: drag and ground effect.
+def _relative_drag(time: float, rotation: Values, qvel: Vector, states: Values, air: Air) -> Triple:
+    """Drag (N, body axes) in the air's motion.
 
     Args:
         time: s.
-        qpos, qvel: MuJoCo's.
+        rotation: Body to world, rows first.
+        qvel: MuJoCo's.
         states: Of the turbulence's filters.
-        tilts: rad.
-        thrusts: Controls of the thrust actuators, (rad/s)^2.
-        surroundings: The parameters of the layer.
+        air: The air.
     """
-    air, vehicle = surroundings.air, surroundings.vehicle
-    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_from_quaternion(
-        qpos[QW], qpos[QX], qpos[QY], qpos[QZ]
-    )
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
     ax, ay, az = air_velocity(time, states, air)
     vx, vy, vz = qvel[0] - ax, qvel[1] - ay, qvel[2] - az
     through = (
@@ -103,47 +65,63 @@ def air_wrench(
         r12 * vx + r22 * vy + r32 * vz,
         r13 * vx + r23 * vy + r33 * vz,
     )
-    fx, fy, fz = drag_force(through, air.drag)
-    radius = air.ground.rotor_radius
-    if radius == 0.0:
-        return fx, fy, fz, 0.0, 0.0, 0.0
+    return drag_force(through, air.drag)
 
-    # Each rotor by its own height; the drag torque about its axis stays (equal power).
-    arm, per_thrust = vehicle.arm_length, vehicle.thrust_coefficient
-    above = qpos[2] - air.ground.height
-    t1 = per_thrust * thrusts[0] * (ground_effect(above + arm * r31, radius) - 1.0)
-    t2 = per_thrust * thrusts[1] * (ground_effect(above + arm * r32, radius) - 1.0)
-    t3 = per_thrust * thrusts[2] * (ground_effect(above - arm * r31, radius) - 1.0)
-    t4 = per_thrust * thrusts[3] * (ground_effect(above - arm * r32, radius) - 1.0)
-    s1, c1, s2, c2, s3, c3, s4, c4 = sines_and_cosines(tilts[0], tilts[1], tilts[2], tilts[3])
-    return (
-        fx + t2 * s2 - t4 * s4,
-        fy - t1 * s1 + t3 * s3,
-        fz + t1 * c1 + t2 * c2 + t3 * c3 + t4 * c4,
-        arm * (t2 * c2 - t4 * c4),
-        arm * (t3 * c3 - t1 * c1),
-        -arm * (t1 * s1 + t2 * s2 + t3 * s3 + t4 * s4),
-    )
+
+@cache
+def air_wrench_of(code: RotorCode, rotors: int, tilts: int) -> Callable[..., Values]:
+    """Scalar code of force (N) and torque (N m) of the air, body axes: drag and ground effect.
+
+    It is ``(time, qpos, qvel, states, thrusts, air, vehicle) -> wrench``; ``thrusts`` are the
+    controls of the thrust actuators, (rad/s)^2, ``vehicle`` is the record of the rotors' ``code``.
+    """
+    heights, lift, tilts_in = code.heights, code.lift, entries_of(TILT_1, tilts)
+    gains = componentwise(
+        "ground_gains", "above, heights, radius", "effect(above + heights#, radius) - 1.0", rotors,
+        effect=ground_effect,
+    )  # fmt: skip
+
+    @scalar
+    def air_wrench(
+        time: float,
+        qpos: Vector,
+        qvel: Vector,
+        states: Values,
+        thrusts: Values,
+        air: Air,
+        vehicle: Any,
+    ) -> Values:
+        rotation = rotation_from_quaternion(qpos[QW], qpos[QX], qpos[QY], qpos[QZ])
+        drag = _relative_drag(time, rotation, qvel, states, air)
+        radius = air.ground.rotor_radius
+        if radius == 0.0:
+            return (*drag, 0.0, 0.0, 0.0)
+        # Each rotor by its own height; the drag torque about its axis stays (equal power).
+        angles, above = tilts_in(qpos), qpos[2] - air.ground.height
+        of_rotors = heights(angles, (rotation[6], rotation[7], rotation[8]), vehicle)
+        return lift(drag, angles, thrusts, gains(above, of_rotors, radius), vehicle)
+
+    return air_wrench
 
 
 @cache
 def with_air(loop: ClosedLoop) -> ClosedLoop:
     """A loop in air with wind, turbulence, gusts, drag and ground effect."""
-    inner_controls, inner_hold = loop.sampling.controls, loop.sampling.hold
-    first, inner_ctrl = loop.dynamics.sizes.act, loop.dynamics.sizes.ctrl
-    tilting = loop.dynamics.model == "tiltrotor"
-    tilts_of: Callable[..., Quad] = pod_tilts if tilting else no_tilts
-    thrust = TILTROTOR_THRUSTS if tilting else QUADROTOR_THRUSTS
+    inner_controls, inner_hold, dynamics = loop.sampling.controls, loop.sampling.hold, loop.dynamics
+    inner_ctrl, (rotors, tilts) = dynamics.sizes.ctrl, layout_of(dynamics)
+    code = rotor_code(dynamics)
+    states_in, thrusts_in = entries_of(dynamics.sizes.act, DRYDEN_STATES), entries_of(tilts, rotors)
+    wrench = air_wrench_of(code, rotors, tilts)
+    record = make_record_type("Surroundings", air=Air, vehicle=code.record)
 
     @scalar
     def air_controls(
-        time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, air: Surroundings
+        time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, layer: Any
     ) -> Values:
-        states = (act[first], act[first + 1], act[first + 2], act[first + 3], act[first + 4])
-        thrusts = (ctrl[thrust], ctrl[thrust + 1], ctrl[thrust + 2], ctrl[thrust + 3])
+        states, thrusts = states_in(act), thrusts_in(ctrl)
         return (
-            *dryden_rates(time, states, air.air.turbulence),
-            *air_wrench(time, qpos, qvel, states, tilts_of(qpos), thrusts, air),
+            *dryden_rates(time, states, layer.air.turbulence),
+            *wrench(time, qpos, qvel, states, thrusts, layer.air, layer.vehicle),
         )
 
     @scalar
@@ -162,8 +140,8 @@ def with_air(loop: ClosedLoop) -> ClosedLoop:
 
     layer = Layer(
         "with_air",
-        Surroundings,
-        _surroundings,
+        record,
+        lambda plan: record(_air(plan), true_rotors(plan.scenario)),
         controls=controls,
         hold=hold,
         actuators=ExtraActuators(states=DRYDEN_STATES, wrench=True),
@@ -185,7 +163,7 @@ def _derive(
     return {**inner(), **dict(zip(AIR_COLUMNS, velocity.T, strict=True))}
 
 
-def _surroundings(plan: FlightPlan) -> Surroundings:
+def _air(plan: FlightPlan) -> Air:
     scenario = plan.scenario
     table = scenario.air
     turbulence = Turbulence()
@@ -206,4 +184,4 @@ def _surroundings(plan: FlightPlan) -> Surroundings:
     if table.ground_effect is not None:
         ground = GroundEffect(table.ground_effect.rotor_radius, table.ground_effect.height)
     drag = Drag(*table.drag.linear, *table.drag.area, table.density)
-    return Surroundings(Air(*table.wind, drag, gust, turbulence, ground), scenario.true_rotorcraft)
+    return Air(*table.wind, drag, gust, turbulence, ground)

@@ -1,0 +1,37 @@
+"""The rotors of the vehicle inside a layer."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tiltsim.models.rotor_table import Multirotor
+from tiltsim_controllers.vehicle.multirotor import body_of
+from tiltsim_controllers.vehicle.rotor_code import (
+    TILTING_CROSS,
+    UPRIGHT_CROSS,
+    RotorCode,
+    rotor_code_of,
+    rotors_of,
+)
+
+if TYPE_CHECKING:
+    from tiltsim.closed_loop.loop import Dynamics
+    from tiltsim.scenario.scenario import Scenario
+
+
+def rotor_code(dynamics: Dynamics) -> RotorCode:
+    """The scalar functions of a model's rotors."""
+    if dynamics.tilt_of_rotor:
+        return rotor_code_of(dynamics.tilt_of_rotor)
+    return TILTING_CROSS if dynamics.model == "tiltrotor" else UPRIGHT_CROSS
+
+
+def true_rotors(scenario: Scenario) -> Any:
+    """The record that these functions read: of the simulated vehicle, not the controller's."""
+    vehicle = scenario.true_vehicle
+    if not isinstance(vehicle, Multirotor):
+        return vehicle
+    body = body_of(vehicle.mass, np.reshape(vehicle.inertia, (3, 3)), vehicle.gravity)
+    return rotors_of(body, vehicle.rotors)
