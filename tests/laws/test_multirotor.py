@@ -245,17 +245,13 @@ HEXAROTOR = {"model": "multirotor", "mjcf": mjcf("hexarotor")}
             {"reference": {"type": "setpoint", "roll": 0.2}},
             "reference.roll = 0.2: is no output with 1 components of force",
         ),
-        "air": (
-            {"air": {"drag": {"linear": [0.1, 0.1, 0.2]}}},
-            "aerodynamic effects are not supported",
-        ),
         "a wrong model": (
             {"model_error": {"mass": 1.1}},
             "is supported for tiltrotor and quadrotor",
         ),
-        "limits on equations": (
-            {"vehicle": {**HEXAROTOR, "max_rotor_speed": 900.0}, "simulation": {"plant": "thesis"}},
-            "its equations of a multirotor have ideal rotors and servos; use mujoco",
+        "rotors heavier than the vehicle": (
+            {"vehicle": {**HEXAROTOR, "rotor_inertia": 0.02}},
+            "vehicle.rotor_inertia = 0.02: must be below 0.0133333",
         ),
         "no hover within the limits": (
             {"vehicle": {**HEXAROTOR, "max_rotor_speed": 400.0}},

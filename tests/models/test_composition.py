@@ -33,7 +33,7 @@ FLEET = sorted({path.stem for path in MJCF.glob("*.xml")} - {"scene", "tilt_car"
 
 LAYERS = (
     ExtraActuators(states=5, begins_with_rotor_speeds=True, memories=3, wrench=True),
-    ExtraActuators(hinge_torques=True),
+    ExtraActuators(hinge_torques=4),
 )
 RICH = {
     "timestep": 0.002,

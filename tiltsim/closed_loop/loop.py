@@ -18,7 +18,7 @@ from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.system.quantity import Quantity, in_words
 from tiltsim_controllers.mathematics.records import flatten, record_dtype, record_size
-from tiltsim_controllers.mathematics.scalar import Floats, Quad, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 from tiltsim_controllers.vehicle.parameters import SPIN
 
 if TYPE_CHECKING:
@@ -149,8 +149,8 @@ class Equations:
             loop's `sample_fields` after the time; ``inputs`` are those in force.
         project_onto_limits: Scalar function ``(state, parameters) -> state`` for the end of each
             step: puts back what has passed a limit. None where there are no limits.
-        tilts: Scalar function ``(time, state, parameters, knots) -> tilt angles`` (rad) of the
-            tiltrotor.
+        tilts: Scalar function ``(time, state, parameters, knots) -> tilt angles`` (rad), where
+            they follow the plan exactly.
     """
 
     inputs: Callable[..., Values]
@@ -159,7 +159,7 @@ class Equations:
     initial: Callable[[FlightPlan, ControlSetup], Vector]
     observe: Callable[..., Values]
     project_onto_limits: Callable[..., list[float]] | None = None
-    tilts: Callable[..., Quad] | None = None
+    tilts: Callable[..., Values] | None = None
 
 
 class SupervisedLaw(NamedTuple):

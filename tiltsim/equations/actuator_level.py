@@ -1,22 +1,27 @@
-"""The thesis's vehicles at the level of their actuators: moved by the controls of MuJoCo's model.
+"""The equations' vehicles at the level of their actuators: moved by controls of MuJoCo's model.
 
-The thesis's vehicles have ideal actuators: pods follow the gait exactly, rotors take any speed. A
-layer around the controller (`tiltsim.laws.layers.layer`) changes that through controls and
-activations of the MuJoCo model. Here these controls act on the thesis's rigid body, on massless
-pods that follow the equation of their servo, and on rotors with limits. Only the order of the
-controls is MuJoCo's, so these flights can check MuJoCo's.
+Vehicles of the thesis's equations have ideal actuators: pods follow the gait exactly, rotors take
+any speed. A layer around the controller (`tiltsim.laws.layers.layer`) changes that through controls
+and activations of the MuJoCo model. Here these controls act on the equations' rigid body, on
+massless pods that follow the equation of their servo, and on rotors with limits. Only the order of
+the controls is MuJoCo's, so these flights can check MuJoCo's.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from math import inf
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from tiltsim.equations.quadrotor import equations_of_motion, initial_state
 from tiltsim.equations.quadrotor import rigid_body as quadrotor_body
 from tiltsim.equations.tiltrotor import rigid_body, rotation_of, velocity_of
+from tiltsim.models.parts import WRENCH_SIZE
 from tiltsim.vehicles.rotorcraft import initial_tilts
+from tiltsim.vehicles.rotorcraft.layout import Layout, layout_of
+from tiltsim.vehicles.rotorcraft.rotors import rotor_code, true_rotors
+from tiltsim_controllers.mathematics.records import make_record_type, vector_of
 from tiltsim_controllers.mathematics.rotation import (
     quaternion_from_euler,
     quaternion_from_rotation,
@@ -24,43 +29,54 @@ from tiltsim_controllers.mathematics.rotation import (
     to_world,
 )
 from tiltsim_controllers.mathematics.scalar import Quad, Triple, Values, Vector, clipped, scalar
+from tiltsim_controllers.mathematics.vectors import (
+    componentwise,
+    entries_of,
+    tuple_text,
+    written_out,
+)
+from tiltsim_controllers.vehicle.effectiveness import effectiveness_of
+from tiltsim_controllers.vehicle.multirotor import BODY_STATES, body_rates, inverse_inertia_times
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
+    from tiltsim.closed_loop.loop import Dynamics
     from tiltsim.scenario.scenario import FlightPlan
 
-Loads = tuple[float, float, float, float, float, float, float, float, float, float]
-"""Force (N) and torque (N m) on the body, body axes, and torques (N m) about the four hinges."""
+Loads = Values
+"""Force (N) and torque (N m) on the body, body axes, then torques (N m) about the hinges."""
 
 
-class Mechanics(NamedTuple):
-    """The true vehicle and its actuators."""
+@cache
+def mechanics_record(vehicle: Any, tilts: int) -> Any:
+    """The type of the true vehicle's and its actuators' parameters."""
+    return make_record_type(
+        "Mechanics",
+        vehicle=vehicle,  # the true one, not the controller's
+        servo_frequency=float,  # rad/s, natural
+        servo_damping=float,  # ratio
+        hinge_inertias=vector_of(tilts),  # kg m^2, of servo and pod
+        max_tilt=float,  # rad, at the stops of the servos
+        min_speed=float,  # rad/s, along a rotor's spin
+        max_speed=float,
+    )
 
-    vehicle: Vehicle  # the true one, not the controller's
-    servo_frequency: float  # rad/s, natural
-    servo_damping: float  # ratio
-    hinge_inertia_1: float  # kg m^2, of servo and pod
-    hinge_inertia_2: float
-    hinge_inertia_3: float
-    hinge_inertia_4: float
-    max_tilt: float  # rad, at the stops of the servos
-    min_speed: float  # rad/s, along a rotor's spin
-    max_speed: float
+
+def mechanics_of(dynamics: Dynamics) -> Any:
+    """The type of the parameters for a model."""
+    return mechanics_record(rotor_code(dynamics).record, layout_of(dynamics).tilts)
 
 
-def mechanics(plan: FlightPlan) -> Mechanics:
+def mechanics(plan: FlightPlan) -> Any:
     """The mechanics of a planned flight's rotorcraft."""
-    rotorcraft = plan.scenario.rotorcraft
-    servo = rotorcraft.tilt_servo
-    hinge_1, hinge_2, hinge_3, hinge_4 = rotorcraft.hinge_inertias
-    return Mechanics(
-        plan.scenario.true_rotorcraft,
+    rotorcraft, vehicle = plan.scenario.any_rotorcraft, true_rotors(plan.scenario)
+    servo, tilts = rotorcraft.tilt_servo, rotorcraft.tilt_count
+    kind: Any = type(vehicle)
+    return mechanics_record(kind, tilts)(
+        vehicle,
         servo.natural_frequency,
         servo.damping_ratio,
-        hinge_1,
-        hinge_2,
-        hinge_3,
-        hinge_4,
+        rotorcraft.hinge_inertias[:tilts],
         inf if servo.max_angle is None else servo.max_angle,
         *rotorcraft.speeds_along_spin,
     )
@@ -87,124 +103,174 @@ class ActuatorPlant(NamedTuple):
     """A vehicle whose state is its motion, followed by MuJoCo's activations."""
 
     motion: int  # numbers before the activations
-    rotor_states: int  # index of the first control that an activation integrates
     qpos: Callable[[Vector], Values]  # MuJoCo's, from the state
     qvel: Callable[[Vector], Values]
-    rates: Callable[[Vector, Vector, Loads, Mechanics, Triple], Values]
+    rates: Callable[[Vector, Vector, Loads, Any, Triple], Values]
     """Time derivative of the motion: state, controls, loads, mechanics, disturbance (m/s^2)."""
-    project_onto_limits: Callable[[list[float], Mechanics], list[float]]
+    project_onto_limits: Callable[[list[float], Any], list[float]]
     """See `tiltsim.closed_loop.loop.Equations`."""
     initial: Callable[[FlightPlan], Values]  # motion
 
 
-# --- tiltrotor ---------------------------------------------------------------------------------
+# --- vehicles with a rotation matrix ------------------------------------------------------------
 # The rigid body as in `tiltsim.equations.tiltrotor`, tilts, tilt rates, then the activations.
-TILT_1, TILT_2, TILT_3, TILT_4, RATE_1, RATE_2, RATE_3, RATE_4, SPEED_1 = range(18, 27)
 
 
 @scalar
-def tiltrotor_qpos(state: Vector) -> Values:
-    """Position, quaternion and tilts."""
-    qw, qx, qy, qz = quaternion_from_rotation(rotation_of(state))
-    return (
-        state[0], state[1], state[2], qw, qx, qy, qz,
-        state[TILT_1], state[TILT_2], state[TILT_3], state[TILT_4],
-    )  # fmt: skip
-
-
-@scalar
-def tiltrotor_qvel(state: Vector) -> Values:
-    """Velocity, body rates and tilt rates."""
-    rates = state[RATE_1], state[RATE_2], state[RATE_3], state[RATE_4]
-    return (*velocity_of(state), *rates)
-
-
-@scalar
-def servo_acceleration(command: float, angle: float, rate: float, mechanics: Mechanics) -> float:
+def servo_acceleration(command: float, angle: float, rate: float, mechanics: Any) -> float:
     """``omega^2 (command - alpha) - 2 zeta omega alpha'`` (rad/s^2) of a massless pod.
 
     Args:
         command, angle, rate: set point and tilt, rad, and its rate, rad/s
         mechanics: of the vehicle
     """
-    omega, limit = mechanics.servo_frequency, mechanics.max_tilt
-    command = clipped(command, -limit, limit)
-    return omega * omega * (command - angle) - 2.0 * mechanics.servo_damping * omega * rate
+    omega: float = mechanics.servo_frequency
+    damping: float = mechanics.servo_damping
+    command = clipped(command, -mechanics.max_tilt, mechanics.max_tilt)
+    return omega * omega * (command - angle) - 2.0 * damping * omega * rate
+
+
+@cache
+def servo_accelerations_of(tilts: int) -> Callable[..., Values]:
+    """Scalar code of what torques about the hinges add to the tilts on a body at rest, rad/s^2.
+
+    It is ``(ctrl, angles, rates, loads, mechanics) -> accelerations``.
+    """
+    accelerations: Callable[..., Values] = componentwise(
+        "servo_accelerations", "ctrl, angles, rates, hinges, mechanics",
+        "by_servo(ctrl#, angles#, rates#, mechanics) + hinges# / mechanics.hinge_inertias#", tilts,
+        by_servo=servo_acceleration,
+    )  # fmt: skip
+    hinges = entries_of(WRENCH_SIZE, tilts)
+
+    @scalar
+    def servo_accelerations(
+        ctrl: Vector, angles: Values, rates: Values, loads: Loads, mechanics: Any
+    ) -> Values:
+        return accelerations(ctrl, angles, rates, hinges(loads), mechanics)
+
+    return servo_accelerations
+
+
+@cache
+def limit_speeds_of(spins: Values, first: int) -> Callable[..., list[float]]:
+    """Scalar code ``(state, mechanics) -> state`` that keeps rotor speeds within their limits.
+
+    They, or commands of them, are the state's entries from ``first`` on.
+    """
+
+    @scalar
+    def limit_speeds(state: list[float], mechanics: Any) -> list[float]:
+        low, high = mechanics.min_speed, mechanics.max_speed
+        limited = state[:]
+        for rotor in range(len(spins)):
+            spin = spins[rotor]
+            limited[first + rotor] = spin * clipped(spin * state[first + rotor], low, high)
+        return limited
+
+    return limit_speeds
 
 
 @scalar
-def accelerations_by_hinge_torques(loads: Loads, mechanics: Mechanics) -> Quad:
-    """What the loads' torques about the hinges add to the servos' accelerations, rad/s^2."""
-    return (
-        loads[6] / mechanics.hinge_inertia_1,
-        loads[7] / mechanics.hinge_inertia_2,
-        loads[8] / mechanics.hinge_inertia_3,
-        loads[9] / mechanics.hinge_inertia_4,
-    )
-
-
-@scalar
-def _tiltrotor_rates(
-    state: Vector, ctrl: Vector, loads: Loads, mechanics: Mechanics, disturbance: Triple
+def _tiltrotor_body(
+    state: Vector, tilts: Quad, thrusts: Quad, loads: Loads, vehicle: Vehicle, disturbance: Triple
 ) -> Values:
-    """Chapter 3's rigid body under thrusts, servos and loads; see `ActuatorPlant.rates`."""
-    vehicle = mechanics.vehicle
-    a1, a2, a3, a4 = state[TILT_1], state[TILT_2], state[TILT_3], state[TILT_4]
-    rate_1, rate_2, rate_3, rate_4 = state[RATE_1], state[RATE_2], state[RATE_3], state[RATE_4]
-    torque_x, torque_y, torque_z = loads[3], loads[4], loads[5]
-    acceleration = external_acceleration(rotation_of(state), loads, vehicle.mass, disturbance)
+    """Chapter 3's rigid body; arguments as in `_body_motion_of`."""
     angular_acceleration = (
-        torque_x / vehicle.inertia_xx,
-        torque_y / vehicle.inertia_yy,
-        torque_z / vehicle.inertia_zz,
+        loads[3] / vehicle.inertia_xx,
+        loads[4] / vehicle.inertia_yy,
+        loads[5] / vehicle.inertia_zz,
     )
-    push_1, push_2, push_3, push_4 = accelerations_by_hinge_torques(loads, mechanics)
+    acceleration = external_acceleration(rotation_of(state), loads, vehicle.mass, disturbance)
     # The controls are s varpi |varpi| with s = (-1, 1, -1, 1), the equations' are without s.
-    squares = (-ctrl[4], ctrl[5], -ctrl[6], ctrl[7])
-    return (
-        *rigid_body(state, (a1, a2, a3, a4), squares, vehicle, acceleration, angular_acceleration),
-        rate_1,
-        rate_2,
-        rate_3,
-        rate_4,
-        servo_acceleration(ctrl[0], a1, rate_1, mechanics) + push_1,
-        servo_acceleration(ctrl[1], a2, rate_2, mechanics) + push_2,
-        servo_acceleration(ctrl[2], a3, rate_3, mechanics) + push_3,
-        servo_acceleration(ctrl[3], a4, rate_4, mechanics) + push_4,
+    squares = (-thrusts[0], thrusts[1], -thrusts[2], thrusts[3])
+    return rigid_body(state, tilts, squares, vehicle, acceleration, angular_acceleration)
+
+
+@cache
+def _body_motion_of(spins: Values, tilt_of_rotor: tuple[int, ...]) -> Callable[..., Values]:
+    """Scalar code of the rates of the rigid body's eighteen numbers, without gyroscopic torque.
+
+    It is ``(state, tilts, thrusts, loads, vehicle, disturbance) -> rates``, where ``thrusts`` are
+    controls, (rad/s)^2, and ``disturbance`` is in m/s^2.
+    """
+    if not tilt_of_rotor:
+        return _tiltrotor_body
+    wrench = effectiveness_of(tilt_of_rotor).wrench
+    senses = "".join("p" if spin > 0.0 else "m" for spin in spins)
+    signs = ["" if spin > 0.0 else "-" for spin in spins]
+    squares = written_out(
+        f"signed_{senses}", "thrusts", tuple_text(f"{s}thrusts[{i}]" for i, s in enumerate(signs))
     )
 
+    @scalar
+    def body_motion(
+        state: Vector,
+        tilts: Values,
+        thrusts: Values,
+        loads: Loads,
+        rotors: Any,
+        disturbance: Triple,
+    ) -> Values:
+        body = rotors.body
+        acceleration = external_acceleration(rotation_of(state), loads, body.mass, disturbance)
+        turning = inverse_inertia_times(body, (loads[3], loads[4], loads[5]))
+        pushed = wrench(tilts, squares(thrusts), rotors.effects, 0)
+        return body_rates(state, pushed, body, acceleration, turning, 0.0)
 
-@scalar
-def limit_speeds(state: list[float], first: int, mechanics: Mechanics) -> list[float]:
-    """Rotor speeds, or commands of them, from ``first`` on within the rotors' limits."""
-    low, high = mechanics.min_speed, mechanics.max_speed
-    limited = state[:]
-    for rotor in range(4):
-        spin = -1.0 if rotor % 2 == 0 else 1.0
-        limited[first + rotor] = spin * clipped(spin * state[first + rotor], low, high)
-    return limited
-
-
-@scalar
-def project_tiltrotor(state: list[float], mechanics: Mechanics) -> list[float]:
-    """Rotors within their speed limits, pods within their stops."""
-    stop = mechanics.max_tilt
-    projected = limit_speeds(state, SPEED_1, mechanics)
-    for rotor in range(4):
-        tilt, rate = state[TILT_1 + rotor], state[RATE_1 + rotor]
-        if abs(tilt) > stop:
-            projected[TILT_1 + rotor] = stop if tilt > 0.0 else -stop
-            projected[RATE_1 + rotor] = 0.0 if tilt * rate > 0.0 else rate
-    return projected
+    return body_motion
 
 
-def initial_tiltrotor(plan: FlightPlan) -> Values:
-    """The motion at time zero; pods as in MuJoCo."""
-    initial = plan.scenario.initial
-    tilts, tilt_rates = initial_tilts(plan)
-    motion = (*initial.position, *initial.velocity)
-    rotation = rotation_from_euler(*initial.attitude)
-    return (*motion, *rotation, *initial.angular_velocity, *tilts, *tilt_rates)
+@cache
+def _tilting_plant(layout: Layout, spins: Values, tilt_of_rotor: tuple[int, ...]) -> ActuatorPlant:
+    """The plant of the tiltrotor, or of a multirotor."""
+    rotors, tilts = layout
+    angles, rates = entries_of(BODY_STATES, tilts), entries_of(BODY_STATES + tilts, tilts)
+    thrusts = entries_of(layout.thrust_1, rotors)
+    motion = BODY_STATES + 2 * tilts
+    body_motion, servos = _body_motion_of(spins, tilt_of_rotor), servo_accelerations_of(tilts)
+    limit_speeds = limit_speeds_of(spins, motion)
+
+    @scalar
+    def qpos(state: Vector) -> Values:
+        qw, qx, qy, qz = quaternion_from_rotation(rotation_of(state))
+        return (state[0], state[1], state[2], qw, qx, qy, qz, *angles(state))
+
+    @scalar
+    def qvel(state: Vector) -> Values:
+        return (*velocity_of(state), *rates(state))
+
+    @scalar
+    def motion_rates(
+        state: Vector, ctrl: Vector, loads: Loads, mechanics: Any, disturbance: Triple
+    ) -> Values:
+        alpha, alpha_rates = angles(state), rates(state)
+        vehicle = mechanics.vehicle
+        return (
+            *body_motion(state, alpha, thrusts(ctrl), loads, vehicle, disturbance),
+            *alpha_rates,
+            *servos(ctrl, alpha, alpha_rates, loads, mechanics),
+        )
+
+    @scalar
+    def project(state: list[float], mechanics: Any) -> list[float]:
+        stop = mechanics.max_tilt
+        projected = limit_speeds(state, mechanics)
+        for hinge in range(BODY_STATES, BODY_STATES + tilts):
+            tilt, rate = state[hinge], state[hinge + tilts]
+            if abs(tilt) > stop:
+                projected[hinge] = stop if tilt > 0.0 else -stop
+                projected[hinge + tilts] = 0.0 if tilt * rate > 0.0 else rate
+        return projected
+
+    def initial(plan: FlightPlan) -> Values:
+        """The motion at time zero; pods as in MuJoCo."""
+        start = plan.scenario.initial
+        tilts, tilt_rates = initial_tilts(plan)
+        body = (*start.position, *start.velocity, *rotation_from_euler(*start.attitude))
+        return (*body, *start.angular_velocity, *tilts, *tilt_rates)
+
+    return ActuatorPlant(motion, qpos, qvel, motion_rates, project, initial)
 
 
 # --- quadrotor ---------------------------------------------------------------------------------
@@ -228,7 +294,7 @@ def quadrotor_qvel(state: Vector) -> Values:
 
 @scalar
 def _quadrotor_rates(
-    state: Vector, ctrl: Vector, loads: Loads, mechanics: Mechanics, disturbance: Triple
+    state: Vector, ctrl: Vector, loads: Loads, mechanics: Any, disturbance: Triple
 ) -> Values:
     """Chapter 2's rigid body under thrusts and loads; see `ActuatorPlant.rates`."""
     vehicle = mechanics.vehicle
@@ -247,29 +313,23 @@ def _quadrotor_rates(
 
 
 @scalar
-def project_quadrotor(state: list[float], mechanics: Mechanics) -> list[float]:
+def project_quadrotor(state: list[float], mechanics: Any) -> list[float]:
     """The state as it is: the rotors make any thrust."""
     return state
 
 
-ACTUATOR_PLANTS: Final[dict[str, ActuatorPlant]] = {
-    "tiltrotor": ActuatorPlant(
-        motion=26,
-        rotor_states=8,
-        qpos=tiltrotor_qpos,
-        qvel=tiltrotor_qvel,
-        rates=_tiltrotor_rates,
-        project_onto_limits=project_tiltrotor,
-        initial=initial_tiltrotor,
-    ),
-    "quadrotor": ActuatorPlant(
-        motion=12,
-        rotor_states=4,
-        qpos=quadrotor_qpos,
-        qvel=quadrotor_qvel,
-        rates=_quadrotor_rates,
-        project_onto_limits=project_quadrotor,
-        initial=lambda plan: initial_state(plan.scenario),
-    ),
-}
-"""By the vehicle's model."""
+QUADROTOR_PLANT: Final = ActuatorPlant(
+    motion=12,
+    qpos=quadrotor_qpos,
+    qvel=quadrotor_qvel,
+    rates=_quadrotor_rates,
+    project_onto_limits=project_quadrotor,
+    initial=lambda plan: initial_state(plan.scenario),
+)
+
+
+def actuator_plant(dynamics: Dynamics) -> ActuatorPlant:
+    """The plant of a model."""
+    if dynamics.model == "quadrotor":
+        return QUADROTOR_PLANT
+    return _tilting_plant(layout_of(dynamics), dynamics.spins, dynamics.tilt_of_rotor)

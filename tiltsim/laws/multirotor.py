@@ -222,6 +222,11 @@ def _equations_of(layout: Layout, law: Callable[..., Values]) -> Equations:
         return inputs_in(law(time, seen, rates(jets), integrals_in(state), own, knots))
 
     @scalar
+    def tilts_of(time: float, state: Vector, parameters: LoopParameters, knots: Vector) -> Values:
+        followed: Values = angles(planned(time, parameters.law.gait, knots))
+        return followed
+
+    @scalar
     def state_rates(
         time: float,
         state: Vector,
@@ -230,8 +235,8 @@ def _equations_of(layout: Layout, law: Callable[..., Values]) -> Equations:
         knots: Vector,
         disturbance: Triple,
     ) -> Values:
-        own = parameters.law
-        tilts, at = angles(planned(time, own.gait, knots)), int(own.rotors)
+        own, tilts = parameters.law, tilts_of(time, state, parameters, knots)
+        at = int(own.rotors)
         body = motion(state, tilts, inputs, own.vehicle, knots, at, disturbance, 0.0)
         return (*body, *integral_rates(inputs))
 
@@ -252,6 +257,7 @@ def _equations_of(layout: Layout, law: Callable[..., Values]) -> Equations:
             *(0.0,) * STATES,
         ),
         observe=observe,
+        tilts=tilts_of,
     )
 
 

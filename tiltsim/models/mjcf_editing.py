@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree
 
 from tiltsim.models.parts import TiltServo
-from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
     import mujoco
@@ -162,11 +161,11 @@ def add_wrench(root: Any, name: str, site: str) -> None:
     _extend_keyframes(root, ctrl=6)
 
 
-def add_hinge_torques(root: Any, name: str) -> None:
-    """Append a torque about each of the tilt hinges."""
-    for i in ROTORS:
+def add_hinge_torques(root: Any, name: str, hinges: int) -> None:
+    """Append a torque about each of so many tilt hinges."""
+    for i in range(1, hinges + 1):
         _add_actuator(root, f"{name}_hinge_{i}", joint=f"tilt_{i}")
-    _extend_keyframes(root, ctrl=len(ROTORS))
+    _extend_keyframes(root, ctrl=hinges)
 
 
 _PLAIN: Final = {

@@ -22,7 +22,6 @@ def require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
 
 
 WRENCH_SIZE: Final = 6
-HINGES: Final = 4
 
 
 class ExtraActuators(NamedTuple):
@@ -31,14 +30,13 @@ class ExtraActuators(NamedTuple):
     states: int = 0  # integrators that act on nothing: ctrl is the rate of an activation
     memories: int = 0  # act on nothing and have no state: a held ctrl is all there is
     wrench: bool = False  # force (N) and torque (N m) on the body, six, in body axes
-    hinge_torques: bool = False  # N m about the tilt hinges, four
-    begins_with_rotor_speeds: bool = False  # the first four states keep within the rotors' limits
+    hinge_torques: int = 0  # N m about so many tilt hinges
+    begins_with_rotor_speeds: bool = False  # these states keep within the rotors' limits
 
     @property
     def controls(self) -> int:
         """Their number of controls."""
-        loads = WRENCH_SIZE * self.wrench + HINGES * self.hinge_torques
-        return self.states + self.memories + loads
+        return self.states + self.memories + WRENCH_SIZE * self.wrench + self.hinge_torques
 
 
 @dataclass(frozen=True)

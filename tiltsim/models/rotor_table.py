@@ -7,6 +7,8 @@ from functools import cached_property
 from math import inf
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
 from tiltsim_controllers.vehicle.effectiveness import Rotor
 
@@ -58,6 +60,13 @@ class Multirotor:
     def spins(self) -> Values:
         """Signs of the rotor speeds at positive thrust."""
         return tuple(rotor.spin for rotor in self.rotors)
+
+    @property
+    def max_rotor_inertia(self) -> float:
+        """The largest spin inertia (kg m^2) of each rotor that the untilted vehicle can have."""
+        axes = np.array([rotor.axis for rotor in self.rotors])
+        share = np.linalg.solve(np.reshape(self.inertia, (3, 3)), axes.T @ axes)
+        return float(1.0 / np.linalg.eigvals(share).real.max())
 
     @property
     def hover_rotor_speed(self) -> float:

@@ -220,8 +220,7 @@ def _compose(spec: RotorcraftSpec) -> tuple[Compile, Compile]:
         add_memories(root, f"layer_{index}_memory", extra.memories)
         if extra.wrench:
             add_wrench(root, f"layer_{index}", center)
-        if extra.hinge_torques:
-            add_hinge_torques(root, f"layer_{index}")
+        add_hinge_torques(root, f"layer_{index}", extra.hinge_torques)
     if spec.ground is not None:
         _set_ground(root, spec.ground)
     complete = compiler_of(root)

@@ -22,10 +22,9 @@ from tiltsim.plants.command import CheckedCommand, ControllerError, Observation
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import Observer, flip_by_spin
 from tiltsim.vehicles.rotorcraft.layout import TILT_1, layout_of
+from tiltsim.vehicles.rotorcraft.rotors import rotor_code, true_rotors
 from tiltsim_controllers.mathematics.records import slotted
 from tiltsim_controllers.mathematics.scalar import Floats, Values, clipped
-from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines
-from tiltsim_controllers.vehicle.rotor_inertia import sum_along_thrust_axes
 
 
 class CommandedPlant(MujocoPlant):
@@ -52,8 +51,8 @@ class CommandedPlant(MujocoPlant):
         # The activations that a commanded speed is written to: where rotors lag behind it, the ones
         # that the layer keeps after the rotor speeds.
         self._lagging = vehicle.rotor_time_constant is not None
-        has_inertia = assembly.scenario.has_rotor_inertia
-        self._rotor_inertia = assembly.scenario.rotorcraft.rotor_inertia if has_inertia else 0.0
+        self._rotor_inertia = vehicle.rotor_inertia
+        self._code, self._rotors = rotor_code(self._loop.dynamics), true_rotors(assembly.scenario)
         first = rotors if self._lagging else 0
         self._speeds = slice(first, first + rotors)
         # The delay line in ``act``, the newest command first; without latency it is empty. A
@@ -93,11 +92,10 @@ class CommandedPlant(MujocoPlant):
         """Command signed rotor speeds (rad/s). A jump of the rotors' momentum turns the body."""
         model, data = self.model, self.data
         if self._rotor_inertia > 0.0 and not self._lagging:
-            tilting = self.layout.tilts > 0
-            tilts = data.qpos[TILT_1 : TILT_1 + 4].tolist() if tilting else (0.0,) * 4
-            trig, jump = sines_and_cosines(*tilts), (speeds - data.act[:4]).tolist()
+            tilts = data.qpos[TILT_1 : TILT_1 + self.layout.tilts].tolist()
+            jump = (speeds - data.act[: self.layout.rotors]).tolist()
             impulse, turned = np.zeros((1, model.nv)), np.empty((1, model.nv))
-            impulse[0, 3:6] = sum_along_thrust_axes(trig, jump)
+            impulse[0, 3:6] = self._code.along(self._code.axes(tilts, self._rotors), jump)
             mujoco.mj_fwdPosition(model, data)  # the mass matrix of the present tilts
             mujoco.mj_solveM(model, data, turned, impulse)
             data.qvel[:] -= self._rotor_inertia * turned[0]

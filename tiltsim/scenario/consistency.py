@@ -88,11 +88,6 @@ def _check_multirotor(scenario: ScenarioTables, vehicle: MultirotorTable) -> Non
         scenario.require(
             "vehicle.tilt_servo", TiltServoTable(), "vehicle.mjcf has no tilts; remove it"
         )
-    if scenario.simulation.plant == "thesis" and not scenario.has_ideal_actuators_in_still_air:
-        raise scenario.mistake(
-            "simulation.plant",
-            "its equations of a multirotor have ideal rotors and servos; use mujoco",
-        )
 
 
 def _check_fixed_rotors(scenario: ScenarioTables) -> None:

@@ -104,6 +104,12 @@ class RotorcraftTable(AnyVehicleTable, ABC):
         "no lag [s]",
         examples=[0.04],
     )
+    rotor_inertia: NonNegative = Field(
+        0.0,
+        description="spin inertia of one rotor about its axis: reaction to its acceleration and "
+        "gyroscopic torque [kg m^2]",
+        examples=[1e-5],
+    )
     tilt_servo: TiltServoTable = Field(
         TiltServoTable(), description="the servos that tilt the rotors"
     )
@@ -159,6 +165,11 @@ class RotorcraftTable(AnyVehicleTable, ABC):
         if low is not None and high is not None and low >= high:
             raise self.mistake("min_rotor_speed", f"must be below max_rotor_speed = {high}")
 
+    def _check_rotor_inertia(self, limit: float) -> None:
+        if self.rotor_inertia >= limit:
+            reason = f"must be below {limit:g}: the vehicle's inertia includes all rotors"
+            raise self.mistake("rotor_inertia", reason)
+
 
 class MultirotorTable(RotorcraftTable):
     """Any number of rotors, each anywhere, fixed or on a hinge, described by an MJCF file alone."""
@@ -211,6 +222,6 @@ class MultirotorTable(RotorcraftTable):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        self.resolve()
+        self._check_rotor_inertia(self.resolve().max_rotor_inertia)
         self._check_limits()
         return self

@@ -134,7 +134,7 @@ class ScenarioTables(Table):
     @property
     def has_rotor_inertia(self) -> bool:
         """Whether the rotors have spin inertia."""
-        return isinstance(self.vehicle, VehicleTable) and self.vehicle.rotor_inertia > 0.0
+        return isinstance(self.vehicle, RotorcraftTable) and self.vehicle.rotor_inertia > 0.0
 
     @property
     def has_ideal_actuators_in_still_air(self) -> bool:

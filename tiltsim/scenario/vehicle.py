@@ -15,7 +15,7 @@ from tiltsim.scenario.rotorcraft import (
     RotorcraftTable,
     ServoTable,
 )
-from tiltsim.scenario.table import NonNegative, NotTiny, Positive, Table, example
+from tiltsim.scenario.table import NotTiny, Positive, Table, example
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, TiltCar
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
@@ -107,12 +107,6 @@ class VehicleTable(RotorcraftTable):
     gravity: Positive | None = Field(
         None, description="default: the preset's [m/s^2]", examples=[9.81]
     )
-    rotor_inertia: NonNegative = Field(
-        0.0,
-        description="spin inertia of one rotor about its axis: reaction to its acceleration and "
-        "gyroscopic torque [kg m^2]",
-        examples=[1e-5],
-    )
     pod: PodTable = Field(PodTable(), description="mass properties of the tilting part of an arm")
 
     def resolve(self) -> Vehicle:
@@ -171,9 +165,7 @@ class VehicleTable(RotorcraftTable):
                 f"is in kg m^2, arms in m: mass this far out, {radius:.3g} m on average, does not "
                 f"belong to arms of {vehicle.arm_length:g} m; check inertia, mass and arm_length",
             )
-        if 4.0 * self.rotor_inertia >= moments[2]:
-            reason = f"must be below {moments[2] / 4.0:g}: vehicle.inertia includes the four rotors"
-            raise self.mistake("rotor_inertia", reason)
+        self._check_rotor_inertia(moments[2] / self.rotor_count)
         self._check_limits()
         return self
 

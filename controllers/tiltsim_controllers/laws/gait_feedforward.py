@@ -69,7 +69,7 @@ from tiltsim_controllers.vehicle.rigid_body import (
     cross,
     torque_rate,
 )
-from tiltsim_controllers.vehicle.rotor_inertia import sum_along_thrust_axes
+from tiltsim_controllers.vehicle.rotor_code import sum_along_thrust_axes
 
 
 class FeedforwardTerms(NamedTuple):

@@ -62,8 +62,9 @@ class Rotor(NamedTuple):
     @property
     def entries(self) -> Values:
         """Its part of the table."""
-        *rotating, tilt, hinge, hinge_axis = self
-        return rotor_entries(*rotating, tilt=tilt, hinge=hinge, hinge_axis=hinge_axis)
+        return rotor_entries(
+            *self[:5], tilt=self.tilt, hinge=self.hinge, hinge_axis=self.hinge_axis
+        )
 
     @property
     def place_entries(self) -> Values:

@@ -2,69 +2,47 @@
 
 A rotor of inertia ``J_r`` about its axis ``d_i``, the thrust axis, has the angular momentum ``J_r
 varpi_i d_i`` beyond what turns with its pod. Its rate acts on the vehicle with the torque ``-d/dt
-sum_i J_r varpi_i d_i - omega x sum_i J_r varpi_i d_i``, and across the pod's hinge on its servo.
-All sums here are per unit of ``J_r``, in body axes, of rotors on the cross.
+sum_i J_r varpi_i d_i - omega x sum_i J_r varpi_i d_i``, and across the pod's hinge on its servo:
+see `tiltsim_controllers.vehicle.rotor_code.RotorCode`. All sums here are per unit of ``J_r``, in
+body axes.
 """
 
 from __future__ import annotations
 
-from tiltsim_controllers.mathematics.scalar import Octet, Quad, Triple, scalar
-from tiltsim_controllers.vehicle.decoupling_matrix import body_force
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+from tiltsim_controllers.mathematics.scalar import Triple, Values, scalar
+from tiltsim_controllers.mathematics.vectors import tuple_text, written_out
 from tiltsim_controllers.vehicle.rigid_body import cross
+from tiltsim_controllers.vehicle.rotor_code import RotorCode
 
 
-@scalar
-def sum_along_thrust_axes(trig: Octet, values: Quad) -> Triple:
-    """``sum_i values_i d_i``: of rotor speeds (rad/s), their total momentum.
+@cache
+def spin_torque_of(code: RotorCode) -> Callable[..., Triple]:
+    """Scalar code of the torque on the vehicle, rad/s^2.
 
-    ``trig`` are the `sines_and_cosines` of the tilt angles, or their rates for ``values_i d_i'``.
+    It is ``(axes, tilt_rates, speeds, accelerations, omega) -> torque``: the axes of `RotorCode`,
+    rates of the tilts (rad/s), signed speeds of the rotors (rad/s), their rates, and body rates.
     """
-    return body_force(trig, -values[0], values[1], -values[2], values[3])
+    turning, along = code.turning, code.along
 
+    @scalar
+    def spin_torque(
+        axes: Any, tilt_rates: Values, speeds: Values, accelerations: Values, omega: Triple
+    ) -> Triple:
+        momentum = along(axes, speeds)
+        faster = along(axes, accelerations)
+        tilting = along(turning(axes, tilt_rates), speeds)
+        carried = cross(omega, momentum)
+        return (
+            -faster[0] - tilting[0] - carried[0],
+            -faster[1] - tilting[1] - carried[1],
+            -faster[2] - tilting[2] - carried[2],
+        )
 
-@scalar
-def spin_torque(
-    trig: Octet, turning: Octet, speeds: Quad, accelerations: Quad, omega: Triple
-) -> Triple:
-    """The torque on the vehicle, rad/s^2.
-
-    Args:
-        trig: `sines_and_cosines` of the tilt angles
-        turning: their `trigonometric_rates`, 1/s
-        speeds: of the rotors, rad/s, signed
-        accelerations: their rates, rad/s^2
-        omega: body rates, rad/s
-    """
-    momentum = sum_along_thrust_axes(trig, speeds)
-    faster = sum_along_thrust_axes(trig, accelerations)
-    tilting = sum_along_thrust_axes(turning, speeds)
-    carried = cross(omega, momentum)
-    return (
-        -faster[0] - tilting[0] - carried[0],
-        -faster[1] - tilting[1] - carried[1],
-        -faster[2] - tilting[2] - carried[2],
-    )
-
-
-@scalar
-def spin_torques_on_hinges(trig: Octet, speeds: Quad, omega: Triple) -> Quad:
-    """The torques about the tilt axes on the four pods, rad/s^2: ``-varpi_i (omega x d_i)``.
-
-    Neither a rotor's acceleration nor the motion of its pod has a part about the hinge.
-
-    Args:
-        trig: `sines_and_cosines` of the tilt angles
-        speeds: of the rotors, rad/s, signed
-        omega: body rates, rad/s
-    """
-    s1, c1, s2, c2, s3, c3, s4, c4 = trig
-    p, q, r = omega
-    return (
-        -speeds[0] * (q * c1 + r * s1),
-        -speeds[1] * (r * s2 - p * c2),
-        -speeds[2] * (r * s3 - q * c3),
-        -speeds[3] * (r * s4 + p * c4),
-    )
+    return spin_torque
 
 
 @scalar
@@ -82,3 +60,21 @@ def acceleration_within_limits(
     if speed <= min_speed and acceleration < 0.0:
         return 0.0
     return acceleration
+
+
+@cache
+def accelerations_within_limits_of(spins: Values) -> Callable[..., Values]:
+    """Scalar code ``(speeds, demanded, low, high) -> accelerations`` of rotors with these spins."""
+    senses = "".join("p" if spin > 0.0 else "m" for spin in spins)
+    accelerations: Callable[..., Values] = written_out(
+        f"accelerations_within_limits_{senses}",
+        "speeds, demanded, low, high",
+        tuple_text(
+            f"within(speeds[{i}], demanded[{i}], low, high)"
+            if spin > 0.0
+            else f"-within(-speeds[{i}], -demanded[{i}], low, high)"
+            for i, spin in enumerate(spins)
+        ),
+        within=acceleration_within_limits,
+    )
+    return accelerations

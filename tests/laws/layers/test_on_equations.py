@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tiltsim
-from tiltsim.equations.actuator_level import ACTUATOR_PLANTS
+from tiltsim.equations.actuator_level import actuator_plant
 from tiltsim.errors import InputError
 from tiltsim.laws import assembling
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
@@ -211,11 +211,9 @@ def test_a_saved_state_restarts_bit_identically(name):
 @pytest.mark.parametrize("base", [TILTROTOR, QUADROTOR])
 def test_a_state_that_has_overflowed_is_seen_as_no_number(base):
     """The last addition of a step may give infinity, of which floats have no sine."""
-    plant = make_plant(assemble(scenario(base, STORM, {"simulation": {"plant": "thesis"}})))
-    state, motion = (
-        plant.state,
-        ACTUATOR_PLANTS[base.get("vehicle", {}).get("model", "tiltrotor")].motion,
-    )
+    assembly = assemble(scenario(base, STORM, {"simulation": {"plant": "thesis"}}))
+    plant = make_plant(assembly)
+    state, motion = plant.state, actuator_plant(assembly.loop.dynamics).motion
     first = 1 + len(plant._held)
     for index in range(motion):
         overflowed = state.copy()

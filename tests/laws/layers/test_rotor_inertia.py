@@ -283,7 +283,7 @@ def test_commanded_speeds_take_their_momentum_from_the_body(model):
             "vehicle.rotor_inertia = 2e-05: not supported for the quadrotor",
         ),
         ({"vehicle": {"rotor_inertia": -1e-6}}, "vehicle.rotor_inertia = -1e-06"),
-        ({"vehicle": {"rotor_inertia": 1.3e-3}}, "four rotors"),
+        ({"vehicle": {"rotor_inertia": 1.3e-3}}, "all rotors"),
     ],
 )
 def test_what_has_no_such_rotors_is_refused(tables, message):

@@ -16,9 +16,9 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
-from tiltsim.laws.layers.rotors import rotor_code, true_rotors
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.vehicles.rotorcraft.layout import QW, QX, QY, QZ, TILT_1, layout_of
+from tiltsim.vehicles.rotorcraft.rotors import rotor_code, true_rotors
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.rotation import rotation_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar

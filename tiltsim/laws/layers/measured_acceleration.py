@@ -9,29 +9,28 @@ from __future__ import annotations
 
 from functools import cache
 from math import inf
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.equations.actuator_level import (
     Loads,
-    Mechanics,
-    accelerations_by_hinge_torques,
     mechanics,
-    servo_acceleration,
+    mechanics_record,
+    servo_accelerations_of,
 )
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.laws.tiltrotor import four
 from tiltsim.models.parts import SERVO_ARMATURE
 from tiltsim.vehicles.rotorcraft import rotor_limits
-from tiltsim.vehicles.rotorcraft.layout import TILT_1, TILT_RATE_1, TILTROTOR_THRUSTS
-from tiltsim_controllers.mathematics.scalar import Quad, Triple, Values, Vector, clipped, scalar
+from tiltsim.vehicles.rotorcraft.layout import CROSS, TILT_1, TILT_RATE_1, TILTROTOR_THRUSTS
+from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, clipped, scalar
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     body_torque,
     sines_and_cosines,
     torque_entries,
 )
-from tiltsim_controllers.vehicle.parameters import drag_ratio
+from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 from tiltsim_controllers.vehicle.rigid_body import cross
 
 if TYPE_CHECKING:
@@ -41,7 +40,7 @@ if TYPE_CHECKING:
 class Motion(NamedTuple):
     """What the angular acceleration depends on besides state and controls."""
 
-    mechanics: Mechanics
+    mechanics: mechanics_record(Vehicle, CROSS.tilts)  # type: ignore[valid-type]
     least_thrust: float  # (rad/s)^2, limits of the thrusts' controls
     greatest_thrust: float
     gyroscopic: float  # factor of the gyroscopic torque, 0 on the thesis plant
@@ -49,20 +48,7 @@ class Motion(NamedTuple):
     pod_share: float  # of a pod's inertia in that of its hinge, which has the servo's armature
 
 
-@scalar
-def _servo_accelerations(
-    qpos: Vector, qvel: Vector, ctrl: Vector, loads: Loads, mechanics: Mechanics
-) -> Quad:
-    """What the torques about the four hinges add to the tilts on a body at rest, rad/s^2."""
-    load_1, load_2, load_3, load_4 = accelerations_by_hinge_torques(loads, mechanics)
-    a1, a2, a3, a4 = four(qpos, TILT_1)
-    rate_1, rate_2, rate_3, rate_4 = four(qvel, TILT_RATE_1)
-    return (
-        servo_acceleration(ctrl[0], a1, rate_1, mechanics) + load_1,
-        servo_acceleration(ctrl[1], a2, rate_2, mechanics) + load_2,
-        servo_acceleration(ctrl[2], a3, rate_3, mechanics) + load_3,
-        servo_acceleration(ctrl[3], a4, rate_4, mechanics) + load_4,
-    )
+_servo_accelerations: Final = servo_accelerations_of(CROSS.tilts)
 
 
 @scalar
@@ -98,7 +84,7 @@ def plant_angular_acceleration(
     # The hinges lie along x, y, -x and -y.
     omega = (qvel[3], qvel[4], qvel[5])
     servo_1, servo_2, servo_3, servo_4 = _servo_accelerations(
-        qpos, qvel, ctrl, loads, motion.mechanics
+        ctrl, tilts, rates, loads, motion.mechanics
     )
     momentum = (
         ixx * omega[0] + pod * (rates[0] - rates[2]),

@@ -13,16 +13,17 @@ from typing import TYPE_CHECKING, Any
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Equations
 from tiltsim.equations.actuator_level import (
-    ACTUATOR_PLANTS,
     Loads,
-    Mechanics,
-    limit_speeds,
+    actuator_plant,
+    limit_speeds_of,
     mechanics,
+    mechanics_of,
 )
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.models.parts import WRENCH_SIZE, ExtraActuators
-from tiltsim.vehicles.rotorcraft.layout import ROTOR_STATES
+from tiltsim.vehicles.rotorcraft.layout import layout_of
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
+from tiltsim_controllers.mathematics.vectors import tuple_text, written_out
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
@@ -33,73 +34,58 @@ def read_actuators(dynamics: Dynamics) -> tuple[Callable[..., Values], Callable[
 
     Returns ``rates(ctrl)`` of the activations, in their order, and ``loads(ctrl)``.
     """
-    own = ExtraActuators(states=ROTOR_STATES + dynamics.controller_states)
-    first = ACTUATOR_PLANTS[dynamics.model].rotor_states
-    return _read_actuators((own, *dynamics.extra_actuators), first)
+    layout = layout_of(dynamics)
+    own = ExtraActuators(states=layout.rotors + dynamics.controller_states)
+    return _read_actuators(
+        (own, *dynamics.extra_actuators), layout.acceleration_1, WRENCH_SIZE + layout.tilts
+    )
 
 
 @cache
 def _read_actuators(
-    actuators: tuple[ExtraActuators, ...], first: int
+    actuators: tuple[ExtraActuators, ...], first: int, loads: int
 ) -> tuple[Callable[..., Values], Callable[..., Loads]]:
     """`read_actuators` of these, whose controls begin at an index."""
-    if not actuators:
-
-        @scalar
-        def no_rates(ctrl: Vector) -> Values:
-            return ()
-
-        @scalar
-        def no_loads(ctrl: Vector) -> Loads:
-            return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-
-        return no_rates, no_loads
-
-    this = actuators[0]
-    memories = first + this.states
-    force = memories + this.memories
-    hinge = force + WRENCH_SIZE * this.wrench
-    further_rates, further_loads = _read_actuators(actuators[1:], first + this.controls)
-    wrench, on_hinges = this.wrench, this.hinge_torques
-
-    @scalar
-    def rates(ctrl: Vector) -> Values:
-        return (*ctrl[first:memories], *further_rates(ctrl))
-
-    if not (wrench or on_hinges):
-        return rates, further_loads
-
-    @scalar
-    def loads(ctrl: Vector) -> Loads:
-        fx, fy, fz, tx, ty, tz, t1, t2, t3, t4 = further_loads(ctrl)
-        if wrench:
-            fx, fy, fz = fx + ctrl[force], fy + ctrl[force + 1], fz + ctrl[force + 2]
-            tx, ty, tz = tx + ctrl[force + 3], ty + ctrl[force + 4], tz + ctrl[force + 5]
-        if on_hinges:
-            t1, t2 = t1 + ctrl[hinge], t2 + ctrl[hinge + 1]
-            t3, t4 = t3 + ctrl[hinge + 2], t4 + ctrl[hinge + 3]
-        return fx, fy, fz, tx, ty, tz, t1, t2, t3, t4
-
-    return rates, loads
+    rates: list[int] = []
+    sums: list[list[int]] = [[] for _ in range(loads)]  # the last layer's come first
+    for this in actuators:
+        rates += range(first, first + this.states)
+        force = first + this.states + this.memories
+        hinge = force + WRENCH_SIZE * this.wrench
+        for load in range(WRENCH_SIZE * this.wrench):
+            sums[load].insert(0, force + load)
+        for load in range(this.hinge_torques):
+            sums[WRENCH_SIZE + load].insert(0, hinge + load)
+        first += this.controls
+    terms = [[f"ctrl[{index}]" for index in places] for places in sums]
+    name = "_".join("x".join(str(int(number)) for number in this) for this in actuators)
+    name = f"{first}_{loads}_{name}"  # distinguishes them from all others
+    return (
+        written_out(f"rates_{name}", "ctrl", tuple_text(f"ctrl[{index}]" for index in rates)),
+        written_out(
+            f"loads_{name}", "ctrl", tuple_text(" + ".join(["0.0", *added]) for added in terms)
+        ),
+    )
 
 
 def _projection(
-    project_motion: Callable[..., list[float]], first: int, actuators: tuple[ExtraActuators, ...]
+    project_motion: Callable[..., list[float]], first: int, dynamics: Dynamics
 ) -> Callable[..., list[float]]:
     """A projection of the motion and of commanded rotor speeds onto their limits.
 
     The states of the actuators begin at ``first``. In scalar code, ``(state, mechanics) -> state``.
     """
-    for this in actuators:
+    for this in dynamics.extra_actuators:
         if this.begins_with_rotor_speeds:
             break
         first += this.states
     else:
         return project_motion
+    limit_speeds = limit_speeds_of(dynamics.spins, first)
 
     @scalar
-    def project(state: list[float], mechanics: Mechanics) -> list[float]:
-        return limit_speeds(project_motion(state, mechanics), first, mechanics)
+    def project(state: list[float], mechanics: Any) -> list[float]:
+        return limit_speeds(project_motion(state, mechanics), mechanics)
 
     return project
 
@@ -111,14 +97,14 @@ def on_equations(loop: ClosedLoop) -> ClosedLoop:
     Their inputs are the controls, their state is the vehicle's motion followed by the activations.
     """
     dynamics = loop.dynamics
-    plant = ACTUATOR_PLANTS[dynamics.model]
+    plant = actuator_plant(dynamics)
     first, qpos_of, qvel_of = plant.motion, plant.qpos, plant.qvel
     motion_rates = plant.rates
     controls, held = loop.sampling.controls, loop.sampling.hold
     observe = loop.columns.observe
     activation_rates, loads = read_actuators(dynamics)
-    further = first + ROTOR_STATES + dynamics.controller_states
-    project_motion = _projection(plant.project_onto_limits, further, dynamics.extra_actuators)
+    further = first + len(dynamics.spins) + dynamics.controller_states
+    project_motion = _projection(plant.project_onto_limits, further, dynamics)
 
     @scalar
     def equation_inputs(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
@@ -171,4 +157,6 @@ def on_equations(loop: ClosedLoop) -> ClosedLoop:
         observe=observe_equations,
         project_onto_limits=project_onto_limits,
     )
-    return wrap_loop(loop, Layer("on_equations", Mechanics, mechanics, equations=equations))
+    return wrap_loop(
+        loop, Layer("on_equations", mechanics_of(dynamics), mechanics, equations=equations)
+    )

@@ -13,105 +13,68 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Equations
 from tiltsim.equations.tiltrotor import SPEED_1, P, Q, R
 from tiltsim.laws.layers.layer import Layer, wrap_loop
-from tiltsim.laws.tiltrotor import four
 from tiltsim.models.parts import ExtraActuators
-from tiltsim.vehicles.rotorcraft.layout import (
-    QUADROTOR_THRUSTS,
-    ROTOR_STATES,
-    TILT_1,
-    TILT_RATE_1,
-    TILTROTOR_THRUSTS,
-)
-from tiltsim_controllers.mathematics.scalar import Octet, Quad, Triple, Values, Vector, scalar
-from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines, trigonometric_rates
-from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim.vehicles.rotorcraft.layout import TILT_1, TILT_RATE_1, layout_of
+from tiltsim.vehicles.rotorcraft.rotors import rotor_code, true_rotors
+from tiltsim_controllers.mathematics.records import make_record_type
+from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
+from tiltsim_controllers.mathematics.vectors import componentwise, entries_of
 from tiltsim_controllers.vehicle.rigid_body import cross
-from tiltsim_controllers.vehicle.rotor_inertia import (
-    acceleration_within_limits,
-    spin_torque,
-    spin_torques_on_hinges,
-    sum_along_thrust_axes,
-)
+from tiltsim_controllers.vehicle.rotor_inertia import accelerations_within_limits_of, spin_torque_of
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
 
 
-class SpinningRotors(NamedTuple):
-    """The parameters of the layer."""
+@cache
+def _loads_of(dynamics: Dynamics) -> Callable[..., Values]:
+    """Scalar code of the wrench on the body (N, N m, body axes) and torques on the hinges (N m).
 
-    inertia: float  # kg m^2, of one rotor about its axis
-    vehicle: Vehicle  # the true one, not the controller's
-    slowest: float  # rad/s, of a rotor along its spin
-    fastest: float
-
-
-@scalar
-def _accelerations(speeds: Quad, demanded: Quad, rotors: SpinningRotors) -> Quad:
-    """Rates (rad/s^2) of the rotor speeds: the demanded ones, except beyond a limit."""
-    low, high = rotors.slowest, rotors.fastest
-    return (
-        -acceleration_within_limits(-speeds[0], -demanded[0], low, high),
-        acceleration_within_limits(speeds[1], demanded[1], low, high),
-        -acceleration_within_limits(-speeds[2], -demanded[2], low, high),
-        acceleration_within_limits(speeds[3], demanded[3], low, high),
-    )
-
-
-@scalar
-def _wrench(
-    trig: Octet, turning: Octet, qvel: Vector, act: Vector, demanded: Quad, rotors: SpinningRotors
-) -> Values:
-    """Force (none) and torque (N m) on the body, body axes.
-
-    Args:
-        trig, turning: `sines_and_cosines` of the tilts, and their rates, 1/s.
-        qvel, act: MuJoCo's state.
-        demanded: Rotor accelerations, rad/s^2.
-        rotors: The parameters of the layer.
+    It is ``(qpos, qvel, act, ctrl, layer) -> loads``.
     """
-    speeds, inertia = four(act, 0), rotors.inertia
-    accelerations = _accelerations(speeds, demanded, rotors)
-    x, y, z = spin_torque(trig, turning, speeds, accelerations, (qvel[3], qvel[4], qvel[5]))
-    return 0.0, 0.0, 0.0, inertia * x, inertia * y, inertia * z
+    code, layout = rotor_code(dynamics), layout_of(dynamics)
+    rotors, tilts = layout
+    axes_of, on_hinges, spin_torque = code.axes, code.on_hinges, spin_torque_of(code)
+    tilts_in, rates_in = entries_of(TILT_1, tilts), entries_of(TILT_RATE_1, tilts)
+    speeds_in, demanded_in = entries_of(0, rotors), entries_of(layout.acceleration_1, rotors)
+    within_limits = accelerations_within_limits_of(dynamics.spins)
+    scaled = componentwise("scaled_torques", "inertia, torques", "inertia * torques#", tilts)
 
+    @scalar
+    def loads(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, layer: Any) -> Values:
+        inertia, speeds, omega = layer.inertia, speeds_in(act), (qvel[3], qvel[4], qvel[5])
+        accelerations = within_limits(speeds, demanded_in(ctrl), layer.slowest, layer.fastest)
+        axes = axes_of(tilts_in(qpos), layer.vehicle)
+        x, y, z = spin_torque(axes, rates_in(qvel), speeds, accelerations, omega)
+        hinges = scaled(inertia, on_hinges(axes, speeds, omega))
+        return (0.0, 0.0, 0.0, inertia * x, inertia * y, inertia * z, *hinges)
 
-@scalar
-def _tiltrotor_loads(
-    qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, rotors: SpinningRotors
-) -> Values:
-    """Wrench on the body, and torques (N m) on the four hinges."""
-    trig = sines_and_cosines(qpos[TILT_1], qpos[TILT_1 + 1], qpos[TILT_1 + 2], qpos[TILT_1 + 3])
-    turning = trigonometric_rates(trig, four(qvel, TILT_RATE_1))
-    h1, h2, h3, h4 = spin_torques_on_hinges(trig, four(act, 0), (qvel[3], qvel[4], qvel[5]))
-    demanded, inertia = four(ctrl, TILTROTOR_THRUSTS + ROTOR_STATES), rotors.inertia
-    wrench = _wrench(trig, turning, qvel, act, demanded, rotors)
-    return (*wrench, inertia * h1, inertia * h2, inertia * h3, inertia * h4)
-
-
-@scalar
-def _quadrotor_loads(
-    qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, rotors: SpinningRotors
-) -> Values:
-    """Wrench on the body."""
-    upright = (0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0)
-    at_rest = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    demanded = four(ctrl, QUADROTOR_THRUSTS + ROTOR_STATES)
-    return _wrench(upright, at_rest, qvel, act, demanded, rotors)
+    return loads
 
 
 @cache
 def with_rotor_inertia(loop: ClosedLoop) -> ClosedLoop:
     """A loop whose rotors have spin inertia."""
     inner_controls, inner_hold = loop.sampling.controls, loop.sampling.hold
-    inner_ctrl = loop.dynamics.sizes.ctrl
-    tilting = loop.dynamics.model == "tiltrotor"
-    loads: Callable[..., Values] = _tiltrotor_loads if tilting else _quadrotor_loads
+    dynamics, equations = loop.dynamics, loop.equations
+    inner_ctrl, code, loads = dynamics.sizes.ctrl, rotor_code(dynamics), _loads_of(dynamics)
+    record = make_record_type(
+        "SpinningRotors",
+        inertia=float,  # kg m^2, of one rotor about its axis
+        vehicle=code.record,  # the true one, not the controller's
+        slowest=float,  # rad/s, of a rotor along its spin
+        fastest=float,
+    )
+
+    def read(plan: FlightPlan) -> Any:
+        vehicle = plan.scenario.any_rotorcraft
+        own = vehicle.rotor_inertia, true_rotors(plan.scenario)
+        return record(*own, *vehicle.speeds_along_spin)
 
     @scalar
     def controls(
@@ -129,30 +92,17 @@ def with_rotor_inertia(loop: ClosedLoop) -> ClosedLoop:
 
     layer = Layer(
         "with_rotor_inertia",
-        SpinningRotors,
-        _spinning_rotors,
+        record,
+        read,
         controls=controls,
         hold=hold,
-        actuators=ExtraActuators(wrench=True, hinge_torques=tilting),
-        equations=None if loop.equations is None else _momentum_equations(loop.equations),
+        actuators=ExtraActuators(wrench=True, hinge_torques=layout_of(dynamics).tilts),
+        equations=None if equations is None else _momentum_equations(equations, dynamics),
     )
     return wrap_loop(loop, layer)
 
 
 # --- ideal actuators on the thesis's equations -------------------------------------------------
-
-
-@scalar
-def _spin_rates(tilts: Quad, speeds: Quad, rotors: SpinningRotors) -> Triple:
-    """The body rates (rad/s) at which the body had the momentum of the rotors' spin."""
-    trig = sines_and_cosines(tilts[0], tilts[1], tilts[2], tilts[3])
-    x, y, z = sum_along_thrust_axes(trig, speeds)
-    inertia, vehicle = rotors.inertia, rotors.vehicle
-    return (
-        inertia * x / vehicle.inertia_xx,
-        inertia * y / vehicle.inertia_yy,
-        inertia * z / vehicle.inertia_zz,
-    )
 
 
 @scalar
@@ -165,19 +115,28 @@ def _with_body_rates_ahead(state: list[float], by: Triple, sign: float) -> list[
     return shifted
 
 
-def _momentum_equations(equations: Equations) -> Equations:
-    """Equations of a tiltrotor whose rotors have spin inertia, and whose pods may jump.
+def _momentum_equations(equations: Equations, dynamics: Dynamics) -> Equations:
+    """Equations of a vehicle whose rotors have spin inertia, and whose pods may jump.
 
     Their body rates are those at which the body alone had the total angular momentum.
     """
     inner_inputs, inner_rates, inner_observe = equations.inputs, equations.rates, equations.observe
-    tilts = equations.tilts
+    tilts, code = equations.tilts, rotor_code(dynamics)
     assert tilts is not None  # other vehicles are refused
+    axes_of, along, inertia_times, inverse = code.axes, code.along, code.inertia, code.inverse
+    speeds_in = entries_of(SPEED_1, len(dynamics.spins))
+
+    @scalar
+    def spin_rates(angles: Values, speeds: Values, layer: Any) -> Triple:
+        """The body rates (rad/s) at which the body had the momentum of the rotors' spin."""
+        x, y, z = along(axes_of(angles, layer.vehicle), speeds)
+        inertia = layer.inertia
+        return inverse((inertia * x, inertia * y, inertia * z), layer.vehicle)
 
     @scalar
     def body_state(time: float, state: list[float], parameters: Any, knots: Vector) -> list[float]:
         angles = tilts(time, state, parameters.inner, knots)
-        spin = _spin_rates(angles, four(state, SPEED_1), parameters.layer)
+        spin = spin_rates(angles, speeds_in(state), parameters.layer)
         return _with_body_rates_ahead(state, spin, -1.0)
 
     @scalar
@@ -198,15 +157,14 @@ def _momentum_equations(equations: Equations) -> Equations:
         moving = inner_rates(time, own, inputs, parameters.inner, knots, disturbance)
         # The rotors' momentum turns with the body: -omega x sum_i J_r varpi_i d_i.
         vehicle = parameters.layer.vehicle
-        x = vehicle.inertia_xx * (state[P] - own[P])
-        y = vehicle.inertia_yy * (state[Q] - own[Q])
-        z = vehicle.inertia_zz * (state[R] - own[R])
-        carried = cross((own[P], own[Q], own[R]), (x, y, z))
+        ahead = (state[P] - own[P], state[Q] - own[Q], state[R] - own[R])
+        carried = cross((own[P], own[Q], own[R]), inertia_times(ahead, vehicle))
+        p_rate, q_rate, r_rate = inverse(carried, vehicle)
         return (
             *moving[:P],
-            moving[P] - carried[0] / vehicle.inertia_xx,
-            moving[Q] - carried[1] / vehicle.inertia_yy,
-            moving[R] - carried[2] / vehicle.inertia_zz,
+            moving[P] - p_rate,
+            moving[Q] - q_rate,
+            moving[R] - r_rate,
             *moving[SPEED_1:],
         )
 
@@ -221,15 +179,9 @@ def _momentum_equations(equations: Equations) -> Equations:
         inner = ControlSetup(setup.parameters.inner, setup.knots)
         own = [*equations.initial(plan, inner)]
         angles = tilts(0.0, own, inner.parameters, inner.knots)
-        spin = _spin_rates(angles, four(own, SPEED_1), setup.parameters.layer)
+        spin = spin_rates(angles, speeds_in(own), setup.parameters.layer)
         return _with_body_rates_ahead(own, spin, 1.0)
 
     law = f"{inner_inputs.__module__}.{inner_inputs.__qualname__}"
     inputs.__qualname__ = f"with_rotor_inertia.{law}"
     return replace(equations, inputs=inputs, rates=rates, observe=observe, initial=initial)
-
-
-def _spinning_rotors(plan: FlightPlan) -> SpinningRotors:
-    scenario = plan.scenario
-    rotorcraft, vehicle = scenario.rotorcraft, scenario.true_rotorcraft
-    return SpinningRotors(rotorcraft.rotor_inertia, vehicle, *rotorcraft.speeds_along_spin)

@@ -1,0 +1,139 @@
+"""Layers around vehicles of six and eight rotors: on both plants, both engines, and as for four."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+import tiltsim
+from tiltsim.laws.assembling import assemble
+from tiltsim.plants.command import Command, check_command
+from tiltsim.plants.commanded_plant import CommandedPlant
+from tiltsim.plants.factory import make_plant
+from tiltsim.studies.fleet import fleet_file
+from tiltsim.vehicles.rotorcraft.layout import Layout
+
+INERTIA = 3e-5  # kg m^2, of a rotor
+STORM = {
+    "drag": {"linear": [0.2, 0.3, 0.1], "area": [0.01, 0.01, 0.02]},
+    "wind": [3.0, 0.0, 0.2],
+    "gust": {"velocity": [2.0, 0.0, 0.0], "rise": 0.05, "start": 0.05},
+    "ground_effect": {"rotor_radius": 0.12, "height": -0.15},
+}
+TILTS = {
+    "type": "waypoints",
+    "angles": [[0.2, -0.1, 0.3, -0.2, 0.1, 0.0], [0.4, -0.3, 0.0, 0.1, -0.2, 0.3]],
+    "period": 0.4,
+}
+LAG = {"rotor_time_constant": 0.02, "max_rotor_speed": 900.0}
+MOTION = ("position", "attitude")
+
+
+def scenario(name, vehicle=None, simulation=None, **tables):
+    tables.setdefault("controller", {"law": "attitude_force"})
+    tables["vehicle"] = {"model": "multirotor", "mjcf": str(fleet_file(name)), **(vehicle or {})}
+    timing = {"duration": 0.1, "engine": "python", "record_timestep": 0.02}
+    return tiltsim.parse_scenario({**tables, "simulation": {**timing, **(simulation or {})}})
+
+
+def fly(*arguments, **tables):
+    flight = tiltsim.simulate(scenario(*arguments, **tables))
+    assert flight.end.kind == "completed", flight.end
+    return flight
+
+
+def furthest(one, other, names=MOTION):
+    return max(np.abs(one[name] - other[name]).max() for name in names)
+
+
+def test_the_tiltrotor_flies_in_air_near_the_ground_as_a_multirotor_does():
+    """The drag, the places of the rotors and what the ground adds to each, by tables."""
+    tables = {
+        "air": {**STORM, "wind": [3.0, 1.0, 0.2]},
+        "gait": {"type": "fixed", "angles": [-0.2, -0.2, 0.2, 0.2]},
+        "initial": {"attitude": [0.1, 0.05, 0.0], "rotor_speed": 361.0},
+    }
+    law = {"gait_rate_feedforward": True, "decoupling": "exact", "decoupler": "exact"}
+    general = fly(
+        "tiltrotor",
+        controller={
+            "law": "attitude_force", "gains": "feedforward", "attitude_error": "euler_angles"
+        },
+        **tables,
+    )  # fmt: skip
+    simulation = general.scenario.simulation.model_dump()
+    special = tiltsim.simulate(
+        {"controller": {**law, "gains": "feedforward"}, "simulation": simulation, **tables}
+    )
+    assert furthest(general, special) < 1e-9
+    assert np.ptp(special["z"]) > 1e-3
+
+
+def test_plants_agree_to_the_order_of_their_solvers():
+    """Lag, limits, air, ground and heavy rotors; pitching alone there is no gyroscopic torque."""
+    tables = {"air": STORM, "initial": {"attitude": [0.0, -0.05, 0.0]}}
+    vehicle = {**LAG, "rotor_inertia": INERTIA}
+    coarse, fine = (
+        [
+            fly("hexarotor", vehicle, {"plant": plant, "timestep": step}, **tables)
+            for plant in ("mujoco", "thesis")
+        ]
+        for step in (0.004, 0.002)
+    )
+    assert furthest(*fine) < 2e-7
+    assert 6.0 < furthest(*coarse) / furthest(*fine) < 11.0  # of third order
+    assert np.ptp(fine[0]["pitch"]) > 0.01
+
+
+def angular_momentum(plant, rotors):
+    """Of body, pods and rotors about the centre of mass, world axes, shape (3,)."""
+    model, data = plant.model, plant.data
+    mujoco.mj_forward(model, data)
+    mujoco.mj_subtreeVel(model, data)
+    sites = [data.site(f"rotor_{i}").xmat.reshape(3, 3)[:, 2] for i in range(1, rotors + 1)]
+    return data.body("vehicle").subtree_angmom + INERTIA * data.act[:rotors] @ np.array(sites)
+
+
+def test_angular_momentum_stays():
+    """Thrust off: body, pods and rotors keep what they have in all, to RK4's fourth order."""
+    off = [{"type": "rotor_loss", "rotor": rotor, "time": 0.0} for rotor in range(1, 7)]
+    tables = {"initial": {"angular_velocity": [0.8, -0.5, 0.6]}, "gait": TILTS, "fault": off}
+    vehicle, drifts = {"rotor_inertia": INERTIA, "rotor_time_constant": 0.02}, []
+    for step in (0.001, 0.0005):
+        desired = scenario("tilt_hexarotor", vehicle, {"timestep": step}, **tables)
+        plant = make_plant(assemble(desired))
+        momentum = angular_momentum(plant, 6)
+        plant.advance(round(0.01 / step))
+        drifts.append(np.abs(angular_momentum(plant, 6) - momentum).max())
+    assert drifts[1] < 5e-9
+    assert drifts[0] > 10.0 * drifts[1]
+
+
+@pytest.mark.parametrize("name", ["tilt_hexarotor", "omni_octorotor"])
+def test_commanded_speeds_take_their_momentum_from_the_body(name):
+    controller = {"law": "python", "function": "unused.py:law"}
+    initial = {"angular_velocity": [0.8, -0.5, 0.6], "attitude": [0.3, -0.2, 1.0]}
+    tables = {"gait": TILTS} if name == "tilt_hexarotor" else {}
+    vehicle = {"rotor_inertia": INERTIA}
+    plant = CommandedPlant(
+        assemble(scenario(name, vehicle, controller=controller, initial=initial, **tables))
+    )
+    rotors = plant.layout.rotors
+    before, rates = angular_momentum(plant, rotors), plant.data.qvel[3:6].copy()
+    speeds = Command(rotor_speeds=[310.0, 340.0, 280.0, 420.0, *[300.0] * (rotors - 4)])
+    plant.apply(check_command(speeds, Layout(rotors, 0)))
+    assert np.abs(plant.data.qvel[3:6] - rates).max() > 0.05
+    np.testing.assert_allclose(angular_momentum(plant, rotors), before, atol=1e-15)
+
+
+def test_stiff_servos_approach_pods_that_follow_exactly():
+    """The torques by tilt rates and rotor accelerations against the momentum formulation."""
+    short = {"plant": "thesis", "duration": 0.008, "timestep": 4e-5, "record_timestep": 0.004}
+    heavy = {"rotor_inertia": INERTIA}
+    exact = fly("tilt_hexarotor", heavy, short, gait=TILTS)
+    servo = {"natural_frequency": 2e4}
+    stiff = fly("tilt_hexarotor", {**heavy, "tilt_servo": servo}, short, gait=TILTS)
+    light = fly("tilt_hexarotor", {}, short, gait=TILTS)
+    assert furthest(exact, stiff) < 1e-2 * furthest(exact, light)
+    assert furthest(exact, light) > 1e-6
