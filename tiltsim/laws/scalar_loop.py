@@ -330,7 +330,7 @@ def _equations(key: Key) -> Equations:
         rates=rates,
         initial=initial,
         observe=observe,
-        tilts=tilts_of if key.model == "tiltrotor" else None,
+        tilts=None if key.model == "quadrotor" else tilts_of,
     )
 
 
@@ -380,6 +380,7 @@ def scalar_loop(key: Key) -> ClosedLoop:
             lambda plan, _setup: (*initial_rotor_speeds(plan), *initial_states(plan)),
             states,
             layout.spins,
+            layout.tilt_of_rotor if multirotor else (),
         ),
         sampling=sampling,
         columns=_columns(key),

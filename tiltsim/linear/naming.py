@@ -6,8 +6,8 @@ from typing import Final
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.equations.actuator_level import ACTUATOR_PLANTS
 from tiltsim.linear.coordinates import MATRIX, QUATERNION, ROTATION_NAMES, Coordinates
+from tiltsim.vehicles.rotorcraft.layout import layout_of
 from tiltsim_controllers.vehicle.states import BODY_FIELDS
 
 POSITION: Final = BODY_FIELDS[:3]
@@ -94,8 +94,8 @@ def equation_coordinates(assembly: Assembly, size: int) -> Coordinates:
     body = BODY_FIELDS
     if rotation:
         body = (*POSITION, *VELOCITY, *ROTATION_NAMES, *BODY_RATES)
-    if loop.dynamics.model in ACTUATOR_PLANTS and loop.within is not None:
-        tilts = 4 if rotation else 0
+    if model != "tilt_car" and loop.within is not None:
+        tilts = layout_of(loop.dynamics).tilts
         servos = (*numbered("alpha", tilts), *numbered("alpha_rate", tilts))
         names = (*body, *servos, *activation_names(loop))
     elif model == "tilt_car":
@@ -134,7 +134,7 @@ def control_names(loop: ClosedLoop) -> tuple[tuple[str, int], ...]:
 def equation_inputs(assembly: Assembly, size: int) -> tuple[tuple[str, int], ...]:
     """Inputs of the vehicle among those of the thesis's equations: names and indices."""
     loop, model = assembly.loop, assembly.scenario.vehicle.model
-    if loop.dynamics.model in ACTUATOR_PLANTS and loop.within is not None:
+    if model != "tilt_car" and loop.within is not None:
         return control_names(loop)
     if model == "quadrotor":
         names: tuple[str, ...] = ("force", "torque_x", "torque_y", "torque_z")

@@ -8,8 +8,7 @@ from typing import Final
 import numpy as np
 
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim_controllers.mathematics.scalar import Values
-from tiltsim_controllers.vehicle.effectiveness import rotor_entries
+from tiltsim_controllers.vehicle.effectiveness import Rotor
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 
 ARMS: Final = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
@@ -17,7 +16,7 @@ ARMS: Final = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0
 
 
 def as_multirotor(vehicle: Vehicle | Multirotor, *, tilting: bool) -> Multirotor:
-    """A vehicle with four equal arms at right angles, as a table of its rotors.
+    """A vehicle with four equal arms at right angles, by its rotors.
 
     Args:
         vehicle: Its parameters; a multirotor is returned as it is.
@@ -25,20 +24,20 @@ def as_multirotor(vehicle: Vehicle | Multirotor, *, tilting: bool) -> Multirotor
     """
     if isinstance(vehicle, Multirotor):
         return vehicle
-    table: Values = ()
-    for rotor, (arm, spin) in enumerate(zip(ARMS, SPIN, strict=True)):
-        place = vehicle.arm_length * np.array(arm)
-        coefficients = vehicle.thrust_coefficient, vehicle.drag_coefficient
-        hinge = {"tilt": rotor, "hinge": place, "hinge_axis": arm} if tilting else {}
-        table += rotor_entries(place, (0.0, 0.0, 1.0), *coefficients, spin, **hinge)  # type: ignore[arg-type]
+    coefficients = vehicle.thrust_coefficient, vehicle.drag_coefficient
+    rotors = []
+    for tilt, (arm, spin) in enumerate(zip(ARMS, SPIN, strict=True)):
+        x, y, z = arm
+        place = (vehicle.arm_length * x, vehicle.arm_length * y, vehicle.arm_length * z)
+        rotor = Rotor(place, (0.0, 0.0, 1.0), *coefficients, spin)
+        hinged = rotor._replace(tilt=tilt, hinge=place, hinge_axis=arm)
+        rotors.append(hinged if tilting else rotor)
     inertia = np.diag((vehicle.inertia_xx, vehicle.inertia_yy, vehicle.inertia_zz))
     return Multirotor(
         mass=vehicle.mass,
         gravity=vehicle.gravity,
         inertia=tuple(inertia.ravel().tolist()),
-        table=table,
-        thrust_coefficients=(vehicle.thrust_coefficient,) * len(ARMS),
-        spins=SPIN,
+        rotors=tuple(rotors),
         speed_ranges=((-inf, inf),) * len(ARMS),
         tilts=len(ARMS) if tilting else 0,
     )
