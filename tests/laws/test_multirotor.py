@@ -67,6 +67,22 @@ def test_the_tiltrotor_is_a_multirotor(plant):
     assert general.metrics()["min_decoupling_condition"] == pytest.approx(condition, rel=1e-9)
 
 
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_full_pose_of_the_tiltrotor_is_that_of_a_multirotor(plant):
+    shared = {
+        "controller": {"law": "full_pose", "max_tilt_rate": 3.0},
+        "initial": {"position": [0.1, 0.0, 0.0], "velocity": [0.0] * 3, "rotor_speed": 300.0},
+        "reference": {"type": "setpoint", "yaw": 0.2},
+    }
+    simulation = {"duration": 0.02, "timestep": 0.0005, "engine": "python", "plant": plant}
+    special = tiltsim.simulate({"simulation": simulation, **shared})
+    general = fly("tiltrotor", simulation=simulation, **shared)
+    for name in ("position", "attitude", "tilt_angles", "singularity_margin"):
+        np.testing.assert_allclose(general[name], special[name], rtol=0.0, atol=1e-12)
+    np.testing.assert_array_equal(general["alpha_ref_1"], general["tilt_command_1"])
+    assert np.abs(special["tilt_angles"]).max() > 0.01
+
+
 def test_plants_agree_but_for_the_gyroscopic_torque():
     flights = [
         fly("tilt_hexarotor", gait=TILTS, simulation={"plant": plant})
@@ -155,6 +171,7 @@ def test_actuators_sensors_and_faults_act_on_each_rotor():
         ("tilt_hexarotor", {"gait": TILTS}),
         ("tilt_hexarotor", {"gait": TILTS, "simulation": {"plant": "thesis"}}),
         ("tilt_hexarotor", ACTUATORS),
+        ("tilt_hexarotor", {"controller": {"law": "full_pose", "failed_rotor": 2}}),
         ("omni_octorotor", {"controller": {"law": "attitude_force", "norm": "thrust"}}),
     ],
 )
@@ -216,10 +233,21 @@ HEXAROTOR = {"model": "multirotor", "mjcf": mjcf("hexarotor")}
     ("tables", "message"),
     {
         "no file": ({"vehicle": {"model": "multirotor"}}, "vehicle.mjcf: missing, and required"),
-        "a law of others": ({"controller": {"law": "attitude_altitude"}}, "choose attitude_force"),
+        "a law of others": (
+            {"controller": {"law": "attitude_altitude"}},
+            "choose full_pose, attitude_force",
+        ),
         "too much force": (
             {"controller": {"law": "attitude_force", "dimension": 3}},
             "controller.dimension = 3: the vehicle has 1 only, as its rotors are placed",
+        ),
+        "full pose of vertical rotors": (
+            {"controller": {"law": "full_pose"}},
+            'controller.law = "full_pose": at the initial tilt angles the inputs move 4 of six',
+        ),
+        "a failed rotor that is not there": (
+            {"controller": {"law": "full_pose", "failed_rotor": 7}},
+            "controller.failed_rotor = 7: the vehicle has 6 rotors",
         ),
         "tilts of fixed rotors": (
             {"gait": {"type": "fixed", "angles": [0.1] * 6}},

@@ -16,6 +16,7 @@ from tiltsim.laws.layers.on_equations import on_equations
 from tiltsim.laws.layers.rotor_inertia import with_rotor_inertia
 from tiltsim.laws.layers.supervision import with_supervisor
 from tiltsim.laws.multirotor import loop_of_multirotor
+from tiltsim.laws.multirotor_full_pose import full_pose_loop_of
 from tiltsim.laws.quadrotor_attitude_altitude import QUADROTOR_ATTITUDE_ALTITUDE
 from tiltsim.laws.scalar_law import loop_of_scalar_law
 from tiltsim.laws.switching import SWITCHING
@@ -45,6 +46,9 @@ LOOPS: Final[dict[str, ClosedLoop]] = {
     "tilt_car_planned_direction": PLANNED_DIRECTION,
 }
 """Loops by their names; see `tiltsim.scenario.controller_table.ControllerTable.loop_name`."""
+
+MULTIROTOR_LOOPS: Final = {"attitude_force": loop_of_multirotor, "full_pose": full_pose_loop_of}
+"""Makers of those of multirotors, which depend on the vehicle's layout."""
 
 MEASURED_LOOPS: Final = {
     "attitude_altitude": MEASURED_TILTROTOR,
@@ -77,7 +81,7 @@ def loop_of(
     elif isinstance(controller, ScalarController):
         loop = loop_of_scalar_law(scenario)
     elif scenario.vehicle.model == "multirotor":
-        loop = loop_of_multirotor(scenario)
+        loop = MULTIROTOR_LOOPS[controller.loop_name](scenario)
     else:
         loop = (MEASURED_LOOPS if measured else LOOPS)[controller.loop_name]
     loop, supervisor = adapted(loop), controller.supervision

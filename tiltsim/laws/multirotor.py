@@ -79,6 +79,12 @@ class Layout(NamedTuple):
         """Where its numbers lie."""
         return Places(len(self.spins), max(self.tilt_of_rotor) + 1)
 
+    @property
+    def name(self) -> str:
+        """For files and models."""
+        tilts = "_".join(str(tilt) if tilt >= 0 else "f" for tilt in self.tilt_of_rotor)
+        return f"{tilts}_{''.join('p' if spin > 0.0 else 'm' for spin in self.spins)}"
+
 
 class Direction(NamedTuple):
     """A vector in body axes."""
@@ -303,16 +309,14 @@ def multirotor_loop(layout: Layout, uses: UsedForce, norm: str) -> ClosedLoop:
     places = layout.places
     law = multirotor_law_of(layout.tilt_of_rotor, uses.dimension, norm, uses.forward)
     sampling, equations = _sampling_of(layout, law), _equations_of(layout, law)
-    tilts = "".join(f"_{tilt}" if tilt >= 0 else "_f" for tilt in layout.tilt_of_rotor)
-    senses = "".join("p" if spin > 0.0 else "m" for spin in layout.spins)
     for step in (sampling.controls, equations.inputs):
-        step.__qualname__ = f"attitude_force_{uses.name}_{norm}{tilts}_{senses}"
+        step.__qualname__ = f"attitude_force_{uses.name}_{norm}_{layout.name}"
     return ClosedLoop(
         kind=rotorcraft_kind(places, ("singularity_margin",)),
         parameters=LoopParameters,
         setup=_setup,
         dynamics=Dynamics(
-            f"multirotor{tilts}_{senses}",
+            f"multirotor_{layout.name}",
             places.sizes(STATES),
             lambda plan, _setup: (*initial_rotor_speeds(plan), *(0.0,) * STATES),
             STATES,

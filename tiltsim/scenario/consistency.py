@@ -16,7 +16,7 @@ from tiltsim.scenario.reference import WaypointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.simulation_table import InitialTable
-from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
+from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController, FullPoseController
 from tiltsim.scenario.vehicle import (
     ModelErrorTable,
     PodTable,
@@ -24,6 +24,7 @@ from tiltsim.scenario.vehicle import (
     require_physical_inertia,
 )
 from tiltsim_controllers.gaits.plans import Gait
+from tiltsim_controllers.laws.multirotor_full_pose import pose_rank
 
 MAX_KNOTS: Final = 1500
 """Numbers of a gait and a reference together, unless they are tables with a limit of their own."""
@@ -294,12 +295,28 @@ def _check_gait(scenario: ScenarioTables) -> None:
         )
     if isinstance(scenario.controller, AttitudeForceController):
         _check_dimension(scenario, scenario.controller, gait)
+    if isinstance(scenario.controller, FullPoseController):
+        _check_full_pose(scenario, scenario.controller, gait)
     if scenario.controller.commands_tilts and not gait.is_constant:
         raise scenario.mistake(
             "gait.type",
             f"the {scenario.controller.law} law commands the tilts itself; give the initial angles "
             "as a fixed gait",
         )
+
+
+def _check_full_pose(scenario: ScenarioTables, controller: FullPoseController, gait: Gait) -> None:
+    """Refuse a failed rotor that is not there, and inputs that do not move six outputs."""
+    vehicle, failed = scenario.vehicle.resolve(), controller.failed_rotor
+    if failed is not None and failed > scenario.vehicle.rotor_count:
+        reason = f"the vehicle has {scenario.vehicle.rotor_count} rotors"
+        raise InvalidValueError("controller.failed_rotor", failed, reason)
+    if isinstance(vehicle, Multirotor):
+        w = [spin * (rotor != failed) for rotor, spin in enumerate(vehicle.spins, start=1)]
+        rank = pose_rank(vehicle.table, gait.angles(0.0).tolist(), w)
+        if rank < 6:
+            reason = f"at the initial tilt angles the inputs move {rank} of six outputs"
+            raise scenario.mistake("controller.law", reason)
 
 
 def _check_dimension(

@@ -8,6 +8,7 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import Discriminator, Field, Tag, model_validator
 
 import tiltsim_controllers.laws.full_pose as full_pose
+from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.controller_table import (
     ControllerTable,
     NamedGains,
@@ -311,15 +312,16 @@ class FullPoseGainTable(Table):
 
 
 class FullPoseController(ControllerTable):
-    """Position and attitude control of the tiltrotor with the tilt angles as inputs (ch. 3)."""
+    """Position and attitude control with the tilt angles as inputs (ch. 3)."""
 
-    vehicle_models = ("tiltrotor",)
+    vehicle_models = ("tiltrotor", "multirotor")
     reference_kinds = ("position", "pose", "attitude_altitude")
     loop_gains = (("position", 3), ("attitude", 3))
     commands_tilts = True
 
     law: Literal["full_pose"] = Field(
-        description="position and attitude independently: the law commands the tilt angles as well"
+        description="position and attitude independently: the law commands the tilt angles as "
+        "well, of the tiltrotor or of a multirotor whose rotors and tilts move six outputs"
     )
     gains: NamedGains[Literal["ch03"], FullPoseGainTable] = Field(
         "ch03", description="a set by name, or a table of gains; ch03 is the thesis's author's"
@@ -329,7 +331,7 @@ class FullPoseController(ControllerTable):
         description="how tilt rates count against rotor accelerations in the least-norm solution: "
         "even by the force that they change, published by number, which turns the rotors fast",
     )
-    failed_rotor: Annotated[int, Field(ge=1, le=4)] | None = Field(
+    failed_rotor: Annotated[int, Field(ge=1)] | None = Field(
         None,
         description="a rotor that the law knows to have failed and does not use; default: none",
         examples=[2],
@@ -349,7 +351,7 @@ class FullPoseController(ControllerTable):
             return full_pose.Gains(*self.gains.position, *self.gains.attitude)
         return full_pose.GAIN_SETS[self.gains]
 
-    def resolve_tilt_weight(self, vehicle: Vehicle) -> float:
+    def resolve_tilt_weight(self, vehicle: Vehicle | Multirotor) -> float:
         """The weight for a vehicle, (rad/s)^2/rad."""
         if self.tilt_weight == "published":
             return full_pose.PUBLISHED_TILT_WEIGHT

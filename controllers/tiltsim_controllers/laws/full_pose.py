@@ -17,7 +17,7 @@ author's public model of this vehicle. As in ch. 3, the gyroscopic torque is omi
 from __future__ import annotations
 
 from math import copysign, inf, nan
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
@@ -84,9 +84,13 @@ PUBLISHED_TILT_WEIGHT: Final = 1.0
 """Rates of ``w`` and of the tilt angles have the same weight, number for number."""
 
 
-def force_balanced_tilt_weight(vehicle: Vehicle) -> float:
-    """The weight with which thrust and tilt rates count by the force they move in hover."""
-    return vehicle.hover_rotor_speed**2
+def force_balanced_tilt_weight(vehicle: Any) -> float:
+    """The weight with which thrust and tilt rates count by the force they move in hover.
+
+    The vehicle has a ``hover_rotor_speed``, rad/s.
+    """
+    weight: float = vehicle.hover_rotor_speed**2
+    return weight
 
 
 @scalar
@@ -240,17 +244,22 @@ def _health(time: float, failure: Failure) -> Quad:
 
 
 @scalar
-def _desired_jerks(
+def desired_jerks(
     time: float,
     state: Values,
     rotation: Values,
     accelerations: tuple[Triple, Triple],
-    parameters: Parameters,
+    parameters: Any,
     knots: Vector,
 ) -> tuple[Triple, Triple]:
-    """Desired third derivatives of position (world) and attitude (body axes).
+    """Desired third derivatives of position (m/s^3, world) and attitude (rad/s^3, body axes).
 
-    ``rotation`` is body to world, ``accelerations`` are the present ones, linear and angular.
+    Args:
+        time: s
+        state: twelve numbers of the body, and any more
+        rotation: body to world, rows first
+        accelerations: the present ones, linear (m/s^2, world) and angular (rad/s^2, body axes)
+        parameters, knots: gains and reference of the controller
     """
     x, y, z, vx, vy, vz, _, _, _, p, q, r = state[0:12]
     (ax, ay, az), (p_rate, q_rate, r_rate) = accelerations
@@ -309,7 +318,7 @@ def full_pose_inputs(
     per_pitch = per_torque / vehicle.inertia_yy
     per_yaw = per_torque / vehicle.inertia_zz
     present = (ax, ay, az), (per_roll * tx, per_pitch * ty, per_yaw * tz)
-    (jx, jy, jz), (p_jerk, q_jerk, r_jerk) = _desired_jerks(
+    (jx, jy, jz), (p_jerk, q_jerk, r_jerk) = desired_jerks(
         time, state, rotation, present, parameters, knots
     )
 
