@@ -60,6 +60,10 @@ MISUSES = {
         "with no common multiple",
     ),
     "linearize another loop": (lambda: tiltsim.linearize({}, loop="half"), "choose closed or open"),
+    "margins of a flight that never rests": (
+        lambda: tiltsim.margins("ch04_tracking/circle#fixed_modified"),
+        "moves with a period of",
+    ),
     "stability of nothing": (lambda: tiltsim.stability(None), "scenario = None: must be"),
     "symbolic in MuJoCo": (lambda: tiltsim.symbolic({}), 'symbolic supports "thesis" only'),
     "a family without a member": (lambda: tiltsim.simulate("ch04_tracking/setpoint"), "choose a"),

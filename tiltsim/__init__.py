@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
     from tiltsim.flight.reading import load_flight
     from tiltsim.linear.linearization import linearize
+    from tiltsim.linear.margins import margins
     from tiltsim.linear.stability import stability
     from tiltsim.plants.command import Command, Observation
     from tiltsim.scenario.loading import load_scenario, parse_scenario
@@ -49,6 +50,7 @@ _HOMES = {
     "linearize": "linear.linearization",
     "load_flight": "flight.reading",
     "load_scenario": "scenario.loading",
+    "margins": "linear.margins",
     "parse_scenario": "scenario.loading",
     "scalar": "scenario.scalar_controller",
     "simulate": "simulation.simulate",
@@ -77,6 +79,7 @@ __all__ = [
     "linearize",
     "load_flight",
     "load_scenario",
+    "margins",
     "parse_scenario",
     "plot",
     "scalar",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from functools import partial
+from math import degrees
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.commands.figure_options import add_plot, check_plot, save_figure
@@ -14,6 +15,7 @@ from tiltsim.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from tiltsim.linear.margins import Margin
     from tiltsim.linear.stability import Stability
     from tiltsim.linear.sweeping import Point
     from tiltsim.scenario.scenario import Scenario
@@ -35,6 +37,8 @@ def add_parser(subparsers: Subparsers) -> None:
     sweep = """how the largest multiplier moves with a number: period, amplitude or any key;
     default: from half to twice its value at 16 points, spaced evenly by ratio"""
     parser.add_argument("--sweep", metavar="KEY[=FROM:TO[:POINTS]]", help=sweep)
+    margins = "at rest: gain, phase, delay and disk margins of the loop broken at one place"
+    parser.add_argument("--margins", action="store_true", help=margins)
     add_overrides(parser, "the scenario", "gait.period=1.5")
     add_json(parser)
     add_plot(parser, "the poles or multipliers, or the sweep")
@@ -50,6 +54,8 @@ def run(arguments: argparse.Namespace) -> int:
     overrides = dict(parse_override(text) for text in arguments.overrides)
     scenarios = [load_scenario(address, overrides) for address in arguments.scenario]
     if arguments.sweep is not None:
+        if arguments.margins:
+            raise InputError("--margins: of one rest point, not with --sweep")
         return _run_sweep(arguments, scenarios)
     if len(scenarios) > 1:
         raise InputError(f"stability: {len(scenarios)} scenarios need --sweep KEY")
@@ -57,13 +63,55 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.linear.stability import stability
 
     found = stability(scenarios[0])
-    if arguments.plot is not None:
-        from tiltsim.views.figures.stability import stability_figure
+    report, text = found.report(), stability_text(found)
+    if arguments.margins:
+        from tiltsim.linear.linearization import linearization_at
+        from tiltsim.linear.margins import margins_of
 
-        save_figure(partial(stability_figure, found), arguments.plot, arguments)
-    print(json_text(found.report()) if arguments.json else stability_text(found))
+        if found.multipliers is not None:
+            raise InputError(
+                f"--margins: {scenarios[0].address} is periodic; margins need a rest point"
+            )
+        system = linearization_at(found.equilibrium)
+        margins = margins_of(system)
+        report["margins"] = [margin.report() for margin in margins]
+        text = f"{text}\n\n{margins_text(margins)}"
+    if arguments.plot is not None:
+        from tiltsim.views.figures.stability import loop_figure, stability_figure
+
+        draw = (
+            partial(loop_figure, system) if arguments.margins else partial(stability_figure, found)
+        )
+        save_figure(draw, arguments.plot, arguments)
+    print(json_text(report) if arguments.json else text)
     print_figure_path(arguments)
     return 0
+
+
+def margins_text(margins: Sequence[Margin]) -> str:
+    """Margins as a table."""
+    header = [
+        "broken at",
+        "gain",
+        "phase (deg)",
+        "at (rad/s)",
+        "delay (s)",
+        "disk",
+        "any gain, phase",
+    ]
+    rows = [
+        (
+            margin.place,
+            f"{number(margin.gain[0], '.3g')} to {number(margin.gain[1], '.4g')}",
+            number(degrees(margin.phase), ".1f"),
+            number(margin.frequency, ".4g"),
+            number(margin.delay, ".4g"),
+            number(margin.disk, ".3f"),
+            f"x {number(margin.disk_gain, '.3g')}, {number(degrees(margin.disk_phase), '.1f')} deg",
+        )
+        for margin in margins
+    ]
+    return table(header, rows, frozenset({2, 3, 4, 5}))
 
 
 def parse_sweep(text: str, scenarios: Sequence[Scenario]) -> tuple[str, list[float]]:

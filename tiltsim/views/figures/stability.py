@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tiltsim.linear.linearization import Linearization
+from tiltsim.linear.margins import TOGETHER, broken_loops, frequency_grid
 from tiltsim.linear.stability import Stability
 from tiltsim.system.quantity import in_words
 from tiltsim.views.figures import style
@@ -63,6 +65,45 @@ def sweep_figure(key: str, sweeps: Mapping[str, Sequence[Point]]) -> Figure:
         lower.set(ylabel="growth rate (1/s)", xlabel=in_words(key), title="The same per second")
         handles, labels = upper.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=2)
+        return figure
+
+
+def loop_figure(system: Linearization) -> Figure:
+    """Bode and Nyquist diagrams of loops broken at one input, and sensitivities of all inputs."""
+    grid, places = frequency_grid(system), {TOGETHER, *(signal.name for signal in system.inputs)}
+    together, *single = [loop for loop in broken_loops(system) if loop.place in places]
+    with style.paper_style():
+        figure = style.new_figure(8.4, 6.0)
+        (gain, nyquist), (phase, sensitivity) = figure.subplots(2, 2)
+        angle = np.linspace(0.0, 2.0 * np.pi, 361)
+        nyquist.plot(np.cos(angle), np.sin(angle), color=style.GREY, lw=0.8)
+        for loop, line in zip(single, style.rotor_lines(len(single)), strict=True):
+            transfer = loop.transfer(grid)[:, 0, 0]
+            gain.loglog(grid, np.abs(transfer), label=in_words(loop.place), **line)
+            degrees = np.degrees(np.unwrap(np.angle(transfer)))
+            phase.semilogx(grid, degrees - 360.0 * np.ceil(degrees.max() / 360.0 - 0.5), **line)
+            nyquist.plot(transfer.real, transfer.imag, **line)
+        nyquist.plot([-1.0], [0.0], "+", color=style.RED, ms=9.0, mew=1.6)
+        gain.axhline(1.0, color=style.INK, lw=0.8)
+        phase.axhline(-180.0, color=style.INK, lw=0.8)
+        transfer = together.transfer(grid)
+        inverse = np.linalg.inv(np.eye(transfer.shape[-1]) + transfer)
+        for name, matrices, line in (
+            ("sensitivity", inverse, style.AXIS_LINES[0]),
+            ("complement", np.eye(transfer.shape[-1]) - inverse, style.AXIS_LINES[1]),
+        ):
+            sizes = np.linalg.norm(matrices, ord=2, axis=(1, 2))
+            sensitivity.loglog(grid, sizes, label=name, **line)
+        sensitivity.axhline(1.0, color=style.INK, lw=0.8)
+        sensitivity.legend(loc="lower center")
+        gain.set(ylabel="gain", title="Loops broken at one input")
+        phase.set(xlabel="frequency (rad/s)", ylabel="phase (deg)")
+        nyquist.set(xlim=(-3.0, 1.5), ylim=(-2.0, 2.0), aspect="equal", title="Nyquist diagram")
+        nyquist.set(xlabel="real part", ylabel="imaginary part")
+        sensitivity.set(xlabel="frequency (rad/s)", ylabel="largest singular value")
+        sensitivity.set_title("All inputs together")
+        handles, labels = gain.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=4)
         return figure
 
 

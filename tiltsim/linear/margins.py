@@ -1,0 +1,231 @@
+"""Margins of a closed loop: how much gain, phase, delay and uncertainty it bears, and where.
+
+The loop is broken at one place at a time, all other feedback closed: at an input of the vehicle or
+at a measured state. At all inputs together, a common gain or delay acts on the eigenvalues of the
+loop's transfer matrix: ``det(I + g exp(-i w tau) L(i w)) = 0`` where one of them is -1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import atan, inf, isfinite, pi
+from os import PathLike
+from typing import Any, Final
+
+import numpy as np
+
+from tiltsim.errors import InputError
+from tiltsim.linear.linearization import Linearization, linearize
+from tiltsim.linear.modes import NEUTRAL, exponents
+from tiltsim.scenario.scenario import Scenario
+from tiltsim_controllers.mathematics.scalar import Floats
+
+MEASURED: Final = (
+    "x",
+    "y",
+    "z",
+    "vx",
+    "vy",
+    "vz",
+    "rotation_",
+    "roll",
+    "pitch",
+    "yaw",
+    "p",
+    "q",
+    "r",
+)
+"""States that sensors measure, by name or its beginning."""
+
+TOGETHER: Final = "all inputs"
+PER_DECADE: Final = 100  # frequencies
+DECADES_BEYOND: Final = 1.0  # of the slowest and of the fastest pole
+GROWTH: Final = 1e-4  # rad/s; slower growth is that of a multiple pole at zero, by rounding
+NEGLIGIBLE: Final = 1e-6  # a loop's transfer below this is rounding
+BISECTIONS: Final = 48
+
+
+@dataclass(frozen=True)
+class Margin:
+    """What a loop bears, broken at one place.
+
+    Attributes:
+        place: An input, a measured state, or all inputs together.
+        gain: Factors of the loop's gain between which it stays stable; 0 and infinity without
+            limit.
+        phase: Smallest lag or lead at which it becomes unstable, rad; infinite if none does.
+        delay: Smallest further delay at which it becomes unstable, s.
+        frequency: Where the smallest phase margin is, rad/s; nan if there is none.
+        disk: Largest alpha of the disk of factors ``(1 + alpha d / 2) / (1 - alpha d / 2)``, any
+            complex ``|d| < 1``, at each input independently; 2 and more: any phase.
+    """
+
+    place: str
+    gain: tuple[float, float]
+    phase: float
+    delay: float
+    frequency: float
+    disk: float
+
+    @property
+    def disk_gain(self) -> float:
+        """The largest gain factor in the disk; one over it is the smallest."""
+        half = 0.5 * self.disk
+        return (1.0 + half) / (1.0 - half) if half < 1.0 else inf
+
+    @property
+    def disk_phase(self) -> float:
+        """The largest phase in the disk, rad."""
+        return 2.0 * atan(min(1.0, 0.5 * self.disk))
+
+    def report(self) -> dict[str, Any]:
+        """As JSON; null stands for no limit."""
+        low, high = self.gain
+        numbers = {
+            "gain_low": low or None,
+            "gain_high": high,
+            "phase": self.phase,
+            "delay": self.delay,
+            "frequency": self.frequency,
+            "disk": self.disk,
+        }
+        known = {
+            key: value if value is not None and isfinite(value) else None
+            for key, value in numbers.items()
+        }
+        return {"place": self.place, **known}
+
+
+@dataclass(frozen=True, eq=False)
+class BrokenLoop:
+    """A loop broken at a place, as ``L = -C (s I - A)^-1 B``."""
+
+    place: str
+    A: Floats
+    B: Floats
+    C: Floats
+    timestep: float | None
+
+    def transfer(self, frequencies: Floats) -> Any:
+        """The loop's transfer matrix at frequencies (rad/s), shape (frequencies, m, m)."""
+        s = 1j * frequencies
+        if self.timestep is not None:
+            s = np.exp(s * self.timestep)
+        pencil = s[:, None, None] * np.eye(len(self.A)) - self.A
+        return -self.C @ np.linalg.solve(pencil, self.B.astype(complex))
+
+
+def broken_loops(system: Linearization) -> Iterator[BrokenLoop]:
+    """The closed loop of a linear system, broken at all inputs, each input, each measured state."""
+    gains, b, timestep = system.feedback, system.B, system.timestep
+    driven = [index for index in range(len(gains)) if np.abs(gains[index]).max() > 0.0]
+    if driven:
+        these, rows = b[:, driven], gains[driven]
+        yield BrokenLoop(TOGETHER, system.A - these @ rows, these, rows, timestep)
+    for index in driven:
+        column, row = b[:, [index]], gains[[index]]
+        yield BrokenLoop(system.inputs[index].name, system.A - column @ row, column, row, timestep)
+    for index, signal in enumerate(system.states):
+        name = signal.name
+        measured = name in MEASURED or name.startswith("rotation_")
+        if measured and np.abs(gains[:, index]).max() > 0.0:
+            column = b @ gains[:, [index]]
+            row = np.zeros((1, len(system.states)))
+            row[0, index] = 1.0
+            yield BrokenLoop(name, system.A - column @ row, column, row, timestep)
+
+
+def frequency_grid(system: Linearization) -> Floats:
+    """Frequencies (rad/s) from far below the slowest to far above the fastest pole."""
+    sizes = np.abs(exponents(system.poles, system.timestep))
+    sizes = sizes[np.isfinite(sizes) & (sizes > 1e3 * NEUTRAL)]
+    low, high = np.log10(sizes.min()) - DECADES_BEYOND, np.log10(sizes.max()) + DECADES_BEYOND
+    if system.timestep is not None:
+        high = min(high, float(np.log10(pi / system.timestep)))
+    return np.asarray(np.logspace(low, high, int((high - low) * PER_DECADE)))
+
+
+def margins(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> list[Margin]:
+    """The margins of a scenario's closed loop at rest: all inputs, each input, each measured state.
+
+    Args:
+        scenario: Anything that `tiltsim.load_scenario` takes.
+
+    Raises:
+        InputError: If it is invalid, has no rest point, or is unstable there.
+    """
+    return margins_of(linearize(scenario))
+
+
+def margins_of(system: Linearization) -> list[Margin]:
+    """The margins of a closed loop at all places. Raises `InputError` if it is unstable."""
+    grows = exponents(system.poles, system.timestep).real.max()
+    if grows > GROWTH:
+        raise InputError(f"margins: the closed loop is unstable, with a pole at {grows:.3g} rad/s")
+    grid = frequency_grid(system)
+    return [_margin(loop, grid) for loop in broken_loops(system)]
+
+
+def _margin(loop: BrokenLoop, grid: Floats) -> Margin:
+    transfer = loop.transfer(grid)
+    eye = np.eye(transfer.shape[-1])
+    difference = 2.0 * np.linalg.inv(eye + transfer) - eye  # sensitivity less its complement
+    disk = 2.0 / float(np.linalg.norm(difference, ord=2, axis=(1, 2)).max())
+    low, high, phase, delay, at = 0.0, inf, inf, inf, float("nan")
+    loci = _tracked(np.linalg.eigvals(transfer))
+    for locus in loci.T:
+        for frequency, value in _crossings(loop, grid, locus, np.log(np.abs(locus)), _size):
+            from_minus_one = abs(np.angle(-value))
+            if from_minus_one < phase:
+                phase, at = float(from_minus_one), frequency
+            lag = float(np.angle(value)) + pi  # until it arrives at -1
+            delay = min(delay, (lag if lag > 0.0 else 2.0 * pi) / frequency)
+        for _, value in _crossings(loop, grid, locus, locus.imag, np.imag):
+            if value.real < -NEGLIGIBLE:
+                factor = float(-1.0 / value.real)
+                low, high = (max(low, factor), high) if factor < 1.0 else (low, min(high, factor))
+    return Margin(loop.place, (low, high), phase, delay, at, disk)
+
+
+def _size(value: complex) -> float:
+    return float(np.log(abs(value)))
+
+
+def _tracked(eigenvalues: Any) -> Any:
+    """Eigenvalues over frequency, each column a continuous locus."""
+    tracked = eigenvalues.copy()
+    for row in range(1, len(tracked)):
+        left = list(tracked[row])
+        for column, before in enumerate(tracked[row - 1]):
+            nearest = min(range(len(left)), key=lambda i: abs(left[i] - before))
+            tracked[row, column] = left.pop(nearest)
+    return tracked
+
+
+def _crossings(
+    loop: BrokenLoop, grid: Floats, locus: Any, signs: Floats, measure: Any
+) -> Iterator[tuple[float, complex]]:
+    """Frequencies and values at which a measure of a locus vanishes.
+
+    Args:
+        loop: The loop.
+        grid: Frequencies, rad/s.
+        locus: An eigenvalue of the transfer matrix at these.
+        signs: Its measure at these.
+        measure: ``(value) -> number``.
+    """
+    for index in np.flatnonzero(np.sign(signs[1:]) != np.sign(signs[:-1])):
+        low, high = first, last = float(grid[index]), float(grid[index + 1])
+        value, rise = complex(locus[index]), complex(locus[index + 1] - locus[index])
+        rising = signs[index + 1] > signs[index]
+        for _ in range(BISECTIONS):
+            middle = (low * high) ** 0.5
+            values = np.linalg.eigvals(loop.transfer(np.array([middle]))[0])
+            expected = locus[index] + rise * (middle - first) / (last - first)
+            value = complex(values[np.argmin(np.abs(values - expected))])
+            if (measure(value) > 0.0) == rising:
+                high = middle
+            else:
+                low = middle
+        yield low, value
