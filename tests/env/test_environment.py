@@ -437,10 +437,19 @@ def test_a_sweeps_file_is_a_domain(tmp_path):
 # --- documentation and Gymnasium ----------------------------------------------------------------
 
 
+def documented(arrays):
+    """The code of the page, of its section on arrays or of the others."""
+    before, section, after = re.split(
+        "^## (?=Thousands|A controller)", DOCS.read_text("utf-8"), flags=re.M
+    )
+    text = section if arrays else before + after
+    return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+
+
 def test_the_documented_examples_run(tmp_path, monkeypatch, capsys):
     pytest.importorskip("gymnasium")
     monkeypatch.chdir(tmp_path)
-    blocks = re.findall(r"```python\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
+    blocks = documented(arrays=False)
     assert len(blocks) == 4
     names = {}
     for block in blocks:

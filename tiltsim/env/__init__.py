@@ -1,14 +1,30 @@
-"""Environments for learning: `TiltrotorEnv` for dm_env, `tiltsim.env.gymnasium` for Gymnasium.
+"""Environments for learning.
 
+`TiltrotorEnv` is for dm_env, `tiltsim.env.gymnasium` for Gymnasium, `VectorEnv` for many in JAX.
 Where Gymnasium is installed, importing this package registers the tasks of `tiltsim.env.tasks`.
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from tiltsim.env.environment import Environment, TiltrotorEnv
 from tiltsim.env.registration import register
 from tiltsim.env.task import Reward, Task, hover_reward
 
-__all__ = ["Environment", "Reward", "Task", "TiltrotorEnv", "hover_reward"]
+if TYPE_CHECKING:
+    from tiltsim.env.vector import VectorEnv
+
+__all__ = ["Environment", "Reward", "Task", "TiltrotorEnv", "VectorEnv", "hover_reward"]
+
+
+def __getattr__(name: str) -> Any:
+    """`VectorEnv` when it is asked for, as it needs JAX and Gymnasium."""
+    if name != "VectorEnv":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from tiltsim.env.vector import VectorEnv
+
+    return VectorEnv
+
 
 register()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from math import pi
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,6 @@ from tiltsim.scenario.messages import choose
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.numbers import is_finite
 from tiltsim.system.text import short_repr
-from tiltsim_controllers.mathematics.rotation import rotation_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats
 
 THRUST_TO_WEIGHT: Final = 2.0
@@ -149,12 +148,13 @@ class Observed:
             for name, bound in self.bounds.items()
         }
 
-    def arrays(self, observation: Observation) -> dict[str, Floats]:
-        """A controller's observation as a flat dict of arrays, clipped to their bounds."""
-        entries = rotation_from_quaternion(*observation.quaternion.tolist())
-        rotation = np.array(entries).reshape(3, 3)
-        all_of_them = np.concatenate([read(observation, rotation) for read in self._readers])
-        clipped = np.minimum(np.maximum(all_of_them, -self._high), self._high)
+    def arrays(self, observation: Observation, rotation: Any, numpy: Any = np) -> dict[str, Any]:
+        """A controller's observation as a flat dict of arrays, clipped to their bounds.
+
+        ``rotation``, (3, 3), is from body to world; ``numpy`` may be ``jax.numpy``.
+        """
+        every = numpy.concatenate([read(observation, rotation) for read in self._readers])
+        clipped = numpy.minimum(numpy.maximum(every, -self._high), self._high)
         return {name: clipped[place] for name, place in self._slices.items()}
 
 

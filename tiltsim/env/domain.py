@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -19,6 +20,7 @@ from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.tables import NormalAxis, SeedAxis, Sweep, UniformAxis
 from tiltsim.system.text import short_repr
+from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
@@ -76,11 +78,51 @@ class Domain:
 
     def draw(self, generator: np.random.Generator) -> Scenario:
         """A scenario of the domain. Raises `InputError` if the values drawn cannot be flown."""
+        return self._points.scenario(self._axes(generator))
+
+    def values(self, generator: np.random.Generator) -> dict[str, Any]:
+        """What `draw` changes in the base, by key, with the same draws."""
+        axes = self._axes(generator)
+        every = axes | self._points.derived(axes)
+        return {key: value for key, value in every.items() if "." in key}
+
+    def sample(self, generators: Sequence[np.random.Generator]) -> Floats:
+        """The numbers of `values`, a row for each generator, shape (generators, numbers)."""
+        if self._uniform is None:
+            return np.array([_flat(self.values(generator)) for generator in generators])
+        columns, low, high = self._uniform
+        axes = len(self._points.sweep.axis)
+        shares = np.stack([generator.random(axes) for generator in generators])
+        return np.asarray(low + (high - low) * shares[:, columns])
+
+    @cached_property
+    def _uniform(self) -> tuple[Any, Floats, Floats] | None:
+        """Of a domain with uniform axes only: the axis, low and high of each number."""
+        columns: list[int] = []
+        ends: list[tuple[float, float]] = []
+        for column, axis in enumerate(self._points.sweep.axis):
+            derives = self._points.sweep.derive or not all("." in key for key in axis.targets)
+            if derives or not isinstance(axis, UniformAxis):
+                return None
+            low, high = (
+                _flat(self._points.place(axis, [end] * len(axis.targets)))
+                for end in (axis.low, axis.high)
+            )
+            columns += [column] * len(low)
+            ends += zip(low, high, strict=True)
+        return columns, *np.array(ends).T
+
+    def _axes(self, generator: np.random.Generator) -> dict[str, Any]:
         values: dict[str, Any] = {}
         positions: dict[str, int] = {}
         for axis in self._points.sweep.axis:
             values |= self._points.place(axis, _row(axis, generator, positions))
-        return self._points.scenario(values)
+        return values
+
+
+def _flat(values: Mapping[str, Any]) -> Floats:
+    """Numbers, and lists of them, one after the other."""
+    return np.concatenate([np.empty(0), *map(np.atleast_1d, values.values())])
 
 
 def _row(axis: Axis, generator: np.random.Generator, positions: dict[str, int]) -> Sequence[Any]:

@@ -18,6 +18,7 @@ from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.text import short_repr
+from tiltsim_controllers.mathematics.rotation import rotation_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats
 
 Reward = Callable[[Mapping[str, Floats], Floats], float]
@@ -27,21 +28,20 @@ ENVIRONMENT: Final = "tiltsim.env.TiltrotorEnv"
 """The controller named in the scenarios of episodes."""
 
 
-def hover_reward(observation: Mapping[str, Floats], action: Floats) -> float:
+def hover_reward(observation: Mapping[str, Any], action: Any) -> Any:
     """Between 0 and 1: 1 at rest on the reference, half of it 1 m away.
 
     ``1 / (1 + e^2 + 0.1 v^2 + 0.01 w^2)`` of the position error e (m), the velocity error v (m/s)
-    and the body rates w (rad/s), from observations in world or in body axes.
+    and the body rates w (rad/s), from observations in world or in body axes; they may be arrays of
+    JAX.
     """
     error, velocity_error = _error(observation, "position"), _error(observation, "velocity")
     rates = observation["body_rates"]
-    return float(
-        1.0
-        / (1.0 + error @ error + 0.1 * (velocity_error @ velocity_error) + 0.01 * (rates @ rates))
-    )
+    squares = error @ error + 0.1 * (velocity_error @ velocity_error) + 0.01 * (rates @ rates)
+    return 1.0 / (1.0 + squares)
 
 
-def _error(observation: Mapping[str, Floats], name: str) -> Floats:
+def _error(observation: Mapping[str, Any], name: str) -> Any:
     error = observation.get(f"{name}_error_body")
     if error is None:
         error = observation[f"reference_{name}"] - observation[name]
@@ -75,14 +75,14 @@ class Task:
         )
         self.controller = scenario.controller  # in the place of which actions are taken
         self.scenario = self._commanded(scenario)
-        self._domain = domain if isinstance(domain, Domain) else None
+        self.domain = domain if isinstance(domain, Domain) else None
         if domain and not isinstance(domain, Domain):
-            self._domain = Domain.from_axes(self.scenario, domain)
-        self._observed = Observed(observations, tilting=has_tilts(scenario))
+            self.domain = Domain.from_axes(self.scenario, domain)
+        self.observed = Observed(observations, tilting=has_tilts(scenario))
         self._action_spec = action_spec(self.scenario, max_tilt_angle)
-        self._reward = reward
+        self.reward = reward
         self._target = np.zeros(3)  # m, of the last observation
-        self._max_position_error = max_position_error
+        self.max_position_error = max_position_error
 
     def _commanded(self, scenario: Scenario) -> Scenario:
         commanded = {"controller.law": "python", "controller.function": ENVIRONMENT}
@@ -103,13 +103,13 @@ class Task:
 
     def observation_spec(self) -> dict[str, specs.BoundedArray]:
         """Shape and bounds of every array of an observation, by name."""
-        return self._observed.spec()
+        return self.observed.spec()
 
     def initialize_episode(self, generator: np.random.Generator) -> Scenario:
         """The scenario of the next episode. Raises `InputError` where the draw cannot be flown."""
-        if self._domain is None:
+        if self.domain is None:
             return self.scenario
-        drawn = self._domain.draw(generator)
+        drawn = self.domain.draw(generator)
         return drawn if self._is_commanded(drawn) else self._commanded(drawn)
 
     def before_step(self, action: Floats, plant: CommandedPlant) -> None:
@@ -121,7 +121,8 @@ class Task:
         """The observation of the plant's state, through the scenario's sensors."""
         observation = plant.observation()
         self._target = observation.reference.position
-        return self._observed.arrays(observation)
+        entries = rotation_from_quaternion(*observation.quaternion.tolist())
+        return self.observed.arrays(observation, np.array(entries).reshape(3, 3))
 
     def get_reward(self, observation: Mapping[str, Floats], action: Floats) -> float:
         """The reward of a step that took ``action`` to ``observation``.
@@ -129,7 +130,7 @@ class Task:
         Raises `InputError` if it needs an observation that there is not.
         """
         try:
-            return float(self._reward(observation, action))
+            return float(self.reward(observation, action))
         except KeyError as error:
             if error.args[0] in OBSERVATIONS and error.args[0] not in observation:
                 raise InputError(f"environment: observations: the reward needs {error}") from None
@@ -142,6 +143,6 @@ class Task:
         """
         target = observation.get("reference_position", self._target)
         error = dist(target.tolist(), sample[1:4].tolist())
-        if error <= self._max_position_error:
+        if error <= self.max_position_error:
             return None
         return End("diverged", float(sample[0]), f"{error:.3g} m away from the reference")

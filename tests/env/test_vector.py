@@ -1,0 +1,167 @@
+"""Environments on arrays: the same episodes as the single environment's in MuJoCo."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.env.test_environment import documented
+from tiltsim.env.domain import Domain
+from tiltsim.env.environment import TiltrotorEnv
+from tiltsim.env.tasks import TASKS
+from tiltsim.equations.implicitfast import make_implicitfast_step
+from tiltsim.errors import InputError
+from tiltsim.laws.assembling import assemble, loop_of
+from tiltsim.laws.commanded import with_command
+from tiltsim.laws.layers.on_equations import on_equations
+
+SPINNING = {"attitude": [0.2, -0.1, 0.5], "velocity": [1.0, 0.3, -0.2]} | {
+    "angular_velocity": [1.0, -2.0, 0.5],
+    "rotor_speed": 361.0,
+}
+LIMITED = {
+    **TASKS["SetPoint"]["scenario"],
+    "initial": SPINNING,
+    "vehicle": {"max_rotor_speed": 480.0, "rotor_time_constant": 0.03},
+    "air": {"drag": {"linear": [0.1, 0.2, 0.1]}, "wind": [2.0, -1.0, 0.5]},
+}
+LIMITED["vehicle"]["tilt_servo"] = {"natural_frequency": 50.0, "max_rate": 3.0, "max_angle": 0.4}
+
+
+@pytest.mark.parametrize(
+    "scenario", [{**TASKS["Hover"]["scenario"], "initial": SPINNING}, LIMITED], ids=["ideal", "all"]
+)
+def test_the_step_is_mujocos(scenario):
+    """Also with gyroscopic torques, drag, and rotors and servos that lag and have limits."""
+    env = TiltrotorEnv(scenario)
+    env.reset()
+    assembly = assemble(env.scenario)
+    loop = on_equations(loop_of(env.scenario))
+    setup = loop.setup(assembly, loop.signature)
+    lagging = env.scenario.rotorcraft.rotor_time_constant is not None
+    first = 30 if lagging else 26  # where commanded speeds go
+    state = [*map(float, loop.equations.initial(assembly, setup))]
+    step = make_implicitfast_step(loop.equations)
+    generator, index = np.random.default_rng(0), 0
+    vehicle = env.scenario.rotorcraft.resolve()
+    for _ in range(6):
+        action = generator.uniform([0.5] * 4 + [-0.5] * 4, [2.0] * 4 + [0.5] * 4)
+        env.step(action)
+        speeds = np.sqrt(action[:4] / vehicle.thrust_coefficient) * [-1, 1, -1, 1]
+        limit = env.scenario.rotorcraft.speeds_along_spin[1]
+        state[first : first + 4] = np.clip(speeds, -limit, limit).tolist()
+        parameters = with_command(setup.parameters, (*action[4:].tolist(), *(0.0,) * 4))
+        inputs = loop.equations.inputs(0.004 * index, state, parameters, setup.knots)
+        for _ in range(5):
+            time = 0.004 * index
+            state = step(time, state, inputs, 0.004, parameters, setup.knots, (0.0, 0.0, 0.0))
+            index += 1
+        sample = env.flight().samples[-1]
+        moved = np.array(state)[[*range(6), *range(15, 22), *range(26, 30)]]
+        flown = sample[[*range(1, 7), *range(10, 21)]]
+        # MuJoCo's pods have inertia: 1e-7 of their servos', by which the body moves them.
+        np.testing.assert_allclose(moved, flown, rtol=1e-7, atol=1e-7)
+
+
+AXES = [
+    {"key": "vehicle.mass", "type": "uniform", "low": 0.8, "high": 1.2, "relative": True},
+    {"keys": ["vehicle.inertia"], "type": "uniform", "low": 0.9, "high": 1.1, "relative": True},
+    {"key": "initial.position[2]", "type": "uniform", "low": -1.0, "high": 2.0},
+]
+
+
+@pytest.mark.parametrize(
+    "axes",
+    [
+        AXES,
+        [*AXES, {"key": "air.density", "type": "normal", "mean": 1.2, "standard_deviation": 0.1}],
+    ],
+    ids=["at once", "one by one"],
+)
+def test_numbers_are_those_that_single_environments_draw(axes):
+    domain = Domain.from_axes(TiltrotorEnv().scenario, axes)
+    rows = domain.sample([np.random.default_rng(seed) for seed in (4, 5)])
+    for seed, row in zip((4, 5), rows, strict=True):
+        drawn = domain.draw(np.random.default_rng(seed))
+        expected = [drawn.vehicle.mass, *drawn.vehicle.inertia, drawn.initial.position[2]]
+        expected += [drawn.air.density] * (len(axes) > 3)
+        np.testing.assert_allclose(row, expected, rtol=1e-15)
+
+
+# --- with JAX and Gymnasium ------------------------------------------------------------------
+
+
+def make(*args, **arguments):
+    pytest.importorskip("jax")
+    pytest.importorskip("gymnasium")
+    from tiltsim.env import VectorEnv
+
+    return VectorEnv(*args, **arguments)
+
+
+@pytest.mark.parametrize(
+    ("task", "arguments", "words"),
+    [
+        ("tiltsim/Hover-v0", {"num_envs": 0}, "num_envs = 0: must be a whole number above 0"),
+        ("tiltsim/Hovver-v0", {}, "'tiltsim/Hovver-v0': did you mean tiltsim/Hover-v0"),
+        ("tiltsim/Hover-v0", {"precision": "half"}, "precision = 'half': must be 'float32' or"),
+        ({}, {}, "simulation.integrator = 'RK4': only 'implicitfast' flies on arrays"),
+        (
+            {"vehicle": {"model": "quadrotor"}, "controller": {"law": "yaw_position"}},
+            {"control_timestep": 0.02},
+            "vehicle.model = 'quadrotor': only 'tiltrotor' flies on arrays; use GymnasiumEnv",
+        ),
+        (
+            "tiltsim/Hover-v0",
+            {"domain": [{"key": "simulation.seed", "type": "seed"}]},
+            "domain: simulation.seed: arrays draw numbers on which a flight depends, of vehicle",
+        ),
+    ],
+)
+def test_what_does_not_fly_on_arrays_is_refused_by_name(task, arguments, words):
+    with pytest.raises(InputError, match=words) as caught:
+        make(task, **arguments)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("task", TASKS)
+def test_episodes_are_those_of_single_environments_step_for_step(task):
+    """Observations, rewards, ends and the starts after them, with Gymnasium's own autoreset."""
+    arguments = {**TASKS[task], "max_position_error": 2.0}
+    scenario = arguments.pop("scenario")
+    scenario = {**scenario, "simulation": {**scenario["simulation"], "duration": 0.8}}
+    vector = make(scenario, num_envs=3, precision="float64", **arguments)
+    import gymnasium
+
+    from tiltsim.env.gymnasium import GymnasiumEnv
+
+    single = [lambda: GymnasiumEnv(scenario=scenario, **arguments, flat=True)] * 3
+    several = gymnasium.vector.SyncVectorEnv(single)
+    for name in ("action_space", "observation_space", "single_action_space"):
+        assert getattr(vector, name) == getattr(several, name)
+    assert vector.metadata["autoreset_mode"] == several.metadata["autoreset_mode"]
+    generator, ends = np.random.default_rng(0), [0, 0]
+    np.testing.assert_array_equal(vector.reset(seed=3)[0], several.reset(seed=3)[0])
+    for _ in range(100):
+        actions = generator.normal([-1.0, 0.0, 0.0], 0.02, (8, 3)).T  # the first one falls
+        *mine, _ = vector.step(actions)
+        *theirs, _ = several.step(actions)
+        np.testing.assert_allclose(mine[0], theirs[0], rtol=0.0, atol=2e-7)  # single precision
+        np.testing.assert_allclose(mine[1], theirs[1], rtol=0.0, atol=1e-9)
+        np.testing.assert_array_equal(mine[2:], theirs[2:])
+        ends = [end + theirs[2 + kind].sum() for kind, end in enumerate(ends)]
+    assert vector.observation_space.contains(mine[0])
+    assert all(ends)  # lost, and over in time
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", [0, 1])
+def test_the_documented_examples_run(block):
+    pytest.importorskip("jax")
+    names = {}
+    exec(compile(documented(arrays=True)[block], "environment.md", "exec"), names)
+    result = names["slopes" if block else "observations"]
+    assert result.shape == ((4, 8) if block else (16, 12))
+    assert np.isfinite(result).all()
+    assert (result != 0.0).all()

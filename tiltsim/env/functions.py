@@ -1,0 +1,293 @@
+"""Environments as pure functions in JAX, on the equations instead of in MuJoCo.
+
+`EnvFunctions` makes them for one environment; ``jax.vmap`` makes many of it, and ``jax.grad``
+differentiates through their episodes. `tiltsim.env.VectorEnv` is made of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from tiltsim.arrays.jax_arrays import JaxArrays, require_jax
+from tiltsim.arrays.lifting import Lifting
+from tiltsim.closed_loop.limits import WITHIN_LIMITS
+from tiltsim.env.task import Task
+from tiltsim.equations.implicitfast import RATE_1, SPEED_1, TILT_1, make_implicitfast_step
+from tiltsim.equations.tiltrotor import P, body_fields, rotation_of
+from tiltsim.errors import InputError
+from tiltsim.laws.assembling import loop_of
+from tiltsim.laws.commanded import commanded_parameters, with_command
+from tiltsim.laws.layers.on_equations import on_equations
+from tiltsim.plants.command import Observation, Reference
+from tiltsim.scenario.override_keys import split_key
+from tiltsim.scenario.surroundings import SensorTable
+from tiltsim.scenario.vehicle import PodTable
+from tiltsim.simulation.array_plan import ArrayPlan, PlannedFlight
+from tiltsim.system.text import short_repr
+from tiltsim_controllers.mathematics.rotation import quaternion_from_rotation
+from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.references.trajectories import reference_derivatives
+from tiltsim_controllers.vehicle.parameters import SPIN
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import Scenario
+
+LEAST_THRUST: Final = 1e-30  # N; a root has no derivative at zero
+
+
+class Episode(NamedTuple):
+    """An episode on arrays."""
+
+    numbers: Any  # drawn for it, shape (numbers,)
+    index: Any  # of the physics step
+    state: tuple[Any, ...]  # motion of the vehicle, then activations as in MuJoCo
+
+
+class Outcome(NamedTuple):
+    """What a step leads to; arrays."""
+
+    observation: Any  # (entries,), from -1 to 1
+    reward: Any
+    terminated: Any  # whether the vehicle is lost
+    truncated: Any  # whether the time is over
+
+
+class EnvFunctions:
+    """An environment as pure functions of arrays: `reset` and `step`.
+
+    They do what `tiltsim.env.gymnasium.GymnasiumEnv` does with ``flat=True``. The vehicle is
+    integrated as MuJoCo does with ``implicitfast``, but its pods are massless.
+
+    Args:
+        task: With a tiltrotor and ``simulation.integrator = "implicitfast"``; without errors of
+            sensors, latency, faults, rotor inertia, ground and MJCF file of its own.
+        precision: "float32" or, if JAX has 64-bit numbers enabled, "float64".
+
+    Attributes:
+        scenario: That of the task, before any draws.
+        keys: What a domain draws for an episode, by the scenario's keys.
+
+    Raises:
+        InputError: If the task is none of these, or draws what is no number of a flight.
+    """
+
+    def __init__(self, task: Task, precision: str = "float32") -> None:
+        require_jax("tiltsim.env.VectorEnv")
+        import jax
+        import jax.numpy as jnp
+
+        if precision not in ("float32", "float64"):
+            shown = short_repr(precision)
+            raise InputError(f"environment: precision = {shown}: must be 'float32' or 'float64'")
+        self._jax, self._numpy, self._dtype, self._task = jax, jnp, precision, task
+        self.scenario = scenario = task.scenario
+        _check_supported(scenario)
+        self._simulation = scenario.simulation
+        self._loop = loop = on_equations(loop_of(scenario))
+        self._follows = loop.follows_position(scenario)
+        self._plan = ArrayPlan(scenario, loop, precision)
+        rotorcraft = scenario.rotorcraft
+        self._slowest, self._fastest = rotorcraft.speeds_along_spin
+        # A command is written to the speeds, or to what they lag behind.
+        self._speeds = SPEED_1 + (4 if rotorcraft.rotor_time_constant is not None else 0)
+        equations = loop.equations
+        assert equations is not None
+        lifting = Lifting(JaxArrays(precision), guarded=True)
+        self._advance = lifting(make_implicitfast_step(equations))
+        self._inputs, self._sample = lifting(equations.inputs), lifting(equations.observe)
+        self._limit = lifting(loop.kind.limit_exceeded)
+        self._reference_at = lifting(reference_derivatives)
+        self._body, self._quaternion = lifting(body_fields), lifting(quaternion_from_rotation)
+        first = {} if task.domain is None else task.domain.values(np.random.default_rng(0))
+        self.keys = tuple(first)
+        self._widths = [None if np.ndim(value) == 0 else len(value) for value in first.values()]
+        for key, value in first.items():
+            self._check_key(key, value)
+        spec = task.action_spec()
+        self._low, self._high = spec.minimum, spec.maximum
+        bounds = task.observation_spec().values()
+        self._bounds = np.concatenate([entry.maximum * np.ones(entry.shape) for entry in bounds])
+
+    @property
+    def actions(self) -> int:
+        """Number of entries of an action."""
+        return len(self._low)
+
+    @property
+    def observations(self) -> int:
+        """Number of entries of an observation."""
+        return len(self._bounds)
+
+    def draw(self, generators: Sequence[np.random.Generator]) -> Floats:
+        """Numbers for `reset`, a row for each generator; they draw as a single environment does."""
+        domain = self._task.domain
+        return np.empty((len(generators), 0)) if domain is None else domain.sample(generators)
+
+    def reset(self, numbers: Any) -> tuple[Episode, Any]:
+        """Begin an episode with numbers of `draw`; the observation is the second.
+
+        Args:
+            numbers: A row, shape (numbers,).
+        """
+        planned, floats = self._planned(numbers), self._numpy.asarray
+        state = tuple(floats(value, self._dtype) for value in planned.state)
+        episode = Episode(floats(numbers, self._dtype), floats(0, "int32"), state)
+        return episode, self._flat(self._observed(episode, planned))
+
+    def step(self, episode: Episode, action: Any) -> tuple[Episode, Outcome]:
+        """Hold an action for one control step.
+
+        Args:
+            episode: From `reset` or `step`.
+            action: From -1 to 1, as that of `tiltsim.env.gymnasium.GymnasiumEnv`.
+        """
+        jnp, planned = self._numpy, self._planned(episode.numbers)
+        middle, half = 0.5 * (self._high + self._low), 0.5 * (self._high - self._low)
+        action = jnp.asarray(action, self._dtype)
+        clipped = jnp.clip(
+            jnp.asarray(middle, self._dtype) + jnp.asarray(half, self._dtype) * action,
+            jnp.asarray(self._low, self._dtype),
+            jnp.asarray(self._high, self._dtype),
+        )
+        now = self._flown(episode, clipped, planned)
+        finite = jnp.stack([jnp.isfinite(value) for value in now.state]).all()
+        kept = tuple(
+            jnp.where(finite, new, old) for new, old in zip(now.state, episode.state, strict=True)
+        )
+        now = now._replace(state=kept)
+        observation = self._observed(now, planned)
+        lost = ~finite | self._is_lost(now, planned)
+        reward = jnp.where(lost, 0.0, self._task.reward(observation, clipped))
+        truncated = ~lost & (now.index >= self._simulation.steps)
+        return now, Outcome(self._flat(observation), reward, lost, truncated)
+
+    def _planned(self, numbers: Any) -> PlannedFlight:
+        """The plan of an episode."""
+        tree, place = self._plan.parameters, 0
+        for key, width in zip(self.keys, self._widths, strict=True):
+            value = numbers[place] if width is None else tuple(numbers[place : place + width])
+            tree, place = _with(tree, split_key(key), value), place + (width or 1)
+        return self._plan(tree)
+
+    def _flown(self, episode: Episode, action: Any, planned: PlannedFlight) -> Episode:
+        """An episode after a control step."""
+        jnp, knots, timestep = self._numpy, planned.knots, self._simulation.timestep
+        parameters, count = planned.parameters, self._simulation.control_steps
+        coefficient = commanded_parameters(parameters.inner).vehicle.thrust_coefficient
+        speeds = jnp.sqrt(jnp.maximum(action[:4], LEAST_THRUST) / coefficient)
+        speeds = jnp.clip(speeds, self._slowest, self._fastest) * jnp.asarray(SPIN, self._dtype)
+        tilts = tuple(action[index] for index in range(4, 8))
+        parameters = with_command(parameters, (*tilts, 0.0, 0.0, 0.0, 0.0))
+        state = [*episode.state]
+        state[self._speeds : self._speeds + 4] = [*speeds]
+        held = self._inputs(self._time(episode.index), state, parameters, knots)
+
+        def one(now: tuple[Any, ...], step: Any) -> tuple[tuple[Any, ...], None]:
+            time = self._time(episode.index + step)
+            new = self._advance(
+                time, [*now], held, timestep, parameters, knots, planned.disturbance
+            )
+            return tuple(jnp.asarray(value, self._dtype) for value in new), None
+
+        last, _ = self._jax.lax.scan(one, tuple(state), jnp.arange(count))
+        return Episode(episode.numbers, episode.index + count, last)
+
+    def _time(self, index: Any) -> Any:
+        return index.astype(self._dtype) * self._simulation.timestep
+
+    def _observed(self, episode: Episode, planned: PlannedFlight) -> dict[str, Any]:
+        """The arrays of an observation."""
+        jnp, state, time = self._numpy, episode.state, self._time(episode.index)
+        rotation, names = rotation_of(state), self._task.observed.bounds
+        reference, spins = planned.plan.reference, jnp.asarray(SPIN, self._dtype)
+        motion = jnp.asarray(self._reference_at(time, reference, planned.knots)[:9])
+        unseen = np.full(4, np.nan)  # what is not observed, as the gait
+        seen = Observation(
+            time=time,
+            position=jnp.stack(state[:3]),
+            velocity=jnp.stack(state[3:6]),
+            attitude=jnp.stack(self._body(state)[6:9]) if "attitude" in names else unseen[:3],
+            quaternion=jnp.stack(self._quaternion(rotation)) if "quaternion" in names else unseen,
+            body_rates=jnp.stack(state[P : P + 3]),
+            tilt_angles=jnp.stack(state[TILT_1 : TILT_1 + 4]),
+            tilt_rates=jnp.stack(state[RATE_1 : RATE_1 + 4]),
+            rotor_speeds=spins * jnp.stack(state[SPEED_1 : SPEED_1 + 4]),
+            reference=Reference(
+                position=motion[:3],
+                velocity=motion[3:6],
+                acceleration=motion[6:],
+                attitude=jnp.stack([reference.roll, reference.pitch, reference.yaw]),
+                tilt_angles=unseen,
+                tilt_rates=unseen,
+            ),
+            vehicle=commanded_parameters(planned.parameters.inner).vehicle,
+        )
+        return self._task.observed.arrays(seen, jnp.stack(rotation).reshape(3, 3), jnp)
+
+    def _is_lost(self, episode: Episode, planned: PlannedFlight) -> Any:
+        """Whether a finite state is beyond the limits of the task or of all flights."""
+        episode = self._jax.lax.stop_gradient(episode)
+        time, (_, parameters, knots, _, _) = self._time(episode.index), planned
+        inputs = self._inputs(time, episode.state, parameters, knots)
+        values = self._sample(time, episode.state, inputs, parameters, knots)
+        reference = planned.plan.reference
+        code = self._limit(time, values, reference, knots, self._follows)
+        target = self._reference_at(time, reference, knots)
+        squares = sum((episode.state[axis] - target[axis]) ** 2 for axis in range(3))
+        return (code != WITHIN_LIMITS) | (squares > self._task.max_position_error**2)
+
+    def _flat(self, observation: Mapping[str, Any]) -> Any:
+        jnp = self._numpy
+        every = jnp.concatenate([*observation.values()])
+        return (every / jnp.asarray(self._bounds, self._dtype)).astype("float32")
+
+    def _check_key(self, key: str, value: Any) -> None:
+        """Refuse to draw what is no number of a flight."""
+        found: Any = self._plan.parameters
+        try:
+            for step in split_key(key):
+                found = found[step]
+        except (KeyError, TypeError):
+            found = None
+        if found is None or np.shape(found) != np.shape(value):
+            names = ", ".join(self._plan.parameters)
+            raise InputError(
+                f"environment: domain: {key}: arrays draw numbers on which a flight depends, of "
+                f"{names}"
+            )
+
+
+def _with(tree: Any, path: Sequence[str | int], value: Any) -> Any:
+    """A tree of dicts and tuples with another value at a path."""
+    if not path:
+        return value
+    step, *rest = path
+    inner = _with(tree[step], rest, value)
+    if isinstance(step, str):
+        return {**tree, step: inner}
+    return (*tree[:step], inner, *tree[step + 1 :])
+
+
+def _check_supported(scenario: Scenario) -> None:
+    """Refuse what these equations do not have."""
+    allowed: dict[str, object] = {
+        "vehicle.model": "tiltrotor",
+        "vehicle.mjcf": None,
+        "vehicle.pod": PodTable(),
+        "vehicle.rotor_inertia": 0.0,
+        "ground": None,
+        "fault": (),
+        "sensors": SensorTable(),
+        "simulation.control_latency": 0.0,
+        "simulation.integrator": "implicitfast",
+    }
+    for key, value in allowed.items():
+        found = attrgetter(key)(scenario)
+        if found != value:
+            shown = short_repr(found)
+            only = f"only {value!r} flies" if isinstance(value, str) else "does not fly"
+            raise InputError(f"environment: {key} = {shown}: {only} on arrays; use GymnasiumEnv")
