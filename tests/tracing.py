@@ -61,14 +61,14 @@ def trace_seldom():
     from matplotlib.figure import Figure
     from numba.core import compiler
 
+    from tiltsim.plants.equations_plant import EquationsPlant
     from tiltsim.plants.mujoco_plant import MujocoPlant
-    from tiltsim.plants.thesis_plant import ThesisPlant
     from tiltsim.plants.user_controller import UserControlledPlant
 
     def begins(plant, _steps):
         return plant.time < BEGINNING
 
-    for plant in (MujocoPlant, ThesisPlant, UserControlledPlant):
+    for plant in (MujocoPlant, EquationsPlant, UserControlledPlant):
         plant.advance = seldom_traced(plant.advance, begins)
     elsewhere = {
         compiler: ["compile_extra"],

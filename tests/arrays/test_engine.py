@@ -13,7 +13,7 @@ from tests.laws.test_baselines import BASELINES
 from tests.laws.test_laws import GUST, LAWS
 from tests.simulation.test_batch import CAR, CAR_GAITS, EXACT, GAITS
 from tiltsim.arrays.flying import Kernel, course_of, double_precision
-from tiltsim.equations.ode3 import Integration, make_stepper
+from tiltsim.equations.solvers import Integration, make_stepper
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.flight_model import disturbance_acceleration
@@ -85,7 +85,7 @@ def test_steps_of_whatever_flies_on_the_equations_are_those_in_python(name):
         state = np.array(carried.state)
     integration = Integration(0.001, 0, *assembly.setup, disturbance)
     held = (0.0,) * equations.inputs_size
-    python, _ = make_stepper(equations)(0, start, held, 3, integration)
+    python, _ = make_stepper(equations, "ode3")(0, start, held, 3, integration)
     scale = np.maximum(1.0, np.abs(python))
     np.testing.assert_array_less(np.abs(state - python) / scale, 1e-11)
 

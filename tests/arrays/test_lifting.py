@@ -7,6 +7,7 @@ from math import isfinite
 
 import numpy as np
 import pytest
+from tiltsim.equations.ode3 import Integration, make_step
 
 from tests.arrays.recorded_calls import described, flown, mapped, record, short_flights
 from tests.laws.test_laws import LAWS
@@ -15,7 +16,6 @@ from tiltsim.arrays.jax_arrays import JaxArrays
 from tiltsim.arrays.lifting import Lifting
 from tiltsim.arrays.values import LiftError
 from tiltsim.closed_loop.loop import Equations
-from tiltsim.equations.ode3 import Integration, make_step
 from tiltsim_controllers.mathematics.scalar import scalar, scalar_functions
 
 jax = pytest.importorskip("jax")

@@ -15,7 +15,7 @@ from types import CodeType, FunctionType
 
 import pytest
 
-import tiltsim.equations.ode3
+import tiltsim.equations.solvers
 import tiltsim.laws.assembling
 import tiltsim_controllers
 from tiltsim_controllers.gaits.parameters import GAIT_TYPES, GaitParameters

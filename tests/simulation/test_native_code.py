@@ -15,6 +15,7 @@ from tests.laws.test_laws import LAWS
 from tests.simulation.test_batch import ALL_LAWS, GAITS, scenario
 from tiltsim.engines.native_engine import compile_control
 from tiltsim.engines.native_stepper import compile_stepper
+from tiltsim.equations.actuator_level import ACTUATOR_PLANTS
 from tiltsim.flight.end import End
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.laws.layers.actuation import with_actuation
@@ -89,7 +90,7 @@ def test_compilation_is_announced_unless_the_code_is_cached(monkeypatch, tmp_pat
     assert announced == ["mujoco.some.law"]
 
 
-@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+@pytest.mark.parametrize("plant", ["mujoco", "thesis", "rigid_body"])
 def test_each_plant_announces_its_compilation(monkeypatch, tmp_path, plant):
     import tiltsim.engines.cache as cache
 
@@ -102,9 +103,11 @@ def test_each_plant_announces_its_compilation(monkeypatch, tmp_path, plant):
     monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
     monkeypatch.setattr(cache, "before_compiling", [stop])
     loop = LOOPS["attitude_altitude"]
-    compiling = compile_control if plant == "mujoco" else compile_stepper
-    with pytest.raises(AnnouncedError, match=re.escape(loop.native_name(plant))):
-        unwrap(compiling)(loop)
+    compiling, more = compile_stepper, (plant, "ode3")
+    if plant == "mujoco":
+        compiling, more = compile_control, ()
+    with pytest.raises(AnnouncedError, match=re.escape(loop.native_name(plant, *more[1:]))):
+        unwrap(compiling)(loop, *more)
 
 
 def test_all_that_processes_fly_with_is_compiled_for_them_once(monkeypatch):
@@ -193,6 +196,10 @@ def test_no_two_control_steps_share_a_name_of_native_code(plant):
     loops = [*laws, *real, *aired, *spinning]
     if plant == "thesis":
         moved = [loop for loop in loops[len(LOOPS) :] if loop.equations is None]
-        loops = [*laws[: len(LOOPS)], *spinning[: len(tiltrotors) - 2], *map(on_equations, moved)]
+        loops = [
+            *laws[: len(LOOPS)],
+            *spinning[: len(tiltrotors) - 2],
+            *(on_equations(loop, ACTUATOR_PLANTS[loop.dynamics.model]) for loop in moved),
+        ]
     names = [loop.native_name(plant) for loop in loops]
     assert len(set(names)) == len(names) == len(loops) > 30

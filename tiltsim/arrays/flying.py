@@ -1,4 +1,4 @@
-"""Flights on the thesis's equations in JAX: the scalar step and sample of a loop, lifted."""
+"""Flights on equations of motion in JAX: the scalar step and sample of a loop, lifted."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tiltsim.arrays.lifting import Lifting
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.limits import SINGULAR, WITHIN_LIMITS
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.equations.ode3 import Integration, Stepper, make_step
+from tiltsim.equations.solvers import Integration, Stepper, make_step
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.records import flatten, record_size, unflatten
 from tiltsim_controllers.mathematics.scalar import Triple, Values
@@ -57,6 +57,7 @@ class Course(NamedTuple):
     steps: int
     follows_position: bool
     dtype: str
+    solver: str  # see `tiltsim.equations.solvers.SOLVERS`
 
 
 class Carried(NamedTuple):
@@ -97,7 +98,8 @@ class Kernel:
         self._arrays = arrays = JaxArrays(course.dtype)
         separate = (equations.inputs, equations.rates) if recomputes() else ()
         lifting = Lifting(arrays, guarded=guarded, separate=separate)
-        self._step, self._inputs = lifting(make_step(equations)), lifting(equations.inputs)
+        self._step = lifting(make_step(equations, course.solver))
+        self._inputs = lifting(equations.inputs)
         self._observe = lifting(equations.observe)
         self._check = lifting(loop.monitoring.sign_check_values)
         self._limit = lifting(loop.kind.limit_exceeded)
@@ -299,6 +301,7 @@ def course_of(assembly: Assembly) -> Course:
         simulation.steps,
         assembly.follows_position,
         simulation.precision,
+        simulation.solver,
     )
 
 
@@ -319,7 +322,7 @@ def _compiled_steps(
 
 
 def stepper_on_arrays(course: Course) -> Stepper:
-    """The solver for one flight in JAX, as `tiltsim.equations.ode3.make_stepper` makes it."""
+    """The solver for one flight in JAX, as `tiltsim.equations.solvers.make_stepper` makes it."""
     require_jax('simulation.engine = "jax"')
 
     def advance(

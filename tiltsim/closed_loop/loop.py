@@ -137,7 +137,7 @@ class Monitoring:
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """A controller on the equations of motion that the thesis prints for its vehicle.
+    """A controller on equations of motion: those that the thesis prints, or those of a rigid body.
 
     Attributes:
         inputs: Scalar function ``(time, state, parameters, knots) -> inputs``: the controller.
@@ -215,12 +215,16 @@ class ClosedLoop:
         layout = (self.dynamics.model, self.dynamics.sizes, record_dtype(self.parameters))
         return float(zlib.crc32(repr(layout).encode()))
 
-    def native_name(self, plant: str) -> str:
-        """File name of the loop's compiled code on a plant, "mujoco" or "thesis"."""
+    def native_name(self, plant: str, solver: str = "RK4") -> str:
+        """File name of the loop's compiled code on a plant of ``simulation.plant``.
+
+        The solver is part of the code on the plant ``rigid_body``, which has more than one.
+        """
         step = self.sampling.controls
-        if plant == "thesis" and self.equations is not None:
+        if plant != "mujoco" and self.equations is not None:
             step = self.equations.inputs
-        return f"{plant}.{step.__module__}.{step.__qualname__}"
+        place = f"{plant}.{solver}" if plant == "rigid_body" else plant
+        return f"{place}.{step.__module__}.{step.__qualname__}"
 
     @cached_property
     def record_size(self) -> int:

@@ -38,6 +38,18 @@ def steps_taken(header: Vector | Floats) -> int:
 
 
 @scalar
+def just_after(time: float) -> float:
+    """A time (s) at which an event at ``time`` has begun."""
+    return time * _AFTER
+
+
+@scalar
+def just_before(time: float) -> float:
+    """A time (s) at which an event at ``time`` has not begun."""
+    return time * _BEFORE
+
+
+@scalar
 def evaluation_time(evaluations: float, evaluations_per_step: float, timestep: float) -> float:
     """Time (s) for the next evaluation of the control step.
 
@@ -53,7 +65,7 @@ def evaluation_time(evaluations: float, evaluations_per_step: float, timestep: f
     step = floor(evaluations / evaluations_per_step)
     stage = evaluations - step * evaluations_per_step
     if stage == 0.0:
-        return step * timestep * _AFTER
+        return just_after(step * timestep)
     if stage == 3.0:
-        return (step + 1.0) * timestep * _BEFORE
+        return just_before((step + 1.0) * timestep)
     return (step + 0.5) * timestep

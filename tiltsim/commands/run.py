@@ -202,11 +202,10 @@ def summary(
         values = (f"{key} = {show(value)}" for key, value in changes)
         lines.append(f"  changed: {printable(', '.join(values))}")
     simulation = scenario.simulation
-    solver = simulation.integrator if simulation.plant == "mujoco" else "ode3"
     factor = metrics["realtime_factor"]
     speed = f"{factor:.0f}" if factor >= 10.0 else f"{factor:.2g}"
     lines.append(
-        f"  {metrics['duration']:g} s on the {simulation.plant} plant, {solver} at "
+        f"  {metrics['duration']:g} s on the {simulation.plant} plant, {simulation.solver} at "
         f"{simulation.timestep:g} s, {flight.engine} engine, {speed} times"
         " real time"
     )

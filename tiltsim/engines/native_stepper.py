@@ -12,7 +12,7 @@ from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.engines.cache import announce_native_code
 from tiltsim.engines.compiling import INNER, compiled, register_scalar_functions
 from tiltsim.engines.recorder import record_sample, recording_is_over
-from tiltsim.equations.ode3 import make_stepper
+from tiltsim.equations.solvers import make_stepper
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.records import record_dtype
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -20,20 +20,21 @@ from tiltsim_controllers.mathematics.scalar import Floats
 
 @one_thread_at_a_time
 @cache
-def compile_stepper(loop: ClosedLoop) -> tuple[Any, Any]:
-    """Compile the thesis plant's solver for a loop, or load it from the cache on disk.
+def compile_stepper(loop: ClosedLoop, plant: str, solver: str) -> tuple[Any, Any]:
+    """Compile a solver of a loop's equations, or load it from the cache on disk.
 
     Args:
         loop: A closed loop with equations.
+        plant, solver: As in `tiltsim.closed_loop.loop.ClosedLoop.native_name`.
 
     Returns:
-        ``advance`` is the stepper of `tiltsim.equations.ode3.make_stepper` with an array for the
+        ``advance`` is the stepper of `tiltsim.equations.solvers.make_stepper` with an array for the
         state. ``record`` takes the address of a `Recorder` and the number of samples before the
         same arguments, and stops when the recording is over. Neither holds Python's lock.
     """
-    announce_native_code(loop.native_name("thesis"))
+    announce_native_code(loop.native_name(plant, solver))
     assert loop.equations is not None
-    stepper = make_stepper(loop.equations)  # defines a scalar function
+    stepper = make_stepper(loop.equations, solver)  # defines a scalar function
     register_scalar_functions()
     inputs, observe = loop.equations.inputs, loop.equations.observe
     watch = loop.monitoring.sign_check_values

@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from tiltsim.equations.quadrotor import equations_of_motion, initial_state
 from tiltsim.equations.quadrotor import rigid_body as quadrotor_body
+from tiltsim.equations.solvers import identity
 from tiltsim.equations.tiltrotor import rigid_body, rotation_of, velocity_of
 from tiltsim.models.parts import WRENCH_SIZE
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim.vehicles.rotorcraft.layout import Layout, layout_of
-from tiltsim.vehicles.rotorcraft.rotors import rotor_code, true_rotors
+from tiltsim.vehicles.rotorcraft.rotors import true_rotors
 from tiltsim_controllers.mathematics.records import make_record_type, vector_of
 from tiltsim_controllers.mathematics.rotation import (
     quaternion_from_euler,
@@ -38,6 +39,7 @@ from tiltsim_controllers.mathematics.vectors import (
 from tiltsim_controllers.vehicle.effectiveness import effectiveness_of
 from tiltsim_controllers.vehicle.multirotor import BODY_STATES, body_rates, inverse_inertia_times
 from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.rotor_code import rotor_code_of
 
 if TYPE_CHECKING:
     from tiltsim.closed_loop.loop import Dynamics
@@ -62,14 +64,14 @@ def mechanics_record(vehicle: Any, tilts: int) -> Any:
     )
 
 
-def mechanics_of(dynamics: Dynamics) -> Any:
-    """The type of the parameters for a model."""
-    return mechanics_record(rotor_code(dynamics).record, layout_of(dynamics).tilts)
-
-
 def mechanics(plan: FlightPlan) -> Any:
     """The mechanics of a planned flight's rotorcraft."""
-    rotorcraft, vehicle = plan.scenario.any_rotorcraft, true_rotors(plan.scenario)
+    return mechanics_around(true_rotors(plan.scenario), plan)
+
+
+def mechanics_around(vehicle: Any, plan: FlightPlan) -> Any:
+    """The mechanics of a planned flight, around the parameters of its true vehicle."""
+    rotorcraft = plan.scenario.any_rotorcraft
     servo, tilts = rotorcraft.tilt_servo, rotorcraft.tilt_count
     kind: Any = type(vehicle)
     return mechanics_record(kind, tilts)(
@@ -110,6 +112,11 @@ class ActuatorPlant(NamedTuple):
     project_onto_limits: Callable[[list[float], Any], list[float]]
     """See `tiltsim.closed_loop.loop.Equations`."""
     initial: Callable[[FlightPlan], Values]  # motion
+    mechanics: Any  # the type of the parameters
+    read: Callable[[FlightPlan], Any] = mechanics  # these
+    name: str = "on_equations"  # part of the name of compiled code
+    finish: Callable[[list[float], Any], list[float]] = identity
+    """``(state, mechanics)``: what else is mended at the end of a step."""
 
 
 # --- vehicles with a rotation matrix ------------------------------------------------------------
@@ -169,6 +176,25 @@ def limit_speeds_of(spins: Values, first: int) -> Callable[..., list[float]]:
         return limited
 
     return limit_speeds
+
+
+@scalar
+def stop_pods(state: list[float], tilt_1: int, rate_1: int, tilts: int, stop: float) -> list[float]:
+    """The state with its pods within their stops.
+
+    Args:
+        state: Of the vehicle.
+        tilt_1, rate_1: Index of the first tilt and of its rate.
+        tilts: How many there are.
+        stop: rad, to either side.
+    """
+    stopped = state[:]
+    for index in range(tilts):
+        tilt, rate = state[tilt_1 + index], state[rate_1 + index]
+        if abs(tilt) > stop:
+            stopped[tilt_1 + index] = stop if tilt > 0.0 else -stop
+            stopped[rate_1 + index] = 0.0 if tilt * rate > 0.0 else rate
+    return stopped
 
 
 @scalar
@@ -254,14 +280,8 @@ def _tilting_plant(layout: Layout, spins: Values, tilt_of_rotor: tuple[int, ...]
 
     @scalar
     def project(state: list[float], mechanics: Any) -> list[float]:
-        stop = mechanics.max_tilt
-        projected = limit_speeds(state, mechanics)
-        for hinge in range(BODY_STATES, BODY_STATES + tilts):
-            tilt, rate = state[hinge], state[hinge + tilts]
-            if abs(tilt) > stop:
-                projected[hinge] = stop if tilt > 0.0 else -stop
-                projected[hinge + tilts] = 0.0 if tilt * rate > 0.0 else rate
-        return projected
+        limited = limit_speeds(state, mechanics)
+        return stop_pods(limited, BODY_STATES, BODY_STATES + tilts, tilts, mechanics.max_tilt)
 
     def initial(plan: FlightPlan) -> Values:
         """The motion at time zero; pods as in MuJoCo."""
@@ -270,7 +290,9 @@ def _tilting_plant(layout: Layout, spins: Values, tilt_of_rotor: tuple[int, ...]
         body = (*start.position, *start.velocity, *rotation_from_euler(*start.attitude))
         return (*body, *start.angular_velocity, *tilts, *tilt_rates)
 
-    return ActuatorPlant(motion, qpos, qvel, motion_rates, project, initial)
+    record = rotor_code_of(tilt_of_rotor).record if tilt_of_rotor else Vehicle
+    kind = mechanics_record(record, tilts)
+    return ActuatorPlant(motion, qpos, qvel, motion_rates, project, initial, kind)
 
 
 # --- quadrotor ---------------------------------------------------------------------------------
@@ -312,19 +334,14 @@ def _quadrotor_rates(
     return equations_of_motion(state, inputs, vehicle, acceleration)
 
 
-@scalar
-def project_quadrotor(state: list[float], mechanics: Any) -> list[float]:
-    """The state as it is: the rotors make any thrust."""
-    return state
-
-
 QUADROTOR_PLANT: Final = ActuatorPlant(
     motion=12,
     qpos=quadrotor_qpos,
     qvel=quadrotor_qvel,
     rates=_quadrotor_rates,
-    project_onto_limits=project_quadrotor,
+    project_onto_limits=identity,  # the rotors make any thrust
     initial=lambda plan: initial_state(plan.scenario),
+    mechanics=mechanics_record(Vehicle, 0),
 )
 
 

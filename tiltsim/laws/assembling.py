@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.equations.actuator_level import ActuatorPlant, actuator_plant
+from tiltsim.equations.rigid_body import form_of, rigid_body_of
 from tiltsim.laws.attitude_altitude import MEASURED_TILTROTOR, TILTROTOR
 from tiltsim.laws.commanded import commanded_loop
 from tiltsim.laws.full_pose import FULL_POSE
@@ -70,12 +72,10 @@ def loop_of(
     ``adapted`` may change the controller before layers go around it.
     """
     controller, external = scenario.controller, scenario.controller.is_external
-    by_controls = (
-        scenario.simulation.plant == "thesis" and not scenario.has_ideal_actuators_in_still_air
-    )
+    plant = scenario.simulation.plant
     # The thesis's equations have no torque but the model's, as long as all is ideal.
-    on_plant = scenario.simulation.plant == "mujoco" or by_controls
-    measured = on_plant and controller.measures_angular_acceleration
+    as_printed = plant == "thesis" and scenario.has_ideal_actuators_in_still_air
+    measured = not as_printed and controller.measures_angular_acceleration
     if external:
         loop = commanded_loop(scenario)
     elif isinstance(controller, ScalarController):
@@ -95,7 +95,16 @@ def loop_of(
         loop = with_rotor_inertia(loop)
     if measured:
         loop = with_measured_acceleration(loop)
-    return on_equations(loop) if by_controls else loop
+    if plant == "mujoco" or as_printed:
+        return loop
+    return on_equations(loop, _plant_of(scenario, loop))
+
+
+def _plant_of(scenario: Scenario, loop: ClosedLoop) -> ActuatorPlant:
+    """The equations on which the controls of MuJoCo's model act."""
+    if scenario.simulation.plant == "rigid_body":
+        return rigid_body_of(form_of(scenario))
+    return actuator_plant(loop.dynamics)
 
 
 def assemble(

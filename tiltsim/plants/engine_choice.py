@@ -28,8 +28,14 @@ def choose_engine(scenario: Scenario, loop: ClosedLoop) -> EngineName:
         return "python"
     if scenario.simulation.engine != "auto":
         return scenario.simulation.engine
-    name = loop.native_name(scenario.simulation.plant)
-    return "native" if _pays_off(scenario.simulation.steps, [name]) else "python"
+    pays_off = _pays_off(scenario.simulation.steps, [native_name(scenario, loop)])
+    return "native" if pays_off else "python"
+
+
+def native_name(scenario: Scenario, loop: ClosedLoop) -> str:
+    """File name of the compiled code of a scenario's loop."""
+    simulation = scenario.simulation
+    return loop.native_name(simulation.plant, simulation.solver)
 
 
 def native_pays_off(scenarios: Iterable[Scenario]) -> bool:
@@ -37,7 +43,7 @@ def native_pays_off(scenarios: Iterable[Scenario]) -> bool:
     steps, names = 0, set()
     for scenario in scenarios:
         steps += scenario.simulation.steps
-        names.add(loop_of(scenario).native_name(scenario.simulation.plant))
+        names.add(native_name(scenario, loop_of(scenario)))
     return _pays_off(steps, names)
 
 

@@ -6,9 +6,9 @@ import mujoco
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.engines.base import EngineName
+from tiltsim.plants.equations_plant import EquationsPlant
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.plant import Plant
-from tiltsim.plants.thesis_plant import ThesisPlant
 from tiltsim.plants.user_controller import UserControlledPlant
 from tiltsim.system.interrupts import reraise_swallowed_interrupts
 
@@ -29,6 +29,6 @@ def make_plant(
     if assembly.scenario.controller.is_external:
         return UserControlledPlant(assembly, model)
     with reraise_swallowed_interrupts():  # it may compile
-        if assembly.scenario.simulation.plant == "thesis":
-            return ThesisPlant(assembly, engine)
-        return MujocoPlant(assembly, model, engine)
+        if assembly.scenario.simulation.plant == "mujoco":
+            return MujocoPlant(assembly, model, engine)
+        return EquationsPlant(assembly, engine)

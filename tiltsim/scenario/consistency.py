@@ -46,15 +46,32 @@ def check_consistency(scenario: ScenarioTables) -> None:
     _check_claims(scenario)
     _check_engine(scenario)
     scenario.controller.check_scenario(scenario)
+    _check_rigid_body(scenario)
 
 
 def _check_engine(scenario: ScenarioTables) -> None:
     simulation = scenario.simulation
     if simulation.engine == "jax":
-        reason = 'simulation.engine = "jax" is supported on the thesis plant only'
-        scenario.require("simulation.plant", "thesis", reason)
+        if simulation.plant == "mujoco":
+            reason = 'simulation.engine = "jax" is supported on the plants thesis and rigid_body'
+            raise scenario.mistake("simulation.plant", reason)
     elif simulation.precision != "float64":
         raise scenario.mistake("simulation.precision", 'needs simulation.engine = "jax"')
+
+
+def _check_rigid_body(scenario: ScenarioTables) -> None:
+    """Refuse vehicles that the plant ``rigid_body`` cannot be."""
+    vehicle = scenario.vehicle
+    if scenario.simulation.plant != "rigid_body":
+        return
+    if not isinstance(vehicle, RotorcraftTable):
+        reason = f"supports no {vehicle.model}; use mujoco or thesis"
+        raise scenario.mistake("simulation.plant", reason)
+    scenario.require("vehicle.pod", PodTable(), "the rigid_body plant has massless pods")
+    file = vehicle.user_vehicle
+    if file is not None and file.unmodeled_properties:
+        reason = f"neglects of vehicle.mjcf {file.unmodeled_properties}; use mujoco"
+        raise scenario.mistake("simulation.plant", reason)
 
 
 def _check_law(scenario: ScenarioTables) -> None:

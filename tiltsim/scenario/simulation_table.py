@@ -22,6 +22,12 @@ MAX_STEPS: Final = 100_000_000
 DEFAULT_ROTOR_SPEED: Final = 300.0
 """rad/s, of the thesis's flights at time zero."""
 
+INTEGRATORS: Final = {
+    "mujoco": ("RK4", "implicitfast", "implicit", "Euler"),
+    "rigid_body": ("RK4", "ode3"),
+}
+"""Those of a plant; the thesis plant ignores the key."""
+
 MAX_LATENCY_STEPS: Final = 20
 """Largest number of delayed control samples; each takes eight states of the simulation."""
 
@@ -56,21 +62,30 @@ class SimulationTable(Table):
     engine: Literal["auto", "python", "native", "jax"] = Field(
         "auto",
         description="evaluates the control law as Python or as compiled code, with bit-identical "
-        "flights; auto compiles for long flights; jax flies many on arrays, on the thesis plant",
+        "flights; auto compiles for long flights; jax flies many on arrays, on the plants of "
+        "equations, thesis and rigid_body",
     )
     precision: Literal["float64", "float32"] = Field(
         "float64", description="numbers of the jax engine; the others always have float64"
     )
-    plant: Literal["mujoco", "thesis"] = Field(
+    plant: Literal["mujoco", "thesis", "rigid_body"] = Field(
         "mujoco",
-        description="what is simulated: the MuJoCo model, or the thesis's equations of motion",
+        description="what is simulated: the MuJoCo model; the thesis's equations of motion; or the "
+        "equations of one rigid body with gyroscopic torque, tilt servos and massless pods",
     )
-    integrator: Literal["RK4", "implicitfast", "implicit", "Euler"] = Field(
-        "RK4", description="MuJoCo's integrator; the thesis plant always uses ode3"
+    integrator: Literal["RK4", "implicitfast", "implicit", "Euler", "ode3"] = Field(
+        "RK4",
+        description="on the mujoco plant RK4, implicitfast, implicit or Euler; on rigid_body RK4 "
+        "or ode3, a method of third order; the thesis plant always uses ode3",
     )
     seed: Annotated[int, Field(ge=0)] = Field(
         0, description="seed of sensor noise and turbulence", examples=[1]
     )
+
+    @property
+    def solver(self) -> str:
+        """The integrator in use: that of the plant."""
+        return "ode3" if self.plant == "thesis" else self.integrator
 
     @property
     def steps(self) -> int:
@@ -106,8 +121,14 @@ class SimulationTable(Table):
                 raise self.mistake(key, f"longer than the flight, {self.duration} s")
             if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
                 raise self.mistake(key, f"must be a multiple of timestep = {self.timestep}")
+        self._check_integrator()
         self._check_latency()
         return self
+
+    def _check_integrator(self) -> None:
+        allowed = INTEGRATORS.get(self.plant)
+        if allowed is not None and self.integrator not in allowed:
+            raise self.mistake("integrator", f"on the {self.plant} plant: {', '.join(allowed)}")
 
     def _check_latency(self) -> None:
         latency, period = self.control_latency, self.control_timestep

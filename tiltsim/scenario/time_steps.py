@@ -27,15 +27,17 @@ MAX_HOVER_SPEED: Final = 5000.0
 MAX_HELD_STEP: Final = 2.0
 """Largest product of control timestep and pole, where a held third derivative turns unstable."""
 
-MAX_SERVO_STEP: Final = {"mujoco": 2.6, "thesis": 2.45}
-"""Largest product of timestep and servo pole, by plant.
+MAX_SERVO_STEP: Final = 2.6
+"""Largest product of timestep and servo pole.
 
-On the real axis RK4 turns unstable at 2.78 and ode3 at 2.51; at a damping ratio of 0.3 or more both
-are stable at these. With less, ode3 is stable up to `MAX_UNDAMPED_SERVO_STEP`.
+On the real axis RK4 turns unstable at 2.78; at a damping ratio of 0.3 or more it is stable here.
 """
 
+MAX_ODE3_SERVO_STEP: Final = 2.45
+"""The same for ode3, which turns unstable at 2.51; at less damping: `MAX_UNDAMPED_SERVO_STEP`."""
+
 MAX_UNDAMPED_SERVO_STEP: Final = 1.7
-"""On the thesis plant: ode3 turns unstable at 1.73 on the imaginary axis."""
+"""ode3 turns unstable at 1.73 on the imaginary axis."""
 
 MAX_EULER_STEP: Final = 1.9
 """Largest product of timestep and a rotor's pole where MuJoCo integrates activations by Euler."""
@@ -56,12 +58,12 @@ def _check_servo(scenario: ScenarioTables) -> None:
     servo, timestep = scenario.vehicle.tilt_servo, scenario.simulation.timestep
     # The fastest pole of the servo must stay where explicit integration is stable.
     fastest = servo.natural_frequency * max(1.0, 2.0 * servo.damping_ratio)
-    plant = scenario.simulation.plant
-    limit = MAX_SERVO_STEP[plant]
-    if plant == "thesis" and servo.damping_ratio < 0.3:
+    limit = _largest_servo_step(scenario.simulation)
+    if scenario.simulation.solver == "ode3" and servo.damping_ratio < 0.3:
         limit = MAX_UNDAMPED_SERVO_STEP
     # On the thesis plant ideal pods follow the gait exactly.
-    moves = plant == "mujoco" or not scenario.has_ideal_actuators_in_still_air
+    ideal = scenario.has_ideal_actuators_in_still_air
+    moves = scenario.simulation.plant != "thesis" or not ideal
     if scenario.vehicle.has_tilting_rotors and moves and fastest * timestep > limit:
         raise scenario.mistake(
             "simulation.timestep",
@@ -87,10 +89,14 @@ def _check_rotors(scenario: ScenarioTables) -> None:
         _check_measured_reaction(scenario, vehicle, controller)
 
 
+def _largest_servo_step(simulation: SimulationTable) -> float:
+    return MAX_ODE3_SERVO_STEP if simulation.solver == "ode3" else MAX_SERVO_STEP
+
+
 def _largest_rotor_step(simulation: SimulationTable) -> float:
     """Largest product of timestep and a pole of the rotors."""
-    by_euler = simulation.plant == "mujoco" and simulation.integrator != "RK4"
-    return MAX_EULER_STEP if by_euler else MAX_SERVO_STEP[simulation.plant]
+    by_euler = simulation.solver not in {"RK4", "ode3"}
+    return MAX_EULER_STEP if by_euler else _largest_servo_step(simulation)
 
 
 def _check_measured_reaction(

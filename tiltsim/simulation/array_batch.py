@@ -1,4 +1,4 @@
-"""Flights on the thesis's equations in JAX, many at once as rows of arrays.
+"""Flights on equations of motion in JAX, many at once as rows of arrays.
 
 Rows of a batch have one closed loop, one time step and one duration; they may differ in any number
 of the scenario. All fly to the end of the duration; a row that ends early is cut there, and its
@@ -50,8 +50,10 @@ class _Sound:
 def _named(record: Any, name: str = "") -> Iterator[tuple[str, float]]:
     """The numbers of a record with the names of their fields."""
     for field, value in zip(record._fields, record):
-        if isinstance(value, tuple):
+        if hasattr(value, "_fields"):
             yield from _named(value, field)
+        elif isinstance(value, tuple):
+            yield from ((field, float(entry)) for entry in value)
         else:
             yield field, float(value)
 

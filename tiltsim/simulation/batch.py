@@ -144,7 +144,7 @@ def _fly_window(
             from tiltsim.simulation.array_batch import ArrayBatch
 
             flown = ArrayBatch(chosen, threads, pool, result).results()
-        elif way == "thesis":
+        elif way == "equations":
             for one_of_each in {assembly.loop: assembly for assembly in chosen}.values():
                 make_plant(one_of_each, engine="native")  # prepares native code before threads do
             flown = enumerate(
@@ -162,7 +162,7 @@ def _fly_window(
 
 
 def _way_to_fly(assembly: Assembly, native: bool) -> object:
-    """``alone``, ``thesis`` for threads with the thesis plant, or what a batch has in common."""
+    """``alone``, ``equations`` for threads without MuJoCo, or what a batch has in common."""
     scenario, loop = assembly.scenario, assembly.loop
     simulation = scenario.simulation
     if simulation.engine == "jax":
@@ -172,8 +172,8 @@ def _way_to_fly(assembly: Assembly, native: bool) -> object:
     natively = simulation.engine == "native" or (simulation.engine == "auto" and native)
     if not natively or scenario.controller.is_external:
         return "alone"
-    if simulation.plant == "thesis":
-        return "thesis"
+    if simulation.plant != "mujoco":
+        return "equations"
     # Stops of the tilt servos are constraints, which lengthen a state; ground adds geoms; a layer
     # has states and controls of its own; a user's file may have other bodies.
     vehicle = scenario.vehicle

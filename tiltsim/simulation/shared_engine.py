@@ -14,7 +14,7 @@ from tiltsim.engines.cache import (
     native_code_is_cached,
 )
 from tiltsim.laws.assembling import assemble, loop_of
-from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE, with_engine
+from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE, native_name, with_engine
 from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.interrupts import reraise_swallowed_interrupts
@@ -80,7 +80,7 @@ def with_compiled(scenario: Scenario, names: frozenset[str]) -> Scenario:
 
 
 def _name(scenario: Scenario) -> str:
-    return loop_of(scenario).native_name(scenario.simulation.plant)
+    return native_name(scenario, loop_of(scenario))
 
 
 def _examples(scenarios: Sequence[Scenario]) -> dict[str, Scenario]:

@@ -46,9 +46,10 @@ def symbolic(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Sy
         TiltsimError: If it needs random numbers, which have no symbolic form.
     """
     scenario = load_scenario(scenario)
-    plant = scenario.simulation.plant
-    if plant != "thesis":
-        raise InputError(f'simulation.plant = "{plant}": symbolic supports "thesis" only')
+    if scenario.simulation.plant == "mujoco":
+        raise InputError(
+            'simulation.plant = "mujoco": symbolic supports "thesis" and "rigid_body" only'
+        )
     symbols = CasadiSymbols()
     assembly = assemble(scenario)
     equations, (parameters, knots) = assembly.loop.equations, assembly.setup

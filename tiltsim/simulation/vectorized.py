@@ -40,9 +40,10 @@ class Vectorized:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        if scenario.simulation.plant != "thesis":
-            plant = scenario.simulation.plant
-            raise InputError(f'simulation.plant = "{plant}": vectorized supports "thesis" only')
+        if scenario.simulation.plant == "mujoco":
+            raise InputError(
+                'simulation.plant = "mujoco": vectorized supports "thesis" and "rigid_body" only'
+            )
         self._jax = require_jax("tiltsim.vectorized")
         self.scenario = scenario
         self._assembly = assemble(in_full(scenario))

@@ -29,6 +29,7 @@ from tiltsim_controllers.mathematics.vectors import (
     vectors_of,
     written_out,
 )
+from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 
 ROTOR_FLOATS: Final = 20
 """Floats of one rotor."""
@@ -124,6 +125,24 @@ def table_per_newton(table: Sequence[float], coefficients: Sequence[float]) -> V
     rows = np.reshape(np.array(table, float), (-1, ROTOR_FLOATS))
     rows[:, CONSTANT:] /= (rows[:, SPIN_SIGN] * coefficients)[:, np.newaxis]
     return tuple(rows.ravel().tolist())
+
+
+def cross_table(vehicle: Vehicle, *, tilting: bool) -> Values:
+    """The table of four rotors at the ends of a cross (ch. 3), each tilted about its arm or fixed.
+
+    In closed form, so that parameters of the vehicle may be numbers of any kind.
+    """
+    drag, table = vehicle.drag_coefficient, []
+    for rotor, (x, y) in enumerate(((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))):
+        spin = SPIN[rotor]
+        push = spin * vehicle.thrust_coefficient
+        lever = vehicle.arm_length * push
+        upright = (0.0, 0.0, push, lever * y, -lever * x, -drag)
+        aside = (push * y, -push * x, 0.0, -drag * y, drag * x, -lever)  # tilted by 90 degrees
+        nothing = (0.0,) * 6
+        parts = (nothing, upright, aside) if tilting else (upright, nothing, nothing)
+        table += [float(rotor) if tilting else -1.0, spin, *parts[0], *parts[1], *parts[2]]
+    return tuple(table)
 
 
 def layout_of(table: Sequence[float]) -> Layout:

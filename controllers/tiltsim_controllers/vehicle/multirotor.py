@@ -18,6 +18,7 @@ from tiltsim_controllers.mathematics.rotation import to_world
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import entries_of
 from tiltsim_controllers.vehicle.effectiveness import Layout, effectiveness_of
+from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rigid_body import cross
 
 BODY_STATES: Final = 18
@@ -49,6 +50,14 @@ def body_of(mass: float, inertia: ArrayLike, gravity: float) -> Body:
     inverse = np.linalg.inv(matrix)
     entries = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
     return Body(mass, gravity, *(float(m[entry]) for m in (matrix, inverse) for entry in entries))
+
+
+def principal_body(vehicle: Vehicle) -> Body:
+    """The body of a vehicle whose principal axes are those of the body."""
+    moments = vehicle.inertia_xx, vehicle.inertia_yy, vehicle.inertia_zz
+    xx, yy, zz = moments
+    none = (0.0, 0.0, 0.0)
+    return Body(vehicle.mass, vehicle.gravity, *moments, *none, 1.0 / xx, 1.0 / yy, 1.0 / zz, *none)
 
 
 @scalar

@@ -44,7 +44,7 @@ class Motion(NamedTuple):
     least_thrust: float  # (rad/s)^2, limits of the thrusts' controls
     greatest_thrust: float
     gyroscopic: float  # factor of the gyroscopic torque, 0 on the thesis plant
-    pod_inertia: float  # kg m^2, 0 on the thesis plant
+    pod_inertia: float  # kg m^2, 0 of massless pods, which only MuJoCo does not have
     pod_share: float  # of a pod's inertia in that of its hinge, which has the servo's armature
 
 
@@ -104,13 +104,13 @@ def plant_angular_acceleration(
 def _motion(plan: FlightPlan) -> Motion:
     scenario = plan.scenario
     least, greatest = rotor_limits(scenario).thrust_range or (-inf, inf)
-    has_pods = scenario.simulation.plant == "mujoco"
-    pod = scenario.rotorcraft.pod.inertia if has_pods else 0.0
+    plant = scenario.simulation.plant
+    pod = scenario.rotorcraft.pod.inertia if plant == "mujoco" else 0.0
     return Motion(
         mechanics=mechanics(plan),
         least_thrust=least,
         greatest_thrust=greatest,
-        gyroscopic=float(has_pods),
+        gyroscopic=float(plant != "thesis"),
         pod_inertia=pod,
         pod_share=pod / (pod + SERVO_ARMATURE),
     )

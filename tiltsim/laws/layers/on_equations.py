@@ -1,8 +1,8 @@
-"""Any closed loop of a rotorcraft, with any layers, on the thesis's equations.
+"""Any closed loop of a rotorcraft, with any layers, on equations of motion.
 
 The controls are the same function of time, `qpos`, `qvel` and `act` as in MuJoCo, with the same
-sensors, noise and latency. Only the plant on which they act differs:
-`tiltsim.equations.actuator_level`.
+sensors, noise and latency. Only the plant on which they act differs: the thesis's vehicle
+(`tiltsim.equations.actuator_level`) or a rigid body (`tiltsim.equations.rigid_body`).
 """
 
 from __future__ import annotations
@@ -12,13 +12,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Equations
-from tiltsim.equations.actuator_level import (
-    Loads,
-    actuator_plant,
-    limit_speeds_of,
-    mechanics,
-    mechanics_of,
-)
+from tiltsim.equations.actuator_level import ActuatorPlant, Loads, limit_speeds_of
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.models.parts import WRENCH_SIZE, ExtraActuators
 from tiltsim.vehicles.rotorcraft.layout import layout_of
@@ -91,15 +85,14 @@ def _projection(
 
 
 @cache
-def on_equations(loop: ClosedLoop) -> ClosedLoop:
-    """A loop with equations in which its controls act on the thesis's rigid body.
+def on_equations(loop: ClosedLoop, plant: ActuatorPlant) -> ClosedLoop:
+    """A loop with equations in which its controls act on a plant.
 
     Their inputs are the controls, their state is the vehicle's motion followed by the activations.
     """
     dynamics = loop.dynamics
-    plant = actuator_plant(dynamics)
     first, qpos_of, qvel_of = plant.motion, plant.qpos, plant.qvel
-    motion_rates = plant.rates
+    motion_rates, finish = plant.rates, plant.finish
     controls, held = loop.sampling.controls, loop.sampling.hold
     observe = loop.columns.observe
     activation_rates, loads = read_actuators(dynamics)
@@ -142,13 +135,13 @@ def on_equations(loop: ClosedLoop) -> ClosedLoop:
 
     @scalar
     def project_onto_limits(state: list[float], parameters: Any) -> list[float]:
-        return project_motion(state, parameters.layer)
+        return project_motion(finish(state, parameters.layer), parameters.layer)
 
     def initial(plan: FlightPlan, setup: ControlSetup) -> Vector:
         inner = ControlSetup(setup.parameters.inner, setup.knots)
         return (*plant.initial(plan), *dynamics.initial_activations(plan, inner))
 
-    equation_inputs.__qualname__ = f"on_equations.{controls.__qualname__}"
+    equation_inputs.__qualname__ = f"{plant.name}.{controls.__qualname__}"
     equations = Equations(
         inputs=equation_inputs,
         inputs_size=dynamics.sizes.ctrl,
@@ -157,6 +150,4 @@ def on_equations(loop: ClosedLoop) -> ClosedLoop:
         observe=observe_equations,
         project_onto_limits=project_onto_limits,
     )
-    return wrap_loop(
-        loop, Layer("on_equations", mechanics_of(dynamics), mechanics, equations=equations)
-    )
+    return wrap_loop(loop, Layer(plant.name, plant.mechanics, plant.read, equations=equations))

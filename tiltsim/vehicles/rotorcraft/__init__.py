@@ -183,7 +183,8 @@ def initial_rotor_speeds(plan: FlightPlan) -> Values:
     return tuple(sign * speed for sign, speed in zip(table.spins, speeds, strict=True))
 
 
-def _initial_motion(plan: FlightPlan) -> tuple[Vector, Vector]:
+def initial_motion(plan: FlightPlan) -> tuple[Vector, Vector]:
+    """``qpos`` and ``qvel`` of MuJoCo at time zero."""
     initial = plan.scenario.initial
     tilting = plan.scenario.vehicle.has_tilting_rotors
     angles, rates = initial_tilts(plan) if tilting else ((), ())
@@ -201,7 +202,7 @@ def rotorcraft_kind(layout: Layout, extra_columns: tuple[str, ...] = ()) -> Vehi
         columns=rotorcraft_columns(layout) | {name: EXTRA_COLUMNS[name] for name in extra_columns},
         thrusts=rotor_thrusts,
         compile=_compile,
-        initial_motion=_initial_motion,
+        initial_motion=initial_motion,
         limit_exceeded=limit_exceeded_of(layout),
         metrics=rotorcraft_metrics,
     )

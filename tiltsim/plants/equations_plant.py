@@ -1,4 +1,4 @@
-"""The thesis's own equations of motion as the plant."""
+"""Equations of motion as the plant: the thesis's own, or those of a rigid body."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ import numpy as np
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.cache import mark_native_code_compiled
-from tiltsim.equations.ode3 import Integration, Stepper, make_stepper
-from tiltsim.plants.engine_choice import choose_engine
+from tiltsim.equations.solvers import Integration, Stepper, make_stepper
+from tiltsim.plants.engine_choice import choose_engine, native_name
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.plants.plant import Plant
 from tiltsim_controllers.mathematics.records import slotted
 from tiltsim_controllers.mathematics.scalar import Floats
 
 
-class ThesisPlant(Plant):
-    """The thesis's equations, integrated with ode3; see `tiltsim.equations.ode3`.
+class EquationsPlant(Plant):
+    """The equations of a loop, integrated by a solver of `tiltsim.equations.solvers`.
 
     Args:
         assembly: The flight; its loop has equations.
@@ -37,10 +37,11 @@ class ThesisPlant(Plant):
         self._fault = ""
         self.engine: EngineName = engine or choose_engine(scenario, loop)
         self._advance: Stepper
+        solver, plant = scenario.simulation.solver, scenario.simulation.plant
         if self.engine == "native":
             from tiltsim.engines.native_stepper import compile_stepper, native_record
 
-            self._advance, self._record = compile_stepper(loop)
+            self._advance, self._record = compile_stepper(loop, plant, solver)
             record: tuple[Any, Any] = native_record(loop, setup.userdata)
         elif self.engine == "jax":
             from tiltsim.arrays.flying import course_of, stepper_on_arrays
@@ -48,7 +49,7 @@ class ThesisPlant(Plant):
             self._advance = stepper_on_arrays(course_of(assembly))
             record = setup
         else:
-            self._advance = make_stepper(self._equations)
+            self._advance = make_stepper(self._equations, solver)
             record = slotted(setup.parameters), setup.knots
         simulation, disturbance = scenario.simulation, disturbance_acceleration(scenario)
         self._integration = Integration(
@@ -108,7 +109,7 @@ class ThesisPlant(Plant):
             self._integration,
         )
         self._state = state.tolist()
-        mark_native_code_compiled(self._assembly.loop.native_name("thesis"))
+        mark_native_code_compiled(native_name(self._assembly.scenario, self._assembly.loop))
         self._step_index += samples * steps
         return None if recorder.terminated else recorder.samples
 
