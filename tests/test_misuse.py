@@ -54,7 +54,7 @@ MISUSES = {
         lambda: delattr(scenario().simulation, "duration"),
         "simulation.duration: a scenario stays as it is",
     ),
-    "vectorized in MuJoCo": (lambda: tiltsim.vectorized({}), 'vectorized supports "thesis" only'),
+    "vectorized in MuJoCo": (lambda: tiltsim.vectorized({}), 'vectorized supports "thesis" and'),
     "linearize a moving gait": (
         lambda: tiltsim.linearize("ch04_tracking/circle#continuous_t2_modified"),
         "with no common multiple",
@@ -65,7 +65,7 @@ MISUSES = {
         "moves with a period of",
     ),
     "stability of nothing": (lambda: tiltsim.stability(None), "scenario = None: must be"),
-    "symbolic in MuJoCo": (lambda: tiltsim.symbolic({}), 'symbolic supports "thesis" only'),
+    "symbolic in MuJoCo": (lambda: tiltsim.symbolic({}), 'symbolic supports "thesis" and'),
     "a family without a member": (lambda: tiltsim.simulate("ch04_tracking/setpoint"), "choose a"),
     "a sweep as scenario": (
         lambda: tiltsim.simulate("beyond/sweeps/monte_carlo"),

@@ -11,12 +11,14 @@ import tiltsim
 from tests.arrays.recorded_calls import LAYERED, REFERENCES, SUPERVISED
 from tests.laws.test_baselines import BASELINES
 from tests.laws.test_laws import GUST, LAWS
+from tests.laws.test_multirotor import TILTS, document
 from tests.simulation.test_batch import CAR, CAR_GAITS, EXACT, GAITS
 from tiltsim.arrays.flying import Kernel, course_of, double_precision
 from tiltsim.equations.solvers import Integration, make_stepper
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.flight_model import disturbance_acceleration
+from tiltsim.scenario.loading import merge
 
 needs_jax = pytest.mark.skipif(
     "not __import__('importlib').util.find_spec('jax')", reason="JAX is not installed"
@@ -38,6 +40,14 @@ EVERY = {
     **LAYERED,
 }
 """Every controller, gait, reference and layer."""
+
+ON_RIGID_BODY = {
+    "everything attitude_altitude": EVERY["everything attitude_altitude"],
+    "multirotor": document(
+        "tilt_hexarotor", {"max_rotor_speed": 800.0, "rotor_time_constant": 0.02}, gait=TILTS
+    ),
+}
+"""Some for its plant: all layers, another layout."""
 
 COMPILED = (
     "attitude_altitude",
@@ -73,8 +83,19 @@ def test_a_flight_in_jax_is_the_one_in_python():
 @pytest.mark.parametrize("name", EVERY)
 def test_steps_of_whatever_flies_on_the_equations_are_those_in_python(name):
     """Not compiled: XLA takes ten times as long to compile a step as this takes to run three."""
-    simulation = {"plant": "thesis", "duration": 0.3}
-    assembly = assemble(tiltsim.parse_scenario({**EVERY[name], "simulation": simulation}))
+    compare_steps({**EVERY[name], "simulation": {"plant": "thesis", "duration": 0.3}})
+
+
+@needs_jax
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ON_RIGID_BODY)
+def test_steps_of_the_rigid_body_are_those_in_python(name):
+    compare_steps(merge(ON_RIGID_BODY[name], {"simulation": {"plant": "rigid_body"}}))
+
+
+def compare_steps(tables):
+    """Three steps in Python and in JAX."""
+    assembly = assemble(tiltsim.parse_scenario(tables))
     equations, disturbance = assembly.loop.equations, disturbance_acceleration(assembly.scenario)
     start = [float(value) for value in equations.initial(assembly, assembly.setup)]
     with double_precision():
@@ -83,9 +104,11 @@ def test_steps_of_whatever_flies_on_the_equations_are_those_in_python(name):
         for _ in range(3):
             carried = kernel.step(carried)
         state = np.array(carried.state)
-    integration = Integration(0.001, 0, *assembly.setup, disturbance)
+    simulation = assembly.scenario.simulation
+    timing = simulation.timestep, simulation.control_steps
+    integration = Integration(*timing, *assembly.setup, disturbance)
     held = (0.0,) * equations.inputs_size
-    python, _ = make_stepper(equations, "ode3")(0, start, held, 3, integration)
+    python, _ = make_stepper(equations, simulation.solver)(0, start, held, 3, integration)
     scale = np.maximum(1.0, np.abs(python))
     np.testing.assert_array_less(np.abs(state - python) / scale, 1e-11)
 

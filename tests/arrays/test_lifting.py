@@ -7,7 +7,6 @@ from math import isfinite
 
 import numpy as np
 import pytest
-from tiltsim.equations.ode3 import Integration, make_step
 
 from tests.arrays.recorded_calls import described, flown, mapped, record, short_flights
 from tests.laws.test_laws import LAWS
@@ -16,6 +15,7 @@ from tiltsim.arrays.jax_arrays import JaxArrays
 from tiltsim.arrays.lifting import Lifting
 from tiltsim.arrays.values import LiftError
 from tiltsim.closed_loop.loop import Equations
+from tiltsim.equations.solvers import Integration, make_step
 from tiltsim_controllers.mathematics.scalar import scalar, scalar_functions
 
 jax = pytest.importorskip("jax")
@@ -128,7 +128,7 @@ def test_stages_of_a_step_do_not_multiply_the_operations():
     def inputs(time, state, parameters, knots):
         return ()
 
-    step = make_step(Equations(inputs, 0, rates, initial=None, observe=None))
+    step = make_step(Equations(inputs, 0, rates, initial=None, observe=None), "ode3")
     integration = Integration(0.1, 0, None, (), (0.0, 0.0, 0.0))
     start = np.linspace(0.1, 0.3, 3 * ROWS).reshape(3, ROWS)
 

@@ -42,10 +42,11 @@ def test_both_forms_of_a_rotation_turn_alike():
         assert matrix.moved(state, by)[1:10] == pytest.approx(expected, abs=1e-12)
 
 
-def test_rates_are_those_of_the_coordinates():
+@pytest.mark.parametrize("entries", [MATRIX, QUATERNION])
+def test_rates_are_those_of_the_coordinates(entries):
     """A turn in body axes for a short time has its rates."""
     step = 1e-6
-    for coordinates, state, by in random_states(MATRIX, 5):
+    for coordinates, state, by in random_states(entries, 5):
         ahead, behind = coordinates.moved(state, step * by), coordinates.moved(state, -step * by)
         derivative = (ahead - behind) / (2.0 * step)
         assert coordinates.rates(state, derivative) == pytest.approx(by, abs=1e-9)

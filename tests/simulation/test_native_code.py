@@ -15,7 +15,7 @@ from tests.laws.test_laws import LAWS
 from tests.simulation.test_batch import ALL_LAWS, GAITS, scenario
 from tiltsim.engines.native_engine import compile_control
 from tiltsim.engines.native_stepper import compile_stepper
-from tiltsim.equations.actuator_level import ACTUATOR_PLANTS
+from tiltsim.equations.actuator_level import actuator_plant
 from tiltsim.flight.end import End
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.laws.layers.actuation import with_actuation
@@ -199,7 +199,7 @@ def test_no_two_control_steps_share_a_name_of_native_code(plant):
         loops = [
             *laws[: len(LOOPS)],
             *spinning[: len(tiltrotors) - 2],
-            *(on_equations(loop, ACTUATOR_PLANTS[loop.dynamics.model]) for loop in moved),
+            *(on_equations(loop, actuator_plant(loop.dynamics)) for loop in moved),
         ]
     names = [loop.native_name(plant) for loop in loops]
     assert len(set(names)) == len(names) == len(loops) > 30

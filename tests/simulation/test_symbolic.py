@@ -19,11 +19,12 @@ LOOPS = LAWS | {
     f"gait {name}": {"gait": {"type": name, **table}, "controller": EXACT}
     for name, table in GAITS.items()
 }
+LOOPS["rigid body"] = {**LAWS["attitude_altitude"], "simulation": {"plant": "rigid_body"}}
 
 
 @pytest.mark.parametrize("name", LOOPS)
 def test_closed_loops_are_those_of_python(name):
-    scenario = tiltsim.parse_scenario({**LOOPS[name], **THESIS})
+    scenario = tiltsim.parse_scenario({**THESIS, **LOOPS[name]})
     model, assembly = tiltsim.symbolic(scenario), assemble(scenario)
     equations, (parameters, knots) = assembly.loop.equations, assembly.setup
     state = np.array(model.initial) + 0.01
@@ -60,7 +61,7 @@ def test_its_jacobian_has_the_poles_of_the_gains():
 
 
 def test_it_refuses_what_has_no_symbolic_form():
-    with pytest.raises(InputError, match='plant = "mujoco": symbolic supports "thesis" only'):
+    with pytest.raises(InputError, match='plant = "mujoco": symbolic supports "thesis" and'):
         tiltsim.symbolic({})
     noisy = {**THESIS, "sensors": {"position_noise": 0.1}}
     with pytest.raises(TiltsimError, match=r"noise.uniform, line \d+: .*as random ones"):

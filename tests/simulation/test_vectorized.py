@@ -84,8 +84,16 @@ def test_a_gait_has_derivatives_by_its_scale_and_bias_where_they_are_one():
     assert slopes == {"scale": pytest.approx(0.4), "bias": pytest.approx(0.4)}
 
 
-def test_it_needs_the_thesis_plant():
-    with pytest.raises(InputError, match=r'plant = "mujoco".*vectorized supports "thesis" only'):
+def test_numbers_of_a_rigid_body_are_parameters():
+    rigid = {"simulation": {"plant": "rigid_body"}, "controller": {"law": "yaw_position"}}
+    tables = {**rigid, "vehicle": {"model": "quadrotor"}}
+    flown = tiltsim.vectorized(tiltsim.parse_scenario(tables))
+    needed = {"mass", "inertia", "arm_length", "thrust_coefficient", "drag_coefficient"}
+    assert needed < set(flown.parameters["vehicle"])
+
+
+def test_it_needs_equations():
+    with pytest.raises(InputError, match=r'plant = "mujoco".*vectorized supports "thesis" and'):
         tiltsim.vectorized({})
 
 

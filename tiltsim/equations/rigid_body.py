@@ -156,11 +156,8 @@ def _rates_of(form: Form) -> Callable[..., Values]:
     def motion_rates(
         state: Vector, ctrl: Vector, loads: Values, mechanics: Any, disturbance: Triple
     ) -> Values:
-        body, (qw, qx, qy, qz), (p, q, r) = (
-            mechanics.vehicle.body,
-            quaternion_in(state),
-            omega_in(state),
-        )
+        body = mechanics.vehicle.body
+        (qw, qx, qy, qz), (p, q, r) = quaternion_in(state), omega_in(state)
         angles, rates = tilts_in(state), tilt_rates_in(state)
         squares = squares_of(ctrl, spins)
         fx, fy, fz, tx, ty, tz = wrench_of(angles, squares, mechanics.vehicle.effects, 0)

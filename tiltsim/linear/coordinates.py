@@ -58,20 +58,24 @@ class Coordinates(NamedTuple):
         """The rates of the coordinates relative to a state, from the derivative of its numbers."""
         if not self.rotation:
             return derivative
-        assert self.rotation == MATRIX  # MuJoCo gives the body rates themselves
-        first, after = self.first, self.first + MATRIX
-        rotation, rates = state[first:after].reshape(3, 3), derivative[first:after].reshape(3, 3)
-        skew = rotation.T @ rates
-        body_rates = 0.5 * np.array(
-            (skew[2, 1] - skew[1, 2], skew[0, 2] - skew[2, 0], skew[1, 0] - skew[0, 1])
-        )
-        return np.concatenate((derivative[:first], body_rates, derivative[after:]))
+        first, after = self.first, self.first + self.rotation
+        rates = _turn_rates(state[first:after], derivative[first:after])
+        return np.concatenate((derivative[:first], rates, derivative[after:]))
 
 
 def _product(p: Floats, q: Floats) -> Floats:
     """The product of two quaternions."""
     vector = p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])
     return np.array((p[0] * q[0] - p[1:] @ q[1:], *vector))
+
+
+def _turn_rates(rotation: Floats, derivative: Floats) -> Floats:
+    """The body rates of a rotation, from the derivative of its entries."""
+    if len(rotation) == QUATERNION:
+        return 2.0 * _product(rotation * (1.0, -1.0, -1.0, -1.0), derivative)[1:]
+    skew = rotation.reshape(3, 3).T @ derivative.reshape(3, 3)
+    turning = (skew[2, 1] - skew[1, 2], skew[0, 2] - skew[2, 0], skew[1, 0] - skew[0, 1])
+    return 0.5 * np.array(turning)
 
 
 def _quaternion(rotation: Floats) -> Floats:

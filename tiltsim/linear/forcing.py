@@ -73,10 +73,10 @@ def forcing_of(assembly: Assembly) -> Forcing:
         kind = gait.parameters
         if kind.type == TABLE and not kind.repeats:
             raise InputError(f"{scenario.address}: gait.hold: a table that does not repeat ends")
-        if kind.type == ROTATING and scenario.simulation.plant == "mujoco":
+        if kind.type == ROTATING and scenario.simulation.plant != "thesis":
             raise InputError(
-                f'{scenario.address}: gait.type = "rotating": its tilt angles grow for ever in '
-                'MuJoCo; choose simulation.plant = "thesis"'
+                f'{scenario.address}: gait.type = "rotating": its tilt angles grow for ever; '
+                'choose simulation.plant = "thesis"'
             )
         periods.append(gait.period)
     gust = None if scenario.air is None else scenario.air.gust

@@ -26,9 +26,9 @@ from tiltsim.linear.naming import (
     equation_inputs,
     mujoco_coordinates,
 )
+from tiltsim.plants.equations_plant import EquationsPlant
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.plants.mujoco_plant import MujocoPlant
-from tiltsim.plants.thesis_plant import ThesisPlant
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 
@@ -102,7 +102,7 @@ class Motion(ABC):
 
 
 class EquationMotion(Motion):
-    """On the thesis's equations."""
+    """On equations of motion."""
 
     def _names(self) -> tuple[Coordinates, tuple[tuple[str, int], ...]]:
         inputs = equation_inputs(self.assembly, self._equations.inputs_size)
@@ -111,16 +111,16 @@ class EquationMotion(Motion):
     @cached_property
     def _equations(self) -> Equations:
         equations = self.assembly.loop.equations
-        assert equations is not None  # on the thesis plant there are some
+        assert equations is not None  # only plants with equations are moved so
         return equations
 
     @cached_property
-    def _plant(self) -> ThesisPlant:
-        return ThesisPlant(assemble(self.scenario), self.engine)
+    def _plant(self) -> EquationsPlant:
+        return EquationsPlant(assemble(self.scenario), self.engine)
 
     @cached_property
-    def _varied(self) -> ThesisPlant:
-        return ThesisPlant(self.assembly, "python")
+    def _varied(self) -> EquationsPlant:
+        return EquationsPlant(self.assembly, "python")
 
     @property
     def initial(self) -> Floats:
@@ -211,6 +211,6 @@ class MujocoMotion(Motion):
 
 def make_motion(scenario: Scenario, engine: EngineName | None = None) -> Motion:
     """The motion of a scenario on the plant that it requests."""
-    if scenario.simulation.plant == "thesis":
-        return EquationMotion(scenario, engine)
-    return MujocoMotion(scenario, engine)
+    if scenario.simulation.plant == "mujoco":
+        return MujocoMotion(scenario, engine)
+    return EquationMotion(scenario, engine)

@@ -88,8 +88,10 @@ def mujoco_coordinates(loop: ClosedLoop) -> Coordinates:
 
 
 def equation_coordinates(assembly: Assembly, size: int) -> Coordinates:
-    """Those of a state of the thesis's equations with so many numbers."""
+    """Those of a state of the equations with so many numbers; a rigid body has MuJoCo's."""
     loop, model = assembly.loop, assembly.scenario.vehicle.model
+    if assembly.scenario.simulation.plant == "rigid_body":
+        return mujoco_coordinates(loop)
     rotation = 0 if model in {"quadrotor", "tilt_car"} else MATRIX
     body = BODY_FIELDS
     if rotation:
@@ -132,7 +134,7 @@ def control_names(loop: ClosedLoop) -> tuple[tuple[str, int], ...]:
 
 
 def equation_inputs(assembly: Assembly, size: int) -> tuple[tuple[str, int], ...]:
-    """Inputs of the vehicle among those of the thesis's equations: names and indices."""
+    """Inputs of the vehicle among those of the equations: names and indices."""
     loop, model = assembly.loop, assembly.scenario.vehicle.model
     if model != "tilt_car" and loop.within is not None:
         return control_names(loop)

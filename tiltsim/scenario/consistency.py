@@ -67,7 +67,8 @@ def _check_rigid_body(scenario: ScenarioTables) -> None:
     if not isinstance(vehicle, RotorcraftTable):
         reason = f"supports no {vehicle.model}; use mujoco or thesis"
         raise scenario.mistake("simulation.plant", reason)
-    scenario.require("vehicle.pod", PodTable(), "the rigid_body plant has massless pods")
+    if isinstance(vehicle, VehicleTable):
+        scenario.require("vehicle.pod", PodTable(), "the rigid_body plant has massless pods")
     file = vehicle.user_vehicle
     if file is not None and file.unmodeled_properties:
         reason = f"neglects of vehicle.mjcf {file.unmodeled_properties}; use mujoco"

@@ -16,7 +16,7 @@ from tiltsim.scenario.scenario import Scenario
 
 
 class Symbolic(NamedTuple):
-    """CasADi functions of a scenario on the thesis's equations; its numbers are constants.
+    """CasADi functions of a scenario on equations of motion; its numbers are constants.
 
     Attributes:
         dynamics: ``(time, state, inputs) -> rates``: the vehicle, whatever its inputs.
@@ -39,10 +39,10 @@ def symbolic(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Sy
     """A scenario as CasADi functions of its dynamics and of its closed loop.
 
     Args:
-        scenario: Anything that `tiltsim.load_scenario` takes; simulated by the thesis's equations.
+        scenario: Anything that `tiltsim.load_scenario` takes; on the plant thesis or rigid_body.
 
     Raises:
-        InputError: If the scenario is invalid or not on the thesis plant, or CasADi is missing.
+        InputError: If the scenario is invalid or in MuJoCo, or CasADi is missing.
         TiltsimError: If it needs random numbers, which have no symbolic form.
     """
     scenario = load_scenario(scenario)
@@ -53,7 +53,7 @@ def symbolic(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Sy
     symbols = CasadiSymbols()
     assembly = assemble(scenario)
     equations, (parameters, knots) = assembly.loop.equations, assembly.setup
-    assert equations is not None  # on the thesis plant there are some
+    assert equations is not None  # mujoco is refused
     disturbance = disturbance_acceleration(scenario)
     initial = tuple(map(float, equations.initial(assembly, assembly.setup)))
     lifting, sx = Lifting(symbols), symbols.casadi.SX

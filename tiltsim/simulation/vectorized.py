@@ -28,7 +28,7 @@ def _check_keys(tree: Mapping[str, Any], known: Tree, path: str = "parameters") 
 
 
 class Vectorized:
-    """A scenario on the thesis's equations as pure functions of a tree of parameters.
+    """A scenario on equations of motion as pure functions of a tree of parameters.
 
     The tree has the scenario's keys, table by table, and may leave out any of them. Its numbers
     may be arrays of JAX; they are not checked against the limits of the keys. A number that is not
@@ -87,9 +87,9 @@ def vectorized(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> 
     """A scenario as pure functions ``initial``, ``step``, ``observe`` and ``fly`` in JAX.
 
     Args:
-        scenario: Anything that `tiltsim.load_scenario` takes; simulated by the thesis's equations.
+        scenario: Anything that `tiltsim.load_scenario` takes; on the plant thesis or rigid_body.
 
     Raises:
-        InputError: If the scenario is invalid or not on the thesis plant, or JAX is missing.
+        InputError: If the scenario is invalid or in MuJoCo, or JAX is missing.
     """
     return Vectorized(load_scenario(scenario))
