@@ -147,7 +147,10 @@ def _rates_of(form: Form) -> Callable[..., Values]:
     tilt_rates_in = entries_of(qvel_1 + TILT_RATE_1, tilts)
     # The controls are s varpi |varpi| with the spins s, the table's wrench is of varpi |varpi|.
     squares_of = componentwise(
-        "squares_of_thrusts", "ctrl, spins", f"spins# * ctrl[{places.thrust_1} + @]", places.rotors
+        f"squares_of_thrusts_{places.thrust_1}",
+        "ctrl, spins",
+        f"spins# * ctrl[{places.thrust_1} + @]",
+        places.rotors,
     )
     servos = servo_accelerations_of(tilts)
     wrench_of, spins = effectiveness_of(layout).wrench, form.spins
