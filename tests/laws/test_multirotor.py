@@ -273,10 +273,6 @@ HEXAROTOR = {"model": "multirotor", "mjcf": mjcf("hexarotor")}
             {"reference": {"type": "setpoint", "roll": 0.2}},
             "reference.roll = 0.2: is no output with 1 components of force",
         ),
-        "a wrong model": (
-            {"model_error": {"mass": 1.1}},
-            "is supported for tiltrotor and quadrotor",
-        ),
         "rotors heavier than the vehicle": (
             {"vehicle": {**HEXAROTOR, "rotor_inertia": 0.02}},
             "vehicle.rotor_inertia = 0.02: must be below 0.0133333",

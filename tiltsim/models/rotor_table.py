@@ -62,6 +62,11 @@ class Multirotor:
         return tuple(rotor.spin for rotor in self.rotors)
 
     @property
+    def moments(self) -> tuple[float, ...]:
+        """Principal moments of inertia, kg m^2."""
+        return tuple(np.linalg.eigvalsh(np.reshape(self.inertia, (3, 3))).tolist())
+
+    @property
     def max_rotor_inertia(self) -> float:
         """The largest spin inertia (kg m^2) of each rotor that the untilted vehicle can have."""
         axes = np.array([rotor.axis for rotor in self.rotors])

@@ -165,7 +165,9 @@ def _with_parameters(
     body = model.body("vehicle").id
     model.body_mass[body], model.body_inertia[body] = _body_inertia(spec, vehicle)
     for i, spin in zip(ROTORS, SPIN, strict=True):
-        model.actuator(f"thrust_{i}").gear[:] = _thrust_gear(vehicle, spin)
+        model.actuator(f"thrust_{i}").gear[:] = _thrust_gear(
+            vehicle.thrust_coefficient, vehicle.drag_coefficient, spin
+        )
     model.opt.gravity[:] = (0.0, 0.0, -vehicle.gravity)
     hover, speed = model.key("hover").id, vehicle.hover_rotor_speed
     model.key_act[hover, :4] = [spin * speed for spin in SPIN]
@@ -202,6 +204,10 @@ def _compose(spec: RotorcraftSpec) -> tuple[Compile, Compile]:
     hinges = [f"tilt_{i}" for i in range(1, spec.tilts + 1)]
     if isinstance(vehicle, Vehicle):
         _set_rotors(root, vehicle, len(hinges))
+    elif user_vehicle is not None and vehicle != user_vehicle.vehicle:
+        for i, rotor in enumerate(vehicle.rotors, start=1):
+            gear = _thrust_gear(rotor.thrust, rotor.drag, rotor.spin)
+            root.find("actuator", f"thrust_{i}").gear = gear
     _limit_rotors(root, spec)
     if hinges:
         if user_vehicle is None:
@@ -274,7 +280,9 @@ def _scale_lengths(root: Any, arm_length: float) -> None:
 def _set_rotors(root: Any, vehicle: Vehicle, hinges: int) -> None:
     """Give four rotors on a cross their coefficients, and the keyframes their speeds."""
     for i, spin in zip(ROTORS, SPIN, strict=True):
-        root.find("actuator", f"thrust_{i}").gear = _thrust_gear(vehicle, spin)
+        root.find("actuator", f"thrust_{i}").gear = _thrust_gear(
+            vehicle.thrust_coefficient, vehicle.drag_coefficient, spin
+        )
     for name, speed in (("hover", vehicle.hover_rotor_speed), ("start", START_SPEED)):
         key = root.find("key", name)
         if key is not None:
@@ -299,10 +307,9 @@ def _limit_speeds(root: Any, name: str, spec: RotorcraftSpec) -> None:
             rotor.actrange, rotor.actlimited = speed_range, "true"
 
 
-def _thrust_gear(vehicle: Vehicle, spin: float) -> tuple[float, ...]:
-    """Thrust and drag torque per unit of control."""
-    drag = -spin * vehicle.drag_coefficient
-    return 0.0, 0.0, vehicle.thrust_coefficient, 0.0, 0.0, drag
+def _thrust_gear(thrust: float, drag: float, spin: float) -> tuple[float, ...]:
+    """Thrust and drag torque per unit of control, by a rotor's coefficients."""
+    return 0.0, 0.0, thrust, 0.0, 0.0, -spin * drag
 
 
 def _set_inertia(root: Any, spec: RotorcraftSpec, vehicle: Vehicle) -> None:

@@ -74,7 +74,7 @@ class UserVehicle:
             found.append(f"its centre of mass at {_triple(self.center)} m")
         if isinstance(self.vehicle, Multirotor):
             return " and ".join(found)
-        if np.abs(self.products).max() > PRODUCT_TOLERANCE * min(self.vehicle[1:4]):
+        if np.abs(self.products).max() > PRODUCT_TOLERANCE * min(self.vehicle.moments):
             products = _triple(np.array(self.products))
             found.append(f"its products of inertia (xy, xz, yz) = {products} kg m^2")
         return " and ".join(found)
@@ -91,9 +91,9 @@ class UserVehicle:
         Raises:
             ValueError: If no body could have the mass and moments that remain for it.
         """
-        if isinstance(vehicle, Multirotor) or isinstance(self.vehicle, Multirotor):
-            return  # the file's
-        if vehicle[:4] == self.vehicle[:4]:
+        about_center = self._inertia_about_center(vehicle)
+        unchanged = np.array_equal(about_center, self._inertia_about_center(self.vehicle))
+        if unchanged and vehicle.mass == self.vehicle.mass:
             return
         carried = self.carried
         mass = vehicle.mass - carried.mass
@@ -103,17 +103,14 @@ class UserVehicle:
                 f"already have {carried.mass:.6g} kg"
             )
         center = (vehicle.mass * self.center - carried.first_moment) / mass
-        xy, xz, yz = self.products
-        xx, yy, zz = vehicle[1:4]
-        about_center = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         whole = about_center + vehicle.mass * parallel_axis(self.center)
         inertia = whole - carried.inertia - mass * parallel_axis(center)
         moments = np.linalg.eigvalsh(inertia)
         if moments[0] <= 0.0 or 2.0 * moments[-1] > moments.sum():
             raise ValueError(
-                f"vehicle.inertia = {list(vehicle[1:4])}: the body without what it carries would "
-                f"have the principal moments {', '.join(f'{m:.4g}' for m in moments)} kg m^2; all "
-                "must be above 0, and none larger than the sum of the other two"
+                f"vehicle.inertia = {list(vehicle.moments)}: the body without what it carries "
+                f"would have the principal moments {', '.join(f'{m:.4g}' for m in moments)} "
+                "kg m^2; all must be above 0, and none larger than the sum of the other two"
             )
         body = root.find("body", "vehicle")
         if body.inertial is not None:
@@ -125,6 +122,14 @@ class UserVehicle:
             mass=mass,
             fullinertia=(xx, yy, zz, inertia[0, 1], inertia[0, 2], inertia[1, 2]),
         )
+
+    def _inertia_about_center(self, vehicle: Vehicle | Multirotor) -> Floats:
+        """The inertia matrix of parameters, with the file's products where they have none."""
+        if isinstance(vehicle, Multirotor):
+            return np.reshape(vehicle.inertia, (3, 3))
+        xy, xz, yz = self.products
+        xx, yy, zz = vehicle.moments
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 @one_thread_at_a_time

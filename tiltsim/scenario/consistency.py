@@ -17,12 +17,7 @@ from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltSe
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.simulation_table import InitialTable
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController, FullPoseController
-from tiltsim.scenario.vehicle import (
-    ModelErrorTable,
-    PodTable,
-    VehicleTable,
-    require_physical_inertia,
-)
+from tiltsim.scenario.vehicle import ModelErrorTable, PodTable, require_physical_inertia
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.laws.multirotor_full_pose import pose_rank
 
@@ -189,16 +184,14 @@ def _check_model_error(scenario: ScenarioTables) -> None:
     error = scenario.model_error
     if error == ModelErrorTable():
         return
-    if not isinstance(scenario.vehicle, VehicleTable):
+    if not isinstance(scenario.vehicle, RotorcraftTable):
         raise scenario.mistake(
-            "vehicle.model",
-            "[model_error] is supported for tiltrotor and quadrotor only; remove it",
+            "vehicle.model", "[model_error] is supported for rotorcraft only; remove it"
         )
     if scenario.vehicle.mjcf is not None:
         scenario.require("model_error.arm_length", 1.0, "defined by vehicle.mjcf; remove it")
-    require_physical_inertia(
-        "model_error.inertia", list(error.inertia), scenario.true_rotorcraft[1:4]
-    )
+    vehicle = scenario.true_vehicle
+    require_physical_inertia("model_error.inertia", list(error.inertia), vehicle.moments)
 
 
 _SPATIAL_KEYS: Final = ("position", "velocity", "acceleration", "amplitude")

@@ -172,7 +172,7 @@ class ScenarioTables(Table):
     def true_vehicle(self) -> Vehicle | Multirotor:
         """The parameters of any simulated rotorcraft."""
         if isinstance(self.vehicle, MultirotorTable):
-            return self.vehicle.resolve()
+            return self.model_error.apply_to_rotors(self.vehicle.resolve())
         return self.true_rotorcraft
 
     @property

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi, sqrt
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
+import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from tiltsim.models.parts import SERVO_ARMATURE, Pod
+from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.rotorcraft import (
     AnyVehicleTable,
@@ -19,10 +22,6 @@ from tiltsim.scenario.table import NotTiny, Positive, Table, example
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, TiltCar
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
-
-if TYPE_CHECKING:
-    pass
-
 
 MOMENTS: Final = ("inertia_xx", "inertia_yy", "inertia_zz")
 """The principal moments among the fields of `Vehicle`."""
@@ -240,7 +239,7 @@ class ModelErrorTable(Table):
     )
     inertia: Annotated[tuple[ScaleFactor, ScaleFactor, ScaleFactor], Field(strict=False)] = Field(
         (1.0, 1.0, 1.0),
-        description="one factor per principal moment [-]",
+        description="one factor per moment about a body axis [-]",
         examples=[[1.1, 1.1, 1.0]],
     )
     arm_length: ScaleFactor = Field(
@@ -252,6 +251,23 @@ class ModelErrorTable(Table):
     drag_coefficient: ScaleFactor = Field(
         1.0, description="factor on every rotor's torque [-]", examples=[0.9]
     )
+
+    def apply_to_rotors(self, vehicle: Multirotor) -> Multirotor:
+        """As `apply`, to a multirotor; products of inertia by the mean factor of their axes."""
+        scale = np.sqrt(self.inertia)
+        inertia = np.reshape(vehicle.inertia, (3, 3)) * np.outer(scale, scale)
+        return replace(
+            vehicle,
+            mass=self.mass * vehicle.mass,
+            inertia=tuple(inertia.ravel().tolist()),
+            rotors=tuple(
+                rotor._replace(
+                    thrust=self.thrust_coefficient * rotor.thrust,
+                    drag=self.drag_coefficient * rotor.drag,
+                )
+                for rotor in vehicle.rotors
+            ),
+        )
 
     def apply(self, vehicle: Vehicle) -> Vehicle:
         """The simulated vehicle, where the controller assumes ``vehicle``."""

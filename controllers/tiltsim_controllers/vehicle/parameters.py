@@ -23,6 +23,11 @@ class Vehicle(NamedTuple):
     gravity: float  # [g] m/s^2
 
     @property
+    def moments(self) -> tuple[float, ...]:
+        """Principal moments of inertia, kg m^2."""
+        return self[1:4]
+
+    @property
     def hover_rotor_speed(self) -> float:
         """The speed (rad/s) at which four untilted rotors carry the weight."""
         return float((self.mass * self.gravity / (4.0 * self.thrust_coefficient)) ** 0.5)

@@ -8,9 +8,11 @@ import pytest
 
 import tiltsim
 from tiltsim.laws.assembling import assemble
+from tiltsim.models.pose import VehiclePose
 from tiltsim.plants.command import Command, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.plants.factory import make_plant
+from tiltsim.plants.flight_model import build_model
 from tiltsim.studies.fleet import fleet_file
 from tiltsim.vehicles.rotorcraft.layout import Layout
 
@@ -108,6 +110,32 @@ def test_angular_momentum_stays():
         drifts.append(np.abs(angular_momentum(plant, 6) - momentum).max())
     assert drifts[1] < 5e-9
     assert drifts[0] > 10.0 * drifts[1]
+
+
+ERROR = {"mass": 1.05, "inertia": [1.1, 1.05, 1.0], "thrust_coefficient": 0.95}
+
+
+def test_a_model_error_is_in_the_plant_and_not_in_the_law():
+    """On both plants; the inertia with its products, the pods' part included."""
+    plain, wrong = (scenario("tilt_heptarotor", model_error=error) for error in ({}, ERROR))
+    assembly = assemble(wrong)
+    assert assembly.setup.parameters.law == assemble(plain).setup.parameters.law
+    known, model = plain.vehicle.resolve(), build_model(assembly)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    whole = VehiclePose(model, data).moments(range(1, model.nbody))
+    scale = np.sqrt(ERROR["inertia"])
+    desired = np.reshape(known.inertia, (3, 3)) * np.outer(scale, scale)
+    assert whole.mass == pytest.approx(1.05 * known.mass, rel=1e-12)
+    np.testing.assert_allclose(whole.inertia, desired, rtol=1e-9, atol=1e-12)
+    gears = model.actuator_gear[[model.actuator(f"thrust_{i}").id for i in range(1, 8)], 2]
+    np.testing.assert_allclose(gears, 0.95 * np.array(known.thrust_coefficients), rtol=1e-12)
+
+    flights = [
+        fly("hexarotor", {}, {"plant": plant}, model_error=ERROR) for plant in ("mujoco", "thesis")
+    ]
+    assert furthest(*flights) < 1e-6
+    assert np.abs(flights[0]["z"][-1]) > 1e-5  # it is heavier, and weaker
 
 
 @pytest.mark.parametrize("name", ["tilt_hexarotor", "omni_octorotor"])
