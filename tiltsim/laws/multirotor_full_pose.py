@@ -196,6 +196,7 @@ def full_pose_loop(layout: Layout) -> ClosedLoop:
             lambda plan, _setup: (*initial_rotor_speeds(plan), *initial_tilts(plan)[0]),
             places.tilts,
             layout.spins,
+            layout.tilt_of_rotor,
         ),
         sampling=sampling,
         columns=_columns_of(layout),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -20,12 +20,15 @@ if TYPE_CHECKING:
     from tiltsim.closed_loop.loop import Dynamics
     from tiltsim.scenario.scenario import Scenario
 
+CROSSES: Final = {"tiltrotor": TILTING_CROSS, "quadrotor": UPRIGHT_CROSS}
+"""Those of vehicles whose rotors lie on a cross, by the model's name."""
+
 
 def rotor_code(dynamics: Dynamics) -> RotorCode:
     """The scalar functions of a model's rotors."""
     if dynamics.tilt_of_rotor:
         return rotor_code_of(dynamics.tilt_of_rotor)
-    return TILTING_CROSS if dynamics.model == "tiltrotor" else UPRIGHT_CROSS
+    return CROSSES[dynamics.model]
 
 
 def true_rotors(scenario: Scenario) -> Any:
