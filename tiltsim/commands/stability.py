@@ -32,13 +32,14 @@ def add_parser(subparsers: Subparsers) -> None:
     sampling and latency included, on the plant of the scenario."""
     summary = "poles of a rest point or multipliers of a periodic flight"
     parser = subparsers.add_parser("stability", help=summary, description=description)
-    scenarios = "TOML files or library names; several only with --sweep"
-    parser.add_argument("scenario", nargs="+", metavar="SCENARIO", help=scenarios)
+    add = parser.add_argument
+    add("scenario", metavar="SCENARIO", help="a TOML file or a library name")
+    add("more", nargs="*", metavar="SCENARIO", help="further ones, with --sweep")
     sweep = """how the largest multiplier moves with a number: period, amplitude or any key;
     default: from half to twice its value at 16 points, spaced evenly by ratio"""
-    parser.add_argument("--sweep", metavar="KEY[=FROM:TO[:POINTS]]", help=sweep)
+    add("--sweep", metavar="KEY[=FROM:TO[:POINTS]]", help=sweep)
     margins = "at rest: gain, phase, delay and disk margins of the loop broken at one place"
-    parser.add_argument("--margins", action="store_true", help=margins)
+    add("--margins", action="store_true", help=margins)
     add_overrides(parser, "the scenario", "gait.period=1.5")
     add_json(parser)
     add_plot(parser, "the poles or multipliers, or the sweep")
@@ -52,7 +53,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     check_plot(arguments)
     overrides = dict(parse_override(text) for text in arguments.overrides)
-    scenarios = [load_scenario(address, overrides) for address in arguments.scenario]
+    addresses = (arguments.scenario, *arguments.more)
+    scenarios = [load_scenario(address, overrides) for address in addresses]
     if arguments.sweep is not None:
         if arguments.margins:
             raise InputError("--margins: of one rest point, not with --sweep")
