@@ -64,6 +64,10 @@ MISUSES = {
         lambda: tiltsim.margins("ch04_tracking/circle#fixed_modified"),
         "moves with a period of",
     ),
+    "attraction over one axis": (
+        lambda: tiltsim.attraction(ADDRESS, ("roll", "roll")),
+        "axes = roll,roll: choose two of",
+    ),
     "stability of nothing": (lambda: tiltsim.stability(None), "scenario = None: must be"),
     "symbolic in MuJoCo": (lambda: tiltsim.symbolic({}), 'symbolic supports "thesis" and'),
     "a family without a member": (lambda: tiltsim.simulate("ch04_tracking/setpoint"), "choose a"),

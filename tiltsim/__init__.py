@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tiltsim.flight.end import End
     from tiltsim.flight.flight import Flight
     from tiltsim.flight.reading import load_flight
+    from tiltsim.linear.attraction import attraction
     from tiltsim.linear.linearization import linearize
     from tiltsim.linear.margins import margins
     from tiltsim.linear.stability import stability
@@ -46,6 +47,7 @@ _HOMES = {
     "Scenario": "scenario.scenario",
     "Simulation": "simulation.stepwise",
     "TiltsimError": "errors",
+    "attraction": "linear.attraction",
     "fly": "simulation.batch",
     "linearize": "linear.linearization",
     "load_flight": "flight.reading",
@@ -75,6 +77,7 @@ __all__ = [
     "Scenario",
     "Simulation",
     "TiltsimError",
+    "attraction",
     "fly",
     "linearize",
     "load_flight",

@@ -1,0 +1,96 @@
+"""``tiltsim attraction``: from how far a flight comes back."""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+from typing import TYPE_CHECKING, Final
+
+from tiltsim.commands.angles import allow_negative_lists
+from tiltsim.commands.figure_options import add_plot, check_plot, save_figure
+from tiltsim.commands.options import Subparsers, add_json, add_overrides
+from tiltsim.commands.text import aligned, json_text, number, print_figure_path
+from tiltsim.errors import InputError
+
+if TYPE_CHECKING:
+    from tiltsim.linear.attraction import Attraction
+
+DEFAULT_REFINEMENTS: Final = 3
+
+
+def add_parser(subparsers: Subparsers) -> None:
+    """Declare the command."""
+    description = """Fly a scenario from a grid over two numbers of its initial state, roll and
+    pitch unless others are given, refined where flights that come back border on those that do
+    not; print which share comes back."""
+    summary = "from which initial states a flight comes back"
+    parser = subparsers.add_parser("attraction", help=summary, description=description)
+    allow_negative_lists(parser)
+    add = parser.add_argument
+    add("scenario", metavar="SCENARIO", help="a TOML file or a library name")
+    axes = "two of x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r (default: roll,pitch)"
+    add("--axes", default="roll,pitch", metavar="A,B", help=axes)
+    ranges = "of each axis, SI units (default: 1.5 rad, 5 m, 5 m/s, 10 rad/s either way)"
+    add("--ranges", metavar="LOW:HIGH,LOW:HIGH", help=ranges)
+    refine = "how often cells at the boundary are divided (default: 3, 96 cells across)"
+    add("--refine", type=int, default=DEFAULT_REFINEMENTS, metavar="N", help=refine)
+    add_overrides(parser, "the scenario", "simulation.duration=15")
+    add_json(parser)
+    add_plot(parser, "the map")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Fly, draw, print."""
+    from tiltsim.scenario.loading import load_scenario
+    from tiltsim.scenario.override_keys import parse_override
+
+    check_plot(arguments)
+    overrides = dict(parse_override(text) for text in arguments.overrides)
+    scenario = load_scenario(arguments.scenario, overrides)
+
+    from tiltsim.linear.attraction import attraction
+
+    first, _, second = arguments.axes.partition(",")
+    found = attraction(
+        scenario,
+        (first.strip(), second.strip()),
+        ranges=_parse_ranges(arguments.ranges),
+        refinements=arguments.refine,
+    )
+    if arguments.plot is not None:
+        from tiltsim.views.figures.attraction import attraction_figure
+
+        save_figure(partial(attraction_figure, found), arguments.plot, arguments)
+    print(json_text(found.report()) if arguments.json else _text(found))
+    print_figure_path(arguments)
+    return 0
+
+
+def _parse_ranges(
+    text: str | None,
+) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
+    if text is None:
+        return None, None
+    try:
+        (a, b), (c, d) = (map(float, part.split(":")) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"--ranges {text}: write LOW:HIGH,LOW:HIGH") from None
+    return (a, b), (c, d)
+
+
+def _text(found: Attraction) -> str:
+    report = found.report()
+    labels = {
+        "returned": "come back",
+        "acceptable": "acceptable attitudes",
+        "acceptable_returned": "of these come back",
+        "unacceptable_returned": "of the others come back",
+    }
+    rows = [("flights", str(found.flights))]
+    rows += [
+        (label, f"{number(100.0 * report[key], '.1f')} %")
+        for key, label in labels.items()
+        if report[key] is not None
+    ]
+    return "\n".join(aligned(rows))

@@ -1,0 +1,221 @@
+"""From how far a flight comes back: a map over two numbers of its initial state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import pi
+from os import PathLike
+from typing import Any, Final
+
+import numpy as np
+
+from tiltsim.errors import InputError
+from tiltsim.laws.assembling import assemble
+from tiltsim.scenario.loading import load_scenario
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.simulation.batch import FlightResult, fly
+from tiltsim_controllers.analysis.singularity import determinant
+from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.vehicle.parameters import Vehicle
+
+PLACES: Final = {
+    **{name: ("position", axis) for axis, name in enumerate(("x", "y", "z"))},
+    **{name: ("velocity", axis) for axis, name in enumerate(("vx", "vy", "vz"))},
+    **{name: ("attitude", axis) for axis, name in enumerate(("roll", "pitch", "yaw"))},
+    **{name: ("angular_velocity", axis) for axis, name in enumerate(("p", "q", "r"))},
+}
+"""Key and index in the table ``initial`` by name."""
+
+SPANS: Final = {"position": 5.0, "velocity": 5.0, "attitude": 1.5, "angular_velocity": 10.0}
+"""Default half-widths of the map, SI units."""
+
+ANGLES: Final = ("final_roll", "final_pitch", "final_yaw")
+POSITION: Final = tuple(f"final_position_error_{axis}" for axis in "zxy")
+"""Metrics in which a flight that came back is as the undisturbed one; x and y where it follows the
+reference's."""
+
+NEAR: Final = 0.05  # m and rad
+COARSE: Final = 12  # cells across, before they are divided
+INSTANTS: Final = 24  # of a moving gait
+
+
+@dataclass(frozen=True, eq=False)
+class Attraction:
+    """Which initial states come back.
+
+    Attributes:
+        scenario: The scenario.
+        axes: Names of the two initial quantities.
+        edges: Of the cells along each axis, shape (cells + 1,) each.
+        share: Of the corners of each cell that come back, shape (cells, cells): by the second, then
+            by the first axis.
+        flights: How many were flown.
+        acceptable: Whether the attitude at the centre of each cell is on the side of level attitude
+            of the gait's singular attitudes, at all times; None unless the axes are roll and pitch
+            of a tiltrotor.
+    """
+
+    scenario: Scenario
+    axes: tuple[str, str]
+    edges: tuple[Floats, Floats]
+    share: Floats
+    flights: int
+    acceptable: Floats | None
+
+    def report(self) -> dict[str, Any]:
+        """As JSON: shares of the map's area."""
+        report: dict[str, Any] = {
+            "scenario": self.scenario.address,
+            "axes": list(self.axes),
+            "ranges": [[float(edges[0]), float(edges[-1])] for edges in self.edges],
+            "flights": self.flights,
+            "returned": float(self.share.mean()),
+            "acceptable": None,
+            "acceptable_returned": None,
+            "unacceptable_returned": None,
+        }
+        if self.acceptable is None:
+            return report
+        inside = self.acceptable.astype(bool)
+        report["acceptable"] = float(inside.mean())
+        for name, these in (("acceptable", inside), ("unacceptable", ~inside)):
+            if these.any():
+                report[f"{name}_returned"] = float(self.share[these].mean())
+        return report
+
+
+def attraction(
+    scenario: Scenario | str | PathLike[str] | Mapping[str, Any],
+    axes: tuple[str, str] = ("roll", "pitch"),
+    *,
+    ranges: tuple[tuple[float, float] | None, tuple[float, float] | None] = (None, None),
+    refinements: int = 3,
+    progress: Callable[[int], None] = lambda _flights: None,
+) -> Attraction:
+    """Which initial states come back to a flight.
+
+    Flights start on a grid; cells whose corners differ are divided into four, and so on. A flight
+    comes back if it completes its duration and in its last second has attitude and position of the
+    undisturbed flight, to 0.05 rad and m: the height, and x and y if its law follows them.
+
+    Args:
+        scenario: Anything that `tiltsim.load_scenario` takes, of a rotorcraft.
+        axes: Two of x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r.
+        ranges: Of each axis, SI units; default: 1.5 rad, 5 m, 5 m/s and 10 rad/s either way.
+        refinements: How often cells at the boundary are divided.
+        progress: Is told the number of flights so far.
+
+    Raises:
+        InputError: If an argument is invalid, or the undisturbed flight is lost.
+    """
+    scenario = load_scenario(scenario)
+    _check(scenario, axes, refinements)
+    cells = COARSE * 2**refinements
+    edges = tuple(_edges(*pair, cells) for pair in zip(axes, ranges, strict=True))
+    grid = _Grid(scenario, axes, (edges[0], edges[1]), progress)
+    size = 2**refinements
+    leaves = [(i, j, size) for i in range(0, cells, size) for j in range(0, cells, size)]
+    share = np.zeros((cells, cells))
+    while leaves:
+        grid.fly({corner for cell in leaves for corner in _corners(*cell)})
+        divided = []
+        for i, j, width in leaves:
+            back = [grid.returned[corner] for corner in _corners(i, j, width)]
+            share[j : j + width, i : i + width] = sum(back) / 4.0
+            if width > 1 and len(set(back)) > 1:
+                half = width // 2
+                divided += [(a, b, half) for a in (i, i + half) for b in (j, j + half)]
+        leaves = divided
+    acceptable = _acceptable(scenario, edges[0], edges[1]) if axes == ("roll", "pitch") else None
+    return Attraction(scenario, axes, (edges[0], edges[1]), share, len(grid.returned), acceptable)
+
+
+def _check(scenario: Scenario, axes: tuple[str, str], refinements: int) -> None:
+    """Refuse what has no such map."""
+    if len(axes) != 2 or axes[0] == axes[1] or not set(axes) <= set(PLACES):
+        raise InputError(f"axes = {','.join(axes)}: choose two of {', '.join(PLACES)}")
+    if not 0 <= refinements <= 6:
+        raise InputError(f"refinements = {refinements}: must be 0 to 6")
+    if scenario.vehicle.model == "tilt_car":
+        raise InputError(f"{scenario.address}: vehicle.model: attraction takes rotorcraft only")
+
+
+def _edges(axis: str, given: tuple[float, float] | None, cells: int) -> Floats:
+    low, high = given or (-SPANS[PLACES[axis][0]], SPANS[PLACES[axis][0]])
+    if not low < high:
+        raise InputError(f"range of {axis} = {low:g}:{high:g}: must grow")
+    if axis == "pitch" and not -0.5 * pi < low < high < 0.5 * pi:
+        raise InputError(f"range of pitch = {low:g}:{high:g}: must be within pi/2 either way")
+    return np.linspace(low, high, cells + 1)
+
+
+def _corners(i: int, j: int, width: int) -> tuple[tuple[int, int], ...]:
+    return (i, j), (i + width, j), (i, j + width), (i + width, j + width)
+
+
+class _Grid:
+    """Flights from points of a grid, each flown once."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        axes: tuple[str, str],
+        edges: tuple[Floats, Floats],
+        progress: Callable[[int], None],
+    ) -> None:
+        self._scenario, self._axes, self._edges = scenario, axes, edges
+        self._progress = progress
+        self.returned: dict[tuple[int, int], bool] = {}
+        (undisturbed,) = fly([scenario])
+        if undisturbed.end.kind != "completed":
+            raise InputError(
+                f"{scenario.address or 'scenario'}: the undisturbed flight itself is lost after "
+                f"{undisturbed.end.time:g} s"
+            )
+        follows = assemble(scenario).follows_position
+        self._compared = (*ANGLES, *(POSITION if follows else POSITION[:1]))
+        self._goal = self._final(undisturbed)
+
+    def fly(self, points: set[tuple[int, int]]) -> None:
+        """Fly from those points that are new."""
+        new = sorted(points - self.returned.keys())
+        flown = fly(self._from(*point) for point in new)
+        for point, result in zip(new, flown, strict=True):
+            self.returned[point] = self._comes_back(result)
+            self._progress(len(self.returned))
+
+    def _from(self, i: int, j: int) -> Scenario:
+        """The scenario from another initial state, which is not validated again."""
+        initial = self._scenario.initial
+        for axis, edges, index in zip(self._axes, self._edges, (i, j), strict=True):
+            key, place = PLACES[axis]
+            values = list(getattr(initial, key))
+            values[place] = float(edges[index])
+            initial = initial.model_copy(update={key: tuple(values)})
+        return self._scenario.model_copy(update={"initial": initial, "expect": ()})
+
+    def _comes_back(self, result: FlightResult) -> bool:
+        if result.end.kind != "completed":
+            return False
+        away = self._final(result) - self._goal
+        away[:3] = np.remainder(away[:3] + pi, 2.0 * pi) - pi
+        return bool(np.abs(away).max() <= NEAR)
+
+    def _final(self, result: FlightResult) -> Floats:
+        return np.array([result.metrics[name] for name in self._compared])
+
+
+def _acceptable(scenario: Scenario, roll: Floats, pitch: Floats) -> Floats | None:
+    """Whether the attitudes at the centres of the cells are acceptable at all times."""
+    vehicle = scenario.vehicle.resolve()
+    if scenario.vehicle.model != "tiltrotor" or not isinstance(vehicle, Vehicle):
+        return None
+    gait = assemble(scenario).gait
+    times = np.arange(INSTANTS) / INSTANTS * (gait.period or 0.0)
+    across, up = np.meshgrid(0.5 * (roll[1:] + roll[:-1]), 0.5 * (pitch[1:] + pitch[:-1]))
+    inside = np.ones(across.shape, dtype=bool)
+    for angles in gait.angles(times if gait.period else times[:1]):
+        level = determinant(angles, 0.0, 0.0, vehicle)
+        inside &= determinant(angles, across, up, vehicle) * level > 0.0
+    return inside.astype(float)
