@@ -129,6 +129,21 @@ def test_a_flight_past_a_singular_attitude_ends_there(name, plant):
     assert flight["singularity_margin"][-1] < 0.0 < flight["singularity_margin"][-2]
 
 
+@pytest.mark.parametrize("told", [True, False])
+def test_seven_of_eight_rotors_hold_the_pose_if_the_controller_knows(told):
+    controller = {"law": "attitude_force", "norm": "thrust"}
+    if told:
+        controller |= {"failed_rotor": 3, "failure_known_from": 0.02}
+    flight = fly(
+        "omni_octorotor",
+        controller=controller,
+        fault=[{"type": "rotor_loss", "rotor": 3, "time": 0.02}],
+        simulation={"duration": 0.5, "timestep": 0.004},
+    )
+    moved = np.abs(flight["attitude"][flight["time"] > 0.4]).max()
+    assert moved < 0.05 if told else moved > 0.2
+
+
 def test_rotors_keep_within_their_limits():
     flight = fly("hexarotor", {"min_rotor_speed": 530.0, "max_rotor_speed": 545.0})
     speeds = flight["rotor_speeds"] * flight.scenario.any_rotorcraft.spins
@@ -248,6 +263,13 @@ HEXAROTOR = {"model": "multirotor", "mjcf": mjcf("hexarotor")}
         "a failed rotor that is not there": (
             {"controller": {"law": "full_pose", "failed_rotor": 7}},
             "controller.failed_rotor = 7: the vehicle has 6 rotors",
+        ),
+        "a rotor that the others cannot replace": (
+            {
+                "vehicle": {"model": "multirotor", "mjcf": mjcf("cant_quadrotor")},
+                "controller": {"law": "attitude_force", "failed_rotor": 2},
+            },
+            "controller.failed_rotor = 2: the others are singular at every attitude",
         ),
         "tilts of fixed rotors": (
             {"gait": {"type": "fixed", "angles": [0.1] * 6}},

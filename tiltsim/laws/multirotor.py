@@ -189,7 +189,10 @@ def _monitoring_of(layout: Layout, uses: UsedForce, norm: str) -> Monitoring:
     places = layout.places
     tilts_in = entries_of(places.alpha_1, places.tilts)
     speeds_in = entries_of(places.speed_1, places.rotors if norm == "speed" else 0)
-    independence, names = independence_of(layout.tilt_of_rotor, *uses), places.names("alpha")
+    independence, names = (
+        independence_of(layout.tilt_of_rotor, uses.dimension, uses.forward),
+        places.names("alpha"),
+    )
     stops = rotor_stops(places.rotors if norm == "speed" else 0)
     harmless = (1.0,) * len(stops)  # as published, the factor 2 |varpi| is in rows of force only
 
@@ -272,7 +275,7 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
     controller, vehicle = scenario.controller, scenario.vehicle.resolve()
     assert isinstance(controller, AttitudeForceController)
     assert isinstance(vehicle, Multirotor)
-    dimension, _ = controller.resolve_force(vehicle, gait)
+    dimension = controller.resolve_force(vehicle, gait).dimension
     inertia = np.reshape(vehicle.inertia, (3, 3))
     law = Parameters(
         vehicle=body_of(vehicle.mass, inertia, vehicle.gravity),
@@ -283,6 +286,7 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
         attitude=ATTITUDE_ERRORS[controller.attitude_error],
         restoring=controller.resolve_restoring(len(vehicle.spins), dimension, gait),
         slowest=controller.slowest_rotor,
+        failure=controller.resolve_failure(),
         turn_time=controller.turn_time,
     )
     lead = servo_lead(scenario.any_rotorcraft.tilt_servo)
@@ -307,7 +311,7 @@ def multirotor_loop(layout: Layout, uses: UsedForce, norm: str) -> ClosedLoop:
         norm: See `tiltsim_controllers.laws.multirotor.multirotor_law_of`.
     """
     places = layout.places
-    law = multirotor_law_of(layout.tilt_of_rotor, uses.dimension, norm, uses.forward)
+    law = multirotor_law_of(layout.tilt_of_rotor, uses.dimension, norm, uses.forward, uses.losses)
     sampling, equations = _sampling_of(layout, law), _equations_of(layout, law)
     for step in (sampling.controls, equations.inputs):
         step.__qualname__ = f"attitude_force_{uses.name}_{norm}_{layout.name}"

@@ -316,12 +316,18 @@ def _check_gait(scenario: ScenarioTables) -> None:
         )
 
 
+def _check_failed_rotor(scenario: ScenarioTables, failed: int | None) -> None:
+    rotors = scenario.vehicle.rotor_count
+    if failed is not None and failed > rotors:
+        raise InvalidValueError(
+            "controller.failed_rotor", failed, f"the vehicle has {rotors} rotors"
+        )
+
+
 def _check_full_pose(scenario: ScenarioTables, controller: FullPoseController, gait: Gait) -> None:
     """Refuse a failed rotor that is not there, and inputs that do not move six outputs."""
     vehicle, failed = scenario.vehicle.resolve(), controller.failed_rotor
-    if failed is not None and failed > scenario.vehicle.rotor_count:
-        reason = f"the vehicle has {scenario.vehicle.rotor_count} rotors"
-        raise InvalidValueError("controller.failed_rotor", failed, reason)
+    _check_failed_rotor(scenario, failed)
     if isinstance(vehicle, Multirotor):
         w = [spin * (rotor != failed) for rotor, spin in enumerate(vehicle.spins, start=1)]
         rank = pose_rank(vehicle.table, gait.angles(0.0).tolist(), w)
@@ -334,9 +340,10 @@ def _check_dimension(
     scenario: ScenarioTables, controller: AttitudeForceController, gait: Gait
 ) -> None:
     """Refuse more components of force than a multirotor has, and a pose that it cannot take."""
+    _check_failed_rotor(scenario, controller.failed_rotor)
     vehicle = scenario.vehicle.resolve()
     assert isinstance(vehicle, Multirotor)
-    dimension, _ = controller.resolve_force(vehicle, gait)
+    dimension = controller.resolve_force(vehicle, gait).dimension
     reference = scenario.reference
     if (reference.kind == "attitude_altitude") != (controller.decoupler == "none"):
         raise scenario.mistake(

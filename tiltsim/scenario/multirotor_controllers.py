@@ -27,6 +27,7 @@ from tiltsim_controllers.analysis.stability import (
 from tiltsim_controllers.analysis.torque_free import hover_direction, torque_free_forces
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING, Gains
+from tiltsim_controllers.laws.failures import Failure
 from tiltsim_controllers.laws.gains import IntegralGains
 from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms
 from tiltsim_controllers.mathematics.scalar import Floats, Triple
@@ -41,11 +42,12 @@ class UsedForce(NamedTuple):
 
     dimension: int
     forward: bool  # two along the x and z axes, of a vehicle that has three
+    losses: bool = False  # whether the controller knows of a failed rotor
 
     @property
     def name(self) -> str:
         """For file names."""
-        return f"{self.dimension}{'_forward' * self.forward}"
+        return f"{self.dimension}{'_forward' * self.forward}{'_losses' * self.losses}"
 
 
 class AttitudeForceController(ControllerTable):
@@ -114,6 +116,14 @@ class AttitudeForceController(ControllerTable):
     turn_time: NonNegative = Field(
         0.0, description="time in which the reference of roll and pitch is reached, smoothly [s]"
     )
+    failed_rotor: Annotated[int, Field(ge=1)] | None = Field(
+        None,
+        description="a rotor that the law knows to have failed and does not use; default: none",
+        examples=[2],
+    )
+    failure_known_from: NonNegative = Field(
+        0.0, description="time from which failed_rotor is known [s]", examples=[10.0]
+    )
     max_acceleration: Positive = Field(
         3.0,
         description="limit on the horizontal acceleration of the position feedback, at which its "
@@ -151,12 +161,22 @@ class AttitudeForceController(ControllerTable):
 
     def resolve_force(self, vehicle: Multirotor, gait: Gait) -> UsedForce:
         """The components of force that are controlled, checked over the gait."""
-        least, where = force_dimension(vehicle, gait)
+        lost = self.failed_rotor
+        least, where = min(force_dimension(vehicle, gait, rotor) for rotor in {None, lost})
+        if least == 0 and where.endswith(f"rotor {lost}"):
+            raise self.mistake("failed_rotor", "the others are singular at every attitude")
         if least == 0:
             raise InvalidValueError("gait.type", gait.name, f"singular at every attitude, {where}")
         if self.dimension is not None and self.dimension > least:
             raise self.mistake("dimension", f"the vehicle has {least} only, {where}")
-        return UsedForce(self.dimension or least, self.dimension == 2 and least == 3)
+        forward = self.dimension == 2 and least == 3
+        return UsedForce(self.dimension or least, forward, lost is not None)
+
+    def resolve_failure(self) -> Failure:
+        """The failed rotor that the law knows of."""
+        if self.failed_rotor is None:
+            return Failure()
+        return Failure(float(self.failed_rotor), self.failure_known_from)
 
     def resolve_restoring(self, rotors: int, dimension: int, gait: Gait) -> float:
         """The restoring rate, 1/s."""
@@ -195,11 +215,19 @@ def upper_side(vehicle: Multirotor, gait: Gait) -> Triple:
     return x, y, z
 
 
-def force_dimension(vehicle: Multirotor, gait: Gait) -> tuple[int, str]:
-    """The least dimension of the torque-free forces over a gait, and where, in words."""
+def force_dimension(vehicle: Multirotor, gait: Gait, lost: int | None = None) -> tuple[int, str]:
+    """The least dimension of the torque-free forces over a gait, and where, in words.
+
+    Args:
+        vehicle: The vehicle.
+        gait: Its gait.
+        lost: A rotor that does not work, from 1.
+    """
     angles = _gait_angles(vehicle, gait)
-    dimension = torque_free_forces(*force_and_torque(vehicle.table, angles)).dimension
+    works = [float(rotor != lost) for rotor in range(1, len(vehicle.spins) + 1)]
+    force, torque = force_and_torque(vehicle.table, angles)
+    dimension = torque_free_forces(force * works, torque * works).dimension
     first = int(dimension.argmin())
     at = ", ".join(f"{angle:.3g}" for angle in angles[first])
     where = f"at tilt angles ({at}) rad" if vehicle.tilts else "as its rotors are placed"
-    return int(dimension[first]), where
+    return int(dimension[first]), where if lost is None else f"{where}, without rotor {lost}"

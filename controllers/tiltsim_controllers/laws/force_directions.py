@@ -10,9 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 from math import nan, sqrt
+from typing import Any
 
-from tiltsim_controllers.gaits.any_tilts import Jets, tilt_motion_of
+from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
 from tiltsim_controllers.gaits.parameters import GaitParameters
+from tiltsim_controllers.laws.failures import health_of, masked_of
 from tiltsim_controllers.laws.least_norm import nearest_of, orthogonal_of
 from tiltsim_controllers.mathematics.jets import (
     Jet,
@@ -190,11 +192,12 @@ def _torque_free_jet_of(length: int) -> Callable[..., Jets3]:
 
 
 @cache
-def direction_jet_of(layout: Layout, dimension: int) -> Callable[..., Jets3]:
+def direction_jet_of(layout: Layout, dimension: int, losses: bool) -> Callable[..., Jets3]:
     """The ``direction`` of one or two components over a planned gait, with derivatives.
 
-    A scalar function ``(time, up, gait, knots, half, at)``; ``half`` as in `anticipated_tilts`,
-    ``at`` is where in the knots the table of the rotors begins.
+    A scalar function ``(time, up, gait, knots, half, at, failure)``; ``half`` as in
+    `anticipated_tilts`, ``at`` is where in the knots the table of the rotors begins. ``losses``:
+    whether the failure counts.
     """
     length, tilts = len(layout), tilts_of(layout)
     effect, anticipated = effectiveness_of(layout).rows, tilt_motion_of(tilts).anticipated
@@ -206,28 +209,47 @@ def direction_jet_of(layout: Layout, dimension: int) -> Callable[..., Jets3]:
         componentwise(f"derivative_{order}", "jets", f"jets#[{order}]", tilts) for order in range(3)
     )
 
+    health, masked = health_of(length), masked_of(length)
+
     @scalar
-    def rows_with_derivatives(tilts: Jets, knots: Vector, at: int) -> tuple[Rows, Rows, Rows]:
-        c, s = cosines(tilts), sines(tilts)
-        return (
-            effect(1.0, value(c), value(s), knots, at),
-            effect(0.0, rate(c), rate(s), knots, at),
-            effect(0.0, acceleration(c), acceleration(s), knots, at),
-        )
+    def rows_with_derivatives(
+        time: float, gait: GaitParameters, knots: Vector, half: float, at: int, failure: Any
+    ) -> tuple[Rows, Rows, Rows]:
+        moving_tilts = anticipated(time, gait, knots, half)
+        c, s = cosines(moving_tilts), sines(moving_tilts)
+        rows = effect(1.0, value(c), value(s), knots, at)
+        first = effect(0.0, rate(c), rate(s), knots, at)
+        second = effect(0.0, acceleration(c), acceleration(s), knots, at)
+        if losses:
+            works = health(time, failure)
+            rows, first, second = masked(works, rows), masked(works, first), masked(works, second)
+        return rows, first, second
 
     @scalar
     def force(
-        time: float, up: Triple, gait: GaitParameters, knots: Vector, half: float, at: int
+        time: float,
+        up: Triple,
+        gait: GaitParameters,
+        knots: Vector,
+        half: float,
+        at: int,
+        failure: Any,
     ) -> Jets3:
-        rows, first, second = rows_with_derivatives(anticipated(time, gait, knots, half), knots, at)
+        rows, first, second = rows_with_derivatives(time, gait, knots, half, at, failure)
         units = orthonormal(rows[3], rows[4], rows[5])
         return moving(up, rows, first, second, units)
 
     @scalar
     def normal(
-        time: float, up: Triple, gait: GaitParameters, knots: Vector, half: float, at: int
+        time: float,
+        up: Triple,
+        gait: GaitParameters,
+        knots: Vector,
+        half: float,
+        at: int,
+        failure: Any,
     ) -> Jets3:
-        rows, first, second = rows_with_derivatives(anticipated(time, gait, knots, half), knots, at)
+        rows, first, second = rows_with_derivatives(time, gait, knots, half, at, failure)
         units = orthonormal(rows[3], rows[4], rows[5])
         across = normal_of(
             remainder(rows[0], units), remainder(rows[1], units), remainder(rows[2], units)

@@ -20,6 +20,8 @@ from math import copysign, inf, nan
 from typing import Any, Final, NamedTuple
 
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
+from tiltsim_controllers.laws.failures import Failure as Failure
+from tiltsim_controllers.laws.failures import health_of
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.mathematics.scalar import Octet, Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
@@ -30,6 +32,8 @@ from tiltsim_controllers.vehicle.decoupling_matrix import (
     torque_entries,
 )
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
+
+_health = health_of(4)
 
 Sextet = tuple[Octet, Octet, Octet, Octet, Octet, Octet]
 
@@ -54,13 +58,6 @@ class Limits(NamedTuple):
 
     max_tilt_rate: float = inf  # rad/s
     max_tilt_angle: float = inf  # rad
-
-
-class Failure(NamedTuple):
-    """A failed rotor and when it is known: from then on the controller uses the other three."""
-
-    rotor: float = 0.0  # 1 to 4, 0 for none
-    known_from: float = inf  # s
 
 
 class Parameters(NamedTuple):
@@ -229,18 +226,6 @@ def limited_tilt_rate(rate: float, angle: float, limits: Limits) -> float:
     if abs(rate) > limits.max_tilt_rate:
         return copysign(limits.max_tilt_rate, rate)
     return rate
-
-
-@scalar
-def _health(time: float, failure: Failure) -> Quad:
-    """1 for every rotor that works as far as the controller knows at a time (s), else 0."""
-    failed = failure.rotor if time >= failure.known_from else 0.0
-    return (
-        0.0 if failed == 1.0 else 1.0,
-        0.0 if failed == 2.0 else 1.0,
-        0.0 if failed == 3.0 else 1.0,
-        0.0 if failed == 4.0 else 1.0,
-    )
 
 
 @scalar

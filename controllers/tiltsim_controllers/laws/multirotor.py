@@ -30,6 +30,7 @@ from typing import Any
 
 from tiltsim_controllers.gaits.parameters import FIXED, NO_KNOTS
 from tiltsim_controllers.laws.decouplers import NONE
+from tiltsim_controllers.laws.failures import health_of, masked_of
 from tiltsim_controllers.laws.feedback import attitude_motion
 from tiltsim_controllers.laws.force_directions import direction_jet_of, factors_of, nearest_in_plane
 from tiltsim_controllers.laws.force_motion import jerk_along
@@ -56,7 +57,7 @@ from tiltsim_controllers.laws.multirotor_steps import (
 from tiltsim_controllers.mathematics.jets import Jet, Jets3
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler, to_body, to_world
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import entries_of
+from tiltsim_controllers.mathematics.vectors import entries_of, vectors_of
 from tiltsim_controllers.vehicle.effectiveness import Layout, effectiveness_of, tilts_of
 from tiltsim_controllers.vehicle.multirotor import body_acceleration, body_torque_rate
 from tiltsim_controllers.vehicle.rigid_body import cross
@@ -96,11 +97,13 @@ def direction_at_rest(
 
 
 @cache
-def _direction_of(layout: Layout, dimension: int, forward: bool) -> Callable[..., Jets3]:
+def _direction_of(
+    layout: Layout, dimension: int, forward: bool, losses: bool
+) -> Callable[..., Jets3]:
     """Scalar code of the ``direction`` with derivatives, as `direction_at_rest`."""
     if dimension == 3 or forward or not tilts_of(layout):
         return direction_at_rest
-    planned = direction_jet_of(layout, dimension)
+    planned = direction_jet_of(layout, dimension, losses)
 
     @scalar
     def over_gait(
@@ -109,15 +112,18 @@ def _direction_of(layout: Layout, dimension: int, forward: bool) -> Callable[...
         gait = parameters.gait
         if parameters.terms.attitude_rates == 0.0 or gait.type == FIXED:
             return direction_at_rest(time, up, present, parameters, knots)
-        return planned(time, up, gait, knots, parameters.anticipation, int(parameters.rotors))
+        half, at = parameters.anticipation, int(parameters.rotors)
+        return planned(time, up, gait, knots, half, at, parameters.failure)
 
     return over_gait
 
 
 @cache
-def _horizontal_of(layout: Layout, dimension: int, forward: bool) -> Callable[..., Horizontal]:
+def _horizontal_of(
+    layout: Layout, dimension: int, forward: bool, losses: bool
+) -> Callable[..., Horizontal]:
     """Scalar code of what moves x and y: force as far as it is controlled, and leaning."""
-    moving_direction = _direction_of(layout, dimension, forward)
+    moving_direction = _direction_of(layout, dimension, forward, losses)
 
     @scalar
     def horizontal(
@@ -176,14 +182,16 @@ def _horizontal_of(layout: Layout, dimension: int, forward: bool) -> Callable[..
 
 
 @cache
-def _control_of(layout: Layout, dimension: int, forward: bool) -> Callable[..., tuple[Any, ...]]:
+def _control_of(
+    layout: Layout, dimension: int, forward: bool, losses: bool
+) -> Callable[..., tuple[Any, ...]]:
     """Scalar code of position and attitude control.
 
     ``(time, state, motion, direction, forces, integrals, parameters, knots)``; it returns the
     desired jerk (m/s^3, world axes), the desired second derivatives of the body rates (rad/s^3),
     the rates of the integrals (m) and the references of roll and pitch (rad).
     """
-    horizontal = _horizontal_of(layout, dimension, forward)
+    horizontal = _horizontal_of(layout, dimension, forward, losses)
 
     @scalar
     def control(
@@ -222,7 +230,7 @@ def _control_of(layout: Layout, dimension: int, forward: bool) -> Callable[..., 
 
 @cache
 def multirotor_law_of(
-    layout: Layout, dimension: int, norm: str = "speed", forward: bool = False
+    layout: Layout, dimension: int, norm: str = "speed", forward: bool = False, losses: bool = False
 ) -> Callable[..., Values]:
     """The control law of vehicles of a layout.
 
@@ -244,6 +252,7 @@ def multirotor_law_of(
         dimension: how many components of force are outputs, 1 to 3
         norm: in `NORMS`
         forward: two components are those along x and z, of a vehicle that has three
+        losses: whether the controller knows of failures
     """
     length, tilts = len(layout), tilts_of(layout)
     tilts_in, speeds_in = entries_of(12, tilts), entries_of(12 + tilts, length)
@@ -253,10 +262,11 @@ def multirotor_law_of(
         factors_of(length, dimension, forward),
     )
     control, solution = (
-        _control_of(layout, dimension, forward),
+        _control_of(layout, dimension, forward, losses),
         solution_of(length, dimension, norm),
     )
     null_part = null_part_of(length, dimension, forward)
+    health, masked, product = health_of(length), masked_of(length), vectors_of(length).product
 
     @scalar
     def inputs(
@@ -274,9 +284,14 @@ def multirotor_law_of(
 
         # What the rotors do now, and how it changes as the pods turn.
         w = squares(speeds)
+        if losses:
+            works = health(time, parameters.failure)
+            w = product(works, w)
         rows, wrench, change = pushing(
             tilts_in(state), tilt_rates, w, knots, int(parameters.rotors)
         )
+        if losses:
+            rows = masked(works, rows)
         fx, fy, fz, tx, ty, tz = wrench
         known = terms.gait_rates
         gx, gy, gz = known * change[0], known * change[1], known * change[2]

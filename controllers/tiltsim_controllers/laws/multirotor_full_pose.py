@@ -17,14 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
+from tiltsim_controllers.laws.failures import Failure, health_of, masked_of
 from tiltsim_controllers.laws.force_directions import factors_of
-from tiltsim_controllers.laws.full_pose import (
-    Failure,
-    Gains,
-    Limits,
-    desired_jerks,
-    limited_tilt_rate,
-)
+from tiltsim_controllers.laws.full_pose import Gains, Limits, desired_jerks, limited_tilt_rate
 from tiltsim_controllers.laws.least_norm import nearest_of
 from tiltsim_controllers.laws.multirotor_inputs import rotor_acceleration
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler, to_body, to_world
@@ -100,13 +95,6 @@ def pose_rank(table: Sequence[float], tilts: Sequence[float], w: ArrayLike) -> i
 
 
 @cache
-def health_of(length: int) -> Callable[..., Values]:
-    """Scalar code ``(time, failure)``: 1 for a rotor that works as far as is known, else 0."""
-    known = "time >= failure.known_from and failure.rotor == @ + 1.0"
-    return componentwise("health", "time, failure", f"0.0 if {known} else 1.0", length)
-
-
-@cache
 def full_pose_law_of(layout: Layout) -> Callable[..., Values]:
     """The control law of vehicles of a layout: scalar code ``(time, state, parameters, knots)``.
 
@@ -119,7 +107,7 @@ def full_pose_law_of(layout: Layout) -> Callable[..., Values]:
     tilts_in, speeds_in = entries_of(12, tilts), entries_of(12 + tilts, length)
     cosines, sines, effect, squares, _ = effectiveness_of(layout)
     dot, _, _, product, _ = vectors_of(length)
-    pose_rows, health = pose_rows_of(layout), health_of(length)
+    pose_rows, health, masked = pose_rows_of(layout), health_of(length), masked_of(length)
     factors, nearest = factors_of(length + tilts, 3), nearest_of(length + tilts, 6)
     negated = componentwise("negated", "a", "-a#", tilts)
     shared = componentwise("shared", "a, f", "a# / f", length)
@@ -137,14 +125,6 @@ def full_pose_law_of(layout: Layout) -> Callable[..., Values]:
     )
 
     @scalar
-    def masked(rows: Rows, works: Values) -> Rows:
-        fx, fy, fz, tx, ty, tz = rows
-        return (
-            *(product(works, fx), product(works, fy), product(works, fz)),
-            *(product(works, tx), product(works, ty), product(works, tz)),
-        )
-
-    @scalar
     def solved(rows: Rows, torque_rate: Triple, force_rate: Triple) -> Values:
         _, pushes, units, _ = factors(rows, (rows[0], rows[1], rows[2]), UP)
         whole, desired = (rows[3], rows[4], rows[5], *pushes), (*torque_rate, *force_rate)
@@ -160,7 +140,7 @@ def full_pose_law_of(layout: Layout) -> Callable[..., Values]:
         c, s = cosines(angles), sines(angles)
         works = health(time, parameters.failure)
         w = product(works, squares(speeds))
-        rows = masked(effect(1.0, c, s, knots, at), works)
+        rows = masked(works, effect(1.0, c, s, knots, at))
         turned = effect(0.0, negated(s), c, knots, at)
 
         # Second derivatives from the model, ch. 3, Eqs. (1) and (4), without gyroscopic torque.

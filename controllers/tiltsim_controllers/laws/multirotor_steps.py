@@ -14,6 +14,7 @@ from tiltsim_controllers.laws.decouplers import (
     exact_decoupler,
     modified_decoupler,
 )
+from tiltsim_controllers.laws.failures import Failure
 from tiltsim_controllers.laws.feedback import attitude_jerk, force_control
 from tiltsim_controllers.laws.full_pose import attitude_error
 from tiltsim_controllers.laws.gains import IntegralGains
@@ -68,6 +69,7 @@ class Parameters(NamedTuple):
     attitude: float = ROTATION
     restoring: float = 0.0  # 1/s, rate towards the least power in the null space
     slowest: float = 0.0  # rad/s, thrust norm: a slower rotor is accelerated as if it were so fast
+    failure: Failure = Failure()
     turn_time: float = 0.0  # s in which a reference of roll and pitch is reached, smoothly
 
 

@@ -27,6 +27,7 @@ from tiltsim_controllers.analysis.torque_free import (
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.laws import attitude_altitude, gait_feedforward
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
+from tiltsim_controllers.laws.failures import Failure
 from tiltsim_controllers.laws.full_pose import attitude_error
 from tiltsim_controllers.laws.gains import GAIN_SETS, Poles, gains_from_poles
 from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms
@@ -40,7 +41,12 @@ from tiltsim_controllers.laws.multirotor_steps import (
 )
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.references.trajectories import CIRCLE, SETPOINT, ReferenceParameters
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque, layout_of
+from tiltsim_controllers.vehicle.effectiveness import (
+    CONSTANT,
+    ROTOR_FLOATS,
+    force_and_torque,
+    layout_of,
+)
 
 ON_CIRCLE = ReferenceParameters(
     CIRCLE, x=0.3, y=-0.2, z=0.1, radius=2.0, angular_frequency=0.5, yaw=0.4,
@@ -141,6 +147,33 @@ def test_independence_is_what_the_other_outputs_leave_of_the_force(dimension):
     across = tuple(np.cross(side, (0.6, 0.8, 0.0)).tolist())
     singular = share(tilts, across, side, table, 0)
     assert abs(singular) < 1e-15 if dimension == 1 else singular > 0.1
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+def test_a_rotor_known_to_have_failed_is_as_if_it_were_not_there(dimension):
+    angles = [[0.3, -0.2, 0.3, -0.3, 0.1, -0.3, 0.2], [0.1, -0.4, 0.2, -0.2, 0.3, -0.1, 0.3]]
+    gait, failure = plans.waypoints(angles, 2.0, tilts=7), Failure(3.0, 2.0)
+    vehicle = Vehicle(ring(7, hinged=True), HEXAROTOR, dimension)
+    layout, forward = layout_of(vehicle.table), dimension == 2
+    law, knots = parameters_of(vehicle, gait, ON_CIRCLE, restoring=0.5, failure=failure)
+    lost = list(knots)
+    first = int(law.rotors) + 2 * ROTOR_FLOATS + CONSTANT
+    lost[first : first + ROTOR_FLOATS - CONSTANT] = [0.0] * (ROTOR_FLOATS - CONSTANT)
+    told = multirotor_law_of(layout, dimension, "speed", forward, True)
+    untold = multirotor_law_of(layout, dimension, "speed", forward)
+    body = 0.2 * np.random.default_rng(5).normal(size=12)
+    speeds = 450.0 * (-1.0) ** np.arange(1, 8)
+    state = (*body.tolist(), *angles[0], *speeds.tolist())
+
+    def at(time, inputs, floats):
+        return inputs(time, state, (0.1,) * 7, (0.1, 0.2, 0.3), law, tuple(floats))[:-1]
+
+    assert at(1.9, told, knots) == at(1.9, untold, knots)
+    found, expected = np.array(at(2.0, told, knots)), np.array(at(2.0, untold, lost))
+    others = np.arange(len(found)) != 2
+    np.testing.assert_allclose(found[others], expected[others], rtol=1e-12)
+    assert found[2] == 0.0
+    assert np.abs(found[:7] - at(2.0, untold, knots)[:7]).max() > 100.0
 
 
 def test_a_hexarotor_with_canted_rotors_flies_a_circle_level():

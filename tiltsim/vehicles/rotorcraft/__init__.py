@@ -177,7 +177,7 @@ def initial_rotor_speeds(plan: FlightPlan) -> Values:
     if isinstance(vehicle, Multirotor) and scenario.initial.rotor_speed is None:
         controller, dimension = scenario.controller, 3
         if isinstance(controller, AttitudeForceController):
-            dimension, _ = controller.resolve_force(vehicle, plan.gait)
+            dimension = controller.resolve_force(vehicle, plan.gait).dimension
         return hover_speeds(vehicle, initial_tilts(plan)[0], table.speeds_along_spin, dimension)
     speeds = scenario.initial.rotor_speeds(table.rotor_count)
     return tuple(sign * speed for sign, speed in zip(table.spins, speeds, strict=True))
