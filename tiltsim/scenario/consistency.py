@@ -17,7 +17,12 @@ from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltSe
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.simulation_table import InitialTable
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController, FullPoseController
-from tiltsim.scenario.vehicle import ModelErrorTable, PodTable, require_physical_inertia
+from tiltsim.scenario.vehicle import (
+    ModelErrorTable,
+    PodTable,
+    VehicleTable,
+    require_physical_inertia,
+)
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.laws.multirotor_full_pose import pose_rank
 
