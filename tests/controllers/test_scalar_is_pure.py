@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import builtins
 import dis
 import inspect
@@ -11,6 +12,7 @@ import subprocess
 import sys
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from types import CodeType, FunctionType
 
 import pytest
@@ -46,8 +48,16 @@ PLAIN_BUILTINS = {
     "bool",
     "list",
 }
-LAYER_FIELDS = {"inner", "layer"}  # of the records that `wrap_loop` makes
-RECORD_FIELDS = LAYER_FIELDS | {
+MADE_FIELDS = {  # of records that are made at run time
+    keyword.arg
+    for root in (tiltsim, tiltsim_controllers)
+    for file in Path(root.__path__[0]).rglob("*.py")
+    if "make_record_type(" in (text := file.read_text())
+    for node in ast.walk(ast.parse(text))
+    if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "make_record_type"
+    for keyword in node.keywords
+}
+RECORD_FIELDS = MADE_FIELDS | {
     field
     for name, module in list(sys.modules.items())
     if name.partition(".")[0] in {"tiltsim", "tiltsim_controllers"}
