@@ -20,6 +20,7 @@ from tiltsim.errors import InputError
 from tiltsim.flight.end import End
 from tiltsim.flight.reading import load_flight
 from tiltsim.plants.command import Command, ControllerError
+from tiltsim.studies.fleet import fleet_file
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 DOCS = Path(__file__).parents[2] / "docs" / "environment.md"
@@ -549,3 +550,26 @@ def test_without_the_extra_one_line_says_what_to_install():
 
 def test_a_step_type_is_dm_envs():
     assert isinstance(TiltrotorEnv(scenario()).reset(), dm_env.TimeStep)
+
+
+@pytest.mark.parametrize(
+    ("name", "rotors", "tilts"), [("tilt_hexarotor", 6, 6), ("omni_octorotor", 8, 0)]
+)
+def test_a_multirotor_has_a_thrust_for_each_rotor_and_an_angle_for_each_servo(name, rotors, tilts):
+    vehicle = {"model": "multirotor", "mjcf": str(fleet_file(name))}
+    timing = {"duration": 0.1, "control_timestep": 0.01}
+    law = {"law": "attitude_force", "norm": "thrust"}
+    env = TiltrotorEnv({"vehicle": vehicle, "simulation": timing, "controller": law})
+    spec, shapes = env.action_spec(), {n: s.shape for n, s in env.observation_spec().items()}
+    assert spec.shape == (rotors + tilts,)
+    assert (spec.minimum[:rotors].max() < 0.0) == (name == "omni_octorotor")  # it reverses
+    assert shapes["rotor_speeds"] == (rotors,)
+    assert shapes.get("tilt_angles", (0,)) == (tilts,)
+    env.reset()
+    known = env.observe().vehicle
+    thrusts = known.thrust_coefficients * env.observe().rotor_speeds ** 2
+    signs = np.sign(env.observe().rotor_speeds)  # the octorotor's stop halfway, or reverse
+    for _ in range(5):
+        step = env.step(np.array([*(signs * thrusts), *[0.0] * tilts]))
+    assert step.reward == pytest.approx(1.0, abs=1e-9)
+    np.testing.assert_allclose(step.observation["position"], 0.0, atol=1e-9)

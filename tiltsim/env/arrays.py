@@ -11,6 +11,7 @@ import numpy.typing as npt
 from dm_env import specs
 
 from tiltsim.errors import InputError
+from tiltsim.models.rotor_table import Multirotor
 from tiltsim.plants.command import Observation
 from tiltsim.scenario.messages import choose
 from tiltsim.scenario.scenario import Scenario
@@ -39,7 +40,6 @@ BOUNDS: Final = {
 }
 """Observations by default, and their largest absolute value, wider than any episode reaches."""
 
-_WIDTHS: Final = {"quaternion": 4, "tilt_angles": 4, "tilt_rates": 4, "rotor_speeds": 4}
 _TILT_OBSERVATIONS: Final = ("tilt_angles", "tilt_rates")
 
 Rotation = npt.NDArray[np.float64]  # (3, 3), body to world; ``vector @ rotation`` is in body axes
@@ -74,27 +74,31 @@ def has_tilts(scenario: Scenario) -> bool:
 
 
 def action_spec(scenario: Scenario, max_tilt_angle: float | None = None) -> specs.BoundedArray:
-    """Shape and bounds of an action: four thrusts (N), then four tilt angles (rad) if any.
+    """Shape and bounds of an action: a thrust (N) by rotor, then a tilt angle (rad) by servo.
 
     ``max_tilt_angle`` (rad) narrows the tilt angles, whose bounds are else those of the servos, or
     `TILT_RANGE`. Raises `InputError` if it is not above 0 or beyond them, or there are no tilts.
     """
     if max_tilt_angle is not None and not has_tilts(scenario):
         raise InputError("environment: max_tilt_angle: the vehicle has no tilt servos")
-    table = scenario.rotorcraft
-    vehicle = table.resolve()
-    fastest = table.max_rotor_speed
-    highest = THRUST_TO_WEIGHT * vehicle.mass * vehicle.gravity / 4.0
-    if fastest is not None:
-        highest = vehicle.thrust_coefficient * fastest**2
-    lowest = vehicle.thrust_coefficient * (table.min_rotor_speed or 0.0) ** 2
-    low, high, name = [lowest] * 4, [highest] * 4, "thrusts"
+    table = scenario.any_rotorcraft
+    vehicle, name = table.resolve(), "thrusts"
+    coefficients = np.array(table.thrust_coefficients)
+    share = THRUST_TO_WEIGHT * vehicle.mass * vehicle.gravity / table.rotor_count
+    high = np.full(table.rotor_count, share)
+    if table.max_rotor_speed is not None:
+        high = coefficients * table.max_rotor_speed**2
+    low = coefficients * (table.min_rotor_speed or 0.0) ** 2
+    if isinstance(vehicle, Multirotor) and table.min_rotor_speed is None:
+        reversing = [slowest < 0.0 < fastest for slowest, fastest in vehicle.speed_ranges]
+        low = np.where(reversing, -high, low)
     if has_tilts(scenario):
         tilt = table.tilt_servo.max_angle or TILT_RANGE
         if max_tilt_angle is not None:
             check_bound("max_tilt_angle", max_tilt_angle, tilt)
             tilt = max_tilt_angle
-        low, high, name = [*low, *[-tilt] * 4], [*high, *[tilt] * 4], "thrusts, tilt_angles"
+        ends, name = np.full(table.tilt_count, tilt), "thrusts, tilt_angles"
+        low, high = np.concatenate([low, -ends]), np.concatenate([high, ends])
     return specs.BoundedArray((len(low),), np.float64, low, high, name)
 
 
@@ -122,20 +126,22 @@ class Observed:
     Args:
         bounds: Names of `OBSERVATIONS` and the largest absolute value of each; default: `BOUNDS`,
             for a vehicle without tilt servos less the tilts.
-        tilting: Whether the vehicle has tilt servos.
+        rotors, tilts: How many rotors and tilt servos the vehicle has.
 
     Raises:
         InputError: If there is no such observation of this vehicle, or a bound is invalid.
     """
 
-    def __init__(self, bounds: Mapping[str, float] | None, *, tilting: bool) -> None:
-        known = [name for name in OBSERVATIONS if tilting or name not in _TILT_OBSERVATIONS]
+    def __init__(self, bounds: Mapping[str, float] | None, *, rotors: int, tilts: int) -> None:
+        known = [name for name in OBSERVATIONS if tilts or name not in _TILT_OBSERVATIONS]
+        self._widths = {"quaternion": 4, "rotor_speeds": rotors}
+        self._widths |= dict.fromkeys(_TILT_OBSERVATIONS, tilts)
         self.bounds = {name: BOUNDS[name] for name in known if name in BOUNDS}
         if bounds is not None:
             _check_bounds(bounds, known)
             self.bounds = dict(bounds)
         self._readers = [OBSERVATIONS[name] for name in self.bounds]
-        widths = [_WIDTHS.get(name, 3) for name in self.bounds]
+        widths = [self._widths.get(name, 3) for name in self.bounds]
         self._high = np.repeat([*self.bounds.values()], widths).astype(np.float64)
         ends = np.cumsum(widths).tolist()
         places = zip(self.bounds, widths, ends)
@@ -144,7 +150,7 @@ class Observed:
     def spec(self) -> dict[str, specs.BoundedArray]:
         """Shape and bounds of every array, by name."""
         return {
-            name: specs.BoundedArray((_WIDTHS.get(name, 3),), np.float64, -bound, bound, name)
+            name: specs.BoundedArray((self._widths.get(name, 3),), np.float64, -bound, bound, name)
             for name, bound in self.bounds.items()
         }
 

@@ -200,10 +200,10 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
 
 
 class TiltrotorEnv(Environment):
-    """A tiltrotor, or a quadrotor, commanded by thrusts and tilt angles, following a reference.
+    """Any rotorcraft, commanded by thrusts and tilt angles, following a reference.
 
-    Actions are the thrusts of rotors 1 to 4 (N), then the tilt angles (rad), clipped to the bounds
-    of `action_spec`; a quadrotor's are the thrusts alone. Each is held for
+    Actions are the thrusts of the rotors (N), then the tilt angles (rad), clipped to the bounds of
+    `action_spec`; without tilt servos, the thrusts alone. Each is held for
     ``simulation.control_timestep``. Observations are a flat dict of arrays, see
     `tiltsim.env.arrays.BOUNDS`. An episode ends after ``simulation.duration`` with a discount of
     1, or with a discount and a reward of 0 when the vehicle is lost.

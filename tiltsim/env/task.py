@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from dm_env import specs
 
-from tiltsim.env.arrays import OBSERVATIONS, Observed, action_spec, check_bound, has_tilts
+from tiltsim.env.arrays import OBSERVATIONS, Observed, action_spec, check_bound
 from tiltsim.env.domain import Domain
 from tiltsim.errors import InputError
 from tiltsim.flight.end import End
@@ -78,7 +78,9 @@ class Task:
         self.domain = domain if isinstance(domain, Domain) else None
         if domain and not isinstance(domain, Domain):
             self.domain = Domain.from_axes(self.scenario, domain)
-        self.observed = Observed(observations, tilting=has_tilts(scenario))
+        vehicle = scenario.vehicle
+        self._rotors = vehicle.rotor_count
+        self.observed = Observed(observations, rotors=self._rotors, tilts=vehicle.tilt_count)
         self._action_spec = action_spec(self.scenario, max_tilt_angle)
         self.reward = reward
         self._target = np.zeros(3)  # m, of the last observation
@@ -114,7 +116,7 @@ class Task:
 
     def before_step(self, action: Floats, plant: CommandedPlant) -> None:
         """Send a clipped action to the plant, where it is held for one control step."""
-        thrusts, tilts = action[:4].tolist(), action[4:].tolist()
+        thrusts, tilts = action[: self._rotors].tolist(), action[self._rotors :].tolist()
         plant.apply(CheckedCommand("thrusts", tuple(thrusts), tuple(tilts) if tilts else None))
 
     def get_observation(self, plant: CommandedPlant) -> dict[str, Floats]:
