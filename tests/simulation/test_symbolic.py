@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import runpy
+from math import sin, sqrt
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -66,3 +70,15 @@ def test_it_refuses_what_has_no_symbolic_form():
     noisy = {**THESIS, "sensors": {"position_noise": 0.1}}
     with pytest.raises(TiltsimError, match=r"noise.uniform, line \d+: .*as random ones"):
         tiltsim.symbolic(noisy)
+
+
+@pytest.mark.slow
+def test_the_optimal_manoeuvre_of_the_example_holds_in_mujoco():
+    example = runpy.run_path(str(Path(__file__).parents[2] / "examples" / "fastest_sidestep.py"))
+    plan = example["fastest"](tiltsim.symbolic(example["SCENARIO"]), True, 20)
+    vehicle = PRESETS["ar_drone_2"]
+    # Level, two of four rotors push along x: no plan is faster than they at full tilt.
+    push = 2.0 * vehicle.thrust_coefficient * 500.0**2 * sin(0.8) / vehicle.mass
+    assert 2.0 * sqrt(3.0 / push) < plan.times[-1] < 1.6
+    assert np.abs(plan.states[:, 12:14]).max() < 0.011
+    assert example["deviation"](plan, example["fly"](plan)) < 0.02
