@@ -8,12 +8,12 @@ import pytest
 from tests.env.test_environment import documented
 from tiltsim.env.domain import Domain
 from tiltsim.env.environment import TiltrotorEnv
+from tiltsim.env.functions import loop_on_equations
 from tiltsim.env.tasks import TASKS
 from tiltsim.equations.implicitfast import make_implicitfast_step
 from tiltsim.errors import InputError
-from tiltsim.laws.assembling import assemble, loop_of
+from tiltsim.laws.assembling import assemble
 from tiltsim.laws.commanded import with_command
-from tiltsim.laws.layers.on_equations import on_equations
 
 SPINNING = {"attitude": [0.2, -0.1, 0.5], "velocity": [1.0, 0.3, -0.2]} | {
     "angular_velocity": [1.0, -2.0, 0.5],
@@ -36,7 +36,7 @@ def test_the_step_is_mujocos(scenario):
     env = TiltrotorEnv(scenario)
     env.reset()
     assembly = assemble(env.scenario)
-    loop = on_equations(loop_of(env.scenario))
+    loop = loop_on_equations(env.scenario)
     setup = loop.setup(assembly, loop.signature)
     lagging = env.scenario.rotorcraft.rotor_time_constant is not None
     first = 30 if lagging else 26  # where commanded speeds go

@@ -16,6 +16,7 @@ from tiltsim.arrays.jax_arrays import JaxArrays, require_jax
 from tiltsim.arrays.lifting import Lifting
 from tiltsim.closed_loop.limits import WITHIN_LIMITS
 from tiltsim.env.task import Task
+from tiltsim.equations.actuator_level import actuator_plant
 from tiltsim.equations.implicitfast import RATE_1, SPEED_1, TILT_1, make_implicitfast_step
 from tiltsim.equations.tiltrotor import P, body_fields, rotation_of
 from tiltsim.errors import InputError
@@ -34,9 +35,16 @@ from tiltsim_controllers.references.trajectories import reference_derivatives
 from tiltsim_controllers.vehicle.parameters import SPIN
 
 if TYPE_CHECKING:
+    from tiltsim.closed_loop.loop import ClosedLoop
     from tiltsim.scenario.scenario import Scenario
 
 LEAST_THRUST: Final = 1e-30  # N; a root has no derivative at zero
+
+
+def loop_on_equations(scenario: Scenario) -> ClosedLoop:
+    """The loop of a tiltrotor under commands, on chapter 3's equations with real actuators."""
+    loop = loop_of(scenario)
+    return on_equations(loop, actuator_plant(loop.dynamics))
 
 
 class Episode(NamedTuple):
@@ -87,7 +95,7 @@ class EnvFunctions:
         self.scenario = scenario = task.scenario
         _check_supported(scenario)
         self._simulation = scenario.simulation
-        self._loop = loop = on_equations(loop_of(scenario))
+        loop = loop_on_equations(scenario)
         self._follows = loop.follows_position(scenario)
         self._plan = ArrayPlan(scenario, loop, precision)
         rotorcraft = scenario.rotorcraft
