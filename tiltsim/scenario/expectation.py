@@ -73,8 +73,8 @@ class Expectation(Table):
     equals: bool | None = Field(
         None, description="for metrics that are true or false", examples=[False]
     )
-    plant: Literal["mujoco", "thesis"] | None = Field(
-        None, description="evaluate on this plant only; default: on both", examples=["thesis"]
+    plant: Literal["mujoco", "thesis", "rigid_body"] | None = Field(
+        None, description="evaluate on this plant only; default: on all", examples=["thesis"]
     )
 
     @model_validator(mode="after")
