@@ -184,11 +184,12 @@ def _sweep_text(key: str, address: str, points: Sequence[Point]) -> str:
         for point in points
     ]
     lines = [
-        f"{key} = {number(crossing.value, '.4g')}: the largest multiplier "
-        f"{'leaves' if crossing.leaves else 'enters'} the unit circle {crossing.how}"
+        f"{key} = {number(crossing.value, '.4g')}: stability is "
+        f"{'lost' if crossing.leaves else 'gained'} {crossing.how}"
         for crossing in crossings(points)
     ]
-    header = (key, "largest multiplier", "verdict")
+    rests = any(point.found is not None and point.found.period is None for point in points)
+    header = (key, "left after 1 s" if rests else "largest multiplier", "verdict")
     return "\n".join([address, table(header, rows, frozenset({0, 1})), *lines])
 
 

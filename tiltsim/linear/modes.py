@@ -59,6 +59,11 @@ class Mode:
     states: tuple[str, ...]
     count: int
 
+    @property
+    def growth_rate(self) -> float:
+        """The real part of the pole, 1/s; negative where the mode decays."""
+        return -self.damping * self.frequency
+
     def report(self) -> dict[str, Any]:
         """As JSON."""
         return {**vars(self), "states": list(self.states)}

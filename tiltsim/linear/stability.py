@@ -57,11 +57,6 @@ class Stability:
         assert self.poles is not None  # it is a rest point
         return float(np.exp(self.poles.real.max()))
 
-    @property
-    def rate(self) -> float:
-        """The growth rate (1/s) of the slowest disturbance, negative where it decays."""
-        return float(np.log(self.growth)) / (self.period or 1.0)
-
     def report(self) -> dict[str, Any]:
         """As JSON."""
         name = "poles" if self.multipliers is None else "multipliers"

@@ -94,10 +94,11 @@ def crossings(points: Iterable[Point]) -> list[Crossing]:
 
 def _how(found: Stability) -> str:
     if found.multipliers is None:
-        return "as a pole of the rest point"
+        pole = max(found.poles, key=lambda value: value.real) if found.poles is not None else 0.0
+        return "at a rest point, with a swing" if abs(pole.imag) > ON_AXIS else "at a rest point"
     largest = complex(found.multipliers[0])
     if abs(largest.imag) > ON_AXIS:
         return "as a pair: a slow swing about the orbit"
     if largest.real < 0.0:
         return "at -1: the orbit's period doubles"
-    return "at +1: the vehicle leaves the orbit to one side"
+    return "at +1: it leaves the orbit to one side"

@@ -37,11 +37,13 @@ def attraction_figure(found: Attraction) -> Figure:
         if found.acceptable is not None and isinstance(vehicle, Vehicle):
             gait = assemble(found.scenario).gait
             times = np.arange(CURVES) / CURVES * (gait.period or 0.0)
-            for angles in gait.angles(times if gait.period else times[:1]):
-                curve = unacceptable_attitudes(angles, vehicle, 721)
+            instants = gait.angles(times if gait.period else times[:1])
+            curves = [unacceptable_attitudes(angles, vehicle, 721) for angles in instants]
+            for curve in curves:
                 axes.plot(curve.roll, curve.pitch, color=style.SINGULAR, lw=1.2)
-            label = "singular, over a period" if gait.period else "singular"
-            handles.append(Line2D([], [], color=style.SINGULAR, lw=1.2, label=label))
+            if any(len(curve.roll) for curve in curves):
+                label = "singular, over a period" if gait.period else "singular"
+                handles.append(Line2D([], [], color=style.SINGULAR, lw=1.2, label=label))
         places = [PLACES[name] for name in found.axes]
         start = [getattr(found.scenario.initial, key)[index] for key, index in places]
         axes.plot(*start, "+", color=style.INK, ms=8, mew=1.2)

@@ -41,16 +41,19 @@ def stability_figure(found: Stability) -> Figure:
 
 
 def sweep_figure(key: str, sweeps: Mapping[str, Sequence[Point]]) -> Figure:
-    """The largest multiplier over a key, and its rate, a line for each scenario."""
+    """The largest multiplier over a key, and the slowest mode but altitude, a line a scenario."""
     with style.paper_style():
         figure = style.new_figure(6.4, 6.0)
         upper, lower = figure.subplots(2, 1, sharex=True)
         looks = zip(cycle(style.CYCLE), cycle(style.DASHES), cycle(style.MARKERS))
         for (address, points), (color, dashes, marker) in zip(sweeps.items(), looks):
-            known = [(p.value, p.found.growth, p.found.rate) for p in points if p.found is not None]
-            if not known:
-                continue
-            values, largest, rates = np.array(known).T
+            found = [(point.value, point.found) for point in points if point.found is not None]
+            values = [value for value, _ in found]
+            largest = [each.growth for _, each in found]
+            rates = [
+                max(mode.growth_rate for mode in each.modes if mode.name != "altitude")
+                for _, each in found
+            ]
             label = address.rpartition("/")[2]
             line: Any = {"color": color, "ls": dashes, "marker": marker, "ms": 3.5, "label": label}
             upper.plot(values, largest, **line)
@@ -62,7 +65,8 @@ def sweep_figure(key: str, sweeps: Mapping[str, Sequence[Point]]) -> Figure:
             axes.axhline(limit, color=style.INK, lw=0.8)
             axes.margins(x=0.02)
         upper.set(ylabel="largest multiplier", title="What is left of a disturbance after a period")
-        lower.set(ylabel="growth rate (1/s)", xlabel=in_words(key), title="The same per second")
+        lower.set(ylabel="growth rate (1/s)", xlabel=in_words(key))
+        lower.set_title("Slowest mode other than altitude")
         handles, labels = upper.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=2)
         return figure
