@@ -12,9 +12,19 @@ pytest.importorskip("jax")
 @pytest.mark.slow
 def test_rows_are_those_of_bench_with_precision_and_time_to_compile(monkeypatch):
     monkeypatch.setattr(array_benchmark, "TOTAL_STEPS", 200)
-    rows = array_benchmark.bench_arrays([2])
-    assert [row["precision"] for row in rows] == ["float64", "float32"]
-    for row in rows:
-        assert row["vehicles"] == 2
-        assert row["realtime_factor"] == pytest.approx(row["steps_per_second"] * row["timestep"])
-        assert row["compile_seconds"] > 0.0
+    monkeypatch.setattr(array_benchmark, "PRECISIONS", ("float32",))
+    (row,) = array_benchmark.bench_arrays([2])
+    assert row["precision"] == "float32"
+    assert row["vehicles"] == 2
+    assert row["realtime_factor"] == pytest.approx(row["steps_per_second"] * row["timestep"])
+    assert row["compile_seconds"] > 0.0
+
+
+@pytest.mark.slow
+def test_rk4_at_8_ms_is_within_a_micrometre(monkeypatch):
+    monkeypatch.setattr(array_benchmark, "ACCURACY_DURATION", 0.16)
+    monkeypatch.setattr(array_benchmark, "ACCURACY_VEHICLES", 2)
+    monkeypatch.setattr(array_benchmark, "REFERENCE_STEP", 0.001)
+    (row,) = array_benchmark.bench_array_accuracy([0.008])
+    assert 0.0 < row["position_error"] < 1e-6
+    assert row["integrator"] == "RK4"

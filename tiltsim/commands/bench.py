@@ -24,8 +24,10 @@ def add_parser(subparsers: Subparsers) -> None:
     instead("--vehicles", type=int, metavar="N", help=vehicles)
     accuracy = "instead print RK4's position error and speed for several time steps"
     instead("--accuracy", action="store_true", help=accuracy)
-    arrays = "instead time batches of 1 to 16384 vehicles in JAX, on the thesis plant"
+    arrays = "instead time batches of 1 to 262144 vehicles in JAX, on the thesis plant"
     instead("--arrays", action="store_true", help=arrays)
+    peers = "instead time another simulator and batches in JAX in turns, where it is installed"
+    instead("--peer", choices=("crazyflow", "rotorpy"), help=peers)
     add = parser.add_argument
     add("--duration", type=float, default=10.0, help="with --vehicles, s")
     add("--timestep", type=float, default=0.001, help="with --vehicles, s")
@@ -51,9 +53,13 @@ def run(arguments: argparse.Namespace) -> int:
         elif arguments.accuracy:
             rows = bench_accuracy()
         elif arguments.arrays:
-            from tiltsim.studies.array_benchmark import bench_arrays
+            from tiltsim.studies.array_benchmark import bench_array_accuracy, bench_arrays
 
-            rows = bench_arrays()
+            rows = bench_arrays() + bench_array_accuracy()
+        elif arguments.peer:
+            from tiltsim.studies.array_benchmark import bench_peer
+
+            rows = bench_peer(arguments.peer)
         else:
             rows = run_benchmark(partial(progress.tell, "comparisons"))
     if arguments.json:
@@ -64,7 +70,10 @@ def run(arguments: argparse.Namespace) -> int:
     elif arguments.accuracy:
         _print_accuracy(rows)
     elif arguments.arrays:
-        _print_arrays(rows)
+        _print_arrays([row for row in rows if row["case"] == "arrays"])
+        _print_array_accuracy([row for row in rows if row["case"] == "array accuracy"])
+    elif arguments.peer:
+        _print_peer(rows)
     else:
         _print_ratios(rows)
     return 0
@@ -110,12 +119,45 @@ def _print_accuracy(rows: list[dict[str, Any]]) -> None:
 
 
 def _print_arrays(rows: list[dict[str, Any]]) -> None:
-    print(f"{'precision':<11}{'vehicles':>9}{'steps/s':>12}{'x real time':>13}{'compile, s':>12}")
+    print(
+        f"{'precision':<11}{'vehicles':>9}{'steps/s':>12}{'per CPU s':>12}{'x real time':>13}"
+        f"{'compile, s':>12}"
+    )
     for row in rows:
         print(
             f"{row['precision']:<11}{row['vehicles']:>9}{row['steps_per_second']:>12.3g}"
-            f"{row['realtime_factor']:>13.0f}{row['compile_seconds']:>12.1f}"
+            f"{row['steps_per_cpu_second']:>12.3g}{row['realtime_factor']:>13.0f}{row['compile_seconds']:>12.1f}"
         )
     print(
         f"\node3 at 1 ms on {rows[-1]['threads']} threads; best of three runs, without compilation"
+    )
+
+
+def _print_array_accuracy(rows: list[dict[str, Any]]) -> None:
+    print(f"\n{'step, ms':<11}{'error, m':>9}{'steps/s':>12}{'x real time':>13}")
+    for row in rows:
+        print(
+            f"{1e3 * row['timestep']:<11g}{row['position_error']:>9.1e}"
+            f"{row['steps_per_second']:>12.3g}{row['realtime_factor']:>13.0f}"
+        )
+    print(
+        f"\nRK4 in float64, {rows[0]['vehicles']} vehicles: position error after 8 s, from a "
+        "step of 0.1 ms"
+    )
+
+
+def _print_peer(rows: list[dict[str, Any]]) -> None:
+    print(
+        f"{'simulator':<18}{'integrator':<12}{'step, ms':>9}  {'precision':<10}{'vehicles':>9}"
+        f"{'threads':>9}{'steps/s':>11}{'per CPU s':>11}{'ratio':>8}"
+    )
+    for row in rows:
+        ratio = "" if row["ratio"] is None else f"{row['ratio']:.1f}"
+        print(
+            f"{row['simulator']:<18}{row['integrator']:<12}{1e3 * row['timestep']:>9g}  "
+            f"{row['precision']:<10}{row['vehicles']:>9}{row['threads']:>9}"
+            f"{row['steps_per_second']:>11.3g}{row['steps_per_cpu_second']:>11.3g}{ratio:>8}"
+        )
+    print(
+        "\nin turns, best of five runs, without compilation; ratio: steps per second to the peer's"
     )

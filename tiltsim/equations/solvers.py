@@ -60,6 +60,24 @@ def _stage_of(equations: Equations) -> Callable[..., tuple[Values, Values]]:
     return rates_after
 
 
+def _euler_of(equations: Equations) -> Callable[..., tuple[list[float], Values]]:
+    """Euler's explicit method, for comparison with other simulators; see `make_step`."""
+    inputs, rates = equations.inputs, equations.rates
+
+    @scalar
+    def euler_step(
+        time: float, state: list[float], held: Values, samples: bool, integration: Integration
+    ) -> tuple[list[float], Values]:
+        timestep, _, parameters, knots, disturbance = integration
+        if samples:
+            held = inputs(time, state, parameters, knots)
+        return stage(
+            state, timestep, rates(time, state, held, parameters, knots, disturbance)
+        ), held
+
+    return euler_step
+
+
 def _ode3_of(equations: Equations) -> Callable[..., tuple[list[float], Values]]:
     """The third-order method of Bogacki and Shampine; see `make_step`."""
     inputs, rates, rates_after = equations.inputs, equations.rates, _stage_of(equations)
@@ -111,7 +129,7 @@ def _rk4_of(equations: Equations) -> Callable[..., tuple[list[float], Values]]:
     return rk4_step
 
 
-SOLVERS: Final = {"ode3": _ode3_of, "RK4": _rk4_of}
+SOLVERS: Final = {"Euler": _euler_of, "ode3": _ode3_of, "RK4": _rk4_of}
 """By the name of ``simulation.integrator``."""
 
 

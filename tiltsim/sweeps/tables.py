@@ -335,7 +335,8 @@ class Sweep(Table):
     keep_flights: bool = Field(False, description="also keep every flight.parquet")
     chunk_size: Count | None = Field(
         None,
-        description="number of points that are flown and saved together; default: 1/64 of all",
+        description="number of points that are flown and saved together; default: 1/64 of "
+        "all, at most 32; with the jax engine a quarter, at most 1024",
         examples=[100],
     )
     plot: PlotTable = Field(PlotTable(), description="how tiltsim plot draws the sweep")

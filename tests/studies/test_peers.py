@@ -1,0 +1,33 @@
+"""Other simulators beside ours."""
+
+from __future__ import annotations
+
+import pytest
+
+from tiltsim.errors import InputError
+from tiltsim.studies import peers
+
+
+def test_an_absent_peer_is_one_line(monkeypatch):
+    monkeypatch.setattr(peers, "find_spec", lambda name: None)
+    message = "--peer crazyflow: not installed; python -m pip install crazyflow"
+    with pytest.raises(InputError, match=message), peers.running("crazyflow"):
+        pass
+
+
+def test_a_peer_that_fails_is_told(monkeypatch):
+    monkeypatch.setattr(peers, "find_spec", lambda name: name)
+    monkeypatch.setitem(peers.PEERS, "json", peers.PeerCase(None, 1, 1))  # not known in its process
+    with pytest.raises(InputError, match="--peer json: it failed"), peers.running("json"):
+        pass
+
+
+@pytest.mark.slow
+def test_rotorpy_is_timed_in_its_own_process():
+    pytest.importorskip("rotorpy")
+    with peers.running("rotorpy") as peer:
+        peer.time()
+        peer.time()
+        row = peer.row()
+    assert row["simulator"].startswith("rotorpy ")
+    assert row["steps_per_second"] == pytest.approx(100 / peer.timings[1][0])
