@@ -307,7 +307,6 @@ def test_rotors_with_inertia_fly_the_same_three_ways():
             layered({"vehicle": {"rotor_inertia": 2e-5}}),
             layered(spinning, FED_FORWARD, {"controller": {"rotor_inertia_feedforward": True}}),
             layered(spinning, STORMY, EVERYTHING, **LATE),
-            layered(spinning, plant="thesis"),
             layered(spinning, LAWS["full_pose"], plant="thesis"),
             layered(spinning, STORMY, EVERYTHING, plant="thesis", **LATE),
         ]

@@ -106,14 +106,14 @@ def test_a_right_model_without_gyroscopic_torque_is_as_good_as_a_measurement(cha
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
 def test_it_flies_the_same_three_ways(plant):
     engine = {"simulation": {"plant": plant, "engine": "native", "duration": 0.2}}
-    rows = three_ways(
-        [
-            scenario(TILTROTOR, TROT, SPINNING, MEASURED, engine),
-            scenario(*EVERYTHING, MEASURED, engine),
-            scenario(TILTROTOR, TROT, STORM, FEEDFORWARD, MEASURED, engine),
-            scenario(TILTROTOR, TROT, WATCHED, MEASURED, engine),
-        ]
-    )
+    flights = [
+        (*EVERYTHING, MEASURED),
+        (TILTROTOR, TROT, STORM, FEEDFORWARD, MEASURED),
+        (TILTROTOR, TROT, WATCHED, MEASURED),
+    ]
+    if plant == "mujoco":  # on the equations each compiles for ten seconds; the first has it all
+        flights.append((TILTROTOR, TROT, SPINNING, MEASURED))
+    rows = three_ways([scenario(*flight, engine) for flight in flights])
     assert {row.end.kind for row in rows} == {"completed"}
 
 
