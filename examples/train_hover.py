@@ -70,7 +70,7 @@ def train(updates: int, seed: int, processes: int) -> np.ndarray:
             best = np.argsort(scores.max(axis=1))[-BEST:]
             slopes = (scores[best, 0] - scores[best, 1]) / (scores[best].std() * BEST)
             weights = weights + scale * STEP * np.tensordot(slopes, directions[best], axes=1)
-            if update % 10 == 9:
+            if (update + 1) % max(1, updates // 8) == 0:
                 print(f"update {update + 1}: {scores.mean():.1f}, {perf_counter() - start:.0f} s")
     return weights
 
@@ -78,10 +78,10 @@ def train(updates: int, seed: int, processes: int) -> np.ndarray:
 def main() -> None:
     """Train, and print the score on starts that the training has not seen."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--updates", type=int, default=80)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--out", help="file for the weights, .npy")
+    parser.add_argument("--updates", type=int, default=80, help="of the weights; default: 80")
+    parser.add_argument("--seed", type=int, default=0, help="of all that is drawn; default: 0")
+    parser.add_argument("--processes", type=int, default=2, help="that fly; default: 2")
+    parser.add_argument("--out", help="file for the weights, .npy; default: none")
     arguments = parser.parse_args()
     start = perf_counter()
     weights = train(arguments.updates, arguments.seed, arguments.processes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -93,11 +94,44 @@ def test_a_short_training_beats_zero_actions_whatever_the_number_of_processes(tm
             [*command, "--processes", processes], cwd=ROOT, capture_output=True, text=True
         )
         assert done.returncode == 0, done.stderr
+        assert re.findall(r"update (\d+): ", done.stdout) == [str(n) for n in range(1, 13)]
         printed.append(float(re.search(r"score ([\d.]+)", done.stdout)[1]))
         weights.append(np.load(file))
     np.testing.assert_array_equal(*weights)
     mean, deviation = stated("Hover")[0]
     assert printed[0] == printed[1] > mean + 3.0 * deviation
+
+
+@pytest.fixture
+def by_gradients():
+    """The example that trains by gradients, as its names."""
+    pytest.importorskip("jax")
+    return runpy.run_path(str(ROOT / "examples" / "train_hover_by_gradients.py"))
+
+
+@pytest.mark.slow
+def test_the_policy_trained_by_gradients_has_the_stated_score_in_mujoco(by_gradients):
+    weights = by_gradients["load"](ROOT / "examples" / "hover_policy.npz")
+    scores = by_gradients["scores_in_mujoco"](weights, 4)
+    row = re.search(r"by gradients \| .*? \| ([\d.]+) ± ([\d.]+) \|", PAGE)
+    mean, deviation = map(float, row.groups())
+    assert mean_is_plausible(scores, mean, deviation)
+    assert scores.min() > stated("Hover")[2][0]
+
+
+@pytest.mark.slow
+def test_an_update_by_gradients_returns_weights_like_those_given(by_gradients):
+    """Traced only: compiling it takes a quarter of a minute."""
+    import jax
+
+    functions = by_gradients["VectorEnv"](by_gradients["TASK"]).functions
+    weights = by_gradients["initial_weights"]([12, 4, 8], 0)
+    zero = jax.tree.map(np.zeros_like, weights)
+    numbers = functions.draw([np.random.default_rng(0)] * 2).astype("float32")
+    update = by_gradients["make_update"](functions)
+    moved, _, reward = jax.eval_shape(update, weights, (zero, zero), numbers, 1.0, 0.1, 0.9)
+    assert jax.tree.map(np.shape, moved) == jax.tree.map(np.shape, weights)
+    assert reward.shape == ()
 
 
 @pytest.mark.slow
