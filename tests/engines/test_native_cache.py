@@ -56,7 +56,7 @@ def test_processes_that_compile_at_once_find_what_they_compiled(tmp_path, monkey
         )
         for name in names
     ]
-    assert [saver.wait(timeout=60) for saver in savers] == [0, 0]
+    assert [saver.wait(timeout=300) for saver in savers] == [0, 0]
     folder = tmp_path / "tiltsim" / native_code_folder().name
     monkeypatch.setattr(compiling, "native_code_folder", lambda: folder)
     index = compiling.NativeCodeCache(named("clipped"))._cache_file

@@ -61,7 +61,7 @@ def run(text, tmp_path):
                 f"--user-data-dir={tmp_path}/profile", "--window-size=1400,900",
                 f"{file.as_uri()}#{fragment}",
             ),
-            capture_output=True, text=True, timeout=60.0, check=True,
+            capture_output=True, text=True, timeout=300.0, check=True,
         )  # fmt: skip
         found = re.search(r'<pre id="result">(.*?)</pre>', done.stdout, re.DOTALL)
         assert found, done.stderr

@@ -100,7 +100,7 @@ def test_two_hundred_flights_of_all_kinds_are_the_same_in_threads():
 
 def test_threads_with_one_callback_step_at_the_same_time_and_others_in_turn():
     """Two blocks with one callback meet; a third, with another, waits until both have ended."""
-    met, order = Barrier(2, timeout=10.0), []
+    met, order = Barrier(2, timeout=300.0), []
 
     def native(_model, _data):
         """Stands for compiled code."""
@@ -120,7 +120,7 @@ def test_threads_with_one_callback_step_at_the_same_time_and_others_in_turn():
         thread.start()
     for thread in threads:
         thread.join()
-    met = Barrier(2, timeout=10.0)
+    met = Barrier(2, timeout=300.0)
     threads = [Thread(target=together), Thread(target=in_turn)]
     for thread in threads:
         thread.start()

@@ -49,8 +49,8 @@ def free_port():
 def wait_for_workers(address, count):
     from distributed import Client
 
-    with Client(address, timeout=60, set_as_default=False) as client:
-        client.wait_for_workers(count, timeout=120)
+    with Client(address, timeout=300, set_as_default=False) as client:
+        client.wait_for_workers(count, timeout=300)
 
 
 @pytest.mark.slow

@@ -72,7 +72,7 @@ def test_the_process_ends_with_its_parent(tmp_path):
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     # Both write to one pipe, of which the end is seen when both have ended.
     command = [sys.executable, "-c", program]
-    done = subprocess.run(command, env=environment, stderr=subprocess.PIPE, text=True, timeout=30)
+    done = subprocess.run(command, env=environment, stderr=subprocess.PIPE, text=True, timeout=300)
     assert (done.returncode, done.stderr) == (-signal.SIGKILL, "")
 
 

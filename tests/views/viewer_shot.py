@@ -21,7 +21,7 @@ from typing import Any
 
 TIMELINE = "sim_time"
 DRIVERS = "/usr/share/vulkan/icd.d"
-START_UP = 30.0  # s to wait for the viewer, the data, a still picture
+START_UP = 120.0  # s to wait for the viewer, the data, a still picture
 GREETING = 4.5  # s during which the viewer shows a message over the views
 STEP = 0.2  # s between looks
 
