@@ -34,4 +34,6 @@ def initial_states(plan: FlightPlan) -> Values:
     controller, airframe = plan.scenario.controller, airframe_of(plan)
     assert isinstance(controller, ScalarController)
     tilts = airframe.initial_tilts if controller.commands_tilts else ()
-    return (*controller.initial_states(airframe), *tilts)
+    late = plan.scenario.simulation.latency_steps > 0
+    speeds = airframe.initial_speeds if late else ()
+    return (*controller.initial_states(airframe), *tilts, *speeds)

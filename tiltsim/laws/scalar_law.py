@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 from tiltsim.errors import InputError
 from tiltsim.laws.airframe import airframe_of
 from tiltsim.laws.multirotor import layout_of_vehicle
-from tiltsim.laws.scalar_loop import Key, scalar_loop
+from tiltsim.laws.scalar_loop import scalar_loop
+from tiltsim.laws.scalar_parameters import Key
 from tiltsim.scenario.controller import ScalarFunctionController
 from tiltsim.scenario.own_code import describe, load_scalar_function
 from tiltsim.scenario.scalar_controller import ScalarController
@@ -108,6 +109,7 @@ def loop_of_scalar_law(scenario: Scenario) -> ClosedLoop:
         type(controller.law_parameters(airframe)),
         tuple(controller.state_units(airframe).items()),
         controller.commands_tilts,
+        scenario.simulation.latency_steps > 0,
     )
     loop = scalar_loop(key)
     if checksum:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import cache
 from math import sqrt
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from tiltsim.closed_loop.loop import (
 )
 from tiltsim.equations.tiltrotor import body_fields, initial_state
 from tiltsim.laws.airframe import airframe_of, initial_states
-from tiltsim.laws.multirotor import Layout
 from tiltsim.laws.rotorcraft import (
     body_state,
     held_controls_of,
@@ -32,63 +31,31 @@ from tiltsim.laws.rotorcraft import (
     thrust_controls_of,
     torque_free_columns,
 )
+from tiltsim.laws.scalar_parameters import Key, Known, record_of
 from tiltsim.laws.tiltrotor import REFERENCE_COLUMNS, reference_columns, servo_lead
 from tiltsim.scenario.scalar_controller import ScalarController
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
 from tiltsim.vehicles.rotorcraft.layout import CROSS, TILT_1, TILT_RATE_1
 from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
-from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.laws.observed import Desired, Observed
-from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import componentwise, entries_of, vectors_of
-from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
+from tiltsim_controllers.references.trajectories import reference_derivatives
 from tiltsim_controllers.vehicle.actuators import held_gain
 from tiltsim_controllers.vehicle.effectiveness import (
     ROTOR_FLOATS,
     effectiveness_of,
     table_per_newton,
 )
-from tiltsim_controllers.vehicle.multirotor import (
-    BODY_STATES,
-    Body,
-    body_of,
-    equations_of_motion_of,
-)
+from tiltsim_controllers.vehicle.multirotor import BODY_STATES, body_of, equations_of_motion_of
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
 
 
-class Known(NamedTuple):
-    """What every law's loop knows of its flight."""
-
-    gait: GaitParameters
-    reference: ReferenceParameters
-    vehicle: Body
-    rotors: float  # index in the knots of the table of rotors, then per newton, then K_f
-    rotor_gain: float  # 1/s, of the rotor speeds' errors
-    tilt_gain: float  # 1/s, of the errors of tilts that the law commands
-
-
-class Key(NamedTuple):
-    """All that a loop is compiled for."""
-
-    model: str
-    layout: Layout
-    law: Callable[..., tuple[Values, Values, Values]]
-    name: str
-    parameters: type[tuple[Any, ...]]  # of the law
-    states: tuple[tuple[str, str], ...]  # of the law, with their units
-    tilts: bool  # whether the law commands the tilts
-
-
-@cache
-def _record(parameters: type[tuple[Any, ...]]) -> Any:
-    """The type of the head of `userdata`."""
-    fields = {"signature": float, "servo_lead": float, "law": Known, "own": parameters}
-    return make_record_type("LoopParameters", **fields)
+CORRECTION: Final = 5.0
+"""1/s: the rate at which rotor speeds approach those of their model, slow beside any latency."""
 
 
 @scalar
@@ -122,6 +89,14 @@ def _inputs_of(key: Key) -> Callable[..., Values]:
         root=signed_root,
     )
     states_in, commanded = entries_of(0, own), entries_of(own, tilts)
+    modelled_in = entries_of(own + tilts * free, rotors)
+    models_rotors, correction = key.models_rotors, CORRECTION
+    corrected = componentwise(
+        "corrected",
+        "rates, spins, f, modelled, speeds",
+        "rates# + f * spins# * (modelled# - speeds#)",
+        rotors,
+    )
     tilt_rates_for = componentwise(
         "tilt_rates_for", "gain, angles, commanded", "gain * (angles# - commanded#)", tilts
     )
@@ -175,11 +150,13 @@ def _inputs_of(key: Key) -> Callable[..., Values]:
             at + per_newton,
         )
         thrusts, angles, rates = law(observed, parameters.own)
-        demanded = accelerations(known.rotor_gain, thrusts, k, turning, spins)
-        if free:
-            moving = tilt_rates_for(known.tilt_gain, angles, commanded(states))
-            return (*demanded, *rates, *moving)
-        return (*demanded, *rates)
+        reached = modelled_in(states) if models_rotors else turning
+        demanded = accelerations(known.rotor_gain, thrusts, k, reached, spins)
+        moving = tilt_rates_for(known.tilt_gain, angles, commanded(states)) if free else ()
+        if models_rotors:
+            following = corrected(demanded, spins, correction, reached, turning)
+            return (*following, *rates, *moving, *product(spins, demanded))
+        return (*demanded, *rates, *moving)
 
     return inputs
 
@@ -188,7 +165,7 @@ def _sampling(key: Key) -> Sampling:
     """The control step in MuJoCo."""
     free, own = key.tilts, len(key.states)
     rotors, tilts = key.layout.places
-    further = _further(key)
+    further = key.further_states
     tilts_in, tilt_rates_in = entries_of(TILT_1, tilts), entries_of(TILT_RATE_1, tilts)
     speeds_in, states_in = entries_of(0, rotors), entries_of(rotors, further)
     commanded = entries_of(rotors + own, tilts)  # of activations, and their rates of the inputs
@@ -213,11 +190,6 @@ def _sampling(key: Key) -> Sampling:
     return Sampling(controls, held_controls_of(key.layout.spins, tilts, further))
 
 
-def _further(key: Key) -> int:
-    """The number of the controller's states: the law's, then the tilts that it commands."""
-    return len(key.states) + key.layout.places.tilts * key.tilts
-
-
 def _idle(key: Key) -> Values:
     """Tilts that a sample of the quadrotor has, and it has not."""
     return (0.0,) * (CROSS.tilts if key.model == "quadrotor" else 0)
@@ -228,12 +200,17 @@ def _columns(key: Key) -> Columns:
     rotors, tilts = key.layout.places
     idle = _idle(key)
     tilts_in, tilt_rates_in = entries_of(TILT_1, tilts), entries_of(TILT_RATE_1, tilts)
-    speeds_in, states_in = entries_of(0, rotors), entries_of(rotors, _further(key))
+    speeds_in, states_in = entries_of(0, rotors), entries_of(rotors, key.further_states)
     planned = tilt_motion_of(tilts).planned
     angles = componentwise("angles_of_jets", "jets", "jets#[0]", tilts)
     shown = CROSS if idle else key.layout.places
     commands = shown.names("tilt_command") if key.tilts else ()
-    units = {**dict(key.states), **dict.fromkeys(commands, "rad")}
+    modelled = shown.names("modelled_rotor_speed") if key.models_rotors else ()
+    units = {
+        **dict(key.states),
+        **dict.fromkeys(commands, "rad"),
+        **dict.fromkeys(modelled, "rad/s"),
+    }
     columns = (*REFERENCE_COLUMNS, *shown.names("alpha_ref"))
     fields = (*shown.observed_fields, *units)
 
@@ -272,7 +249,7 @@ def _equations(key: Key) -> Equations:
     """The law on the equations of motion, with pods that follow their commands exactly."""
     rotors, tilts = key.layout.places
     own, free, gyroscopic = len(key.states), key.tilts, float(key.model == "quadrotor")
-    further, idle = _further(key), _idle(key)
+    further, idle = key.further_states, _idle(key)
     motion = equations_of_motion_of(key.layout.tilt_of_rotor)
     planned = tilt_motion_of(tilts).planned
     angles = componentwise("angles_of_jets", "jets", "jets#[0]", tilts)
@@ -354,7 +331,7 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
         *table_per_newton(vehicle.table, vehicle.thrust_coefficients),
     )
     return ControlSetup(
-        _record(type(own))(signature, lead, known, own), (*knots, *vehicle.thrust_coefficients)
+        record_of(type(own))(signature, lead, known, own), (*knots, *vehicle.thrust_coefficients)
     )
 
 
@@ -363,16 +340,16 @@ def scalar_loop(key: Key) -> ClosedLoop:
     """The closed loop of a scalar law."""
     layout = key.layout
     places, free = layout.places, key.tilts
-    states = _further(key)
+    states = key.further_states
     sampling, equations = _sampling(key), _equations(key)
     tilts = "".join(f"_{tilt}" if tilt >= 0 else "_f" for tilt in layout.tilt_of_rotor)
     senses = "".join("p" if spin > 0.0 else "m" for spin in layout.spins)
     for step in (sampling.controls, equations.inputs):
-        step.__qualname__ = f"{key.name}{'_free' * free}.{key.model}{tilts}_{senses}"
+        step.__qualname__ = f"{key.code_name}.{key.model}{tilts}_{senses}"
     multirotor = key.model == "multirotor"
     return ClosedLoop(
         kind=rotorcraft_kind(places if multirotor else CROSS, ("singularity_margin",)),
-        parameters=_record(key.parameters),
+        parameters=record_of(key.parameters),
         setup=_setup,
         dynamics=Dynamics(
             f"multirotor{tilts}_{senses}" if multirotor else key.model,

@@ -1,0 +1,53 @@
+"""Allocated thrusts and tilts make the force and torque that were asked for."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.controllers.multirotors import ring
+from tiltsim_controllers.laws.rotor_allocation import planned_allocation_of, tilting_allocation_of
+from tiltsim_controllers.vehicle.effectiveness import force_and_torque, layout_of, table_per_newton
+
+
+def per_newton(table):
+    return table_per_newton(table, [8.5e-6] * len(layout_of(table)))
+
+
+@pytest.mark.parametrize("rotors", [4, 6])
+def test_planned_tilts_make_any_torque_and_force_along_one_axis(rotors):
+    rng = np.random.default_rng(rotors)
+    table = per_newton(ring(rotors, hinged=True))
+    functions = planned_allocation_of(rotors)
+    for _ in range(20):
+        force, torque = force_and_torque(table, rng.uniform(-0.6, 0.6, rotors))
+        observed = SimpleNamespace(force=tuple(map(tuple, force)), torque=tuple(map(tuple, torque)))
+        lift = functions.lift(observed)
+        axis = functions.axis(observed, lift)
+        assert axis[2] == pytest.approx(1.0, rel=1e-9)
+        assert torque @ lift == pytest.approx(np.zeros(3), abs=1e-9)
+        wanted, push = rng.normal(size=3), rng.uniform(1.0, 20.0)
+        thrusts = np.array(functions.thrusts(observed, lift, axis, push, tuple(wanted)))
+        assert torque @ thrusts == pytest.approx(wanted, rel=1e-8, abs=1e-9)
+        along = np.array(axis) / np.linalg.norm(axis)
+        assert along @ force @ thrusts == pytest.approx(push, rel=1e-8)
+
+
+@pytest.mark.parametrize("rotors", [4, 6])
+def test_tilts_of_its_own_make_any_force_and_torque_with_the_least_thrusts(rotors):
+    rng = np.random.default_rng(rotors)
+    table = per_newton(ring(rotors, hinged=True))
+    allocated = tilting_allocation_of(layout_of(table))
+    observed = SimpleNamespace(table=table, at=0, tilt_angles=(0.0,) * rotors)
+    level, across = (
+        np.vstack(force_and_torque(table, [angle] * rotors)) for angle in (0.0, np.pi / 2)
+    )
+    for _ in range(20):
+        wrench = np.r_[rng.normal(size=3) * 5.0, rng.normal(size=3)]
+        thrusts, tilts = map(np.array, allocated(observed, tuple(wrench[:3]), tuple(wrench[3:])))
+        force, torque = force_and_torque(table, tilts)
+        assert np.r_[force @ thrusts, torque @ thrusts] == pytest.approx(wrench, abs=1e-9)
+        least = np.linalg.pinv(np.hstack([level, across])) @ wrench
+        assert thrusts == pytest.approx(np.hypot(*least.reshape(2, rotors)), rel=1e-8)

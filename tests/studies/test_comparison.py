@@ -1,0 +1,125 @@
+"""Controllers side by side: rows, searches, the figure and the command."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import tiltsim
+from tiltsim.cli import main
+from tiltsim.errors import InputError
+from tiltsim.studies.comparison import (
+    MEASURES,
+    SEARCHES,
+    Search,
+    _last,
+    _survived,
+    compare,
+    is_last_tried,
+)
+from tiltsim.views.figures.controllers_compared import comparison_figure
+
+SETPOINT = "ch04_tracking/setpoint#rho_0_modified"
+SHORT = {"simulation.duration": 0.3, "initial.position": [0.3, 0.0, 0.0], "expect": []}
+
+
+@pytest.fixture(scope="module")
+def rows():
+    names = ["given", "lqr", "yaw_position"]
+    return list(compare([SETPOINT], names, SHORT, searches=False))
+
+
+def test_a_row_is_of_its_flight(rows):
+    flight = tiltsim.simulate(tiltsim.load_scenario(SETPOINT, {**SHORT, "controller.law": "lqr"}))
+    row = rows[1].row
+    assert (row["controller"], row["scenario"], row["end"]) == ("lqr", SETPOINT, "completed")
+    error = np.linalg.norm(flight["position"] - flight["reference_position"], axis=1)
+    assert row["rms_position_error"] == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-12)
+    assert row["max_position_error"] == error.max()
+    change = np.diff(flight["rotor_speeds"], axis=0) / np.diff(flight["time"])[:, None]
+    effort = np.sqrt(np.mean(change**2))
+    assert row["rms_rotor_acceleration"] == pytest.approx(effort, rel=1e-12)
+    assert row["min_rotor_speed"] == flight.metrics()["min_rotor_speed"]
+    assert row["time_per_call"] > 0.0
+    np.testing.assert_array_equal(rows[1].error, error)
+
+
+def test_a_controller_that_does_not_fit_is_part_of_the_result(rows):
+    row = rows[2].row
+    assert row["end"] == "refused"
+    assert "controls the quadrotor" in row["refused"]
+    assert {row[measure] for measure in MEASURES} == {None}
+    assert set(row) == set(rows[0].row)
+
+
+def test_the_figure_has_every_flight(rows):
+    figure = comparison_figure(rows)
+    (axes,) = figure.axes
+    assert len([line for line in axes.lines if len(line.get_xdata())]) == 2
+    assert [text.get_text() for text in figure.legends[0].get_texts()][:2] == ["given", "lqr"]
+
+
+@pytest.mark.parametrize(("fails_at", "found"), [(9.0, None), (2.3, 2.2), (0.9, 0.8)])
+def test_a_search_ends_at_the_last_value_that_holds(fails_at, found):
+    search = Search("", 1.0, 3.0, 0.5, 0.15)
+    if fails_at == 0.9:
+        search = Search("", 1.0, 0.3, 0.2, 0.05)
+        last = _last(lambda value: value > fails_at, search)
+        assert fails_at < last <= fails_at + 0.05
+        return
+    last = _last(lambda value: value < fails_at, search)
+    assert last == 3.0 if found is None else fails_at - 0.15 <= last < fails_at
+
+
+def test_nothing_is_found_where_the_true_value_fails():
+    assert _last(lambda value: False, SEARCHES["max_mass_factor"]) is None
+    row = {"max_mass_factor": 3.0, "max_latency": 0.1, "control_period": 0.005}
+    assert is_last_tried(row, "max_mass_factor")
+    assert is_last_tried(row, "max_latency")
+    assert not is_last_tried({**row, "max_latency": 0.05}, "max_latency")
+
+
+def test_a_latency_is_sought_in_control_periods(monkeypatch):
+    """With the sample time of the scenario, and a law that a latency of one sample ends."""
+    scenario = tiltsim.load_scenario(
+        {
+            "controller": {"law": "lqr", "attitude_error": 0.02, "rate_error": 0.1},
+            "simulation": {"duration": 1.2, "timestep": 0.004, "control_timestep": 0.008},
+            "initial": {"angular_velocity": [1.0, 0.0, 0.0]},
+        }
+    )
+    search = Search("simulation.control_latency", 0.0, 4.0, 2.0, 1.0)
+    tried = []
+
+    def noticed(flown):
+        tried.append(flown.simulation.control_latency)
+        return tiltsim.simulate(flown)
+
+    monkeypatch.setattr("tiltsim.studies.comparison.simulate", noticed)
+    found = _survived(scenario, search)
+    assert tried[:2] == [0.0, pytest.approx(0.016)]
+    assert found is not None
+    assert found == pytest.approx(0.008 * round(found / 0.008))
+    assert found < 0.032
+
+
+def test_the_command_prints_rows_and_writes_a_folder(tmp_path, capsys):
+    options = [x for key, value in SHORT.items() for x in ("--set", f"{key}={json.dumps(value)}")]
+    names = ["--controllers", "lqr,yaw_position", "--jobs", "1", "--nominal", *options]
+    assert main(["compare", SETPOINT, *names, "--json", "--out", str(tmp_path)]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert [row["controller"] for row in printed] == ["lqr", "yaw_position"]
+    assert json.loads((tmp_path / "comparison.json").read_text())[0].keys() == printed[0].keys()
+    assert (tmp_path / "comparison.png").stat().st_size > 10_000
+    assert main(["compare", SETPOINT, *names]) == 0
+    table = capsys.readouterr().out.splitlines()
+    assert table[0] == SETPOINT
+    assert table[1].split()[:2] == ["controller", "rms"]
+    assert "yaw_position: " in table[4]
+
+
+def test_an_unknown_controller_is_refused():
+    with pytest.raises(InputError, match=r"--controllers pdi: did you mean pid\? choose given, "):
+        next(compare([SETPOINT], ["pdi"], {}))
