@@ -13,6 +13,7 @@ import numpy as np
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
+from tiltsim.linear.differences import CENTRAL, HALF_STENCIL
 from tiltsim.linear.forcing import Forcing, forcing_of
 from tiltsim.linear.motion import Motion, make_motion
 from tiltsim.linear.newton import Root, solve
@@ -27,6 +28,7 @@ ORBIT: Final = 1e-7
 """Largest difference after a period, in SI units, that counts as periodic."""
 
 SETTLING_TIME: Final = 40.0  # s, flown at most to approach an orbit or a rest point
+LONG: Final = 5000  # steps, from which on an orbit's differences have fewer evaluations
 FLIGHTS: Final = 150  # over a period, that an orbit takes to find
 
 
@@ -170,7 +172,8 @@ class _Search:
         raise InputError(f"{address}: found no {what} near its flight{left}")
 
     def _solve(self, state: Floats, tolerance: float) -> Root | None:
-        root = solve(self._change, self._motion.coordinates, state, 1e-4 * tolerance)
+        stencil = CENTRAL if self._steps > LONG else HALF_STENCIL
+        root = solve(self._change, self._motion.coordinates, state, 1e-4 * tolerance, stencil)
         regular = np.array_equal(self._signs(root.state), self._sides)
         if not (regular and np.isfinite(root.derivative).all()):
             return None  # beyond a singular attitude, or with a rotor that turns backwards

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from tiltsim.linear.coordinates import Coordinates
-from tiltsim.linear.differences import jacobian, steps_at
+from tiltsim.linear.differences import HALF_STENCIL, Stencil, jacobian, steps_at
 from tiltsim_controllers.mathematics.scalar import Floats
 
 ITERATIONS: Final = 30
@@ -33,11 +33,21 @@ class Root(NamedTuple):
 
 
 def derivative_at(
-    function: Callable[[Floats], Floats], coordinates: Coordinates, state: Floats
+    function: Callable[[Floats], Floats],
+    coordinates: Coordinates,
+    state: Floats,
+    stencil: Stencil = HALF_STENCIL,
 ) -> Floats:
-    """Derivative of a function of the state by its coordinates."""
+    """Derivative of a function of the state by its coordinates.
+
+    Args:
+        function: Of a state.
+        coordinates: Of the state.
+        state: Where.
+        stencil: Of the differences.
+    """
     steps = _steps(coordinates, state)
-    return jacobian(lambda by: function(coordinates.moved(state, by)), steps)
+    return jacobian(lambda by: function(coordinates.moved(state, by)), steps, stencil)
 
 
 def _steps(coordinates: Coordinates, state: Floats) -> Floats:
@@ -50,7 +60,11 @@ def _steps(coordinates: Coordinates, state: Floats) -> Floats:
 
 
 def solve(
-    function: Callable[[Floats], Floats], coordinates: Coordinates, state: Floats, tolerance: float
+    function: Callable[[Floats], Floats],
+    coordinates: Coordinates,
+    state: Floats,
+    tolerance: float,
+    stencil: Stencil = HALF_STENCIL,
 ) -> Root:
     """A state near another at which a function of it vanishes, or nearly so.
 
@@ -63,14 +77,15 @@ def solve(
         coordinates: Of the state.
         state: Where to begin.
         tolerance: Of the largest entry of the value.
+        stencil: Of the differences.
     """
     value, derived_at = function(state), state
-    derivative, renew = derivative_at(function, coordinates, state), False
+    derivative, renew = derivative_at(function, coordinates, state, stencil), False
     for _ in range(ITERATIONS):
         if np.abs(value).max() <= tolerance:
             break
         if renew:
-            derived_at, derivative = state, derivative_at(function, coordinates, state)
+            derived_at, derivative = state, derivative_at(function, coordinates, state, stencil)
         if not np.isfinite(derivative).all():
             break
         scale = _steps(coordinates, state)
@@ -89,5 +104,5 @@ def solve(
         renew = bool(np.linalg.norm(its_value) > GOOD * np.linalg.norm(value))
         state, value = moved, its_value
     if np.abs(coordinates.between(derived_at, state) / _steps(coordinates, state)).max() > NEAR:
-        derivative = derivative_at(function, coordinates, state)
+        derivative = derivative_at(function, coordinates, state, stencil)
     return Root(state, value, derivative)
