@@ -37,8 +37,9 @@ def hover_reward(observation: Mapping[str, Any], action: Any) -> Any:
     """
     error, velocity_error = _error(observation, "position"), _error(observation, "velocity")
     rates = observation["body_rates"]
-    squares = error @ error + 0.1 * (velocity_error @ velocity_error) + 0.01 * (rates @ rates)
-    return 1.0 / (1.0 + squares)
+    return 1.0 / (
+        1.0 + error @ error + 0.1 * (velocity_error @ velocity_error) + 0.01 * (rates @ rates)
+    )
 
 
 def _error(observation: Mapping[str, Any], name: str) -> Any:
