@@ -178,14 +178,26 @@ def test_actuators_sensors_and_faults_act_on_each_rotor():
     assert set(flight["thrust_factor_1"]) == {1.0}
 
 
+HEAVY = {"rotor_inertia": 2e-5}
+EVERYTHING = {
+    **ACTUATORS,
+    "vehicle": {**ACTUATORS["vehicle"], **HEAVY},
+    "model_error": {"mass": 1.05, "thrust_coefficient": 0.97},
+    "air": {
+        **{"drag": {"linear": [0.2, 0.3, 0.1]}, "wind": [3.0, 1.0, 0.0]},
+        **{"turbulence": {"wind_at_6m": 3.0}, "ground_effect": {"height": -0.15}},
+    },
+}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "tables"),
     [
         ("hexarotor", BEYOND_THE_SIDE),
         ("tilt_hexarotor", {"gait": TILTS}),
-        ("tilt_hexarotor", {"gait": TILTS, "simulation": {"plant": "thesis"}}),
-        ("tilt_hexarotor", ACTUATORS),
+        ("tilt_hexarotor", {"vehicle": HEAVY, "gait": TILTS, "simulation": {"plant": "thesis"}}),
+        ("tilt_hexarotor", EVERYTHING),
         ("tilt_hexarotor", {"controller": {"law": "full_pose", "failed_rotor": 2}}),
         ("omni_octorotor", {"controller": {"law": "attitude_force", "norm": "thrust"}}),
     ],

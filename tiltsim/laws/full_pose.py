@@ -31,7 +31,7 @@ from tiltsim.laws.tiltrotor import (
 )
 from tiltsim.scenario.tiltrotor_controllers import FullPoseController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT, initial_tilts
-from tiltsim.vehicles.rotorcraft.layout import ROTOR_STATES
+from tiltsim.vehicles.rotorcraft.layout import CROSS
 from tiltsim_controllers.laws.full_pose import Parameters, full_pose_inputs, limited_tilt_rate
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.vehicle.states import ROTORS
@@ -41,6 +41,9 @@ if TYPE_CHECKING:
 
 TILT_COMMANDS: Final = tuple(f"tilt_command_{rotor}" for rotor in ROTORS)
 """The controller's states: the commands of the servos (rad) without their lead."""
+
+COMMAND_1: Final = CROSS.rotors
+"""Of ``act``: the commands follow the rotor speeds."""
 
 TILT_RATES: Final = 4
 """Index of the first tilt rate among the control law's inputs."""
@@ -69,7 +72,7 @@ def _full_pose_controls(
         time, state, parameters.law, knots
     )
     # The law's limit sees a pod that stops at its servo's stop, but not the command beyond it.
-    a1, a2, a3, a4 = four(act, ROTOR_STATES)
+    a1, a2, a3, a4 = four(act, COMMAND_1)
     rate_1 = limited_tilt_rate(rate_1, a1, limits)
     rate_2 = limited_tilt_rate(rate_2, a2, limits)
     rate_3 = limited_tilt_rate(rate_3, a3, limits)
@@ -82,7 +85,7 @@ def _full_pose_controls(
 @scalar
 def _observe_full_pose(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
     """The tiltrotor and the commands of its servos."""
-    return (*observe_tiltrotor(qpos, qvel, act, ctrl), *four(act, ROTOR_STATES))
+    return (*observe_tiltrotor(qpos, qvel, act, ctrl), *four(act, COMMAND_1))
 
 
 @scalar

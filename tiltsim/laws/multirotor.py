@@ -135,7 +135,7 @@ def _sampling_of(layout: Layout, law: Callable[..., Values]) -> Sampling:
             *rates_in(rates),
         )
 
-    return Sampling(controls, held_controls_of(layout.spins, tilts, STATES))
+    return Sampling(controls, held_controls_of(layout.spins, tilts))
 
 
 @cache

@@ -83,7 +83,7 @@ def _sampling_of(layout: Layout) -> Sampling:
         servos = ahead(commands, parameters.servo_lead, rates)
         return (*servos, *thrusts(act), *accelerations(inputs), *rates)
 
-    return Sampling(controls, held_controls_of(layout.spins, tilts, tilts))
+    return Sampling(controls, held_controls_of(layout.spins, tilts))
 
 
 @cache

@@ -20,12 +20,7 @@ from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import (
-    componentwise,
-    entries_of,
-    tuple_text,
-    written_out,
-)
+from tiltsim_controllers.mathematics.vectors import componentwise, tuple_text, written_out
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
 
@@ -50,23 +45,20 @@ def thrust_controls_of(spins: Values) -> Callable[[Vector], Values]:
 
 
 @cache
-def held_controls_of(spins: Values, tilts: int, states: int = 0) -> Callable[..., Values]:
+def held_controls_of(spins: Values, tilts: int) -> Callable[..., Values]:
     """Scalar code of held controls with the thrusts of the present rotor speeds.
 
     Args:
         spins: Signs of the rotor speeds.
         tilts: Number of hinges.
-        states: Number of the controller's own states.
     """
-    rotors = len(spins)
-    servos, thrusts = entries_of(0, tilts), thrust_controls_of(spins)
-    rates = entries_of(Layout(rotors, tilts).acceleration_1, rotors + states)
+    thrusts, further = thrust_controls_of(spins), Layout(len(spins), tilts).acceleration_1
 
     @scalar
     def held_controls(
         time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: object
     ) -> Values:
-        return (*servos(ctrl), *thrusts(act), *rates(ctrl))
+        return (*ctrl[:tilts], *thrusts(act), *ctrl[further:])
 
     return held_controls
 

@@ -187,7 +187,7 @@ def _sampling(key: Key) -> Sampling:
             servos = servo_commands(time, lead, parameters.law.gait, knots)
         return (*servos, *thrusts(act), *rates)
 
-    return Sampling(controls, held_controls_of(key.layout.spins, tilts, further))
+    return Sampling(controls, held_controls_of(key.layout.spins, tilts))
 
 
 def _idle(key: Key) -> Values:

@@ -16,6 +16,7 @@ import numpy as np
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Sizes
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
+from tiltsim.laws.rotorcraft import held_controls_of, thrust_controls_of
 from tiltsim.vehicles.rotorcraft.layout import TILT_RATE_1
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
 from tiltsim_controllers.gaits.parameters import GaitParameters
@@ -62,16 +63,8 @@ def four(values: Vector, first: int) -> Quad:
     return values[first], values[first + 1], values[first + 2], values[first + 3]
 
 
-@scalar
-def rotor_thrust_controls(act: Vector) -> Quad:
-    """Controls of the thrust actuators, ``s_i varpi_i |varpi_i|`` with ``s = (-1, 1, -1, 1)``."""
-    speed_1, speed_2, speed_3, speed_4 = act[0], act[1], act[2], act[3]
-    return (
-        -speed_1 * abs(speed_1),
-        speed_2 * abs(speed_2),
-        -speed_3 * abs(speed_3),
-        speed_4 * abs(speed_4),
-    )
+rotor_thrust_controls: Final = thrust_controls_of(SPIN)
+"""Controls of the thrust actuators, ``s_i varpi_i |varpi_i|`` with ``s = (-1, 1, -1, 1)``."""
 
 
 @scalar
@@ -123,12 +116,8 @@ def with_measured_inputs(loop: ClosedLoop, inputs: Callable[..., Values]) -> Clo
     )
 
 
-@scalar
-def refreshed_controls(
-    time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: Any
-) -> Values:
-    """Held controls with the thrusts of the present rotor speeds."""
-    return (*ctrl[:4], *rotor_thrust_controls(act), *ctrl[8:])
+refreshed_controls: Final = held_controls_of(SPIN, len(SPIN))
+"""Held controls with the thrusts of the present rotor speeds."""
 
 
 def servo_lead(servo: ServoTable) -> float:

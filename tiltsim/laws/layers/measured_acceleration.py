@@ -23,7 +23,7 @@ from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.laws.tiltrotor import four
 from tiltsim.models.parts import SERVO_ARMATURE
 from tiltsim.vehicles.rotorcraft import rotor_limits
-from tiltsim.vehicles.rotorcraft.layout import CROSS, TILT_1, TILT_RATE_1, TILTROTOR_THRUSTS
+from tiltsim.vehicles.rotorcraft.layout import CROSS, TILT_1, TILT_RATE_1
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, clipped, scalar
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     body_torque,
@@ -35,6 +35,9 @@ from tiltsim_controllers.vehicle.rigid_body import cross
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
+
+
+CROSS_THRUSTS: Final = CROSS.thrust_1
 
 
 class Motion(NamedTuple):
@@ -70,14 +73,15 @@ def plant_angular_acceleration(
     ixx, iyy, izz = vehicle.inertia_xx, vehicle.inertia_yy, vehicle.inertia_zz
     low, high = motion.least_thrust, motion.greatest_thrust
     tilts, rates = four(qpos, TILT_1), four(qvel, TILT_RATE_1)
+    thrusts = four(ctrl, CROSS_THRUSTS)
     trig = sines_and_cosines(tilts[0], tilts[1], tilts[2], tilts[3])
     # The controls are s varpi |varpi| with s = (-1, 1, -1, 1), the matrix's are without s.
     tx, ty, tz = body_torque(
         torque_entries(trig, drag_ratio(vehicle)),
-        -clipped(ctrl[TILTROTOR_THRUSTS], low, high),
-        clipped(ctrl[TILTROTOR_THRUSTS + 1], low, high),
-        -clipped(ctrl[TILTROTOR_THRUSTS + 2], low, high),
-        clipped(ctrl[TILTROTOR_THRUSTS + 3], low, high),
+        -clipped(thrusts[0], low, high),
+        clipped(thrusts[1], low, high),
+        -clipped(thrusts[2], low, high),
+        clipped(thrusts[3], low, high),
     )
     per_torque = vehicle.arm_length * vehicle.thrust_coefficient
 

@@ -11,13 +11,6 @@ from tiltsim_controllers.vehicle.states import BODY_FIELDS
 QW, QX, QY, QZ, TILT_1 = range(3, 8)
 TILT_RATE_1: Final = 6
 
-ROTOR_STATES: Final = 4
-"""Of ``act``: rotor speeds, before the states of the controller and of the layers around it."""
-
-# Of ``ctrl``: tilt servos, thrusts, rotor accelerations, rates of further states; the quadrotor has
-# the same without servos.
-TILTROTOR_THRUSTS, QUADROTOR_THRUSTS, ACCELERATION_1, FURTHER_RATES = 4, 0, 8, 12
-
 
 class Layout(NamedTuple):
     """The layout of a rotorcraft's numbers, by how many rotors and tilt hinges it has."""
