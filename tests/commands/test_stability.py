@@ -1,0 +1,99 @@
+"""``tiltsim stability`` and ``tiltsim attraction``."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import tiltsim
+from tiltsim.cli import main
+from tiltsim.commands.stability import parse_sweep
+from tiltsim.linear.attraction import Attraction
+from tiltsim.linear.sweeping import sweep_stability
+from tiltsim.views.figures.attraction import attraction_figure
+from tiltsim.views.figures.stability import loop_figure, sweep_figure
+
+SETPOINT = "ch04_tracking/setpoint#rho_065_modified"
+THESIS = ["--set", "simulation.plant=thesis"]
+
+
+def test_json_of_a_rest_point_with_margins(capsys):
+    assert main(["stability", SETPOINT, *THESIS, "--margins", "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert list(report)[:6] == ["kind", "period", "residual", "stable", "neutral", "poles"]
+    assert (report["kind"], report["period"], report["stable"]) == ("rest", None, True)
+    assert len(report["poles"]) == len(report["states"]) == 16
+    assert set(report["modes"][0]) == {"name", "frequency", "damping", "states", "count"}
+    assert report["margins"][0]["place"] == "all inputs"
+
+
+def test_text_and_figure_of_poles(tmp_path, capsys):
+    figure = tmp_path / "poles.svg"
+    assert main(["stability", SETPOINT, *THESIS, "--plot", str(figure)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:2] == ["kind      rest point", "verdict   stable"]
+    assert "Poles of the rest point: stable" in figure.read_text(encoding="utf-8")
+
+
+def test_a_sweep_prints_where_stability_is_lost(capsys):
+    keys = [*THESIS, "--set", "controller.allow_unstable=true"]
+    assert main(["stability", SETPOINT, *keys, "--sweep", "vehicle.mass=0.4:0.5:2"]) == 0
+    printed = capsys.readouterr().out
+    assert printed.splitlines()[1].split() == ["vehicle.mass", "left", "after", "1", "s", "verdict"]
+    assert printed.count("stable") == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("gait.period=1", "write KEY=FROM:TO"),
+        ("gait.period=a:b", "write KEY=FROM:TO"),
+        ("gait.period=1:1", "with 2 or more :POINTS"),
+        ("period", "gait.period has no value to start from"),
+    ],
+)
+def test_a_wrong_sweep_is_refused(text, message):
+    with pytest.raises(tiltsim.InputError, match=message):
+        parse_sweep(text, [tiltsim.load_scenario(SETPOINT)])
+
+
+def test_a_sweep_without_a_range_goes_from_half_to_twice():
+    key, values = parse_sweep("vehicle.mass", [tiltsim.parse_scenario({"vehicle": {"mass": 0.4}})])
+    assert (key, len(values)) == ("vehicle.mass", 16)
+    assert values[0] == pytest.approx(0.2)
+    assert values[-1] == pytest.approx(0.8)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([SETPOINT, SETPOINT], "2 scenarios need --sweep KEY"),
+        ([SETPOINT, "--margins", "--sweep", "vehicle.mass"], "not with --sweep"),
+    ],
+)
+def test_contradicting_options_are_refused(arguments, message, capsys):
+    assert main(["stability", *arguments]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_wrong_ranges_of_a_map_are_refused(capsys):
+    assert main(["attraction", SETPOINT, "--ranges=-1:1"]) == 2
+    assert "write LOW:HIGH,LOW:HIGH" in capsys.readouterr().err
+
+
+def test_figures_of_sweeps_loops_and_maps():
+    """A line a scenario; the curve of singular attitudes where there is one."""
+    scenario = tiltsim.load_scenario(SETPOINT, {"simulation.plant": "thesis"})
+    points = sweep_stability(scenario, "vehicle.mass", [0.4, 0.45])
+    upper, lower = sweep_figure("vehicle.mass", {"one": points, "two": points}).axes
+    assert [len(axes.lines) for axes in (upper, lower)] == [3, 3]
+    gain, nyquist, *_ = loop_figure(tiltsim.linearize(scenario)).axes
+    assert [len(axes.lines) for axes in (gain, nyquist)] == [5, 6]
+    edges = np.linspace(-1.5, 1.5, 5)
+    share = np.eye(4)
+    found = Attraction(scenario, ("roll", "pitch"), (edges, edges), share, 25, np.ones((4, 4)))
+    (axes,) = attraction_figure(found).axes
+    assert axes.get_title(loc="left") == "25 % come back"
+    assert len(axes.lines) == 2  # the curve and the scenario
