@@ -161,6 +161,7 @@ NEVER_CALLED = {
     # Vehicles whose torque-free forces are a plane, and these gaits with more than four tilts:
     *("unit_vector", "jet_cross", "_jet_dot", "desired_direction", "nearest_in_plane"),
     *("normal_of_rows", "_fixed_jet", "_rounded", "_table_jet"),
+    "torque_for",  # of the example package
 }
 """Functions of modules that none of these flights calls."""
 
