@@ -204,6 +204,22 @@ def test_modes_group_equal_poles_and_name_their_states():
     assert (mode.frequency, mode.damping) == (pytest.approx(5**0.5), pytest.approx(5**-0.5))
 
 
+def test_a_negative_multiplier_is_one_pole():
+    """Its logarithm is complex, without a partner."""
+    modes = modes_of(np.diag([-0.5, 0.3]), ("x", "y"), 1.0)
+    assert [(mode.name, mode.count) for mode in modes] == [("y", 1), ("x", 1)]
+
+
+def test_rest_is_where_the_vehicle_is_told_to_turn():
+    """Upside down, and not level, which is at rest, too, as far as can be from there."""
+    changes = {"simulation.plant": "rigid_body", "simulation.engine": "python"}
+    changes |= {"controller.turn_time": 1.0, "simulation.duration": 1.0}
+    found = tiltsim.stability(tiltsim.load_scenario("fleet/omni_octorotor#upside_down", changes))
+    assert found.stable
+    quaternion = found.equilibrium.root.state[3:7]
+    assert np.abs(quaternion) == pytest.approx((0.0, 1.0, 0.0, 0.0), abs=1e-9)
+
+
 REFUSED = {
     "noise": ({"sensors.position_noise": 0.1}, "sensors.position_noise: with noise"),
     "a moving gait": (

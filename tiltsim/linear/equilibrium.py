@@ -180,17 +180,20 @@ class _Search:
         return root
 
     def _starts(self) -> Iterator[Floats]:
-        """States to start from: of an orbit one where the flight has settled."""
+        """States to start from: first of a rest point that no event precedes the initial one."""
         initial = self._motion.initial
-        if self._forcing.period is None:
+        at_once = self._forcing.period is None and self._step == 0
+        if at_once:
             yield initial
         yield self._settled()
-        if self._forcing.period is not None:
+        if not at_once:
             yield initial
 
     def _settled(self) -> Floats:
-        """The state at which the flight changes least from one return to the next."""
-        state, step = self._motion.initial, 0
+        """The state at which the flight, once steady, changes least from a return to the next."""
+        state, step = self._motion.initial, self._step
+        if step:
+            state = self._motion.flown(0, state, step)
         between = self._steps or ceil(1.0 / self._timestep)
         count = self._returns if self._steps else ceil(self._returns / between)
         best, least = state, np.inf

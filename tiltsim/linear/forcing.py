@@ -26,6 +26,8 @@ from tiltsim_controllers.references.trajectories import (
 MOST_PERIODS: Final = 1000
 """Of a gait or reference in their common period."""
 
+CONTROLLER_EVENTS: Final = ("turn_time", "failure_known_from")
+"""Keys of controllers: times (s) until which they change."""
 
 _AT_REST: Final = (0.0, 0.0, 0.0)
 
@@ -37,7 +39,8 @@ class Forcing(NamedTuple):
         period: s; None where nothing but the motion of the frame depends on time.
         velocity, acceleration: Of a frame in which the reference repeats, at time zero, m/s and
             m/s^2, world axes.
-        start: Time (s) after which it is so: faults have happened, gusts have passed.
+        start: Time (s) after which it is so: faults have happened and are known, gusts have passed,
+            the attitude that a controller is told is reached.
     """
 
     period: float | None
@@ -81,8 +84,9 @@ def forcing_of(assembly: Assembly) -> Forcing:
         periods.append(gait.period)
     gust = None if scenario.air is None else scenario.air.gust
     passed = 0.0 if gust is None else gust.start + 2.0 * gust.rise + gust.duration
-    start = max((fault.time for fault in scenario.fault), default=0.0)
-    return Forcing(_common(periods, scenario), velocity, acceleration, max(start, passed))
+    events = [passed, *(fault.time for fault in scenario.fault)]
+    events += [getattr(scenario.controller, key, 0.0) for key in CONTROLLER_EVENTS]
+    return Forcing(_common(periods, scenario), velocity, acceleration, max(events))
 
 
 def _check(scenario: Scenario) -> None:

@@ -117,7 +117,8 @@ def modes_of(matrix: Floats, names: Sequence[str], timestep: float | None) -> tu
         group = [i for i in left_over if abs(poles[i] - pole) <= near]
         left_over = [i for i in left_over if i not in group]
         part = np.abs(np.einsum("ik,ki->i", vectors[:, group], left[group]))
-        count = len(group) * (2 if pole.imag > 0.0 else 1)
+        # The logarithm of a negative real eigenvalue is complex, yet it has no partner.
+        count = sum(2 if eigenvalues[i].imag > 0.0 else 1 for i in group)
         found.append(_mode(pole, part, names, count))
     return tuple(found)
 
