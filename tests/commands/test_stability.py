@@ -50,7 +50,8 @@ def test_a_sweep_prints_where_stability_is_lost(capsys):
     [
         ("gait.period=1", "write KEY=FROM:TO"),
         ("gait.period=a:b", "write KEY=FROM:TO"),
-        ("gait.period=1:1", "with 2 or more :POINTS"),
+        ("gait.period=1:1", "with 2 to 1000 :POINTS"),
+        ("gait.period=1:2:100000000000", "with 2 to 1000 :POINTS"),
         ("period", "gait.period has no value to start from"),
     ],
 )

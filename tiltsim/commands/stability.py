@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 SHORT_KEYS: Final = {"period": "gait.period", "amplitude": "gait.amplitude"}
 POINTS: Final = 16
+MOST_POINTS: Final = 1000
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -135,8 +136,8 @@ def parse_sweep(text: str, scenarios: Sequence[Scenario]) -> tuple[str, list[flo
                 f"--sweep {text}: {key} has no value to start from; write {name}=FROM:TO"
             )
         first, last = 0.5 * value, 2.0 * value
-    if len(parts) not in {0, 2, 3} or points < 2 or first == last:
-        raise InputError(f"--sweep {text}: write KEY=FROM:TO, with 2 or more :POINTS")
+    if len(parts) not in {0, 2, 3} or not 2 <= points <= MOST_POINTS or first == last:
+        raise InputError(f"--sweep {text}: write KEY=FROM:TO, with 2 to {MOST_POINTS} :POINTS")
     shares = [index / (points - 1) for index in range(points)]
     if first > 0.0 and last > 0.0:
         return key, [first * (last / first) ** share for share in shares]
