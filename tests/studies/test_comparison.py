@@ -123,3 +123,8 @@ def test_the_command_prints_rows_and_writes_a_folder(tmp_path, capsys):
 def test_an_unknown_controller_is_refused():
     with pytest.raises(InputError, match=r"--controllers pdi: did you mean pid\? choose given, "):
         next(compare([SETPOINT], ["pdi"], {}))
+
+
+def test_no_controller_at_all_is_refused():
+    with pytest.raises(InputError, match="--controllers : choose given, "):
+        next(compare([SETPOINT], [], {}))

@@ -72,7 +72,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.out is not None:
         prepare_folder(arguments.out)
-    controllers = list(dict.fromkeys(filter(None, arguments.controllers.split(","))))
+    names = (name.strip() for name in arguments.controllers.split(","))
+    controllers = list(dict.fromkeys(filter(None, names)))
     addresses, compared = collect(arguments.scenarios), []
     flown = compare(
         addresses,

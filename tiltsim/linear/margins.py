@@ -58,7 +58,8 @@ class Margin:
         delay: Smallest further delay at which it becomes unstable, s.
         frequency: Where the smallest phase margin is, rad/s; nan if there is none.
         disk: Largest alpha of the disk of factors ``(1 + alpha d / 2) / (1 - alpha d / 2)``, any
-            complex ``|d| < 1``, at each input independently; 2 and more: any phase.
+            complex ``|d| < 1``; 2 and more: any phase. At all inputs together d is any matrix
+            smaller than 1, so the disk holds for independent factors, which may bear more.
     """
 
     place: str

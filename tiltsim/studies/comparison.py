@@ -118,11 +118,11 @@ def compare(
         trusted: Whether Python code that scenario files name may be executed.
 
     Raises:
-        InputError: If a controller or scenario does not exist.
+        InputError: If a controller or scenario does not exist, or none is given.
     """
-    for name in controllers:
-        if name not in (GIVEN, *CONTROLLERS) or name in ("python", "scalar"):
-            known = [law for law in (GIVEN, *CONTROLLERS) if law not in ("python", "scalar")]
+    known = [law for law in (GIVEN, *CONTROLLERS) if law not in ("python", "scalar")]
+    for name in controllers or ("",):
+        if name not in known:
             raise InputError(f"--controllers {name}: {choose(name, known)}")
     for address in addresses:
         require_trust(load_scenario(address, overrides), trusted)
