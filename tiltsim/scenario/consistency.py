@@ -6,12 +6,12 @@ import re
 from math import pi
 from typing import Final
 
-from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.claim import NAME
 from tiltsim.scenario.controller import laws_for
 from tiltsim.scenario.gait import FixedGait, TableGait
 from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
+from tiltsim.scenario.outputs import check_dimension, check_full_pose
 from tiltsim.scenario.reference import WaypointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
 from tiltsim.scenario.scenario_tables import ScenarioTables
@@ -23,8 +23,6 @@ from tiltsim.scenario.vehicle import (
     VehicleTable,
     require_physical_inertia,
 )
-from tiltsim_controllers.gaits.plans import Gait
-from tiltsim_controllers.laws.multirotor_full_pose import pose_rank
 
 MAX_KNOTS: Final = 1500
 """Numbers of a gait and a reference together, unless they are tables with a limit of their own."""
@@ -310,61 +308,14 @@ def _check_gait(scenario: ScenarioTables) -> None:
             f"too many waypoints: {total} numbers with the gait's, at most {MAX_KNOTS}",
         )
     if isinstance(scenario.controller, AttitudeForceController):
-        _check_dimension(scenario, scenario.controller, gait)
+        check_dimension(scenario, scenario.controller, gait)
     if isinstance(scenario.controller, FullPoseController):
-        _check_full_pose(scenario, scenario.controller, gait)
+        check_full_pose(scenario, scenario.controller, gait)
     if scenario.controller.commands_tilts and not gait.is_constant:
         raise scenario.mistake(
             "gait.type",
             f"the {scenario.controller.law} law commands the tilts itself; give the initial angles "
             "as a fixed gait",
-        )
-
-
-def _check_failed_rotor(scenario: ScenarioTables, failed: int | None) -> None:
-    rotors = scenario.vehicle.rotor_count
-    if failed is not None and failed > rotors:
-        raise InvalidValueError(
-            "controller.failed_rotor", failed, f"the vehicle has {rotors} rotors"
-        )
-
-
-def _check_full_pose(scenario: ScenarioTables, controller: FullPoseController, gait: Gait) -> None:
-    """Refuse a failed rotor that is not there, and inputs that do not move six outputs."""
-    vehicle, failed = scenario.vehicle.resolve(), controller.failed_rotor
-    _check_failed_rotor(scenario, failed)
-    if isinstance(vehicle, Multirotor):
-        w = [spin * (rotor != failed) for rotor, spin in enumerate(vehicle.spins, start=1)]
-        rank = pose_rank(vehicle.table, gait.angles(0.0).tolist(), w)
-        if rank < 6:
-            reason = f"at the initial tilt angles the inputs move {rank} of six outputs"
-            raise scenario.mistake("controller.law", reason)
-
-
-def _check_dimension(
-    scenario: ScenarioTables, controller: AttitudeForceController, gait: Gait
-) -> None:
-    """Refuse more components of force than a multirotor has, and a pose that it cannot take."""
-    _check_failed_rotor(scenario, controller.failed_rotor)
-    vehicle = scenario.vehicle.resolve()
-    assert isinstance(vehicle, Multirotor)
-    dimension = controller.resolve_force(vehicle, gait).dimension
-    reference = scenario.reference
-    if (reference.kind == "attitude_altitude") != (controller.decoupler == "none"):
-        raise scenario.mistake(
-            "controller.decoupler",
-            f"reference.type = {reference.type!r} needs "
-            + ("none" if controller.decoupler != "none" else "conventional, modified or exact"),
-        )
-    if reference.kind == "pose" and dimension < 3:
-        key = "roll" if reference.roll else "pitch"
-        reason = f"is no output with {dimension} components of force; needs a vehicle with 3"
-        raise scenario.mistake(f"reference.{key}", reason)
-    if dimension == 1:
-        return
-    if controller.decoupling != "exact" or controller.decoupler != "exact":
-        raise scenario.mistake(
-            "controller.dimension", f"the vehicle has {dimension}; set it to 1 for this decoupler"
         )
 
 

@@ -1,0 +1,58 @@
+"""Checks that a vehicle can control the outputs of its law, with its gait and without a rotor."""
+
+from __future__ import annotations
+
+from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.multirotor_controllers import AttitudeForceController
+from tiltsim.scenario.scenario_tables import ScenarioTables
+from tiltsim.scenario.tiltrotor_controllers import FullPoseController
+from tiltsim_controllers.gaits.plans import Gait
+from tiltsim_controllers.laws.multirotor_full_pose import pose_rank
+
+
+def _check_failed_rotor(scenario: ScenarioTables, failed: int | None) -> None:
+    rotors = scenario.vehicle.rotor_count
+    if failed is not None and failed > rotors:
+        raise InvalidValueError(
+            "controller.failed_rotor", failed, f"the vehicle has {rotors} rotors"
+        )
+
+
+def check_full_pose(scenario: ScenarioTables, controller: FullPoseController, gait: Gait) -> None:
+    """Refuse a failed rotor that is not there, and inputs that do not move six outputs."""
+    vehicle, failed = scenario.vehicle.resolve(), controller.failed_rotor
+    _check_failed_rotor(scenario, failed)
+    if isinstance(vehicle, Multirotor):
+        w = [spin * (rotor != failed) for rotor, spin in enumerate(vehicle.spins, start=1)]
+        rank = pose_rank(vehicle.table, gait.angles(0.0).tolist(), w)
+        if rank < 6:
+            reason = f"at the initial tilt angles the inputs move {rank} of six outputs"
+            raise scenario.mistake("controller.law", reason)
+
+
+def check_dimension(
+    scenario: ScenarioTables, controller: AttitudeForceController, gait: Gait
+) -> None:
+    """Refuse more components of force than a multirotor has, and a pose that it cannot take."""
+    _check_failed_rotor(scenario, controller.failed_rotor)
+    vehicle = scenario.vehicle.resolve()
+    assert isinstance(vehicle, Multirotor)
+    dimension = controller.resolve_force(vehicle, gait).dimension
+    reference = scenario.reference
+    if (reference.kind == "attitude_altitude") != (controller.decoupler == "none"):
+        raise scenario.mistake(
+            "controller.decoupler",
+            f"reference.type = {reference.type!r} needs "
+            + ("none" if controller.decoupler != "none" else "conventional, modified or exact"),
+        )
+    if reference.kind == "pose" and dimension < 3:
+        key = "roll" if reference.roll else "pitch"
+        reason = f"is no output with {dimension} components of force; needs a vehicle with 3"
+        raise scenario.mistake(f"reference.{key}", reason)
+    if dimension == 1:
+        return
+    if controller.decoupling != "exact" or controller.decoupler != "exact":
+        raise scenario.mistake(
+            "controller.dimension", f"the vehicle has {dimension}; set it to 1 for this decoupler"
+        )
