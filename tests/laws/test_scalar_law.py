@@ -104,6 +104,11 @@ def no_floats(observed):
 
 
 @tiltsim.scalar
+def of_two(observed, parameters):
+    return (1.0, 1.0, 1.0, 1.0), (), ()
+
+
+@tiltsim.scalar
 def misspelt(observed):
     return observed.nothing
 
@@ -113,6 +118,7 @@ def misspelt(observed):
     [
         (three_thrusts, "must return 4 thrusts"),
         (no_floats, "must return 4 thrusts"),
+        (of_two, "must return 4 thrusts.* TypeError: .*missing 1 required positional argument"),
         (misspelt, r"AttributeError: .* \(test_scalar_law.py, line \d+\)"),
     ],
 )

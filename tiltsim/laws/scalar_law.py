@@ -139,7 +139,7 @@ def _try_once(loop: ClosedLoop, plan: FlightPlan) -> None:
     except Exception as error:
         calls = 4 + isinstance(scenario.controller, ScalarFunctionController)  # before the law
         if len(traceback.extract_tb(error.__traceback__)) <= calls:
-            raise InputError(wanted) from error
+            raise InputError(f"{wanted} ({describe(error, calls)})") from error
         raise InputError(f"{start}: the law raised {describe(error, calls)}") from error
     if len(ctrl) != loop.dynamics.sizes.ctrl or not all(isinstance(v, float) for v in ctrl):
         raise InputError(f"{wanted}; with {states} states they make {len(ctrl)} controls")
