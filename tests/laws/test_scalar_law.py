@@ -118,7 +118,7 @@ def misspelt(observed):
     [
         (three_thrusts, "must return 4 thrusts"),
         (no_floats, "must return 4 thrusts"),
-        (of_two, "must return 4 thrusts.* TypeError: .*missing 1 required positional argument"),
+        (of_two, "must return 4 thrusts.*TypeError: .*missing 1 required positional argument"),
         (misspelt, r"AttributeError: .* \(test_scalar_law.py, line \d+\)"),
     ],
 )
