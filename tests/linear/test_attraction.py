@@ -98,3 +98,9 @@ def test_wrong_arguments(arguments, message):
 def test_tilt_cars_have_no_attitude():
     with pytest.raises(tiltsim.InputError, match="takes rotorcraft only"):
         attraction("ch11_penguin/straight_line#small")
+
+
+@pytest.mark.parametrize("refinements", [7, -1, "3", 1.5])
+def test_refinements_are_a_small_whole_number(refinements):
+    with pytest.raises(tiltsim.InputError, match=r"refinements = .*: must be 0 to 6"):
+        attraction(SETPOINT, refinements=refinements)

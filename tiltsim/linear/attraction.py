@@ -135,8 +135,8 @@ def _check(scenario: Scenario, axes: tuple[str, str], refinements: int) -> None:
     """Refuse what has no such map."""
     if len(axes) != 2 or axes[0] == axes[1] or not set(axes) <= set(PLACES):
         raise InputError(f"axes = {','.join(axes)}: choose two of {', '.join(PLACES)}")
-    if not 0 <= refinements <= 6:
-        raise InputError(f"refinements = {refinements}: must be 0 to 6")
+    if not (isinstance(refinements, int) and 0 <= refinements <= 6):
+        raise InputError(f"refinements = {refinements!r}: must be 0 to 6")
     if scenario.vehicle.model == "tilt_car":
         raise InputError(f"{scenario.address}: vehicle.model: attraction takes rotorcraft only")
 
