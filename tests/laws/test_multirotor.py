@@ -129,10 +129,10 @@ def test_a_flight_past_a_singular_attitude_ends_there(name, plant):
     assert flight["singularity_margin"][-1] < 0.0 < flight["singularity_margin"][-2]
 
 
-@pytest.mark.parametrize("told", [True, False])
-def test_seven_of_eight_rotors_hold_the_pose_if_the_controller_knows(told):
+@pytest.mark.parametrize("aware", [True, False])
+def test_seven_of_eight_rotors_hold_the_pose_if_the_controller_knows(aware):
     controller = {"law": "attitude_force", "norm": "thrust"}
-    if told:
+    if aware:
         controller |= {"failed_rotor": 3, "failure_known_from": 0.02}
     flight = fly(
         "omni_octorotor",
@@ -141,7 +141,7 @@ def test_seven_of_eight_rotors_hold_the_pose_if_the_controller_knows(told):
         simulation={"duration": 0.5, "timestep": 0.004},
     )
     moved = np.abs(flight["attitude"][flight["time"] > 0.4]).max()
-    assert moved < 0.05 if told else moved > 0.2
+    assert moved < 0.05 if aware else moved > 0.2
 
 
 def test_rotors_keep_within_their_limits():

@@ -137,7 +137,7 @@ def test_the_open_loop_is_the_vehicle():
     """Integrators only; with the feedback it is the closed loop."""
     closed = tiltsim.linearize(SETPOINT, loop="closed")
     vehicle = tiltsim.linearize(tiltsim.load_scenario(SETPOINT, THESIS), loop="open")
-    assert vehicle.A[12:] == pytest.approx(0.0, abs=1e-7)  # rotors turn as they are told
+    assert vehicle.A[12:] == pytest.approx(0.0, abs=1e-7)  # rotors turn as commanded
     assert vehicle.B[12:] == pytest.approx(np.eye(4), abs=1e-9)
     assert np.linalg.matrix_power(vehicle.A, 6) == pytest.approx(0.0, abs=1e-3)
     opened = closed.opened()

@@ -72,8 +72,8 @@ def ran(folder):
 
 def test_check_executes_code_only_with_trust(folder, capsys, monkeypatch):
     assert main(["check", str(folder)]) == 2
-    told = capsys.readouterr().out
-    assert "is Python code to execute; allow it with --trust or TILTSIM_TRUST=1" in told
+    printed = capsys.readouterr().out
+    assert "is Python code to execute; allow it with --trust or TILTSIM_TRUST=1" in printed
     assert not ran(folder)
     assert main(["check", "--trust", str(folder)]) == 0
     assert ran(folder)
@@ -87,9 +87,9 @@ def test_sweeps_execute_code_only_with_trust(folder, text, capsys):
     sweep.write_text(text)
     command = ["sweep", str(sweep), "--jobs", "1", "--quiet", "--out", str(folder / "out")]
     assert main(command) == 2
-    told = capsys.readouterr().err
-    assert told.count("\n") == 1
-    assert "allow it with --trust or TILTSIM_TRUST=1" in told
+    printed = capsys.readouterr().err
+    assert printed.count("\n") == 1
+    assert "allow it with --trust or TILTSIM_TRUST=1" in printed
     assert not ran(folder)
     assert main([*command, "--trust"]) == 0
     assert ran(folder)
@@ -108,9 +108,9 @@ def test_code_elsewhere_is_not_executed(folder, function, capsys):
     text = SCENARIO.format(function=json.dumps(function.format(folder)))
     (inner / "scenario.toml").write_text(text)
     assert main(["run", str(inner / "scenario.toml"), "--quiet"]) == 2
-    told = capsys.readouterr().err
-    assert "controller.function" in told
-    assert "must lie in the folder of the scenario file" in told
+    printed = capsys.readouterr().err
+    assert "controller.function" in printed
+    assert "must lie in the folder of the scenario file" in printed
     assert not ran(folder)
 
 

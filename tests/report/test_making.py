@@ -303,9 +303,9 @@ def test_the_command_writes_both_and_tells_of_bounds(library, tmp_path, capsys):
     out, summary = tmp_path / "out", tmp_path / "summary.md"
     arguments = ["report", f"{library}/bounded.toml", f"{library}/lost.toml", "--jobs", "2"]
     code = main([*arguments, "--out", str(out), "--markdown", str(summary)])
-    shown, told = capsys.readouterr()
+    shown, printed = capsys.readouterr()
     assert code == EXPECTATION_FAILED
-    assert all(line.startswith("tiltsim: ") for line in told.splitlines())
+    assert all(line.startswith("tiltsim: ") for line in printed.splitlines())
     assert "3 rows: 2 reproduced, 1 not reproduced" in shown
     assert "FAILED  " in shown
     assert "max_rotor_speed" in shown

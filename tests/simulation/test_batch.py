@@ -466,8 +466,8 @@ def test_a_batch_takes_whatever_describes_a_scenario_and_flies_own_controllers()
 
 
 def test_a_batch_tells_of_its_flights_and_takes_numbers_of_numpy():
-    told = []
+    counts = []
     short = {"simulation": {"duration": 0.01}}
-    results = tiltsim.fly([short] * 3, threads=np.int64(2), progress=told.append)
+    results = tiltsim.fly([short] * 3, threads=np.int64(2), progress=counts.append)
     assert len([*results]) == 3
-    assert told[-1] == 3
+    assert counts[-1] == 3

@@ -187,9 +187,9 @@ def _toml(table: dict[str, Any], place: Place, example: dict[str, Any]) -> str:
     if not place:
         return ""
     head = head_of(place)
-    wanted = {*table.get("required", ()), *example}
+    shown = {*table.get("required", ()), *example}
     values = {key: _example(value) for key, value in table["properties"].items()} | example
-    lines = [f"{key} = {_written(values[key])}" for key in values if key in wanted]
+    lines = [f"{key} = {_written(values[key])}" for key in values if key in shown]
     lines.sort(key=lambda line: not line.startswith(TAG_KEYS))
     return "\n".join([head, *lines]) + "\n"
 

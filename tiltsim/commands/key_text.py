@@ -56,14 +56,14 @@ def description(tables: Sequence[KeyTable], address: str) -> str:
 
     Raises `InputError`, with the closest address, if there are none.
     """
-    wanted = address.replace("[", "").replace("]", "")
-    found = [table for table in tables if wanted in table.addresses()]
+    plain = address.replace("[", "").replace("]", "")
+    found = [table for table in tables if plain in table.addresses()]
     if len(found) > FEW:
         lines = [f"{_narrow(table)}\n{_body(_plain(table.meaning))}" for table in found]
         return "\n".join([*lines, "\ntiltsim schema ADDRESS prints the keys of one of these"])
     if found:
         return "\n\n".join(map(_text, found))
-    above, _, name = wanted.rpartition(".")
+    above, _, name = plain.rpartition(".")
     keys = [
         f"{_narrow(table) or 'before all tables'}\n{_key_text(key)}"
         for table in tables
@@ -73,7 +73,7 @@ def description(tables: Sequence[KeyTable], address: str) -> str:
     ]
     if not keys:
         known = [name for table in tables for name in table.addresses() if name]
-        hint = did_you_mean(wanted, known) + "tiltsim schema --markdown prints them all"
+        hint = did_you_mean(plain, known) + "tiltsim schema --markdown prints them all"
         raise InputError(f"{address}: no such table or key; {hint}")
     return "\n".join(keys)
 

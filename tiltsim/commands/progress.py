@@ -70,7 +70,7 @@ class Progress:
         """Tell how much of the stage is done."""
 
     def tell(self, stage: str, done: int, total: int) -> None:
-        """Tell how much of a stage is done, which begins when it is first told of."""
+        """Report how much of a stage is done; the first report begins the stage."""
         if stage != self._stage:
             self.begin(stage, total, done)
         self.move(done)

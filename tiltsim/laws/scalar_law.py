@@ -130,7 +130,7 @@ def _try_once(loop: ClosedLoop, plan: FlightPlan) -> None:
     act = tuple(map(float, loop.dynamics.initial_activations(plan, setup)))
     start = f'{scenario.address or "scenario"}: controller.law = "{scenario.controller.law}"'
     rotors, states = len(loop.dynamics.spins), loop.dynamics.controller_states
-    wanted = (
+    requirement = (
         f"{start}: the law must return {rotors} thrusts (N), the tilts (rad) if it commands them, "
         f"and the rates of its states: three tuples of floats"
     )
@@ -139,7 +139,7 @@ def _try_once(loop: ClosedLoop, plan: FlightPlan) -> None:
     except Exception as error:
         calls = 4 + isinstance(scenario.controller, ScalarFunctionController)  # before the law
         if len(traceback.extract_tb(error.__traceback__)) <= calls:
-            raise InputError(f"{wanted} ({describe(error, calls)})") from error
+            raise InputError(f"{requirement} ({describe(error, calls)})") from error
         raise InputError(f"{start}: the law raised {describe(error, calls)}") from error
     if len(ctrl) != loop.dynamics.sizes.ctrl or not all(isinstance(v, float) for v in ctrl):
-        raise InputError(f"{wanted}; with {states} states they make {len(ctrl)} controls")
+        raise InputError(f"{requirement}; with {states} states they make {len(ctrl)} controls")

@@ -115,10 +115,10 @@ def _inputs_of(key: Key) -> Callable[..., Values]:
     ) -> Values:
         x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r = body
         known = parameters.law
-        at, wanted, jets = int(known.rotors), known.reference, planned(time, known.gait, knots)
+        at, reference, jets = int(known.rotors), known.reference, planned(time, known.gait, knots)
         fx, fy, fz, tx, ty, tz = rows_of(1.0, cosines(tilts), sines(tilts), knots, at + per_newton)
         px, py, pz, ux, uy, uz, ax, ay, az, jx, jy, jz, _, _, _ = reference_derivatives(
-            time, wanted, knots
+            time, reference, knots
         )
         turning, k = product(spins, speeds), coefficients_in(knots, at + coefficients)
         # Built where it is used: native code cannot return records.
@@ -139,7 +139,7 @@ def _inputs_of(key: Key) -> Callable[..., Values]:
                 (ux, uy, uz),
                 (ax, ay, az),
                 (jx, jy, jz),
-                (wanted.roll, wanted.pitch, wanted.yaw),
+                (reference.roll, reference.pitch, reference.yaw),
                 angles_of(jets),
                 rates_of(jets),
             ),
@@ -222,11 +222,11 @@ def _columns(key: Key) -> Columns:
     @scalar
     def asked(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
         known = parameters.law
-        wanted = known.reference
-        motion = reference_derivatives(time, wanted, knots)
+        reference = known.reference
+        motion = reference_derivatives(time, reference, knots)
         jets = planned(time, known.gait, knots)
         return (
-            *(motion[0], motion[1], motion[2], wanted.roll, wanted.pitch, wanted.yaw),
+            *(motion[0], motion[1], motion[2], reference.roll, reference.pitch, reference.yaw),
             *angles(jets),
             *idle,
         )

@@ -104,7 +104,7 @@ def attraction(
         axes: Two of x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r.
         ranges: Of each axis, SI units; default: 1.5 rad, 5 m, 5 m/s and 10 rad/s either way.
         refinements: How often cells at the boundary are divided.
-        progress: Is told the number of flights so far.
+        progress: Called with the number of flights so far.
 
     Raises:
         InputError: If an argument is invalid, or the undisturbed flight is lost.

@@ -40,7 +40,7 @@ class Forcing(NamedTuple):
         velocity, acceleration: Of a frame in which the reference repeats, at time zero, m/s and
             m/s^2, world axes.
         start: Time (s) after which it is so: faults have happened and are known, gusts have passed,
-            the attitude that a controller is told is reached.
+            the attitude that a controller is given is reached.
     """
 
     period: float | None

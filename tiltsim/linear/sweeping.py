@@ -63,7 +63,7 @@ def sweep_stability(
         scenario: The scenario.
         key: Dotted, of a number.
         values: For the key.
-        seen: Is told each point when it is found.
+        seen: Called with each point when it is found.
     """
     points = []
     for value in values:

@@ -11,7 +11,7 @@ A **statement** (`tiltsim.report.statement.Statement`) is one thing that the the
 * ``note``: what a reader must know to judge it, whatever the verdict.
 
 A **row** (`tiltsim.report.claim.Claim`) is one case of a statement. Its id is that of the statement
-and its label. What of it does not come from the thesis is told by `Origin`: scenario files say it
+and its label. `Origin` says what of it does not come from the thesis: scenario files say it
 of their flights (``ours = ["path", "gains", "keyframes", "parameters", "flight"]``), statements and
 rows of what they compute (``origins``). Where the flight is ours the published value is shown as
 implied. A row that holds because parameters were chosen so (``fitted``) is no evidence and gets its

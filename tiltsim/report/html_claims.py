@@ -32,7 +32,7 @@ COLLAPSE: Final = 6
 """Rows of one statement with the same verdict from which they are collapsed."""
 
 SHOWN_FLIGHTS: Final = 6
-"""Flights of a row that are listed; of more the number is told."""
+"""Flights of a row that are listed; of more, only the number is stated."""
 
 _HEAD: Final = (
     '<div class="grid head" aria-hidden="true"><span>Case</span><span class="n">Published</span>'

@@ -70,11 +70,11 @@ def did_you_mean(name: object, names: Iterable[str]) -> str:
 def _shared_words(given: str, known: str) -> float:
     """How well the words of one name are found in another, from 0 to 1."""
     words = given.split("_")
-    likeness = (
+    similarity = (
         max(SequenceMatcher(None, word, other).ratio() for other in known.split("_"))
         for word in words
     )
-    return sum(likeness) / len(words)
+    return sum(similarity) / len(words)
 
 
 def choose(name: object, names: Iterable[str]) -> str:
@@ -102,11 +102,11 @@ def one_line_message(
     details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
     # Missing entries of one list, and the options of one union, are one mistake each.
     missing = {_mistake(detail, document): detail["type"] == "missing" for detail in details}
-    told, line = _dropped_keys(missing, document, emptied) or (
+    explained, line = _dropped_keys(missing, document, emptied) or (
         [*missing][:1],
         _short_list(details, document) or _describe(details[0], document, schema, details),
     )
-    others = [key for key in missing if key not in told]
+    others = [key for key in missing if key not in explained]
     if not others:
         return line
     more = f" and {len(others) - MAX_OTHERS} more" if len(others) > MAX_OTHERS else ""

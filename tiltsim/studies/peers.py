@@ -122,7 +122,7 @@ PEERS: Final = {
 
 
 class Peer:
-    """A peer in a process of its own, which flies when it is told to; see `running`."""
+    """A peer in a process of its own, which flies on request; see `running`."""
 
     def __init__(self, name: str, process: subprocess.Popen[str]) -> None:
         assert process.stdin is not None

@@ -77,7 +77,7 @@ class SweepPoints:
     def _on_arrays(self) -> bool:
         try:
             return self.scenario(self.point(0)).simulation.engine == "jax"
-        except InputError:  # told when it is flown
+        except InputError:  # reported when it is flown
             return False
 
     @property

@@ -82,7 +82,7 @@ def level_hover(
 
 
 class _Problem:
-    """Imbalance of tilts and inputs, in units of the force wanted and its torque on a lever."""
+    """Imbalance of tilts and inputs, in units of the desired force and its torque on a lever."""
 
     def __init__(self, table: Sequence[float], force: Floats) -> None:
         layout = layout_of(table)
@@ -104,7 +104,7 @@ class _Problem:
         return np.array(self._functions.rows(constant, cosines, sines, self._table, 0))
 
     def imbalance(self, x: Floats) -> Floats:
-        """Force less that wanted, and torque, shape (6,)."""
+        """Force less the desired one, and torque, shape (6,)."""
         cosines, sines = self._turned(x[: self.tilts])
         wrench = self._rows(1.0, cosines, sines) @ (x[self.tilts :] * self.unit)
         return np.asarray((wrench - self._wanted) * self._scale)

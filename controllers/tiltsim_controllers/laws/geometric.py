@@ -95,13 +95,13 @@ def free_geometric_law_of(layout: Layout) -> Callable[..., Commands]:
 
     @scalar
     def free_geometric(observed: Observed, parameters: Parameters) -> Commands:
-        body, wanted = observed.vehicle, observed.reference.attitude
+        body, attitude = observed.vehicle, observed.reference.attitude
         ax, ay, az = demanded_acceleration(
             observed, parameters.position, parameters.velocity, parameters.max_acceleration
         )
         mass = body.mass
         force = to_body(observed.rotation, (mass * ax, mass * ay, mass * (az + body.gravity)))
-        desired = rotation_from_euler(wanted[0], wanted[1], wanted[2])
+        desired = rotation_from_euler(attitude[0], attitude[1], attitude[2])
         torque = attitude_torque(observed, desired, (0.0, 0.0, 0.0), parameters)
         thrusts, tilts = allocated(observed, force, torque)
         return thrusts, tilts, ()

@@ -7,7 +7,7 @@ the outputs are the attitude and that many components of force:
   attitude-altitude controller of ch. 3 and 4;
 - 2: along world up, and across it within V. What V leaves is controlled by leaning. A vehicle with
   all three that is to use two (``forward``) pushes within its x-z plane;
-- 3: all of it. The attitude is free: the vehicle flies level, or as it is told.
+- 3: all of it. The attitude is free: the vehicle flies level, or as the reference says.
 
 The decoupling matrix ``[tau; b^T F]`` with the directions ``b`` of the force has rank 3 + dimension
 wherever the margin is positive, for any number of rotors. Of all inputs that give the desired third

@@ -27,12 +27,12 @@ def shortened(vector: Triple, limit: float) -> Triple:
 @scalar
 def tracking_errors(observed: Observed) -> tuple[Triple, Triple]:
     """Reference minus actual position (m) and velocity (m/s), world axes."""
-    wanted = observed.reference
+    reference = observed.reference
     x, y, z = observed.position
     vx, vy, vz = observed.velocity
     return (
-        (wanted.position[0] - x, wanted.position[1] - y, wanted.position[2] - z),
-        (wanted.velocity[0] - vx, wanted.velocity[1] - vy, wanted.velocity[2] - vz),
+        (reference.position[0] - x, reference.position[1] - y, reference.position[2] - z),
+        (reference.velocity[0] - vx, reference.velocity[1] - vy, reference.velocity[2] - vz),
     )
 
 

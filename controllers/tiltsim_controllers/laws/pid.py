@@ -53,15 +53,15 @@ def pid_law_of(rotors: int) -> Callable[..., Commands]:
 
     @scalar
     def pid(observed: Observed, parameters: Parameters) -> Commands:
-        c, wanted = parameters, observed.reference
+        c, reference = parameters, observed.reference
         sx, sy, sz, sp, sq, sr, fp, fq, fr = observed.states
         (ex, ey, ez), _ = tracking_errors(observed)
         ux, uy, uz = shortened((c.position * ex, c.position * ey, c.position * ez), c.max_speed)
         vx, vy, vz = observed.velocity
         ux, uy, uz = (
-            wanted.velocity[0] + ux - vx,
-            wanted.velocity[1] + uy - vy,
-            wanted.velocity[2] + uz - vz,
+            reference.velocity[0] + ux - vx,
+            reference.velocity[1] + uy - vy,
+            reference.velocity[2] + uz - vz,
         )
         demand = (
             c.velocity * ux + c.velocity_integral * sx,
@@ -70,7 +70,7 @@ def pid_law_of(rotors: int) -> Callable[..., Commands]:
         )
         ax, ay, az = shortened(demand, c.max_acceleration)
         goes_on = 1.0 if (ax, ay, az) == demand else 0.0
-        wx, wy, wz = wanted.acceleration
+        wx, wy, wz = reference.acceleration
         acceleration = (ax + wx, ay + wy, az + wz)
         lift = lift_of(observed)
         axis = axis_of(observed, lift)

@@ -106,10 +106,14 @@ def sequential_program(matrices, requested, low, high):
     _, share = solve(-1.0, (0.0, 1.0), hstack([rows, -tilting]), np.zeros(2 * cases))
     known = tilting @ share
     for axis in (2, 3):  # least distance from what is requested, a bound on both differences
-        row, wanted, one = block_diag(matrices[:, None, axis]), requested[:, axis], eye_array(cases)
+        row, requirement, one = (
+            block_diag(matrices[:, None, axis]),
+            requested[:, axis],
+            eye_array(cases),
+        )
         limited = vstack([hstack([row, -one]), hstack([-row, -one])])
         equal = hstack([rows, csr_array((rows.shape[0], cases))])
-        limits = np.concatenate([wanted, -wanted])
+        limits = np.concatenate([requirement, -requirement])
         inputs, _ = solve(1.0, (0.0, np.inf), equal, known, limited, limits)
         rows, known = vstack([rows, row]), np.concatenate([known, row @ inputs])
     roll_pitch, yaw, lift = np.split(known, [2 * cases, 3 * cases])
@@ -137,9 +141,11 @@ def test_roll_and_pitch_come_before_yaw_and_yaw_before_lift():
     matrices = np.array([decoupling(*case) for case in zip(angles, signed, *leans.T, strict=True)])
     matrices /= np.abs(matrices).sum(axis=2, keepdims=True)
     ends = np.array([slowest - magnitudes, LIMITS[1] - magnitudes]) * SPIN / (HORIZON * unit)
-    wanted, achieved = (np.einsum("nij,nj->ni", matrices, w) for w in (requested, found / unit))
-    attainable = sequential_program(matrices, wanted, ends.min(axis=0), ends.max(axis=0))
-    limited = (np.abs(attainable - wanted) > 1e-6).sum(axis=0)
+    requirement, achieved = (
+        np.einsum("nij,nj->ni", matrices, w) for w in (requested, found / unit)
+    )
+    attainable = sequential_program(matrices, requirement, ends.min(axis=0), ends.max(axis=0))
+    limited = (np.abs(attainable - requirement) > 1e-6).sum(axis=0)
     assert (limited > 200).all(), limited
     # The linear program is solved to 1e-7.
     np.testing.assert_allclose(achieved, attainable, rtol=0, atol=1e-6)

@@ -159,8 +159,8 @@ def test_a_rotor_known_to_have_failed_is_as_if_it_were_not_there(dimension):
     lost = list(knots)
     first = int(law.rotors) + 2 * ROTOR_FLOATS + CONSTANT
     lost[first : first + ROTOR_FLOATS - CONSTANT] = [0.0] * (ROTOR_FLOATS - CONSTANT)
-    told = multirotor_law_of(layout, dimension, "speed", forward, True)
-    untold = multirotor_law_of(layout, dimension, "speed", forward)
+    aware = multirotor_law_of(layout, dimension, "speed", forward, True)
+    unaware = multirotor_law_of(layout, dimension, "speed", forward)
     body = 0.2 * np.random.default_rng(5).normal(size=12)
     speeds = 450.0 * (-1.0) ** np.arange(1, 8)
     state = (*body.tolist(), *angles[0], *speeds.tolist())
@@ -168,12 +168,12 @@ def test_a_rotor_known_to_have_failed_is_as_if_it_were_not_there(dimension):
     def at(time, inputs, floats):
         return inputs(time, state, (0.1,) * 7, (0.1, 0.2, 0.3), law, tuple(floats))[:-1]
 
-    assert at(1.9, told, knots) == at(1.9, untold, knots)
-    found, expected = np.array(at(2.0, told, knots)), np.array(at(2.0, untold, lost))
+    assert at(1.9, aware, knots) == at(1.9, unaware, knots)
+    found, expected = np.array(at(2.0, aware, knots)), np.array(at(2.0, unaware, lost))
     others = np.arange(len(found)) != 2
     np.testing.assert_allclose(found[others], expected[others], rtol=1e-12)
     assert found[2] == 0.0
-    assert np.abs(found[:7] - at(2.0, untold, knots)[:7]).max() > 100.0
+    assert np.abs(found[:7] - at(2.0, unaware, knots)[:7]).max() > 100.0
 
 
 def test_a_hexarotor_with_canted_rotors_flies_a_circle_level():
@@ -263,13 +263,13 @@ def test_attitude_control_feeds_the_motion_of_its_reference_forward():
 
         return omega
 
-    present, wanted = seen_from_body(body), seen_from_body(desired)
+    present, demand = seen_from_body(body), seen_from_body(desired)
     error = attitude_error(tuple(body(now).ravel()), tuple(desired(now).ravel()))
     gains = law.gains
     expected = (
         np.array((gains.roll_1, gains.pitch_1, gains.yaw_1))
-        * (rate(wanted, now) - rate(present, now))
-        + np.array((gains.roll_2, gains.pitch_2, gains.yaw_2)) * (wanted(now) - present(now))
+        * (rate(demand, now) - rate(present, now))
+        + np.array((gains.roll_2, gains.pitch_2, gains.yaw_2)) * (demand(now) - present(now))
         + np.array((gains.roll_3, gains.pitch_3, gains.yaw_3)) * error
     )
     motion = tuple(body(now).ravel()), tuple(present(now)), tuple(rate(present, now))

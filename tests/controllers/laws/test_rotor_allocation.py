@@ -28,9 +28,9 @@ def test_planned_tilts_make_any_torque_and_force_along_one_axis(rotors):
         axis = functions.axis(observed, lift)
         assert axis[2] == pytest.approx(1.0, rel=1e-9)
         assert torque @ lift == pytest.approx(np.zeros(3), abs=1e-9)
-        wanted, push = rng.normal(size=3), rng.uniform(1.0, 20.0)
-        thrusts = np.array(functions.thrusts(observed, lift, axis, push, tuple(wanted)))
-        assert torque @ thrusts == pytest.approx(wanted, rel=1e-8, abs=1e-9)
+        demand, push = rng.normal(size=3), rng.uniform(1.0, 20.0)
+        thrusts = np.array(functions.thrusts(observed, lift, axis, push, tuple(demand)))
+        assert torque @ thrusts == pytest.approx(demand, rel=1e-8, abs=1e-9)
         along = np.array(axis) / np.linalg.norm(axis)
         assert along @ force @ thrusts == pytest.approx(push, rel=1e-8)
 

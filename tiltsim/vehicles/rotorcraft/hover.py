@@ -44,8 +44,8 @@ def hover_speeds(
     forces = torque_free_forces(force, torque)
     if dimension < forces.dimension:
         axes = controlled_axes(forces, LEVEL, dimension)
-        wanted = force @ _least_inputs(axes @ force, torque, weight * axes[:, 2])
-        direction = wanted / np.linalg.norm(wanted)
+        desired = force @ _least_inputs(axes @ force, torque, weight * axes[:, 2])
+        direction = desired / np.linalg.norm(desired)
     else:
         direction = hover_direction(forces)
     ends = np.outer(vehicle.spins, [speed * abs(speed) for speed in limits])
@@ -67,12 +67,12 @@ def hover_speeds(
     return tuple((np.sign(inputs) * np.sqrt(np.abs(inputs))).tolist())
 
 
-def _least_inputs(force: Floats, torque: Floats, wanted: Floats) -> Floats:
+def _least_inputs(force: Floats, torque: Floats, desired: Floats) -> Floats:
     """The shortest ``varpi |varpi|`` that make a force, or components of it, without torque."""
     # Rows of one size: a force in N and a torque in N m do not compare.
     sizes = np.abs(force).max(), np.abs(torque).max()
     rows = np.vstack([force / sizes[0], torque / sizes[1]])
-    values = np.concatenate([wanted / sizes[0], np.zeros(3)])
+    values = np.concatenate([desired / sizes[0], np.zeros(3)])
     inputs: Floats = np.linalg.pinv(rows, rcond=TOLERANCE) @ values
     return inputs
 
