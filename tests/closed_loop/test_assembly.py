@@ -49,8 +49,8 @@ def calls(monkeypatch):
 
         return count
 
-    def loop_of(flown):
-        loop = choose(flown)
+    def loop_of(*arguments):
+        loop = choose(*arguments)
         return replace(loop, setup=counted("setup", loop.setup))
 
     choose = counted("loop_of", assembling.loop_of)

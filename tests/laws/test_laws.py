@@ -356,7 +356,7 @@ MISTAKES = {
         'controller.law = "attitude_altitude": controls the tiltrotor, and vehicle.model = '
         "'quadrotor'; choose yaw_position, switching, quadrotor_attitude_altitude",
     ),
-    "unknown law": ({"controller": {"law": "pid"}}, 'controller.law = "pid": choose attitude'),
+    "unknown law": ({"controller": {"law": "mpc"}}, 'controller.law = "mpc": choose attitude'),
     "key of another law": (
         {"vehicle": QUADROTOR, "controller": {"law": "yaw_position", "decoupler": "exact"}},
         'controller.decoupler = "exact": unknown key; only for law attitude_altitude, '

@@ -189,8 +189,8 @@ def accelerations(time):
 def open_loop(monkeypatch, scenario, plant, along_spin):
     """A flight with given rotor accelerations, whatever the state."""
 
-    def loop(desired):
-        found = loop_of(desired)
+    def loop(*arguments):
+        found = loop_of(*arguments)
         given = lambda time, *_: tuple((SPIN * along_spin(time)).tolist())  # noqa: E731
         return replace(found, equations=replace(found.equations, inputs=given))
 
