@@ -109,6 +109,11 @@ def of_two(observed, parameters):
 
 
 @tiltsim.scalar
+def tilting(observed):
+    return (1.0, 1.0, 1.0, 1.0), (0.1, 0.1, 0.1, 0.1), ()
+
+
+@tiltsim.scalar
 def misspelt(observed):
     return observed.nothing
 
@@ -119,6 +124,7 @@ def misspelt(observed):
         (three_thrusts, "must return 4 thrusts"),
         (no_floats, "must return 4 thrusts"),
         (of_two, "must return 4 thrusts.*TypeError: .*missing 1 required positional argument"),
+        (tilting, "the tilts .* if it commands them.* they make 16 controls"),
         (misspelt, r"AttributeError: .* \(test_scalar_law.py, line \d+\)"),
     ],
 )

@@ -10,6 +10,7 @@ import pytest
 import tiltsim
 from tiltsim.cli import main
 from tiltsim.errors import InputError
+from tiltsim.exit_codes import INTERRUPTED
 from tiltsim.studies.comparison import (
     MEASURES,
     SEARCHES,
@@ -128,3 +129,15 @@ def test_an_unknown_controller_is_refused():
 def test_no_controller_at_all_is_refused():
     with pytest.raises(InputError, match="--controllers : choose given, "):
         next(compare([SETPOINT], [], {}))
+
+
+def test_what_is_flown_is_kept_when_the_rest_is_interrupted(rows, tmp_path, capsys, monkeypatch):
+    def interrupted(*_, **__):
+        yield rows[0]
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tiltsim.studies.comparison.compare", interrupted)
+    options = ["--controllers", "lqr,pid", "--out", str(tmp_path), "--quiet"]
+    assert main(["compare", SETPOINT, *options]) == INTERRUPTED
+    assert len(json.loads((tmp_path / "comparison.json").read_text())) == 1
+    assert f"comparison written to {tmp_path}" in capsys.readouterr().out

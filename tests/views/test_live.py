@@ -79,7 +79,7 @@ def test_all_samples_reach_the_recorder_in_order(listener, monkeypatch):
     pieces = []
 
     class Taker(BlockedRecorder):
-        def append(self, _piece):
+        def append(self, piece):
             pieces.append(piece.samples)
 
     with stream_to(Taker(), listener, monkeypatch) as stream:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.commands.options import (
     Subparsers,
@@ -16,6 +16,9 @@ from tiltsim.commands.options import (
 )
 from tiltsim.commands.progress import show_progress
 from tiltsim.commands.text import json_text, number, print_line, table
+
+if TYPE_CHECKING:
+    from tiltsim.studies.comparison import Compared
 
 COLUMNS: Final = {
     "rms_position_error": ("rms error (m)", ".3g", 1.0),
@@ -83,28 +86,37 @@ def run(arguments: argparse.Namespace) -> int:
         jobs=arguments.jobs,
         trusted=is_trusted(arguments.trust),
     )
-    with show_progress(shown=not arguments.quiet) as progress:
-        total = len(addresses) * len(controllers)
-        progress.begin("comparisons", total)
-        for one in flown:
-            compared.append(one)
-            progress.tell("comparisons", len(compared), total)
+    try:
+        with show_progress(shown=not arguments.quiet) as progress:
+            total = len(addresses) * len(controllers)
+            progress.begin("comparisons", total)
+            for one in flown:
+                compared.append(one)
+                progress.tell("comparisons", len(compared), total)
+    finally:  # what is flown is shown, even if the rest is interrupted
+        if compared:
+            _show(compared, arguments)
+    return 0
+
+
+def _show(compared: list[Compared], arguments: argparse.Namespace) -> None:
+    """Print the rows, and write them with their figure into the folder."""
     rows = [one.row for one in compared]
     if arguments.json:
         print(json_text(rows))
     else:
         _print(rows, searched=not arguments.nominal)
-    if arguments.out is not None:
-        from tiltsim.system.files import replacing
-        from tiltsim.views.figures import style
-        from tiltsim.views.figures.controllers_compared import comparison_figure
+    if arguments.out is None:
+        return
+    from tiltsim.system.files import replacing
+    from tiltsim.views.figures import style
+    from tiltsim.views.figures.controllers_compared import comparison_figure
 
-        with replacing(arguments.out / "comparison.json") as file:
-            file.write_text(json_text(rows) + "\n", encoding="utf-8")
-        style.save(comparison_figure(compared), arguments.out / "comparison.png")
-        if not arguments.json:
-            print_line(f"comparison written to {arguments.out}")
-    return 0
+    with replacing(arguments.out / "comparison.json") as file:
+        file.write_text(json_text(rows) + "\n", encoding="utf-8")
+    style.save(comparison_figure(compared), arguments.out / "comparison.png")
+    if not arguments.json:
+        print_line(f"comparison written to {arguments.out}")
 
 
 def _print(rows: list[dict[str, Any]], *, searched: bool) -> None:

@@ -152,7 +152,8 @@ def _inputs_of(key: Key) -> Callable[..., Values]:
         thrusts, angles, rates = law(observed, parameters.own)
         reached = modelled_in(states) if models_rotors else turning
         demanded = accelerations(known.rotor_gain, thrusts, k, reached, spins)
-        moving = tilt_rates_for(known.tilt_gain, angles, commanded(states)) if free else ()
+        # Angles beside a gait are controls that no vehicle has: refused before the flight.
+        moving = tilt_rates_for(known.tilt_gain, angles, commanded(states)) if free else angles
         if models_rotors:
             following = corrected(demanded, spins, correction, reached, turning)
             return (*following, *rates, *moving, *product(spins, demanded))
