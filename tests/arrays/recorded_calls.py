@@ -12,7 +12,7 @@ from tests.laws.layers.test_actuation import EVERYTHING
 from tests.laws.layers.test_air import STORM
 from tests.laws.test_baselines import BASELINES
 from tests.laws.test_laws import GUST, LAWS
-from tests.laws.test_multirotor import TILTS, document
+from tests.laws.test_multirotor import CLIMB, PRIORITIZED, TILTS, WEAK, document
 from tests.simulation.test_batch import CAR, CAR_GAITS, EXACT, GAITS
 from tiltsim.scenario.loading import merge
 from tiltsim_controllers.mathematics.scalar import scalar_functions
@@ -62,6 +62,7 @@ MULTIROTORS = {
         "hexarotor", controller={"law": "attitude_force", "attitude_error": "euler_angles"}
     ),
     "tilting": document("tilt_hexarotor", gait=TILTS),
+    "within limits": document("hexarotor", WEAK, controller=PRIORITIZED, **CLIMB),
     "by thrust": document("cant_hexarotor", controller={"law": "attitude_force", "norm": "thrust"}),
 }
 for _tables in MULTIROTORS.values():

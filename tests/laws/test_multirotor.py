@@ -152,6 +152,22 @@ def test_rotors_keep_within_their_limits():
     assert flight.metrics()["saturated_fraction"] > 0.0
 
 
+WEAK = {"min_rotor_speed": 0.0, "max_rotor_speed": 585.0}  # 8 % above hover
+PRIORITIZED = {"law": "attitude_force", "allocation": "prioritized"}
+CLIMB = {
+    "reference": {"type": "setpoint", "position": [1.0, 0.5, 20.0], "yaw": 0.3},
+    "initial": {"position": [0.0] * 3, "velocity": [0.0] * 3, "attitude": [0.2, -0.2, 0.0]},
+}
+
+
+def test_prioritized_allocation_keeps_the_attitude_where_inversion_stops_a_rotor():
+    simulation = {"duration": 0.5, "timestep": 0.004}
+    flight = fly("hexarotor", WEAK, controller=PRIORITIZED, simulation=simulation, **CLIMB)
+    assert np.abs(flight["attitude"][:, :2]).max() < 0.25
+    inverting = tiltsim.simulate(document("hexarotor", WEAK, simulation=simulation, **CLIMB))
+    assert inverting.end.kind == "singular"
+
+
 ACTUATORS = {
     "vehicle": {
         "rotor_time_constant": 0.02,
@@ -195,6 +211,7 @@ EVERYTHING = {
     ("name", "tables"),
     [
         ("hexarotor", BEYOND_THE_SIDE),
+        ("hexarotor", {"vehicle": WEAK, "controller": PRIORITIZED, **CLIMB}),
         ("tilt_hexarotor", {"gait": TILTS}),
         ("tilt_hexarotor", {"vehicle": HEAVY, "gait": TILTS, "simulation": {"plant": "thesis"}}),
         ("tilt_hexarotor", EVERYTHING),
@@ -267,6 +284,10 @@ HEXAROTOR = {"model": "multirotor", "mjcf": mjcf("hexarotor")}
         "too much force": (
             {"controller": {"law": "attitude_force", "dimension": 3}},
             "controller.dimension = 3: the vehicle has 1 only, as its rotors are placed",
+        ),
+        "allocation without limits": (
+            {"controller": {"law": "attitude_force", "allocation": "prioritized"}},
+            'controller.allocation = "prioritized": needs rotor limits: vehicle.min_rotor_speed',
         ),
         "full pose of vertical rotors": (
             {"controller": {"law": "full_pose"}},

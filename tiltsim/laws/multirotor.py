@@ -48,6 +48,7 @@ from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
 from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS, PUBLISHED_DECOUPLING
 from tiltsim_controllers.laws.gait_feedforward import INTEGRAL_FIELDS
 from tiltsim_controllers.laws.multirotor import multirotor_law_of
+from tiltsim_controllers.laws.multirotor_allocation import RotorRange
 from tiltsim_controllers.laws.multirotor_inputs import independence_of
 from tiltsim_controllers.laws.multirotor_steps import ATTITUDE_ERRORS, Parameters, SideGains
 from tiltsim_controllers.mathematics.rotation import world_up_in_body
@@ -288,6 +289,9 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
         slowest=controller.slowest_rotor,
         failure=controller.resolve_failure(),
         turn_time=controller.turn_time,
+        limits=RotorRange(
+            *scenario.any_rotorcraft.speeds_along_spin, controller.allocation_horizon
+        ),
     )
     lead = servo_lead(scenario.any_rotorcraft.tilt_servo)
     side = Direction(*upper_side(vehicle, gait))
@@ -311,7 +315,9 @@ def multirotor_loop(layout: Layout, uses: UsedForce, norm: str) -> ClosedLoop:
         norm: See `tiltsim_controllers.laws.multirotor.multirotor_law_of`.
     """
     places = layout.places
-    law = multirotor_law_of(layout.tilt_of_rotor, uses.dimension, norm, uses.forward, uses.losses)
+    law = multirotor_law_of(
+        layout.tilt_of_rotor, uses.dimension, norm, uses.forward, uses.losses, uses.prioritized
+    )
     sampling, equations = _sampling_of(layout, law), _equations_of(layout, law)
     for step in (sampling.controls, equations.inputs):
         step.__qualname__ = f"attitude_force_{uses.name}_{norm}_{layout.name}"

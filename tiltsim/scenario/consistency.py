@@ -155,7 +155,7 @@ def _check_actuators(scenario: ScenarioTables) -> None:
                 "set vehicle.rotor_time_constant or remove it"
             )
             scenario.require("vehicle.rotor_inertia", 0.0, reason)
-    if scenario.controller.prioritizes_attitude and not scenario.rotorcraft.has_rotor_limits:
+    if scenario.controller.prioritizes_attitude and not scenario.any_rotorcraft.has_rotor_limits:
         raise scenario.mistake(
             "controller.allocation",
             "needs rotor limits: vehicle.min_rotor_speed or vehicle.max_rotor_speed",

@@ -43,11 +43,13 @@ class UsedForce(NamedTuple):
     dimension: int
     forward: bool  # two along the x and z axes, of a vehicle that has three
     losses: bool = False  # whether the controller knows of a failed rotor
+    prioritized: bool = False  # whether it keeps rotor accelerations within limits
 
     @property
     def name(self) -> str:
         """For file names."""
-        return f"{self.dimension}{'_forward' * self.forward}{'_losses' * self.losses}"
+        options = "_forward" * self.forward, "_losses" * self.losses
+        return f"{self.dimension}{''.join(options)}{'_prioritized' * self.prioritized}"
 
 
 class AttitudeForceController(ControllerTable):
@@ -113,6 +115,14 @@ class AttitudeForceController(ControllerTable):
         "rotors than outputs, else 0 [1/s]",
         examples=[0.5],
     )
+    allocation: Literal["inversion", "prioritized"] = Field(
+        "inversion",
+        description="at rotor limits: inversion saturates each rotor alone, prioritized gives up "
+        "side forces first, then lift, then torque",
+    )
+    allocation_horizon: Positive = Field(
+        0.02, description="time for which prioritized allocation keeps within the limits [s]"
+    )
     turn_time: NonNegative = Field(
         0.0, description="time in which the reference of roll and pitch is reached, smoothly [s]"
     )
@@ -170,7 +180,9 @@ class AttitudeForceController(ControllerTable):
         if self.dimension is not None and self.dimension > least:
             raise self.mistake("dimension", f"the vehicle has {least} only, {where}")
         forward = self.dimension == 2 and least == 3
-        return UsedForce(self.dimension or least, forward, lost is not None)
+        return UsedForce(
+            self.dimension or least, forward, lost is not None, self.prioritizes_attitude
+        )
 
     def resolve_failure(self) -> Failure:
         """The failed rotor that the law knows of."""
@@ -191,6 +203,10 @@ class AttitudeForceController(ControllerTable):
             return error_loops(gains, speed, PUBLISHED_DECOUPLING)
         side = linear_loop("side", self.side_gains)
         return [*feedforward_loops(gains, self.resolve_integral_gains()), side]
+
+    @property
+    def prioritizes_attitude(self) -> bool:
+        return self.allocation == "prioritized"
 
     @property
     def linearization(self) -> str:

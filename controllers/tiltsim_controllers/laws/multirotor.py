@@ -40,6 +40,7 @@ from tiltsim_controllers.laws.gait_feedforward import (
     horizontal_control,
     tracking_errors,
 )
+from tiltsim_controllers.laws.multirotor_allocation import limited_of
 from tiltsim_controllers.laws.multirotor_inputs import (
     null_part_of,
     pushing_of,
@@ -230,7 +231,12 @@ def _control_of(
 
 @cache
 def multirotor_law_of(
-    layout: Layout, dimension: int, norm: str = "speed", forward: bool = False, losses: bool = False
+    layout: Layout,
+    dimension: int,
+    norm: str = "speed",
+    forward: bool = False,
+    losses: bool = False,
+    prioritized: bool = False,
 ) -> Callable[..., Values]:
     """The control law of vehicles of a layout.
 
@@ -253,6 +259,7 @@ def multirotor_law_of(
         norm: in `NORMS`
         forward: two components are those along x and z, of a vehicle that has three
         losses: whether the controller knows of failures
+        prioritized: whether it keeps within rotor limits (`multirotor_allocation`)
     """
     length, tilts = len(layout), tilts_of(layout)
     tilts_in, speeds_in = entries_of(12, tilts), entries_of(12 + tilts, length)
@@ -267,6 +274,7 @@ def multirotor_law_of(
     )
     null_part = null_part_of(length, dimension, forward)
     health, masked, product = health_of(length), masked_of(length), vectors_of(length).product
+    limited = limited_of(length)
 
     @scalar
     def inputs(
@@ -301,8 +309,8 @@ def multirotor_law_of(
             omega_rate = measured
         up = (rotation[6], rotation[7], rotation[8])
         unseen = null_part(rows, up, w)
-        rows, pushes = scaled_rows(rows, speeds, parameters.decoupling)
-        factors = factors_of_rows(rows, pushes, up)
+        unknown_rows, pushes = scaled_rows(rows, speeds, parameters.decoupling)
+        factors = factors_of_rows(unknown_rows, pushes, up)
         jerk, angular_jerk, rates, roll_ref, pitch_ref = control(
             time,
             state,
@@ -321,7 +329,7 @@ def multirotor_law_of(
         jx, jy, jz = to_body(rotation, (mass * jerk[0], mass * jerk[1], mass * jerk[2]))
         sx, sy, sz = cross(omega, (fx, fy, fz))
         accelerations = solution(
-            rows,
+            unknown_rows,
             factors,
             (mx - known * change[3], my - known * change[4], mz - known * change[5]),
             (jx - sx - gx, jy - sy - gy, jz - sz - gz),
@@ -329,6 +337,9 @@ def multirotor_law_of(
             speeds,
             parameters,
         )
+        if prioritized:
+            limits, at = parameters.limits, int(parameters.rotors)
+            accelerations = limited(accelerations, rows, up, speeds, limits, knots, at)
         references = (roll_ref, pitch_ref, parameters.reference.yaw)
         return (*accelerations, *rates, *references, unseen)
 

@@ -19,6 +19,7 @@ from tiltsim_controllers.laws.feedback import attitude_jerk, force_control
 from tiltsim_controllers.laws.full_pose import attitude_error
 from tiltsim_controllers.laws.gains import IntegralGains
 from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms, decoupled_attitude
+from tiltsim_controllers.laws.multirotor_allocation import RotorRange
 from tiltsim_controllers.mathematics.jets import (
     Jet,
     Jets3,
@@ -71,6 +72,7 @@ class Parameters(NamedTuple):
     slowest: float = 0.0  # rad/s, thrust norm: a slower rotor is accelerated as if it were so fast
     failure: Failure = Failure()
     turn_time: float = 0.0  # s in which a reference of roll and pitch is reached, smoothly
+    limits: RotorRange = RotorRange()  # of prioritized allocation
 
 
 @scalar

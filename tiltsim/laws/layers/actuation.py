@@ -291,7 +291,7 @@ def _actuation(plan: FlightPlan) -> Any:
             horizon=controller.allocation_window,
             min_speed=low or 0.0,
             max_speed=inf if high is None else high,
-            # A multirotor's rotors are not allocated.
+            # A multirotor's law keeps within the limits itself.
             vehicle=assumed if isinstance(assumed, Vehicle) else PRESETS["ar_drone_2"],
         ),
         control_timestep=simulation.control_timestep,
