@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,10 +14,11 @@ from tiltsim.commands.stability import parse_sweep
 from tiltsim.linear.attraction import Attraction
 from tiltsim.linear.sweeping import sweep_stability
 from tiltsim.views.figures.attraction import attraction_figure
-from tiltsim.views.figures.stability import loop_figure, sweep_figure
+from tiltsim.views.figures.stability import loop_figure, stability_figure, sweep_figure
 
 SETPOINT = "ch04_tracking/setpoint#rho_065_modified"
 THESIS = ["--set", "simulation.plant=thesis"]
+THESIS_KEYS = {"simulation.plant": "thesis"}
 
 
 def test_json_of_a_rest_point_with_margins(capsys):
@@ -35,6 +37,22 @@ def test_text_and_figure_of_poles(tmp_path, capsys):
     lines = capsys.readouterr().out.splitlines()
     assert lines[:2] == ["kind      rest point", "verdict   stable"]
     assert "Poles of the rest point: stable" in figure.read_text(encoding="utf-8")
+
+
+def test_axes_of_poles_are_labelled_where_the_poles_are():
+    """Slow poles lie between labels; double poles that rounding splits stretch no axis."""
+    poles = np.array(
+        [-0.2 + 1.0j, -0.5 + 1.6j, -0.5 - 1.6j, -0.2 - 1.0j, -300 + 1e-3j, -300 - 1e-3j]
+    )
+    found = replace(tiltsim.stability(tiltsim.load_scenario(SETPOINT, THESIS_KEYS)), poles=poles)
+    (axes,) = stability_figure(found).axes
+    assert axes.get_xscale() == "symlog"
+    assert axes.get_yscale() == "linear"
+    low, high = axes.get_xlim()
+    real = [tick for tick in axes.get_xticks() if low <= tick <= high]
+    assert real == [-100.0, -10.0, -1.0, -0.1, 0.0, 0.1][: len(real)]
+    assert len(real) >= 5
+    assert sum(0.0 < tick <= axes.get_ylim()[1] for tick in axes.get_yticks()) >= 2
 
 
 def test_a_sweep_prints_where_stability_is_lost(capsys):
@@ -90,6 +108,7 @@ def test_figures_of_sweeps_loops_and_maps():
     points = sweep_stability(scenario, "vehicle.mass", [0.4, 0.45])
     upper, lower = sweep_figure("vehicle.mass", {"one": points, "two": points}).axes
     assert [len(axes.lines) for axes in (upper, lower)] == [3, 3]
+    assert lower.get_xlabel() == "mass (kg)"
     gain, nyquist, *_ = loop_figure(tiltsim.linearize(scenario)).axes
     assert [len(axes.lines) for axes in (gain, nyquist)] == [5, 6]
     edges = np.linspace(-1.5, 1.5, 5)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import tiltsim
 from tests.linear.test_rest import SETPOINT, distance
+from tiltsim.commands.stability import stability_text
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear.equilibrium import equilibrium_of
 from tiltsim.linear.forcing import forcing_of
@@ -54,6 +57,21 @@ def test_the_multipliers_are_those_of_the_product_of_exact_steps(continuous):
     columns = [motion.coordinates.rates(end, column) for column in product.T]
     expected = np.linalg.eigvals(np.array(columns).T)
     assert distance(stability_at(continuous).multipliers, expected) < 1e-7
+
+
+def test_modes_lost_in_the_rounding_of_a_period_are_not_listed():
+    """Servos of 300 rad/s, seen from a period of 2 s, are no modes of 14 rad/s."""
+    orbit = SimpleNamespace(
+        matrix=np.diag([0.5, -1e-12]),
+        timestep=2.0,
+        names=("z", "alpha_1"),
+        is_orbit=True,
+        root=SimpleNamespace(residual=0.0),
+    )
+    found = stability_at(orbit)
+    assert [mode.name for mode in found.modes] == ["altitude"]
+    assert len(found.multipliers) == 2
+    assert "not listed" in stability_text(found)
 
 
 @pytest.mark.parametrize(

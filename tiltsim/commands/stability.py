@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 from functools import partial
 from math import degrees
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.commands.figure_options import add_plot, check_plot, save_figure
-from tiltsim.commands.options import Subparsers, add_json, add_overrides
+from tiltsim.commands.options import Subparsers, add_json, add_overrides, add_quiet
+from tiltsim.commands.progress import show_progress
 from tiltsim.commands.text import aligned, json_text, number, print_figure_path, table
 from tiltsim.errors import InputError
 
@@ -43,6 +45,7 @@ def add_parser(subparsers: Subparsers) -> None:
     add("--margins", action="store_true", help=margins)
     add_overrides(parser, "the scenario", "gait.period=1.5")
     add_json(parser)
+    add_quiet(parser, "show no progress")
     add_plot(parser, "the poles or multipliers, or the sweep")
     parser.set_defaults(run=run)
 
@@ -149,7 +152,14 @@ def _run_sweep(arguments: argparse.Namespace, scenarios: Sequence[Scenario]) -> 
     from tiltsim.linear.sweeping import crossings, sweep_stability
 
     key, values = parse_sweep(arguments.sweep, scenarios)
-    sweeps = {one.address: sweep_stability(one, key, values) for one in scenarios}
+    sweeps: dict[str, list[Point]] = {}
+    with show_progress(shown=not arguments.quiet) as progress:
+        found, total = itertools.count(1), len(scenarios) * len(values)
+        progress.begin("points", total)
+        for one in scenarios:
+            sweeps[one.address] = sweep_stability(
+                one, key, values, lambda _point: progress.move(next(found))
+            )
     if arguments.plot is not None:
         from tiltsim.views.figures.stability import sweep_figure
 
@@ -204,6 +214,9 @@ def stability_text(found: Stability) -> str:
     if found.multipliers is not None:
         largest = found.multipliers[0]
         rows.append(("largest multiplier", f"{complex(largest):.5g}, size {abs(largest):.5g}"))
+    forgotten = len(found.states) - sum(mode.count for mode in found.modes)
+    if forgotten:
+        rows.append(("not listed", f"{forgotten} states, forgotten within a period or sample"))
     header = ["mode", "frequency (rad/s)", "damping", "count", "states"]
     modes = [
         (

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import log
 from os import PathLike
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from tiltsim.linear.modes import Mode, exponents, is_stable, modes_of
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
+
+RESOLVED: Final = 1e-8
+"""Of an orbit, modes whose multiplier is smaller are not told from the rounding of a period."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +34,7 @@ class Stability:
         poles: At rest, rad/s, complex, the slowest first; of a sampled controller
             ``log(mu) / control_timestep``. None of an orbit.
         multipliers: Of an orbit, complex, the largest first; None at rest.
-        modes: The slowest first.
+        modes: The slowest first, but for states that are forgotten within a period or sample.
         states: Names of the coordinates.
         matrix: Of the linear system, shape (states, states): rates by coordinates, or the
             coordinates after a control sample or period by those before.
@@ -94,6 +98,9 @@ def stability_at(found: Equilibrium) -> Stability:
     poles = exponents(eigenvalues, timestep)
     finite = poles[np.isfinite(poles)]
     modes = modes_of(matrix, found.names, timestep)
+    if found.is_orbit and timestep is not None:
+        fastest = log(RESOLVED) / timestep
+        modes = tuple(mode for mode in modes if mode.growth_rate > fastest)
     return Stability(
         kind="orbit" if found.is_orbit else "rest",
         period=found.timestep if found.is_orbit else None,

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from itertools import cycle
-from typing import TYPE_CHECKING, Any
+from math import nan
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from tiltsim.linear.linearization import Linearization
 from tiltsim.linear.margins import TOGETHER, broken_loops, frequency_grid
+from tiltsim.linear.modes import EQUAL, NEUTRAL
 from tiltsim.linear.stability import Stability
+from tiltsim.scenario.key_units import quantity_of_key
 from tiltsim.system.quantity import in_words
 from tiltsim.views.figures import style
 
@@ -20,6 +23,13 @@ if TYPE_CHECKING:
 
     from tiltsim.linear.sweeping import Point
     from tiltsim_controllers.mathematics.scalar import Floats
+
+
+ALIKE: Final = 30.0
+"""Parts of poles that differ by a smaller factor share a linear axis."""
+
+MOST: Final = 1e4
+"""Between the largest part of a pole and those that a logarithmic axis does not resolve."""
 
 
 def stability_figure(found: Stability) -> Figure:
@@ -51,7 +61,10 @@ def sweep_figure(key: str, sweeps: Mapping[str, Sequence[Point]]) -> Figure:
             values = [value for value, _ in found]
             largest = [each.growth for _, each in found]
             rates = [
-                max(mode.growth_rate for mode in each.modes if mode.name != "altitude")
+                max(
+                    (mode.growth_rate for mode in each.modes if mode.name != "altitude"),
+                    default=nan,
+                )
                 for _, each in found
             ]
             label = address.rpartition("/")[2]
@@ -65,7 +78,7 @@ def sweep_figure(key: str, sweeps: Mapping[str, Sequence[Point]]) -> Figure:
             axes.axhline(limit, color=style.INK, lw=0.8)
             axes.margins(x=0.02)
         upper.set(ylabel="largest multiplier", title="What is left of a disturbance after a period")
-        lower.set(ylabel="growth rate (1/s)", xlabel=in_words(key))
+        lower.set(ylabel="growth rate (1/s)", xlabel=quantity_of_key(key).text)
         lower.set_title("Slowest mode other than altitude")
         handles, labels = upper.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=2)
@@ -113,20 +126,36 @@ def loop_figure(system: Linearization) -> Figure:
 
 def _draw_poles(axes: Any, poles: Floats) -> None:
     grows = poles.real > 0.0
-    left = min(-2.0, 1.5 * float(poles.real.min()))
-    right = max(1.0, 1.5 * float(poles.real.max()))
-    up = max(2.0, 1.5 * float(poles.imag.max()))
+    # Rounding splits equal real poles into pairs with tiny imaginary parts.
+    swings = np.where(np.abs(poles.imag) > EQUAL * np.abs(poles), poles.imag, 0.0)
+    least = _stretch(axes, "x", poles.real)
+    _stretch(axes, "y", swings)
+    left = min(-least, 1.5 * float(poles.real.min()))
+    right = max(least, 1.5 * float(poles.real.max()))
+    up = 1.5 * float(swings.max()) or 1.0
     axes.axvspan(0.0, right, color=style.UNREACHABLE, lw=0)
     _mark(axes, poles[~grows], style.BLUE, "x")
     _mark(axes, poles[grows], style.RED, "X")
-    # Slow and fast poles differ by a factor of a thousand.
-    axes.set_xscale("symlog", linthresh=1.0)
-    axes.set_yscale("symlog", linthresh=1.0)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter("{x:g}")
     axes.set(xlim=(left, right), xlabel="real part (rad/s)")
     axes.set(ylim=(-up, up), ylabel="imaginary part (rad/s)")
     axes.axvline(0.0, color=style.INK, lw=0.8)
+
+
+def _stretch(axes: Any, name: str, parts: Floats) -> float:
+    """Make an axis logarithmic down to the smallest part if the parts are of different size.
+
+    Returns:
+        The size below which it is linear; a tenth of the largest where it is throughout.
+    """
+    sizes = np.abs(parts)[np.abs(parts) > NEUTRAL]
+    if not sizes.size:
+        return 1.0
+    if sizes.max() <= ALIKE * sizes.min():
+        return float(0.1 * sizes.max())
+    least = 10.0 ** np.floor(np.log10(max(sizes.min(), sizes.max() / MOST)))
+    getattr(axes, f"set_{name}scale")("symlog", linthresh=least, subs=range(2, 10))
+    getattr(axes, f"{name}axis").set_major_formatter("{x:g}")
+    return float(least)
 
 
 def _draw_multipliers(axes: Any, multipliers: Floats) -> None:
