@@ -111,6 +111,11 @@ MISTAKES = {
         "expect[0].maxi = 3.0",
         "did you mean max?",
     ),
+    "name that does not fit": (
+        '[controller]\nlaw = "scalar"\nfunction = "law.py:law"\nstates = { height = "m" }',
+        "controller.states.height",
+        "the name must match ^state_",
+    ),
     "key that is two lines": ('"a\\nb" = 3', "= 3", "unknown key"),
     "string for a number": (
         '[simulation]\nduration = "40"',

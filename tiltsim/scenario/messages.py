@@ -204,6 +204,8 @@ def _describe(
         return f"{key} = {show(value)}: angles are in rad, from -3.14159 to 3.14159"
     if kind == "tuple_type":
         return f"{key} = {show(value)}: must be a list{_entries(schema, detail['loc'])}"
+    if kind == "string_pattern_mismatch" and detail["loc"][-1] == "[key]":
+        return f"{key}: the name must match {context['pattern']}"
     unit = _unit(schema, detail["loc"])
     if kind == "float_type" and unit and re.match(r"[-+.]*\d", str(value)):
         return f"{key} = {show(value)}: must be a number in {unit}, without the unit"
