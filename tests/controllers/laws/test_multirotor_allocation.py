@@ -83,17 +83,17 @@ def test_each_part_is_the_optimum_of_its_linear_program(rotors):
         assert np.abs(torque @ (found - turning)).max() < 10.0 * small
 
         # One variable each: the program's solution in closed form, good to rounding.
-        wanted, close = lift @ requested, 1e-9 * np.abs(requested).max() / np.abs(alone).min()
+        asked, close = lift @ requested, 1e-9 * np.abs(requested).max() / np.abs(alone).min()
         turning = np.linalg.pinv(torque) @ torque @ found
         least, most = steps(turning, alone, box)
-        step = (wanted - lift @ turning) / (lift @ alone)
+        step = (asked - lift @ turning) / (lift @ alone)
         assert alone @ found == pytest.approx(min(max(step, least), most), abs=close)
 
         if rotors > 4:
             _, most = steps(turning + alone * (alone @ found), rest, box)
             shares.append(min(max(most, 0.0), 1.0))
             assert rest @ found / (rest @ rest) == pytest.approx(shares[-1], abs=1e-6)
-        given_up = [*(np.array(shares) < 0.99), abs(lift @ found - wanted) > 1e-3]
+        given_up = [*(np.array(shares) < 0.99), abs(lift @ found - asked) > 1e-3]
         limited[: len(given_up)] += given_up
     assert (limited[: 3 + (rotors > 4)] > 2).all(), limited
 
@@ -104,11 +104,11 @@ def test_roll_and_pitch_are_the_largest_of_all_accelerations_of_four_rotors(roto
     for torque, _, box, requested, found in cases(rotors):
         if (found == requested).all():
             continue
-        wanted = np.r_[(torque @ requested)[:2], 0.0]
-        rows = np.column_stack([torque, -wanted])
+        asked = np.r_[(torque @ requested)[:2], 0.0]
+        rows = np.column_stack([torque, -asked])
         bounds = [*box.tolist(), (0.0, 1.0)]
         share = best(np.r_[np.zeros(rotors), 1.0], rows, np.zeros(3), bounds)[-1]
-        reached = (wanted @ torque @ found) / (wanted @ wanted)
+        reached = (asked @ torque @ found) / (asked @ asked)
         assert reached < share + 1e-7
         assert rotors > 4 or reached > share - 1e-7
 
