@@ -115,5 +115,5 @@ def test_figures_of_sweeps_loops_and_maps():
     share = np.eye(4)
     found = Attraction(scenario, ("roll", "pitch"), (edges, edges), share, 25, np.ones((4, 4)))
     (axes,) = attraction_figure(found).axes
-    assert axes.get_title(loc="left") == "25 % come back"
+    assert axes.get_title(loc="left") == "25.0 % come back"
     assert len(axes.lines) == 2  # the curve and the scenario

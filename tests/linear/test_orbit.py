@@ -13,6 +13,7 @@ from tiltsim.commands.stability import stability_text
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear.equilibrium import equilibrium_of
 from tiltsim.linear.forcing import forcing_of
+from tiltsim.linear.motion import make_motion
 from tiltsim.linear.newton import derivative_at
 from tiltsim.linear.stability import stability_at
 from tiltsim.linear.sweeping import Point, crossings, sweep_stability
@@ -25,7 +26,10 @@ QUICK = {"simulation.engine": "python", "simulation.duration": 1.0}
 
 def gait(kind, plant="thesis", **keys):
     """The published controller at a set point with a quick gait."""
-    gait = {"gait.type": kind, "gait.amplitude": 0.5, "gait.period": 0.1, **keys}
+    shape = {"gait.amplitude": 0.5}
+    if kind == "two_color":  # a circle on the red surface
+        shape = {"gait.centre": [0.3, -0.3], "gait.radius": 0.1}
+    gait = {"gait.type": kind, "gait.period": 0.1, **shape, **keys}
     return tiltsim.load_scenario(
         SETPOINT, {"simulation.plant": plant, "simulation.timestep": 0.0025, **QUICK, **gait}
     )
@@ -72,6 +76,23 @@ def test_modes_lost_in_the_rounding_of_a_period_are_not_listed():
     assert [mode.name for mode in found.modes] == ["altitude"]
     assert len(found.multipliers) == 2
     assert "not listed" in stability_text(found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["trot_continuous", "trot_instant", "walk", "two_color"])
+def test_the_multipliers_are_those_of_native_flights_over_a_period(kind):
+    """Simple differences of second order, with the step at which they are best, near 1e-5."""
+    found = equilibrium_of(gait(kind, **{"gait.period": 0.05}))  # by the Python engine
+    motion, start = make_motion(found.motion.scenario, "native"), found.root.state
+    coordinates, columns = motion.coordinates, []
+    for moved in 1e-5 * np.eye(coordinates.size)[found.kept]:
+        ends = (coordinates.moved(start, by) for by in (moved, -moved))
+        after, before = (
+            coordinates.between(start, motion.flown(found.step, end, found.steps)) for end in ends
+        )
+        columns.append((after - before)[found.kept] / 2e-5)
+    flown = np.linalg.eigvals(np.array(columns).T)
+    assert distance(stability_at(found).multipliers, flown) < 1e-4
 
 
 @pytest.mark.parametrize(
@@ -156,6 +177,12 @@ def test_a_sweep_keeps_what_is_found_and_why_nothing_is():
     assert 0.0 < found.largest < 1.0
     assert (refused.largest, refused.report()["stable"]) == (None, None)
     assert "noise" in refused.reason
+
+
+def test_an_orbit_of_too_many_steps_is_refused_at_once():
+    endless = gait("trot_continuous").replace({"gait.period": 1000.0})
+    with pytest.raises(tiltsim.InputError, match="an orbit has at most 200000"):
+        tiltsim.stability(endless)
 
 
 def test_what_does_not_return_is_refused():

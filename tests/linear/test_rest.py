@@ -42,6 +42,20 @@ def random_hover(seed):
     )
 
 
+def random_line(seed):
+    """A line flown with random fixed tilts and mass, on the plants in turn."""
+    draw = np.random.default_rng(seed).uniform
+    angles = np.array((1.0, -1.0, 1.0, -1.0)) * draw(0.3, 0.7) * draw(0.9, 1.1, 4)
+    changes = {
+        "simulation.plant": ("thesis", "mujoco")[seed % 2],
+        "vehicle.mass": float(draw(0.40, 0.45)),
+        "gait.angles": angles.tolist(),
+        "reference.type": "line",
+        "reference.velocity": draw(-0.3, 0.3, 3).tolist(),
+    }
+    return tiltsim.load_scenario(SETPOINT, changes)
+
+
 def routh_roots(scenario):
     """The poles of the error loops that the law follows, in closed form."""
     loops = error_loops(scenario.controller.resolve_gains(), 1.0, 1.0)
@@ -87,6 +101,27 @@ def test_poles_are_those_of_the_flown_step(plant):
     z = timestep * poles[np.abs(poles + 300.0) > 1.0]
     growth = 1.0 + z + z**2 / 2.0 + z**3 / 6.0 + (z**4 / 24.0 if plant == "mujoco" else 0.0)
     assert distance(np.linalg.eigvals(step), growth) < 1e-5 * timestep
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(8))
+def test_the_linear_system_is_that_of_the_native_step(seed):
+    """The matrix of a step is the solver's polynomial of the linear system's matrix.
+
+    Matrices, not eigenvalues: those of the servos are defective, and differences give of a double
+    one no more than half the digits.
+    """
+    found = equilibrium_of(random_line(seed))
+    motion, state = make_motion(found.motion.scenario, "native"), found.root.state
+    coordinates, timestep = motion.coordinates, motion.scenario.simulation.timestep
+    step = derivative_at(
+        lambda at: coordinates.between(state, motion.flown(0, at, 1)), coordinates, state
+    )
+    power = growth = np.eye(coordinates.size)
+    for order in range(1, 5 if motion.scenario.simulation.plant == "mujoco" else 4):
+        power = power @ found.root.derivative * (timestep / order)
+        growth = growth + power
+    assert np.abs(step - growth).max() < 1e-8 * np.abs(growth).max()
 
 
 def test_the_plants_have_the_same_poles_but_for_the_servos():
@@ -218,6 +253,13 @@ def test_rest_is_where_the_vehicle_is_told_to_turn():
     assert found.stable
     quaternion = found.equilibrium.root.state[3:7]
     assert np.abs(quaternion) == pytest.approx((0.0, 1.0, 0.0, 0.0), abs=1e-9)
+
+
+def test_a_rest_point_beyond_a_singular_attitude_does_not_count():
+    """From a pitch of -1.4 rad, beyond the curve, Newton's method jumps to its near side."""
+    beyond = {**THESIS, "simulation.duration": 0.1, "initial.attitude": [0.0, -1.4, 0.0]}
+    with pytest.raises(tiltsim.InputError, match="found no rest point near its flight"):
+        tiltsim.stability(tiltsim.load_scenario(SETPOINT, beyond))
 
 
 REFUSED = {

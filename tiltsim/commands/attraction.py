@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Final
 
 from tiltsim.commands.angles import allow_negative_lists
 from tiltsim.commands.figure_options import add_plot, check_plot, save_figure
-from tiltsim.commands.options import Subparsers, add_json, add_overrides
+from tiltsim.commands.options import Subparsers, add_json, add_overrides, add_quiet
+from tiltsim.commands.progress import show_progress
 from tiltsim.commands.text import aligned, json_text, number, print_figure_path
 from tiltsim.errors import InputError
 
@@ -36,6 +37,7 @@ def add_parser(subparsers: Subparsers) -> None:
     add("--refine", type=int, default=DEFAULT_REFINEMENTS, metavar="N", help=refine)
     add_overrides(parser, "the scenario", "simulation.duration=15")
     add_json(parser)
+    add_quiet(parser, "show no progress")
     add_plot(parser, "the map")
     parser.set_defaults(run=run)
 
@@ -52,12 +54,16 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.linear.attraction import attraction
 
     first, _, second = arguments.axes.partition(",")
-    found = attraction(
-        scenario,
-        (first.strip(), second.strip()),
-        ranges=_parse_ranges(arguments.ranges),
-        refinements=arguments.refine,
-    )
+    ranges = _parse_ranges(arguments.ranges)
+    with show_progress(shown=not arguments.quiet) as progress:
+        progress.begin("flights")
+        found = attraction(
+            scenario,
+            (first.strip(), second.strip()),
+            ranges=ranges,
+            refinements=arguments.refine,
+            progress=progress.move,
+        )
     if arguments.plot is not None:
         from tiltsim.views.figures.attraction import attraction_figure
 

@@ -105,6 +105,8 @@ class _Bars(Progress):
 
     def move(self, done: float) -> None:
         if self._bar is not None:
+            if not self._bar.total:
+                self._bar.bar_format = self._stage + ": {n} [{elapsed}]"
             self._bar.update(done - self._bar.n)
 
     def print(self, line: str, *, error: bool = False) -> None:
@@ -143,6 +145,8 @@ class _Lines(Progress):
         line = f"tiltsim: {self._stage}"
         if total:
             line += f": {done:.0f} of {_total(total)}"
+        elif done:
+            line += f": {done:.0f}"
         line += f", {_clock(elapsed)}"
         if self._initial < done < total:
             left = elapsed * (total - done) / (done - self._initial)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 SHORT_KEYS: Final = {"period": "gait.period", "amplitude": "gait.amplitude"}
 POINTS: Final = 16
+FLIGHTS: Final = "flights over a period or sample"
 MOST_POINTS: Final = 1000
 
 
@@ -68,7 +69,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     from tiltsim.linear.stability import stability
 
-    found = stability(scenarios[0])
+    with show_progress(shown=not arguments.quiet) as progress:
+        progress.begin(FLIGHTS)
+        found = stability(scenarios[0], progress=progress.move)
     report, text = found.report(), stability_text(found)
     if arguments.margins:
         from tiltsim.linear.linearization import linearization_at

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
@@ -28,7 +28,10 @@ ORBIT: Final = 1e-7
 """Largest difference after a period, in SI units, that counts as periodic."""
 
 SETTLING_TIME: Final = 40.0  # s, flown at most to approach an orbit or a rest point
-LONG: Final = 5000  # steps, from which on an orbit's differences have fewer evaluations
+LONG: Final = 1000  # steps, from which on an orbit's differences have fewer evaluations
+MOST_STEPS: Final = 200_000
+"""Of an orbit: some 250 flights over it take a quarter of an hour with compiled steps."""
+
 FLIGHTS: Final = 150  # over a period, that an orbit takes to find
 
 
@@ -89,11 +92,21 @@ class Equilibrium:
         return change if not self.steps else change + np.eye(len(change))
 
 
-def equilibrium_of(scenario: Scenario, *, at_rest: bool = False) -> Equilibrium:
-    """The rest point or the periodic orbit of a scenario; ``at_rest`` demands the former.
+def equilibrium_of(
+    scenario: Scenario,
+    *,
+    at_rest: bool = False,
+    progress: Callable[[int], None] = lambda _flights: None,
+) -> Equilibrium:
+    """The rest point or the periodic orbit of a scenario.
+
+    Args:
+        scenario: The scenario.
+        at_rest: Demands a rest point.
+        progress: Called with the number of periods or samples flown so far.
 
     Raises:
-        InputError: If it has none.
+        InputError: If it has none, or if its orbit takes more than `MOST_STEPS`.
     """
     forcing = forcing_of(assemble(scenario))
     if forcing.period is not None:
@@ -108,12 +121,19 @@ def equilibrium_of(scenario: Scenario, *, at_rest: bool = False) -> Equilibrium:
     steps = simulation.control_steps
     if forcing.period is not None:
         steps = round(forcing.period / simulation.timestep)
+        if steps > MOST_STEPS:
+            raise InputError(
+                f"{scenario.address or 'scenario'}: gait and reference repeat after "
+                f"{forcing.period:g} s, {steps} steps of simulation.timestep = "
+                f"{simulation.timestep:g}; an orbit has at most {MOST_STEPS}"
+            )
     flights = FLIGHTS if forcing.period is not None else 1
     settling = ceil(min(SETTLING_TIME, simulation.duration) / simulation.timestep)
     motion = make_motion(scenario, _engine(scenario, max(settling, flights * steps)))
     step = ceil(forcing.start / simulation.timestep - 1e-9)
     step = ceil(step / steps) * steps if steps else step
-    search = _Search(motion, forcing, step, steps, max(1, settling // max(1, steps)))
+    returns = max(1, settling // max(1, steps))
+    search = _Search(motion, forcing, step, steps, returns, progress)
     return Equilibrium(motion, forcing, search.root(), step, steps)
 
 
@@ -145,13 +165,20 @@ class _Search:
     Args:
         motion, forcing, step, steps: As in `Equilibrium`.
         returns: How often the flight may return until it has settled.
+        progress: As in `equilibrium_of`.
     """
 
     def __init__(
-        self, motion: Motion, forcing: Forcing, step: int, steps: int, returns: int
+        self,
+        motion: Motion,
+        forcing: Forcing,
+        step: int,
+        steps: int,
+        returns: int,
+        progress: Callable[[int], None],
     ) -> None:
         self._motion, self._forcing, self._step, self._steps = motion, forcing, step, steps
-        self._returns = returns
+        self._returns, self._progress, self._flights = returns, progress, 0
         self._timestep = motion.assembly.scenario.simulation.timestep
         self._start = step * self._timestep
         self._sides = self._signs(motion.initial)
@@ -198,7 +225,7 @@ class _Search:
         count = self._returns if self._steps else ceil(self._returns / between)
         best, least = state, np.inf
         for _ in range(count):
-            after = self._motion.flown(step, state, between)
+            after = self._flown(step, state, between)
             moved = self._frame(step * self._timestep, (step + between) * self._timestep)
             change = np.linalg.norm(self._motion.coordinates.between(state, after) - moved)
             step += between
@@ -210,6 +237,13 @@ class _Search:
             if change < ORBIT:
                 break
         return best
+
+    def _flown(self, step: int, state: Floats, steps: int) -> Floats:
+        """The state some steps after a step, reported."""
+        after = self._motion.flown(step, state, steps)
+        self._flights += 1
+        self._progress(self._flights)
+        return after
 
     def _frame(self, start: float, end: float) -> Floats:
         """How the moving frame moves from one time (s) to another."""
@@ -226,7 +260,7 @@ class _Search:
             if self._steps == 0:
                 names = motion.coordinates.names
                 return motion.rates(start, state) - self._forcing.rates(names, start)
-            after = motion.flown(self._step, state, self._steps)
+            after = self._flown(self._step, state, self._steps)
         except (ArithmeticError, ValueError):
             return np.full(motion.coordinates.size, np.nan)
         moved = self._frame(start, start + self._steps * self._timestep)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import log
 from os import PathLike
@@ -78,16 +78,21 @@ class Stability:
         }
 
 
-def stability(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Stability:
+def stability(
+    scenario: Scenario | str | PathLike[str] | Mapping[str, Any],
+    *,
+    progress: Callable[[int], None] = lambda _flights: None,
+) -> Stability:
     """Poles of a scenario's rest point, or Floquet multipliers of its periodic orbit.
 
     Args:
         scenario: Anything that `tiltsim.load_scenario` takes.
+        progress: Called with the number of periods or samples flown so far.
 
     Raises:
         InputError: If it is invalid, neither at rest nor periodic, or has no such state nearby.
     """
-    return stability_at(equilibrium_of(load_scenario(scenario)))
+    return stability_at(equilibrium_of(load_scenario(scenario), progress=progress))
 
 
 def stability_at(found: Equilibrium) -> Stability:

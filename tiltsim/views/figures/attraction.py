@@ -52,7 +52,7 @@ def attraction_figure(found: Attraction) -> Figure:
         first, second = found.edges
         axes.set(xlim=(first[0], first[-1]), ylim=(second[0], second[-1]))
         axes.set(xlabel=f"initial {labels[0]}", ylabel=f"initial {labels[1]}")
-        axes.set_title(f"{100.0 * found.share.mean():.0f} % come back")
+        axes.set_title(f"{100.0 * found.share.mean():.1f} % come back")
         axes.grid(False)
         if len({PLACES[name][0] for name in found.axes}) == 1:
             axes.set_aspect("equal")
