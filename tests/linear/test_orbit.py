@@ -131,12 +131,15 @@ def test_the_penguin_gait_agrees_with_the_map_of_half_a_period():
         "ch11_penguin/straight_line#large",
         {"simulation.plant": "thesis", "simulation.timestep": 0.005, **QUICK},
     )
-    found = tiltsim.stability(scenario)
+    flights = []
+    found = tiltsim.stability(scenario, progress=flights.append)
     swing = Swing(half_angle=np.pi / 6.0, half_period=1.0, gains=GAIN_SETS["ch11"])
     half = multipliers(swing, limit_cycle(swing))
     assert found.period == pytest.approx(2.0)
     assert distance(np.sqrt(found.multipliers), half) < 2e-3
     assert found.report()["kind"] == "orbit"
+    assert flights == list(range(1, len(flights) + 1))
+    assert len(flights) > 6 * len(found.states)  # the derivative alone takes so many
 
 
 def test_a_flight_repeats_when_gait_and_circle_share_a_period():
