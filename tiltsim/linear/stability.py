@@ -17,7 +17,7 @@ from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
 
 RESOLVED: Final = 1e-8
-"""Of an orbit, modes whose multiplier is smaller are not told from the rounding of a period."""
+"""Of an orbit, modes whose multiplier is smaller are lost in the rounding of a period."""
 
 
 @dataclass(frozen=True, eq=False)
