@@ -20,6 +20,7 @@ from tiltsim.system.text import printable, without_long_words
 
 FLIGHT_COMMANDS: Final = ("run", "check", "sweep", "list", "view", "plot", "video")
 OTHER_COMMANDS: Final = (
+    "arena",
     "attraction",
     "compare",
     "concepts",

@@ -68,6 +68,7 @@ MEASURES: Final = (
     "rms_position_error",
     "max_position_error",
     "final_position_error",
+    "rms_yaw_error",
     "rms_rotor_acceleration",
     "tilt_travel",
     "min_singularity_margin",
@@ -140,8 +141,7 @@ def compare_one(item: Item, overrides: Mapping[str, Any], *, searches: bool) -> 
     address, name = item
     row: dict[str, Any] = {"controller": name, "scenario": address}
     try:
-        law = {} if name == GIVEN else {"controller.law": name}
-        scenario = load_scenario(address, {**overrides, **law})
+        scenario = load_scenario(address, {**_with_law(name, overrides), **overrides})
         assembly = assemble(scenario)
         flight = simulate(_engine(scenario, searches))
     except InputError as error:
@@ -157,6 +157,14 @@ def compare_one(item: Item, overrides: Mapping[str, Any], *, searches: bool) -> 
     row["time_per_call"] = _time_per_call(assembly)
     row = {key: _number(value) for key, value in row.items()}
     return Compared(row, flight["time"], _distance(flight))
+
+
+def _with_law(name: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """A law in place of the scenario's own table, even of the same law, which has its own gains."""
+    if name == GIVEN:
+        return {}
+    gains_given = any(key.startswith("controller") for key in overrides)
+    return {"controller.law": name} if gains_given else {"controller": {"law": name}}
 
 
 def _engine(scenario: Scenario, searches: bool) -> Scenario:
@@ -188,7 +196,16 @@ def _tracking(flight: Flight) -> dict[str, float]:
         "rms_position_error": float(np.sqrt(np.mean(error**2))),
         "max_position_error": float(error.max()),
         "final_position_error": float(error[last].mean()),
+        "rms_yaw_error": _yaw_error(flight),
     }
+
+
+def _yaw_error(flight: Flight) -> float:
+    """Root mean square over the flight, rad, each the shorter way around."""
+    if "yaw_ref" not in flight.units:
+        return nan
+    error = flight["yaw_ref"] - flight["yaw"]
+    return float(np.sqrt(np.mean(np.arctan2(np.sin(error), np.cos(error)) ** 2)))
 
 
 def _effort(flight: Flight) -> dict[str, float]:
