@@ -64,6 +64,12 @@ MULTIROTORS = {
     "tilting": document("tilt_hexarotor", gait=TILTS),
     "within limits": document("hexarotor", WEAK, controller=PRIORITIZED, **CLIMB),
     "by thrust": document("cant_hexarotor", controller={"law": "attitude_force", "norm": "thrust"}),
+    "heavy rotors": merge(document("tilt_hexarotor", gait=TILTS), {"vehicle": HEAVY}),
+    "turning over": document(
+        "omni_octorotor",
+        controller={"law": "attitude_force", "norm": "thrust", "turn_time": 2.0},
+        reference={"type": "setpoint", "roll": 0.5},
+    ),
 }
 for _tables in MULTIROTORS.values():
     _tables.pop("simulation", None)
@@ -91,6 +97,11 @@ def short_flights():
         yield {"reference": {"type": name, **table}, "controller": controller}, {"plant": "thesis"}
     for tables in SUPERVISED.values():
         yield tables, {"plant": "thesis"}
+    for tables in (LAWS["attitude_altitude"], LAYERED["heavy attitude_altitude"]):
+        yield tables, {"plant": "rigid_body"}
+    for tables in (LAWS["attitude_altitude"], MULTIROTORS["tilting"], MULTIROTORS["leaning"]):
+        for plant in ("thesis", "mujoco"):
+            yield merge(tables, {"vehicle": {"rotor_inertia": 1e-5}}), {"plant": plant}
     for tables in MULTIROTORS.values():
         yield tables, {"plant": "thesis"}
         yield tables, {"plant": "mujoco", **LATE}

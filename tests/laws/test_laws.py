@@ -357,6 +357,10 @@ MISTAKES = {
         "'quadrotor'; choose yaw_position, switching, quadrotor_attitude_altitude",
     ),
     "unknown law": ({"controller": {"law": "mpc"}}, 'controller.law = "mpc": choose attitude'),
+    "rotor inertia of a quadrotor": (
+        {"vehicle": {**QUADROTOR, "rotor_inertia": 1e-5}, "controller": {"law": "geometric"}},
+        "vehicle.rotor_inertia = 1e-05: not supported for the quadrotor",
+    ),
     "key of another law": (
         {"vehicle": QUADROTOR, "controller": {"law": "yaw_position", "decoupler": "exact"}},
         'controller.decoupler = "exact": unknown key; only for law attitude_altitude, '

@@ -112,8 +112,9 @@ def _check_fixed_rotors(scenario: ScenarioTables) -> None:
     keys |= {"vehicle.tilt_servo": TiltServoTable(), "vehicle.pod": PodTable()}
     if not scenario.controller.rotors_have_speeds:
         keys |= {"vehicle.min_rotor_speed": None, "vehicle.max_rotor_speed": None}
-        keys["vehicle.rotor_inertia"] = 0.0
         keys["initial.rotor_speed"] = InitialTable().rotor_speed
+    if not scenario.controller.is_external:
+        keys["vehicle.rotor_inertia"] = 0.0
     for key, default in keys.items():
         scenario.require(
             key,
