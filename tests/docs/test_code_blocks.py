@@ -269,7 +269,7 @@ def test_pages_run(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mjcf").symlink_to(ROOT / "mjcf")
     (tmp_path / "docs" / "pictures").mkdir(parents=True)  # where a page draws its own
-    names = {}
+    names = {"__name__": "page"}
     for start, file in SAVED_AS.get(name, {}).items():
         (text,) = (block.code for block in blocks(name) if block.code.startswith(start))
         (tmp_path / file).write_text(text)

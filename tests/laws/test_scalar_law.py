@@ -11,6 +11,7 @@ import pytest
 
 import tiltsim
 from tests.docs.pages import code
+from tiltsim.arrays.values import LiftError
 from tiltsim.laws.assembling import loop_of
 from tiltsim.laws.scalar_law import _collect
 from tiltsim.scenario.controller_packages import installed_controllers
@@ -180,3 +181,20 @@ def test_a_package_is_found(monkeypatch):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert [*installed_controllers(())] == ["geometric"]
+
+
+def test_a_function_without_a_file_flies_but_not_on_arrays():
+    text = """
+@tiltsim.scalar
+def hover(observed):
+    each = 0.25 * observed.vehicle.mass * observed.vehicle.gravity
+    return (each, each, each, each), (), ()
+"""
+    names = {"__name__": "shell", "tiltsim": tiltsim}
+    exec(text, names)
+    short = {"reference": TARGET, "simulation": {"duration": 0.01}}
+    assert tiltsim.simulate(short, controller=names["hover"]).end.kind == "completed"
+    pytest.importorskip("jax")
+    short["simulation"] |= {"engine": "jax", "plant": "thesis"}
+    with pytest.raises(LiftError, match="hover: its source is not in <string>"):
+        tiltsim.simulate(short, controller=names["hover"])

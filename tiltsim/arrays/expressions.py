@@ -63,9 +63,10 @@ def _definition(function: FunctionType) -> ast.FunctionDef | ast.Lambda:
         (node,) = ast.parse(text).body
         assert isinstance(node, ast.FunctionDef)
         return node
-    for node in _definitions(code.co_filename).get(code.co_firstlineno, []):
-        if getattr(node, "name", "<lambda>") == code.co_name:
-            return node
+    if Path(code.co_filename).is_file():
+        for node in _definitions(code.co_filename).get(code.co_firstlineno, []):
+            if getattr(node, "name", "<lambda>") == code.co_name:
+                return node
     raise LiftError(f"{code.co_name}: its source is not in {code.co_filename}")
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import inspect
 import textwrap
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple, TypeVar
@@ -33,7 +34,8 @@ def scalar(function: Function) -> Function:
     of ``math``.
     """
     if not Path(function.__code__.co_filename).is_file():  # of a notebook; arrays need its text
-        function.__source__ = textwrap.dedent(inspect.getsource(function))  # type: ignore[attr-defined]
+        with suppress(OSError):  # without its text, as in a plain Python shell, it flies otherwise
+            function.__source__ = textwrap.dedent(inspect.getsource(function))  # type: ignore[attr-defined]
     return register(function)
 
 
