@@ -45,6 +45,8 @@ def _mistake(entry: EntryPoint, table: object, built_in: Container[str]) -> str:
         return f"{entry.value} is no subclass of tiltsim.ScalarController"
     if entry.name in built_in:
         return "tiltsim has a law of this name"
+    if table.scalar_law is ScalarController.scalar_law:
+        return f"{entry.value} has no method scalar_law(airframe)"
     if get_args(table.model_fields["law"].annotation) != (entry.name,):
         return f'{entry.value} needs the field law: Literal["{entry.name}"]'
     return ""
