@@ -6,7 +6,8 @@ import subprocess
 from pathlib import Path
 
 RECORDER = r"""
-command_not_found_handle() { printf '%s\x1f' "$@" >> "$CALLS"; printf '\x1e' >> "$CALLS"; }
+# The commands of a pipeline run at once: each is appended by a single write.
+command_not_found_handle() { local IFS=$'\x1f'; printf '%s\x1f\x1e' "$*" >> "$CALLS"; }
 cd() { :; }
 source() { :; }
 """
