@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.commands.options import (
     Subparsers,
+    add_controllers,
     add_jobs,
     add_json,
     add_overrides,
@@ -34,6 +35,7 @@ COLUMNS: Final = {
     "min_thrust_factor": ("thrust ×", ".2f", 1.0),
     "max_inertia_factor": ("inertia ×", ".1f", 1.0),
     "time_per_call": ("call (µs)", ".0f", 1e6),
+    "compiled_time_per_call": ("compiled (µs)", ".1f", 1e6),
 }
 """Measures in the table: heading, form and factor."""
 
@@ -43,18 +45,14 @@ def add_parser(subparsers: Subparsers) -> None:
     description = """Fly scenarios under several controllers, and compare tracking error, effort,
     smallest margin, and the largest latency and errors of mass, thrust and inertia that each
     survives: flights that end regularly, in the last second within 1 m of the reference; with +,
-    nothing beyond was tried. The time of a call is that of a control step in Python."""
+    nothing beyond was tried, lost where a flight fails without any error, refused where the law
+    cannot be sampled. The times of a call are those of a control step in Python and compiled."""
     parser = subparsers.add_parser(
         "compare", help="fly scenarios under several controllers", description=description
     )
     add = parser.add_argument
     add("scenarios", nargs="+", metavar="SCENARIO", help="files, folders or names of the library")
-    add(
-        "--controllers",
-        required=True,
-        metavar="A,B,...",
-        help="laws, with their default gains; given: the scenario's own controller",
-    )
+    add_controllers(parser, "laws, with their default gains; given: the scenario's own controller")
     add("--nominal", action="store_true", help="leave out what each survives, forty flights each")
     add("--out", type=Path, metavar="DIR", help="also write comparison.json and comparison.png")
     add_overrides(parser, "all flights", "simulation.duration=10")
@@ -67,6 +65,7 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fly, print, draw."""
+    from tiltsim.commands.controllers import chosen_controllers
     from tiltsim.plants.trust import is_trusted
     from tiltsim.scenario.override_keys import parse_override
     from tiltsim.studies.checking import collect
@@ -75,8 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.out is not None:
         prepare_folder(arguments.out)
-    names = (name.strip() for name in arguments.controllers.split(","))
-    controllers = list(dict.fromkeys(filter(None, names)))
+    controllers = chosen_controllers(arguments)
     addresses, compared = collect(arguments.scenarios), []
     flown = compare(
         addresses,
@@ -123,7 +121,8 @@ def _print(rows: list[dict[str, Any]], *, searched: bool) -> None:
     """A table for every scenario, and below it why flights ended or were refused."""
     from tiltsim.studies.comparison import SEARCHES
 
-    shown = [key for key in COLUMNS if searched or key not in SEARCHES]
+    with_searches = (*SEARCHES, "compiled_time_per_call")
+    shown = [key for key in COLUMNS if searched or key not in with_searches]
     header = ("controller", *(COLUMNS[key][0] for key in shown))
     for scenario in dict.fromkeys(row["scenario"] for row in rows):
         chosen = [row for row in rows if row["scenario"] == scenario]
@@ -133,13 +132,15 @@ def _print(rows: list[dict[str, Any]], *, searched: bool) -> None:
         for row in chosen:
             if row["end"] != "completed":
                 print_line(f"{row['controller']}: {row['refused'] or row['end']}")
+            elif row["latency_refused"]:
+                print_line(f"{row['controller']}: {row['latency_refused']}")
         print_line("")
 
 
 def _cell(row: dict[str, Any], key: str) -> str:
-    from tiltsim.studies.comparison import is_last_tried
+    from tiltsim.studies.comparison import is_last_tried, why_none
 
     _, form, factor = COLUMNS[key]
     if row[key] is None:
-        return "-"
+        return why_none(row, key)
     return number(factor * row[key], form) + "+" * is_last_tried(row, key)

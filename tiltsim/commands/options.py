@@ -76,3 +76,16 @@ def add_vehicle(parser: argparse.ArgumentParser) -> None:
         metavar="VEHICLE",
         help="ar_drone_2 (default), luukkonen, KEY=VALUE,..., or a preset with KEY=VALUE,...",
     )
+
+
+def add_controllers(parser: argparse.ArgumentParser, listed: str) -> None:
+    """Declare ``--controllers`` and ``--controller``; see `tiltsim.commands.controllers`."""
+    parser.add_argument("--controllers", default="", metavar="A,B,...", help=listed)
+    parser.add_argument(
+        "--controller",
+        action="append",
+        default=[],
+        metavar="NAME=TABLE",
+        help="one with gains of its own, such as fast='{law=\"pid\", position_gain=2.0}', or your "
+        "scalar function, FILE.py:FUNCTION; repeatable",
+    )

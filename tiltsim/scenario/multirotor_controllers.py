@@ -17,6 +17,7 @@ from tiltsim.scenario.tiltrotor_controllers import (
     attitude_altitude_gain_kind,
     resolved_gains,
     resolved_integral_gains,
+    with_numbers,
 )
 from tiltsim_controllers.analysis.stability import (
     ErrorLoop,
@@ -156,6 +157,9 @@ class AttitudeForceController(ControllerTable):
         if self.norm == "speed":
             self.require_defaults(("slowest_rotor",), 'needs controller.norm = "thrust"')
         return self
+
+    def in_full(self) -> Self:
+        return with_numbers(self, self.gains)
 
     def resolve_gains(self) -> Gains:
         return resolved_gains(self.gains)

@@ -51,6 +51,11 @@ class YawPositionController(ControllerTable):
     )
     gains: YawPositionGains = Field("stable", description=YAW_POSITION_GAINS)
 
+    def in_full(self) -> Self:
+        gains = self.resolve_gains()
+        table = YawPositionGainTable(position=gains[:4], yaw=gains[4:])
+        return self.model_copy(update={"gains": table})
+
     def resolve_gains(self) -> yaw_position.Gains:
         return _yaw_position_gains(self.gains)
 

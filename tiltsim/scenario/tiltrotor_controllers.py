@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf, pi
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Final, Literal, Self, TypeVar
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -108,6 +108,20 @@ def resolved_gains(gains: str | GainTable | PolePlacementTable) -> Gains:
     if isinstance(gains, GainTable):
         return gains_from_rows(gains.attitude, gains.altitude, gains.position)
     return gains.resolve()[0] if isinstance(gains, PolePlacementTable) else GAIN_SETS[gains]
+
+
+Named = TypeVar("Named", bound=ControllerTable)
+
+
+def with_numbers(controller: Named, gains: str | GainTable | PolePlacementTable) -> Named:
+    """The same controller with numbers in place of the name of a set."""
+    if not isinstance(gains, str):
+        return controller
+    values = (*GAIN_SETS[gains],)
+    first, second, third = zip(values[:3], values[3:6], values[6:9], strict=True)
+    attitude = (first, second, third)
+    table = GainTable(attitude=attitude, altitude=values[9:12], position=values[12:])
+    return controller.model_copy(update={"gains": table})
 
 
 def resolved_integral_gains(gains: str | GainTable | PolePlacementTable) -> IntegralGains:
@@ -231,13 +245,7 @@ class AttitudeAltitudeController(ControllerTable):
         return resolved_gains(self.gains)
 
     def in_full(self) -> Self:
-        if not isinstance(self.gains, str):
-            return self
-        values = (*self.resolve_gains(),)
-        first, second, third = zip(values[:3], values[3:6], values[6:9], strict=True)
-        attitude = (first, second, third)
-        table = GainTable(attitude=attitude, altitude=values[9:12], position=values[12:])
-        return self.model_copy(update={"gains": table})
+        return with_numbers(self, self.gains)
 
     def resolve_integral_gains(self) -> IntegralGains:
         """The gains on the integrals, zero unless given by poles."""
@@ -345,6 +353,11 @@ class FullPoseController(ControllerTable):
     max_tilt_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
         None, description="limit enforced by the law; default: none [rad]", examples=[1.0]
     )
+
+    def in_full(self) -> Self:
+        gains = self.resolve_gains()
+        table = FullPoseGainTable(position=gains[:3], attitude=gains[3:])
+        return self.model_copy(update={"gains": table})
 
     def resolve_gains(self) -> full_pose.Gains:
         if isinstance(self.gains, FullPoseGainTable):

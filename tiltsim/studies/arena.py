@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from statistics import mean
+from types import MappingProxyType
 from typing import Any, Final
 
 from tiltsim.errors import InputError
@@ -13,7 +14,8 @@ from tiltsim.scenario.controller import CONTROLLERS
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.messages import choose
 from tiltsim.studies.checking import collect
-from tiltsim.studies.comparison import GIVEN, Compared, compare
+from tiltsim.studies.comparison import GIVEN, Entry, fly_entries
+from tiltsim.studies.fleet import FLEET, fleet_file
 
 FOLDER: Final = "arena"
 """Of the library: one file for each vehicle, one variant for each task."""
@@ -35,6 +37,26 @@ HALF_OF: Final = {
 """Tasks with other errors than `HALF`: steps, whose error begins with the step itself."""
 
 
+MULTIROTOR: Final = "multirotor"
+"""The file whose tasks the fleet flies, each vehicle in place of the file's own."""
+
+OWN_KEYS: Final = {"omni_octorotor": {"controller.norm": "thrust"}}
+"""What a vehicle of the fleet needs beside its file and its tilt angles: its rotors reverse."""
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """Of the arena.
+
+    Attributes:
+        tasks: Addresses.
+        overrides: Values by dotted key that make the tasks those of this vehicle.
+    """
+
+    tasks: tuple[str, ...]
+    overrides: Mapping[str, Any]
+
+
 @dataclass(frozen=True)
 class Standing:
     """The scores of one controller on the tasks of one vehicle.
@@ -42,10 +64,12 @@ class Standing:
     Attributes:
         controller: Its law, or `GIVEN`.
         scores: By task, 0 to 100; None where the controller does not fit the task.
+        tuned: The same with tuned gains; those of `scores` where there are none.
     """
 
     controller: str
     scores: Mapping[str, float | None]
+    tuned: Mapping[str, float | None]
 
     @property
     def total(self) -> float:
@@ -53,32 +77,38 @@ class Standing:
         return mean(score or 0.0 for score in self.scores.values())
 
     @property
-    def of_flown(self) -> float | None:
-        """Mean over the tasks that the controller fits."""
-        flown = [score for score in self.scores.values() if score is not None]
-        return mean(flown) if flown else None
+    def tuned_total(self) -> float:
+        """The same with tuned gains."""
+        return mean(score or 0.0 for score in self.tuned.values())
 
 
-def vehicles() -> dict[str, list[str]]:
-    """Addresses of the tasks, by vehicle."""
+def vehicles() -> dict[str, Vehicle]:
+    """The vehicles by name: those with a file of their own, then the others of the fleet."""
     found: dict[str, list[str]] = {}
     for address in collect([str(shipped_folder("scenarios") / FOLDER)]):
         found.setdefault(address.partition("#")[0].rpartition("/")[2], []).append(address)
-    return found
+    shared = tuple(found.pop(MULTIROTOR))
+    every = {name: Vehicle(tuple(tasks), {}) for name, tasks in found.items()}
+    for name, angles in FLEET.items():
+        if name not in every:
+            gait = {"gait": {"type": "fixed", "angles": [*angles]}} if angles else {}
+            own = {"vehicle.mjcf": str(fleet_file(name)), **gait, **OWN_KEYS.get(name, {})}
+            every[name] = Vehicle(shared, own)
+    return every
 
 
-def chosen_vehicles(names: Sequence[str]) -> dict[str, list[str]]:
+def chosen_vehicles(names: Sequence[str]) -> dict[str, Vehicle]:
     """Those named, or all. Raises InputError if one does not exist."""
     known = vehicles()
     for name in names:
         if name not in known:
             raise InputError(f"--vehicles {name}: {choose(name, sorted(known))}")
-    return {name: tasks for name, tasks in known.items() if name in names or not names}
+    return {name: vehicle for name, vehicle in known.items() if name in names or not names}
 
 
-def fitting(tasks: Sequence[str]) -> list[str]:
-    """Controllers for the vehicle of tasks: their own, and all laws that follow positions."""
-    scenario = load_scenario(tasks[0])
+def fitting(vehicle: Vehicle) -> list[str]:
+    """Controllers for a vehicle: the tasks' own, and all laws that follow positions."""
+    scenario = load_scenario(vehicle.tasks[0], vehicle.overrides)
     own, model = scenario.controller, scenario.vehicle.model
     laws = [
         law
@@ -87,27 +117,59 @@ def fitting(tasks: Sequence[str]) -> list[str]:
         and model in table.vehicle_models
         and "position" in table.reference_kinds
     ]
-    default = load_scenario(tasks[0], {"controller": {"law": own.law}}).controller
+    default = load_scenario(vehicle.tasks[0], {"controller": {"law": own.law}}).controller
     return laws if own == default else [GIVEN, *laws]
 
 
 def fly_tasks(
-    tasks: Mapping[str, Sequence[str]], controllers: Sequence[str], jobs: int
-) -> Iterator[tuple[str, Compared]]:
-    """Fly the tasks of every vehicle; yields them with the vehicle's name.
+    chosen: Mapping[str, Vehicle],
+    controllers: Mapping[str, Mapping[str, Mapping[str, Any]]],
+    tuned: Mapping[str, Mapping[str, Mapping[str, Any]]],
+    jobs: int,
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Fly the tasks of every vehicle; yields the vehicle's name and a row with its score.
 
     Args:
-        tasks: Addresses by vehicle.
-        controllers: Laws, or `GIVEN`; those that `fitting` finds if empty.
+        chosen: The vehicles.
+        controllers: Their tables by vehicle and name.
+        tuned: Tables with tuned gains of some of them, flown, too.
         jobs: Processes.
-
-    Raises:
-        InputError: If a controller does not exist.
     """
-    for vehicle, addresses in tasks.items():
-        names = controllers or fitting(addresses)
-        for compared in compare(addresses, names, {}, searches=False, jobs=jobs):
-            yield vehicle, compared
+    places, entries = [], []
+    for name, vehicle in chosen.items():
+        for address in vehicle.tasks:
+            for controller, table in controllers[name].items():
+                gains = tuned.get(name, {}).get(controller)
+                for kind, keys in (("default", table), ("tuned", gains)):
+                    if keys is not None:
+                        places.append((name, kind))
+                        entries.append(entry_of(vehicle, address, controller, keys))
+    for (name, kind), one in zip(places, fly_entries(entries, searches=False, jobs=jobs)):
+        yield name, one.row | {"gains": kind, "score": score(one.row)}
+
+
+def entry_of(
+    vehicle: Vehicle,
+    address: str,
+    name: str,
+    table: Mapping[str, Any],
+    changes: Mapping[str, Any] = MappingProxyType({}),
+) -> Entry:
+    """A controller on a task of a vehicle; `OWN_KEYS` are for the tasks' own controller only.
+
+    Args:
+        vehicle: The vehicle.
+        address: Of the task.
+        name: Of the controller.
+        table: Its keys, empty for the tasks' own.
+        changes: Further values by dotted key.
+    """
+    own = {
+        key: value
+        for key, value in vehicle.overrides.items()
+        if not table or not key.startswith("controller")
+    }
+    return Entry(address, name, table, {**own, **changes})
 
 
 def score(row: Mapping[str, Any]) -> float | None:
@@ -129,72 +191,56 @@ def task_of(row: Mapping[str, Any]) -> str:
 
 
 def standings(rows: Sequence[Mapping[str, Any]]) -> list[Standing]:
-    """Of the rows of one vehicle, the best first."""
-    scores: dict[str, dict[str, float | None]] = {}
+    """Of the rows of one vehicle, the best first, with tuned gains where there are any."""
+    scores: dict[str, dict[str, dict[str, float | None]]] = {}
     for row in rows:
-        scores.setdefault(row["controller"], {})[task_of(row)] = score(row)
-    every = [Standing(name, by_task) for name, by_task in scores.items()]
-    return sorted(every, key=lambda standing: -standing.total)
+        by_gains = scores.setdefault(row["controller"], {"default": {}, "tuned": {}})
+        by_gains[row["gains"]][task_of(row)] = row["score"]
+    every = [
+        Standing(name, by["default"], by["tuned"] or by["default"]) for name, by in scores.items()
+    ]
+    return sorted(every, key=lambda standing: -standing.tuned_total)
 
 
-def beaten(every: Sequence[Standing]) -> list[str]:
-    """A line for each task in which a baseline stands before all of the thesis's laws and ours."""
+def best(every: Sequence[Standing], task: str, gains: str) -> tuple[str, float]:
+    """The controller that is best in a task, and its score.
+
+    Args:
+        every: The controllers of a vehicle.
+        task: Name.
+        gains: default or tuned.
+    """
+    reached = {one.controller: _scores(one, gains)[task] or 0.0 for one in every}
+    winner = max(reached, key=lambda name: reached[name])
+    return winner, reached[winner]
+
+
+def _scores(standing: Standing, gains: str) -> Mapping[str, float | None]:
+    return standing.tuned if gains == "tuned" else standing.scores
+
+
+def beaten(every: Sequence[Standing], gains: str) -> list[str]:
+    """Of each task in which a baseline stands before all of the thesis's laws and ours, who wins.
+
+    Args:
+        every: The controllers of a vehicle.
+        gains: default or tuned.
+    """
+    known = [one for one in every if one.controller in BASELINES]
+    others = [one for one in every if one.controller not in BASELINES]
     lines = []
-    for task in every[0].scores if every else ():
-        best: dict[bool, tuple[float, str]] = {}
-        for standing in every:
-            reached = (standing.scores[task] or 0.0, standing.controller)
-            kind = standing.controller in BASELINES
-            best[kind] = max(best.get(kind, reached), reached)
-        if len(best) == 2 and best[True][0] > best[False][0]:
-            (high, winner), (low, loser) = best[True], best[False]
-            lines.append(f"`{task}`: `{winner}` {high:.0f} against {low:.0f} (`{loser}`)")
+    for task in every[0].scores if known and others else ():
+        (winner, high), (loser, low) = best(known, task, gains), best(others, task, gains)
+        if high > low:
+            lines.append(f"`{task}` (`{winner}` {high:.0f}, `{loser}` {low:.0f})")
     return lines
 
 
-def arena_page(rows: Mapping[str, Sequence[Mapping[str, Any]]], made: str) -> str:
-    """The page in Markdown: where baselines win, a table for each vehicle, and refusals.
-
-    Args:
-        rows: Of each vehicle.
-        made: Sentence on versions.
-    """
-    every = {vehicle: standings(chosen) for vehicle, chosen in rows.items()}
-    lines = [
-        "# Arena",
-        "",
-        "A baseline beats the thesis's laws and ours, the best of them, in:",
-        "",
-    ]
-    for vehicle, ranked in every.items():
-        lines += [f"- {vehicle}, {line}" for line in beaten(ranked)] or [f"- {vehicle}: none"]
-    for vehicle, ranked in every.items():
-        lines += ["", f"## {vehicle.capitalize()}", "", *_table(ranked)]
-        refused = dict.fromkeys(
-            f"- `{row['controller']}`: {row['refused'].partition(': ')[2]}"
-            for row in rows[vehicle]
-            if row["end"] == "refused"
-        )
-        lost = [
-            f"- `{row['controller']}` in `{task_of(row)}`: {row['end']}"
-            for row in rows[vehicle]
-            if row["end"] not in ("completed", "refused")
-        ]
-        lines += ["", "Refused (-):", "", *refused] * bool(refused)
-        lines += ["", "Ended early (0):", "", *lost] * bool(lost)
-    return "\n".join([*lines, "", made, ""])
-
-
-def _table(ranked: Sequence[Standing]) -> Iterator[str]:
-    """Tasks as rows, controllers as columns."""
-    yield "| task | " + " | ".join(f"`{standing.controller}`" for standing in ranked) + " |"
-    yield "| --- |" + " --: |" * len(ranked)
-    for task in ranked[0].scores if ranked else ():
-        yield f"| `{task}` | " + " | ".join(shown(s.scores[task]) for s in ranked) + " |"
-    yield "| all tasks | " + " | ".join(f"**{s.total:.0f}**" for s in ranked) + " |"
-    yield "| tasks that it fits | " + " | ".join(shown(s.of_flown) for s in ranked) + " |"
-
-
-def shown(value: float | None) -> str:
-    """A score as text."""
-    return "-" if value is None else f"{value:.0f}"
+def changed(every: Sequence[Standing]) -> list[str]:
+    """Of each task whose winner is another with tuned gains, both winners."""
+    lines = []
+    for task in every[0].scores if every else ():
+        (before, low), (after, high) = (best(every, task, kind) for kind in ("default", "tuned"))
+        if before != after:
+            lines.append(f"`{task}` (`{before}` {low:.0f}, then `{after}` {high:.0f})")
+    return lines

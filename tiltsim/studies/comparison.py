@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from math import isclose, nan
 from time import perf_counter
 from typing import Any, Final
 
+import mujoco
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.closed_loop.userdata import CONTROL_PERIOD as PERIOD_IN_USERDATA
+from tiltsim.engines.callback import control_callback
+from tiltsim.engines.native_engine import compile_empty
 from tiltsim.errors import InputError
 from tiltsim.flight.flight import Flight
-from tiltsim.laws.assembling import assemble
+from tiltsim.laws.assembling import assemble, loop_of
 from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE
+from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.trust import require_trust
 from tiltsim.scenario.controller import CONTROLLERS
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.messages import choose
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.simulation.shared_engine import compile_together, with_compiled
 from tiltsim.simulation.simulate import simulate
 from tiltsim.sweeps.search import boundary
 from tiltsim.system.processes import in_processes
@@ -37,7 +44,10 @@ WITHIN: Final = 1.0
 """m: largest position error in the last second of a flight that counts as survived."""
 
 CALLS: Final = 200
-"""Control steps that are timed."""
+"""Control steps that are timed together."""
+
+ROUNDS: Final = 40
+"""Timings of compiled code, of which the least counts."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +87,7 @@ MEASURES: Final = (
     *SEARCHES,
     "control_period",
     "time_per_call",
+    "compiled_time_per_call",
 )
 """Numbers of a row; null where a flight has none, or a search did not survive its start."""
 
@@ -95,13 +106,54 @@ class Compared:
     error: Floats
 
 
-Item = tuple[str, str]
-"""Address of a scenario and name of a law."""
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """One controller on one scenario, to be flown.
+
+    Attributes:
+        address: Of the scenario.
+        name: Of the controller in the results.
+        table: Its keys in place of the scenario's ``[controller]``; empty for the scenario's own.
+        overrides: Further values by dotted key.
+    """
+
+    address: str
+    name: str
+    table: Mapping[str, Any]
+    overrides: Mapping[str, Any]
+
+    def scenario(self) -> Scenario:
+        """The scenario under this controller. Raises InputError if it refuses the controller."""
+        return load_scenario(self.address, {**self._controller(), **self.overrides})
+
+    def _controller(self) -> Mapping[str, Any]:
+        """A whole table, even of the scenario's own law, which has gains of its own."""
+        if not self.table:
+            return {}
+        if any(key.startswith("controller") for key in self.overrides):
+            return {f"controller.{key}": value for key, value in self.table.items()}
+        return {"controller": dict(self.table)}
+
+
+def controller_tables(names: Sequence[str]) -> dict[str, Mapping[str, Any]]:
+    """The tables of laws with their default gains, and of the scenario's own controller.
+
+    Args:
+        names: Laws, or `GIVEN`.
+
+    Raises:
+        InputError: If one does not exist.
+    """
+    known = [law for law in (GIVEN, *CONTROLLERS) if law not in ("python", "scalar")]
+    for name in names:
+        if name not in known:
+            raise InputError(f"--controllers {name}: {choose(name, known)}")
+    return {name: {} if name == GIVEN else {"law": name} for name in names}
 
 
 def compare(
     addresses: Sequence[str],
-    controllers: Sequence[str],
+    controllers: Mapping[str, Mapping[str, Any]],
     overrides: Mapping[str, Any],
     *,
     searches: bool = True,
@@ -112,41 +164,64 @@ def compare(
 
     Args:
         addresses: Of scenarios.
-        controllers: Laws, or `GIVEN`.
+        controllers: Their tables by name, see `controller_tables`.
         overrides: Values by dotted key, for all flights.
         searches: Whether robustness is sought, which takes some forty flights each.
         jobs: Processes.
         trusted: Whether Python code that scenario files name may be executed.
 
     Raises:
-        InputError: If a controller or scenario does not exist, or none is given.
+        InputError: If no controller is given, a scenario does not exist, or code is not trusted.
     """
-    known = [law for law in (GIVEN, *CONTROLLERS) if law not in ("python", "scalar")]
-    for name in controllers or ("",):
-        if name not in known:
-            raise InputError(f"--controllers {name}: {choose(name, known)}")
+    if not controllers:
+        raise InputError("--controllers: name one at least")
+    entries = [
+        Entry(address, name, table, overrides)
+        for address in addresses
+        for name, table in controllers.items()
+    ]
     for address in addresses:
         require_trust(load_scenario(address, overrides), trusted)
-    items = [(address, name) for address in addresses for name in controllers]
-    work = partial(compare_one, overrides=overrides, searches=searches)
+    yield from fly_entries(entries, searches=searches, jobs=jobs)
+
+
+def fly_entries(entries: Sequence[Entry], *, searches: bool, jobs: int) -> Iterator[Compared]:
+    """Fly controllers on scenarios, in this order."""
+    scenarios = []
+    for entry in () if searches else entries:
+        with suppress(InputError):  # a refusal is part of the result
+            scenario = entry.scenario()
+            loop_of(scenario)
+            scenarios.append(scenario)
+    compiled = compile_together(scenarios, jobs)
+    work = partial(compare_one, searches=searches, compiled=compiled)
     if jobs == 1:
-        yield from map(work, items)
+        yield from map(work, entries)
         return
-    done = {item: future.result() for item, future in in_processes(work, items, jobs)}
-    yield from map(done.__getitem__, items)
+    done = {}
+    for entry, future in in_processes(work, entries, jobs):
+        done[entry] = future.result()
+    yield from map(done.__getitem__, entries)
 
 
-def compare_one(item: Item, overrides: Mapping[str, Any], *, searches: bool) -> Compared:
-    """One controller on one scenario; a scenario that refuses it is part of the result."""
-    address, name = item
-    row: dict[str, Any] = {"controller": name, "scenario": address}
+def compare_one(
+    entry: Entry, *, searches: bool, compiled: frozenset[str] = frozenset()
+) -> Compared:
+    """One controller on one scenario; a scenario that refuses it is part of the result.
+
+    Args:
+        entry: What to fly.
+        searches: Whether robustness is sought.
+        compiled: Loops to fly natively, of `compile_together`.
+    """
+    row: dict[str, Any] = {"controller": entry.name, "scenario": entry.address}
     try:
-        scenario = load_scenario(address, {**_with_law(name, overrides), **overrides})
+        scenario = entry.scenario()
         assembly = assemble(scenario)
-        flight = simulate(_engine(scenario, searches))
+        flight = simulate(with_compiled(_engine(scenario, searches), compiled))
     except InputError as error:
         refusal = {"end": "refused", "refused": str(error), **dict.fromkeys(MEASURES)}
-        return Compared(row | refusal, np.zeros(0), np.zeros(0))
+        return Compared(row | refusal | {"latency_refused": None}, np.zeros(0), np.zeros(0))
     row |= {"end": flight.end.kind, "refused": None, **_tracking(flight), **_effort(flight)}
     metrics = flight.metrics()
     for measure in ("min_singularity_margin", "min_rotor_speed", "saturated_fraction"):
@@ -155,16 +230,10 @@ def compare_one(item: Item, overrides: Mapping[str, Any], *, searches: bool) -> 
         row[measure] = _survived(scenario, search) if searches else None
     row["control_period"] = _control_period(scenario)
     row["time_per_call"] = _time_per_call(assembly)
+    row["compiled_time_per_call"] = _compiled_time_per_call(scenario) if searches else None
+    row["latency_refused"] = _latency_refusal(scenario) if searches else None
     row = {key: _number(value) for key, value in row.items()}
     return Compared(row, flight["time"], _distance(flight))
-
-
-def _with_law(name: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """A law in place of the scenario's own table, even of the same law, which has its own gains."""
-    if name == GIVEN:
-        return {}
-    gains_given = any(key.startswith("controller") for key in overrides)
-    return {"controller.law": name} if gains_given else {"controller": {"law": name}}
 
 
 def _engine(scenario: Scenario, searches: bool) -> Scenario:
@@ -229,7 +298,7 @@ def _survived(scenario: Scenario, search: Search) -> float | None:
     """The last value up to which the controller flies; None if it does not at the true one."""
     simulation, latency, period = scenario.simulation, {}, _control_period(scenario)
     if "latency" in search.key:
-        latency = {"simulation.control_timestep": period, "simulation.engine": "python"}
+        latency = _sampled(scenario)
     else:
         scenario = _engine(scenario, searches=True)
 
@@ -251,6 +320,21 @@ def _survived(scenario: Scenario, search: Search) -> float | None:
     return found * period if latency and found is not None else found
 
 
+def _sampled(scenario: Scenario) -> dict[str, Any]:
+    """Changes of a scenario in which latencies are sought."""
+    period = _control_period(scenario)
+    return {"simulation.control_timestep": period, "simulation.engine": "python"}
+
+
+def _latency_refusal(scenario: Scenario) -> str | None:
+    """Why the scenario cannot be flown with a sampled control law; None if it can."""
+    try:
+        assemble(scenario.replace(_sampled(scenario)))
+    except InputError as error:
+        return str(error)
+    return None
+
+
 def _last(holds: Callable[[float], bool], search: Search) -> float | None:
     walk = boundary(search.start, search.stop, search.step, search.tolerance)
     value = next(walk)
@@ -270,6 +354,13 @@ def is_last_tried(row: Mapping[str, Any], measure: str) -> bool:
     return isclose(row[measure], last)
 
 
+def why_none(row: Mapping[str, Any], measure: str) -> str:
+    """In place of a measure that is None: lost, refused, or - where there is nothing to measure."""
+    if measure not in SEARCHES or row["end"] == "refused":
+        return "-"
+    return "refused" if measure == "max_latency" and row["latency_refused"] else "lost"
+
+
 def _time_per_call(assembly: Assembly) -> float:
     """Seconds that one control step takes in Python, the least of a few rounds."""
     loop, setup = assembly.loop, assembly.setup
@@ -285,3 +376,25 @@ def _time_per_call(assembly: Assembly) -> float:
             loop.sampling.controls(0.0, *vectors, setup.parameters, setup.knots)
         rounds.append((perf_counter() - start) / CALLS)
     return min(rounds)
+
+
+def _compiled_time_per_call(scenario: Scenario) -> float:
+    """Seconds that one control step takes in compiled code; NaN where it does not fly in MuJoCo.
+
+    The difference, the least of a few rounds each, of MuJoCo's forward dynamics with the control
+    step and with a callback that does nothing.
+    """
+    if scenario.controller.is_external or scenario.simulation.plant != "mujoco":
+        return nan
+    plant = MujocoPlant(assemble(scenario), engine="native")
+    plant.data.userdata[PERIOD_IN_USERDATA] = 0.0  # the control step at every evaluation
+    callbacks = plant.callback, compile_empty().ctypes
+    rounds = []
+    for _ in range(ROUNDS):  # by turns, as the speed of a machine changes
+        for callback in callbacks:
+            with control_callback(callback):
+                start = perf_counter()
+                for _ in range(CALLS):
+                    mujoco.mj_forward(plant.model, plant.data)
+                rounds.append((perf_counter() - start) / CALLS)
+    return max(0.0, min(rounds[::2]) - min(rounds[1::2]))

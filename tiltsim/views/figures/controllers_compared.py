@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.studies.comparison import Compared, is_last_tried
+from tiltsim.studies.comparison import Compared, is_last_tried, why_none
 from tiltsim.views.figures import style
 from tiltsim.views.figures.layout import add_legend
 
@@ -83,7 +83,7 @@ def _draw_survived(axes: Axes, rows: Sequence[Compared], looks: Mapping[str, Any
             share = abs(value - true) / best if value is not None and best > 0.0 else 0.0
             color = looks[compared.row["controller"]]["color"]
             axes.barh(y, share, 0.85 * height, color=color)
-            text = "-" if value is None else form.format(value)
+            text = why_none(compared.row, key) if value is None else form.format(value)
             text += ", the last tried" * is_last_tried(compared.row, key)
             axes.text(share + 0.02, y, text, va="center", size="x-small")
     axes.set(title="survived", xlabel="share of the best", xlim=(0.0, 1.45))

@@ -1,0 +1,94 @@
+"""The arena's page in Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from tiltsim.studies.arena import Standing, beaten, changed, standings, task_of
+
+
+def arena_page(rows: Mapping[str, Sequence[Mapping[str, Any]]], made: Sequence[str]) -> str:
+    """Where baselines win, what tuning changes, all totals, and a table for each vehicle.
+
+    Args:
+        rows: Of each vehicle.
+        made: Sentences on versions, seeds and gains.
+    """
+    every = {vehicle: standings(chosen) for vehicle, chosen in rows.items()}
+    lines = ["# Arena", "", *_who_wins(every, is_tuned(rows)), "", "## All tasks", ""]
+    lines += _totals(every)
+    for vehicle, ranked in every.items():
+        lines += ["", f"## {vehicle.capitalize()}", "", *_table(ranked), *_failures(rows[vehicle])]
+    return "\n".join([*lines, "", *made, ""])
+
+
+def is_tuned(rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> bool:
+    """Whether any flight has tuned gains."""
+    return any(row["gains"] == "tuned" for chosen in rows.values() for row in chosen)
+
+
+def _who_wins(every: Mapping[str, Sequence[Standing]], tuned: bool) -> Iterator[str]:
+    for gains in ("tuned", "default") if tuned else ("default",):
+        found = {vehicle: beaten(ranked, gains) for vehicle, ranked in every.items()}
+        tasks = sum(len(ranked[0].scores) for ranked in every.values() if ranked)
+        yield (
+            f"With {gains} gains a baseline beats the thesis's laws and ours, the best of them, in "
+            f"{sum(map(len, found.values()))} of {tasks} tasks:"
+        )
+        yield ""
+        for vehicle, lines in found.items():
+            yield f"- {vehicle}: {', '.join(lines) or 'none'}"
+        yield ""
+    if tuned:
+        yield "Tuning changes who wins:"
+        yield ""
+        for vehicle, ranked in every.items():
+            yield f"- {vehicle}: {', '.join(changed(ranked)) or 'nowhere'}"
+
+
+def _totals(every: Mapping[str, Sequence[Standing]]) -> Iterator[str]:
+    """Vehicles as rows, controllers as columns."""
+    names = list(dict.fromkeys(one.controller for ranked in every.values() for one in ranked))
+    yield "| | " + " | ".join(f"`{name}`" for name in names) + " |"
+    yield "| --- |" + " --: |" * len(names)
+    for vehicle, ranked in every.items():
+        cells = {one.controller: cell(one.total, one.tuned_total) for one in ranked}
+        yield f"| {vehicle} | " + " | ".join(cells.get(name, "") for name in names) + " |"
+
+
+def _table(ranked: Sequence[Standing]) -> Iterator[str]:
+    """Tasks as rows, controllers as columns."""
+    yield "| task | " + " | ".join(f"`{standing.controller}`" for standing in ranked) + " |"
+    yield "| --- |" + " --: |" * len(ranked)
+    for task in ranked[0].scores if ranked else ():
+        cells = " | ".join(cell(one.scores[task], one.tuned[task]) for one in ranked)
+        yield f"| `{task}` | {cells} |"
+    yield "| all tasks | " + " | ".join(cell(s.total, s.tuned_total) for s in ranked) + " |"
+
+
+def _failures(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Refusals, each once, and flights that ended early."""
+    refused = dict.fromkeys(
+        f"- `{row['controller']}`: {row['refused'].partition(': ')[2]}"
+        for row in rows
+        if row["end"] == "refused"
+    )
+    lost = dict.fromkeys(
+        f"- `{row['controller']}` in `{task_of(row)}`, {row['gains']} gains: {row['end']}"
+        for row in rows
+        if row["end"] not in ("completed", "refused")
+    )
+    yield from ["", "Refused (-):", "", *refused] * bool(refused)
+    yield from ["", "Ended early (0):", "", *lost] * bool(lost)
+
+
+def cell(default: float | None, tuned: float | None) -> str:
+    """Two scores as text, one where they are the same."""
+    before, after = shown(default), shown(tuned)
+    return before if before == after else f"{before} → {after}"
+
+
+def shown(value: float | None) -> str:
+    """A score as text."""
+    return "-" if value is None else f"{value:.0f}"
