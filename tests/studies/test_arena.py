@@ -7,23 +7,26 @@ import json
 import numpy as np
 import pytest
 
-import tiltsim
 from tiltsim.cli import main
 from tiltsim.errors import InputError
-from tiltsim.studies import arena
-from tiltsim.studies.comparison import Compared, compare_one
+from tiltsim.studies import arena, tuning
+from tiltsim.studies.arena_page import arena_page
+from tiltsim.studies.comparison import Compared, Entry, compare_one, controller_tables
+from tiltsim.studies.fleet import FLEET
 from tiltsim.views.figures.arena_scores import arena_figure
 
 
-def row(controller, task, position=0.0, yaw=0.0, end="completed"):
-    return {
+def row(controller, task, position=0.0, yaw=0.0, end="completed", gains="default"):
+    made = {
         "controller": controller,
         "scenario": f"arena/tiltrotor#{task}",
         "end": end,
         "refused": "arena/tiltrotor#x: needs legs" if end == "refused" else None,
         "rms_position_error": position,
         "rms_yaw_error": yaw,
+        "gains": gains,
     }
+    return made | {"score": arena.score(made)}
 
 
 @pytest.fixture
@@ -55,83 +58,140 @@ def test_a_refusal_counts_as_zero_in_the_total_alone(rows):
     assert [standing.controller for standing in ranked] == ["full_pose", "pid", "lqr"]
     by_name = {standing.controller: standing for standing in ranked}
     assert by_name["pid"].scores == {"step": 50.0, "circle": None}
-    assert (by_name["pid"].total, by_name["pid"].of_flown) == (25.0, 50.0)
-    assert (by_name["lqr"].total, by_name["lqr"].of_flown) == (25.0, 25.0)
+    assert [by_name[name].total for name in ("pid", "lqr")] == [25.0, 25.0]
 
 
 def test_the_page_says_first_where_a_baseline_wins(rows):
-    lines = arena.arena_page({"tiltrotor": rows}, "Made.").splitlines()
-    assert lines[4] == "- tiltrotor, `step`: `pid` 50 against 33 (`full_pose`)"
-    assert lines[5] == "- tiltrotor, `circle`: `lqr` 50 against 25 (`full_pose`)"
+    lines = arena_page({"tiltrotor": rows}, ["Made."]).splitlines()
+    assert lines[2].endswith("in 2 of 2 tasks:")
+    assert lines[4] == (
+        "- tiltrotor: `step` (`pid` 50, `full_pose` 33), `circle` (`lqr` 50, `full_pose` 25)"
+    )
     assert "| `circle` | 25 | - | 50 |" in lines
     assert "- `pid`: needs legs" in lines
-    assert "- `lqr` in `step`: singular" in lines
-    assert not arena.beaten(arena.standings(rows[2:4]))
+    assert "- `lqr` in `step`, default gains: singular" in lines
+    assert not arena.beaten(arena.standings(rows[2:4]), "default")
 
 
-def test_the_figure_shows_every_score(rows):
-    figure = arena_figure({"tiltrotor": arena.standings(rows)})
+@pytest.fixture
+def tuned(rows):
+    """Tuning makes full_pose the best in the step, and nothing else."""
+    return [
+        *rows,
+        row("full_pose", "step", 0.125, gains="tuned"),
+        row("full_pose", "circle", 0.1, 0.2, gains="tuned"),
+    ]
+
+
+def test_tuned_scores_stand_beside_default_ones_and_decide_the_order(tuned):
+    lines = arena_page({"tiltrotor": tuned}, ["Made."]).splitlines()
+    assert lines[2].startswith("With tuned gains a baseline beats")
+    assert lines[4] == "- tiltrotor: `circle` (`lqr` 50, `full_pose` 25)"
+    assert "- tiltrotor: `step` (`pid` 50, then `full_pose` 67)" in lines
+    assert "| `step` | 33 → 67 | 50 | 0 |" in lines
+    assert "| tiltrotor | 29 → 46 | 25 | 25 |" in lines
+
+
+def test_the_figure_shows_every_score(tuned):
+    ranked = arena.standings(tuned)
+    figure = arena_figure({"tiltrotor": ranked})
     texts = [text.get_text() for text in figure.axes[0].texts]
-    assert texts == ["33", "50", "0", "25", "–", "50", "29", "25", "25"]
+    assert texts == ["33 → 67", "50", "0", "25", "–", "50", "29 → 46", "25", "25"]
+    many = arena_figure({"one": ranked, "two": ranked, "three": ranked})
+    assert [len(axes.texts) for axes in many.axes] == [9, 9, 9]
 
 
-def test_every_task_is_flown_by_the_scenarios_own_controller():
-    tasks = arena.vehicles()
-    assert list(map(len, tasks.values())) == [len(tasks["quadrotor"]), len(tasks["tiltrotor"])]
-    names = {task.partition("#")[2] for task in tasks["tiltrotor"]}
-    assert names >= {task.partition("#")[2] for task in tasks["quadrotor"]}
-    assert set(arena.HALF_OF) <= names
-    for address in (*tasks["tiltrotor"], *tasks["quadrotor"]):
-        assert tiltsim.load_scenario(address).simulation.duration <= 10.0
+def test_every_vehicle_of_the_fleet_has_tasks():
+    vehicles = arena.vehicles()
+    assert list(vehicles)[:2] == ["quadrotor", "tiltrotor"]
+    assert set(vehicles) == set(FLEET)
+    of = {name: {task.partition("#")[2] for task in one.tasks} for name, one in vehicles.items()}
+    assert of["tiltrotor"] >= of["quadrotor"]
+    assert of["tiltrotor"] >= of["hexarotor"] == of["omni_octorotor"]
+    assert set(arena.HALF_OF) <= of["tiltrotor"]
+    for name in ("quadrotor", "tiltrotor", "tilt_octorotor", "omni_octorotor"):
+        for address in vehicles[name].tasks[::4]:
+            flown = arena.entry_of(vehicles[name], address, "given", {}).scenario()
+            assert flown.simulation.duration <= 10.0
+    assert len(flown.vehicle.resolve().spins) == 8
 
 
 def test_a_vehicle_has_the_controllers_that_fit():
-    tasks = arena.vehicles()
+    vehicles = arena.vehicles()
     own = ["given", "attitude_altitude", "full_pose", *arena.BASELINES]
-    assert arena.fitting(tasks["tiltrotor"])[:7] == own
-    assert arena.fitting(tasks["quadrotor"])[:5] == ["yaw_position", *arena.BASELINES]
+    assert arena.fitting(vehicles["tiltrotor"])[:7] == own
+    assert arena.fitting(vehicles["quadrotor"])[:5] == ["yaw_position", *arena.BASELINES]
+    of_fleet = ["full_pose", "attitude_force", *arena.BASELINES]
+    assert arena.fitting(vehicles["hexarotor"])[:6] == of_fleet
+    assert arena.fitting(vehicles["omni_octorotor"])[:7] == ["given", *of_fleet]
 
 
-def test_a_named_law_has_its_default_gains_even_where_the_scenario_has_others(monkeypatch):
-    flown = []
+def test_only_the_tasks_own_controller_takes_what_a_vehicle_needs():
+    octorotor = arena.vehicles()["omni_octorotor"]
+    of = [
+        arena.entry_of(octorotor, octorotor.tasks[0], name, table).scenario().controller
+        for name, table in controller_tables(["given", "attitude_force", "pid"]).items()
+    ]
+    assert [one.law for one in of] == ["attitude_force", "attitude_force", "pid"]
+    assert [one.norm for one in of[:2]] == ["thrust", "speed"]
 
-    def noticed(scenario):
-        flown.append(scenario.controller)
-        raise InputError("seen")
 
-    monkeypatch.setattr("tiltsim.studies.comparison.simulate", noticed)
-    for name in ("given", "attitude_altitude"):
-        compare_one(("arena/tiltrotor#step", name), {}, searches=False)
-    assert [table.gains for table in flown] == ["feedforward", "ch04"]
+def test_a_named_law_has_its_default_gains_even_where_the_scenario_has_others():
+    flown = [
+        Entry("arena/tiltrotor#step", name, table, {}).scenario().controller.gains
+        for name, table in controller_tables(["given", "attitude_altitude"]).items()
+    ]
+    assert flown == ["feedforward", "ch04"]
 
 
 def test_a_yaw_error_is_the_shorter_way_around():
     overrides = {"simulation.duration": 0.02, "initial.attitude": [0.0, 0.0, -3.0]}
-    item = ("arena/tiltrotor#yaw_step", "geometric")
     overrides["reference.yaw"] = 3.0
-    error = compare_one(item, overrides, searches=False).row["rms_yaw_error"]
+    entry = Entry("arena/tiltrotor#yaw_step", "geometric", {"law": "geometric"}, overrides)
+    error = compare_one(entry, searches=False).row["rms_yaw_error"]
     assert error == pytest.approx(2.0 * np.pi - 6.0, abs=0.02)
 
 
-def test_the_command_writes_data_page_and_figure(tmp_path, capsys, monkeypatch):
-    def flown(addresses, names, overrides, **_):
-        for address in addresses:
-            for name in names:
-                task = address.partition("#")[2]
-                yield Compared(row(name, task, 0.1), np.zeros(0), np.zeros(0))
+def flown(entries, **_):
+    for entry in entries:
+        task = entry.address.partition("#")[2]
+        error = 0.1 if len(entry.table) < 2 else 0.05
+        yield Compared(row(entry.name, task, error), np.zeros(0), np.zeros(0))
 
-    monkeypatch.setattr(arena, "compare", flown)
-    options = ["--controllers", "pid,lqr", "--vehicles", "tiltrotor", "--out", str(tmp_path)]
-    assert main(["arena", *options, "--json"]) == 0
+
+def test_the_command_writes_data_page_and_figure(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(arena, "fly_entries", flown)
+    found = {
+        tuning.Search("tiltrotor", "pid"): tuning.Tuned(
+            {"law": "pid"}, {"law": "pid", "position_gain": 1.5}, {"position_gain": 1.5}, 1, 2, 40
+        ),
+        tuning.Search("tiltrotor", "lqr"): None,
+    }
+    monkeypatch.setattr(tuning, "tune_all", lambda *_, **__: iter(found.items()))
+    chosen = ["--controllers", "pid,lqr", "--vehicles", "tiltrotor"]
+    first, second = tmp_path / "first", tmp_path / "second"
+    assert main(["arena", *chosen, "--tune", "40", "--out", str(first), "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
-    assert printed == json.loads((tmp_path / "arena.json").read_text())
+    assert printed == json.loads((first / "arena.json").read_text())
     assert printed["made"]["versions"]["mujoco"]
-    assert {one["controller"] for one in printed["vehicles"]["tiltrotor"]} == {"pid", "lqr"}
-    assert printed["vehicles"]["tiltrotor"][0]["score"] == pytest.approx(50.0)
-    assert (tmp_path / "arena.png").stat().st_size > 10_000
-    assert (tmp_path / "arena.md").read_text().startswith("# Arena")
+    rows = printed["vehicles"]["tiltrotor"]
+    assert [(one["controller"], one["gains"]) for one in rows[:3]] == [
+        ("pid", "default"),
+        ("pid", "tuned"),
+        ("lqr", "default"),
+    ]
+    assert [one["score"] for one in rows[:2]] == pytest.approx([50.0, 100.0 / 1.5])
+    assert (first / "arena.png").stat().st_size > 10_000
+    assert (first / "arena.md").read_text().startswith("# Arena")
+    gains = first / "tuned_gains.json"
+    kept = json.loads(gains.read_text())
+    assert (kept["seed"], kept["flights"]) == (1, 40)
+    assert kept["gains"]["tiltrotor"]["pid"]["table"]["position_gain"] == 1.5
+    assert main(["arena", *chosen, "--gains", str(gains), "--out", str(second), "--json"]) == 0
+    again = json.loads(capsys.readouterr().out)
+    assert again["vehicles"] == printed["vehicles"]
 
 
 def test_an_unknown_vehicle_is_refused():
-    with pytest.raises(InputError, match="--vehicles boat: choose quadrotor, tiltrotor"):
+    with pytest.raises(InputError, match="--vehicles boat: choose cant_hexarotor, "):
         arena.chosen_vehicles(["boat"])

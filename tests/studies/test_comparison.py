@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import json
+from argparse import Namespace
 
 import numpy as np
 import pytest
 
 import tiltsim
 from tiltsim.cli import main
+from tiltsim.commands.controllers import chosen_controllers
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import INTERRUPTED
 from tiltsim.studies.comparison import (
     MEASURES,
     SEARCHES,
+    Entry,
     Search,
+    _compiled_time_per_call,
     _last,
+    _latency_refusal,
     _survived,
     compare,
+    controller_tables,
     is_last_tried,
+    why_none,
 )
 from tiltsim.views.figures.controllers_compared import comparison_figure
 
@@ -29,7 +36,7 @@ SHORT = {"simulation.duration": 0.3, "initial.position": [0.3, 0.0, 0.0], "expec
 @pytest.fixture(scope="module")
 def rows():
     names = ["given", "lqr", "yaw_position"]
-    return list(compare([SETPOINT], names, SHORT, searches=False))
+    return list(compare([SETPOINT], controller_tables(names), SHORT, searches=False))
 
 
 def test_a_row_is_of_its_flight(rows):
@@ -121,14 +128,62 @@ def test_the_command_prints_rows_and_writes_a_folder(tmp_path, capsys):
     assert "yaw_position: " in table[4]
 
 
+def named(controllers="", *own):
+    return chosen_controllers(Namespace(controllers=controllers, controller=own))
+
+
+def test_a_controller_has_gains_of_its_own(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    fast = 'fast={law="pid", velocity_gains=[6.0, 3.6]}'
+    assert named("pid", fast, "my_law.py:hover") == {
+        "pid": {"law": "pid"},
+        "fast": {"law": "pid", "velocity_gains": [6.0, 3.6]},
+        "hover": {"law": "scalar", "function": f"{tmp_path}/my_law.py:hover"},
+    }
+    entry = Entry(SETPOINT, "fast", named("", fast)["fast"], {"simulation.duration": 1.0})
+    assert entry.scenario().controller.velocity_gains == (6.0, 3.6)
+    within = Entry(SETPOINT, "fast", entry.table, {"controller.position_gain": 2.0})
+    assert within.scenario().controller.velocity_gains == (6.0, 3.6)
+    assert within.scenario().controller.position_gain == 2.0
+
+
+@pytest.mark.parametrize("text", ["pid", "fast=2", "fast={position_gain=2.0}", "mine.py"])
+def test_gains_that_are_no_table_are_refused(text):
+    with pytest.raises(InputError, match=r"write NAME=\{law=\"pid\", KEY=VALUE, ...\}"):
+        named("", text)
+
+
+def test_two_controllers_of_one_name_are_refused():
+    with pytest.raises(InputError, match="pid is there twice"):
+        named("pid", 'pid={law="pid"}')
+
+
+def test_a_refused_sample_time_is_not_a_lost_flight():
+    refusal = _latency_refusal(tiltsim.load_scenario(SETPOINT))
+    assert "control_timestep = 0.005: too long" in refusal
+    assert _latency_refusal(tiltsim.load_scenario(SETPOINT, {"controller.law": "pid"})) is None
+    row = {"end": "completed", "latency_refused": refusal}
+    assert why_none(row, "max_latency") == "refused"
+    assert why_none(row, "max_mass_factor") == "lost"
+    assert why_none({**row, "latency_refused": None}, "max_latency") == "lost"
+    assert why_none({**row, "end": "refused"}, "max_latency") == "-"
+    assert why_none(row, "min_rotor_speed") == "-"
+
+
+def test_the_time_of_compiled_code_is_that_of_the_mujoco_plant():
+    scenario = tiltsim.load_scenario(SETPOINT)
+    assert _compiled_time_per_call(scenario) >= 0.0
+    assert np.isnan(_compiled_time_per_call(scenario.replace({"simulation.plant": "thesis"})))
+
+
 def test_an_unknown_controller_is_refused():
     with pytest.raises(InputError, match=r"--controllers pdi: did you mean pid\? choose given, "):
-        next(compare([SETPOINT], ["pdi"], {}))
+        controller_tables(["pdi"])
 
 
 def test_no_controller_at_all_is_refused():
-    with pytest.raises(InputError, match="--controllers : choose given, "):
-        next(compare([SETPOINT], [], {}))
+    with pytest.raises(InputError, match="--controllers: name one at least"):
+        next(compare([SETPOINT], {}, {}))
 
 
 def test_what_is_flown_is_kept_when_the_rest_is_interrupted(rows, tmp_path, capsys, monkeypatch):

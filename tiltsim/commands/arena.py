@@ -132,7 +132,10 @@ def _tuning(
 
     if arguments.tune is None:
         shipped = shipped_folder("scenarios") / FOLDER / GAINS_FILE
-        return read_tuning(arguments.gains or shipped)
+        file = arguments.gains or shipped
+        if not file.is_file():
+            return {"gains": {}, "flights": 0, "seed": 0, "made": {"date": "", "commit": ""}}
+        return read_tuning(file)
     total, found = sum(map(len, tables.values())), {}
     progress.begin("searches", total)
     budget = {"flights": arguments.tune, "seed": arguments.seed}

@@ -144,7 +144,8 @@ def fly_tasks(
                     if keys is not None:
                         places.append((name, kind))
                         entries.append(entry_of(vehicle, address, controller, keys))
-    for (name, kind), one in zip(places, fly_entries(entries, searches=False, jobs=jobs)):
+    flown = fly_entries(entries, searches=False, timed=False, jobs=jobs)
+    for (name, kind), one in zip(places, flown, strict=True):
         yield name, one.row | {"gains": kind, "score": score(one.row)}
 
 

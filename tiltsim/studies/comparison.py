@@ -185,8 +185,17 @@ def compare(
     yield from fly_entries(entries, searches=searches, jobs=jobs)
 
 
-def fly_entries(entries: Sequence[Entry], *, searches: bool, jobs: int) -> Iterator[Compared]:
-    """Fly controllers on scenarios, in this order."""
+def fly_entries(
+    entries: Sequence[Entry], *, searches: bool, timed: bool = True, jobs: int
+) -> Iterator[Compared]:
+    """Fly controllers on scenarios, in this order.
+
+    Args:
+        entries: What to fly.
+        searches: Whether robustness is sought.
+        timed: Whether control steps are timed.
+        jobs: Processes.
+    """
     scenarios = []
     for entry in () if searches else entries:
         with suppress(InputError):  # a refusal is part of the result
@@ -194,7 +203,7 @@ def fly_entries(entries: Sequence[Entry], *, searches: bool, jobs: int) -> Itera
             loop_of(scenario)
             scenarios.append(scenario)
     compiled = compile_together(scenarios, jobs)
-    work = partial(compare_one, searches=searches, compiled=compiled)
+    work = partial(compare_one, searches=searches, timed=timed, compiled=compiled)
     if jobs == 1:
         yield from map(work, entries)
         return
@@ -205,13 +214,14 @@ def fly_entries(entries: Sequence[Entry], *, searches: bool, jobs: int) -> Itera
 
 
 def compare_one(
-    entry: Entry, *, searches: bool, compiled: frozenset[str] = frozenset()
+    entry: Entry, *, searches: bool, timed: bool = True, compiled: frozenset[str] = frozenset()
 ) -> Compared:
     """One controller on one scenario; a scenario that refuses it is part of the result.
 
     Args:
         entry: What to fly.
         searches: Whether robustness is sought.
+        timed: Whether control steps are timed.
         compiled: Loops to fly natively, of `compile_together`.
     """
     row: dict[str, Any] = {"controller": entry.name, "scenario": entry.address}
@@ -229,7 +239,7 @@ def compare_one(
     for measure, search in SEARCHES.items():
         row[measure] = _survived(scenario, search) if searches else None
     row["control_period"] = _control_period(scenario)
-    row["time_per_call"] = _time_per_call(assembly)
+    row["time_per_call"] = _time_per_call(assembly) if timed else None
     row["compiled_time_per_call"] = _compiled_time_per_call(scenario) if searches else None
     row["latency_refused"] = _latency_refusal(scenario) if searches else None
     row = {key: _number(value) for key, value in row.items()}

@@ -146,11 +146,11 @@ def _order(path: Path) -> int:
 def scaled(controller: ControllerTable, factors: Mapping[str, float]) -> dict[str, Any]:
     """The table of a controller with factors on its knobs, to six digits."""
     given = controller.model_dump(mode="json", exclude_defaults=True)
-    full = controller.in_full().model_dump(mode="json")
+    full: Any = controller.in_full().model_dump(mode="json")
     changed = set()
     for knob, places in knobs(controller).items():
         for path, power in places.items():
-            table: Any = full
+            table = full
             for part in path[:-1]:
                 table = table[part]
             table[path[-1]] = float(f"{table[path[-1]] * factors[knob] ** power:.6g}")
@@ -195,7 +195,8 @@ def tune(
     def value(logarithms: Floats) -> float:
         factors = dict(zip(names, np.exp(logarithms).tolist(), strict=True))
         flown = tuning_entries(vehicle, search.controller, scaled(controller, factors))
-        return mean(score(compare_one(entry, searches=False).row) or 0.0 for entry in flown)
+        rows = (compare_one(entry, searches=False, timed=False).row for entry in flown)
+        return mean(score(row) or 0.0 for row in rows)
 
     tried = maximize(value, len(names), flights // len(tasks), seed)
     best = max(tried, key=lambda one: one[1])
