@@ -77,6 +77,6 @@ def test_nothing_is_loaded_from_the_network(pages):
 
 
 def test_notebooks_have_their_pictures(pages):
-    for name in ("fly_and_look", "design_a_gait"):
+    for name in ("fly_and_look", "design_a_gait", "compare_controllers"):
         page = pages[SITE / "notebooks" / f"{name}.html"]
         assert sum(link.endswith(".png") for link in page.loaded) >= 2

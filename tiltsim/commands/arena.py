@@ -132,19 +132,18 @@ def _tuning(
 
     if arguments.tune is None:
         shipped = shipped_folder("scenarios") / FOLDER / GAINS_FILE
-        file = arguments.gains or shipped
-        if not file.is_file():
-            return {"gains": {}, "flights": 0, "seed": 0, "made": {"date": "", "commit": ""}}
-        return read_tuning(file)
+        return read_tuning(arguments.gains or shipped)
     total, found = sum(map(len, tables.values())), {}
     progress.begin("searches", total)
+    made = asdict(Made.now())
     budget = {"flights": arguments.tune, "seed": arguments.seed}
+    tuning: dict[str, Any] = {}
     for search, result in tune_all(vehicles, tables, **budget, jobs=arguments.jobs):
         found[search] = result
         progress.tell("searches", len(found), total)
-    tuning = tuning_document(found, **budget, made=asdict(Made.now()))
-    with replacing(arguments.out / GAINS_FILE) as file:
-        file.write_text(json_text(tuning) + "\n", encoding="utf-8")
+        tuning = tuning_document(found, **budget, made=made)
+        with replacing(arguments.out / GAINS_FILE) as file:  # an interrupt keeps what is found
+            file.write_text(json_text(tuning) + "\n", encoding="utf-8")
     return tuning
 
 
