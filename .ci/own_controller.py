@@ -38,4 +38,3 @@ arena = ("--vehicles", "quadrotor", "--controllers", "steady", "--jobs", "1")
 rows = json.loads(tiltsim("arena", *arena, "--out", "arena", "--json"))["vehicles"]["quadrotor"]
 assert len(rows) == 9
 assert all(row["controller"] == "steady" and row["score"] > 0.0 for row in rows)
-print("the example package: flown, checked, described, scored in the arena")

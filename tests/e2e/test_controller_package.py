@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from tests.docs.pages import ROOT
@@ -76,6 +77,12 @@ def test_the_command_line_knows_the_law(folder):
     keys = run(folder, "-m", "tiltsim", "schema", "controller.steady").stdout
     assert "attitude_bandwidth" in keys
     assert "removes steady errors" in keys
+    poles = json.loads(run(folder, "-m", "tiltsim", "stability", "steady.toml", "--json").stdout)
+    found = [complex(*pole) for pole in poles["poles"]]
+    for pole in np.roots(
+        [0.01, 1.0, 4.5, 6.75, 3.375]
+    ):  # the rotors' lag, and a triple pole at -1.5
+        assert min(abs(one - pole) for one in found) < 1e-4
     unknown = ["--set", "controller.position_bandwidth=-1"]
     refused = run(folder, "-m", "tiltsim", "run", "steady.toml", *unknown)
     assert refused.returncode == 2

@@ -284,3 +284,38 @@ def test_refusals(case):
     changes, message = REFUSED[case]
     with pytest.raises(tiltsim.InputError, match=message):
         tiltsim.linearize(tiltsim.load_scenario(SETPOINT, {**THESIS, **changes}))
+
+
+@tiltsim.scalar
+def upright(observed):
+    """Altitude with both poles at -3, attitude with both at -10; level rotors."""
+    roll, pitch, _ = observed.attitude
+    p, q, r = observed.body_rates
+    body, rise = observed.vehicle, observed.reference.position[2] - observed.position[2]
+    arm, drag = observed.torque[0][1], observed.torque[2][0]
+    lift = body.mass * (body.gravity + 9.0 * rise - 6.0 * observed.velocity[2])
+    a = 0.5 / arm * body.inertia_xx * (-100.0 * roll - 20.0 * p)
+    b = 0.5 / arm * body.inertia_yy * (-100.0 * pitch - 20.0 * q)
+    c = 0.25 / drag * body.inertia_zz * (-10.0 * r)
+    each = 0.25 * lift
+    return (each - b + c, each + a - c, each + b + c, each - a - c), (), ()
+
+
+LAGGED = {  # s^2 times the rotors' lag, 1 + s / 100, and the law's polynomial in altitude
+    "geometric": [0.01, 1.0, 4.0, 4.0],
+    "indi": [0.01, 1.0, 4.0, 4.0],
+    "pid": [0.01, 1.0, 3.0, 3.9, 0.9],
+    "own": [0.01, 1.0, 6.0, 9.0],
+}
+
+
+@pytest.mark.parametrize("law", LAGGED)
+def test_baselines_and_own_laws_have_the_altitude_poles_of_their_gains(law):
+    hover = "ch04_tracking/setpoint#rho_0_modified"
+    given = {"controller": upright} if law == "own" else {}
+    changes = {} if law == "own" else {"controller.law": law}
+    found = tiltsim.stability(tiltsim.load_scenario(hover, changes, **given))
+    for pole in np.roots(LAGGED[law]):
+        assert np.abs(found.poles - pole).min() < 1e-6 * abs(pole)
+    # The own law leaves x and y, and yaw, where they are put.
+    assert (found.neutral > 0) == (law == "own")
