@@ -102,6 +102,18 @@ def test_wrong_ranges_of_a_map_are_refused(capsys):
     assert "write LOW:HIGH,LOW:HIGH" in capsys.readouterr().err
 
 
+def test_a_map_of_short_flights_warns_in_one_line(capsys):
+    keys = [*THESIS, "--set", "simulation.duration=0.05"]
+    grid = ["--ranges=-0.1:0.1,-0.1:0.1", "--coarse=1", "--refine=0", "--quiet"]
+    assert main(["attraction", SETPOINT, *keys, *grid, "--json"]) == 0
+    printed = capsys.readouterr()
+    (line,) = printed.err.splitlines()
+    assert line.startswith(f"tiltsim: {SETPOINT}: simulation.duration = 0.05 s is short: the slow")
+    report = json.loads(printed.out)
+    assert (report["flights"], report["duration"], report["engine"]) == (4, 0.05, "python")
+    assert report["slowest_mode"]["name"] == "altitude"
+
+
 def test_figures_of_sweeps_loops_and_maps():
     """A line a scenario; the curve of singular attitudes where there is one."""
     scenario = tiltsim.load_scenario(SETPOINT, {"simulation.plant": "thesis"})
@@ -113,7 +125,9 @@ def test_figures_of_sweeps_loops_and_maps():
     assert [len(axes.lines) for axes in (gain, nyquist)] == [5, 6]
     edges = np.linspace(-1.5, 1.5, 5)
     share = np.eye(4)
-    found = Attraction(scenario, ("roll", "pitch"), (edges, edges), share, 25, np.ones((4, 4)))
+    found = Attraction(
+        scenario, ("roll", "pitch"), (edges, edges), share, 25, "jax", None, np.ones((4, 4))
+    )
     (axes,) = attraction_figure(found).axes
     assert axes.get_title(loc="left") == "25.0 % come back"
     assert len(axes.lines) == 2  # the curve and the scenario
