@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, Final, NamedTuple
 
 from tiltsim.arrays.jax_arrays import JaxArrays, recomputes, require_jax
@@ -179,21 +179,22 @@ class Kernel:
         return self._numpy.isfinite(sample).all() & kept & (code == WITHIN_LIMITS)
 
     def samples(self, carried: Carried) -> Any:
-        """Samples from a state to the end of the duration, shape (samples, fields)."""
-        first, (full, rest) = (
-            self.sample(carried),
-            divmod(self.course.steps, self.course.record_steps),
-        )
+        """Samples from a state to the end of the duration, shape (samples, fields).
 
-        def interval(now: Carried, _: None) -> tuple[Carried, Any]:
-            now = self.steps(now, self.course.record_steps)
-            return now, self.sample(now)
+        Its derivative in reverse mode keeps the states at the samples alone, and flies each
+        interval between two of them again.
+        """
+        jax, every = self._jax, self.course.record_steps
+        full, rest = divmod(self.course.steps, every)
 
-        carried, samples = self._jax.lax.scan(interval, carried, length=full)
-        parts = [first[None], samples]
-        if rest:
-            parts.append(self.sample(self.steps(carried, rest))[None])
-        return self._numpy.concatenate(parts)
+        @partial(jax.checkpoint, prevent_cse=False)  # which a scan does not need
+        def interval(now: Carried, _: None) -> tuple[Carried, Carried]:
+            return self.steps(now, every), now
+
+        last, before = jax.lax.scan(interval, carried, length=full)
+        ends = [last, self.steps(last, rest)] if rest else [last]
+        join = lambda *parts: self._numpy.concatenate([parts[0], self._numpy.stack(parts[1:])])
+        return jax.lax.map(self.sample, jax.tree.map(join, before, *ends))
 
     def record(self, state: Iterable[Any], reference: Any) -> Recording:
         """A whole flight, as if nothing ended it."""
