@@ -13,7 +13,7 @@ from tiltsim.cli import main
 from tiltsim.commands.stability import parse_sweep
 from tiltsim.linear.attraction import Attraction
 from tiltsim.linear.sweeping import sweep_stability
-from tiltsim.views.figures.attraction import attraction_figure
+from tiltsim.views.figures.attraction import attraction_figure, attraction_panels
 from tiltsim.views.figures.stability import loop_figure, stability_figure, sweep_figure
 
 SETPOINT = "ch04_tracking/setpoint#rho_065_modified"
@@ -124,10 +124,12 @@ def test_figures_of_sweeps_loops_and_maps():
     gain, nyquist, *_ = loop_figure(tiltsim.linearize(scenario)).axes
     assert [len(axes.lines) for axes in (gain, nyquist)] == [5, 6]
     edges = np.linspace(-1.5, 1.5, 5)
-    share = np.eye(4)
+    back, all_of_them = np.arange(25).reshape(5, 5) < 10, np.ones((5, 5), dtype=bool)
     found = Attraction(
-        scenario, ("roll", "pitch"), (edges, edges), share, 25, "jax", None, np.ones((4, 4))
+        scenario, ("roll", "pitch"), (edges, edges), back, 25, "jax", None, all_of_them
     )
     (axes,) = attraction_figure(found).axes
-    assert axes.get_title(loc="left") == "25.0 % come back"
+    assert axes.get_title(loc="left") == "37.5 % come back"
     assert len(axes.lines) == 2  # the curve and the scenario
+    panels = attraction_panels({"one": found, "two": found}, columns=2).axes
+    assert [axes.get_title(loc="left") for axes in panels] == ["one\n37.5 % | -", "two\n37.5 % | -"]

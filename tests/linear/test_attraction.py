@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -67,14 +69,28 @@ def test_a_finer_first_grid_and_the_flights_to_come(flown):
 def test_shares_are_of_acceptable_and_other_attitudes(flown):
     found = attraction(SETPOINT, refinements=1)
     report = found.report()
-    inside = found.acceptable.astype(bool)
-    assert report["acceptable"] == pytest.approx(inside.mean())
+    inside = found.acceptable
+    inner = np.s_[1:-1, 1:-1]
+    assert 0.0 < report["acceptable"] < inside[inner].mean()
+    assert report["returned"] == pytest.approx(found.share.mean())
     assert report["returned"] == pytest.approx(
         report["acceptable"] * report["acceptable_returned"]
         + (1.0 - report["acceptable"]) * report["unacceptable_returned"]
     )
     assert inside[12, 12]  # level
     assert not inside[0, 12]  # pitched down beyond the curve
+
+
+def test_a_corner_counts_as_what_it_is_itself():
+    """Cells across the curve are no reason for attitudes beyond it to count as returned."""
+    edges = np.linspace(-1.0, 1.0, 4)
+    side = np.outer(np.ones(4), [True, True, False, False]).astype(bool)
+    found = module.Attraction(None, ("roll", "pitch"), (edges, edges), side, 16, None, None, side)
+    assert found._areas.sum() == pytest.approx(1.0)
+    found = dataclasses.replace(found, scenario=tiltsim.load_scenario(SETPOINT))
+    report = found.report()
+    assert (report["acceptable_returned"], report["unacceptable_returned"]) == (1.0, 0.0)
+    assert report["acceptable"] == report["returned"] == pytest.approx(0.5)
 
 
 def test_other_axes_have_ranges_of_their_own(flown):

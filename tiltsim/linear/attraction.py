@@ -10,6 +10,7 @@ from typing import Any, Final
 from warnings import warn
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
@@ -47,24 +48,40 @@ class Attraction:
         scenario: The scenario.
         axes: Names of the two initial quantities.
         edges: Of the cells along each axis, shape (cells + 1,) each.
-        share: Of the corners of each cell that come back, shape (cells, cells): by the second, then
-            by the first axis.
+        returned: Whether flights from the corners of the cells come back, shape (cells + 1,
+            cells + 1): by the second, then by the first axis. Those that were not flown lie in
+            cells whose corners agree.
         flights: How many were flown, but for the undisturbed one.
         engine: Which flew them.
         slowest: The slowest mode of the linear analysis, if there is one.
-        acceptable: Whether the attitude at the centre of each cell is on the side of level attitude
-            of the gait's singular attitudes, at all times; None unless the axes are roll and pitch
-            of a tiltrotor.
+        acceptable: Whether the attitudes at the corners are on the side of level attitude of the
+            gait's singular attitudes, at all times; None unless the axes are roll and pitch of a
+            tiltrotor.
     """
 
     scenario: Scenario
     axes: tuple[str, str]
     edges: tuple[Floats, Floats]
-    share: Floats
+    returned: NDArray[np.bool_]
     flights: int
     engine: str | None
     slowest: SlowestMode | None
-    acceptable: Floats | None
+    acceptable: NDArray[np.bool_] | None
+
+    @property
+    def share(self) -> Floats:
+        """Of the corners of each cell that come back, shape (cells, cells)."""
+        back = self.returned.astype(float)
+        share: Floats = 0.25 * (back[1:, 1:] + back[:-1, 1:] + back[1:, :-1] + back[:-1, :-1])
+        return share
+
+    @property
+    def _areas(self) -> Floats:
+        """What the corners stand for of the map's area."""
+        sides = np.ones(len(self.returned))
+        sides[[0, -1]] = 0.5
+        areas: Floats = np.outer(sides, sides) / (len(sides) - 1) ** 2
+        return areas
 
     def report(self) -> dict[str, Any]:
         """As JSON: shares of the map's area."""
@@ -83,11 +100,12 @@ class Attraction:
         }
         if self.acceptable is None:
             return report
-        inside = self.acceptable.astype(bool)
-        report["acceptable"] = float(inside.mean())
-        for name, these in (("acceptable", inside), ("unacceptable", ~inside)):
+        areas = self._areas
+        report["acceptable"] = float(areas[self.acceptable].sum())
+        for name, these in (("acceptable", self.acceptable), ("unacceptable", ~self.acceptable)):
             if these.any():
-                report[f"{name}_returned"] = float(self.share[these].mean())
+                back = areas[these & self.returned].sum()
+                report[f"{name}_returned"] = float(back / areas[these].sum())
         return report
 
 
@@ -131,22 +149,24 @@ def attraction(
     edges = tuple(_edges(*pair, cells) for pair in zip(axes, ranges, strict=True))
     grid = _Grid(scenario, axes, (edges[0], edges[1]), progress)
     leaves = [(i, j, size) for i in range(0, cells, size) for j in range(0, cells, size)]
-    share = np.zeros((cells, cells))
+    returned = np.zeros((cells + 1, cells + 1), dtype=bool)
     while leaves:
         grid.fly({corner for cell in leaves for corner in _corners(*cell)}, leaves[0][2])
         divided = []
         for i, j, width in leaves:
-            back = [grid.returned[corner] for corner in _corners(i, j, width)]
-            share[j : j + width, i : i + width] = sum(back) / 4.0
-            if width > 1 and len(set(back)) > 1:
+            agree = {grid.returned[corner] for corner in _corners(i, j, width)}
+            returned[j : j + width + 1, i : i + width + 1] = all(agree)
+            if width > 1 and len(agree) > 1:
                 half = width // 2
                 divided += [(a, b, half) for a in (i, i + half) for b in (j, j + half)]
         leaves = divided
+    for (i, j), back in grid.returned.items():
+        returned[j, i] = back
     return Attraction(
         scenario,
         axes,
         (edges[0], edges[1]),
-        share,
+        returned,
         len(grid.returned),
         grid.engine,
         slowest,
@@ -251,16 +271,16 @@ def _is_near(away: Floats) -> bool:
     return bool(np.abs([*angles, *away[3:]]).max() <= NEAR)
 
 
-def _acceptable(scenario: Scenario, roll: Floats, pitch: Floats) -> Floats | None:
-    """Whether the attitudes at the centres of the cells are acceptable at all times."""
+def _acceptable(scenario: Scenario, roll: Floats, pitch: Floats) -> NDArray[np.bool_] | None:
+    """Whether attitudes are acceptable at all times, shape (pitch, roll)."""
     vehicle = scenario.vehicle.resolve()
     if scenario.vehicle.model != "tiltrotor" or not isinstance(vehicle, Vehicle):
         return None
     gait = assemble(scenario).gait
     times = np.arange(INSTANTS) / INSTANTS * (gait.period or 0.0)
-    across, up = np.meshgrid(0.5 * (roll[1:] + roll[:-1]), 0.5 * (pitch[1:] + pitch[:-1]))
+    across, up = np.meshgrid(roll, pitch)
     inside = np.ones(across.shape, dtype=bool)
     for angles in gait.angles(times if gait.period else times[:1]):
         level = determinant(angles, 0.0, 0.0, vehicle)
         inside &= determinant(angles, across, up, vehicle) * level > 0.0
-    return inside.astype(float)
+    return inside
