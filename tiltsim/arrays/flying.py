@@ -72,7 +72,7 @@ class Recording(NamedTuple):
     """Samples of a flight on arrays."""
 
     samples: Any  # (samples, fields), the first at time zero
-    alive: Any  # whether the flight had not ended at each sample but the first
+    alive: Any  # whether the flight had not ended at each sample
     last: Carried  # the state at the last sample before its end
 
 
@@ -212,7 +212,8 @@ class Kernel:
             return (now, alive, last), (sample, alive)
 
         full, rest = divmod(course.steps, course.record_steps)
-        progress = (start, self._numpy.isfinite(first).all(), start)
+        begins = self.goes_on(first, sides, reference)
+        progress = (start, begins, start)
         progress, (samples, alive) = jax.lax.scan(
             lambda p, _: interval(p, course.record_steps), progress, length=full
         )
@@ -220,7 +221,8 @@ class Kernel:
             progress, (sample, on) = interval(progress, rest)
             samples = self._numpy.concatenate((samples, sample[None]))
             alive = self._numpy.append(alive, on)
-        return Recording(self._numpy.concatenate((first[None], samples)), alive, progress[2])
+        samples = self._numpy.concatenate((first[None], samples))
+        return Recording(samples, self._numpy.append(begins, alive), progress[2])
 
     def approach(self, carried: Carried) -> Any:
         """Samples after each step of a recording interval, shape (steps, fields)."""

@@ -18,13 +18,18 @@ import numpy as np
 Record = TypeVar("Record", bound=tuple[Any, ...])
 
 
-def flatten(record: Iterable[Any]) -> Iterator[float]:
-    """Yield the floats of a record in the order of declaration, nested records in place."""
+def leaves(record: Iterable[Any]) -> Iterator[Any]:
+    """Yield the numbers of a record in the order of declaration, nested records in place."""
     for value in record:
         if isinstance(value, tuple):
-            yield from flatten(value)
+            yield from leaves(value)
         else:
-            yield float(value)
+            yield value
+
+
+def flatten(record: Iterable[Any]) -> Iterator[float]:
+    """The same as floats."""
+    return map(float, leaves(record))
 
 
 def unflatten(record_type: type[Record], values: Iterable[float]) -> Record:
