@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from time import perf_counter
 from typing import Any, Final, Generic, TypeVar
 
@@ -30,7 +31,9 @@ from tiltsim.flight.metrics import Metrics, metrics_of_rows
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.simulation.monitor import TerminationMonitor
 from tiltsim.simulation.simulate import simulate_assembly
+from tiltsim_controllers.mathematics.records import flatten, names_of
 from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.references.trajectories import ReferenceParameters
 
 MEMORY: Final = 256 * 2**20
 """Bytes of the samples of all rows that fly together."""
@@ -51,15 +54,11 @@ class _Sound:
         return ""
 
 
-def _named(record: Any, name: str = "") -> Iterator[tuple[str, float]]:
-    """The numbers of a record with the names of their fields."""
-    for field, value in zip(record._fields, record):
-        if hasattr(value, "_fields"):
-            yield from _named(value, field)
-        elif isinstance(value, tuple):
-            yield from ((field, float(entry)) for entry in value)
-        else:
-            yield field, float(value)
+@cache
+def _codes_of(record: type[tuple[Any, ...]]) -> tuple[int, ...]:
+    """Where the `CODES` are among the numbers of a record of a type."""
+    names = names_of(record)
+    return tuple(place for place, name in enumerate(names) if name in CODES)
 
 
 def numbers_of(assembly: Assembly) -> tuple[float, ...]:
@@ -67,7 +66,7 @@ def numbers_of(assembly: Assembly) -> tuple[float, ...]:
     equations = assembly.loop.equations
     assert equations is not None  # refused otherwise
     return (
-        *(value for _, value in _named(assembly.setup.parameters)),
+        *flatten(assembly.setup.parameters),
         *map(float, assembly.reference),
         *disturbance_acceleration(assembly.scenario),
         *map(float, equations.initial(assembly, assembly.setup)),
@@ -77,8 +76,14 @@ def numbers_of(assembly: Assembly) -> tuple[float, ...]:
 def batch_key(assembly: Assembly) -> object:
     """Equal for flights that may share a batch."""
     parameters, knots = assembly.setup
-    records = (*_named(parameters), *_named(assembly.reference))
-    return course_of(assembly), len(knots), tuple(v for name, v in records if name in CODES)
+    codes: list[float] = []
+    for kind, record in (
+        (assembly.loop.parameters, parameters),
+        (ReferenceParameters, assembly.reference),
+    ):
+        numbers = [*flatten(record)]
+        codes += (numbers[place] for place in _codes_of(kind))
+    return course_of(assembly), len(knots), tuple(codes)
 
 
 def _padded(rows: int) -> int:

@@ -135,6 +135,11 @@ class SweepPoints:
             points += [self.point(place * stride) for place in places]
         return points
 
+    def spread(self, most: int) -> list[dict[str, Any]]:
+        """So many points at most, spread evenly over the sweep, both ends included."""
+        count = min(len(self), most)
+        return [self.point(n * (len(self) - 1) // max(1, count - 1)) for n in range(count)]
+
     def derived(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The ``[derive]`` keys for values of the axes. Raises `InputError` if one has no value."""
         rules = self.sweep.derive.items()

@@ -79,7 +79,9 @@ def _similar(known: _Known, changes: Mapping[str, Any]) -> Scenario | None:
         name, *path, last = split_key(key)
         if not isinstance(getattr(known.scenario, str(name), None), BaseModel):
             return None
-        target: Any = changed.setdefault(str(name), deepcopy(known.document[str(name)]))
+        if name not in changed:
+            changed[str(name)] = deepcopy(known.document[str(name)])
+        target: Any = changed[str(name)]
         for step in path:
             target = target[step]
         target[last] = value
