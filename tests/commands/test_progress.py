@@ -64,6 +64,19 @@ def test_a_count_is_shown_from_the_start_with_rate_and_time_left(monkeypatch):
     assert re.search(rf"\| 3/5 \[\d\d:\d\d<\d\d:\d\d,{rate}\]", shown.text)
 
 
+def test_a_total_may_change(monkeypatch, capsys):
+    with terminal_as_stderr(monkeypatch) as shown, show_progress(shown=True) as progress:
+        progress.tell("flights", 1, 10)
+        progress.tell("flights", 2, 4)
+        progress.tick()
+    assert "| 2/4 [" in shown.text
+    with show_progress(shown=True) as progress:
+        progress.tell("flights", 1, 10)
+        progress.tell("flights", 2, 4)
+        progress.tick()
+    assert "flights: 2 of 4, 0:00" in capsys.readouterr().err
+
+
 def test_the_clock_moves_while_nothing_is_finished(monkeypatch):
     monkeypatch.setattr(progress.Progress, "interval", 0.02)
     with terminal_as_stderr(monkeypatch) as shown, show_progress(shown=True) as moving:

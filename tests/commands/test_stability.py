@@ -13,7 +13,7 @@ from tiltsim.cli import main
 from tiltsim.commands.stability import parse_sweep
 from tiltsim.linear.attraction import Attraction
 from tiltsim.linear.sweeping import sweep_stability
-from tiltsim.views.figures.attraction import attraction_figure
+from tiltsim.views.figures.attraction import attraction_figure, attraction_panels
 from tiltsim.views.figures.stability import loop_figure, stability_figure, sweep_figure
 
 SETPOINT = "ch04_tracking/setpoint#rho_065_modified"
@@ -102,6 +102,18 @@ def test_wrong_ranges_of_a_map_are_refused(capsys):
     assert "write LOW:HIGH,LOW:HIGH" in capsys.readouterr().err
 
 
+def test_a_map_of_short_flights_warns_in_one_line(capsys):
+    keys = [*THESIS, "--set", "simulation.duration=0.05"]
+    grid = ["--ranges=-0.1:0.1,-0.1:0.1", "--coarse=1", "--refine=0", "--quiet"]
+    assert main(["attraction", SETPOINT, *keys, *grid, "--json"]) == 0
+    printed = capsys.readouterr()
+    (line,) = printed.err.splitlines()
+    assert line.startswith(f"tiltsim: {SETPOINT}: simulation.duration = 0.05 s is short: the slow")
+    report = json.loads(printed.out)
+    assert (report["flights"], report["duration"], report["engine"]) == (4, 0.05, "python")
+    assert report["slowest_mode"]["name"] == "altitude"
+
+
 def test_figures_of_sweeps_loops_and_maps():
     """A line a scenario; the curve of singular attitudes where there is one."""
     scenario = tiltsim.load_scenario(SETPOINT, {"simulation.plant": "thesis"})
@@ -112,8 +124,12 @@ def test_figures_of_sweeps_loops_and_maps():
     gain, nyquist, *_ = loop_figure(tiltsim.linearize(scenario)).axes
     assert [len(axes.lines) for axes in (gain, nyquist)] == [5, 6]
     edges = np.linspace(-1.5, 1.5, 5)
-    share = np.eye(4)
-    found = Attraction(scenario, ("roll", "pitch"), (edges, edges), share, 25, np.ones((4, 4)))
+    back, all_of_them = np.arange(25).reshape(5, 5) < 10, np.ones((5, 5), dtype=bool)
+    found = Attraction(
+        scenario, ("roll", "pitch"), (edges, edges), back, 25, "jax", None, all_of_them
+    )
     (axes,) = attraction_figure(found).axes
-    assert axes.get_title(loc="left") == "25.0 % come back"
+    assert axes.get_title(loc="left") == "37.5 % come back"
     assert len(axes.lines) == 2  # the curve and the scenario
+    panels = attraction_panels({"one": found, "two": found}, columns=2).axes
+    assert [axes.get_title(loc="left") for axes in panels] == ["one\n37.5 % | -", "two\n37.5 % | -"]

@@ -2,38 +2,41 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import tiltsim
+from tests.laws.test_laws import LAWS
+from tiltsim.arrays.values import LiftError
+from tiltsim.flight.end import End
 from tiltsim.linear import attraction as module
+from tiltsim.linear import final_states, settling
 from tiltsim.linear.attraction import attraction
+from tiltsim.linear.final_states import FinalStates
+from tiltsim.linear.settling import SlowestMode, advice_on_duration, slowest_mode
+from tiltsim.scenario.loading import merge
 
 SETPOINT = "ch04_tracking/setpoint#rho_065_modified"
 SHORT = {"simulation.plant": "thesis", "simulation.duration": 1.0}
 
 
-class Result:
-    """A flight that comes back from within an ellipse."""
-
-    def __init__(self, scenario):
-        roll, pitch, _ = scenario.initial.attitude
-        back = (roll / 1.2) ** 2 + (pitch / 0.7) ** 2 < 1.0
-        self.end = type("End", (), {"kind": "completed" if back else "diverged", "time": 0.5})
-        self.metrics = dict.fromkeys((*module.ANGLES, *module.POSITION), 0.0)
-
-
 @pytest.fixture
 def flown(monkeypatch):
-    """Scenarios that were flown, on a plant that is an ellipse."""
+    """Scenarios that were flown, on a plant from which an ellipse comes back."""
     scenarios = []
 
-    def fly(these):
-        for scenario in these:
-            scenarios.append(scenario)
-            yield Result(scenario)
+    class Ellipse(FinalStates):
+        def fly(self, these):
+            for scenario in these:
+                scenarios.append(scenario)
+                roll, pitch, _ = scenario.initial.attitude
+                back = (roll / 1.2) ** 2 + (pitch / 0.7) ** 2 < 1.0
+                yield End("completed" if back else "diverged", 0.5), np.zeros(6)
 
-    monkeypatch.setattr(module, "fly", fly)
+    monkeypatch.setattr(module, "FinalStates", Ellipse)
+    monkeypatch.setattr(module, "slowest_mode", lambda scenario: None)
     return scenarios
 
 
@@ -49,17 +52,45 @@ def test_the_map_is_fine_at_the_boundary_only(flown):
     assert len({scenario.initial.attitude for scenario in flown[1:]}) == found.flights
 
 
+def test_a_finer_first_grid_and_the_flights_to_come(flown):
+    """The number to come is an estimate until the last division, when it is the number."""
+    heard = []
+    found = attraction(
+        SETPOINT, coarse=25, progress=lambda done, total: heard.append((done, total))
+    )
+    assert found.share.shape == (200, 200)
+    done, expected = np.array(heard).T
+    assert done.tolist() == list(range(1, found.flights + 1))
+    assert (done <= expected).all()
+    assert expected[-1] == found.flights
+    assert expected[0] == pytest.approx(found.flights, rel=0.3)
+
+
 def test_shares_are_of_acceptable_and_other_attitudes(flown):
     found = attraction(SETPOINT, refinements=1)
     report = found.report()
-    inside = found.acceptable.astype(bool)
-    assert report["acceptable"] == pytest.approx(inside.mean())
+    inside = found.acceptable
+    inner = np.s_[1:-1, 1:-1]
+    assert 0.0 < report["acceptable"] < inside[inner].mean()
+    assert report["returned"] == pytest.approx(found.share.mean())
     assert report["returned"] == pytest.approx(
         report["acceptable"] * report["acceptable_returned"]
         + (1.0 - report["acceptable"]) * report["unacceptable_returned"]
     )
     assert inside[12, 12]  # level
     assert not inside[0, 12]  # pitched down beyond the curve
+
+
+def test_a_corner_counts_as_what_it_is_itself():
+    """Cells across the curve are no reason for attitudes beyond it to count as returned."""
+    edges = np.linspace(-1.0, 1.0, 4)
+    side = np.outer(np.ones(4), [True, True, False, False]).astype(bool)
+    found = module.Attraction(None, ("roll", "pitch"), (edges, edges), side, 16, None, None, side)
+    assert found._areas.sum() == pytest.approx(1.0)
+    found = dataclasses.replace(found, scenario=tiltsim.load_scenario(SETPOINT))
+    report = found.report()
+    assert (report["acceptable_returned"], report["unacceptable_returned"]) == (1.0, 0.0)
+    assert report["acceptable"] == report["returned"] == pytest.approx(0.5)
 
 
 def test_other_axes_have_ranges_of_their_own(flown):
@@ -74,11 +105,96 @@ def test_other_axes_have_ranges_of_their_own(flown):
 def test_a_flight_comes_back_if_it_ends_as_the_undisturbed_one():
     """Two real corners of a small square: at rest to begin with, and too far to be back in 1 s."""
     scenario = tiltsim.load_scenario(SETPOINT, SHORT)
-    grid = module._Grid(
-        scenario, ("x", "y"), (np.array([0.0, 1.0]), np.array([0.0, 1.0])), lambda _count: None
-    )
-    grid.fly({(0, 0), (1, 1)})
+    square = np.array([0.0, 1.0])
+    grid = module._Grid(scenario, ("x", "y"), (square, square), lambda _count, _expected: None)
+    grid.fly({(0, 0), (1, 1)}, 1)
     assert grid.returned == {(0, 0): True, (1, 1): False}
+
+
+def quadrotor(**simulation):
+    simulation = {"plant": "thesis", "duration": 2.0, "timestep": 0.01, **simulation}
+    return tiltsim.parse_scenario(
+        merge(LAWS["quadrotor_attitude_altitude"], {"simulation": simulation})
+    )
+
+
+@pytest.mark.parametrize(
+    ("simulation", "flights", "installed", "engine"),
+    [
+        ({}, 100_000, True, "jax"),
+        ({}, 10, True, "auto"),  # compiling would take longer
+        ({}, 100_000, False, "auto"),
+        ({"engine": "native"}, 100_000, True, "native"),  # as the scenario asks
+        ({"plant": "mujoco"}, 100_000, True, "auto"),
+        ({"plant": "rigid_body"}, 100_000, True, "jax"),
+    ],
+)
+def test_many_flights_on_equations_fly_in_jax(simulation, flights, installed, engine, monkeypatch):
+    monkeypatch.setattr(final_states, "find_spec", lambda name: installed or None)
+    monkeypatch.setattr(final_states, "fly_each", lambda scenarios, *_: iter(scenarios))
+    states = FinalStates(quadrotor(**simulation), flights, "z")
+    (scenario,) = states.fly([quadrotor(**simulation)])
+    assert scenario.simulation.engine == engine
+
+
+def test_what_has_no_form_on_arrays_flies_without(monkeypatch):
+    def refuse(scenarios, *_):
+        if scenarios[0].simulation.engine == "jax":
+            raise LiftError("noise: whole numbers")
+        yield from scenarios
+
+    monkeypatch.setattr(final_states, "find_spec", lambda name: True)
+    monkeypatch.setattr(final_states, "fly_each", refuse)
+    (scenario,) = FinalStates(quadrotor(), 100_000, "z").fly([quadrotor()])
+    assert scenario.simulation.engine == "auto"
+
+
+@pytest.mark.slow
+def test_maps_of_both_engines_are_the_same():
+    pytest.importorskip("jax")
+    maps = [
+        attraction(
+            quadrotor(engine=engine), ranges=((-0.1, 1.1), (-1.1, 0.1)), coarse=3, refinements=1
+        )
+        for engine in ("python", "jax")
+    ]
+    assert [found.engine for found in maps] == ["python", "jax"]
+    assert 0.0 < maps[0].share.mean() < 1.0
+    np.testing.assert_array_equal(maps[0].share, maps[1].share)
+
+
+def test_the_slowest_mode_is_that_of_the_linear_analysis():
+    """Ch. 4's altitude loop decays most slowly; its law follows x and y as well."""
+    scenario = tiltsim.load_scenario(SETPOINT, SHORT)
+    slowest = slowest_mode(scenario)
+    assert slowest.name == "altitude"
+    poles = tiltsim.stability(scenario).poles
+    moving = poles.real[np.abs(poles) > 1e-6]
+    assert slowest.decay_rate == pytest.approx(-moving.max())
+
+
+def test_flights_without_an_analysis_have_no_slowest_mode(monkeypatch):
+    assert (
+        slowest_mode(tiltsim.load_scenario("ch04_tracking/circle#continuous_t2_modified")) is None
+    )
+    monkeypatch.setattr(settling, "MOST_STEPS", 10)
+    assert slowest_mode(tiltsim.load_scenario("ch04_tracking/line#continuous_t2_modified")) is None
+
+
+def test_a_duration_is_short_if_more_is_left_than_counts_as_back():
+    slowest = SlowestMode("altitude", 0.2)
+    assert advice_on_duration(slowest, 16.0, 0.05, 1.0) == ""  # exp(-3) < 0.05
+    advice = advice_on_duration(slowest, 8.0, 0.05, 1.0)
+    assert "duration = 8 s is short: the slowest mode, altitude, decays as exp(-0.2 t)" in advice
+    assert "leaves 25 % of a disturbance" in advice
+    assert advice.endswith("take 16 s")
+
+
+def test_a_short_duration_is_a_warning(flown, monkeypatch):
+    monkeypatch.setattr(module, "slowest_mode", lambda scenario: SlowestMode("altitude", 0.2))
+    with pytest.warns(RuntimeWarning, match=r"duration = 1 s is short: .* altitude, .* take 16 s"):
+        found = attraction(tiltsim.load_scenario(SETPOINT, SHORT), refinements=0)
+    assert found.report()["slowest_mode"] == {"name": "altitude", "decay_rate": 0.2}
 
 
 @pytest.mark.parametrize(
@@ -104,3 +220,9 @@ def test_tilt_cars_have_no_attitude():
 def test_refinements_are_a_small_whole_number(refinements):
     with pytest.raises(tiltsim.InputError, match=r"refinements = .*: must be 0 to 6"):
         attraction(SETPOINT, refinements=refinements)
+
+
+@pytest.mark.parametrize("coarse", [0, 126, "3", 1.5])
+def test_a_map_has_at_most_a_thousand_cells_across(coarse):
+    with pytest.raises(tiltsim.InputError, match=r"coarse = .*: must be 1 to 125, for 1000 cells"):
+        attraction(SETPOINT, coarse=coarse)

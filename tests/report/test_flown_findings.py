@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from functools import cache
 
+import numpy as np
 import pytest
 
 import tiltsim
+from tiltsim.laws.assembling import assemble
+from tiltsim.report.attraction_maps import attraction_map
+from tiltsim_controllers.analysis.singularity import determinant
 
 pytestmark = pytest.mark.slow  # more laws to compile than to fly
 
@@ -75,3 +79,19 @@ def test_a_rounded_blue_gait_hovers_undisturbed_and_is_lost_on_a_circle():
     circle = fly("ch07_robust_gaits/circle#gait_1_blue_rounded", duration=3.0)
     assert circle.end.kind != "completed"
     assert circle.end.time < 0.01
+
+
+def test_what_comes_back_was_acceptable_when_the_flight_began():
+    """Fixed gait, trot and red gait, from 81 attitudes each."""
+    names = ("ch. 4, fixed at 0.65", "ch. 4, trot to 0.65, T = 2 s", "ch. 6, gait 3, red")
+    fixed, trot, red = (attraction_map(name, coarse=8, refinements=0) for name in names)
+    for found in (fixed, trot):
+        across, up = np.meshgrid(*found.edges)
+        angles = assemble(found.scenario).gait.angles(0.0)
+        beyond = determinant(angles, across, up, found.scenario.vehicle.resolve()) < 0.0
+        assert beyond.any()
+        assert not found.returned[beyond].any()
+    assert 0.85 < fixed.report()["acceptable_returned"] < 0.98
+    assert 0.35 < trot.report()["unacceptable_returned"] < 0.65
+    assert red.acceptable.all()
+    assert red.share.mean() < 0.9

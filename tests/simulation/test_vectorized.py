@@ -12,8 +12,10 @@ from tests.laws.test_laws import LAWS
 from tiltsim.arrays.flying import double_precision
 from tiltsim.arrays.values import LiftError
 from tiltsim.errors import InputError
+from tiltsim.laws.assembling import loop_of
 from tiltsim.scenario.loading import merge
 from tiltsim.scenario.scenario import plan_flight
+from tiltsim.simulation.array_plan import ArrayPlan
 
 jax = pytest.importorskip("jax")
 
@@ -60,7 +62,23 @@ def test_a_parameter_may_vary_unless_its_plan_needs_it_as_a_number():
     }
     parameters = tiltsim.vectorized(tiltsim.parse_scenario({**tables, **THESIS})).parameters
     assert set(parameters["gait"]) == {"scale", "bias", "amplitude", "lean", "period"}
-    assert "positions" not in parameters["reference"]  # NumPy solves for their polynomials
+    assert set(parameters["reference"]) == {"roll", "pitch", "yaw", "positions"}  # but not times
+
+
+def test_knots_of_other_points_are_those_of_their_own_plan():
+    changes = {
+        "gait": {"rectangle": [[-0.3, -0.1], [0.1, 0.25]], "period": 3.0},
+        "reference": {"positions": [[0.1, 0.0, 0.0], [1.2, 0.3, -0.1], [2.0, 0.0, 1.0]]},
+    }
+    tables = {
+        "gait": {"type": "two_color", "rectangle": [[-0.2, 0.0], [0.1, 0.3]], "period": 4.0},
+        "reference": {"type": "waypoints", "positions": [[0, 0, 0]] * 3, "times": [0, 2, 5]},
+    }
+    scenario = tiltsim.parse_scenario({**tables, **THESIS})
+    plan = ArrayPlan(scenario, loop_of(scenario), "float64")
+    knots = jax.jit(lambda tree: plan(tree).knots)(changes)
+    expected = plan_flight(tiltsim.parse_scenario(merge({**tables, **THESIS}, changes)))
+    np.testing.assert_allclose(knots, expected.knots, rtol=0.0, atol=1e-13)
 
 
 def test_a_plan_that_cannot_be_lifted_hides_no_parameter(monkeypatch):

@@ -160,6 +160,22 @@ def test_a_bad_flight_becomes_a_row(tmp_path, monkeypatch):
         assert (row["max_abs_roll"] is None) == bad
 
 
+@pytest.mark.parametrize("chunk", [1, 16])
+def test_a_sweep_whose_flights_all_crash_stops_after_the_first_few(tmp_path, monkeypatch, chunk):
+    tried = []
+
+    def simulate(assembly):
+        tried.append(assembly)
+        raise TypeError("no such luck")
+
+    monkeypatch.setattr(batch, "simulate_assembly", simulate)
+    file = short_sweep(tmp_path / "sweep.toml", count=16, chunk_size=chunk)
+    with pytest.raises(InputError, match=r"flights, tried all over .* TypeError: no such luck$"):
+        run_sweep(load_sweep(file), tmp_path / "out")
+    assert len(tried) < 8
+    assert not parts_in(tmp_path / "out")
+
+
 def test_points_without_a_valid_scenario_become_rows(tmp_path):
     file = short_sweep(tmp_path / "sweep.toml", count=32)
     text = file.read_text().replace("0.1", "0.2").replace("mean = 0.0", "mean = 2.9")

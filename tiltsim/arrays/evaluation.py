@@ -102,6 +102,8 @@ class Frame(Expressions):
                 )
             case ast.Raise() if self.lifting.planning:
                 return {}
+            case ast.Expr(value=ast.Call()) if self.lifting.planning:  # appends to a list
+                self.value(node.value, variables)
             case ast.Break():
                 return {BREAK: (True, variables)}
             case ast.Continue():

@@ -203,8 +203,8 @@ class Expressions:
         if isinstance(op, ast.In | ast.NotIn):
             return (left in right) == isinstance(op, ast.In)
         if isinstance(left, tuple | list) and isinstance(right, tuple | list):
-            equal: Any = True
-            for a, b in zip(left, right, strict=True):
+            equal: Any = len(left) == len(right)
+            for a, b in zip(left, right):
                 equal = self.lifting.conjunction(equal, self.compared(ast.Eq(), a, b))
             return equal if isinstance(op, ast.Eq) else self.lifting.negation(equal)
         result = self.lifting.apply(COMPARISONS[type(op)], left, right)

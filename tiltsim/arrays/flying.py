@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, Final, NamedTuple
 
 from tiltsim.arrays.jax_arrays import JaxArrays, recomputes, require_jax
@@ -72,7 +72,7 @@ class Recording(NamedTuple):
     """Samples of a flight on arrays."""
 
     samples: Any  # (samples, fields), the first at time zero
-    alive: Any  # whether the flight had not ended at each sample but the first
+    alive: Any  # whether the flight had not ended at each sample
     last: Carried  # the state at the last sample before its end
 
 
@@ -179,21 +179,22 @@ class Kernel:
         return self._numpy.isfinite(sample).all() & kept & (code == WITHIN_LIMITS)
 
     def samples(self, carried: Carried) -> Any:
-        """Samples from a state to the end of the duration, shape (samples, fields)."""
-        first, (full, rest) = (
-            self.sample(carried),
-            divmod(self.course.steps, self.course.record_steps),
-        )
+        """Samples from a state to the end of the duration, shape (samples, fields).
 
-        def interval(now: Carried, _: None) -> tuple[Carried, Any]:
-            now = self.steps(now, self.course.record_steps)
-            return now, self.sample(now)
+        Its derivative in reverse mode keeps the states at the samples alone, and flies each
+        interval between two of them again.
+        """
+        jax, every = self._jax, self.course.record_steps
+        full, rest = divmod(self.course.steps, every)
 
-        carried, samples = self._jax.lax.scan(interval, carried, length=full)
-        parts = [first[None], samples]
-        if rest:
-            parts.append(self.sample(self.steps(carried, rest))[None])
-        return self._numpy.concatenate(parts)
+        @partial(jax.checkpoint, prevent_cse=False)  # which a scan does not need
+        def interval(now: Carried, _: None) -> tuple[Carried, Carried]:
+            return self.steps(now, every), now
+
+        last, before = jax.lax.scan(interval, carried, length=full)
+        ends = [last, self.steps(last, rest)] if rest else [last]
+        join = lambda *parts: self._numpy.concatenate([parts[0], self._numpy.stack(parts[1:])])
+        return jax.lax.map(self.sample, jax.tree.map(join, before, *ends))
 
     def record(self, state: Iterable[Any], reference: Any) -> Recording:
         """A whole flight, as if nothing ended it."""
@@ -211,7 +212,8 @@ class Kernel:
             return (now, alive, last), (sample, alive)
 
         full, rest = divmod(course.steps, course.record_steps)
-        progress = (start, self._numpy.isfinite(first).all(), start)
+        begins = self.goes_on(first, sides, reference)
+        progress = (start, begins, start)
         progress, (samples, alive) = jax.lax.scan(
             lambda p, _: interval(p, course.record_steps), progress, length=full
         )
@@ -219,7 +221,8 @@ class Kernel:
             progress, (sample, on) = interval(progress, rest)
             samples = self._numpy.concatenate((samples, sample[None]))
             alive = self._numpy.append(alive, on)
-        return Recording(self._numpy.concatenate((first[None], samples)), alive, progress[2])
+        samples = self._numpy.concatenate((first[None], samples))
+        return Recording(samples, self._numpy.append(begins, alive), progress[2])
 
     def approach(self, carried: Carried) -> Any:
         """Samples after each step of a recording interval, shape (steps, fields)."""

@@ -21,7 +21,7 @@ import numpy as np
 from tiltsim.arrays.evaluation import Frame
 from tiltsim.arrays.expressions import Borrowed
 from tiltsim.arrays.values import Arrays, Function, PlainNumberError, rebuilt
-from tiltsim_controllers.mathematics.scalar import scalar_functions
+from tiltsim_controllers.mathematics.scalar import Floats, scalar_functions
 
 
 class Lifting:
@@ -83,11 +83,26 @@ class Lifting:
         try:
             return function(*args, **keywords)
         except TypeError as error:
-            source = getattr(function, "__func__", function)
+            source = inspect.unwrap(getattr(function, "__func__", function))
+            if hasattr(source, "affine_in"):
+                return self.affine(source, inspect.signature(source).bind(*args, **keywords))
             if not isinstance(source, FunctionType):  # of NumPy, or one that caches its results
                 raise PlainNumberError(f"{source.__name__}: {error}") from error
             bound = [function.__self__] if isinstance(function, MethodType) else []
             return self.run(source, [*bound, *args], keywords)
+
+    def affine(self, function: Any, bound: inspect.BoundArguments) -> tuple[Any, ...]:
+        """What a function that `affine_in` marks returns, from its values at unit vectors."""
+        points = [[*point] for point in bound.arguments[function.affine_in]]
+        entries = [entry for point in points for entry in point]
+
+        def at(*values: float) -> Floats:
+            plain = np.reshape(values, (len(points), -1))
+            return np.array(function(**{**bound.arguments, function.affine_in: plain}))
+
+        offset = at(*np.zeros(len(entries)))
+        columns = [at(*unit) - offset for unit in np.eye(len(entries))]
+        return tuple(offset + self.arrays.vector(entries) @ np.array(columns))
 
     def attribute(self, record: Any, name: str) -> Any:
         """A field, or a property that may have to be lifted."""

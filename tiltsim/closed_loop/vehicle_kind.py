@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tiltsim.models.vehicle_parts import MAX_ROTORS
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
@@ -34,8 +34,9 @@ class VehicleKind:
         limit_exceeded: Scalar function ``(time, values, reference, knots, follows_position) ->
             code`` of the first limit of `tiltsim.closed_loop.limits` that a sample exceeds;
             ``values`` begin with the observed fields.
-        metrics: ``(columns, scenario, follows_position) -> metrics`` of a flight, without those of
-            all kinds.
+        metrics: ``(columns, scenario, follows_position) -> metrics``, without those of all kinds.
+            Columns have shape (..., N), the time (N,); numbers of the scenario may be arrays (...,
+            1); metrics have shape (...) and are NaN where a flight has none.
     """
 
     observed_fields: tuple[str, ...]
@@ -44,7 +45,7 @@ class VehicleKind:
     compile: Callable[[Scenario, int, tuple[ExtraActuators, ...], int, bool], mujoco.MjModel]
     initial_motion: Callable[[FlightPlan], tuple[Vector, Vector]]
     limit_exceeded: Callable[..., int]
-    metrics: Callable[[Mapping[str, Floats], Scenario, bool], dict[str, float | bool]]
+    metrics: Callable[[Mapping[str, Floats], Scenario, bool], dict[str, Any]]
 
     @property
     def rotors(self) -> tuple[int, ...]:

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import argparse
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.commands.angles import allow_negative_lists
 from tiltsim.commands.figure_options import add_plot, check_plot, save_figure
 from tiltsim.commands.options import Subparsers, add_json, add_overrides, add_quiet
-from tiltsim.commands.progress import show_progress
+from tiltsim.commands.progress import Progress, show_progress
 from tiltsim.commands.text import aligned, json_text, number, print_figure_path
 from tiltsim.errors import InputError
 
 if TYPE_CHECKING:
     from tiltsim.linear.attraction import Attraction
 
+DEFAULT_COARSE: Final = 12
 DEFAULT_REFINEMENTS: Final = 3
 
 
@@ -33,6 +37,8 @@ def add_parser(subparsers: Subparsers) -> None:
     add("--axes", default="roll,pitch", metavar="A,B", help=axes)
     ranges = "of each axis, SI units (default: 1.5 rad, 5 m, 5 m/s, 10 rad/s either way)"
     add("--ranges", metavar="LOW:HIGH,LOW:HIGH", help=ranges)
+    coarse = "cells across before cells at the boundary are divided (default: 12)"
+    add("--coarse", type=int, default=DEFAULT_COARSE, metavar="N", help=coarse)
     refine = "how often cells at the boundary are divided (default: 3, 96 cells across)"
     add("--refine", type=int, default=DEFAULT_REFINEMENTS, metavar="N", help=refine)
     add_overrides(parser, "the scenario", "simulation.duration=15")
@@ -55,14 +61,15 @@ def run(arguments: argparse.Namespace) -> int:
 
     first, _, second = arguments.axes.partition(",")
     ranges = _parse_ranges(arguments.ranges)
-    with show_progress(shown=not arguments.quiet) as progress:
-        progress.begin("flights")
+    with show_progress(shown=not arguments.quiet) as progress, _warnings_in_a_line(progress):
+        progress.begin("linear analysis")
         found = attraction(
             scenario,
             (first.strip(), second.strip()),
             ranges=ranges,
+            coarse=arguments.coarse,
             refinements=arguments.refine,
-            progress=progress.move,
+            progress=partial(progress.tell, "flights"),
         )
     if arguments.plot is not None:
         from tiltsim.views.figures.attraction import attraction_figure
@@ -71,6 +78,19 @@ def run(arguments: argparse.Namespace) -> int:
     print(json_text(found.report()) if arguments.json else _text(found))
     print_figure_path(arguments)
     return 0
+
+
+@contextmanager
+def _warnings_in_a_line(progress: Progress) -> Iterator[None]:
+    """Within the block Python's warnings are lines on standard error."""
+
+    def show(message: Warning | str, *_: Any, **__: Any) -> None:
+        progress.print(f"tiltsim: {message}", error=True)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", RuntimeWarning)
+        warnings.showwarning = show
+        yield
 
 
 def _parse_ranges(
@@ -93,7 +113,10 @@ def _text(found: Attraction) -> str:
         "acceptable_returned": "of these come back",
         "unacceptable_returned": "of the others come back",
     }
-    rows = [("flights", str(found.flights))]
+    rows = [("flights", str(found.flights)), ("engine", str(found.engine))]
+    if found.slowest is not None:
+        name, rate = found.slowest
+        rows.append(("slowest mode", f"{name}, exp(-{number(rate, '.3g')} t)"))
     rows += [
         (label, f"{number(100.0 * report[key], '.1f')} %")
         for key, label in labels.items()

@@ -69,10 +69,14 @@ class Progress:
     def move(self, done: float) -> None:
         """Tell how much of the stage is done."""
 
+    def expect(self, total: float) -> None:
+        """Tell how many there will be, where that becomes known during the stage."""
+
     def tell(self, stage: str, done: int, total: int) -> None:
         """Report how much of a stage is done; the first report begins the stage."""
         if stage != self._stage:
             self.begin(stage, total, done)
+        self.expect(total)
         self.move(done)
 
     def print(self, line: str, *, error: bool = False) -> None:
@@ -114,6 +118,10 @@ class _Bars(Progress):
 
         tqdm.write(printable(line), file=sys.stderr if error else sys.stdout)
 
+    def expect(self, total: float) -> None:
+        if self._bar is not None:
+            self._bar.total = total
+
     def tick(self) -> None:
         if self._bar is not None:
             self._bar.refresh()
@@ -139,6 +147,9 @@ class _Lines(Progress):
 
     def move(self, done: float) -> None:
         self._done = done
+
+    def expect(self, total: float) -> None:
+        self._total = total
 
     def tick(self) -> None:
         elapsed, done, total = monotonic() - self._start, self._done, self._total

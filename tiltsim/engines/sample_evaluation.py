@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache
+from itertools import pairwise
 from math import nan
 from typing import Any, Final
 
@@ -13,13 +14,18 @@ import numpy as np
 from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.system.interrupts import reraise_swallowed_interrupts
 from tiltsim.system.locks import one_thread_at_a_time
-from tiltsim_controllers.mathematics.records import record_dtype, record_size
+from tiltsim_controllers.mathematics.records import leaves, record_dtype, record_size, unflatten
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 
 MIN_ROWS_TO_COMPILE: Final = 20_000
 """Rows that one process evaluates in Python before it loads or compiles native code for them."""
 
 _evaluated: dict[Callable[..., Values], int] = {}
+
+
+def flights_in(time: Floats) -> int:
+    """How many flights, with the same times (s), follow one another in samples."""
+    return max(1, int(np.count_nonzero(time == time[:1])))
 
 
 def evaluate_over_samples(
@@ -32,22 +38,39 @@ def evaluate_over_samples(
         width: How many values it returns.
         time: Times of the samples (N,), s.
         states: The fields of the samples that the function reads, shape (N, fields).
-        setup: Parameters and knots.
+        setup: Parameters and knots; parameters may be arrays (N,), for samples of several flights.
 
     Returns:
         The values, shape (N, width), equal for Python and native code. Where an operation on floats
         has no result, as beside the state of a diverged flight, Python's whole row is NaN.
     """
     evaluated = _evaluated[function] = _evaluated.get(function, 0) + len(time)
-    if evaluated >= MIN_ROWS_TO_COMPILE and len(time):
-        with reraise_swallowed_interrupts():
-            return _evaluate_natively(function, time, states, setup)
-    parameters, knots = setup.parameters, setup.knots
+    natively = evaluated >= MIN_ROWS_TO_COMPILE
     rows = np.full((len(time), width), nan)
-    for row, t, state in zip(rows, time.tolist(), states.tolist()):
-        with suppress(ArithmeticError, ValueError):
-            row[:] = function(t, state, parameters, knots)
+    for part, own in _flights(setup, len(time)):
+        if natively:
+            with reraise_swallowed_interrupts():
+                rows[part] = _evaluate_natively(function, time[part], states[part], own)
+            continue
+        for row, t, state in zip(rows[part], time[part].tolist(), states[part].tolist()):
+            with suppress(ArithmeticError, ValueError):
+                row[:] = function(t, state, own.parameters, own.knots)
     return rows
+
+
+def _flights(setup: ControlSetup, samples: int) -> Iterator[tuple[slice, ControlSetup]]:
+    """Runs of samples with equal parameters, and these as floats."""
+    values = [*leaves(setup.parameters)]
+    if not any(isinstance(value, np.ndarray) for value in values):
+        if samples:
+            yield slice(samples), setup
+        return
+    table = np.stack([np.broadcast_to(value, samples) for value in values], axis=-1).astype(float)
+    bits = table.view(np.int64)  # as NaN differs from itself
+    starts = 1 + np.flatnonzero((bits[1:] != bits[:-1]).any(axis=-1))
+    for first, end in pairwise([0, *starts.tolist(), samples]):
+        parameters = unflatten(type(setup.parameters), table[first].tolist())
+        yield slice(first, end), ControlSetup(parameters, setup.knots)
 
 
 def _evaluate_natively(

@@ -29,7 +29,7 @@ from tiltsim.system.text import html_table, short_repr, shortened, valid_unicode
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     import pyarrow
 
@@ -59,6 +59,7 @@ class Flight:
     end: End
     engine: EngineName
     wall_time: float  # s, integration alone
+    shared_metrics: Callable[[], Metrics | None] = lambda: None  # computed with other flights'
 
     def __post_init__(self) -> None:
         self.samples.setflags(write=False)  # derived columns are cached
@@ -139,6 +140,9 @@ class Flight:
 
     @cached_property
     def _metrics(self) -> Metrics:
+        known = self.shared_metrics()
+        if known is not None:
+            return known
         with _overflow_ignored():
             return compute_metrics(self.columns, self.assembly, self.end, self.wall_time)
 

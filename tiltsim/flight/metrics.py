@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isfinite
-from typing import NoReturn
+from typing import Any, NoReturn
+
+import numpy as np
+from pydantic import BaseModel
 
 from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.errors import InputError
 from tiltsim.flight.end import End
 from tiltsim.scenario.messages import did_you_mean
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.system.text import short_repr
+from tiltsim_controllers.mathematics.records import flatten, unflatten
 from tiltsim_controllers.mathematics.scalar import Floats
 
 
@@ -42,10 +47,81 @@ def compute_metrics(
         end: How it ended.
         wall_time: Duration of the integration, s.
     """
-    duration = float(columns["time"][-1])
-    metrics = assembly.loop.kind.metrics(columns, assembly.scenario, assembly.follows_position) | {
+    values = assembly.loop.kind.metrics(columns, assembly.scenario, assembly.follows_position)
+    own = {name: float(value) for name, value in values.items()}
+    return _metrics(own, float(columns["time"][-1]), end, wall_time)
+
+
+def _metrics(own: dict[str, float], duration: float, end: End, wall_time: float) -> Metrics:
+    """Metrics of a kind of vehicle with those of all kinds, without those that have no value."""
+    metrics: dict[str, float | bool] = own | {
         "diverged": end.kind in {"diverged", "singular", "failed"},
         "duration": duration,
         "realtime_factor": duration / max(wall_time, 1e-9),
     }
     return Metrics({name: value for name, value in metrics.items() if isfinite(value)})
+
+
+def metrics_of_rows(
+    assemblies: Sequence[Assembly], samples: Floats, end: End, wall_time: float
+) -> list[Metrics] | None:
+    """`compute_metrics` of flights of one closed loop, computed together.
+
+    Args:
+        assemblies: Those of the flights, with the same knots.
+        samples: Of shape (rows, N, fields), at the same times.
+        end: How they ended.
+        wall_time: Of the integration of one, s.
+
+    Returns:
+        None if scenarios differ in more than numbers that metrics read.
+    """
+    first, (rows, count, _) = assemblies[0], samples.shape
+    loop, time = first.loop, samples[0, :, 0]
+    try:
+        read = {
+            name: _together([getattr(assembly.scenario, name) for assembly in assemblies])
+            for name in ("vehicle", "reference")
+        }
+    except _DifferentError:
+        return None
+    scenario = first.scenario.model_copy(update=read)
+    numbers = np.array([[*flatten(assembly.setup.parameters)] for assembly in assemblies])
+    same = (numbers.view(np.int64) == numbers[:1].view(np.int64)).all(axis=0)
+    values: list[Any] = [
+        value if common else np.repeat(column, count)
+        for value, common, column in zip(numbers[0].tolist(), same, numbers.T)
+    ]
+    setup = ControlSetup(unflatten(loop.parameters, values), first.setup.knots)
+    fields = np.ascontiguousarray(np.moveaxis(samples, -1, 0)).reshape(-1, rows * count)
+    known = dict(zip(loop.sample_fields, fields, strict=True))
+    known |= loop.columns.derive(known, setup)
+    columns = {name: np.reshape(column, (rows, count)) for name, column in known.items()}
+    metrics = loop.kind.metrics(columns | {"time": time}, scenario, first.follows_position)
+    table = np.stack([*metrics.values()], axis=-1).tolist()
+    return [
+        _metrics(dict(zip(metrics, row, strict=True)), float(time[-1]), end, wall_time)
+        for row in table
+    ]
+
+
+class _DifferentError(Exception):
+    """Tables differ in more than numbers."""
+
+
+def _together(tables: Sequence[Any]) -> Any:
+    """Tables as one whose numbers, where they differ, are arrays (rows, 1)."""
+    first = tables[0]
+    if all(table is first or table == first for table in tables):
+        return first
+    if len({*map(type, tables)}) > 1:
+        raise _DifferentError
+    if isinstance(first, BaseModel):
+        keys = type(first).model_fields
+        values = {key: _together([getattr(table, key) for table in tables]) for key in keys}
+        return first.model_copy(update=values)
+    if isinstance(first, tuple) and len({*map(len, tables)}) == 1:
+        return tuple(map(_together, zip(*tables)))
+    if isinstance(first, float):
+        return np.array(tables)[:, np.newaxis]
+    raise _DifferentError

@@ -22,6 +22,7 @@ from tiltsim.closed_loop.loop import (
     Sampling,
     Sizes,
 )
+from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.equations.quadrotor import equations_of_motion, initial_state, rigid_body
 from tiltsim.laws.tiltrotor import REFERENCE_COLUMNS, TILT_REFERENCE_COLUMNS
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
@@ -196,6 +197,15 @@ def _hover_thrust(plan: FlightPlan) -> tuple[float, float]:
     return vehicle.mass * vehicle.gravity, 0.0
 
 
+@scalar
+def _reference_position(
+    time: float, state: Vector, reference: ReferenceParameters, knots: Vector
+) -> Triple:
+    """The position (m) to track."""
+    x, y, z, _, _, _, _, _, _ = position_reference(time, reference, knots)
+    return x, y, z
+
+
 def references(
     samples: Mapping[str, Floats],
     reference: ReferenceParameters,
@@ -210,8 +220,8 @@ def references(
         attitude: Columns of roll, pitch and yaw (rad): arrays or constants.
     """
     time = samples["time"]
-    position = np.array([position_reference(t, reference, knots)[:3] for t in time.tolist()])
-    columns = [*position.reshape(len(time), 3).T]
+    states, setup = np.empty((len(time), 0)), ControlSetup(reference, tuple(knots))
+    columns = [*evaluate_over_samples(_reference_position, 3, time, states, setup).T]
     columns += [np.broadcast_to(np.asarray(angle, dtype=float), time.shape) for angle in attitude]
     tilts = dict.fromkeys(TILT_REFERENCE_COLUMNS, np.zeros_like(time))
     return dict(zip(REFERENCE_COLUMNS, columns, strict=True)) | tilts

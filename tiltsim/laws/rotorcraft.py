@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from tiltsim.engines.sample_evaluation import flights_in
 from tiltsim.vehicles.rotorcraft.layout import Layout
 from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.torque_free import (
@@ -100,7 +101,7 @@ def torque_free_columns(
     angles = np.reshape([samples[name] for name in names], (len(names), len(samples["time"]))).T
     pushing, up = force_and_torque(table, angles), world_up(samples["roll"], samples["pitch"])
     forces = torque_free_forces(*pushing)
-    columns = {"singularity_margin": margin_over_flight(forces, up)}
+    columns = {"singularity_margin": margin_over_flight(forces, up, flights_in(samples["time"]))}
     if dimension is not None:
         axes = controlled_axes(forces, up, dimension)
         columns[CONDITION] = decoupling_condition(*pushing, axes)

@@ -19,6 +19,7 @@ from tiltsim.laws.multirotor import layout_of_vehicle
 from tiltsim.laws.scalar_loop import scalar_loop
 from tiltsim.laws.scalar_parameters import Key
 from tiltsim.scenario.controller import ScalarFunctionController
+from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.own_code import describe, load_scalar_function
 from tiltsim.scenario.scalar_controller import ScalarController
 from tiltsim.scenario.scenario import plan_flight
@@ -101,12 +102,16 @@ def loop_of_scalar_law(scenario: Scenario) -> ClosedLoop:
     else:
         law = controller.scalar_law(airframe)
         checksum = foreign_code(law)
+    try:
+        parameters = controller.law_parameters(airframe)
+    except InvalidValueError as error:  # found only with the vehicle and its gait at hand
+        raise InputError(f"{scenario.address or 'scenario'}: {error}") from error
     key = Key(
         scenario.vehicle.model,
         layout_of_vehicle(airframe.vehicle),
         _with_checksum(law, checksum),
         f"{controller.law}{checksum}",
-        type(controller.law_parameters(airframe)),
+        type(parameters),
         tuple(controller.state_units(airframe).items()),
         controller.commands_tilts,
         scenario.simulation.latency_steps > 0,

@@ -101,6 +101,7 @@ def _inputs_of(key: Key) -> Callable[..., Values]:
         "tilt_rates_for", "gain, angles, commanded", "gain * (angles# - commanded#)", tilts
     )
     per_newton, coefficients = ROTOR_FLOATS * rotors, 2 * ROTOR_FLOATS * rotors
+    own_table = coefficients + rotors
 
     @scalar
     def inputs(
@@ -148,6 +149,7 @@ def _inputs_of(key: Key) -> Callable[..., Values]:
             (tx, ty, tz),
             knots,
             at + per_newton,
+            at + own_table,
         )
         thrusts, angles, rates = law(observed, parameters.own)
         reached = modelled_in(states) if models_rotors else turning
@@ -332,7 +334,8 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
         *table_per_newton(vehicle.table, vehicle.thrust_coefficients),
     )
     return ControlSetup(
-        record_of(type(own))(signature, lead, known, own), (*knots, *vehicle.thrust_coefficients)
+        record_of(type(own))(signature, lead, known, own),
+        (*knots, *vehicle.thrust_coefficients, *controller.law_table(airframe)),
     )
 
 

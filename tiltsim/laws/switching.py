@@ -10,6 +10,7 @@ import numpy as np
 
 import tiltsim_controllers.laws.yaw_position as yaw_position
 from tiltsim.closed_loop.loop import Columns, ControlSetup, Monitoring
+from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.equations.quadrotor import rigid_body
 from tiltsim.laws.quadrotor import (
     EXTENSION_COLUMNS,
@@ -70,11 +71,18 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
     return ControlSetup(LoopParameters(signature, vehicle, law), plan.knots)
 
 
+@scalar
+def _inside(time: float, attitude: Vector, zone: Zone, knots: Vector) -> tuple[float]:
+    """1 where the attitude-altitude controller is active, else 0."""
+    return (1.0 if in_attitude_zone(attitude[0], attitude[1], zone) else 0.0,)
+
+
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     law = setup.parameters.law
     reference = law.yaw_position.reference
-    attitudes = zip(samples["roll"].tolist(), samples["pitch"].tolist(), strict=True)
-    inside = np.array([in_attitude_zone(*attitude, law.zone) for attitude in attitudes], float)
+    attitude = np.stack([samples["roll"], samples["pitch"]], axis=-1)
+    zone = ControlSetup(law.zone)
+    (inside,) = evaluate_over_samples(_inside, 1, samples["time"], attitude, zone).T
     # Outside the zone roll and pitch are not outputs: they follow from the position.
     roll = np.where(inside > 0.0, reference.roll, samples["roll"])
     pitch = np.where(inside > 0.0, reference.pitch, samples["pitch"])

@@ -17,6 +17,7 @@ from tiltsim.closed_loop.loop import (
     Sampling,
     Sizes,
 )
+from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.laws.tiltrotor import servo_lead
 from tiltsim.vehicles.tilt_car import SPEED_1, SPEED_2, TILT_CAR, initial_tilt
 from tiltsim_controllers.mathematics.scalar import Floats, Pair, Values, Vector, scalar
@@ -56,11 +57,18 @@ def speed_squares(act: Vector) -> Pair:
     return speed_1 * speed_1, speed_2 * speed_2
 
 
+@scalar
+def _reference_values(
+    time: float, state: Vector, reference: ReferenceParameters, knots: Vector
+) -> Values:
+    """`reference_derivatives`; the references of the tilt-car have no knots."""
+    return reference_derivatives(time, reference)
+
+
 def reference_columns(samples: Mapping[str, Floats], reference: ReferenceParameters) -> Floats:
     """The reference and its derivatives at the samples' times, shape (15, N)."""
-    time = samples["time"]
-    rows = [reference_derivatives(t, reference) for t in time.tolist()]
-    return np.array(rows).reshape(len(time), 15).T
+    time, setup = samples["time"], ControlSetup(reference)
+    return evaluate_over_samples(_reference_values, 15, time, np.empty((len(time), 0)), setup).T
 
 
 def derived_columns(

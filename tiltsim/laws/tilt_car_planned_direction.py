@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import nan, sqrt
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from tiltsim.closed_loop.loop import (
     Sampling,
     Sizes,
 )
+from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.equations.tilt_car import equations_of_motion, yaw_of
 from tiltsim.laws.tilt_car import (
     CarState,
@@ -26,6 +27,7 @@ from tiltsim.laws.tilt_car import (
     initial_motion,
     reference_columns,
 )
+from tiltsim.laws.tiltrotor import four
 from tiltsim.scenario.tilt_car_controllers import PlannedDirectionController
 from tiltsim.vehicles.tilt_car import ROTORS, TILT_CAR
 from tiltsim_controllers.gaits.parameters import GaitParameters
@@ -137,26 +139,31 @@ def _observe_planned_direction_equations(
     return x, y, vx, vy, yaw, r, alpha, tilt_rate, speed_1, speed_2
 
 
+@scalar
+def _demanded(time: float, state: Vector, parameters: LoopParameters, knots: Vector) -> Values:
+    """Acceleration (m/s^2), squares of the rotor speeds (rad^2/s^2) and tilt (rad)."""
+    seen = four(state, 0) + four(state, 4)
+    ax, ay = demanded_acceleration(time, seen, parameters.law)
+    square_1, square_2 = demanded_squared_speeds(time, seen, parameters.law)
+    return ax, ay, square_1, square_2, tilt_reference(time, parameters.gait, knots)[0]
+
+
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-    parameters, knots = setup
-    law = parameters.law
-    time = samples["time"].tolist()
+    law = setup.parameters.law
     names = ("x", "y", "vx", "vy", "yaw", "alpha", "rotor_speed_1", "rotor_speed_2")
-    states = np.stack([samples[name] for name in names], axis=-1).tolist()
-    demanded = [demanded_acceleration(*row, law) for row in zip(time, states, strict=True)]
-    squares = [demanded_squared_speeds(*row, law) for row in zip(time, states, strict=True)]
-    tilts = [tilt_reference(t, parameters.gait, knots)[0] for t in time]
+    states = np.stack([samples[name] for name in names], axis=-1)
+    demanded = evaluate_over_samples(_demanded, 5, samples["time"], states, setup).T
     reference = reference_columns(samples, law.reference)
-    ax, ay = np.array(demanded).reshape(len(time), 2).T
-    columns = derived_columns(samples, reference, (ax, ay), law.car) | {
-        "alpha_ref": np.array(tilts)
-    }
-    for rotor, values in zip(ROTORS, np.array(squares).reshape(len(time), 2).T, strict=True):
+    acceleration = demanded[0], demanded[1]
+    columns = derived_columns(samples, reference, acceleration, law.car)
+    columns["alpha_ref"] = demanded[4]
+    for rotor, values in zip(ROTORS, demanded[2:4], strict=True):
         columns[f"wanted_square_{rotor}"] = values
         columns[f"switch_{rotor}"] = (values > 0.0).astype(float)
-    error_y = columns["y_ref"] - samples["y"]
-    error_rate_y = columns["vy_ref"] - samples["vy"]
-    return columns | {"lyapunov": lyapunov_candidate(error_y, error_rate_y, law.gains)}
+    error_y: Any = columns["y_ref"] - samples["y"]
+    error_rate_y: Any = columns["vy_ref"] - samples["vy"]
+    lyapunov: Any = lyapunov_candidate(error_y, error_rate_y, law.gains)
+    return columns | {"lyapunov": lyapunov}
 
 
 PLANNED_DIRECTION: Final = ClosedLoop(

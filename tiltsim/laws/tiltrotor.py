@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Sizes
-from tiltsim.engines.sample_evaluation import evaluate_over_samples
+from tiltsim.engines.sample_evaluation import evaluate_over_samples, flights_in
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.laws.rotorcraft import held_controls_of, thrust_controls_of
 from tiltsim.vehicles.rotorcraft.layout import TILT_RATE_1
@@ -190,7 +190,9 @@ def singularity_columns(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict
     tilts = np.stack([samples[name] for name in TILT_FIELDS], axis=-1)
     attitude = samples["roll"], samples["pitch"]
     return {
-        "singularity_margin": margin_over_gait(tilts, vehicle, *attitude),
+        "singularity_margin": margin_over_gait(
+            tilts, vehicle, *attitude, flights=flights_in(samples["time"])
+        ),
         "determinant": determinant(tilts, *attitude, vehicle),
     }
 

@@ -7,14 +7,17 @@ from dataclasses import dataclass
 from math import pi
 from os import PathLike
 from typing import Any, Final
+from warnings import warn
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
+from tiltsim.linear.final_states import FinalStates
+from tiltsim.linear.settling import SlowestMode, advice_on_duration, slowest_mode
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.simulation.batch import FlightResult, fly
 from tiltsim_controllers.analysis.singularity import determinant
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import Vehicle
@@ -30,13 +33,10 @@ PLACES: Final = {
 SPANS: Final = {"position": 5.0, "velocity": 5.0, "attitude": 1.5, "angular_velocity": 10.0}
 """Default half-widths of the map, SI units."""
 
-ANGLES: Final = ("final_roll", "final_pitch", "final_yaw")
-POSITION: Final = tuple(f"final_position_error_{axis}" for axis in "zxy")
-"""Metrics in which a flight that came back is as the undisturbed one; x and y where it follows the
-reference's."""
-
 NEAR: Final = 0.05  # m and rad
+MEAN: Final = 1.0  # s, at the end of a flight, over which the mean is taken
 COARSE: Final = 12  # cells across, before they are divided
+MOST_CELLS: Final = 1_000
 INSTANTS: Final = 24  # of a moving gait
 
 
@@ -48,20 +48,40 @@ class Attraction:
         scenario: The scenario.
         axes: Names of the two initial quantities.
         edges: Of the cells along each axis, shape (cells + 1,) each.
-        share: Of the corners of each cell that come back, shape (cells, cells): by the second, then
-            by the first axis.
-        flights: How many were flown.
-        acceptable: Whether the attitude at the centre of each cell is on the side of level attitude
-            of the gait's singular attitudes, at all times; None unless the axes are roll and pitch
-            of a tiltrotor.
+        returned: Whether flights from the corners of the cells come back, shape (cells + 1,
+            cells + 1): by the second, then by the first axis. Those that were not flown lie in
+            cells whose corners agree.
+        flights: How many were flown, but for the undisturbed one.
+        engine: Which flew them.
+        slowest: The slowest mode of the linear analysis, if there is one.
+        acceptable: Whether the attitudes at the corners are on the side of level attitude of the
+            gait's singular attitudes, at all times; None unless the axes are roll and pitch of a
+            tiltrotor.
     """
 
     scenario: Scenario
     axes: tuple[str, str]
     edges: tuple[Floats, Floats]
-    share: Floats
+    returned: NDArray[np.bool_]
     flights: int
-    acceptable: Floats | None
+    engine: str | None
+    slowest: SlowestMode | None
+    acceptable: NDArray[np.bool_] | None
+
+    @property
+    def share(self) -> Floats:
+        """Of the corners of each cell that come back, shape (cells, cells)."""
+        back = self.returned.astype(float)
+        share: Floats = 0.25 * (back[1:, 1:] + back[:-1, 1:] + back[1:, :-1] + back[:-1, :-1])
+        return share
+
+    @property
+    def _areas(self) -> Floats:
+        """What the corners stand for of the map's area."""
+        sides = np.ones(len(self.returned))
+        sides[[0, -1]] = 0.5
+        areas: Floats = np.outer(sides, sides) / (len(sides) - 1) ** 2
+        return areas
 
     def report(self) -> dict[str, Any]:
         """As JSON: shares of the map's area."""
@@ -69,7 +89,10 @@ class Attraction:
             "scenario": self.scenario.address,
             "axes": list(self.axes),
             "ranges": [[float(edges[0]), float(edges[-1])] for edges in self.edges],
+            "duration": self.scenario.simulation.duration,
+            "slowest_mode": self.slowest and self.slowest._asdict(),
             "flights": self.flights,
+            "engine": self.engine,
             "returned": float(self.share.mean()),
             "acceptable": None,
             "acceptable_returned": None,
@@ -77,11 +100,12 @@ class Attraction:
         }
         if self.acceptable is None:
             return report
-        inside = self.acceptable.astype(bool)
-        report["acceptable"] = float(inside.mean())
-        for name, these in (("acceptable", inside), ("unacceptable", ~inside)):
+        areas = self._areas
+        report["acceptable"] = float(areas[self.acceptable].sum())
+        for name, these in (("acceptable", self.acceptable), ("unacceptable", ~self.acceptable)):
             if these.any():
-                report[f"{name}_returned"] = float(self.share[these].mean())
+                back = areas[these & self.returned].sum()
+                report[f"{name}_returned"] = float(back / areas[these].sum())
         return report
 
 
@@ -90,53 +114,77 @@ def attraction(
     axes: tuple[str, str] = ("roll", "pitch"),
     *,
     ranges: tuple[tuple[float, float] | None, tuple[float, float] | None] = (None, None),
+    coarse: int = COARSE,
     refinements: int = 3,
-    progress: Callable[[int], None] = lambda _flights: None,
+    progress: Callable[[int, int], None] = lambda _flights, _expected: None,
 ) -> Attraction:
     """Which initial states come back to a flight.
 
     Flights start on a grid; cells whose corners differ are divided into four, and so on. A flight
     comes back if it completes its duration and in its last second has attitude and position of the
-    undisturbed flight, to 0.05 rad and m: the height, and x and y if its law follows them.
+    undisturbed flight, to 0.05 rad and m: the height, and x and y if its law follows them. A
+    duration in which the slowest mode leaves more of a disturbance is a RuntimeWarning.
 
     Args:
         scenario: Anything that `tiltsim.load_scenario` takes, of a rotorcraft.
         axes: Two of x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r.
         ranges: Of each axis, SI units; default: 1.5 rad, 5 m, 5 m/s and 10 rad/s either way.
+        coarse: Cells across, before they are divided.
         refinements: How often cells at the boundary are divided.
-        progress: Called with the number of flights so far.
+        progress: Called with the number of flights so far, and with how many there will be, an
+            estimate until the last division.
 
     Raises:
         InputError: If an argument is invalid, or the undisturbed flight is lost.
     """
     scenario = load_scenario(scenario)
-    _check(scenario, axes, refinements)
-    cells = COARSE * 2**refinements
+    _check(scenario, axes, coarse, refinements)
+    slowest = slowest_mode(scenario)
+    if slowest is not None:
+        advice = advice_on_duration(slowest, scenario.simulation.duration, NEAR, MEAN)
+        if advice:
+            warn(f"{scenario.address or 'scenario'}: {advice}", RuntimeWarning, stacklevel=2)
+    size = 2**refinements
+    cells = coarse * size
     edges = tuple(_edges(*pair, cells) for pair in zip(axes, ranges, strict=True))
     grid = _Grid(scenario, axes, (edges[0], edges[1]), progress)
-    size = 2**refinements
     leaves = [(i, j, size) for i in range(0, cells, size) for j in range(0, cells, size)]
-    share = np.zeros((cells, cells))
+    returned = np.zeros((cells + 1, cells + 1), dtype=bool)
     while leaves:
-        grid.fly({corner for cell in leaves for corner in _corners(*cell)})
+        grid.fly({corner for cell in leaves for corner in _corners(*cell)}, leaves[0][2])
         divided = []
         for i, j, width in leaves:
-            back = [grid.returned[corner] for corner in _corners(i, j, width)]
-            share[j : j + width, i : i + width] = sum(back) / 4.0
-            if width > 1 and len(set(back)) > 1:
+            agree = {grid.returned[corner] for corner in _corners(i, j, width)}
+            returned[j : j + width + 1, i : i + width + 1] = all(agree)
+            if width > 1 and len(agree) > 1:
                 half = width // 2
                 divided += [(a, b, half) for a in (i, i + half) for b in (j, j + half)]
         leaves = divided
-    acceptable = _acceptable(scenario, edges[0], edges[1]) if axes == ("roll", "pitch") else None
-    return Attraction(scenario, axes, (edges[0], edges[1]), share, len(grid.returned), acceptable)
+    for (i, j), back in grid.returned.items():
+        returned[j, i] = back
+    return Attraction(
+        scenario,
+        axes,
+        (edges[0], edges[1]),
+        returned,
+        len(grid.returned),
+        grid.engine,
+        slowest,
+        _acceptable(scenario, *edges) if axes == ("roll", "pitch") else None,
+    )
 
 
-def _check(scenario: Scenario, axes: tuple[str, str], refinements: int) -> None:
+def _check(scenario: Scenario, axes: tuple[str, str], coarse: int, refinements: int) -> None:
     """Refuse what has no such map."""
     if len(axes) != 2 or axes[0] == axes[1] or not set(axes) <= set(PLACES):
         raise InputError(f"axes = {','.join(axes)}: choose two of {', '.join(PLACES)}")
     if not (isinstance(refinements, int) and 0 <= refinements <= 6):
         raise InputError(f"refinements = {refinements!r}: must be 0 to 6")
+    most = MOST_CELLS // 2**refinements
+    if not (isinstance(coarse, int) and 1 <= coarse <= most):
+        raise InputError(
+            f"coarse = {coarse!r}: must be 1 to {most}, for {MOST_CELLS} cells across at most"
+        )
     if scenario.vehicle.model == "tilt_car":
         raise InputError(f"{scenario.address}: vehicle.model: attraction takes rotorcraft only")
 
@@ -154,6 +202,11 @@ def _corners(i: int, j: int, width: int) -> tuple[tuple[int, int], ...]:
     return (i, j), (i + width, j), (i, j + width), (i + width, j + width)
 
 
+def _expected(following: int, width: int) -> int:
+    """How many flights come after a level whose cells have a width, a boundary being a line."""
+    return following * (width - 1)  # each level has twice as many as the one before
+
+
 class _Grid:
     """Flights from points of a grid, each flown once."""
 
@@ -162,28 +215,44 @@ class _Grid:
         scenario: Scenario,
         axes: tuple[str, str],
         edges: tuple[Floats, Floats],
-        progress: Callable[[int], None],
+        progress: Callable[[int, int], None],
     ) -> None:
         self._scenario, self._axes, self._edges = scenario, axes, edges
         self._progress = progress
+        self._across = len(edges[0]) - 1
         self.returned: dict[tuple[int, int], bool] = {}
-        (undisturbed,) = fly([scenario])
-        if undisturbed.end.kind != "completed":
-            raise InputError(
-                f"{scenario.address or 'scenario'}: the undisturbed flight itself is lost after "
-                f"{undisturbed.end.time:g} s"
-            )
         follows = assemble(scenario).follows_position
-        self._compared = (*ANGLES, *(POSITION if follows else POSITION[:1]))
-        self._goal = self._final(undisturbed)
+        self._states = FinalStates(scenario, 8 * self._across, "xyz" if follows else "z")
+        self._goal: Floats | None = None
 
-    def fly(self, points: set[tuple[int, int]]) -> None:
-        """Fly from those points that are new."""
+    @property
+    def engine(self) -> str | None:
+        """Which flew the last flight."""
+        return self._states.engine
+
+    def fly(self, points: set[tuple[int, int]], width: int) -> None:
+        """Fly from those points that are new.
+
+        Args:
+            points: Indices of edges.
+            width: Of the cells whose corners they are; all but the first are at the boundary.
+        """
         new = sorted(points - self.returned.keys())
-        flown = fly(self._from(*point) for point in new)
-        for point, result in zip(new, flown, strict=True):
-            self.returned[point] = self._comes_back(result)
-            self._progress(len(self.returned))
+        undisturbed = [self._scenario] if self._goal is None else []
+        following = 8 * (self._across // width) if undisturbed else 2 * len(new)
+        expected = len(self.returned) + len(new) + _expected(following, width)
+        flown = self._states.fly([*undisturbed, *(self._from(*point) for point in new)])
+        if undisturbed:
+            end, self._goal = next(flown)
+            if end.kind != "completed":
+                raise InputError(
+                    f"{self._scenario.address or 'scenario'}: the undisturbed flight itself is "
+                    f"lost after {end.time:g} s"
+                )
+        assert self._goal is not None  # of the first call
+        for point, (end, state) in zip(new, flown, strict=True):
+            self.returned[point] = end.kind == "completed" and _is_near(state - self._goal)
+            self._progress(len(self.returned), expected)
 
     def _from(self, i: int, j: int) -> Scenario:
         """The scenario from another initial state, which is not validated again."""
@@ -195,27 +264,23 @@ class _Grid:
             initial = initial.model_copy(update={key: tuple(values)})
         return self._scenario.model_copy(update={"initial": initial, "expect": ()})
 
-    def _comes_back(self, result: FlightResult) -> bool:
-        if result.end.kind != "completed":
-            return False
-        away = self._final(result) - self._goal
-        away[:3] = np.remainder(away[:3] + pi, 2.0 * pi) - pi
-        return bool(np.abs(away).max() <= NEAR)
 
-    def _final(self, result: FlightResult) -> Floats:
-        return np.array([result.metrics[name] for name in self._compared])
+def _is_near(away: Floats) -> bool:
+    """Whether angles and position differ by little."""
+    angles = np.remainder(away[:3] + pi, 2.0 * pi) - pi
+    return bool(np.abs([*angles, *away[3:]]).max() <= NEAR)
 
 
-def _acceptable(scenario: Scenario, roll: Floats, pitch: Floats) -> Floats | None:
-    """Whether the attitudes at the centres of the cells are acceptable at all times."""
+def _acceptable(scenario: Scenario, roll: Floats, pitch: Floats) -> NDArray[np.bool_] | None:
+    """Whether attitudes are acceptable at all times, shape (pitch, roll)."""
     vehicle = scenario.vehicle.resolve()
     if scenario.vehicle.model != "tiltrotor" or not isinstance(vehicle, Vehicle):
         return None
     gait = assemble(scenario).gait
     times = np.arange(INSTANTS) / INSTANTS * (gait.period or 0.0)
-    across, up = np.meshgrid(0.5 * (roll[1:] + roll[:-1]), 0.5 * (pitch[1:] + pitch[:-1]))
+    across, up = np.meshgrid(roll, pitch)
     inside = np.ones(across.shape, dtype=bool)
     for angles in gait.angles(times if gait.period else times[:1]):
         level = determinant(angles, 0.0, 0.0, vehicle)
         inside &= determinant(angles, across, up, vehicle) * level > 0.0
-    return inside.astype(float)
+    return inside

@@ -52,11 +52,11 @@ def draw_all(
     Raises:
         InputError: If a figure cannot be drawn or a process dies.
     """
-    sources = Path(__file__).parents[1] / "views" / "figures"
     own = Path(__file__).parent
-    style = sources_digest(
-        [*sources.glob("*.py"), own / "drawing.py", own / "pictures.py"], code_digest().hex()
-    )
+    folders = own.parent / "views" / "figures", own.parent / "linear"
+    sources = [own / f"{name}.py" for name in ("drawing", "pictures", "attraction_maps")]
+    sources += [file for folder in folders for file in folder.glob("*.py")]
+    style = sources_digest(sources, code_digest().hex())
     scenarios = {
         (entry.address, plant): scenario
         for entry in entries

@@ -9,10 +9,12 @@ from typing import Final, TypeAlias
 
 from matplotlib.figure import Figure
 
+from tiltsim.report.attraction_maps import GAITS, attraction_map
 from tiltsim.report.claim import Metrics
 from tiltsim.report.flights import PLANTS, Plant, variant_for
 from tiltsim.simulation.simulate import simulate
 from tiltsim.views.figures.attainable import attainable_figure
+from tiltsim.views.figures.attraction import attraction_panels
 from tiltsim.views.figures.determinant import determinant_figure
 from tiltsim.views.figures.gait import comparison_figure
 from tiltsim.views.figures.plot import plot
@@ -205,6 +207,14 @@ PICTURES: Final[tuple[Picture, ...]] = (
         "circle-and-biased",
         "Gait 2 of ch. 8, a circle on red, and its biased twin.",
         lambda _: _gait_and_biased("ch08_gait_2"),
+    ),
+    Picture(
+        8,
+        "attraction",
+        "Initial attitudes from which gaits of ch. 3 to 8 come back, on the thesis's equations, "
+        "and the curves beyond which the thesis calls attitudes unacceptable. In the titles the "
+        "shares of the acceptable and of the other attitudes that come back.",
+        lambda _: attraction_panels({name: attraction_map(name) for name in GAITS}),
     ),
     Picture(
         9,

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cache
-from math import inf
 from typing import Any, Literal
 
 import numpy as np
@@ -15,21 +13,10 @@ import tiltsim_controllers.laws.indi as indi
 import tiltsim_controllers.laws.pid as pid
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.scalar_controller import Airframe, ScalarController, TiltingController
-from tiltsim.scenario.table import Gains2, NonNegative, Positive, Vector3
+from tiltsim.scenario.table import Gains2, Positive, Vector3
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
-from tiltsim_controllers.laws.decouplers import exact_decoupler
-from tiltsim_controllers.laws.lqr import BODY, linear_hover, lqr_law_of, regulator
-from tiltsim_controllers.mathematics.records import make_record_type, vector_of
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler
-from tiltsim_controllers.mathematics.scalar import Floats, Values
-from tiltsim_controllers.vehicle.effectiveness import (
-    CONSTANT,
-    COSINE,
-    ROTOR_FLOATS,
-    force_and_torque,
-    layout_of,
-    table_per_newton,
-)
+from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.vehicle.effectiveness import CONSTANT, COSINE, ROTOR_FLOATS, layout_of
 
 
 def require_no_pose(scenario: Any) -> None:
@@ -207,79 +194,3 @@ class IndiController(ScalarController):
         pairs = zip(airframe.vehicle.thrust_coefficients, airframe.initial_speeds, strict=True)
         thrusts = (k * speed * abs(speed) for k, speed in pairs)
         return (*(0.0,) * 6, *thrusts, *(0.0,) * airframe.rotors)
-
-
-class LqrController(ScalarController):
-    """The linear-quadratic regulator about hover with fixed tilts."""
-
-    law: Literal["lqr"] = Field(
-        description="linear-quadratic regulator about hover, for fixed tilts; weights are one over "
-        "the square of what is acceptable (Bryson's rule)"
-    )
-    position_error: Positive = Field(0.5, description="acceptable [m]")
-    velocity_error: Positive = Field(1.0, description="acceptable [m/s]")
-    attitude_error: Positive = Field(0.3, description="acceptable [rad]")
-    rate_error: Positive = Field(3.0, description="acceptable [rad/s]")
-    thrust_change: NonNegative = Field(
-        0.3, gt=0.0, description="acceptable, of every rotor, as a part of its thrust in hover [-]"
-    )
-
-    def check_scenario(self, scenario: Any) -> None:
-        if scenario.gait.type != "fixed":
-            reason = "the lqr law holds about one hover; needs fixed"
-            raise InvalidValueError("gait.type", scenario.gait.type, reason)
-
-    def scalar_law(self, airframe: Airframe) -> Callable[..., Any]:
-        return lqr_law_of(airframe.rotors)
-
-    def hover(self, airframe: Airframe) -> tuple[Floats, Floats, tuple[float, float]]:
-        """The linear system A, B about hover, thrusts (N), and roll and pitch (rad) there.
-
-        A and B are stacked side by side.
-        """
-        vehicle = airframe.vehicle
-        table = table_per_newton(vehicle.table, vehicle.thrust_coefficients)
-        force, torque = force_and_torque(table, airframe.initial_tilts)
-        free = np.eye(airframe.rotors) - np.linalg.pinv(torque) @ torque
-        lift = free @ force[2]
-        axis = force @ lift
-        weight = vehicle.mass * vehicle.gravity
-        if np.linalg.matrix_rank(torque) < 3 or axis[2] < 1e-6 * np.abs(force).max():
-            raise InvalidValueError("controller.law", "lqr", "the vehicle cannot hover so")
-        thrusts = lift * weight / np.linalg.norm(axis)
-        x, y, z = axis.tolist()
-        lean = exact_decoupler(0.0, 0.0, 0.0, 0.0, vehicle.gravity, (x, y, z))
-        up = vehicle.gravity * np.reshape(rotation_from_euler(*lean, 0.0), (3, 3))[2]
-        inertia = np.reshape(vehicle.inertia, (3, 3))
-        a, b = linear_hover(force, torque, vehicle.mass, inertia, up, self.rotor_bandwidth)
-        return np.hstack([a, b]), thrusts, lean
-
-    def solution(self, airframe: Airframe) -> tuple[Floats, Floats]:
-        """Gains K and the solution of the Riccati equation."""
-        system, thrusts, _ = self.hover(airframe)
-        errors = (self.position_error, self.velocity_error, self.attitude_error, self.rate_error)
-        size = BODY + airframe.rotors
-        acceptable = np.r_[np.repeat(errors, 3), np.full(airframe.rotors, inf)]
-        changes = self.thrust_change * np.abs(thrusts)
-        return regulator(system[:, :size], system[:, size:], acceptable, changes)
-
-    def law_parameters(self, airframe: Airframe) -> tuple[Any, ...]:
-        _, thrusts, lean = self.hover(airframe)
-        gains, _ = self.solution(airframe)
-        record = _lqr_record(airframe.rotors)
-        made: tuple[Any, ...] = record(
-            *lean, tuple(thrusts.tolist()), tuple(gains.ravel().tolist())
-        )
-        return made
-
-
-@cache
-def _lqr_record(rotors: int) -> Any:
-    """The type of the law's parameters."""
-    return make_record_type(
-        "LqrParameters",
-        roll=float,
-        pitch=float,
-        thrusts=vector_of(rotors),
-        gains=vector_of(rotors * (BODY + rotors)),
-    )

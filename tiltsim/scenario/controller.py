@@ -10,14 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from tiltsim.scenario.baseline_controllers import (
-    GeometricController,
-    IndiController,
-    LqrController,
-    PidController,
-)
+from tiltsim.scenario.baseline_controllers import GeometricController, IndiController, PidController
 from tiltsim.scenario.controller_packages import installed_controllers
 from tiltsim.scenario.controller_table import ControllerTable
+from tiltsim.scenario.lqr_controller import LqrController
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.quadrotor_controllers import (

@@ -101,6 +101,10 @@ class ScalarController(ControllerTable):
         """The law's parameters: a NamedTuple of floats and of such records, one at least."""
         return NoParameters()
 
+    def law_table(self, airframe: Airframe) -> Values:
+        """Any number of further floats, for the law in ``observed.table`` from ``own`` on."""
+        return ()
+
     def state_units(self, airframe: Airframe) -> Mapping[str, str]:
         """The law's states, columns of the flight, and their units."""
         return {}

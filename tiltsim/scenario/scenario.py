@@ -66,9 +66,13 @@ class Scenario(ScenarioTables):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        self.require_consistency()
+        return self
+
+    def require_consistency(self) -> None:
+        """Raise `InvalidValueError`, worded by validation, if tables contradict each other."""
         check_consistency(self)
         check_time_steps(self)
-        return self
 
     def replace(self, changes: Mapping[str, Any]) -> Scenario:
         """This scenario with other values.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -16,6 +17,7 @@ from tiltsim_controllers.analysis.rotor_reaction import largest_held_gain, react
 from tiltsim_controllers.analysis.stability import ErrorLoop
 from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS
 from tiltsim_controllers.laws.supervisor import LAG
+from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 MAX_LOOP_STEP: Final = 2.5
@@ -174,7 +176,7 @@ def _check_speed(scenario: ScenarioTables, loop: ErrorLoop) -> None:
     The published decoupling matrix speeds the attitude loops up some 700 times, so that
     harmless-looking gains can outrun the integrator within a few steps.
     """
-    fastest = float(np.abs(np.roots(loop.polynomial)).max())
+    fastest = _fastest_pole(tuple(map(float, loop.polynomial)))
     limits = {"timestep": MAX_LOOP_STEP, "control_timestep": MAX_HELD_STEP}
     for key, limit in limits.items():
         step = getattr(scenario.simulation, key)
@@ -187,6 +189,12 @@ def _check_speed(scenario: ScenarioTables, loop: ErrorLoop) -> None:
                 f"rad/s; at most {limit / fastest:.3g} s, or slower gains, or "
                 "controller.allow_unstable = true",
             )
+
+
+@lru_cache(maxsize=256)
+def _fastest_pole(polynomial: Values) -> float:
+    """The largest absolute value (rad/s) of a root; the scenarios of a sweep share most loops."""
+    return float(np.abs(np.roots(polynomial)).max())
 
 
 def _check_weight(scenario: ScenarioTables) -> None:

@@ -110,8 +110,7 @@ class VehicleTable(RotorcraftTable):
 
     def resolve(self) -> Vehicle:
         """The physical parameters: the preset's or the file's, overridden by the keys given."""
-        given = self.model_dump(include={*Vehicle._fields})
-        known = {key: value for key, value in given.items() if value is not None}
+        known = {k: value for k, value in self if k in Vehicle._fields and value is not None}
         if self.inertia is not None:
             known |= zip(MOMENTS, self.inertia, strict=True)
         user_vehicle = self.user_vehicle
@@ -205,7 +204,7 @@ class TiltCarTable(AnyVehicleTable):
         return 1
 
     def resolve(self) -> TiltCar:
-        return TiltCar(**self.model_dump(include={*TiltCar._fields}))
+        return TiltCar(**{key: value for key, value in self if key in TiltCar._fields})
 
 
 def _model(value: Any) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from time import perf_counter
 from typing import Any, Final, Generic, TypeVar
 
@@ -26,16 +27,22 @@ from tiltsim.arrays.jax_arrays import require_jax
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
+from tiltsim.flight.metrics import Metrics, metrics_of_rows
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.simulation.monitor import TerminationMonitor
 from tiltsim.simulation.simulate import simulate_assembly
+from tiltsim_controllers.mathematics.records import flatten, names_of
 from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.references.trajectories import ReferenceParameters
 
 MEMORY: Final = 256 * 2**20
 """Bytes of the samples of all rows that fly together."""
 
 ROUND_ROWS: Final = 1024
 """Large numbers of rows are multiples of it; it is also what fits the caches of a core."""
+
+METRICS_ROWS: Final = 128
+"""Rows whose metrics are computed together: as many as a core's caches hold."""
 
 Result = TypeVar("Result")
 
@@ -47,15 +54,11 @@ class _Sound:
         return ""
 
 
-def _named(record: Any, name: str = "") -> Iterator[tuple[str, float]]:
-    """The numbers of a record with the names of their fields."""
-    for field, value in zip(record._fields, record):
-        if hasattr(value, "_fields"):
-            yield from _named(value, field)
-        elif isinstance(value, tuple):
-            yield from ((field, float(entry)) for entry in value)
-        else:
-            yield field, float(value)
+@cache
+def _codes_of(record: type[tuple[Any, ...]]) -> tuple[int, ...]:
+    """Where the `CODES` are among the numbers of a record of a type."""
+    names = names_of(record)
+    return tuple(place for place, name in enumerate(names) if name in CODES)
 
 
 def numbers_of(assembly: Assembly) -> tuple[float, ...]:
@@ -63,7 +66,7 @@ def numbers_of(assembly: Assembly) -> tuple[float, ...]:
     equations = assembly.loop.equations
     assert equations is not None  # refused otherwise
     return (
-        *(value for _, value in _named(assembly.setup.parameters)),
+        *flatten(assembly.setup.parameters),
         *map(float, assembly.reference),
         *disturbance_acceleration(assembly.scenario),
         *map(float, equations.initial(assembly, assembly.setup)),
@@ -73,8 +76,14 @@ def numbers_of(assembly: Assembly) -> tuple[float, ...]:
 def batch_key(assembly: Assembly) -> object:
     """Equal for flights that may share a batch."""
     parameters, knots = assembly.setup
-    records = (*_named(parameters), *_named(assembly.reference))
-    return course_of(assembly), len(knots), tuple(v for name, v in records if name in CODES)
+    codes: list[float] = []
+    for kind, record in (
+        (assembly.loop.parameters, parameters),
+        (ReferenceParameters, assembly.reference),
+    ):
+        numbers = [*flatten(record)]
+        codes += (numbers[place] for place in _codes_of(kind))
+    return course_of(assembly), len(knots), tuple(codes)
 
 
 def _padded(rows: int) -> int:
@@ -108,9 +117,9 @@ class ArrayBatch(Generic[Result]):
         first = self._numbers[0]
         self._varies = (self._numbers != first).any(axis=0)
         common = tuple(None if v else float(n) for v, n in zip(self._varies, first))
-        one_plan = (self._knots == self._knots[0]).all()
+        self._one_plan = bool((self._knots == self._knots[0]).all())
         self._batch: Batch = compile_batch(
-            course, common, tuple(assemblies[0].setup.knots) if one_plan else None
+            course, common, tuple(assemblies[0].setup.knots) if self._one_plan else None
         )
         samples = 2 + course.steps // course.record_steps
         row = samples * len(course.loop.sample_fields) * 8
@@ -127,9 +136,9 @@ class ArrayBatch(Generic[Result]):
             flown = list(self._pool.map(lambda part: self._fly(part, size), together))
             share = (perf_counter() - began) / sum(map(len, together))
             for part, (recording, closer) in zip(together, flown, strict=True):
-                for row, index in enumerate(part):
-                    flight = self._flight(index, row, recording, closer, share)
-                    yield index, self._finish(flight)
+                for start in range(0, len(part), METRICS_ROWS):
+                    rows = range(start, min(start + METRICS_ROWS, len(part)))
+                    yield from self._finished(part, rows, recording, closer, share)
 
     def _fly(self, part: range, size: int) -> tuple[Recording, Floats]:
         """Samples of some flights, and steps of the intervals in which some of them ended."""
@@ -146,19 +155,62 @@ class ArrayBatch(Generic[Result]):
                 closer = np.asarray(self._batch.approach(numbers, knots, recording.last), float)
             return jax.device_get(recording), closer
 
-    def _flight(
-        self, index: int, row: int, recording: Recording, closer: Floats, seconds: float
+    def _finished(
+        self, part: range, rows: range, recording: Recording, closer: Floats, seconds: float
+    ) -> Iterator[tuple[int, Result]]:
+        """Index and result of flights that are some rows of a part."""
+        course = self._course
+        samples = np.array(recording.samples[rows.start : rows.stop], float)
+        steps = np.minimum(np.arange(samples.shape[1]) * course.record_steps, course.steps)
+        samples[:, :, 0] = steps * course.timestep  # not rounded
+        completed = End("completed", float(samples[0, -1, 0]))
+        indices = part[rows.start : rows.stop]
+        whole = [i for i, row in enumerate(rows) if recording.alive[row].all()]
+
+        @cache
+        def together() -> dict[int, Metrics]:
+            """Metrics of completed flights, computed when the first of them is asked for."""
+            if len(whole) < 2 or len({*map(tuple, self._knots[indices])}) > 1:
+                return {}
+            assemblies = [self._assemblies[indices[i]] for i in whole]
+            found = metrics_of_rows(assemblies, samples[whole], completed, seconds)
+            return dict(zip(whole, found or ()))
+
+        for i, (row, index) in enumerate(zip(rows, indices, strict=True)):
+            if recording.alive[row].all():
+                flight = Flight(
+                    *(self._assemblies[index], samples[i].copy(), completed, "jax", seconds),
+                    shared_metrics=lambda i=i: together().get(i),  # type: ignore[misc]
+                )
+            else:
+                flight = self._ended(index, row, samples[i], recording, closer, seconds)
+            yield index, self._finish(flight)
+
+    def _ended(
+        self,
+        index: int,
+        row: int,
+        samples: Floats,
+        recording: Recording,
+        closer: Floats,
+        seconds: float,
     ) -> Flight:
+        """The flight of a row that ended before the end of the duration.
+
+        Args:
+            index: Of its assembly.
+            row: In the recording.
+            samples: As if nothing ended it.
+            recording: Of the part.
+            closer: Its samples from step to step in the interval in which it ended.
+            seconds: That it took.
+        """
         assembly, course = self._assemblies[index], self._course
-        samples = np.array(recording.samples[row], float)
-        steps = np.minimum(np.arange(len(samples)) * course.record_steps, course.steps)
-        samples[:, 0] = steps * course.timestep  # not rounded
         monitor, sound = TerminationMonitor(assembly), _Sound()
         end = monitor.check(sound, samples[0])  # type: ignore[arg-type]
-        alive = recording.alive[row]
-        count = 1 if end else 1 + int(np.count_nonzero(alive))
+        count = 1 if end else max(1, int(np.count_nonzero(recording.alive[row])))
         kept = list(samples[:count])
-        if end is None and not alive.all():
+        if end is None:
             closer = closer[row].copy()
             closer[:, 0] = (
                 recording.last.index[row] + 1 + np.arange(len(closer))
@@ -166,7 +218,6 @@ class ArrayBatch(Generic[Result]):
             end = next(filter(None, (self._end(monitor, s, kept) for s in closer)), None)
             if end is None:  # rounding: the limit is reached later
                 return simulate_assembly(assembly)
-        end = end or End("completed", float(samples[-1, 0]))
         return Flight(assembly, np.array(kept), end, "jax", seconds)
 
     @staticmethod

@@ -131,6 +131,8 @@ class ArrayPlan:
             scenario = replaced(self._full, tree)
             plan = lifting.plan(plan_flight, [scenario], {})
             setup = lifting.plan(loop.setup, [plan, loop.signature], {})
+            if any(map(lifting.arrays.is_array, setup.knots)):
+                setup = setup._replace(knots=lifting.arrays.vector(setup.knots))
             state = lifting.plan(equations.initial, [plan, setup], {})
         disturbance = disturbance_acceleration(scenario)
         return PlannedFlight(plan, setup.parameters, setup.knots, disturbance, state)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 from warnings import warn
 
 from tiltsim.closed_loop.assembly import Assembly
@@ -29,6 +29,8 @@ from tiltsim.system.text import short_repr
 
 WINDOW: Final = 2048
 """How many scenarios are grouped together into those that share a batch."""
+
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, repr=False)
@@ -91,7 +93,12 @@ def fly(
     threads = (os.cpu_count() or 1) if threads is None else whole_number("threads", threads)
     check_progress(progress)
     chosen = [as_scenario(scenario) for scenario in scenarios]
-    return _with_progress(_fly(chosen, threads, keep_samples), len(chosen), progress)
+
+    def result(flight: Flight) -> FlightResult:
+        kept = flight if keep_samples else None
+        return FlightResult(flight.scenario, flight.end, flight.metrics(), kept)
+
+    return _with_progress(fly_each(chosen, result, threads), len(chosen), progress)
 
 
 def _with_progress(
@@ -107,12 +114,24 @@ def _with_progress(
             yield result
 
 
-def _fly(scenarios: Sequence[Scenario], threads: int, keep_samples: bool) -> Iterator[FlightResult]:
+def fly_each(
+    scenarios: Sequence[Scenario], finish: Callable[[Flight], Result], threads: int
+) -> Iterator[Result]:
+    """Fly as `fly` does, and yield what ``finish`` makes of each flight, in their order.
+
+    Samples are freed unless it keeps them. Raises `KeyboardInterrupt` if interrupted.
+    """
+
+    def result(flight: Flight) -> Result:
+        if flight.end.kind == "interrupted":
+            raise KeyboardInterrupt
+        return finish(flight)
+
     native = native_pays_off(scenarios)
     with ThreadPoolExecutor(threads) as pool:
         for start in range(0, len(scenarios), WINDOW):
             window = [assemble(scenario) for scenario in scenarios[start : start + WINDOW]]
-            yield from _fly_window(window, native, threads, pool, keep_samples)
+            yield from _fly_window(window, native, threads, pool, result)
 
 
 def _fly_window(
@@ -120,24 +139,18 @@ def _fly_window(
     native: bool,
     threads: int,
     pool: ThreadPoolExecutor,
-    keep_samples: bool,
-) -> Iterator[FlightResult]:
+    result: Callable[[Flight], Result],
+) -> Iterator[Result]:
     """Fly group by group, and put the results back into their order."""
     groups: dict[object, list[int]] = {}
     for index, assembly in enumerate(assemblies):
         groups.setdefault(_way_to_fly(assembly, native), []).append(index)
-    done: dict[int, FlightResult] = {}
+    done: dict[int, Result] = {}
     following = 0
-
-    def result(flight: Flight) -> FlightResult:
-        if flight.end.kind == "interrupted":
-            raise KeyboardInterrupt
-        kept = flight if keep_samples else None
-        return FlightResult(flight.scenario, flight.end, flight.metrics(), kept)
 
     for way, indices in groups.items():
         chosen = [assemblies[index] for index in indices]
-        flown: Iterator[tuple[int, FlightResult]]
+        flown: Iterator[tuple[int, Result]]
         if way == "alone":
             flown = ((index, result(simulate_assembly(a))) for index, a in enumerate(chosen))
         elif chosen[0].scenario.simulation.engine == "jax":
@@ -182,13 +195,13 @@ def _way_to_fly(assembly: Assembly, native: bool) -> object:
 
 
 def _in_order(
-    fly: Callable[[Assembly], FlightResult],
+    fly: Callable[[Assembly], Result],
     assemblies: Sequence[Assembly],
     threads: int,
     pool: ThreadPoolExecutor,
-) -> Iterator[FlightResult]:
+) -> Iterator[Result]:
     """Results of flights that do not need MuJoCo's callback, several at a time."""
-    waiting: deque[Future[FlightResult]] = deque()
+    waiting: deque[Future[Result]] = deque()
     for assembly in assemblies:
         waiting.append(pool.submit(fly, assembly))
         if len(waiting) > 2 * threads:

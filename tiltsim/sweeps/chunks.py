@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -15,7 +16,7 @@ from tiltsim.plants.trust import require_trust
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.sweeps.columns import installed_versions, make_row, rows_to_table
 from tiltsim.sweeps.definition import SweepDefinition
-from tiltsim.sweeps.executing import ScenarioResult, fly_scenarios
+from tiltsim.sweeps.executing import FEW, ScenarioResult, fly_scenarios
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.search import boundary
 from tiltsim.system.parquet import parquet_bytes
@@ -103,10 +104,21 @@ def _fly_values(
         if engine is not None and scenario.simulation.engine == "auto":
             scenario = with_engine(scenario, engine)
         scenarios[position] = scenario
-    flown = fly_scenarios(list(scenarios.values()), keep_flights=points.sweep.keep_flights)
+    flown = fly_scenarios(
+        list(scenarios.values()),
+        keep_flights=points.sweep.keep_flights,
+        others=lambda: _valid(points, points.spread(FEW)),
+    )
     for position, result in zip(scenarios, flown, strict=True):
         results[position] = replace(result, scenario=asked[position])
     return [results[position] for position in range(len(batch))]
+
+
+def _valid(points: SweepPoints, several: Iterable[dict[str, Any]]) -> Iterator[Scenario]:
+    """The scenarios of points that have one."""
+    for values in several:
+        with suppress(InputError):
+            yield points.scenario(values)
 
 
 Search = Generator[dict[str, Any], ScenarioResult, tuple[Row, ScenarioResult]]

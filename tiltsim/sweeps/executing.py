@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from tiltsim.errors import InputError
 from tiltsim.simulation.batch import fly
@@ -13,6 +13,9 @@ from tiltsim.system.parquet import parquet_bytes
 if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
     from tiltsim.scenario.scenario import Scenario
+
+FEW: Final = 3
+"""Crashed flights after which others of the sweep are tried before more are flown."""
 
 
 @dataclass(frozen=True)
@@ -28,17 +31,43 @@ class ScenarioResult:
 
 
 def fly_scenarios(
-    scenarios: Sequence[Scenario], *, keep_flights: bool = False
+    scenarios: Sequence[Scenario],
+    *,
+    keep_flights: bool = False,
+    others: Callable[[], Iterable[Scenario]] = tuple,
 ) -> list[ScenarioResult]:
     """Fly scenarios and return their results in the same order.
 
-    Raises KeyboardInterrupt if a flight was interrupted from the keyboard.
+    Args:
+        scenarios: Of a chunk of a sweep.
+        keep_flights: Whether results hold their flights.
+        others: Makes a few scenarios from all over the sweep.
+
+    Raises:
+        InputError: If the first few crash, and the others, all with one Python error.
+        KeyboardInterrupt: If a flight was interrupted from the keyboard.
     """
     try:
         return _fly(scenarios, keep_flights)
     except Exception:
         # One bad flight must not end the others: find it by flying one at a time.
-        return [_fly_alone(scenario, keep_flights) for scenario in scenarios]
+        first = [_fly_alone(scenario, keep_flights) for scenario in scenarios[:FEW]]
+        if _have_one_crash(first):
+            crash = first[0]
+            tried = [*first, *(_fly_alone(scenario, False) for scenario in others())]
+            if len(tried) > len(first) and _have_one_crash(tried):
+                raise InputError(
+                    f"all of {len(tried)} flights, tried all over the sweep, crashed with "
+                    f"{crash.cause}"
+                ) from None
+        return [*first, *(_fly_alone(scenario, keep_flights) for scenario in scenarios[FEW:])]
+
+
+def _have_one_crash(results: Sequence[ScenarioResult]) -> bool:
+    """Whether all flights crashed, for one reason."""
+    return len({(result.end, result.cause) for result in results}) == 1 and (
+        results[0].end == "crashed"
+    )
 
 
 def _fly(scenarios: Sequence[Scenario], keep_flights: bool) -> list[ScenarioResult]:

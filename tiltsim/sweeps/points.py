@@ -13,7 +13,7 @@ from math import prod
 from typing import Any, Final
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.loading import apply_overrides, merge, parse_scenario
+from tiltsim.scenario.loading import apply_overrides, merge
 from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
 from tiltsim.scenario.override_keys import split_key
 from tiltsim.scenario.scenario import Scenario
@@ -21,6 +21,7 @@ from tiltsim.sweeps.base_values import BaseValues
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.expressions import evaluate
 from tiltsim.sweeps.sampling import draw_samples
+from tiltsim.sweeps.similar import SimilarScenarios
 from tiltsim.sweeps.tables import (
     AxisTable,
     CasesAxis,
@@ -52,6 +53,7 @@ class SweepPoints:
         self.definition = definition
         self.sweep = Sweep.model_validate(definition.sweep)
         self._base_values = BaseValues(definition)
+        self._scenarios = SimilarScenarios(definition.address)
         self._check_count()
         self._groups = self._make_groups()
         axes = self.sweep.axis
@@ -133,6 +135,11 @@ class SweepPoints:
             points += [self.point(place * stride) for place in places]
         return points
 
+    def spread(self, most: int) -> list[dict[str, Any]]:
+        """So many points at most, spread evenly over the sweep, both ends included."""
+        count = min(len(self), most)
+        return [self.point(n * (len(self) - 1) // max(1, count - 1)) for n in range(count)]
+
     def derived(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The ``[derive]`` keys for values of the axes. Raises `InputError` if one has no value."""
         rules = self.sweep.derive.items()
@@ -148,17 +155,23 @@ class SweepPoints:
         document = deepcopy(self.definition.base)
         for axis in self.cases:
             document = merge(document, deepcopy(axis.cases[values[axis.key]]))
-        overrides = {**self.sweep.set, **values, **self.derived(values)}
-        overrides = {key: value for key, value in overrides.items() if "." in key}
+        overrides = self._given(values)
         for key in overrides:
             if "[" in key:
                 self._write_out(document, key.partition("[")[0])
         apply_overrides(document, overrides, self.definition.address)
         return document
 
+    def _given(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """What a point gives of its scenario, by dotted key."""
+        given = {**self.sweep.set, **values, **self.derived(values)}
+        return {key: value for key, value in given.items() if "." in key}
+
     def scenario(self, values: Mapping[str, Any]) -> Scenario:
         """The scenario for values of the axes. Raises `InputError` if it is not valid."""
-        return parse_scenario(self.document(values), self.definition.address)
+        given = self._given(values)
+        kind = tuple(values[axis.key] for axis in self.cases)
+        return self._scenarios.scenario(kind, given, lambda: self.document(values))
 
     def place(self, axis: AxisTable, values: Sequence[Any]) -> dict[str, Any]:
         """The values that an axis sets, by key, from one value for each of its targets."""

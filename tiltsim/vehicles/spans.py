@@ -1,8 +1,13 @@
-"""Which samples of a flight a metric covers, by physics steps instead of sums of their lengths."""
+"""Which samples of a flight a metric covers, and what it makes of them.
+
+Columns have shape (..., N): those of one flight, or of several in rows, with the same times (N,).
+Spans are counted in physics steps instead of sums of their lengths.
+"""
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Iterable
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -28,3 +33,31 @@ def when_settled(time: Floats, timestep: float) -> npt.NDArray[np.bool_]:
         np.rint(time / timestep) >= (1.0 - _ROUNDING) * SETTLED / timestep
     )
     return settled
+
+
+def mean_of(column: Floats, span: npt.NDArray[np.bool_]) -> Any:
+    """The mean over some samples, in one order of summation for one flight and for rows."""
+    return np.mean(np.compress(span, column, axis=-1), axis=-1)
+
+
+def largest(values: Iterable[Any]) -> Any:
+    """The largest of arrays (...), one by one; a NaN that comes first stays, as in ``max``."""
+    first, *others = values
+    for other in others:
+        first = np.where(other > first, other, first)
+    return first
+
+
+def first_and_last(where: npt.NDArray[np.bool_]) -> tuple[Any, Any]:
+    """The first and the last sample, shape (...), at which something is the case, -1 if none."""
+    count = where.shape[-1]
+    if not count:
+        return np.full(where.shape[:-1], -1), np.full(where.shape[:-1], -1)
+    found = where.any(axis=-1)
+    first, last = where.argmax(axis=-1), count - 1 - where[..., ::-1].argmax(axis=-1)
+    return np.where(found, first, -1), np.where(found, last, -1)
+
+
+def time_of(time: Floats, sample: Any) -> Any:
+    """The times (s) of samples (...), NaN for -1."""
+    return np.where(sample < 0, np.nan, time[sample])

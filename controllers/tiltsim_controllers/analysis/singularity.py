@@ -153,7 +153,9 @@ def _has_full_rank(angles: Floats, torque: Any, inputs: Floats, vehicle: Vehicle
     frobenius = np.linalg.norm(np.stack(torque, axis=-1), axis=-1)
     full = np.asarray(inputs > 2.0 * RANK_TOLERANCE * frobenius**3)
     if not full.all():
-        full[~full] = rank(angles[~full], vehicle) == 3
+        unsure = ~full
+        values = (np.broadcast_to(value, full.shape)[unsure] for value in vehicle)
+        full[unsure] = rank(angles[unsure], Vehicle(*values)) == 3
     return full
 
 
@@ -177,7 +179,11 @@ def singularity_margin(
 
 
 def margin_over_gait(
-    angles: ArrayLike, vehicle: Vehicle, roll: ArrayLike = 0.0, pitch: ArrayLike = 0.0
+    angles: ArrayLike,
+    vehicle: Vehicle,
+    roll: ArrayLike = 0.0,
+    pitch: ArrayLike = 0.0,
+    flights: int = 1,
 ) -> Floats:
     """Margin (rad) along a gait that must not cross a singularity, shape (N,).
 
@@ -188,9 +194,15 @@ def margin_over_gait(
     Args:
         angles: shape (N, 4), in order of time, rad
         vehicle, roll, pitch: as for `decoupling_matrix`
+        flights: how many gaits, of equal length, follow one another
     """
     sign = np.sign(residuals(angles, vehicle).R)
-    started = np.flatnonzero(sign)
-    side = sign[started[0]] if started.size else 1.0
     margin = singularity_margin(angles, vehicle, roll, pitch)
-    return margin * sign * side + 0.0  # no negative zeros
+    if not sign.size:
+        return margin
+    signs = sign.reshape(flights, -1)
+    started = (signs != 0.0).argmax(axis=-1)
+    side = np.take_along_axis(signs, started[:, np.newaxis], axis=-1)
+    side = np.where(side == 0.0, 1.0, side)
+    sides = np.broadcast_to(side, signs.shape).ravel()
+    return np.asarray(margin * sign * sides + 0.0)  # no negative zeros

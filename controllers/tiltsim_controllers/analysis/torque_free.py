@@ -77,7 +77,7 @@ def singularity_margin(forces: TorqueFreeForces, up: ArrayLike = LEVEL) -> Float
     return np.asarray(np.arcsin(np.minimum(1.0, np.linalg.norm(along, axis=-1))))
 
 
-def margin_over_flight(forces: TorqueFreeForces, up: ArrayLike) -> Floats:
+def margin_over_flight(forces: TorqueFreeForces, up: ArrayLike, flights: int = 1) -> Floats:
     """Margin (rad) along a flight, shape (N,), negative beyond a singularity.
 
     A great circle of singular directions has two sides, and world up starts on the positive one:
@@ -87,18 +87,21 @@ def margin_over_flight(forces: TorqueFreeForces, up: ArrayLike) -> Floats:
     Args:
         forces: in order of time
         up: world up in body axes, unit vectors of shape (N, 3)
+        flights: how many flights, of equal length, follow one another
     """
     margin = singularity_margin(forces, up)
-    if not (forces.dimension == 1).all():
+    one_circle = (forces.dimension.reshape(flights, -1) == 1).all(axis=-1)
+    if not (one_circle.any() and margin.size):
         return margin
     square = np.diagonal(forces.projector, axis1=-2, axis2=-1)
     along = square.argmax(axis=-1)[:, np.newaxis, np.newaxis]
     direction = np.take_along_axis(forces.projector, along, axis=-1)[..., 0]
-    turns = np.einsum("ki,ki->k", direction[1:], direction[:-1])
-    first = -1.0 if len(direction) and direction[0, 2] < 0.0 else 1.0
-    sides = np.cumprod([first, *np.where(turns < 0.0, -1.0, 1.0)])[: len(direction)]
-    side = sides * np.einsum("ki,ki->k", direction, np.asarray(up, float))
-    return np.where(side < 0.0, -margin, margin)
+    turns = np.einsum("ki,ki->k", direction, np.roll(direction, 1, axis=0)).reshape(flights, -1)
+    turns[:, 0] = direction.reshape(flights, -1, 3)[:, 0, 2]  # from upward, at first
+    sides = np.cumprod(np.where(turns < 0.0, -1.0, 1.0), axis=-1)
+    side = sides.ravel() * np.einsum("ki,ki->k", direction, np.asarray(up, float))
+    crossed = (side < 0.0) & np.repeat(one_circle, len(side) // flights)
+    return np.where(crossed, -margin, margin)
 
 
 def controlled_axes(forces: TorqueFreeForces, up: ArrayLike, dimension: int) -> Floats:

@@ -45,3 +45,4 @@ class Observed(NamedTuple):
     torque: tuple[Values, Values, Values]  # likewise, N m per newton
     table: Vector  # of the rotors per newton from `at` on; see `vehicle.effectiveness`
     at: int
+    own: int  # index in `table` of the law's own numbers, if it has a table

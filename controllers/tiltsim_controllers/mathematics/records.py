@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import cache
-from itertools import islice
+from itertools import islice, repeat
 from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
@@ -18,13 +18,29 @@ import numpy as np
 Record = TypeVar("Record", bound=tuple[Any, ...])
 
 
-def flatten(record: Iterable[Any]) -> Iterator[float]:
-    """Yield the floats of a record in the order of declaration, nested records in place."""
+def leaves(record: Iterable[Any]) -> Iterator[Any]:
+    """Yield the numbers of a record in the order of declaration, nested records in place."""
     for value in record:
         if isinstance(value, tuple):
-            yield from flatten(value)
+            yield from leaves(value)
         else:
-            yield float(value)
+            yield value
+
+
+def flatten(record: Iterable[Any]) -> Iterator[float]:
+    """The same as floats."""
+    return map(float, leaves(record))
+
+
+def names_of(record_type: type[tuple[Any, ...]]) -> Iterator[str]:
+    """The names of the fields that hold the floats of a record, in the order of `flatten`."""
+    for name, kind in _fields(record_type).items():
+        if _is_record(kind):
+            yield from names_of(kind)
+        elif issubclass(kind, tuple):
+            yield from repeat(name, kind.length)
+        else:
+            yield name
 
 
 def unflatten(record_type: type[Record], values: Iterable[float]) -> Record:

@@ -33,6 +33,19 @@ def scalar(function: Function) -> Function:
     return function
 
 
+def affine_in(argument: str) -> Callable[[Function], Function]:
+    """Mark a function that plans, whose values are affine in the points of an argument.
+
+    It is not lifted to arrays but evaluated at plain points, which give its matrix.
+    """
+
+    def mark(function: Function) -> Function:
+        function.affine_in = argument  # type: ignore[attr-defined]
+        return function
+
+    return mark
+
+
 def scalar_functions() -> tuple[Callable[..., Any], ...]:
     """All functions registered so far, callees before their callers."""
     return tuple(_registry)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Values, Vector, affine_in, scalar
 
 
 @scalar
@@ -57,6 +57,7 @@ def polynomial_motion(
     return value, first, 2.0 * second, 6.0 * third, 24.0 * fourth
 
 
+@affine_in("points")
 def spline_knots(
     times: Sequence[float], points: ArrayLike, coefficients: int, *, degree: int, ends: Any = None
 ) -> Values:

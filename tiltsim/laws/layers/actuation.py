@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, get_type_hints
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
+from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.laws.layers.delay_line import delay_line, held_line, undelayed
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
 from tiltsim.laws.layers.sensing import measured_qpos, measured_qvel, sensor_parameters
@@ -266,15 +267,18 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
 def _derive(
     inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
 ) -> dict[str, Floats]:
-    time = samples["time"].tolist()
-    faults = enumerate(setup.parameters.layer.faults, start=1)
-    return {
-        **inner(),
-        **{
-            f"thrust_factor_{i}": np.array([thrust_factor(t, fault) for t in time])
-            for i, fault in faults
-        },
-    }
+    time, columns = samples["time"], inner()
+    for rotor, fault in enumerate(setup.parameters.layer.faults, start=1):
+        states, own = np.empty((len(time), 0)), ControlSetup(fault)
+        remaining = evaluate_over_samples(_remaining, 1, time, states, own)
+        columns[f"thrust_factor_{rotor}"] = remaining[:, 0]
+    return columns
+
+
+@scalar
+def _remaining(time: float, state: Vector, fault: RotorFault, knots: Vector) -> tuple[float]:
+    """`thrust_factor` of a sample."""
+    return (thrust_factor(time, fault),)
 
 
 def _actuation(plan: FlightPlan) -> Any:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
+from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.vehicles.rotorcraft.layout import QW, QX, QY, QZ, TILT_1, layout_of
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
 
 AIR_COLUMNS: Final = ("air_vx", "air_vy", "air_vz")
 DRYDEN_FIELDS: Final = tuple(f"dryden_{index}" for index in range(1, DRYDEN_STATES + 1))
+_dryden_in = entries_of(0, DRYDEN_STATES)
 
 
 @scalar
@@ -156,11 +158,16 @@ def with_air(loop: ClosedLoop) -> ClosedLoop:
 def _derive(
     inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
 ) -> dict[str, Floats]:
-    air = setup.parameters.layer.air
+    air = ControlSetup(setup.parameters.layer.air)
     states = np.stack([samples[name] for name in DRYDEN_FIELDS], axis=-1)
-    rows = zip(samples["time"].tolist(), states.tolist(), strict=True)
-    velocity = np.array([air_velocity(time, tuple(state), air) for time, state in rows])
+    velocity = evaluate_over_samples(_velocity, 3, samples["time"], states, air)
     return {**inner(), **dict(zip(AIR_COLUMNS, velocity.T, strict=True))}
+
+
+@scalar
+def _velocity(time: float, states: Vector, air: Air, knots: Vector) -> Triple:
+    """`air_velocity` of a sample."""
+    return air_velocity(time, _dryden_in(states), air)
 
 
 def _air(plan: FlightPlan) -> Air:

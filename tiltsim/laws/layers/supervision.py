@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
+from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
 from tiltsim.laws.tiltrotor import (
     TILT_REFERENCE_COLUMNS,
@@ -90,6 +91,12 @@ def _gait_scale(time: float, roll: float, pitch: float, parameters: Any, knots: 
     return supervised_gait_scale(planned, roll, pitch, parameters.layer, law.vehicle)
 
 
+@scalar
+def _scale(time: float, attitude: Vector, parameters: Any, knots: Vector) -> tuple[float]:
+    """`_gait_scale` of a sample."""
+    return (_gait_scale(time, attitude[0], attitude[1], parameters, knots),)
+
+
 def _scaling(loop: ClosedLoop) -> Layer:
     """A supervisor that scales the gait, without states."""
     inner_controls = loop.sampling.controls
@@ -112,11 +119,8 @@ def _scaling(loop: ClosedLoop) -> Layer:
     def derive(
         inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
     ) -> dict[str, Floats]:
-        columns, (parameters, knots) = inner(), setup
-        rows = zip(*(samples[name].tolist() for name in ("time", "roll", "pitch")), strict=True)
-        scale = np.array(
-            [_gait_scale(t, roll, pitch, parameters, knots) for t, roll, pitch in rows]
-        )
+        columns, attitude = inner(), np.stack([samples["roll"], samples["pitch"]], axis=-1)
+        (scale,) = evaluate_over_samples(_scale, 1, samples["time"], attitude, setup).T
         scaled = {name: scale * columns[name] for name in TILT_REFERENCE_COLUMNS}
         return {**columns, **scaled, SUPERVISION: 1.0 - scale}
 

@@ -3,37 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.saturation import at_lower_limit, saturation_metrics
-from tiltsim.vehicles.spans import in_last_second, when_settled
+from tiltsim.vehicles.spans import in_last_second, mean_of, when_settled
 from tiltsim_controllers.mathematics.scalar import Floats
 
 
 def tilt_car_metrics(
     columns: Mapping[str, Floats], scenario: Scenario, _follows_position: bool
-) -> dict[str, float | bool]:
+) -> dict[str, Any]:
     """See `tiltsim.closed_loop.vehicle_kind.VehicleKind.metrics`."""
     clock, metrics = (columns["time"], scenario.simulation.timestep), {}
     last_second, settled = in_last_second(*clock), when_settled(*clock)
     errors = {axis: columns[f"{axis}_ref"] - columns[axis] for axis in ("x", "y")}
     speeds = np.array([columns["rotor_speed_1"], columns["rotor_speed_2"]])
     for axis, error in errors.items():
-        metrics[f"final_position_error_{axis}"] = float(np.mean(error[last_second]))
+        metrics[f"final_position_error_{axis}"] = mean_of(error, last_second)
     if settled.any():
-        horizontal = np.hypot(errors["x"], errors["y"])
-        metrics["sup_position_error_after_20s"] = float(horizontal[settled].max())
-        metrics["least_position_error_after_20s"] = float(horizontal[settled].min())
+        horizontal = np.hypot(errors["x"], errors["y"])[..., settled]
+        metrics["sup_position_error_after_20s"] = horizontal.max(axis=-1)
+        metrics["least_position_error_after_20s"] = horizontal.min(axis=-1)
     for axis, error in errors.items():
-        metrics[f"max_abs_error_{axis}"] = float(np.abs(error).max())
+        metrics[f"max_abs_error_{axis}"] = np.abs(error).max(axis=-1)
     if "lyapunov" in columns:
-        metrics["max_lyapunov"] = float(columns["lyapunov"].max())
-    metrics["final_input_split"] = float(np.mean(columns["input_split"][last_second]))
-    metrics["final_yaw"] = float(np.mean(columns["yaw"][last_second]))
-    metrics["min_rotor_speed"] = float(speeds.min())
-    metrics["max_rotor_speed"] = float(speeds.max())
-    metrics["max_tilt_rate"] = float(np.abs(columns["alpha_rate"]).max())
+        metrics["max_lyapunov"] = columns["lyapunov"].max(axis=-1)
+    metrics["final_input_split"] = mean_of(columns["input_split"], last_second)
+    metrics["final_yaw"] = mean_of(columns["yaw"], last_second)
+    metrics["min_rotor_speed"] = speeds.min(axis=(0, -1))
+    metrics["max_rotor_speed"] = speeds.max(axis=(0, -1))
+    metrics["max_tilt_rate"] = np.abs(columns["alpha_rate"]).max(axis=-1)
     # A thrust cannot pull: at rest a rotor is at its limit.
     return metrics | saturation_metrics(columns["time"], at_lower_limit(speeds, 0.0))

@@ -1,0 +1,97 @@
+"""Scenarios that differ in numbers: of each, only the tables that hold them are validated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from copy import deepcopy
+from typing import Any, NamedTuple
+
+from pydantic import BaseModel, ValidationError
+
+from tiltsim.scenario.loading import parse_scenario
+from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.override_keys import split_key
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.system.numbers import is_number
+
+Document = dict[str, Any]
+
+
+class _Known(NamedTuple):
+    """A scenario with the values by key that it was made from."""
+
+    values: Mapping[str, Any]
+    document: Document
+    scenario: Scenario
+
+
+class SimilarScenarios:
+    """Makes scenarios from documents; one of each kind is made in full.
+
+    Args:
+        address: Of the documents, in messages.
+    """
+
+    def __init__(self, address: str) -> None:
+        self._address = address
+        self._known: dict[object, _Known] = {}
+
+    def scenario(
+        self, kind: object, values: Mapping[str, Any], document: Callable[[], Document]
+    ) -> Scenario:
+        """A scenario. Raises `InputError` if it is not valid.
+
+        Args:
+            kind: Equal for documents in which only ``values`` differ.
+            values: By dotted key.
+            document: Makes the document, with the values in it.
+        """
+        known = self._known.get(kind)
+        if known is not None:
+            changes = _changes(known.values, values)
+            similar = None if changes is None else _similar(known, changes)
+            if similar is not None:
+                return similar
+        made = document()
+        scenario = parse_scenario(made, self._address)
+        self._known.setdefault(kind, _Known(values, made, scenario))
+        return scenario
+
+
+def _changes(before: Mapping[str, Any], now: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The values that changed; None if one is no number or list of numbers as before."""
+    changed = {key: value for key, value in now.items() if value != before.get(key)}
+    if before.keys() != now.keys():
+        return None
+    return changed if all(_alike(before[key], value) for key, value in changed.items()) else None
+
+
+def _alike(first: Any, second: Any) -> bool:
+    if isinstance(first, list) and isinstance(second, list):
+        return len(first) == len(second) and all(map(_alike, first, second))
+    return type(first) is type(second) and is_number(first)
+
+
+def _similar(known: _Known, changes: Mapping[str, Any]) -> Scenario | None:
+    """A known scenario with other numbers; None if it is not valid, or its tables have no keys."""
+    changed: Document = {}
+    for key, value in changes.items():
+        name, *path, last = split_key(key)
+        if not isinstance(getattr(known.scenario, str(name), None), BaseModel):
+            return None
+        if name not in changed:
+            changed[str(name)] = deepcopy(known.document[str(name)])
+        target: Any = changed[str(name)]
+        for step in path:
+            target = target[step]
+        target[last] = value
+    try:
+        tables = {
+            name: type(getattr(known.scenario, name)).model_validate(table)
+            for name, table in changed.items()
+        }
+        scenario = known.scenario.model_copy(update=tables)
+        scenario.require_consistency()
+    except (ValidationError, InvalidValueError):  # in words of the whole document: by the caller
+        return None
+    return scenario
