@@ -7,7 +7,7 @@ import pytest
 
 import tiltsim
 from tests.linear.test_rest import SETPOINT, random_hover
-from tiltsim.linear.linearization import linearize
+from tiltsim.linear.linearization import Linearization, Signal, linearize
 from tiltsim.linear.margins import Margin, broken_loops, frequency_grid, margins_of
 
 
@@ -80,6 +80,37 @@ def test_opening_a_loop_leaves_the_others_closed():
     for loop in loops:
         closed = loop.A + loop.B @ loop.C
         assert closed == pytest.approx(system.A, abs=1e-9)
+
+
+def scalar_loop(pole, gain, timestep):
+    """``x' = pole x + u`` with ``u = -gain x``, or from sample to sample."""
+    one, signal = np.ones((1, 1)), Signal("x", "m")
+    return Linearization(
+        A=(pole - gain) * one,
+        B=one,
+        C=one,
+        D=0.0 * one,
+        feedback=-gain * one,
+        states=(signal,),
+        inputs=(signal,),
+        outputs=(signal,),
+        timestep=timestep,
+        state={},
+        command={},
+        loop="closed",
+    )
+
+
+def test_a_sampled_loop_may_reach_minus_one_at_the_nyquist_frequency():
+    """``L = gain / (z - pole)`` is real at z = -1 and nowhere else between."""
+    margin = margins_of(scalar_loop(0.5, 0.6, 0.01))[0]
+    assert margin.gain == (0.0, pytest.approx(1.5 / 0.6))
+
+
+def test_an_unstable_vehicle_needs_a_gain():
+    """``L = gain / (s - pole)`` reaches -1 at frequency zero."""
+    margin = margins_of(scalar_loop(1.0, 3.0, None))[0]
+    assert margin.gain == (pytest.approx(1.0 / 3.0), np.inf)
 
 
 def test_report_has_null_where_there_is_no_limit():

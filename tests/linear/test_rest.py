@@ -7,7 +7,7 @@ import pytest
 
 import tiltsim
 from tiltsim.linear.equilibrium import equilibrium_of
-from tiltsim.linear.modes import exponents, is_stable, modes_of
+from tiltsim.linear.modes import exponents, is_stable, modes_of, spectrum
 from tiltsim.linear.motion import make_motion
 from tiltsim.linear.newton import derivative_at
 from tiltsim_controllers.analysis.stability import error_loops
@@ -231,6 +231,35 @@ def test_double_integrators_are_not_stable_but_single_ones_are():
         assert is_stable(matrix, poles, timestep) == (timestep is not None)
 
 
+def test_an_undamped_swing_is_not_stable_beside_neutral_states_either():
+    swing = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    assert not is_stable(swing, np.linalg.eigvals(swing), None)
+    damped = swing - np.diag([0.0, 0.1, 0.0])
+    assert is_stable(damped, np.linalg.eigvals(damped), None)
+
+
+def test_what_decays_slowest_comes_first():
+    """A fast swing that lasts before a slow pole, and neutral states before both."""
+    matrix = np.zeros((4, 4))
+    matrix[0, 0] = -1.0
+    matrix[1:3, 1:3] = [[-0.1, 50.0], [-50.0, -0.1]]
+    modes = modes_of(matrix, ("z", "p", "q", "x"), None)
+    assert [mode.frequency for mode in modes] == [0.0, pytest.approx(50.0, rel=1e-4), 1.0]
+    found = tiltsim.stability(tiltsim.load_scenario(SETPOINT, THESIS))
+    assert (np.diff(found.poles.real) <= 0.0).all()
+
+
+def test_a_multiple_pole_that_errors_split_is_its_mean():
+    """A critically damped servo: an error of 1e-11 splits -300 by 1e-3; a pole 0.1 away stays."""
+    matrix = np.zeros((3, 3))
+    matrix[:2, :2] = [[0.0, 1.0], [-9e4 * (1.0 + 1e-11), -600.0]]
+    matrix[2, 2] = -300.1
+    split = np.sort_complex(np.linalg.eigvals(matrix))
+    assert np.abs(split[1:] + 300.0).min() > 5e-4
+    values, _, _ = spectrum(matrix, 2e-11)
+    assert distance(values, (-300.0, -300.0, -300.1)) < 1e-8
+
+
 def test_modes_group_equal_poles_and_name_their_states():
     block = np.array([[-1.0, 2.0], [-2.0, -1.0]])
     matrix = np.kron(np.eye(2), block)
@@ -242,7 +271,7 @@ def test_modes_group_equal_poles_and_name_their_states():
 def test_a_negative_multiplier_is_one_pole():
     """Its logarithm is complex, without a partner."""
     modes = modes_of(np.diag([-0.5, 0.3]), ("x", "y"), 1.0)
-    assert [(mode.name, mode.count) for mode in modes] == [("y", 1), ("x", 1)]
+    assert [(mode.name, mode.count) for mode in modes] == [("x", 1), ("y", 1)]
 
 
 def test_rest_is_where_the_vehicle_is_told_to_turn():
@@ -262,7 +291,17 @@ def test_a_rest_point_beyond_a_singular_attitude_does_not_count():
         tiltsim.stability(tiltsim.load_scenario(SETPOINT, beyond))
 
 
+LINE = {"reference.type": "line", "reference.velocity": [0.5, 0.0, 0.1]}
+
 REFUSED = {
+    "a line that accelerates through air": (
+        {**LINE, "reference.acceleration": [0.1, 0, 0], "air.drag.linear": [0.1, 0.1, 0.1]},
+        "reference.acceleration = .*: with air.drag",
+    ),
+    "a line that climbs above ground": (
+        {**LINE, "air.ground_effect.height": -1.0},
+        "the line climbs or descends: with air.ground_effect",
+    ),
     "noise": ({"sensors.position_noise": 0.1}, "sensors.position_noise: with noise"),
     "a moving gait": (
         {"gait.type": "trot_continuous", "gait.amplitude": 0.5, "gait.period": 2.0},

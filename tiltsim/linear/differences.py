@@ -20,6 +20,8 @@ STEP: Final = 5e-3
 HALF_STENCIL: Final = ((1.0, 3.0 / 4.0), (2.0, -3.0 / 20.0), (3.0, 1.0 / 60.0))
 """Offsets in steps, and weights; those on the other side are the negative ones."""
 
+ERROR: Final = 2e-11
+"""Of derivatives by it, as a share of the largest of their row; measured against symbolic ones."""
 
 CENTRAL: Final = ((0.02, 25.0),)
 """The same with a third of the evaluations, for long flights: second order at a step of 1e-4."""
