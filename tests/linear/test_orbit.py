@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from types import SimpleNamespace
 
 import numpy as np
@@ -79,10 +80,11 @@ def test_modes_lost_in_the_rounding_of_a_period_are_not_listed():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("plant", ["thesis", "mujoco"])
 @pytest.mark.parametrize("kind", ["trot_continuous", "trot_instant", "walk", "two_color"])
-def test_the_multipliers_are_those_of_native_flights_over_a_period(kind):
+def test_the_multipliers_are_those_of_native_flights_over_a_period(kind, plant):
     """Simple differences of second order, with the step at which they are best, near 1e-5."""
-    found = equilibrium_of(gait(kind, **{"gait.period": 0.05}))  # by the Python engine
+    found = equilibrium_of(gait(kind, plant, **{"gait.period": 0.05}))  # by the Python engine
     motion, start = make_motion(found.motion.scenario, "native"), found.root.state
     coordinates, columns = motion.coordinates, []
     for moved in 1e-5 * np.eye(coordinates.size)[found.kept]:
@@ -186,6 +188,36 @@ def test_an_orbit_of_too_many_steps_is_refused_at_once():
     endless = gait("trot_continuous").replace({"gait.period": 1000.0})
     with pytest.raises(tiltsim.InputError, match="an orbit has at most 200000"):
         tiltsim.stability(endless)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("plant", ["thesis", "mujoco"])
+def test_flights_on_all_cores_end_as_single_ones(plant, monkeypatch):
+    """More of them than a batch has rows; the lost one is lost alone."""
+    monkeypatch.setattr("tiltsim.linear.motion.LONG", 10)
+    motion = make_motion(gait("trot_continuous", plant), "native")
+    offsets = np.linspace(-0.1, 0.1, 4 * os.cpu_count() + 3)
+    states = [motion.initial + offset * np.eye(len(motion.initial))[0] for offset in offsets]
+    states[1] = np.full(len(states[1]), np.nan)
+    together = list(motion.flown_each(4, states, 20))
+    alone = [motion.flown(4, state, 20) for state in states]
+    np.testing.assert_array_equal(together, alone)
+    assert np.isnan(together[1]).all()
+    assert np.isfinite(np.delete(together, 1, axis=0)).all()
+
+
+@pytest.mark.slow
+def test_a_long_orbit_takes_one_derivative():
+    """12,566 steps: the flight settles within four periods, so Newton has little left to do."""
+    circle = {"reference.type": "circle", "reference.radius": 1.0}
+    changes = {**circle, "reference.angular_frequency": 0.5, "simulation.engine": "native"}
+    scenario = tiltsim.load_scenario(SETPOINT, {"simulation.plant": "thesis", **changes})
+    flights = []
+    found = tiltsim.stability(scenario, progress=flights.append)
+    assert found.equilibrium.steps == 12_567
+    assert len(flights) < 2 * 2 * len(found.states)  # one has two for each state
+    altitude = tiltsim.stability(scenario.replace({"reference.type": "setpoint"})).poles[0].real
+    assert abs(found.multipliers[0]) == pytest.approx(np.exp(altitude * found.period), rel=1e-4)
 
 
 def test_what_does_not_return_is_refused():

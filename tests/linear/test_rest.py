@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from math import factorial
+
 import numpy as np
 import pytest
 
 import tiltsim
+from tiltsim.linear.differences import ERROR
 from tiltsim.linear.equilibrium import equilibrium_of
 from tiltsim.linear.modes import exponents, is_stable, modes_of, spectrum
 from tiltsim.linear.motion import make_motion
@@ -85,43 +88,38 @@ def test_poles_are_the_roots_of_the_routh_polynomials(seed):
     assert not found.stable  # its place drifts
 
 
-@pytest.mark.parametrize("plant", ["thesis", "mujoco"])
-def test_poles_are_those_of_the_flown_step(plant):
-    """A step multiplies a mode by the solver's polynomial of time step times pole."""
-    scenario = tiltsim.load_scenario(SETPOINT, {"simulation.plant": plant})
-    found = equilibrium_of(scenario)
-    motion, state = found.motion, found.root.state
-    coordinates, timestep = motion.coordinates, scenario.simulation.timestep
-
-    step = derivative_at(
-        lambda at: coordinates.between(state, motion.flown(0, at, 1)), coordinates, state
-    )
-    poles = tiltsim.stability(scenario).poles
-    # Of the servos' double poles the differences give no more than half the digits.
-    z = timestep * poles[np.abs(poles + 300.0) > 1.0]
-    growth = 1.0 + z + z**2 / 2.0 + z**3 / 6.0 + (z**4 / 24.0 if plant == "mujoco" else 0.0)
-    assert distance(np.linalg.eigvals(step), growth) < 1e-5 * timestep
+RANDOM = [
+    pytest.param(seed, engine, marks=marks, id=f"{seed}-{engine}")
+    for seeds, engine, marks in (((0, 1), "python", ()), (range(20), "native", pytest.mark.slow))
+    for seed in seeds
+]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(8))
-def test_the_linear_system_is_that_of_the_native_step(seed):
-    """The matrix of a step is the solver's polynomial of the linear system's matrix.
+@pytest.mark.parametrize(("seed", "engine"), RANDOM)
+def test_matrix_and_poles_are_those_of_a_flown_step(seed, engine):
+    """A step's matrix is the solver's polynomial of the linear system's, its poles those of it.
 
-    Matrices, not eigenvalues: those of the servos are defective, and differences give of a double
-    one no more than half the digits.
+    The servos' poles are double and defective. An error of differences splits such an eigenvalue by
+    the error's root, so neither side has single ones to compare: what is well posed is the mean of
+    those that the error splits, which both sides take.
     """
-    found = equilibrium_of(random_line(seed))
-    motion, state = make_motion(found.motion.scenario, "native"), found.root.state
-    coordinates, timestep = motion.coordinates, motion.scenario.simulation.timestep
+    scenario = random_line(seed)
+    found = tiltsim.stability(scenario)
+    motion, state = make_motion(scenario, engine), found.equilibrium.root.state
+    coordinates, timestep = motion.coordinates, scenario.simulation.timestep
     step = derivative_at(
         lambda at: coordinates.between(state, motion.flown(0, at, 1)), coordinates, state
     )
+    order = 4 if scenario.simulation.plant == "mujoco" else 3
     power = growth = np.eye(coordinates.size)
-    for order in range(1, 5 if motion.scenario.simulation.plant == "mujoco" else 4):
-        power = power @ found.root.derivative * (timestep / order)
+    for term in range(1, order + 1):
+        power = power @ found.equilibrium.root.derivative * (timestep / term)
         growth = growth + power
     assert np.abs(step - growth).max() < 1e-8 * np.abs(growth).max()
+    kept = found.equilibrium.kept
+    flown, _, _ = spectrum(step[np.ix_(kept, kept)], ERROR)
+    factors = np.polynomial.Polynomial(1.0 / np.array([factorial(i) for i in range(order + 1)]))
+    assert distance(flown, factors(timestep * found.poles)) < 1e-5 * timestep
 
 
 def test_the_plants_have_the_same_poles_but_for_the_servos():
