@@ -28,8 +28,11 @@ ORBIT: Final = 1e-7
 """Largest difference after a period, in SI units, that counts as periodic."""
 
 SETTLING_TIME: Final = 40.0  # s, flown at most to approach an orbit or a rest point
-RETURNS: Final = 4
-"""Periods, flown at least to approach an orbit: each costs as much as one of the derivative's."""
+RETURNS: Final = 10
+"""Periods, flown at most to approach a long orbit: a derivative takes two for each state."""
+
+SETTLED: Final = 1e-9
+"""Change over a period below which more of them gain nothing: the derivative is the orbit's."""
 
 MOST_STEPS: Final = 200_000
 """Of an orbit: some 250 flights over it take a quarter of an hour with compiled steps."""
@@ -98,6 +101,7 @@ def equilibrium_of(
     scenario: Scenario,
     *,
     at_rest: bool = False,
+    near: Floats | None = None,
     progress: Callable[[int], None] = lambda _flights: None,
 ) -> Equilibrium:
     """The rest point or the periodic orbit of a scenario.
@@ -105,6 +109,7 @@ def equilibrium_of(
     Args:
         scenario: The scenario.
         at_rest: Demands a rest point.
+        near: A state near the orbit, such as one of a neighbouring scenario's; tried first.
         progress: Called with the number of periods or samples flown so far.
 
     Raises:
@@ -137,7 +142,9 @@ def equilibrium_of(
     fewest = 1 if forcing.period is None else RETURNS
     returns = max(fewest, settling // max(1, steps))
     search = _Search(motion, forcing, step, steps, returns, progress)
-    return Equilibrium(motion, forcing, search.root(), step, steps)
+    if forcing.period is None or (near is not None and near.shape != motion.initial.shape):
+        near = None  # at rest, neutral states stay where the scenario puts them
+    return Equilibrium(motion, forcing, search.root(near), step, steps)
 
 
 def _engine(scenario: Scenario, steps: int) -> EngineName:
@@ -186,11 +193,11 @@ class _Search:
         self._start = step * self._timestep
         self._sides = self._signs(motion.initial)
 
-    def root(self) -> Root:
-        """The state, or an `InputError`."""
+    def root(self, near: Floats | None = None) -> Root:
+        """The state, sought near another one first, or an `InputError`."""
         tolerance = ORBIT if self._forcing.period is not None else REST
         best = None
-        for state in self._starts():
+        for state in self._starts(near):
             root = self._solve(state, tolerance)
             if root is not None and root.residual <= tolerance:
                 return root
@@ -209,9 +216,11 @@ class _Search:
             return None  # beyond a singular attitude, or with a rotor that turns backwards
         return root
 
-    def _starts(self) -> Iterator[Floats]:
+    def _starts(self, near: Floats | None) -> Iterator[Floats]:
         """States to start from: first of a rest point that no event precedes the initial one."""
         initial = self._motion.initial
+        if near is not None:
+            yield near
         at_once = self._forcing.period is None and self._step == 0
         if at_once:
             yield initial
@@ -237,7 +246,7 @@ class _Search:
                 break
             if change < least:
                 best, least = self._back(after, step * self._timestep), float(change)
-            if change < ORBIT:
+            if change < SETTLED:
                 break
         return best
 

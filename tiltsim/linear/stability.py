@@ -82,18 +82,21 @@ class Stability:
 def stability(
     scenario: Scenario | str | PathLike[str] | Mapping[str, Any],
     *,
+    near: Stability | None = None,
     progress: Callable[[int], None] = lambda _flights: None,
 ) -> Stability:
     """Poles of a scenario's rest point, or Floquet multipliers of its periodic orbit.
 
     Args:
         scenario: Anything that `tiltsim.load_scenario` takes.
+        near: Of a neighbouring scenario, whose orbit is followed to this one's.
         progress: Called with the number of periods or samples flown so far.
 
     Raises:
         InputError: If it is invalid, neither at rest nor periodic, or has no such state nearby.
     """
-    return stability_at(equilibrium_of(load_scenario(scenario), progress=progress))
+    state = None if near is None else near.equilibrium.root.state
+    return stability_at(equilibrium_of(load_scenario(scenario), near=state, progress=progress))
 
 
 def stability_at(found: Equilibrium) -> Stability:
