@@ -160,7 +160,6 @@ def is_lost(scenario, latency):
         "beyond/actuators#rotor_lag",
         "fleet/hexarotor#hover",
         "fleet/tilt_hexarotor#hover",
-        "fleet/cant_hexarotor#hover",
         "fleet/cant_quadrotor#hover",
     ],
 )
