@@ -99,23 +99,31 @@ def test_the_multipliers_are_those_of_native_flights_over_a_period(kind, plant):
     assert distance(stability_at(found).multipliers, flown) < 1e-4
 
 
-QUICK_WALK = {"gait.period": 0.05, "gait.scale": 0.5}
+SLOW_ROTORS = {
+    "vehicle.rotor_time_constant": 0.06,
+    "gait.amplitude": 0.3,
+    "controller.decoupling": "exact",
+    "controller.decoupler": "exact",
+    "controller.gains": "exact",
+    "controller.allow_unstable": True,
+}
+"""Too slow for the gains: the vehicle swings ever more."""
 
 
 @pytest.mark.parametrize(
     ("kind", "plant", "keys", "stable"),
     [
         ("trot_instant", "thesis", {}, True),
-        pytest.param("walk", "thesis", {"gait.period": 0.05}, False, marks=pytest.mark.slow),
+        pytest.param("walk", "thesis", {"gait.scale": 0.5}, True, marks=pytest.mark.slow),
         pytest.param("trot_continuous", "mujoco", {}, True, marks=pytest.mark.slow),
         pytest.param("trot_instant", "mujoco", {}, True, marks=pytest.mark.slow),
-        pytest.param("walk", "mujoco", QUICK_WALK, False, marks=pytest.mark.slow),
+        pytest.param("trot_continuous", "mujoco", SLOW_ROTORS, False, marks=pytest.mark.slow),
     ],
 )
 def test_a_disturbance_grows_or_decays_by_the_largest_multiplier(kind, plant, keys, stable):
-    """Measured over two periods, to a thousandth; the quick walks' orbits are left by a swing."""
+    """Measured to a thousandth a period, over five."""
     found = equilibrium_of(gait(kind, plant, **keys))
-    largest, growth = growth_in_flight(found, 2)
+    largest, growth = growth_in_flight(found, 5)
     assert growth == pytest.approx(largest, rel=1e-3)
     assert (largest < 1.0) == stability_at(found).stable == stable
     assert found.root.residual < 1e-9
