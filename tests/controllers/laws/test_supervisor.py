@@ -17,20 +17,18 @@ from tiltsim_controllers.gaits.plans import fixed, waypoints
 from tiltsim_controllers.gaits.plans import instant_trot as trot_instant
 from tiltsim_controllers.gaits.tilts import planned_jets, tilt_reference
 from tiltsim_controllers.laws.decouplers import exact_decoupler
-from tiltsim_controllers.laws.supervisor import (
-    BAND,
-    LAG,
-    STRATEGIES,
-    Supervisor,
-    allowed_scale,
-    margin_and_determinant,
-    supervised_derivative,
-    supervised_gait_scale,
-    supervised_tilts,
-    threshold_clearance,
-)
+from tiltsim_controllers.laws.supervisor import BAND, LAG, STRATEGIES, Supervisor
+from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
+(
+    margin_and_determinant,
+    threshold_clearance,
+    allowed_scale,
+    supervised_gait_scale,
+    supervised_tilts,
+    supervised_derivative,
+) = SUPERVISION
 VEHICLE = PRESETS["ar_drone_2"]
 RATIO = drag_ratio(VEHICLE)
 WATCH = Supervisor(min_margin=0.3, min_determinant=1.0)
@@ -68,8 +66,8 @@ def test_what_passes_is_regular_and_a_little_more_is_not(tilts, roll, pitch):
 
 
 def test_without_thresholds_everything_passes():
-    wild = (3.0, -2.0, 1.0, 2.5, 0.0, 0.0, 0.0, 0.0)
-    assert supervised_gait_scale(wild, 2.0, 1.0, Supervisor(), VEHICLE) == 1.0
+    wild = (3.0, -2.0, 1.0, 2.5)
+    assert supervised_gait_scale(wild, 2.0, 1.0, Supervisor(), RATIO) == 1.0
 
 
 def test_a_vehicle_that_leans_too_far_gets_no_tilt():
@@ -175,20 +173,20 @@ def test_the_clock_slows_down_within_the_band():
 
 @pytest.mark.parametrize("strategy", WITH_STATES)
 def test_only_the_scaling_strategy_scales(strategy):
-    planned = (1.2, -0.9, 0.7, 1.1, 0.0, 0.0, 0.0, 0.0)
+    planned = (1.2, -0.9, 0.7, 1.1)
     scaling = Supervisor(0.3, 1.0, STRATEGIES["scale"])
-    passed = supervised_gait_scale(planned, 0.2, -0.1, scaling, VEHICLE)
-    assert passed == allowed_scale(planned[:4], 0.2, -0.1, scaling, RATIO)
+    passed = supervised_gait_scale(planned, 0.2, -0.1, scaling, RATIO)
+    assert passed == allowed_scale(planned, 0.2, -0.1, scaling, RATIO)
     assert 0.0 < passed < 1.0
     other = scaling._replace(strategy=STRATEGIES[strategy])
-    assert supervised_gait_scale(planned, 0.2, -0.1, other, VEHICLE) == 1.0
+    assert supervised_gait_scale(planned, 0.2, -0.1, other, RATIO) == 1.0
 
 
 @pytest.mark.parametrize("threshold", ["min_margin", "min_determinant"])
 def test_one_threshold_is_enough_to_scale(threshold):
-    planned = (1.2, -0.9, 0.7, 1.1, 0.0, 0.0, 0.0, 0.0)
+    planned = (1.2, -0.9, 0.7, 1.1)
     single = Supervisor(**{threshold: 1.0})
-    assert supervised_gait_scale(planned, 0.2, -0.1, single, VEHICLE) < 1.0
+    assert supervised_gait_scale(planned, 0.2, -0.1, single, RATIO) < 1.0
 
 
 @pytest.mark.parametrize("left", [1e-4, 1e-3])

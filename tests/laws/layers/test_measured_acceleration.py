@@ -23,15 +23,15 @@ from tests.laws.layers.test_on_equations import (
 )
 from tests.simulation.test_batch import three_ways
 from tiltsim.engines.callback import control_callback
+from tiltsim.equations.actuator_level import actuator_plant
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
-from tiltsim.laws.layers.measured_acceleration import plant_angular_acceleration
+from tiltsim.laws.layers.measured_acceleration import plant_angular_acceleration_of
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.plants.factory import make_plant
 from tiltsim.resources import shipped_folder
-from tiltsim_controllers.analysis.rotor_reaction import reaction_gains
+from tiltsim.scenario.time_steps import _reaction_gains
 from tiltsim_controllers.analysis.statics import hover_rotor_speeds
-from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS
 from tiltsim_controllers.vehicle.parameters import SPIN
 
 MEASURED = {"controller": {"angular_acceleration": "measured"}}
@@ -54,13 +54,14 @@ def test_it_is_the_acceleration_that_mujoco_integrates(changes):
     plant = make_plant(assemble(scenario(*changes, HEAVY, MEASURED)))
     loop, parameters = plant._loop, plant._setup.parameters
     _, wrench = read_actuators(loop.dynamics)
+    acceleration_of = plant_angular_acceleration_of(loop.dynamics)
     data, largest = plant.data, 0.0
     for _ in range(20):
         plant.advance(3)
         with control_callback(plant.callback):
             mujoco.mj_forward(plant.model, data)
         state, ctrl = (data.qpos.tolist(), data.qvel.tolist()), data.ctrl.tolist()
-        measured = plant_angular_acceleration(*state, ctrl, wrench(ctrl), parameters.layer)
+        measured = acceleration_of(*state, ctrl, wrench(ctrl), parameters.layer)
         np.testing.assert_allclose(measured, data.qacc[3:6], rtol=1e-9, atol=1e-9)
         largest = max(largest, *np.abs(measured))
     assert largest > 5.0
@@ -73,19 +74,19 @@ def test_it_is_the_acceleration_that_the_equations_integrate():
     plant.advance(60)
     first = 1 + len(plant._held)
     state, setup = plant.state[first:].tolist(), assembly.setup
-    equations = loop.equations
-    inputs = equations.inputs(plant.time, state, setup.parameters, setup.knots)
-    rates = equations.rates(plant.time, state, inputs, setup.parameters, setup.knots, (0.0,) * 3)
-    seen = []
-
-    def watch(qpos, qvel, ctrl, wrench, motion):
-        seen.append(plant_angular_acceleration(qpos, qvel, ctrl, wrench, motion))
-        return seen[-1]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tiltsim.laws.layers.measured_acceleration.plant_angular_acceleration", watch)
-        equations.inputs(plant.time, state, setup.parameters, setup.knots)
-    np.testing.assert_allclose(seen[-1], rates[15:18], rtol=1e-12)
+    inputs = loop.equations.inputs(plant.time, state, setup.parameters, setup.knots)
+    rates = loop.equations.rates(
+        plant.time, state, inputs, setup.parameters, setup.knots, (0.0,) * 3
+    )
+    body, (layer, inner) = actuator_plant(loop.dynamics), setup.parameters.inner[1:]
+    qpos, qvel, act = body.qpos(state), body.qvel(state), state[body.motion :]
+    unmeasured = loop.within.within
+    ctrl = unmeasured.sampling.controls(
+        plant.time, qpos, (*qvel, 0.0, 0.0, 0.0), act, inner, setup.knots
+    )
+    loads = read_actuators(unmeasured.dynamics)[1](ctrl)
+    seen = plant_angular_acceleration_of(loop.dynamics)(qpos, qvel, ctrl, loads, layer)
+    np.testing.assert_allclose(seen, rates[15:18], rtol=1e-12)
 
 
 def test_on_the_ideal_thesis_plant_it_is_the_model_s():
@@ -167,10 +168,7 @@ def poles_of_hover(desired):
 
 
 def gains_of_reaction(desired):
-    controller, vehicle = desired.controller, desired.vehicle
-    tilts, form = np.array([desired.gait.angles]), DECOUPLINGS[controller.decoupling]
-    gains = controller.resolve_gains()
-    return reaction_gains(tilts, gains, vehicle.resolve(), vehicle.rotor_inertia, form)[0]
+    return _reaction_gains(desired, desired.controller)[0]
 
 
 @pytest.mark.parametrize("form", [{}, EXACT], ids=["published", "exact"])
