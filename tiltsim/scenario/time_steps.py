@@ -112,12 +112,14 @@ def _reaction_gains(scenario: ScenarioTables, controller: GaitFollowingControlle
     assumed, limits = scenario.vehicle.resolve(), (-np.inf, np.inf)
     gait = scenario.gait.plan(assumed)
     angles, dimension, norm = gait.angles(gait.sample_times()), 1, "speed"
+    found: list[Values | None]
     if isinstance(assumed, Multirotor):
         assert isinstance(controller, AttitudeForceController)
         dimension, norm = controller.resolve_force(assumed, gait).dimension, controller.norm
         table, inertia = assumed.table, np.reshape(assumed.inertia, (3, 3))
         found = [hover_speeds(assumed, (*row,), limits, dimension) for row in angles.tolist()]
     else:
+        assert isinstance(assumed, Vehicle)
         table, inertia = cross_table(assumed, tilting=True), np.diag(assumed.moments)
         found = [hover_rotor_speeds((*row,), assumed) for row in angles.tolist()]
     return reaction_gains(
@@ -166,7 +168,7 @@ def _check_supervisor(scenario: ScenarioTables) -> None:
     supervisor = scenario.controller.supervision
     if supervisor is None:
         return
-    supervisor.resolve(scenario.vehicle.resolve())
+    supervisor.resolve(scenario.any_rotorcraft.resolve())
     longest = MAX_HELD_STEP * LAG
     step, strategy = scenario.simulation.control_timestep, supervisor.strategy
     if strategy != "scale" and step >= longest:

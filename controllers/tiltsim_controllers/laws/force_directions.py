@@ -108,6 +108,19 @@ def combination_of(length: int) -> Callable[..., Values]:
 
 
 @cache
+def share_of(length: int) -> Callable[..., float]:
+    """Scalar code of the share of a row that lies along a unit row: ``(row, unit)``; 0 of none."""
+    dot = vectors_of(length).dot
+
+    @scalar
+    def share(row: Values, unit: Values) -> float:
+        square = dot(row, row)
+        return dot(row, unit) / sqrt(square) if square > 0.0 else 0.0
+
+    return share
+
+
+@cache
 def factors_of(length: int, dimension: int, forward: bool = False) -> Callable[..., Factors]:
     """Orthogonal factors of the decoupling matrix: scalar code ``(rows, pushes, up) -> Factors``.
 

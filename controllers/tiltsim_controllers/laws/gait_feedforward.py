@@ -120,9 +120,8 @@ def _planned_force(
     planned = tilt_reference(clock, gait, knots)
     scale = _gait_scale(planned[:4], roll, pitch, supervisor, ratio, knots)
     tilts = anticipated_tilts(clock, gait, knots, parameters.anticipation)
-    return torque_free_force_jet(
-        _supervised_tilts(tilts, scale, supervisor_motion, supervisor, ratio), ratio
-    )
+    a1, a2, a3, a4 = _supervised_tilts(tilts, scale, supervisor_motion, supervisor, ratio)
+    return torque_free_force_jet((a1, a2, a3, a4), ratio)
 
 
 # --- steps of the control law ------------------------------------------------------------------

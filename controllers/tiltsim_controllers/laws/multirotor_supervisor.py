@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tiltsim_controllers.laws.force_directions import combination_of, factors_of
+from tiltsim_controllers.laws.force_directions import combination_of, factors_of, share_of
 from tiltsim_controllers.laws.supervisor import UNTILTED, Supervision, supervision_of
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import vectors_of
@@ -45,7 +45,7 @@ def untilted_volume(table: Sequence[float]) -> float:
     sizes = np.linalg.norm(torque, axis=-1).max(), np.linalg.norm(force[2])
     rows = np.vstack([torque / sizes[0], force[2] / sizes[1]])
     volume = float(np.prod(np.linalg.svd(rows, compute_uv=False)))
-    return volume * sizes[0] ** 3 * sizes[1] if volume > 1e-6 else 0.0
+    return float(volume * sizes[0] ** 3 * sizes[1]) if volume > 1e-6 else 0.0
 
 
 def watched(table: Sequence[float], rotors: int, side: Triple) -> Watched:
@@ -64,7 +64,11 @@ def multirotor_supervision_of(layout: Layout, dimension: int, forward: bool = Fa
     cosines, sines, effect, _, _ = effectiveness_of(layout)
     length = len(layout)
     factors_of_rows = factors_of(length, dimension, forward)
-    dot, combination = vectors_of(length).dot, combination_of(length)
+    dot, combination, share_of_row = (
+        vectors_of(length).dot,
+        combination_of(length),
+        share_of(length),
+    )
 
     @scalar
     def margin_of(up: Triple, direction: Triple) -> float:
@@ -88,7 +92,7 @@ def multirotor_supervision_of(layout: Layout, dimension: int, forward: bool = Fa
         size = dot(rows[3], units[0]) * dot(rows[4], units[1]) * dot(rows[5], units[2])
         size *= vehicle.per_volume * sqrt(dot(lift, lift))
         for k in range(dimension):
-            size *= dot(lifts[k], units[3 + k]) / sqrt(dot(lifts[k], lifts[k]))
+            size *= share_of_row(lifts[k], units[3 + k])
         if not size > 0.0:
             return 0.0, 0.0
         margin = margin_of(up, direction)

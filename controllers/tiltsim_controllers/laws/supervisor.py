@@ -217,10 +217,10 @@ def _scales_of(
 
 def _tilts_of(tilts: int, way_back: WayBack) -> Callable[..., Jets]:
     moved_back = way_back.tilts
-    on_clock = componentwise(
+    on_clock: Callable[..., Jets] = componentwise(
         "on_clock", "planned, motion", "clock(planned#, motion)", tilts, clock=_on_clock
     )
-    scaled = componentwise(
+    scaled: Callable[..., Jets] = componentwise(
         "scaled_jets", "scale, planned", "scaled(scale, planned#)", tilts, scaled=jet_scaled
     )
 

@@ -30,7 +30,14 @@ NEAR: Final = 0.05
 def margin_and_determinant(
     tilts: Quad, up: Triple, drag_ratio: float, knots: Vector = NO_KNOTS
 ) -> tuple[float, float]:
-    """Singularity margin (rad) and determinant of ``tilts`` (rad); ``up`` is `world_up_in_body`."""
+    """Singularity margin (rad) and determinant.
+
+    Args:
+        tilts: rad
+        up: `world_up_in_body`
+        drag_ratio: ``r = K_m / (L K_f)``
+        knots: without use here
+    """
     trig = sines_and_cosines(tilts[0], tilts[1], tilts[2], tilts[3])
     nx, ny, nz = torque_free_force(trig, torque_entries(trig, drag_ratio), drag_ratio)
     along = nx * up[0] + ny * up[1] + nz * up[2]
