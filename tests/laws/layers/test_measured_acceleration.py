@@ -72,7 +72,7 @@ SIX = {"simulation": {"timestep": 0.002, "engine": "python", "duration": 0.2}}
         (TILTROTOR, TROT, SPINNING, HEAVY),
         (*EVERYTHING, HEAVY),
         (*EVERYTHING, HEAVY_ROTORS, HEAVY),
-        (SIX, HEAVY_POD, SPINNING, STORM, LATE, SENSORS, SLOW, WEAK, MASS),
+        (SIX, HEAVY_POD, SPINNING, STORM, SLOW, WEAK, MASS),
     ],
 )
 def test_it_is_the_acceleration_that_mujoco_integrates(changes, tmp_path):
